@@ -13,7 +13,7 @@ from feti_homog.analysis.result import Result
 from feti_homog.analysis.result_fields import Fields
 from feti_homog.analysis.result_records import CellInfo, Checks, FibreInfo, SolverInfo
 from feti_homog.case.case import Case
-from feti_homog.fibres.ellipses import Ellipses
+from feti_homog.fibres.outlines.ellipses import Ellipses
 from feti_homog.homogenization.domain_partition import CellSummary
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.parallel.mpi_errors import on_root

@@ -11,8 +11,9 @@ import numpy as np
 from feti_homog.case.cell_section import Cell
 from feti_homog.case.fibre_table import FibreTable, read_table, table_of
 from feti_homog.case.section_values import MESH_SUFFIXES
-from feti_homog.case.table_shapes import check_hollow, with_polygons, with_shapes
+from feti_homog.case.table_shapes import check_shapes
 from feti_homog.errors import CaseError
+from feti_homog.fibres.outlines.shapes import given_shapes
 from feti_homog.schema.wording import toml_value
 
 SUFFIXES = {"mesh": MESH_SUFFIXES, "table": (".csv",)}
@@ -76,14 +77,15 @@ def _with_table(cell: Cell, faults: list[str]) -> Cell:
     except CaseError as error:
         faults += [f"[cell] {fault}" for fault in error.faults]
         return cell
-    if cell.coating is not None and table.coating is not None:
+    if cell.coating is not None and "coating" in table.given:
         faults.append(f"[cell] coating = {cell.coating:g}: {table.name} has a column of it; give one")
     elif cell.coating is not None:
-        table = replace(table, coating=np.where(table.is_void, 0.0, cell.coating))
-    table = with_shapes(with_polygons(table, cell.window, faults), faults)
-    check_hollow(table, faults)
-    if table.polygons is not None and cell.tip_size is not None:
-        faults.append(f"[cell] tip_size = {cell.tip_size:g}: {table.name} has polygons, and with them no nodes at tips")
+        coating = np.where(table.is_void, 0.0, cell.coating)
+        table = replace(table, columns={**table.columns, "coating": coating})
+    check_shapes(table, faults)
+    for shape in [] if cell.tip_size is None else given_shapes(table.columns, has_tips=False):
+        words = f"{table.name} has {shape.name}, and with them no nodes at tips"
+        faults.append(f"[cell] tip_size = {cell.tip_size:g}: {words}")
     width, height = (_size(name, getattr(cell, name), table, faults) for name in ("width", "height"))
     return replace(cell, table=replace(table, width=width, height=height))
 

@@ -241,9 +241,8 @@ class Cell:
     @property
     def has_voids(self) -> bool:
         """Whether there are voids, as far as is known before a user's mesh is read."""
-        hollow = None if self.table is None else self.table.inner_radius
-        listed = self.table is not None and bool(self.table.is_void.any())
-        return bool(self.voids) or listed or (hollow is not None and bool(hollow.any()))
+        table = self.table
+        return bool(self.voids) or (table is not None and bool(table.is_void.any() or table.inner_radius.any()))
 
     @property
     def has_own_mesh(self) -> bool:

@@ -88,7 +88,7 @@ def coarsest(cell: Cell) -> float:
     cell, in two digits."""
     if cell.table is not None:
         assert cell.table.width is not None and cell.table.height is not None
-        fibres, height = len(cell.table.radius), cell.table.height / cell.table.width
+        fibres, height = len(cell.table.row), cell.table.height / cell.table.width
     else:
         fibres = FIBRES_OF.get(cell.geometry) or sum(fibre_counts(cell).values())
         height = math.sqrt(3.0) if cell.geometry == "hexagonal" else 1.0

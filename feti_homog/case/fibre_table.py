@@ -5,22 +5,23 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from feti_homog.case.phase_names import VOID
-from feti_homog.case.rounded_polygons import RoundedPolygons
-from feti_homog.case.section_values import FIBRE_CELLS
+from feti_homog.case.section_values import FIBRE_CELLS, NUMBERS
 from feti_homog.errors import CaseError
+from feti_homog.fibres.outlines.outlines import Columns, Outlines
+from feti_homog.fibres.outlines.shapes import REPLACING, outlines_of
 from feti_homog.schema.values import is_number
 from feti_homog.schema.wording import suggestion, toml_value
 from feti_homog.typing import Bool, Float, Int
 
-NUMBERS = ("x", "y", "radius", "coating", "a", "b", "angle", "inner_radius", "sides", "corner")
-COLUMNS = (*NUMBERS[:3], "phase", *NUMBERS[3:])
+COLUMNS = (*list(NUMBERS)[:3], "phase", *list(NUMBERS)[3:])
 SIZES = ("width", "height", "left", "bottom")
 """What comment lines may say of the cell: its size, and the coordinates of its lower left corner."""
 OF_FIBRES = ("coating", "inner_radius")
@@ -37,40 +38,46 @@ class FibreTable:
     Attributes:
         name: of the file or list, for faults.
         row: (N,) line of the file, counted from 1, or place in the list: what faults call the fibre.
-        x, y: (N,) centres.
-        radius: (N,); NaN where the table gives semi-axes instead.
+        columns: (N,) numbers of all NUMBERS, and which of them the table has.
         phase: N names, "fibre" where the table gives none, "void" of voids.
-        coating: (N,) thickness / radius, 0 where a cell is empty; None without that column, like what follows.
-        sides, corner: (N,) of rounded polygons; NaN where a cell is empty.
-        inner_radius: (N,) of the void within hollow fibres, 0 of others.
-        a, b, angle: (N,) semi-axes, and the angle in degrees from x to a, of ellipses; NaN where a cell is empty.
         width, height: of the cell; None if the table does not say.
         left, bottom: coordinates of its lower left corner; None if the table does not say.
     """
 
     name: str
     row: Int
-    x: Float
-    y: Float
-    radius: Float
+    columns: Columns
+    given: frozenset[str]
     phase: tuple[str, ...]
-    coating: Float | None
-    a: Float | None
-    b: Float | None
-    angle: Float | None
-    inner_radius: Float | None
-    sides: Float | None
-    corner: Float | None
     width: float | None
     height: float | None
     left: float | None
     bottom: float | None
-    polygons: RoundedPolygons | None = None
+
+    @cached_property
+    def outlines(self) -> Outlines:
+        """(N,) without coatings, in the unit of the table; of tables without faults."""
+        return outlines_of(self.columns)
+
+    @property
+    def radius(self) -> Float:
+        """(N,) of discs, and of discs of the same area as other outlines."""
+        return self.outlines.radii
+
+    @property
+    def coating(self) -> Float:
+        """(N,) thickness of coatings / radius, 0 without one."""
+        return self.columns["coating"]
+
+    @property
+    def inner_radius(self) -> Float:
+        """(N,) of the void within hollow fibres, 0 of others."""
+        return self.columns["inner_radius"]
 
     @property
     def centres(self) -> Float:
         """(N, 2)."""
-        return np.column_stack([self.x, self.y])
+        return np.column_stack([self.columns["x"], self.columns["y"]])
 
     @property
     def is_void(self) -> Bool:
@@ -81,16 +88,13 @@ class FibreTable:
     def solid(self) -> FibreTable:
         """The table without its voids."""
         kept = np.flatnonzero(~self.is_void)
-        columns = {each.name: getattr(self, each.name) for each in fields(self)}
-        arrays: dict[str, Any] = {
-            name: c[kept] for name, c in columns.items() if isinstance(c, np.ndarray | RoundedPolygons)
-        }
-        return replace(self, phase=tuple(self.phase[k] for k in kept.tolist()), **arrays)
+        columns = {name: values[kept] for name, values in self.columns.items()}
+        return replace(self, row=self.row[kept], columns=columns, phase=tuple(self.phase[k] for k in kept.tolist()))
 
     @property
     def outer_radius(self) -> Float:
         """(N,) with the coating."""
-        return self.radius if self.coating is None else self.radius * (1 + self.coating)
+        return np.asarray(self.radius * (1 + self.coating))
 
 
 def read_table(path: Path) -> FibreTable:
@@ -201,9 +205,10 @@ def _check_names(names: list[str], row: int, faults: _Faults) -> None:
 
 
 def _missing(names: set[str]) -> list[str]:
-    """Columns that a table with these lacks: x, y, and the radius or both semi-axes."""
-    size = [name for name in ("a", "b") if name not in names] if names & {"a", "b"} else ["radius"]
-    return [name for name in ("x", "y") if name not in names] + ([] if "radius" in names else size)
+    """Columns that a table with these lacks: x, y, and the radius or the sizes of a shape, which stand in its place."""
+    instead = [sizes for sizes in REPLACING if names & set(sizes)]
+    sizes = [] if "radius" in names else instead[0] if instead else ("radius",)
+    return [name for name in ("x", "y", *sizes) if name not in names]
 
 
 def _split(
@@ -233,27 +238,38 @@ def _table(
     if not rows and not faults.lines:
         faults.lines.append(f"{name}: no fibres; expected a row for each")
     faults.throw()
-    nothing = dict.fromkeys(("coating", "angle", "inner_radius", "sides", "corner"), 0.0)
-
-    def column(key: str) -> Float:
-        return np.array([cells.get(key, nothing.get(key, math.nan)) for cells in rows.values()], float)
-
-    columns: dict[str, Any] = {key: column(key) if key in names else None for key in NUMBERS[3:]}
-    columns |= {size: sizes.get(size) for size in SIZES}
-    phase = tuple(cells.get("phase", "fibre") for cells in rows.values())
-    columns |= dict(zip(NUMBERS[:3], map(column, NUMBERS[:3]), strict=True))
-    return FibreTable(name=name, row=np.fromiter(rows, np.intp), phase=phase, **columns)
+    columns = {
+        key: np.array([cells.get(key, column.empty) for cells in rows.values()], float)
+        for key, column in NUMBERS.items()
+    }
+    return FibreTable(
+        name=name,
+        row=np.fromiter(rows, np.intp),
+        columns=columns,
+        given=frozenset(names),
+        phase=tuple(cells.get("phase", "fibre") for cells in rows.values()),
+        width=sizes.get("width"),
+        height=sizes.get("height"),
+        left=sizes.get("left"),
+        bottom=sizes.get("bottom"),
+    )
 
 
 def _cell_faults(cells: Mapping[str, Any]) -> Iterator[str]:
     """What is wrong with the cells of one row."""
-    for key in ("x", "y", *([] if {"a", "b"} <= cells.keys() else ["radius"])):
+    has_size = any(set(sizes) <= cells.keys() for sizes in REPLACING)
+    for key in ("x", "y", *([] if has_size else ["radius"])):
         if key not in cells:
             yield f"{key}: no value; expected a number"
     for key in NUMBERS:
         complaint = FIBRE_CELLS[key].complaint(cells.get(key, 1.0))
         if complaint:
             yield f"{key} = {toml_value(cells[key])}: {complaint}"
+    yield from _phase_faults(cells)
+
+
+def _phase_faults(cells: Mapping[str, Any]) -> Iterator[str]:
+    """Faults of the phase of one row."""
     phase = cells.get("phase", "fibre")
     if phase == VOID:
         yield from (f"{key} = {toml_value(cells[key])}: a void has none" for key in OF_FIBRES if cells.get(key))

@@ -8,8 +8,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from feti_homog.case.fibre_table import FibreTable, read_table
-from feti_homog.case.table_shapes import BOTH_SIZES, equal_area_radii, have_both_sizes
 from feti_homog.errors import CaseError
+from feti_homog.fibres.outlines.shapes import BOTH_SIZES, have_both_sizes
 from feti_homog.microstructure.fibre_pattern import FibrePattern
 from feti_homog.typing import Bool
 
@@ -34,10 +34,10 @@ def read_window(path: Path, size: tuple[float, float] | None = None) -> FibrePat
             f'{table.name}: the size of the window is not known; expected a line such as "# width = 120, height = 80"'
         )
     centres = table.centres - [table.left or 0.0, table.bottom or 0.0]
-    radii = equal_area_radii(table)
+    radii = table.radius
     outside = ~np.all((centres >= 0) & (centres <= [width, height]), axis=1)
     faults = [
-        *_faults(table, have_both_sizes(table), BOTH_SIZES),
+        *_faults(table, have_both_sizes(table.columns), BOTH_SIZES),
         *_faults(table, outside, f"its centre is outside of the window of {width:g} x {height:g}"),
     ]
     if not faults:

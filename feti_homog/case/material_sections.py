@@ -56,7 +56,7 @@ def coating_faults(cell: Cell, materials: Mapping[str, object]) -> list[str]:
         return []
     has_coatings = cell.coating is not None
     if cell.table is not None:
-        has_coatings = cell.table.coating is not None and bool((cell.table.coating > 0).any())
+        has_coatings = bool((cell.table.coating > 0).any())
     if has_coatings and COATING not in materials:
         return [f"[material.{COATING}]: missing section; [cell] has coatings"]
     if not has_coatings and COATING in materials:

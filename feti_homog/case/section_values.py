@@ -9,6 +9,8 @@ from itertools import pairwise
 from typing import Any
 
 from feti_homog.case.phase_names import FIBRE_PHASE
+from feti_homog.fibres.outlines.outlines import Column
+from feti_homog.fibres.outlines.shapes import SHAPES
 from feti_homog.schema.values import (
     SMALLEST,
     ValueType,
@@ -60,11 +62,17 @@ def _positive_or_inf(what: str) -> ValueType:
     )
 
 
-FIBRE_CELLS: Mapping[str, ValueType] = (
-    dict.fromkeys(("x", "y", "angle"), real())
-    | dict.fromkeys(("radius", "a", "b"), real(above=0.0))
-    | dict.fromkeys(("coating", "inner_radius", "sides", "corner"), real(least=0.0))
-)
+# Of an empty cell, and the bounds, of the columns that are numbers.
+NUMBERS = {
+    "x": Column(math.nan),
+    "y": Column(math.nan),
+    "radius": Column(math.nan, above=0.0),
+    "coating": Column(0.0, least=0.0),
+    "inner_radius": Column(0.0, least=0.0),
+} | {name: column for shape in SHAPES for name, column in shape.columns.items()}
+FIBRE_CELLS: Mapping[str, ValueType] = {
+    name: real(least=column.least, above=column.above) for name, column in NUMBERS.items()
+}
 """The numbers of a fibre in a table."""
 
 TABLE_FILE = file_name("the name of a .csv file", ".csv")

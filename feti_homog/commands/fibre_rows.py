@@ -33,13 +33,9 @@ def table(source: Path) -> str:
         columns["angle"] = _words(np.where(is_round, np.nan, ellipses.angles))
     if fibres.coatings.any():
         columns["coating"] = _words(fibres.coatings / fibres.radii)
-    if fibres.polygons is not None:
-        own = fibres.polygons.sides > 0
-        columns["radius"] = _words(np.where(own, fibres.polygons.circumradius, np.where(is_round, a, np.nan)))
-        columns["sides"] = [str(sides) for sides in fibres.polygons.sides.tolist()]
-        columns["corner"] = _words(fibres.polygons.corner)
-        turns = np.where(own, fibres.polygons.angle, np.where(is_round, np.nan, ellipses.angles))
-        columns["angle"] = _words(turns)
+    for name, values in fibres.others.items():
+        before = columns.get(name, [""] * len(is_round))
+        columns[name] = [new or old for old, new in zip(before, _words(values), strict=True)]
     if fibres.cores.any():
         columns["inner_radius"] = _words(fibres.cores)
     rows = map(",".join, zip(*columns.values(), strict=True))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +12,10 @@ import numpy as np
 from feti_homog.analysis import stored_result
 from feti_homog.case import case as cases
 from feti_homog.case.cell_section import Cell
-from feti_homog.case.rounded_polygons import RoundedPolygons
 from feti_homog.errors import CaseError
-from feti_homog.fibres import periodic_table
 from feti_homog.fibres.arrange import arrange
-from feti_homog.fibres.ellipses import Ellipses
+from feti_homog.fibres.outlines.ellipses import Ellipses
+from feti_homog.fibres.outlines.shapes import columns_without_tips, elliptic
 from feti_homog.mesh.fibre_centres import fibre_circles
 from feti_homog.mesh.fibre_numbers import coating_thickness, fibre_numbers
 from feti_homog.mesh.fibre_shapes import fibre_frames
@@ -37,8 +36,9 @@ class ListedFibres:
         phases: their names; those of cells that the program meshes have the voids behind them.
         coatings: (N,) thickness of the coatings, 0 without one.
         cores: (N,) radii of the voids within hollow fibres, 0 of others.
-        polygons: those that some are, else None; they have discs of the same areas among the ellipses.
         lacks_voids: whether there are voids that are not listed.
+        others: columns (N,) of fibres that are neither discs nor ellipses, and have discs of the same areas among the
+            ellipses; NaN of others.
     """
 
     size: Float
@@ -47,7 +47,7 @@ class ListedFibres:
     coatings: Float
     cores: Float
     lacks_voids: bool
-    polygons: RoundedPolygons | None = None
+    others: Mapping[str, Float] = field(default_factory=dict)
 
     @property
     def radii(self) -> Float:
@@ -96,7 +96,7 @@ def _of_records(fibres: Sequence[Mapping[str, Any]], cell: Mapping[str, Any]) ->
 
 
 def _is_complete(document: Mapping[str, Any]) -> bool:
-    """Whether a result tells all outlines: it does not those of voids, nor of polygons."""
+    """Whether a result has all outlines: it lacks those of voids, and those that are neither round nor elliptic."""
     are_known = all("radius" in fibre or "semi_axes" in fibre for fibre in document["fibres"])
     return are_known and not document["cell"].get("porosity")
 
@@ -106,22 +106,15 @@ def _of_cell(cell: Cell) -> ListedFibres:
         return _of_mesh(cell)
     arrangement = arrange(cell)
     scale = arrangement_scale(cell, arrangement)
-    size = scale * np.array([arrangement.width, arrangement.height])
-    hollow = arrangement.is_hollow
-    discs = Ellipses.round(np.column_stack([arrangement.centres, arrangement.radii]))
-    inner = discs if arrangement.frames is None else arrangement.ellipses
-    own = inner.grown(np.where(hollow, arrangement.thickness, 0.0))
+    size = scale * arrangement.size
+    own = elliptic(arrangement.outlines).grown(arrangement.walls)
     ellipses = Ellipses(scale * own.centres % size, scale * own.frames)
-    coatings = scale * np.where(hollow, 0.0, arrangement.thickness)
-    cores = scale * np.where(hollow, arrangement.radii, 0.0)
-    return ListedFibres(size, ellipses, arrangement.phase, coatings, cores, False, _polygons(cell))
-
-
-def _polygons(cell: Cell) -> RoundedPolygons | None:
-    """Those of a table, in the order of its fibres."""
-    if cell.table is None or cell.table.polygons is None:
-        return None
-    return cell.table.polygons[periodic_table.fibres(cell.table, cell.window)[0]]
+    coatings = scale * (arrangement.coating - arrangement.walls)
+    cores = scale * np.where(arrangement.walls > 0, arrangement.radii, 0.0)
+    others = {}
+    if cell.table is not None:
+        others = columns_without_tips({name: of[arrangement.row] for name, of in cell.table.columns.items()})
+    return ListedFibres(size, ellipses, arrangement.phase, coatings, cores, lacks_voids=False, others=others)
 
 
 def _of_mesh(cell: Cell) -> ListedFibres:

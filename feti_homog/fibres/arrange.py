@@ -13,8 +13,8 @@ from feti_homog.case.phase_names import FIBRE, VOID
 from feti_homog.errors import MeshError
 from feti_homog.fibres.arrangement import Arrangement, clear_shift
 from feti_homog.fibres.matched_arrangement import matched_arrangement
+from feti_homog.fibres.periodic_table import table_arrangement
 from feti_homog.fibres.relaxation import MAX_STEPS, relax
-from feti_homog.fibres.table_arrangement import table_arrangement
 from feti_homog.typing import Float
 
 # Quenched random packings jam near this area fraction.
@@ -26,7 +26,7 @@ def arrange(cell: Cell) -> Arrangement:
 
     square: one disc in the middle of a 1 x 1 cell. hexagonal: 1 x sqrt(3), a disc in the middle and one at
     the corner. random: discs in a 1 x 1 cell, see `random_arrangement`, with
-    `cell.match` see `matched_arrangement`. table: see `table_arrangement.table_arrangement`.
+    `cell.match` see `matched_arrangement`. table: see `periodic_table.table_arrangement`.
 
     Raises:
         MeshError: discs of that fraction touch, no arrangement is found, or the table is faulty.
@@ -61,12 +61,7 @@ def _lattice(cell: Cell, height: float, centres: Float, limit: float) -> Arrange
         )
     radius = sqrt(fraction * height / (pi * len(centres)))
     radii = np.full(len(centres), radius)
-    return Arrangement(1.0, height, centres, radii, (FIBRE,) * len(centres), coating=_coating(cell, radii))
-
-
-def _coating(cell: Cell, radii: Float) -> Float | None:
-    """Thickness (N,) of the coatings that a case gives all its fibres, of these radii."""
-    return None if cell.coating is None else cell.coating * radii
+    return Arrangement.of_discs(1.0, height, centres, radii, (FIBRE,) * len(centres), (cell.coating or 0.0) * radii)
 
 
 def random_arrangement(cell: Cell, max_steps: int = MAX_STEPS, max_attempts: int | None = None) -> Arrangement:
@@ -89,10 +84,10 @@ def random_arrangement(cell: Cell, max_steps: int = MAX_STEPS, max_attempts: int
     for name, share in cell.fractions.items():
         own = np.array(phase) == name
         radii[own] *= sqrt(share / (pi * fsum(radii[own] ** 2)))
-    coating, clear = _coating(cell, radii), gap * fsum(radii) / fibres
+    coating, clear = (cell.coating or 0.0) * radii, gap * fsum(radii) / fibres
     radii, coating = _with_voids(cell, radii, coating)
     count, phase = len(radii), phase + (VOID,) * (len(radii) - fibres)
-    grown = (radii if coating is None else radii + coating) + clear
+    grown = radii + coating + clear
     ask = f"[cell] {fractions_in_words(cell)} with min_gap = {gap:g} and fibres = {fibres}"
     of_all = "fraction of fibres and voids" if cell.voids else "fibre fraction"
     if pi * np.sum(grown**2) > 0.9:
@@ -104,7 +99,7 @@ def random_arrangement(cell: Cell, max_steps: int = MAX_STEPS, max_attempts: int
     for _ in range(attempts):
         centres, reached = relax(generator.random((count, 2)), grown, max_steps)
         if reached >= 1:
-            return clear_shift(Arrangement(1.0, 1.0, centres, radii, phase, coating=coating))
+            return clear_shift(Arrangement.of_discs(1.0, 1.0, centres, radii, phase, coating))
         best = max(best, reached)
     raise MeshError(
         f"{ask}: no arrangement found in {attempts} attempts; they reached a fibre fraction of at most about "
@@ -112,13 +107,13 @@ def random_arrangement(cell: Cell, max_steps: int = MAX_STEPS, max_attempts: int
     )
 
 
-def _with_voids(cell: Cell, radii: Float, coating: Float | None) -> tuple[Float, Float | None]:
+def _with_voids(cell: Cell, radii: Float, coating: Float) -> tuple[Float, Float]:
     """Radii and coatings of the fibres, and after them those of the voids."""
     count = void_count(cell, float(radii.mean()))
     if not count:
         return radii, coating
     own = np.full(count, sqrt((cell.voids or 0.0) / (pi * count)))
-    return np.append(radii, own), None if coating is None else np.append(coating, np.zeros(count))
+    return np.append(radii, own), np.append(coating, np.zeros(count))
 
 
 ARRANGEMENTS: dict[str, Callable[[Cell], Arrangement]] = {

@@ -3,40 +3,74 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
 
 import numpy as np
 
 from feti_homog.case.phase_names import COATING, MATRIX, VOID
-from feti_homog.fibres.clear_sides import farthest, widest_gaps
-from feti_homog.fibres.convex_shapes import ConvexShapes
-from feti_homog.fibres.ellipses import Ellipses
+from feti_homog.fibres.outlines.discs import Discs
+from feti_homog.fibres.outlines.outlines import Outlines
 from feti_homog.typing import Bool, Float, Int
+
+# Decimals in which lengths / width of the cell are compared.
+DECIMALS = 10
+# Gaps between tangents that are looked at, and the narrowest of them / the widest.
+MOST_GAPS, NARROWEST = 4, 0.7
 
 
 @dataclass(frozen=True)
 class Arrangement:
-    """Discs with `centres` (N, 2) and `radii` (N,) on the torus of periods `width`, `height`; none touch.
+    """N fibres and voids on the torus of periods `width`, `height`; none touch.
 
-    `phase` (N,) names what each disc is made of. Fibre k + 1 of a case is disc k; voids come after the fibres.
-    `mesh_order` (N,) are the discs in the order in which they are meshed, on which a few triangles depend; that of the
-    discs if it is None. `coating` (N,) is the thickness of the ring around each disc, 0 where there is none; None if no
-    disc has one. Rings do not touch. `frames` (N, 2, 2) are those of `Ellipses` where some discs are ellipses, with
-    `radii` of the same areas; else None. A coating makes the semi-axes of an ellipse longer by its thickness. Discs
-    that are `hollow` (N,), if any, are voids within rings of the fibre's own phase. `shapes` are the outlines where
-    some are polygons, with `radii` of the same areas; else None.
+    Attributes:
+        outlines: of them, without the rings around some. Fibre k + 1 of a case is number k; voids come after fibres.
+        phase: (N,) what each is made of.
+        coating: (N,) thickness of the ring around each outline, 0 without one.
+        is_hollow: (N,) which are voids within rings of the fibre's own phase; other rings are coatings.
+        mesh_order: (N,) in which order they are meshed, on which a few triangles depend; that of the numbers if None.
+        row: (N,) the place of each in its table; None without one.
+        remarks: how the cell differs from its table, a line each.
     """
 
     width: float
     height: float
-    centres: Float
-    radii: Float
+    outlines: Outlines
     phase: tuple[str, ...]
+    coating: Float
+    is_hollow: Bool
     mesh_order: Int | None = None
-    coating: Float | None = None
-    frames: Float | None = None
-    hollow: Bool | None = None
-    shapes: ConvexShapes | None = None
+    row: Int | None = None
+    remarks: tuple[str, ...] = ()
+
+    @classmethod
+    def of_discs(
+        cls,
+        width: float,
+        height: float,
+        centres: Float,
+        radii: Float,
+        phase: tuple[str, ...],
+        coating: Float | float = 0.0,
+    ) -> Arrangement:
+        """Discs of centres (N, 2) and radii (N,) with coatings (N,)."""
+        thickness = np.broadcast_to(coating, radii.shape).astype(float)
+        return cls(width, height, Discs(centres, radii), phase, thickness, np.zeros(len(radii), bool))
+
+    @property
+    def centres(self) -> Float:
+        """(N, 2)."""
+        return self.outlines.centres
+
+    @cached_property
+    def radii(self) -> Float:
+        """(N,) of discs of the same area, without rings."""
+        return self.outlines.radii
+
+    @property
+    def size(self) -> Float:
+        """(2,) width and height."""
+        return np.array([self.width, self.height])
 
     @property
     def phases(self) -> tuple[str, ...]:
@@ -46,19 +80,24 @@ class Arrangement:
 
     @property
     def is_void(self) -> Bool:
-        """(N,) which discs are voids."""
+        """(N,) which are voids."""
         return np.array([name == VOID for name in self.phase], bool)
 
     @property
-    def is_hollow(self) -> Bool:
-        """(N,) which discs are hollow fibres."""
-        return np.zeros(len(self.radii), bool) if self.hollow is None else self.hollow
+    def voids(self) -> int:
+        """Number of voids, those within hollow fibres too."""
+        return int(self.is_void.sum() + self.is_hollow.sum())
 
     @property
     def within(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """What is in each disc (N,), and what is in the ring around it if there is one (N,)."""
+        """What is in each outline (N,), and what is in the ring around it if there is one (N,)."""
         both = list(zip(self.phase, self.is_hollow.tolist(), strict=True))
         return tuple(VOID if void else own for own, void in both), tuple(own if void else COATING for own, void in both)
+
+    def precedence(self, fibre: Int, is_ring: Bool) -> Int:
+        """(k,) numbers from 1 of what is in the rings, or within them, of fibres (k,); those of coatings come behind
+        all fibres, in the same order."""
+        return np.asarray(fibre + 1 + np.where(is_ring & ~self.is_hollow[fibre], self.fibres, 0))
 
     @property
     def fibres(self) -> int:
@@ -66,61 +105,67 @@ class Arrangement:
         return int((~self.is_void).sum())
 
     @property
-    def thickness(self) -> Float:
-        """(N,) of the coatings."""
-        return np.zeros(len(self.radii)) if self.coating is None else self.coating
+    def walls(self) -> Float:
+        """(N,) thickness of hollow fibres, 0 of others."""
+        return np.where(self.is_hollow, self.coating, 0.0)
 
     @property
     def coated(self) -> Bool:
-        """(N,) which discs have a coating."""
-        return np.asarray(self.thickness > 0)
+        """(N,) which have a ring."""
+        return np.asarray(self.coating > 0)
+
+    @cached_property
+    def outer(self) -> Outlines:
+        """(N,) the outlines with their rings."""
+        return self.outlines.grown(self.coating)
 
     @property
     def outer_radii(self) -> Float:
-        """(N,) of the discs with their coatings."""
-        return np.asarray(self.radii + self.thickness)
+        """(N,) of discs with their rings."""
+        return np.asarray(self.radii + self.coating)
 
-    @property
-    def circles(self) -> tuple[Float, Int]:
-        """Radii (k,) of all circles, and their discs (k,): for each disc the outer circle, then that within a coating.
-
-        The circles come in the order of the discs.
-        """
-        disc = np.concatenate([np.arange(len(self.radii)), np.flatnonzero(self.coated)])
-        radii = np.concatenate([self.outer_radii, self.radii[self.coated]])
-        order = np.argsort(disc, kind="stable")
-        return radii[order], disc[order]
-
-    @property
-    def ellipses(self) -> Ellipses:
-        """The discs and ellipses."""
-        assert self.frames is not None
-        return Ellipses(self.centres, self.frames)
+    @cached_property
+    def shells(self) -> tuple[Outlines, Int]:
+        """All outlines (k,), and whose they are (k,): of each fibre the outer one, then that within a ring."""
+        coated = np.flatnonzero(self.coated)
+        own = np.concatenate([np.arange(len(self.phase)), coated])
+        order = np.argsort(own, kind="stable")
+        return self.outer.joined(self.outlines[coated])[order], own[order]
 
 
 def clearance(arrangement: Arrangement) -> float:
-    """Distance of the sides of the cell from the nearest position at which they would touch a disc."""
-    size = np.array([arrangement.width, arrangement.height])
-    radii, disc = arrangement.circles
-    reach = radii[:, None] * [1, -1]
-    touching = np.concatenate([(arrangement.centres[disc, axis, None] + reach) / size[axis] for axis in (0, 1)])
+    """Distance of the sides of the cell from the nearest position at which they would touch an outline."""
+    touching = _tangents(arrangement) / arrangement.size[:, None]
     return float(np.abs((touching - np.round(touching)) * arrangement.width).min())
 
 
 def clear_shift(arrangement: Arrangement) -> Arrangement:
-    """The arrangement moved as a whole such that the cell's boundary stays clear of tangency with the discs.
+    """The arrangement moved as a whole such that the cell's boundary stays clear of tangency with the outlines.
 
     Along each axis the candidates are the middles of the widest gaps between the positions where a boundary
-    line touches a disc; among their combinations the one whose corner is farthest from a circle is taken.
+    line touches an outline; among their combinations the one whose corner is farthest from an outline is taken. In
+    cells with a symmetry, as any two discs have, several are as good but for rounding: it is the first of them, so that
+    the choice does not hang on the unit of length.
     """
-    size = (arrangement.width, arrangement.height)
-    radii, disc = arrangement.circles
-    centres = arrangement.centres[disc]
-    lines = []
-    for axis in (0, 1):
-        touching = np.concatenate([centres[:, axis] - radii, centres[:, axis] + radii])
-        lines.append(widest_gaps(touching, size[axis]))
-    corners, half = np.array(list(product(*lines))), np.array(size) / 2
-    offset = (centres - corners[:, None] + half) % size - half
-    distance = np.abs(np.linalg.norm(offset, axis=2) - radii).min(axis=1)
-    return replace(arrangement, centres=(arrangement.centres - farthest(corners, distance)) % size)
+    size, lines = arrangement.size, []
+    for axis, places in enumerate(_tangents(arrangement).transpose(1, 0, 2)):
+        lines.append(_widest_gaps(places.ravel(), size[axis]))
+    corners, half, outlines = np.array(list(product(*lines))), size / 2, arrangement.shells[0]
+    offset = (outlines.centres - corners[:, None] + half) % size - half
+    corner = corners[np.argmax(outlines.distances(-offset).min(axis=1).round(DECIMALS))]
+    return replace(arrangement, outlines=arrangement.outlines.at((arrangement.centres - corner) % size))
+
+
+def _widest_gaps(touching: Float, period: float) -> Float:
+    """Middles (m,) of the widest gaps between positions (k,) at which a side touches something."""
+    places = np.sort(touching % period)
+    gaps = np.diff(places, append=places[0] + period)
+    wide = np.argsort(-gaps.round(DECIMALS), kind="stable")[:MOST_GAPS]
+    wide = wide[gaps[wide] > NARROWEST * gaps[wide[0]]]
+    return np.asarray(places[wide] + gaps[wide] / 2)
+
+
+def _tangents(arrangement: Arrangement) -> Float:
+    """(k, 2, 2) where lines across each axis touch each outline, on either side."""
+    outlines, _ = arrangement.shells
+    return np.asarray(outlines.centres[:, :, None] + outlines.extents * [-1.0, 1.0])

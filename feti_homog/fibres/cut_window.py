@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import nnls
 
 from feti_homog.errors import MeshError
-from feti_homog.fibres.ellipses import Ellipses, directions, gaps
+from feti_homog.fibres.outlines.outlines import Outlines
 from feti_homog.fibres.torus_pairs import neighbours
 from feti_homog.typing import Float, Int
 
@@ -51,27 +51,27 @@ class _Pairs:
         return np.asarray(centres[self.second] - centres[self.first] + self.shift * size)
 
 
-# The directions n (k, 2) that part pairs (k,), (k,) at these vectors (k, 2) from first to second best, and how far both
-# reach along them (k,).
+# As `Outlines.parting`.
 Parting = Callable[[Int, Int, Float], tuple[Float, Float]]
 
 
-def moves(centres: Float, radii: Float, size: Float, frames: Float | None = None) -> Float:
-    """(N, 2) the moves d of discs on the torus of periods `size` (2,) that part those which overlap across its border.
+def moves(outlines: Outlines, size: Float) -> Float:
+    """(N, 2) the moves d of outlines on the torus of periods `size` (2,) that part those which overlap across its
+    border.
 
     They are a local minimum of sum |d|^2 such that no gap across the border is less than the smallest one within, and
     no gap within becomes less than that, all relative to the sum of the radii and that gap between LEAST_GAP and
     MOST_GAP. Each step solves it with the distances |v| >= r replaced by n . v >= r, n the present directions; since
     n . v <= |v|, its solution keeps the distances.
 
-    With `frames` (N, 2, 2) they are those of `Ellipses` with radii of the same areas: n is the direction of the largest
-    n . v - r, where r = |F_1^T n| + |F_2^T n|, and that is the gap.
+    Of others than discs, with radii of the same areas, n is the direction of the largest n . v - r, where r is the
+    reach of both along n, and that is the gap.
 
     Raises:
         MeshError: there is no room.
     """
-    parting = _of_discs(radii) if frames is None else _of_ellipses(Ellipses(centres, frames))
-    reach = 3 * (radii.max() if frames is None else Ellipses(centres, frames).longest.max())
+    centres, radii, parting = outlines.centres, outlines.radii, outlines.parting
+    reach = 3 * float(outlines.longest.max())
     moved, gap = np.zeros_like(centres), _gap_within(centres, radii, size, reach, parting)
     nobody = np.zeros(0, np.intp)
     pairs = _Pairs(nobody, nobody, np.zeros((0, 2)), np.zeros(0))
@@ -85,26 +85,6 @@ def moves(centres: Float, radii: Float, size: Float, frames: Float | None = None
         if len(short.first) == 0 and np.abs(moved - before).max() < SETTLED * radii.mean():
             return moved
     raise MeshError("there is no room to move them apart")
-
-
-def _of_discs(radii: Float) -> Parting:
-    """That of discs: along the vectors, or along x where that is 0."""
-
-    def parting(first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
-        length = np.linalg.norm(vector, axis=1)
-        normal = np.where(length[:, None] > 0, vector / np.maximum(length, 1e-300)[:, None], [1.0, 0.0])
-        return normal, radii[first] + radii[second]
-
-    return parting
-
-
-def _of_ellipses(ellipses: Ellipses) -> Parting:
-    def parting(first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
-        one, other = ellipses[first], ellipses[second]
-        normal = directions(gaps(one, Ellipses(one.centres + vector, other.frames))[1])
-        return normal, one.support(normal) + other.support(normal)
-
-    return parting
 
 
 def _gap_within(centres: Float, radii: Float, size: Float, reach: float, parting: Parting) -> float:

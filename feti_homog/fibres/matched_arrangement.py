@@ -44,8 +44,8 @@ def matched_arrangement(cell: Cell) -> Arrangement:
         keys = f"[cell] fibre_fraction = {fraction:g} with min_gap = {cell.min_gap:g} and fibres = {count}"
         raise MeshError(f"{keys}: no arrangement found; lower one of them, or change seed") from error
     centres = matched(start, gap, wanted_distances(window, count) / grown, generator)
-    coating = None if cell.coating is None else cell.coating * radii
-    return clear_shift(Arrangement(1.0, 1.0, centres, radii, (FIBRE,) * count, coating=coating))
+    coating = (cell.coating or 0.0) * radii
+    return clear_shift(Arrangement.of_discs(1.0, 1.0, centres, radii, (FIBRE,) * count, coating))
 
 
 def distance_of(window: FibrePattern, width: float, height: float, centres: Float, radii: Float) -> float:

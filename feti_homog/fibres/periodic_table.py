@@ -1,63 +1,115 @@
-"""A table of fibres on the torus: images that are one fibre, and what is wrong with it."""
+"""The arrangement of the fibres of a table: images that are one fibre, and what is wrong with it."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import replace
 
 import numpy as np
 
+from feti_homog.case.cell_section import Cell
+from feti_homog.case.fibre_table import FibreTable
 from feti_homog.errors import MeshError
 from feti_homog.fibres import cut_window
-from feti_homog.fibres.convex_shapes import ConvexShapes, shape_gaps
-from feti_homog.fibres.ellipses import Ellipses, gaps
-from feti_homog.fibres.elliptic_table import ellipses_of, with_coatings
-from feti_homog.fibres.shaped_table import shapes_of
+from feti_homog.fibres.arrangement import Arrangement, clear_shift, clearance
+from feti_homog.fibres.outlines.discs import Discs
+from feti_homog.fibres.outlines.outlines import Outlines, directions
+from feti_homog.fibres.outlines.shapes import SHAPES, with_parts
 from feti_homog.fibres.torus_pairs import neighbours
 from feti_homog.typing import Bool, Float, Int
 
-if TYPE_CHECKING:
-    from feti_homog.case.fibre_table import FibreTable
-
 # Relative to the radius: rows nearer than this, or a period apart to this, are one fibre.
 SAME_FIBRE = 0.01
+# Directions in which outlines are compared.
+COMPARED = directions(np.linspace(0.0, 2 * np.pi, 24, endpoint=False))
 # Gap / mean radius of two fibres below which they touch: elements between them would be too many.
 LEAST_GAP = 1e-4
 # Radius / width of the cell above which positions on a circle differ by more than rounding.
 SMALLEST_RADIUS = 1e-6
 # Thickness / radius of the thinnest and of the thickest coating.
 COATINGS = 0.01, 1.0
-# Faults that are told one by one.
-MAX_FAULTS = 30
+# Distance of the sides of a cell from tangency with an outline / mean radius, below which elements there are needles.
+LEAST_CLEARANCE = 1e-3
+# Decimals of coordinates / width of the cell of tables that may have any origin and unit, and of height / width: gmsh
+# may put other elements beside ellipses and polygons where the last digit of a length is another.
+TABLE_DECIMALS, HEIGHT_DECIMALS = 10, 12
+MAX_FAULTS = 30  # that are told one by one
+MOST_LISTED = 30  # moved fibres that are listed one by one
 
 
-def fibres(table: FibreTable, window: str) -> tuple[Int, Float, Float, float]:
-    """The rows (k,) that are fibres, then voids, their centres (k, 2), radii (k,), and the height; all / width of the
-    cell.
+def table_arrangement(cell: Cell) -> Arrangement:
+    """The fibres of the case's table, in the order of its rows, then its voids; periodic images are one, the first of
+    them. In a window that is cut out of something larger, fibres that overlap across its border are moved apart.
 
-    In a periodic window, rows a period apart are images of one fibre, the first of them. In one that is cut out of
-    something larger, fibres that overlap across its border are moved apart.
+    A table that says where its cell begins keeps that place, if the sides are clear of tangency with its discs; the
+    table of a cell gives the mesh of that cell. Else all is shifted (`clear_shift`), rounded and meshed in the order of
+    the coordinates, so that tables that differ by a shift, by the order of rows or by units have one mesh. Outlines
+    that are not round are rounded wherever they are.
 
     Raises:
         MeshError: rows lie outside, come twice, overlap or touch; a line for each fault.
     """
-    kept, centres, moved, size = _on_torus(table, window)
+    table = cell.table
+    assert table is not None and table.width is not None
+    kept, centres, moves, size = on_torus(table, cell.window)
     order = np.argsort(table.is_void[kept], kind="stable")
-    kept, places = kept[order], (centres + moved)[order]
-    return kept, places % size / size[0], table.radius[kept] / size[0], float(size[1] / size[0])
+    rows, places = kept[order], (centres + moves)[order]
+    fibres = replace(
+        _nested(table, rows, places % size / size[0], float(size[1] / size[0])),
+        remarks=_moved_fibres(table, kept, moves) if cell.window == "cut" else (),
+    )
+    shifted = clear_shift(fibres)
+    is_placed = table.left is not None and table.bottom is not None
+    clear = min(LEAST_CLEARANCE * float(fibres.radii.mean()), clearance(shifted))
+    if not is_placed or clearance(fibres) < clear:
+        return _in_mesh_order(_rounded(shifted))
+    return fibres if isinstance(fibres.outlines, Discs) else _rounded(fibres)
 
 
-def moved_rows(table: FibreTable, window: str) -> tuple[Int, Float]:
-    """The rows (m,) whose fibres a cut window moves, numbered as the table has them, and how far (m,). Raises as
-    `fibres`.
+def _nested(table: FibreTable, rows: Int, centres: Float, height: float) -> Arrangement:
+    """The rows (k,) about these centres / width of the cell: a ring around each outline that has a coating or that is a
+    void in a hollow fibre."""
+    assert table.width is not None
+    outlines, core = table.outlines[rows].per(table.width).at(centres), table.inner_radius[rows] / table.width
+    radii, is_hollow = outlines.radii, core > 0
+    coating = np.where(is_hollow, radii - core, table.coating[rows] * radii)
+    inner = with_parts(outlines, [(is_hollow, Discs(centres[is_hollow], core[is_hollow]))])
+    phase = tuple(table.phase[row] for row in rows)
+    return Arrangement(1.0, height, inner, phase, coating, is_hollow, row=rows)
+
+
+def _rounded(arrangement: Arrangement) -> Arrangement:
+    """The arrangement with coordinates of TABLE_DECIMALS, 0 on either side, in a cell of HEIGHT_DECIMALS."""
+    outlines, least = arrangement.outlines.rounded(TABLE_DECIMALS), 10.0**-TABLE_DECIMALS
+    return replace(
+        arrangement,
+        height=round(arrangement.height, HEIGHT_DECIMALS),
+        outlines=outlines.at(np.where(outlines.centres >= arrangement.size - least, 0.0, outlines.centres)),
+        coating=arrangement.coating.round(TABLE_DECIMALS),
+    )
+
+
+def _in_mesh_order(arrangement: Arrangement) -> Arrangement:
+    """The arrangement meshed in the order of its coordinates."""
+    x, y = arrangement.centres.T
+    return replace(arrangement, mesh_order=np.lexsort((y, x)))
+
+
+def _moved_fibres(table: FibreTable, kept: Int, moves: Float) -> tuple[str, ...]:
+    """List the rows of `kept` (k,) that a cut window moves by these vectors (k, 2), and how far, in one line."""
+    distance = np.linalg.norm(moves, axis=1)
+    moved = distance > cut_window.TOLERANCE * table.radius.mean()
+    rows, far = table.row[kept[moved]], distance[moved]
+    listed = [f"row {rows[k]} by {far[k]:.3g}" for k in np.argsort(-far, kind="stable")[:MOST_LISTED]]
+    rest = [f"and {len(rows) - MOST_LISTED} others by less"] if len(rows) > MOST_LISTED else []
+    which = f": {', '.join(listed + rest)}" if listed else ""
+    return (f'[cell] window = "cut": {len(rows)} of {len(table.row)} fibres moved{which}',)
+
+
+def on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]:
+    """Rows (k,) that are fibres, where they are (k, 2) in the cell, their moves (k, 2), and the cell's size (2,).
+
+    Raises as `table_arrangement`.
     """
-    kept, _, moved, _ = _on_torus(table, window)
-    distance = np.linalg.norm(moved, axis=1)
-    far = distance > cut_window.TOLERANCE * table.radius.mean()
-    return table.row[kept[far]], distance[far]
-
-
-def _on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]:
-    """Rows (k,) that are fibres, where they are (k, 2) in the cell, their moves (k, 2), and the cell's size (2,)."""
     assert table.width is not None and table.height is not None
     size = np.array([table.width, table.height])
     centres = table.centres - _corner(table)
@@ -67,24 +119,15 @@ def _on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]
     _raise_faults(table, faults)
     kept = np.flatnonzero(first)
     centres = centres[kept]
-    ellipses = None if table.a is None else with_coatings(table, kept, centres)
-    shapes = None if table.polygons is None else _shapes(table, kept, centres, ellipses)
-    _raise_faults(table, _contacts(table, kept, centres, size, is_cut, ellipses, shapes))
+    outer = table.outlines[kept].at(centres).grown((table.coating * table.radius)[kept])
+    _raise_faults(table, _contacts(table, kept, outer, size, is_cut))
     if not is_cut:
         return kept, centres, np.zeros_like(centres), size
-    frames = None if ellipses is None else ellipses.frames
     try:
-        return kept, centres, cut_window.moves(centres, table.outer_radius[kept], size, frames), size
+        return kept, centres, cut_window.moves(outer, size), size
     except MeshError as error:
         words = "fibres overlap across the border, and " + str(error)
         raise MeshError(f'[cell] {table.name}: window = "cut": {words}; leave some of them out') from error
-
-
-def _shapes(table: FibreTable, kept: Int, centres: Float, ellipses: Ellipses | None) -> ConvexShapes:
-    """Those of the rows `kept` (k,), with their coatings."""
-    assert table.polygons is not None
-    discs = Ellipses.round(np.column_stack([centres, table.outer_radius[kept]]))
-    return shapes_of(discs if ellipses is None else ellipses, table.polygons[kept])
 
 
 def _corner(table: FibreTable) -> Float:
@@ -105,12 +148,8 @@ def _outside(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> li
 
     Discs reach into a periodic cell; of a cut window the centres are within.
     """
-    radius, faults, called = table.radius, [], ["radius"] * len(table.row)
-    if table.polygons is not None:
-        radius = np.where(table.polygons.sides > 0, table.polygons.circumradius, radius)
-    if table.a is not None and table.b is not None:
-        radius = np.maximum(radius, np.maximum(table.a, table.b))
-        called = np.where(table.a == table.b, "radius", np.where(table.a > table.b, "a", "b")).tolist()
+    radius, called = _largest_sizes(table)
+    faults = []
     for axis, (name, width) in enumerate(zip(("width", "height"), size.tolist(), strict=True)):
         over = np.maximum(-centres[:, axis], centres[:, axis] - width)
         reach = radius if (table.left, table.bottom)[axis] is not None else np.full_like(radius, 2 * radius.max())
@@ -123,10 +162,15 @@ def _outside(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> li
     return faults + _unlikely_coatings(table)
 
 
+def _largest_sizes(table: FibreTable) -> tuple[Float, list[str]]:
+    """The largest of the lengths (N,) that rows give, and their columns."""
+    names = ["radius", *(name for shape in SHAPES for name in shape.sizes if name != "radius")]
+    given = np.nan_to_num(np.stack([table.columns[name] for name in names]))
+    return given.max(axis=0), [names[k] for k in given.argmax(axis=0).tolist()]
+
+
 def _unlikely_coatings(table: FibreTable) -> list[str]:
     """Faults of coatings that are too thin or too thick to be meshed."""
-    if table.coating is None:
-        return []
     least, most = COATINGS
     bad = np.flatnonzero((table.coating > 0) & ((table.coating < least) | (table.coating > most)))
     expected = f"expected 0, or from {least:g} to {most:g}"
@@ -141,11 +185,9 @@ def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool
     near = (first != second) & (apart < SAME_FIBRE * smaller)
     first, second, vector = first[near], second[near], vector[near]
     in_place = np.linalg.norm(centres[second] - centres[first] - vector, axis=1) < SAME_FIBRE * radius[first]
-    both = np.column_stack([radius, table.outer_radius])
+    reach = table.outlines.support(np.broadcast_to(COMPARED, (len(radius), *COMPARED.shape)))
+    both = np.column_stack([reach, radius, table.outer_radius])
     alike = (np.abs(both[second] - both[first]) < SAME_FIBRE * smaller[near, None]).all(axis=1)
-    if table.a is not None:
-        squares = ellipses_of(table, np.arange(len(radius)), centres).squares
-        alike &= np.abs(squares[second] - squares[first]).max(axis=(1, 2)) < SAME_FIBRE * smaller[near] ** 2
     faults = []
     for i, j, is_here, is_alike in zip(first.tolist(), second.tolist(), in_place, alike, strict=True):
         rows = f"rows {table.row[i]} and {table.row[j]}"
@@ -158,28 +200,14 @@ def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool
     return is_first, faults
 
 
-def _contacts(
-    table: FibreTable,
-    kept: Int,
-    centres: Float,
-    size: Float,
-    is_cut: bool,
-    ellipses: Ellipses | None,
-    shapes: ConvexShapes | None,
-) -> list[str]:
-    """Faults of fibres, the rows `kept` (k,) and their ellipses or shapes if some are not round, that overlap or touch;
-    of a cut window only of those that do within."""
-    radius = table.outer_radius[kept]
-    longest = radius.max() if ellipses is None else ellipses.longest.max()
-    longest = longest if shapes is None else float(shapes.extents.max())
-    first, second, vector = neighbours(centres, size, 2 * longest * (1 + LEAST_GAP))
+def _contacts(table: FibreTable, kept: Int, outer: Outlines, size: Float, is_cut: bool) -> list[str]:
+    """Faults of fibres, the rows `kept` (k,) with their coatings, that overlap or touch; of a cut window only of those
+    that do within."""
+    centres, radius = outer.centres, table.outer_radius[kept]
+    first, second, vector = neighbours(centres, size, 2 * outer.longest.max() * (1 + LEAST_GAP))
     together = radius[first] + radius[second]
-    if shapes is not None:
-        gap = shape_gaps(shapes[first], shapes[second].at(centres[first] + vector))
-    elif ellipses is None:
-        gap = np.linalg.norm(vector, axis=1) - together
-    else:
-        gap, _ = gaps(ellipses[first], Ellipses(centres[first] + vector, ellipses.frames[second]))
+    normal, reach = outer.parting(first, second, vector)
+    gap = (normal * vector).sum(axis=1) - reach
     across = np.linalg.norm(centres[second] - centres[first] - vector, axis=1) > SAME_FIBRE * radius[first]
     bad = np.flatnonzero((gap < LEAST_GAP * together / 2) & ~(across & is_cut))
     faults = []

@@ -5,23 +5,21 @@ from __future__ import annotations
 import numpy as np
 
 from feti_homog.case.case import Case
-from feti_homog.fibres import periodic_table
 from feti_homog.homogenization import bonds
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.submesh import pinned_class
 from feti_homog.typing import Int
 
-MOST_LISTED = 30  # moved fibres that are listed one by one
 SAME_FRACTION = 0.01  # of a matched table and its cell, relative
 
 
 def mesh_remarks(case: Case, torus: Torus, pairs: Int) -> tuple[str, ...]:
-    """List unused curves of a user's mesh, an [interface] without an effect, and nodes that never part, a line each.
+    """List what the mesh remarks, an [interface] without an effect, and nodes that never part, a line each.
 
     `pairs` as in `share_entities`.
     """
     return (
-        *torus.mesh.unused_curves,
+        *torus.mesh.remarks,
         *_bonding(case, len(torus.mesh.debonded_edges) > 0),
         *((*_held_nodes(torus, pairs), *_pinned_bond(torus)) if case.interfaces else ()),
     )
@@ -73,15 +71,6 @@ def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles
 
 
 def table_remarks(case: Case) -> tuple[str, ...]:
-    """List how the cell differs from its table of fibres, a line each.
-
-    Raises:
-        CaseError, MeshError: the table is faulty.
-    """
-    return (*_moved_fibres(case), *_other_fraction(case))
-
-
-def _other_fraction(case: Case) -> tuple[str, ...]:
     """Mention a fibre fraction other than that of the table that the cell matches."""
     cell = case.cell
     if cell.match is None or cell.matched is None or cell.fibre_fraction is None:
@@ -93,15 +82,3 @@ def _other_fraction(case: Case) -> tuple[str, ...]:
         f"[cell] fibre_fraction = {cell.fibre_fraction:g}: {cell.match.name} has {fraction:.4g}; neighbours are as far "
         "away as there, in diameters",
     )
-
-
-def _moved_fibres(case: Case) -> tuple[str, ...]:
-    """List the rows of a table that its cut window moves, and how far, in one line."""
-    table = case.cell.table
-    if table is None or case.cell.window != "cut":
-        return ()
-    rows, far = periodic_table.moved_rows(table, case.cell.window)
-    listed = [f"row {rows[k]} by {far[k]:.3g}" for k in np.argsort(-far, kind="stable")[:MOST_LISTED]]
-    rest = [f"and {len(rows) - MOST_LISTED} others by less"] if len(rows) > MOST_LISTED else []
-    which = f": {', '.join(listed + rest)}" if listed else ""
-    return (f'[cell] window = "cut": {len(rows)} of {len(table.radius)} fibres moved{which}',)

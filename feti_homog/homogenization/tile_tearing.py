@@ -193,8 +193,8 @@ def summary_of(case: Case, noded: NodedCell, subdomains: int, triangles: int) ->
     own = regions.constituent[:-1]
     solid = np.flatnonzero(own >= 0)
     circle = solid[np.unique(own[solid], return_index=True)[1]]
-    disc, hollow = lines.disc[circle], arrangement.is_hollow
-    is_fibre = ~lines.is_coating[circle] | hollow[disc]
+    disc = lines.disc[circle]
+    is_fibre = arrangement.precedence(disc, lines.is_coating[circle]) == disc + 1
     centres = in_cell(noded.scale * arrangement.centres[disc], np.array([regions.width, regions.height]))
     radii = regions.ellipses.circles[circle, 2]
     ends = noded.scale * lines.points[arc_edges(lines.curves)[0]]
@@ -215,7 +215,11 @@ def summary_of(case: Case, noded: NodedCell, subdomains: int, triangles: int) ->
         frames=np.concatenate([np.full((1, 2, 2), np.nan), regions.ellipses.frames[circle]]),
         moved_tips=({},) * len(case.interfaces),
         snapped=0.0,
-        voids=int(arrangement.is_void.sum() + hollow.sum()),
+        voids=arrangement.voids,
         match_distance=match_distance(case, regions.width, regions.height, centres[is_fibre], radii[is_fibre]),
-        remarks=(*table_remarks(case), *subdomain_remarks(case, len(regions.phase), subdomains, triangles)),
+        remarks=(
+            *arrangement.remarks,
+            *table_remarks(case),
+            *subdomain_remarks(case, len(regions.phase), subdomains, triangles),
+        ),
     )

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from feti_homog.fibres.ellipses import Ellipses
+from feti_homog.fibres.outlines.ellipses import Ellipses
 from feti_homog.mesh.periodic_sides import paired_sides
 from feti_homog.typing import Float, Int, Int32
 
@@ -29,7 +29,7 @@ class CoarseMesh:
         arc_circle: (a,) that one.
         debonded_edges: (d, 2) edges between a fibre and the matrix that are debonded from the start.
         snapped: how far a node of a user's mesh was moved to make sides match, at most.
-        unused_curves: the curves of a user's mesh that nothing uses, in a line.
+        remarks: how a cell differs from its table, and the curves of a user's mesh that nothing uses, a line each.
         centres: (fibres, 2) of fibres whose precedence is their number from 1, where they are known, else None; those
             of their coatings are behind them in the same order.
     """
@@ -47,7 +47,7 @@ class CoarseMesh:
     arc_circle: Int32
     debonded_edges: Int32
     snapped: float = 0.0
-    unused_curves: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
     centres: Float | None = None
 
     @property

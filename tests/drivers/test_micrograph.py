@@ -10,9 +10,9 @@ from matplotlib.image import imread
 from support.command_line import assert_verified
 from support.jobs import ROOT, mpirun
 from support.made_micrograph import text
+from support.moved_rows import moved_rows
 
 from feti_homog.case.fibre_table import read_table
-from feti_homog.fibres.periodic_table import moved_rows
 
 TABLE = "# width = 20, height = 16\nx,y,radius\n3,3,2.6\n9,4,2\n15,3,2.5\n4,12,3\n12,11,2.8\n18.5,12,2.4\n"
 
@@ -21,7 +21,7 @@ def test_the_table_is_that_of_the_script():
     path = ROOT / "meshes/micrograph.csv"
     assert path.read_text() == text()
     table = read_table(path)
-    rows, far = moved_rows(table, "cut")
+    rows, far = moved_rows(table)
     assert len(table.row) == 196 and 10 < len(rows) < 60 and far.max() < 1.2 * table.radius.max()
 
 

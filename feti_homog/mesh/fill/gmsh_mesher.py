@@ -9,8 +9,10 @@ from feti_homog.case.mixed_cell import fractions_in_words, mixed_width
 from feti_homog.errors import MeshError
 from feti_homog.fibres.arrange import arrange, listed_arrangement
 from feti_homog.fibres.arrangement import Arrangement
+from feti_homog.fibres.outlines.discs import Discs
+from feti_homog.fibres.outlines.ellipses import Ellipses
 from feti_homog.mesh.coarse_mesh import CoarseMesh
-from feti_homog.mesh.fill.shape_mesher import mesh_shapes
+from feti_homog.mesh.fill.shape_mesher import mesh_outlines
 from feti_homog.mesh.fill.unmeshed_cell import NO_MARKS, NodedCell, UnmeshedCell
 from feti_homog.mesh.outline import elliptic_outline
 from feti_homog.mesh.sizes.element_estimate import ElementEstimate, triangles_of_a_tip
@@ -68,11 +70,12 @@ def begin(
             f"{arrangement.radii.min():.2g}; expected at least {SMALLEST_RADIUS} of the width of the cell"
         )
     scale = arrangement_scale(cell, arrangement)
-    if arrangement.shapes is not None:
-        return mesh_shapes(arrangement, sizes, scale)
-    if arrangement.frames is not None:
-        return NodedCell.of(arrangement, elliptic_outline.outline(arrangement, sizes, marks), sizes, None, scale)
-    return UnmeshedCell.of(arrangement, sizes, marks, scale, policy)
+    if isinstance(arrangement.outlines, Discs):
+        return UnmeshedCell.of(arrangement, sizes, marks, scale, policy)
+    if isinstance(arrangement.outlines, Ellipses):
+        lines = elliptic_outline.outline(arrangement, arrangement.outlines, sizes, marks)
+        return NodedCell.of(arrangement, lines, sizes, None, scale)
+    return mesh_outlines(arrangement, sizes, scale)
 
 
 def _sizes(cell: Cell, marks: Mapping[int, Sequence[float]]) -> MeshSizes:

@@ -1,10 +1,11 @@
-"""The coarse periodic mesh of a table with polygons: gmsh cuts their outlines and fills them.
+"""The coarse periodic mesh of a cell with outlines of any convex shape: gmsh cuts them and fills them.
 
 The middle nodes of its second-order edges tell the curves, as those of users' meshes do.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
@@ -12,18 +13,20 @@ from tempfile import TemporaryDirectory
 from types import ModuleType
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from feti_homog.case.phase_names import MATRIX, VOID
 from feti_homog.fibres.arrangement import Arrangement
-from feti_homog.fibres.convex_shapes import ConvexShapes
-from feti_homog.fibres.shaped_table import outer_shapes
+from feti_homog.fibres.outlines.convex_sums import POINTS, ConvexSums
+from feti_homog.fibres.outlines.outlines import Outlines
 from feti_homog.mesh.coarse_mesh import CoarseMesh
 from feti_homog.mesh.readers.gmsh_file import triangles_of_model
 from feti_homog.mesh.readers.msh_reader import made
+from feti_homog.mesh.sizes.from_sources import MAX_GROWTH, wrap
 from feti_homog.mesh.sizes.graded_size import MeshSizes
-from feti_homog.mesh.sizes.shape_sizes import SizeAt, shape_sizes
+from feti_homog.mesh.sizes.size_field import MIN_EDGES_AROUND, PASSAGE_EDGE
 from feti_homog.mesh.tiles.filling import gmsh_session
-from feti_homog.typing import Float
+from feti_homog.typing import Float, Int
 
 # Distance from a line / size of the cell within which curves lie on it.
 ON_SIDE = 1e-6
@@ -32,18 +35,26 @@ ROUND = 1e-9
 # Cells of the grid of sizes along a side.
 FEWEST_CELLS, MOST_CELLS = 32, 1000
 
+# Edges of coatings / thickness; cosine of the angle between normals of outlines and sides that face each other.
+COATING_EDGE, FACING = 2.0, 0.9
+# Sources of sizes that are looked at for each point.
+NEAREST = 12
+# Smallest size / size of the cell.
+LEAST = 1e-5
+
 Surface = tuple[int, int]
+SizeAt = Callable[[Float], Float]
 
 
-def mesh_shapes(arrangement: Arrangement, sizes: MeshSizes, scale: float) -> CoarseMesh:
-    """As `gmsh_mesher.mesh_arrangement`, of an arrangement with `shapes`."""
+def mesh_outlines(arrangement: Arrangement, sizes: MeshSizes, scale: float) -> CoarseMesh:
+    """The mesh that `gmsh_mesher.begin` begins, of fibres with outlines of any convex shape."""
     with gmsh_session() as gmsh:
         number = _add_surfaces(gmsh, arrangement)
         _match_sides(gmsh, arrangement)
         for option in ("MeshSizeFromPoints", "MeshSizeExtendFromBoundary"):
             gmsh.option.setNumber(f"Mesh.{option}", 0)
         with TemporaryDirectory() as folder:
-            _set_sizes(gmsh, Path(folder) / "sizes", arrangement, *shape_sizes(arrangement, sizes))
+            _set_sizes(gmsh, Path(folder) / "sizes", arrangement, *_sizes_at(arrangement, sizes))
             gmsh.model.mesh.generate(2)
         gmsh.model.mesh.setOrder(2)
         own = np.array([number[tag] for _, tag in gmsh.model.getEntities(2)], np.int32)
@@ -68,9 +79,10 @@ def _add_surfaces(gmsh: ModuleType, arrangement: Arrangement) -> dict[int, int]:
     _, parts = occ.fragment([rectangle], added)
     occ.synchronize()
     number, phase = dict.fromkeys(parts[0], 0), dict.fromkeys(parts[0], MATRIX)
-    for pieces, own, is_ring in zip(parts[1:], disc, ring, strict=True):
+    numbers = arrangement.precedence(np.array(disc), np.array(ring))
+    for pieces, own, is_ring, precedence in zip(parts[1:], disc, ring, numbers, strict=True):
         inside = set(pieces) & set(number)
-        number |= dict.fromkeys(inside, _precedence(arrangement, own, is_ring))
+        number |= dict.fromkeys(inside, int(precedence))
         phase |= dict.fromkeys(inside, arrangement.within[is_ring][own])
     outside = {piece for pieces in parts for piece in pieces} - set(number)
     voids = {piece for piece, name in phase.items() if name == VOID}
@@ -81,20 +93,9 @@ def _add_surfaces(gmsh: ModuleType, arrangement: Arrangement) -> dict[int, int]:
     return {tag: own for (_, tag), own in number.items()}
 
 
-def _precedence(arrangement: Arrangement, disc: int, is_ring: bool) -> int:
-    """The number of the fibre, from 1; of coatings those behind them in the same order."""
-    return disc + 1 + arrangement.fibres * (is_ring and not arrangement.is_hollow[disc])
-
-
 def _add_outlines(gmsh: ModuleType, arrangement: Arrangement) -> tuple[list[Surface], list[int], list[bool]]:
     """Surfaces of all images that reach into the cell, their discs, and which have another within: outer ones first."""
-    size, outer, inner = (
-        np.array([arrangement.width, arrangement.height]),
-        outer_shapes(arrangement),
-        arrangement.shapes,
-    )
-    assert inner is not None
-    inner = inner.at(arrangement.centres)
+    size, outer, inner = arrangement.size, _sums(arrangement.outer), _sums(arrangement.outlines)
     order = range(len(outer)) if arrangement.mesh_order is None else arrangement.mesh_order.tolist()
     low, high = (outer.centres + sign * outer.extents[:, :, side] for side, sign in ((0, -1), (1, 1)))
     added, disc, ring = list[Surface](), list[int](), list[bool]()
@@ -109,7 +110,12 @@ def _add_outlines(gmsh: ModuleType, arrangement: Arrangement) -> tuple[list[Surf
     return added, disc, ring
 
 
-def _add_shape(gmsh: ModuleType, shapes: ConvexShapes, number: int, shift: Float) -> int:
+def _sums(outlines: Outlines) -> ConvexSums:
+    """The outlines as sums of polygons and ellipses."""
+    return ConvexSums(outlines.centres, outlines.cores, outlines.frames)
+
+
+def _add_shape(gmsh: ModuleType, shapes: ConvexSums, number: int, shift: Float) -> int:
     """The plane surface of one shape, moved."""
     occ, (x, y) = gmsh.model.occ, (shapes.centres[number] + shift).tolist()
     frame, core = shapes.frames[number], shapes.cores[number]
@@ -146,7 +152,7 @@ def _rounded_lines(occ: ModuleType, corners: Float, rounding: float) -> list[int
 
 def _match_sides(gmsh: ModuleType, arrangement: Arrangement) -> None:
     """Let the curves on the right and upper side have the nodes of those on the left and lower one."""
-    size = np.array([arrangement.width, arrangement.height])
+    size = arrangement.size
     curves = [tag for _, tag in gmsh.model.getEntities(1)]
     boxes = np.array([gmsh.model.getBoundingBox(1, tag) for tag in curves]).reshape(-1, 2, 3)[:, :, :2]
     for axis in (0, 1):
@@ -161,7 +167,7 @@ def _match_sides(gmsh: ModuleType, arrangement: Arrangement) -> None:
 
 def _set_sizes(gmsh: ModuleType, path: Path, arrangement: Arrangement, least: float, size_at: SizeAt) -> None:
     """Let gmsh interpolate the sizes at positions (n, 2), the least of which is told, on a grid, by way of a file."""
-    size = np.array([arrangement.width, arrangement.height])
+    size = arrangement.size
     counts = np.clip(np.ceil(size / least), FEWEST_CELLS, MOST_CELLS).astype(np.int32) + 1
     x, y = (np.linspace(0.0, width, count) for width, count in zip(size, counts, strict=True))
     values = size_at(np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2))
@@ -172,3 +178,45 @@ def _set_sizes(gmsh: ModuleType, path: Path, arrangement: Arrangement, least: fl
     field = gmsh.model.mesh.field.add("Structured")
     gmsh.model.mesh.field.setString(field, "FileName", str(path))
     gmsh.model.mesh.field.setAsBackgroundMesh(field)
+
+
+def _sizes_at(arrangement: Arrangement, sizes: MeshSizes) -> tuple[float, SizeAt]:
+    """The least size of elements, and the sizes at positions (n, 2): h = min_k h_k + g |x - x_k| over points x_k of all
+    outlines.
+
+    h_k is at most that of interfaces, that of the curvature, and PASSAGE_EDGE times the distance of the next outline or
+    of a side of the cell that the outline faces there.
+    """
+    size, shapes = arrangement.size, _sums(arrangement.outer)
+    places, normal, shape = shapes.boundary(POINTS)
+    rounds = np.linalg.norm(shapes.frames, axis=1).min(axis=1)
+    rounds = np.where(rounds > 0, rounds, np.inf)
+    thickness = np.where(arrangement.coated, arrangement.coating, np.inf)
+    length = np.minimum(sizes.interface, PASSAGE_EDGE * _distance_of_others(places, shape, size))
+    length = np.minimum(length, np.minimum(2 * np.pi * rounds / MIN_EDGES_AROUND, COATING_EDGE * thickness)[shape])
+    for axis in (0, 1):
+        away = np.abs(places[:, axis] - np.round(places[:, axis] / size[axis]) * size[axis])
+        faces = np.abs(normal[:, axis]) > FACING
+        length = np.where(faces, np.minimum(length, PASSAGE_EDGE * away), length)
+    length = np.maximum(length, LEAST * size.max())
+    tree, nearest = cKDTree(wrap(places, size), boxsize=size), min(NEAREST, len(places))
+
+    def at(positions: Float) -> Float:
+        distance, which = tree.query(wrap(positions, size), nearest)
+        return np.asarray(np.minimum(sizes.largest, (length[which] + MAX_GROWTH * distance).min(axis=1)))
+
+    return float(length.min()), at
+
+
+def _distance_of_others(places: Float, shape: Int, size: Float) -> Float:
+    """(n,) distances of points (n, 2) from the nearest ones of other shapes (n,) or of an image of their own."""
+    distance = np.full(len(places), np.inf)
+    steps = np.array(list(product((-1, 0, 1), repeat=2))) * size
+    for own in np.unique(shape):
+        mine = places[shape == own]
+        others = places[shape != own]
+        if len(others):
+            distance[shape == own] = cKDTree(wrap(others, size), boxsize=size).query(wrap(mine, size))[0]
+        images = np.concatenate([mine + step for step in steps if step.any()])
+        distance[shape == own] = np.minimum(distance[shape == own], cKDTree(images).query(mine)[0])
+    return distance

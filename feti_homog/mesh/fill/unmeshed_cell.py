@@ -114,7 +114,6 @@ class NodedCell:
         phase, precedence = self._within
         void = len(self.phases)
         arcs, arc_circle = arc_edges(lines.curves)
-        known = arrangement.frames is not None
         filled = CoarseMesh(
             width=scale * arrangement.width,
             height=scale * arrangement.height,
@@ -128,7 +127,8 @@ class NodedCell:
             arc_edges=arcs,
             arc_circle=arc_circle,
             debonded_edges=np.zeros((0, 2), np.int32),
-            centres=scale * arrangement.centres[: arrangement.fibres] if known else None,
+            centres=scale * arrangement.centres[: arrangement.fibres],
+            remarks=arrangement.remarks,
         )
         return _without_voids(filled, void) if np.any(phase == void) else filled
 
@@ -141,8 +141,7 @@ class NodedCell:
         within = [(in_ring if ring else in_disc)[disc] for disc, ring in zip(lines.disc, lines.is_coating, strict=True)]
         place = {name: number for number, name in enumerate((*arrangement.phases, VOID))}
         phase = np.array([place[name] for name in (*within, arrangement.phases[0])], np.int32)
-        is_coating = lines.is_coating & ~arrangement.is_hollow[lines.disc]
-        precedence = lines.disc + 1 + np.where(is_coating, arrangement.fibres, 0)
+        precedence = arrangement.precedence(lines.disc, lines.is_coating)
         return phase, np.append(precedence, 0).astype(np.int32)
 
     @cached_property

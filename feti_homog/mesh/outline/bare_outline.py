@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from feti_homog.fibres.arrangement import Arrangement
-from feti_homog.fibres.ellipses import Ellipses
+from feti_homog.fibres.outlines.ellipses import Ellipses
 from feti_homog.mesh.lines import Arcs, Segments, on_circle, on_circles
 from feti_homog.mesh.outline.bridges import Bridges, OnCircles
 from feti_homog.mesh.outline.circle_arcs import SAME_PLACE, arcs_within, vertex_angles
@@ -115,7 +115,7 @@ class BareOutline:
         `marks` maps a curve to angles in degrees, measured at its centre, that become nodes: curve k is the outer one
         of fibre k, and ~k that within its coating. The bridges are the last curves.
         """
-        size = np.array([arrangement.width, arrangement.height])
+        size = arrangement.size
         circles, disc, around = images(arrangement)
         places = [crossings(circles, axis, size) for axis in (0, 1)]
         sides = ((axis, level) for axis in (0, 1) for level in (0.0, size[1 - axis]))
@@ -182,7 +182,7 @@ def _arcs(
 
 def _caps(arrangement: Arrangement, largest: float, disc: Int, around: Int) -> Float:
     """Largest edge length (k,) on the circles of these discs (k,) with these circles around (k,)."""
-    first = np.unique(arrangement.circles[1], return_index=True)[1]
+    first = np.unique(arrangement.shells[1], return_index=True)[1]
     return np.asarray(circle_size(arrangement, largest)[first[disc] + (around != MATRIX)])
 
 
@@ -204,7 +204,7 @@ def _segments(circles: Float, bridges: Bridges, caps: Float, field: SizeField) -
 def _tips(arrangement: Arrangement, marks: Mapping[int, Sequence[float]], vertices: Float) -> Float:
     """The vertices (t, 2) that the marks have become; those of curves that are not there are none."""
     curve, angle = marked(arrangement, marks)
-    size, fibre = np.array([arrangement.width, arrangement.height]), np.where(curve < 0, ~curve, curve)
+    size, fibre = arrangement.size, np.where(curve < 0, ~curve, curve)
     radii = np.where(curve < 0, arrangement.radii[fibre], arrangement.outer_radii[fibre])
     places = on_circle(np.column_stack([arrangement.centres[fibre], radii]), angle)
     return np.asarray(vertices[cKDTree(vertices % size, boxsize=size).query(places % size)[1]])

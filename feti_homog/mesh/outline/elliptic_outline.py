@@ -11,7 +11,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from feti_homog.fibres.arrangement import Arrangement
-from feti_homog.fibres.ellipses import Ellipses, directions
+from feti_homog.fibres.outlines.ellipses import Ellipses
+from feti_homog.fibres.outlines.outlines import directions
 from feti_homog.mesh.outline.bridges import TURN
 from feti_homog.mesh.outline.circle_arcs import MERGED, SAME_PLACE, arcs_within
 from feti_homog.mesh.outline.curves import MATRIX, Curves, Numbering
@@ -26,25 +27,27 @@ from feti_homog.typing import Float, Int
 LENGTH_STEPS = 256
 
 
-def outline(arrangement: Arrangement, sizes: MeshSizes, marks: Mapping[int, Sequence[float]]) -> Outline:
-    """As `BareOutline.of`, with the nodes on its lines."""
-    size = np.array([arrangement.width, arrangement.height])
-    ellipses, fibre, around = _images(arrangement, size)
+def outline(
+    arrangement: Arrangement, inner: Ellipses, sizes: MeshSizes, marks: Mapping[int, Sequence[float]]
+) -> Outline:
+    """As `BareOutline.of`, of an arrangement whose outlines are the ellipses `inner`, with the nodes on its lines."""
+    size = arrangement.size
+    ellipses, fibre, around = _images(arrangement, inner, size)
     places = [_crossings(ellipses, axis, size) for axis in (0, 1)]
     sides = ((axis, level) for axis in (0, 1) for level in (0.0, size[1 - axis]))
     border = np.concatenate([on_side(places[axis], axis, level) for axis, level in sides])
     curve = np.where(around == MATRIX, fibre, ~fibre)
     angles, sharp = _vertex_angles(ellipses, curve, border, size, marks)
-    which, start, stop = arcs_within(len(fibre), *angles, lambda of, angle: ellipses[of].at(angle), size)
-    ends = ellipses[which].at(start)
+    which, start, stop = arcs_within(len(fibre), *angles, lambda of, angle: ellipses[of].points(angle), size)
+    ends = ellipses[which].points(start)
     away = cKDTree(border).query(ends)[0] > SAME_PLACE * size.max()
     border = np.unique(border, axis=0)
     numbering = Numbering(np.concatenate([border, ends[away]]))
     # Vertices within coatings are as far from each other as those on the ellipse around, which they face, or marked.
     sparse = (around != MATRIX) & ~np.isin(curve, list(marks))
     outer = np.concatenate([border, ends[away & ~sparse[which]]])
-    tips = _tips(arrangement, marks, numbering.vertices, size)
-    field = size_field(arrangement, sizes, outer, sharp, tips)
+    tips = _tips(arrangement, inner, marks, numbering.vertices)
+    field = size_field(arrangement, inner, sizes, outer, sharp, tips)
     find = partial(_ellipse_at, ellipses)
     curves = [side_curves(axis, places[axis], find, around, size, field, numbering, WHOLE) for axis in (0, 1)]
     arcs = _EllipticArcs.of(ellipses[which], start, stop, sizes.interface)
@@ -54,17 +57,17 @@ def outline(arrangement: Arrangement, sizes: MeshSizes, marks: Mapping[int, Sequ
     return Outline(numbering.points(), Curves.joined(curves), ellipses, fibre, around)
 
 
-def _images(arrangement: Arrangement, size: Float) -> tuple[Ellipses, Int, Int]:
+def _images(arrangement: Arrangement, own: Ellipses, size: Float) -> tuple[Ellipses, Int, Int]:
     """Periodic images that may reach into the cell, their fibres (k,), and the ellipses around them (k,).
 
     Fibre by fibre, the ellipses of each image one after the other, from without.
     """
     steps = np.array(list(product((-1, 0, 1), repeat=2)))
     order = arrangement.mesh_order
-    fibre = np.repeat(np.arange(len(arrangement.radii)) if order is None else order, len(steps))
-    shift = np.tile(steps, (len(arrangement.radii), 1)) * size
-    inner = Ellipses(arrangement.centres[fibre] + shift, arrangement.ellipses.frames[fibre])
-    outer = inner.grown(arrangement.thickness[fibre])
+    fibre = np.repeat(np.arange(len(own)) if order is None else order, len(steps))
+    shift = np.tile(steps, (len(own), 1)) * size
+    inner = own[fibre].at(own.centres[fibre] + shift)
+    outer = inner.grown(arrangement.coating[fibre])
     near = np.all((outer.centres + outer.reach > 0) & (outer.centres - outer.reach < size), axis=1)
     coated = arrangement.coated[fibre[near]]
     place = np.arange(len(coated)) + np.cumsum(coated) - coated
@@ -121,12 +124,12 @@ def _on_upright(places: Float, size: Float) -> Float:
     return np.asarray(np.abs(places[:, 0] - np.clip(np.round(places[:, 0] / size[0]), 0, 1) * size[0]) == 0)
 
 
-def _tips(arrangement: Arrangement, marks: Mapping[int, Sequence[float]], vertices: Float, size: Float) -> Float:
+def _tips(arrangement: Arrangement, inner: Ellipses, marks: Mapping[int, Sequence[float]], vertices: Float) -> Float:
     """The vertices (t, 2) that the marks have become; those of curves that are not there are none."""
     curve, angle = marked(arrangement, marks)
-    fibre = np.where(curve < 0, ~curve, curve)
-    own = arrangement.ellipses[fibre].grown(np.where(curve < 0, 0.0, arrangement.thickness[fibre]))
-    places = own.at(own.parameter(directions(angle)))
+    fibre, size = np.where(curve < 0, ~curve, curve), arrangement.size
+    own = inner[fibre].grown(np.where(curve < 0, 0.0, arrangement.coating[fibre]))
+    places = own.points(own.parameter(directions(angle)))
     return np.asarray(vertices[cKDTree(vertices % size, boxsize=size).query(places % size)[1]])
 
 
@@ -158,7 +161,7 @@ class _EllipticArcs:
         """Between parameters (a,) of ellipses (a,)."""
         share = np.linspace(0, 1, LENGTH_STEPS + 1)
         angle = start[:, None] + (stop - start)[:, None] * share
-        places = np.stack([ellipses.at(angle[:, k]) for k in range(len(share))], axis=1)
+        places = np.stack([ellipses.points(angle[:, k]) for k in range(len(share))], axis=1)
         length = np.cumsum(np.linalg.norm(np.diff(places, axis=1), axis=2), axis=1)
         way = np.column_stack([np.zeros(len(length)), length / length[:, -1:]])
         return cls(ellipses, angle, way, length[:, -1], cap)
@@ -169,7 +172,7 @@ class _EllipticArcs:
         low, high = self.way[line, after - 1], self.way[line, after]
         part = (share - low) / (high - low)
         parameter = self.angle[line, after - 1] * (1 - part) + self.angle[line, after] * part
-        return self.ellipses[line].at(parameter)
+        return self.ellipses[line].points(parameter)
 
     def caps(self, line: Int, share: Float) -> Float:
         """As in `Lines`."""

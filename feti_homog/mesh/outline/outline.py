@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 
 from feti_homog.fibres.arrangement import Arrangement
-from feti_homog.fibres.ellipses import Ellipses
+from feti_homog.fibres.outlines.ellipses import Ellipses
 from feti_homog.mesh.lines import Segments
 from feti_homog.mesh.outline.curves import MATRIX, OUTSIDE, Curves, Numbering, backwards
 from feti_homog.mesh.outline.edge_samples import EdgeSamples, Sampling
@@ -47,7 +47,7 @@ def images(arrangement: Arrangement) -> tuple[Float, Int, Int]:
 
     Fibre by fibre, the circles of each image one after the other, from without.
     """
-    size = np.array([arrangement.width, arrangement.height])
+    size = arrangement.size
     outer, fibre = _outer_images(arrangement, size)
     coated = arrangement.coated[fibre]
     inner = np.column_stack([outer[:, :2], arrangement.radii[fibre]])[coated]

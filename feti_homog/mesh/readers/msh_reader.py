@@ -9,7 +9,7 @@ import numpy as np
 
 from feti_homog.case.cell_section import Cell
 from feti_homog.errors import MeshError
-from feti_homog.fibres.ellipses import Ellipses
+from feti_homog.fibres.outlines.ellipses import Ellipses
 from feti_homog.mesh.coarse_mesh import CoarseMesh, areas, representatives
 from feti_homog.mesh.interface_edges import can_debond
 from feti_homog.mesh.periodic_sides import paired_sides
@@ -50,7 +50,7 @@ def read(path: Path, snap: float | None = None) -> CoarseMesh:
     if snap is not None:
         raw, moved = snapped(raw, snap)
     unused = tuple(f"{path.name}: {line}" for line in mesh_checks.unused_curves(raw))
-    return replace(made(raw, path.name), snapped=moved, unused_curves=unused)
+    return replace(made(raw, path.name), snapped=moved, remarks=unused)
 
 
 def made(raw: RawMesh, path: str) -> CoarseMesh:

@@ -10,7 +10,8 @@ import numpy as np
 from feti_homog.case.cell_section import FIBRES_OF, Cell
 from feti_homog.case.mixed_cell import fibre_counts
 from feti_homog.fibres.arrangement import Arrangement
-from feti_homog.fibres.ellipses import Ellipses
+from feti_homog.fibres.outlines.ellipses import Ellipses
+from feti_homog.fibres.outlines.shapes import elliptic
 from feti_homog.mesh.sizes.from_sources import MAX_GROWTH
 from feti_homog.mesh.sizes.size_field import MIN_EDGES_AROUND
 
@@ -31,25 +32,29 @@ class ElementEstimate:
         fibres: number of fibres.
         mean_radius: of the fibres, of a table of the voids too.
         height: of the cell.
-        ellipses: the fibres, if some are not round.
+        interfaces: their length.
+        ovals: the fibres that are ellipses.
     """
 
     cell: Cell
     fibres: int
     mean_radius: float
     height: float
-    ellipses: Ellipses | None = None
+    interfaces: float
+    ovals: Ellipses
 
     @classmethod
     def of(cls, cell: Cell, listed: Arrangement | None) -> ElementEstimate:
         """That of a cell, with the arrangement of its table if it has one."""
         if listed is not None:
-            ellipses = None if listed.frames is None else listed.ellipses
-            return cls(cell, listed.fibres, float(listed.radii.mean()), listed.height, ellipses)
+            ellipses, radius = elliptic(listed.outlines), float(listed.radii.mean())
+            ovals = ellipses[~ellipses.are_round]
+            length = math.fsum(ellipses.perimeters) if len(ovals) else 2 * math.pi * radius * listed.fibres
+            return cls(cell, listed.fibres, radius, listed.height, length, ovals)
         fibres = FIBRES_OF.get(cell.geometry) or sum(fibre_counts(cell).values())
         height = math.sqrt(3.0) if cell.geometry == "hexagonal" else 1.0
         radius = math.sqrt(math.fsum(cell.fractions.values()) * height / (math.pi * fibres))
-        return cls(cell, fibres, radius, height)
+        return cls(cell, fibres, radius, height, 2 * math.pi * radius * fibres, Ellipses.round(np.zeros((0, 3))))
 
     @property
     def interface_size(self) -> float:
@@ -63,15 +68,13 @@ class ElementEstimate:
 
         On both sides of interfaces of the length P there are 2 P int dx / (A (h + g x)^2) = 2 P / (A g h) triangles.
         """
-        cell, ellipses = self.cell, self.ellipses
+        cell = self.cell
         irregular = 0 if cell.geometry in FIBRES_OF else self.fibres
         count = self.height / (TRIANGLE_AREA * cell.mesh_size**2) + TRIANGLES_OF_A_FIBRE * irregular
-        if ellipses is not None:
-            count += _triangles_of_ends(ellipses, cell.interface_size or cell.mesh_size)
+        count += _triangles_of_ends(self.ovals, cell.interface_size or cell.mesh_size)
         if cell.interface_size is None:
             return count
-        length = 2 * math.pi * self.mean_radius * self.fibres if ellipses is None else math.fsum(ellipses.perimeters)
-        return count + 2 * length / (TRIANGLE_AREA * MAX_GROWTH * cell.interface_size)
+        return count + 2 * self.interfaces / (TRIANGLE_AREA * MAX_GROWTH * cell.interface_size)
 
 
 def triangles_of_a_tip(ratio: np.float64 | float) -> float:
@@ -89,8 +92,8 @@ def ratio_at_a_tip(count: float) -> float:
     return float(np.interp(count, counts, RATIOS))
 
 
-def _triangles_of_ends(ellipses: Ellipses, around: float) -> float:
+def _triangles_of_ends(ovals: Ellipses, around: float) -> float:
     """Those that the ends of long axes, where the radius of curvature is b^2 / a, add among elements of this size."""
-    short, long = np.sort(ellipses.semi_axes[~ellipses.are_round], axis=1).T
+    short, long = np.sort(ovals.semi_axes, axis=1).T
     at_ends = 2 * np.pi * short**2 / long / MIN_EDGES_AROUND
     return 2 * math.fsum(map(triangles_of_a_tip, np.maximum(1.0, around / at_ends).tolist()))

@@ -8,8 +8,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from feti_homog.fibres.arrangement import Arrangement
-from feti_homog.fibres.ellipses import Ellipses, directions, gaps
-from feti_homog.fibres.elliptic_table import shells
+from feti_homog.fibres.outlines.ellipses import Ellipses, gaps
+from feti_homog.fibres.outlines.outlines import directions
 from feti_homog.fibres.torus_pairs import neighbours
 from feti_homog.mesh.sizes.from_sources import MAX_GROWTH, Source, SourcedSize, wrap
 from feti_homog.mesh.sizes.graded_size import MeshSizes, SizeField
@@ -23,16 +23,22 @@ LONGEST = 10.0
 
 
 def size_field(
-    arrangement: Arrangement, sizes: MeshSizes, vertices: Float, crossings: tuple[Float, Float], tips: Float
+    arrangement: Arrangement,
+    inner: Ellipses,
+    sizes: MeshSizes,
+    vertices: Float,
+    crossings: tuple[Float, Float],
+    tips: Float,
 ) -> SizeField:
-    """As `graded_size.size_field`; `crossings` are where sides of the cell meet ellipses (c, 2), and the length (c,)
-    R phi of the angle phi between them where the radius of curvature is R."""
-    size, largest = np.array([arrangement.width, arrangement.height]), sizes.largest
-    ellipses, disc = _in_mesh_order(arrangement, *shells(arrangement))
+    """As `graded_size.size_field`, for the ellipses `inner`; `crossings` are where sides of the cell meet ellipses
+    (c, 2), and the length (c,) R phi of the angle phi between them where the radius of curvature is R."""
+    size, largest = arrangement.size, sizes.largest
+    shells, disc = arrangement.shells
+    ellipses, disc = _in_mesh_order(arrangement, Ellipses(shells.centres, shells.frames), disc)
     angle, which = np.tile(np.linspace(0, 2 * np.pi, POINTS, endpoint=False), len(ellipses)), np.arange(len(ellipses))
     around = np.repeat(which, POINTS)
-    points, normal = ellipses[around].at(angle), ellipses[around].normal(angle)
-    thin = _coating_size(arrangement, disc[around], normal)
+    points, normal = ellipses[around].points(angle), ellipses[around].normal(angle)
+    thin = _coating_size(arrangement, inner, disc[around], normal)
     caps = np.minimum(edge_size(ellipses[around], normal, sizes.interface), thin)
     outer = ellipses[np.sort(np.unique(disc, return_index=True)[1])]
     sources = [
@@ -66,14 +72,14 @@ def _in_mesh_order(arrangement: Arrangement, ellipses: Ellipses, disc: Int) -> t
     return ellipses[order], disc[order]
 
 
-def _coating_size(arrangement: Arrangement, disc: Int, normal: Float) -> Float:
+def _coating_size(arrangement: Arrangement, inner: Ellipses, disc: Int, normal: Float) -> Float:
     """Largest edge length (k,) on either side of the coatings of discs (k,) where their normals are n (k, 2).
 
     As of circles, sqrt(t R), with the thickness and the radius of curvature there, but not longer than in the thinnest
     coatings of circles, LONGEST t; infinite without a coating.
     """
-    own = arrangement.ellipses[disc]
-    thickness = own.grown(arrangement.thickness[disc]).support(normal) - own.support(normal)
+    own = inner[disc]
+    thickness = own.grown(arrangement.coating[disc]).support(normal) - own.support(normal)
     return np.where(
         arrangement.coated[disc], np.minimum(np.sqrt(thickness * own.bend(normal)), LONGEST * thickness), np.inf
     )

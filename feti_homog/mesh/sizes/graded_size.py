@@ -111,7 +111,7 @@ class _FromLines:
     @classmethod
     def of(cls, arrangement: Arrangement, sizes: MeshSizes, tips: Float) -> _FromLines:
         """That of a cell."""
-        size, caps = np.array([arrangement.width, arrangement.height]), sizes.on_circles(arrangement)
+        size, caps = arrangement.size, sizes.on_circles(arrangement)
         radii = arrangement.outer_radii
         counts = np.ceil(2 * np.pi * radii / caps).astype(int)
         disc = np.repeat(np.arange(len(counts)), counts)

@@ -27,9 +27,8 @@ def line_size(arrangement: Arrangement, largest: float, vertices: Float) -> Sour
     a side or corner of the cell, with h_k proportional to its width, and the `vertices` (v, 2) that the mesh
     must have, with the distance to the next one.
     """
-    size = np.array([arrangement.width, arrangement.height])
-    radii, disc = arrangement.circles
-    circles, caps = np.column_stack([arrangement.centres[disc], radii]), circle_size(arrangement, largest)
+    size, (shells, disc) = arrangement.size, arrangement.shells
+    circles, caps = np.column_stack([shells.centres, shells.radii]), circle_size(arrangement, largest)
     outer = np.unique(disc, return_index=True)[1]
     sources = [
         _between_fibres(circles[outer], size, caps[outer], largest),
@@ -46,14 +45,14 @@ def circle_size(arrangement: Arrangement, largest: float) -> Float:
     Those on a coating of the thickness t on the radius a have at most sqrt(t a): then they are t / 8 away from their
     arcs, and elements across the coating do not turn over when their edges are bent.
     """
-    radii, disc = arrangement.circles
-    caps = np.minimum(largest, 2 * np.pi * radii / MIN_EDGES_AROUND)
+    shells, disc = arrangement.shells
+    caps = np.minimum(largest, 2 * np.pi * shells.radii / MIN_EDGES_AROUND)
     return np.where(arrangement.coated[disc], np.minimum(caps, coating_size(arrangement)[disc]), caps)
 
 
 def coating_size(arrangement: Arrangement) -> Float:
     """sqrt(t a) (N,) of the coating of the thickness t on each disc of the radius a."""
-    return np.asarray(np.sqrt(arrangement.thickness * arrangement.radii))
+    return np.asarray(np.sqrt(arrangement.coating * arrangement.radii))
 
 
 def _between_fibres(circles: Float, size: Float, caps: Float, largest: float) -> Source:

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.spatial import QhullError
 
 from feti_homog.fibres.arrangement import Arrangement
+from feti_homog.fibres.outlines.discs import Discs
 from feti_homog.mesh.outline.bridges import CLEAR, Bridges, bridges, centre_lines
 from feti_homog.mesh.outline.curves import MATRIX, OUTSIDE
 from feti_homog.mesh.outline.outline import Outline, crossings, disc_at, images, on_side
@@ -59,7 +60,7 @@ class Tiling:
 
 def is_tiled(arrangement: Arrangement, policy: TilePolicy) -> bool:
     """Whether it is large and has round discs only."""
-    return len(arrangement.radii) >= policy.least_discs and arrangement.frames is None and arrangement.shapes is None
+    return len(arrangement.phase) >= policy.least_discs and isinstance(arrangement.outlines, Discs)
 
 
 def tiling(
@@ -71,7 +72,7 @@ def tiling(
     """
     if not is_tiled(arrangement, policy):
         return None
-    size = np.array([arrangement.width, arrangement.height])
+    size = arrangement.size
     circles, disc, around = images(arrangement)
     outer = np.flatnonzero(around == MATRIX)
     try:

@@ -69,7 +69,7 @@ fibre_list = [{x = 1, y = 2, a = 0.3, b = 0.8, angle = 20, coating = 0.1}, {x = 
 
 def squares(cell):
     found = arrange(cell)
-    return found.ellipses.squares, found.thickness, found.centres
+    return found.outlines.squares, found.coating, found.centres
 
 
 @pytest.mark.parametrize("of", ["case", "result"])
@@ -92,9 +92,11 @@ def test_ellipses_of_a_users_mesh_are_found(tmp_path):
     rows = fibre_rows.table(Path(__file__).parents[3] / "drivers" / "two_fibres.toml")
     (tmp_path / "t.csv").write_text(rows)
     table = read_table(tmp_path / "t.csv")
-    assert [table.a[0], table.b[0], table.angle[0] % 180] == pytest.approx([0.4, 0.3, 180.0], abs=1e-6)
+    a, b, angle = (table.columns[name][0] for name in ("a", "b", "angle"))
+    assert [a, b, angle % 180] == pytest.approx([0.4, 0.3, 180.0], abs=1e-6)
     assert table.centres == pytest.approx(np.array([[0.6, 0.5], [1.5, 0.5]]), abs=1e-6)
-    assert table.radius[1] == pytest.approx(0.3) and np.isnan([table.radius[0], table.a[1]]).all()
+    assert table.radius[1] == pytest.approx(0.3)
+    assert np.isnan([table.columns["radius"][0], table.columns["a"][1]]).all()
 
 
 def test_the_table_of_a_users_mesh_has_its_round_fibres(tmp_path):

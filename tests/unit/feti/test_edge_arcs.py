@@ -7,7 +7,7 @@ import pytest
 from scipy.special import ellipeinc
 
 from feti_homog.feti.decomposition.edge_arcs import along, mean_speed
-from feti_homog.fibres.ellipses import Ellipses
+from feti_homog.fibres.outlines.ellipses import Ellipses
 
 A, B = 0.5, 0.2
 

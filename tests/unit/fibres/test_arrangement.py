@@ -112,7 +112,7 @@ def test_neighbours_are_all_pairs_of_images():
 
 
 def test_shift_clears_tangency_and_keeps_the_arrangement():
-    before = Arrangement(1.0, 1.0, np.array([[0.2, 0.5], [0.7001, 0.2]]), np.array([0.2, 0.2]), ("fibre",) * 2)
+    before = Arrangement.of_discs(1.0, 1.0, np.array([[0.2, 0.5], [0.7001, 0.2]]), np.array([0.2, 0.2]), ("fibre",) * 2)
     after = clear_shift(before)
     assert smallest_gap(after) == pytest.approx(smallest_gap(before))
     for axis in (0, 1):

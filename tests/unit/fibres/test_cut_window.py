@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from support.moved_rows import moved_rows
 from unit.fibres.test_arrangement import smallest_gap
 from unit.fibres.test_periodic_table import cell_of, table
 
@@ -11,7 +12,7 @@ from feti_homog.case.cell_section import Cell
 from feti_homog.errors import MeshError
 from feti_homog.fibres.arrange import arrange
 from feti_homog.fibres.cut_window import LEAST_GAP, MOST_GAP, moves
-from feti_homog.fibres.periodic_table import moved_rows
+from feti_homog.fibres.outlines.discs import Discs
 
 SIZE = np.array([1.0, 1.0])
 
@@ -32,7 +33,7 @@ def overlaps_within(centres, radii):
 def test_two_discs_share_the_move():
     """The overlap of 0.05 and the largest gap, for within there is no smaller one; half for each."""
     radii = np.array([0.1, 0.1])
-    moved = moves(np.array([[0.05, 0.5], [0.9, 0.5]]), radii, SIZE)
+    moved = moves(Discs(np.array([[0.05, 0.5], [0.9, 0.5]]), radii), SIZE)
     half = (0.2 * (1 + MOST_GAP) - 0.15) / 2
     assert np.abs(moved - [[half, 0.0], [-half, 0.0]]).max() < 1e-5
 
@@ -40,7 +41,7 @@ def test_two_discs_share_the_move():
 def test_a_disc_that_is_in_the_way_is_pushed():
     """Three in a row, the first over the border: least squares share the overlap as chains do."""
     centres, radii = np.array([[0.05, 0.5], [0.95, 0.5], [0.31, 0.5]]), np.full(3, 0.1)
-    moved = moves(centres, radii, SIZE)
+    moved = moves(Discs(centres, radii), SIZE)
     assert np.abs(moved[:, 1]).max() < 1e-6
     # d0 - d1 = 0.11, and d2 - d0 = -0.05 leaves the gap of 0.05: d0 = t, d1 = t - 0.11, d2 = t - 0.05.
     first = (0.11 + 0.05) / 3
@@ -51,27 +52,27 @@ def test_gaps_across_are_those_within():
     """0.03 of the sum of the radii, if the nearest two within are so near; not less than a least gap."""
     for gap, kept in ((0.03, 0.03), (0.001, LEAST_GAP)):
         centres = np.array([[0.05, 0.2], [0.95, 0.2], [0.5, 0.7], [0.5 + 0.2 * (1 + gap), 0.7]])
-        moved = moves(centres, np.full(4, 0.1), SIZE)
+        moved = moves(Discs(centres, np.full(4, 0.1)), SIZE)
         assert np.abs(moved[2:]).max() < 1e-9
         assert moved[0, 0] - moved[1, 0] == pytest.approx(0.2 * (1 + kept) - 0.1, rel=1e-5)
 
 
 def test_discs_that_need_not_move_do_not():
     centres = np.array([[0.25, 0.25], [0.75, 0.75], [0.25, 0.75]])
-    assert np.array_equal(moves(centres, np.full(3, 0.2), SIZE), np.zeros((3, 2)))
+    assert np.array_equal(moves(Discs(centres, np.full(3, 0.2)), SIZE), np.zeros((3, 2)))
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_a_window_is_made_periodic(seed):
     centres, radii, size = window(seed)
-    moved = moves(centres, radii, size)
+    moved = moves(Discs(centres, radii), size)
     far = np.linalg.norm(moved, axis=1)
     placed = arrange(cell_of(table(centres, radii, (1.0, 1.0), (0.0, 0.0))))
     assert overlaps_within(placed.centres, radii) > 0  # the overlaps are those across the border
     fibres = table(centres, radii, size.tolist(), (0.0, 0.0))
     arrangement = arrange(Cell(geometry="table", table=fibres, window="cut"))
     assert smallest_gap(arrangement) > 0
-    rows, told = moved_rows(fibres, "cut")
+    rows, told = moved_rows(fibres)
     assert np.array_equal(told, far[rows - 1]) and len(rows) < 0.7 * len(radii)
     assert far[np.setdiff1d(np.arange(len(radii)), rows - 1)].max() < 1e-6 * radii.mean()
     assert far.max() < 1.1 * radii.max()
@@ -81,7 +82,7 @@ def test_a_window_is_made_periodic(seed):
 def test_no_smaller_moves_are_near(seed):
     """Moves scaled down, or those of any one disc, would let discs overlap."""
     centres, radii, size = window(seed)
-    moved = moves(centres, radii, size)
+    moved = moves(Discs(centres, radii), size)
 
     def gap(trial):
         at = (centres + trial)[:, None] - (centres + trial)

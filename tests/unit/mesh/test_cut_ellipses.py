@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from support.moved_rows import moved_rows
 from unit.mesh.test_table_ellipses import cell_of, table
 
 from feti_homog.errors import MeshError
 from feti_homog.fibres.arrange import arrange
 from feti_homog.fibres.cut_window import LEAST_GAP, MOST_GAP, moves
-from feti_homog.fibres.ellipses import Ellipses, gaps
-from feti_homog.fibres.periodic_table import moved_rows
+from feti_homog.fibres.outlines.discs import Discs
+from feti_homog.fibres.outlines.ellipses import Ellipses, gaps
 from feti_homog.fibres.torus_pairs import neighbours
 
 SIZE = np.array([1.0, 1.0])
@@ -41,7 +42,7 @@ def test_ellipses_that_are_discs_move_like_discs():
     generator = np.random.default_rng(3)
     centres, radii = np.array([[0.05, 0.2], [0.95, 0.22], [0.5, 0.7], [0.52, 0.97], [0.5, 0.1]]), np.full(5, 0.1)
     frames = radii[:, None, None] * np.linalg.qr(generator.normal(size=(5, 2, 2)))[0]
-    discs, ellipses = moves(centres, radii, SIZE), moves(centres, radii, SIZE, frames)
+    discs, ellipses = moves(Discs(centres, radii), SIZE), moves(Ellipses(centres, frames), SIZE)
     assert np.abs(discs).max() > 0.02 and ellipses == pytest.approx(discs, abs=1e-7)
 
 
@@ -50,7 +51,7 @@ def test_two_flat_ones_share_the_move_across():
     a, b = 0.2, 0.05
     own = Ellipses.of(np.array([[0.5, 0.04], [0.5, 0.96]]), np.full(2, a), np.full(2, b), np.zeros(2))
     radius = np.sqrt(a * b)
-    moved = moves(own.centres, np.full(2, radius), SIZE, own.frames)
+    moved = moves(own, SIZE)
     half = (2 * radius * MOST_GAP + 0.02) / 2
     assert moved == pytest.approx(np.array([[0.0, half], [0.0, -half]]), abs=1e-5)
 
@@ -60,7 +61,7 @@ def test_a_window_is_made_periodic_by_small_moves(seed):
     own = crowd(seed)
     radii = np.sqrt(np.abs(np.linalg.det(own.frames)))
     assert smallest_gap(own) < 0
-    moved = moves(own.centres, radii, SIZE, own.frames)
+    moved = moves(own, SIZE)
     at = Ellipses(own.centres + moved, own.frames)
     assert smallest_gap(at) >= LEAST_GAP * (1 - 1e-3) and np.linalg.norm(moved, axis=1).max() < 2 * radii.max()
     part = Ellipses(own.centres + 0.9 * moved, own.frames)
@@ -72,5 +73,5 @@ def test_a_cut_table_says_which_rows_it_moved():
     fibres = table(rows, (0.0, 0.0))
     with pytest.raises(MeshError, match=r"overlap by 0\.02 across the border"):
         arrange(cell_of(fibres))
-    assert smallest_gap(arrange(cell_of(fibres, window="cut")).ellipses) > 0
-    assert moved_rows(fibres, "cut")[0].tolist() == [1, 2]
+    assert smallest_gap(arrange(cell_of(fibres, window="cut")).outlines) > 0
+    assert moved_rows(fibres)[0].tolist() == [1, 2]

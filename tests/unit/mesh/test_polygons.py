@@ -15,8 +15,7 @@ from feti_homog.case import case as cases
 from feti_homog.commands import fibre_rows
 from feti_homog.errors import CaseError, MeshError
 from feti_homog.fibres.arrange import arrange
-from feti_homog.fibres.convex_shapes import ConvexShapes, shape_gaps
-from feti_homog.fibres.ellipses import Ellipses
+from feti_homog.fibres.outlines.shapes import outlines_of
 from feti_homog.mesh.coarse_mesh import areas
 from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.mesh.interface_edges import voids
@@ -41,8 +40,17 @@ def case_of(*rows, **cell):
 
 
 def polygon(x, y, sides, radius, rounding=0.0, angle=0.0):
-    disc = Ellipses.round(np.array([[x, y, radius]]))
-    return ConvexShapes.of(disc, np.array([sides]), *(np.array([each]) for each in (radius, rounding, angle)))
+    corner = rounding / radius / np.cos(np.pi / sides) if sides else 0.0
+    row = {"x": x, "y": y, "radius": radius, "sides": sides, "corner": corner, "angle": angle, "inner_radius": 0.0}
+    return {name: np.array([value]) for name, value in ({"a": np.nan, "b": np.nan} | row).items()}
+
+
+def gap_between(*rows):
+    """Of two outlines that are a row each."""
+    outlines = outlines_of({name: np.concatenate([row[name] for row in rows]) for name in rows[0]})
+    vector = np.diff(outlines.centres, axis=0)
+    normal, reach = outlines.parting(np.array([0]), np.array([1]), vector)
+    return (normal * vector).sum() - reach[0]
 
 
 @pytest.mark.parametrize(("one", "other", "gap"), [
@@ -56,8 +64,8 @@ def polygon(x, y, sides, radius, rounding=0.0, angle=0.0):
     (polygon(0, 0, 4, 2**0.5, 0.0, 45.0), polygon(1.5, 0.0, 4, 2**0.5, 0.3, 45.0), -0.5),
 ])  # fmt: skip
 def test_gaps_are_those_of_elementary_geometry(one, other, gap):
-    assert shape_gaps(one, other)[0] == pytest.approx(gap, abs=1e-8)
-    assert shape_gaps(other, one)[0] == pytest.approx(gap, abs=1e-8)
+    assert gap_between(one, other) == pytest.approx(gap, abs=1e-8)
+    assert gap_between(other, one) == pytest.approx(gap, abs=1e-8)
 
 
 @pytest.mark.parametrize("sides", [3, 4, 7, 12])
@@ -66,11 +74,11 @@ def test_radii_are_of_the_same_area(sides, corner):
     """The area by the shoelace formula of many points of the outline."""
     case = case_of(SQUARE | {"sides": sides, "corner": corner})
     arrangement = arrange(case.cell)
-    points, normals, _ = arrangement.shapes.boundary(4000)
+    points, normals, _ = arrangement.outlines.boundary(4000)
     x, y = points.T
     area = (x * np.roll(y, -1) - y * np.roll(x, -1)).sum() / 2
     assert np.pi * arrangement.radii[0] ** 2 == pytest.approx(area, rel=1e-6)
-    away = points - arrangement.shapes.centres[0]
+    away = points - arrangement.outlines.centres[0]
     inner = 0.3 * np.cos(np.pi / sides)
     reach = inner * corner + (0.3 - inner * corner / np.cos(np.pi / sides))
     assert np.linalg.norm(away, axis=1).max() == pytest.approx(reach, rel=1e-5)
@@ -140,11 +148,18 @@ def test_faults_of_rows(row, fault):
     assert caught.value.faults[0].endswith(f"row 1: {fault}")
 
 
+def test_a_cut_window_moves_polygons():
+    """Squares that overlap across the border by 0.02 are moved apart along its normal."""
+    rows = [{"x": x, "y": 0.5, "radius": 0.2 * 2**0.5, "sides": 4, "angle": 45.0} for x in (0.17, 0.79)]
+    with pytest.raises(MeshError, match=r"overlap by 0\.02 across the border"):
+        arrange(case_of(*rows).cell)
+    first, second = arrange(case_of(*rows, window="cut").cell).centres
+    assert 1.0 - abs(first[0] - second[0]) > 0.4 and first[1] == pytest.approx(second[1], abs=1e-6)
+
+
 def test_faults_of_the_table():
-    with pytest.raises(CaseError, match="corner: belongs to sides, which no fibre has"):
+    with pytest.raises(CaseError, match="row 1: has a corner, but no sides"):
         case_of({"x": 0.5, "y": 0.5, "radius": 0.1, "corner": 0.3})
-    with pytest.raises(CaseError, match='window = "cut": fibre_list has polygons, which it does not move'):
-        case_of(SQUARE, window="cut")
     with pytest.raises(CaseError, match=r"tip_size = 0\.01: fibre_list has polygons, and with them no nodes at tips"):
         case_of(SQUARE, tip_size=0.01)
 

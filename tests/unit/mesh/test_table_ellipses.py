@@ -9,10 +9,10 @@ import pytest
 
 from feti_homog.case.cell_section import Cell
 from feti_homog.case.fibre_table import table_of
-from feti_homog.case.table_shapes import with_shapes
+from feti_homog.case.table_shapes import check_shapes
 from feti_homog.errors import MeshError
 from feti_homog.fibres.arrange import arrange
-from feti_homog.fibres.ellipses import Ellipses, gaps
+from feti_homog.fibres.outlines.ellipses import Ellipses, gaps
 from feti_homog.mesh.coarse_mesh import areas
 from feti_homog.mesh.fibre_centres import fibre_circles
 from feti_homog.mesh.fill.gmsh_mesher import generate
@@ -29,10 +29,11 @@ ROWS = [
 
 def table(rows, corner=None):
     left, bottom = corner or (None, None)
+    found = replace(table_of(rows, "t.csv"), width=1.0, height=1.0, left=left, bottom=bottom)
     faults = []
-    found = with_shapes(replace(table_of(rows, "t.csv"), width=1.0, height=1.0), faults)
+    check_shapes(found, faults)
     assert not faults
-    return replace(found, left=left, bottom=bottom)
+    return found
 
 
 def cell_of(fibres, size=0.1, **keys):
@@ -67,7 +68,7 @@ def test_nodes_of_interfaces_lie_on_the_ellipses(corner):
     mesh, arrangement = generate(cell), arrange(cell)
     torus = Torus.of(mesh)
     for fibre, row in enumerate(ROWS, 1):
-        own = arrangement.ellipses[np.array([fibre - 1])]
+        own = arrangement.outlines[np.array([fibre - 1])]
         inside = torus.constituent == fibre
         nodes = np.intersect1d(mesh.triangles[inside], mesh.triangles[mesh.phase == 0])
         offsets = (mesh.points[nodes] - own.centres + 0.5) % 1.0 - 0.5
@@ -137,7 +138,7 @@ def test_gap_of_discs_and_of_affine_images_of_tangent_discs():
 def test_gap_is_the_smallest_distance_of_points():
     one, other = ellipse([0.0, 0.0], 0.5, 0.1, 20.0), ellipse([0.3, 0.55], 0.4, 0.15, -50.0)
     angle = np.linspace(0, 2 * np.pi, 2000)
-    points = [each[np.zeros(2000, int)].at(angle) for each in (one, other)]
+    points = [each[np.zeros(2000, int)].points(angle) for each in (one, other)]
     distance = np.linalg.norm(points[0][:, None] - points[1], axis=2).min()
     assert 0.05 < gaps(one, other)[0][0] == pytest.approx(distance, rel=1e-4)
 
@@ -185,7 +186,7 @@ SHAPES = {
 @pytest.mark.parametrize("name", SHAPES)
 def test_faulty_shapes_name_the_row(name):
     (rows, line), faults = SHAPES[name], []
-    with_shapes(table_of(rows, "t.csv"), faults)
+    check_shapes(table_of(rows, "t.csv"), faults)
     assert faults == [f"[cell] t.csv: {line}"]
 
 

@@ -8,7 +8,7 @@ from scipy.special import ellipe
 from unit.mesh.test_table_ellipses import cell_of, table
 
 from feti_homog.fibres.arrange import arrange
-from feti_homog.fibres.ellipses import Ellipses
+from feti_homog.fibres.outlines.ellipses import Ellipses
 from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.mesh.sizes.element_estimate import ElementEstimate
 

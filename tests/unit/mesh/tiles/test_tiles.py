@@ -13,6 +13,7 @@ from unit.mesh.fill.test_gmsh_mesher import least_angle
 from feti_homog.errors import MeshError
 from feti_homog.fibres.arrange import arrange
 from feti_homog.fibres.arrangement import Arrangement
+from feti_homog.fibres.outlines.shapes import elliptic
 from feti_homog.mesh.coarse_mesh import areas
 from feti_homog.mesh.fill.gmsh_mesher import begin, generate
 from feti_homog.mesh.outline.bridges import CLEAR, LEAST_ANGLE
@@ -119,7 +120,9 @@ def test_bridges_keep_away_from_all_of_some_near_marks():
 
 def test_fibres_in_a_row_are_one_tile():
     """No three of their centres make a triangle."""
-    row = Arrangement(1.0, 0.2, np.array([[(k + 0.5) / 8, 0.1] for k in range(8)]), np.full(8, 0.04), ("fibre",) * 8)
+    row = Arrangement.of_discs(
+        1.0, 0.2, np.array([[(k + 0.5) / 8, 0.1] for k in range(8)]), np.full(8, 0.04), ("fibre",) * 8
+    )
     assert is_tiled(row, SMALL) and tiling(row, 0.05, {}, SMALL) is None
 
 
@@ -146,7 +149,7 @@ def test_order_of_filling_does_not_matter():
 def test_small_cells_and_other_shapes_are_not_tiled():
     arrangement = arrange(CELLS["dense"])
     assert is_tiled(arrangement, TilePolicy(least_discs=36)) and not is_tiled(arrangement, TilePolicy(least_discs=37))
-    assert not is_tiled(replace(arrangement, frames=np.zeros((36, 2, 2))), SMALL)
+    assert not is_tiled(replace(arrangement, outlines=elliptic(arrangement.outlines)), SMALL)
     assert len(begin(CELLS["dense"], None, policy=TilePolicy(least_discs=37)).with_nodes().parts) == 1
 
 

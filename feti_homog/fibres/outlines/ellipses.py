@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterator
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
+from feti_homog.fibres.outlines.outlines import Column, Columns, directions, widest
 from feti_homog.typing import Bool, Float, Int, Int32
 
-# Directions in which the distance of two ellipses is first looked for, and how often the best are looked between.
-DIRECTIONS, ZOOMS, ZOOM = 180, 12, 9
 # Relative difference of the squares of semi-axes of a circle.
 SAME_AXES = 1e-12
+# Shorter / longer semi-axis of a fibre, at least: elements at the tips would be too small.
+THINNEST = 0.05
 
 
 @dataclass(frozen=True)
 class Ellipses:
-    """The k images c + F p of the unit circle |p| = 1; `centres` (k, 2), `frames` (k, 2, 2)."""
+    """The k images c + F p of the unit circle |p| = 1, as `Outlines`; `centres` (k, 2), `frames` (k, 2, 2)."""
 
     centres: Float
     frames: Float
@@ -40,13 +42,40 @@ class Ellipses:
         radius = np.sqrt(np.abs(np.linalg.det(self.frames)))
         return np.column_stack([self.centres, np.where(self.are_round, radius, np.nan)])
 
+    @property
+    def cores(self) -> Float:
+        """The origin."""
+        return np.zeros((len(self), 1, 2))
+
+    @property
+    def radii(self) -> Float:
+        """As in `Outlines`."""
+        return np.asarray(np.sqrt(np.abs(np.linalg.det(self.frames))))
+
+    @property
+    def extents(self) -> Float:
+        """As in `Outlines`."""
+        return np.repeat(self.reach[:, :, None], 2, axis=2)
+
+    def at(self, centres: Float) -> Ellipses:
+        """As in `Outlines`."""
+        return Ellipses(centres, self.frames)
+
+    def per(self, unit: float) -> Ellipses:
+        """As in `Outlines`."""
+        return Ellipses(self.centres / unit, self.frames / unit)
+
+    def rounded(self, decimals: int) -> Ellipses:
+        """As in `Outlines`."""
+        return Ellipses(self.centres.round(decimals), self.frames.round(decimals))
+
     def joined(self, others: Ellipses) -> Ellipses:
-        """These, then the others."""
+        """As in `Outlines`."""
         pairs = (self.centres, others.centres), (self.frames, others.frames)
         return Ellipses(*(np.concatenate(pair) for pair in pairs))
 
     def grown(self, thickness: Float) -> Ellipses:
-        """Those whose semi-axes are longer by `thickness` (k,)."""
+        """Ellipses whose semi-axes are longer by `thickness` (k,)."""
         lengths = np.linalg.norm(self.frames, axis=1)
         return Ellipses(self.centres, self.frames * (1 + thickness[:, None] / lengths)[:, None])
 
@@ -99,7 +128,7 @@ class Ellipses:
         """(k,) the longer semi-axes."""
         return np.asarray(self.semi_axes.max(axis=1))
 
-    def at(self, angle: Float) -> Float:
+    def points(self, angle: Float) -> Float:
         """(k, 2) the point c + F (cos t, sin t) of each at its parameter t (k,)."""
         return np.asarray(self.centres + np.einsum("kij,kj->ki", self.frames, directions(angle)))
 
@@ -118,8 +147,19 @@ class Ellipses:
         return np.asarray(np.linalg.norm(np.einsum("kij,nkj->nki", inverse, points[:, None] - self.centres), axis=2))
 
     def support(self, normal: Float) -> Float:
-        """(k,) |F^T n|: how far each reaches from its centre along the unit vector n (k, 2)."""
-        return np.asarray(np.linalg.norm(np.einsum("kij,ki->kj", self.frames, normal), axis=1))
+        """(k, ...) |F^T n| for unit vectors n (k, ..., 2), as in `Outlines`."""
+        return np.asarray(np.linalg.norm(np.einsum("kij,k...i->k...j", self.frames, normal), axis=-1))
+
+    def parting(self, first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
+        """As in `Outlines`."""
+        one, other = self[first], self[second]
+        normal = directions(gaps(one, other.at(one.centres + vector))[1])
+        return normal, one.support(normal) + other.support(normal)
+
+    def distances(self, offsets: Float) -> Float:
+        """As in `Outlines`: ||F^-1 d| - 1| times the mean radius."""
+        unit = np.einsum("kij,nkj->nki", np.linalg.inv(self.frames), offsets)
+        return np.asarray(np.abs(np.linalg.norm(unit, axis=2) - 1) * self.radii)
 
     def facing(self, normal: Float) -> Float:
         """(k, 2) the point of each whose outward normal is n (k, 2)."""
@@ -134,11 +174,6 @@ class Ellipses:
         """(k, 2) the outward unit normal of each at its parameter (k,)."""
         across = np.einsum("kji,kj->ki", np.linalg.inv(self.frames), directions(angle))
         return np.asarray(across / np.linalg.norm(across, axis=1)[:, None])
-
-
-def directions(angle: Float) -> Float:
-    """(..., 2) unit vectors at angles in radians."""
-    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
 
 def gaps(first: Ellipses, second: Ellipses) -> tuple[Float, Float]:
@@ -158,14 +193,23 @@ def gaps(first: Ellipses, second: Ellipses) -> tuple[Float, Float]:
     return widest(vector, gap)
 
 
-def widest(vector: Float, gap: Callable[[Float], Float]) -> tuple[Float, Float]:
-    """The largest gap (k,) of pairs at these vectors (k, 2) from the first to the second, and its direction (k,) in
-    radians; gap(a) are those across directions a (k, m)."""
-    step = 2 * np.pi / DIRECTIONS
-    around = np.arctan2(vector[:, 1], vector[:, 0])[:, None] + step * np.arange(DIRECTIONS)
-    best = around[np.arange(len(vector)), gap(around).argmax(axis=1)]
-    for _ in range(ZOOMS):
-        around = best[:, None] + np.linspace(-step, step, ZOOM)
-        best = around[np.arange(len(vector)), gap(around).argmax(axis=1)]
-        step *= 2 / (ZOOM - 1)
-    return gap(best[:, None])[:, 0], best
+class EllipticRows:
+    """Rows with semi-axes in place of a radius, as `Shape`."""
+
+    name, sizes, has_tips = "ellipses", ("a", "b"), True
+    columns = MappingProxyType({"a": Column(np.nan, above=0.0), "b": Column(np.nan, above=0.0), "angle": Column(0.0)})
+
+    def given(self, rows: Columns) -> Bool:
+        """(N,) which rows have it."""
+        return np.asarray(~np.isnan(rows["a"]) & (rows["a"] != rows["b"]))
+
+    def faults(self, rows: Columns) -> Iterator[tuple[Bool, str]]:
+        """As in `Shape`."""
+        a, b = rows["a"], rows["b"]
+        thin = np.minimum(a, b) < THINNEST * np.maximum(a, b)
+        yield thin, f"expected a / b from {THINNEST:g} to {1 / THINNEST:g}"
+        yield self.given(rows) & (rows["inner_radius"] > 0), "has an inner_radius, which only round fibres may have"
+
+    def outlines(self, rows: Columns, centres: Float) -> Ellipses:
+        """As in `Shape`."""
+        return Ellipses.of(centres, rows["a"], rows["b"], rows["angle"])

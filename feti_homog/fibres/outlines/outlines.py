@@ -1,0 +1,132 @@
+"""What is asked of the outlines of fibres, whichever shape they have."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import NamedTuple, Protocol, Self
+
+import numpy as np
+
+from feti_homog.typing import Bool, Float, Int
+
+# Directions in which the distance of two outlines is first looked for, and how often the best are looked between.
+DIRECTIONS, ZOOMS, ZOOM = 180, 12, 9
+
+# Numbers (N,) of the rows of a table by column; NaN, or what the column takes for it, where a row has none.
+Columns = Mapping[str, Float]
+
+
+class Outlines(Protocol):
+    """k closed convex curves, each a sum c + V + F D of the hull V of a core and the unit disc D in a frame F."""
+
+    @property
+    def centres(self) -> Float:
+        """(k, 2)"""
+
+    @property
+    def cores(self) -> Float:
+        """(k, m, 2) corners of V about the centres; the origin where there is no V."""
+
+    @property
+    def frames(self) -> Float:
+        """(k, 2, 2) F."""
+
+    @property
+    def radii(self) -> Float:
+        """(k,) of discs of the same area."""
+
+    @property
+    def longest(self) -> Float:
+        """(k,) a bound of the distance of the points from the centres."""
+
+    @property
+    def extents(self) -> Float:
+        """(k, 2, 2) reach from the centre along each axis, backwards and forwards."""
+
+    def __len__(self) -> int: ...
+
+    def __getitem__(self, rows: Int | Bool) -> Self: ...
+
+    def at(self, centres: Float) -> Self:
+        """Outlines of the same shapes about other centres (k, 2)."""
+
+    def per(self, unit: float) -> Self:
+        """Shapes, and centres, with all lengths divided by a unit."""
+
+    def rounded(self, decimals: int) -> Self:
+        """Outlines with coordinates of so many decimals."""
+
+    def grown(self, thickness: Float) -> Self:
+        """Outlines around these with rings of that `thickness` (k,)."""
+
+    def joined(self, others: Self) -> Self:
+        """These outlines, then the others."""
+
+    def support(self, normal: Float) -> Float:
+        """(k, ...) reach from the centre along unit vectors n (k, ..., 2)."""
+
+    def parting(self, first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
+        """The normals n (p, 2) of the lines that part pairs (p,), (p,) at vectors v (p, 2) from first to second best,
+        and the reach r (p,) of both along them: the gap, negative if they overlap, is n . v - r."""
+
+    def distances(self, offsets: Float) -> Float:
+        """(n, k) distance from each outline of points at these vectors (n, k, 2) from its centre; about, of those that
+        are not round."""
+
+
+class Column(NamedTuple):
+    """A column of numbers: what an empty cell counts as, and the bound that numbers keep or do not reach."""
+
+    empty: float
+    least: float = -np.inf
+    above: float = -np.inf
+
+
+class Shape(Protocol):
+    """A shape that rows of a table may have, other than a disc.
+
+    Attributes:
+        name: of several fibres with it.
+        columns: those that other shapes do not need.
+        sizes: columns of the lengths that are the largest; in place of the radius if that is not among them.
+        has_tips: whether its mesh may have nodes at tips of debonded arcs.
+    """
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def columns(self) -> Mapping[str, Column]: ...
+
+    @property
+    def sizes(self) -> tuple[str, ...]: ...
+
+    @property
+    def has_tips(self) -> bool: ...
+
+    def given(self, rows: Columns) -> Bool:
+        """(N,) which rows have it."""
+
+    def faults(self, rows: Columns) -> Iterator[tuple[Bool, str]]:
+        """Faults of rows that have it or seem to: which rows (N,), and the words."""
+
+    def outlines(self, rows: Columns, centres: Float) -> Outlines:
+        """Those of rows (k,) that have it, about centres (k, 2)."""
+
+
+def directions(angle: Float) -> Float:
+    """(..., 2) unit vectors at angles in radians."""
+    return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+
+
+def widest(vector: Float, gap: Callable[[Float], Float]) -> tuple[Float, Float]:
+    """The largest gap (k,) of pairs at these vectors (k, 2) from the first to the second, and its direction (k,) in
+    radians; gap(a) are those across directions a (k, m)."""
+    step = 2 * np.pi / DIRECTIONS
+    around = np.arctan2(vector[:, 1], vector[:, 0])[:, None] + step * np.arange(DIRECTIONS)
+    best = around[np.arange(len(vector)), gap(around).argmax(axis=1)]
+    for _ in range(ZOOMS):
+        around = best[:, None] + np.linspace(-step, step, ZOOM)
+        best = around[np.arange(len(vector)), gap(around).argmax(axis=1)]
+        step *= 2 / (ZOOM - 1)
+    return gap(best[:, None])[:, 0], best
