@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -187,9 +188,11 @@ def parse(values: Mapping[str, Any], folder: Path) -> Case:
     document = to_document(values)
     reader = TableReader(_selected(document), KEY_OWNERS, _top_level_faults(document))
     selected, faults = reader.selected, reader.faults
+    of_rules = [[*rule.faults(document, selected)] for rule in RULES]
+    foreign = {rule.path[0] for rule, found in zip(RULES, of_rules, strict=True) if found and rule.schema is False}
     cell = _read_section(document, "cell", reader)
     sections = {
-        "cell": cell and _checked_cell(with_match(cell, folder, faults), folder, faults),
+        "cell": None if "cell" in foreign or cell is None else _checked_cell(cell, folder, faults),
         "materials": read_materials(document.get("material"), document.get("cell"), selected[PLANE], reader),
         "analysis": _read_section(document, "analysis", reader),
         "decomposition": _read_section(document, "decomposition", reader),
@@ -198,9 +201,9 @@ def parse(values: Mapping[str, Any], folder: Path) -> Case:
         "output": _read_section(document, "output", reader),
         "petsc": read_petsc(document.get("petsc", {}), faults),
     }
-    for rule in RULES:
-        faults += rule.faults(document, selected)
-    faults += _relations(sections, document, selected)
+    faults += chain.from_iterable(of_rules)
+    # What has keys of other cases is not looked into.
+    faults += _relations(sections | {FIELDS.get(name, name): None for name in foreign}, document, selected)
     if not faults:
         faults += contrast_faults(sections["materials"], sections["analysis"].plane)
     if not faults:
@@ -258,7 +261,8 @@ def _read_section(document: Mapping[str, Any], section: str, reader: TableReader
 
 
 def _checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
-    """The cell with its file's path completed; faults between its keys are added to `faults`."""
+    """The cell with what its files have; faults between its keys are added to `faults`."""
+    cell = with_match(cell, folder, faults)
     if cell.fibre_fraction is not None:
         spacing = (cell.coating or 0.0) + (cell.min_gap if cell.geometry == "random" else 0.0)
         limit = TOUCHING[cell.geometry] / (1.0 + spacing) ** 2

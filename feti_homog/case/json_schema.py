@@ -7,22 +7,22 @@ fraction at which fibres touch, are beyond a schema: `feti-homog check` knows th
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from feti_homog.case.cell_section import ALL_CIRCULAR, GEOMETRY
+from feti_homog.case.cell_section import ALL_CIRCULAR
 from feti_homog.case.interface_section import Arc
 from feti_homog.case.material_sections import CONSTANTS
 from feti_homog.case.mixed_load import TEMPERATURE, MixedLoad
 from feti_homog.case.petsc_section import PREFIXED
 from feti_homog.case.phase_names import COATING, FIBRE, MATRIX, PHASE
-from feti_homog.case.rules import PLACES_OF_LOADS, RULES
+from feti_homog.case.rules import PLACES_OF_LOADS, PLACES_OF_TABLES, RULES
 from feti_homog.case.sections import REQUIRED, SECTIONS, TOP_LEVEL
-from feti_homog.case.selectors import ANALYSIS_TYPE, CRITERION, GENERALIZED, METHOD, PLANE
+from feti_homog.case.selectors import GENERALIZED, PLANE
 from feti_homog.case.sweep_section import AXIS_MEANING, RANGE_KEYS, SWEEP, SweepSection
 from feti_homog.materials.forms import EXPANSION_PAIR, MATERIAL_FORMS
 from feti_homog.materials.laws import NEEDED
-from feti_homog.schema.keys import Condition, Key, Selector, defaults_of, keys_of
+from feti_homog.schema.keys import Condition, Key, defaults_of, keys_of
 from feti_homog.schema.rules import ITEMS, Rule, Schema
 from feti_homog.schema.values import text
 
@@ -120,20 +120,8 @@ def _axis() -> Schema:
 
 def _rules_of_one_case() -> Schema:
     """What must be given, by conditions that are independent of each other."""
-    required = [_required(path, contents) for path, contents in _tables()]
-    selectors = (GEOMETRY, ANALYSIS_TYPE, PLANE, METHOD, CRITERION)
-    conditional = [_keys_of_a_value(selector, value) for selector in selectors for value in _values(selector)]
-    shared = [_rule(rule) for rule in RULES]
-    return {"required": list(REQUIRED), "allOf": [*filter(None, required), *conditional, *shared, *_material_rules()]}
-
-
-def _tables() -> Iterator[tuple[tuple[str, ...], type[Any]]]:
-    """The way to each table with keys that may be conditional, and the table."""
-    for section, contents in SECTIONS.items():
-        yield (section,), contents
-    yield ("interface", "debonded", ITEMS), Arc
-    for place in PLACES_OF_LOADS:
-        yield place, MixedLoad
+    required = [_required(path, contents) for path, contents in PLACES_OF_TABLES]
+    return {"required": list(REQUIRED), "allOf": [*filter(None, required), *map(_rule, RULES), *_material_rules()]}
 
 
 def _rule(rule: Rule) -> Schema:
@@ -142,30 +130,22 @@ def _rule(rule: Rule) -> Schema:
     return {"if": {"allOf": [_if(condition) for condition in rule.when]}, "then": schema} if rule.when else schema
 
 
-def _at(path: Sequence[str], schema: Schema) -> Schema:
-    """The schema for what stands at a path, if it is there."""
-    for name in reversed(path):
-        if name == ITEMS:
-            schema = {"items": schema}
-        else:
-            schema = {"properties": {name: _each_or_one(schema) if name == "interface" else schema}}
-    return schema
-
-
-def _each_or_one(schema: Schema) -> Schema:
-    """The schema of a section, or of each of several."""
-    return {"if": {"type": "array"}, "then": {"items": schema}, "else": schema}
+def _at(path: Sequence[str], schema: Schema | bool) -> Schema:
+    """The schema for what stands at a path, if it is there; of several sections of one name in each."""
+    if not path:
+        return {"allOf": [schema]}
+    name, *below = path
+    inner = _at(below, schema) if below else schema
+    if name == ITEMS:
+        return {"items": inner}
+    each = {"if": {"type": "array"}, "then": {"items": inner}, "else": inner}
+    return {"properties": {name: each if name == "interface" else inner}}
 
 
 def _required(path: Sequence[str], contents: type[Any]) -> Schema:
     """The keys that a table always has; empty if there are none."""
     names = [name for name, entry in keys_of(contents).items() if entry.required and not entry.only]
     return _at(path, {"required": names}) if names else {}
-
-
-def _values(selector: Selector) -> Sequence[str]:
-    values: Sequence[str] = keys_of(SECTIONS[selector.section])[selector.key].type.json_schema["enum"]
-    return values
 
 
 def _if(condition: Condition) -> Schema:
@@ -178,31 +158,6 @@ def _if(condition: Condition) -> Schema:
     if selector.section == "interface":  # the first of several, for all agree
         has_value = {"if": {"type": "array"}, "then": {"prefixItems": [has_value]}, "else": has_value}
     return {"properties": {selector.section: has_value}, "required": [selector.section]}
-
-
-def _keys_of_a_value(selector: Selector, value: str) -> Schema:
-    """What follows from a selector's value: required keys, and those that belong to other values."""
-    consequences = [_consequence(path, keys_of(contents), selector, value) for path, contents in _tables()]
-    return {"if": _if(selector.among(value)), "then": {"allOf": [*filter(None, consequences)]}}
-
-
-def _consequence(path: Sequence[str], keys: Mapping[str, Key], selector: Selector, value: str) -> Schema:
-    own = {name: entry for name, entry in keys.items() if selector in [each.selector for each in entry.only]}
-    required = [
-        _presence(name, entry) for name, entry in own.items() if entry.required and _fits(entry, selector, value)
-    ]
-    excluded = {name: False for name, entry in own.items() if not _fits(entry, selector, value)}
-    return _at(path, {"properties": excluded} | ({"allOf": required} if required else {})) if own else {}
-
-
-def _fits(entry: Key, selector: Selector, value: str) -> bool:
-    return all(value in condition.values for condition in entry.only if condition.selector == selector)
-
-
-def _presence(name: str, entry: Key) -> Schema:
-    """That a key is there, or one that it is not required beside."""
-    there: list[Schema] = [{"required": [each]} for each in (name, *entry.unless)]
-    return {"anyOf": there} if entry.unless else there[0]
 
 
 def _material_rules() -> list[Schema]:

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import product
+from typing import Any
 
 from feti_homog.case.cell_files import FEWEST_MATCHED
 from feti_homog.case.cell_section import MESH, MESHED, TABLE, Cell
 from feti_homog.case.element_sizes import ASKED, CHOSEN
-from feti_homog.case.interface_section import ARCS, STIFFNESSES, STRENGTHS
-from feti_homog.case.mixed_load import components
+from feti_homog.case.interface_section import ARCS, STIFFNESSES, STRENGTHS, Arc
+from feti_homog.case.mixed_load import MixedLoad, components
 from feti_homog.case.section_values import MESH_FILE, MESH_SUFFIXES
-from feti_homog.case.sections import OUT_OF_PLANE_STRESSES, SECTIONS_OF_AN_ANALYSIS, Analysis
+from feti_homog.case.sections import OUT_OF_PLANE_STRESSES, SECTIONS, SECTIONS_OF_AN_ANALYSIS
 from feti_homog.case.selectors import (
     ANALYSIS_TYPE,
     ANGLE_ANALYSIS,
@@ -24,13 +26,17 @@ from feti_homog.case.selectors import (
     PLANE,
 )
 from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS, STRESSES
-from feti_homog.schema.keys import Condition, keys_of
-from feti_homog.schema.rules import ITEMS, Path, Place, Rule, Schema, exclusive, misplaced, needed, refused
+from feti_homog.schema.keys import Condition, Selector, keys_of
+from feti_homog.schema.rules import ITEMS, Path, Place, Rule, Schema, belonging, exclusive, misplaced, needed, refused
 from feti_homog.schema.values import INF
-from feti_homog.schema.wording import toml_value
 
 CELL, INTERFACE, LOADS = ("cell",), ("interface",), ("strain", "to", "waypoints")
 PLACES_OF_LOADS: tuple[Path, ...] = (("path", "to"), ("path", "waypoints", ITEMS), ("load", "to"))
+PLACES_OF_TABLES: tuple[tuple[Path, type[Any]], ...] = (
+    *(((section,), contents) for section, contents in SECTIONS.items()),
+    (("interface", "debonded", ITEMS), Arc),
+    *((place, MixedLoad) for place in PLACES_OF_LOADS),
+)
 ALONG_FIBRES = [name for name in (*SPATIAL_STRESSES, *SPATIAL_STRAINS) if name not in (*STRESSES, *STRAINS)]
 SOME_ARC: Schema = {"required": ["debonded"], "properties": {"debonded": {"minItems": 1}}}
 NO_TABLES: Schema = {"not": {"anyOf": [{"type": "object"}, {"type": "array"}]}}
@@ -41,15 +47,30 @@ def _any_section(schema: Schema) -> Schema:
     return {"anyOf": [{"type": "object", **schema}, {"type": "array", "contains": schema}, NO_TABLES]}
 
 
+def _values(selector: Selector) -> list[str]:
+    """The values that a selector may have."""
+    values: list[str] = keys_of(SECTIONS[selector.section])[selector.key].type.json_schema["enum"]
+    return values
+
+
 def _sections_of_an_analysis() -> Iterator[Rule]:
     """Sections that one type of analysis needs, and that no other has."""
     for section, own in SECTIONS_OF_AN_ANALYSIS.items():
-        words = own.in_words(section)
-        yield _document({"required": [section]}, f"[{section}]: missing section; {words} needs it", own)
-        for other in keys_of(Analysis)["type"].type.json_schema["enum"]:
-            if other not in own.values:
-                line = f"[{section}]: belongs to {words}, not {toml_value(other)}"
-                yield _document({"properties": {section: False}}, line, ANALYSIS_TYPE.among(other))
+        line = f"[{section}]: missing section; {own.in_words(section)} needs it"
+        yield _document({"required": [section]}, line, own)
+        yield belonging((section,), own, _values(ANALYSIS_TYPE))
+
+
+def _conditional_keys() -> Iterator[Rule]:
+    """Keys that some cases have or need, and others have not."""
+    for path, contents in PLACES_OF_TABLES:
+        for name, entry in keys_of(contents).items():
+            for k, condition in enumerate(entry.only):
+                above, values = entry.only[:k], _values(condition.selector)
+                yield belonging((*path, name), condition, values, *above, instead=entry.instead)
+            if entry.required and entry.only:
+                line = f"missing; expected {entry.type.expected}"
+                yield needed(path, name, line, *entry.only, unless=entry.unless)
 
 
 def _document(schema: Schema, line: str, *when: Condition) -> Rule:
@@ -149,16 +170,14 @@ def _bonds() -> Iterator[Rule]:
 
 def _along_fibres() -> Iterator[Rule]:
     """Components that generalized plane strain alone has."""
-    for plane in IN_THE_PLANE.values:
-        owner, only = f"{GENERALIZED.in_words('')}, not {toml_value(plane)}", PLANE.among(plane)
-        outside: Schema = {"enum": [*OUT_OF_PLANE_STRESSES]}
-        yield refused(("output", "stress"), outside, f"belongs to {owner}", only)
-        axes = ("envelope", "plane", ITEMS)
-        yield refused(axes, {"enum": ALONG_FIBRES}, f"belongs to {owner}", only)
+    for path, names in ((("output", "stress"), OUT_OF_PLANE_STRESSES), (("envelope", "plane", ITEMS), ALONG_FIBRES)):
+        rule = belonging(path, GENERALIZED, _values(PLANE))
+        yield replace(rule, schema={"not": {"enum": [*names]}})
 
 
 RULES = (
     *_sections_of_an_analysis(),
+    *_conditional_keys(),
     *_cell(),
     *_files(),
     exclusive(("decomposition",), "subdomains", "max_dofs"),

@@ -75,14 +75,6 @@ class Key:
         """Whether the key belongs to the table; not, if that depends on a faulty selector."""
         return all(selected.get(condition.selector) in condition.values for condition in self.only)
 
-    def owner(self, selected: Selected, section: str) -> str:
-        """To what the key belongs, if that is another case than the one selected; else empty."""
-        for condition in self.only:
-            found = selected.get(condition.selector)
-            if found is not None and found not in condition.values:
-                return f"{condition.in_words(section)}, not {toml_value(found)}"
-        return ""
-
 
 def key(
     type_: ValueType,
@@ -158,7 +150,7 @@ class TableReader:
             for name, value in table.items()
             if name not in keys
         }
-        known = {name: self._fault(name, entry, table, section) for name, entry in keys.items()}
+        known = {name: self._fault(name, entry, table) for name, entry in keys.items()}
         faulty = {name: words for name, words in (unknown | known).items() if words}
         self.faults += [f"[{section}] {prefix}{toml_key(name)}{words}" for name, words in faulty.items()]
         values = {
@@ -176,17 +168,12 @@ class TableReader:
             return self.read(type_.table, value, section, f"{place}.")
         return type_.store(value)
 
-    def _fault(self, name: str, entry: Key, table: Mapping[str, Any], section: str) -> str:
-        """What is wrong with one known key, empty if nothing."""
+    def _fault(self, name: str, entry: Key, table: Mapping[str, Any]) -> str:
+        """What is wrong with one known key, whatever the case, empty if nothing."""
         if name not in table:
-            missing = entry.required and not {*entry.unless} & {*table} and entry.belongs(self.selected)
-            return f": missing; expected {entry.type.expected}" if missing else ""
-        line = f" = {toml_value(table[name])}: "
-        owner = entry.owner(self.selected, section)
-        if owner:
-            return f"{line}belongs to {owner}{f'; use {entry.instead}' if entry.instead else ''}"
+            return f": missing; expected {entry.type.expected}" if entry.required and not entry.only else ""
         complaint = entry.type.complaint(table[name])
-        return f"{line}{complaint}" if complaint else ""
+        return f" = {toml_value(table[name])}: {complaint}" if complaint else ""
 
 
 def to_table(instance: Any, selected: Selected) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Any
 
@@ -21,11 +21,12 @@ _TYPES: dict[str, Any] = {"object": dict, "array": list, "string": str}
 
 @dataclass(frozen=True)
 class Place:
-    """A value of a document: its section as faults name it, its place there, and itself."""
+    """A value of a document: its section as faults name it, its place there, itself, and what the document selects."""
 
     section: str
     key: str
     value: Any
+    selected: Selected = field(default_factory=dict)
 
     def named(self, *names: str) -> str:
         """Keys of the table at this place, as the beginning of a fault."""
@@ -50,7 +51,7 @@ class Rule:
     """
 
     path: Path
-    schema: Schema
+    schema: Schema | bool
     fault: Callable[[Place], str]
     when: tuple[Condition, ...] = ()
 
@@ -59,7 +60,7 @@ class Rule:
         if all(selected.get(condition.selector) in condition.values for condition in self.when):
             for place in _places(document, self.path):
                 if not holds(self.schema, place.value):
-                    yield self.fault(place)
+                    yield self.fault(replace(place, selected=selected))
 
 
 def exclusive(path: Path, *names: str, words: str = "exclude each other; give one", beside: Sequence[str] = ()) -> Rule:
@@ -84,6 +85,18 @@ def misplaced(path: Path, name: str, owner: str, words: str = "") -> Rule:
     line = f"belongs to {owner}, which is missing{words}"
     schema = {"if": {"required": [name]}, "then": {"required": [owner]}}
     return Rule(path, schema, lambda place: f"{place.named(name)}: {line}")
+
+
+def belonging(path: Path, condition: Condition, values: Sequence[str], *when: Condition, instead: str = "") -> Rule:
+    """A key or section, at the end of the path, belongs to cases in which a selector has some of its values."""
+    others = tuple(value for value in values if value not in condition.values)
+
+    def fault(place: Place) -> str:
+        start = place.given if place.key else f"[{path[0]}]"
+        owner = f"{condition.in_words(path[0])}, not {toml_value(place.selected[condition.selector])}"
+        return f"{start}: belongs to {owner}{f'; use {instead}' if instead else ''}"
+
+    return Rule(path, False, fault, (*when, condition.selector.among(*others)))
 
 
 def refused(path: Path, schema: Schema, words: str, *when: Condition) -> Rule:
