@@ -57,6 +57,7 @@ FLOORS = (
     ("interface",),
     ("homogenization",),
     ("results",),
+    ("report.analyses",),
     ("report.text",),
     ("report.plots",),
     ("report.html",),

@@ -10,6 +10,7 @@ from bokeh.models import ColumnDataSource, HoverTool
 from bokeh.plotting import figure
 
 from feti_homog.materials.voigt import STRESSES, voigt_names
+from feti_homog.report.analyses import reported
 from feti_homog.report.plots.interface_marks import BONDED, CLOSED, OPEN, STATE_COLOURS, STATE_NAMES
 from feti_homog.report.plots.response_curves import INK
 from feti_homog.report.text.point_tables import shown_entries
@@ -27,13 +28,13 @@ Curves = Mapping[str, Array]
 def figures(document: Document) -> dict[str, Any]:
     """The figures of a result by name; none for a stiffness with debonded faces, which is not linear."""
     unit = document["case"]["output"].get("stress_unit", "") or "unit of the moduli"
-    if document.get("path"):
-        return _path(document, unit)
-    if document.get("angle"):
-        return _angle(document["angle"], unit)
-    if document.get("moduli") is not None:
-        return {"young": _young(np.array(document["effective_stiffness"]), unit)}
-    return {}
+    name = reported(document).name
+    return FIGURES[name](document, unit) if name in FIGURES else {}
+
+
+def _stiffness(document: Document, unit: str) -> dict[str, Any]:
+    linear = document.get("moduli") is not None
+    return {"young": _young(np.array(document["effective_stiffness"]), unit)} if linear else {}
 
 
 def _path(document: Document, unit: str) -> dict[str, Any]:
@@ -58,7 +59,8 @@ def _path(document: Document, unit: str) -> dict[str, Any]:
     return {"curve": _finished(first), "along": _finished(second), "counts": _counts(points, number, second.x_range)}
 
 
-def _angle(points: Sequence[Document], unit: str) -> dict[str, Any]:
+def _angle(document: Document, unit: str) -> dict[str, Any]:
+    points = document["angle"]
     angles, number = np.array([point["angle"] for point in points]), np.arange(len(points))
     if points[0].get("stiffness") is not None:
         stiffness = np.array([point["stiffness"] for point in points])
@@ -134,3 +136,6 @@ def _finished(drawn: Any) -> Any:
     drawn.outline_line_color = None
     drawn.title.text_font_size = "14px"
     return drawn
+
+
+FIGURES = {"stiffness": _stiffness, "angle": _angle, "path": _path}

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feti_homog.materials.voigt import voigt_names
+from feti_homog.report.analyses import reported
 from feti_homog.report.plots.decimation import DrawnMesh, drawn_displacement, drawn_mesh, outline_edges
 from feti_homog.report.plots.deformed_panels import shown_scale
 from feti_homog.report.plots.interface_marks import STATE_COLOURS, STATE_NAMES, STATE_WIDTHS, InterfaceEdges
 from feti_homog.report.plots.plot_helpers import drawn_stress, stress_component, value_range
-from feti_homog.results import kept_points
 from feti_homog.results.path_curves import FAINT, components_above
 
 MOST_STATES, TRIANGLES = 48, 8000  # of the viewer, which keep a page below some megabytes
@@ -33,7 +33,7 @@ def viewer_data(file: Any, document: Document) -> dict[str, Any]:
     drawn = drawn_mesh(file, TRIANGLES)
     borders = outline_edges(drawn, drawn.body)
     edges = InterfaceEdges.of(file, drawn, borders)
-    numbers = _numbers(file, document)
+    numbers = reported(document).states(document, MOST_STATES, len(file["state"]))
     shown = [file[f"state/{number}"] for number in numbers]
     stresses = voigt_names(len(shown[0].attrs["strain"]))[1]
     component = stress_component(document["case"]["output"].get("stress", "auto"), shown)
@@ -52,14 +52,6 @@ def viewer_data(file: Any, document: Document) -> dict[str, Any]:
     }
 
 
-def _numbers(file: Any, document: Document) -> list[int]:
-    """The states that are shown: all, or of many some."""
-    count = len(file["state"])
-    if document.get("path"):
-        return kept_points.chosen_states(document, MOST_STATES, count)
-    return sorted({round(k) for k in np.linspace(0, count - 1, min(MOST_STATES, count))})
-
-
 def _state(file: Any, number: int, drawn: DrawnMesh, edges: InterfaceEdges, document: Document) -> dict[str, Any]:
     state = file[f"state/{number}"]
     displacement = drawn_displacement(state, drawn)
@@ -72,7 +64,7 @@ def _state(file: Any, number: int, drawn: DrawnMesh, edges: InterfaceEdges, docu
     words = [f"{name} = {value:.4g}" for name, value in loads]
     return {
         "number": number,
-        "point": int(attributes["point"]) if document.get("angle") or document.get("path") else None,
+        "point": int(attributes["point"]) if reported(document).is_curve else None,
         "label": str(attributes["label"]),
         "load": ", ".join(words) or "no strain",
         "stress": [float(value) for value in attributes["stress"]],

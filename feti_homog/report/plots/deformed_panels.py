@@ -16,6 +16,7 @@ from matplotlib.ticker import MaxNLocator
 from PIL import Image
 
 from feti_homog.errors import FetiHomogError
+from feti_homog.report.analyses import reported
 from feti_homog.report.plots.decimation import DrawnMesh, drawn_displacement, drawn_mesh, largest_scale, outline_edges
 from feti_homog.report.plots.interface_marks import STATE_NAMES, InterfaceEdges, state_legend
 from feti_homog.report.plots.load_labels import LoadLabels
@@ -129,16 +130,26 @@ def plot(directory: Path, file: Any, document: Document) -> list[Path]:
     count = len(file.get("state", ()))
     if not count:
         return []
+    return PANELS[reported(document).name](directory, file, document, count)
+
+
+def _angle(directory: Path, file: Any, document: Document, count: int) -> list[Path]:
+    # The first of the unit cases, if there are three an angle.
+    every = range(0, count, count // len(document["angle"]) or 1)
+    numbers = [every[round(k)] for k in np.linspace(0, len(every) - 1, min(MAX_PANELS, len(every)))]
+    panels = _side_by_side(file, numbers, document, shown_scale(file, document))
+    return [save(panels, directory / "angle_states.png")]
+
+
+def _path(directory: Path, file: Any, document: Document, count: int) -> list[Path]:
     scale = shown_scale(file, document)
-    if "angle" in document:
-        # The first of the unit cases, if there are three an angle.
-        every = range(0, count, count // len(document["angle"]) or 1)
-        numbers = [every[round(k)] for k in np.linspace(0, len(every) - 1, min(MAX_PANELS, len(every)))]
-        return [save(_side_by_side(file, numbers, document, scale), directory / "angle_states.png")]
     panels = _side_by_side(file, kept_points.chosen_states(document, MAX_PANELS, count), document, scale)
     paths = [save(panels, directory / "path_states.png")]
     frames = kept_points.chosen_states(document, MAX_FRAMES, count)
     return [*paths, _animation(file, frames, document, scale, directory / "path.gif")]
+
+
+PANELS = {"angle": _angle, "path": _path}
 
 
 def shown_scale(file: Any, document: Mapping[str, Any]) -> float:
@@ -151,27 +162,14 @@ def shown_scale(file: Any, document: Mapping[str, Any]) -> float:
     drawn = drawn_mesh(file, PANEL_LIMIT)
     displacement = opening = 0.0
     largest = math.inf
-    for number in _frames(document, len(file["state"])):
+    for number in reported(document).states(document, MAX_FRAMES, len(file["state"])):
         state = file[f"state/{number}"]
         u = drawn_displacement(state, drawn)
         displacement, largest = max(displacement, largest_length(u)), min(largest, largest_scale(u, drawn))
         opening = max(opening, float(state["jump"][:, 0].max(initial=0.0)))
     size = float(min(file.attrs["width"], file.attrs["height"]))
     scale = magnification(displacement, size, opening, largest)
-    return max(scale, 1.0) if _is_load_given(document) else scale
-
-
-def _is_load_given(document: Mapping[str, Any]) -> bool:
-    """Whether states are under a load of the case, not under unit strains."""
-    angle = document.get("case", {}).get("angle", {})
-    return "path" in document or "load" in document or angle.get("strain") is not None
-
-
-def _frames(document: Mapping[str, Any], count: int) -> list[int]:
-    """Numbers of at most MAX_FRAMES of so many states."""
-    if "path" in document:
-        return kept_points.chosen_states(document, MAX_FRAMES, count)
-    return sorted({round(k) for k in np.linspace(0, count - 1, min(MAX_FRAMES, count))})
+    return max(scale, 1.0) if reported(document).is_load_given(document) else scale
 
 
 def _side_by_side(file: Any, numbers: Sequence[int], document: Document, scale: float) -> Figure:

@@ -17,6 +17,7 @@ from matplotlib.tri import Triangulation
 
 from feti_homog.errors import FetiHomogError
 from feti_homog.materials.voigt import voigt_names
+from feti_homog.report.analyses import reported
 from feti_homog.report.plots import cell_picture, deformed_panels, response_curves, traction_plots
 from feti_homog.report.plots.decimation import (
     DrawnMesh,
@@ -91,14 +92,14 @@ def _pictures(directory: Path, document: Mapping[str, Any]) -> list[Path]:
         borders = outline_edges(drawn, drawn.body)
         interface_edges = InterfaceEdges.of(file, drawn, borders)
         paths = [save(cell_picture.figure(file, drawn, borders), directory / "cell.png")]
-        if "angle" in document or "path" in document:
+        if reported(document).is_curve:
             paths += deformed_panels.plot(directory, file, document)
         else:
             for number in sorted(file.get("state", ()), key=int):
                 state = file[f"state/{number}"]
                 draw = _sheared if is_axial(state) else _deformed
                 figure = draw(file, state, drawn, borders, interface_edges, document)
-                name = "load" if document.get("load") else _name(number, state.attrs)
+                name = reported(document).picture or _name(number, state.attrs)
                 paths.append(save(figure, directory / f"{name}.png"))
         return paths + traction_plots.plot(directory, file, interface_edges, document)
 

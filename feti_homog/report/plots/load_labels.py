@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, voigt_names
+from feti_homog.report.analyses import reported
 from feti_homog.report.plots.plot_helpers import strain_symbols
 from feti_homog.results.path_curves import FAINT, ZERO, components_above, leading_component
 
@@ -37,10 +38,11 @@ class LoadLabels:
     @classmethod
     def of(cls, document: Mapping[str, Any]) -> LoadLabels:
         """Those of a result.json."""
-        if document.get("path"):
-            largest = np.abs([point["stress"] for point in document["path"]]).max()
+        analysis = reported(document)
+        if analysis.is_followed:
+            largest = np.abs([point["stress"] for point in document[analysis.name]]).max()
             return cls(leading_component(document), ZERO * float(largest))
-        return cls(given=document["case"]["load"]["to"] if document.get("load") else None)
+        return cls(given=document["case"][analysis.name]["to"] if analysis.picture else None)
 
     def words(self, attributes: Any) -> list[str]:
         """The strains that are seen, and the temperature, of a state with these attributes, as formulas; of a path on

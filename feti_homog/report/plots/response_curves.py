@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 
 from feti_homog.materials.voigt import STRESSES, voigt_names
+from feti_homog.report.analyses import reported
 from feti_homog.report.plots import envelope_plot
 from feti_homog.report.plots.interface_marks import BONDED, CLOSED, OPEN, STATE_COLOURS, STATE_NAMES
 from feti_homog.report.plots.plot_helpers import bond_limits, interfaces_of, plain, save, strain_symbols, unit_label
@@ -31,13 +32,8 @@ STATES = {BONDED: "bonded", OPEN: "open", CLOSED: "closed"}
 
 def plot(directory: Path, document: Document) -> list[Path]:
     """angle.png, path.png or envelope.png beside result.json, if the document has such points."""
-    if document.get("envelope"):
-        return [save(envelope_plot.figure(document), directory / "envelope.png")]
-    if document.get("angle"):
-        return [save(_angle(document), directory / "angle.png")]
-    if document.get("path"):
-        return [save(_path(document), directory / "path.png")]
-    return []
+    name = reported(document).name
+    return [save(CURVES[name](document), directory / f"{name}.png")] if name in CURVES else []
 
 
 def _angle(document: Document) -> Figure:
@@ -198,3 +194,6 @@ def _finish(axes: Axes) -> None:
     axes.spines[["top", "right"]].set_visible(False)
     if axes.get_legend_handles_labels()[0]:
         axes.legend(frameon=False, fontsize=9, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+
+
+CURVES = {"angle": _angle, "path": _path, "envelope": envelope_plot.figure}

@@ -16,6 +16,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components, depth_first_order
 from scipy.spatial import cKDTree
 
+from feti_homog.report.analyses import reported
 from feti_homog.report.plots.interface_marks import (
     BONDED,
     CLOSED,
@@ -49,7 +50,11 @@ def plot(directory: Path, file: Any, edges: InterfaceEdges, document: Mapping[st
     # After all bonds are gone there is not much left to see, unless the faces touch.
     last = next((n for n in reversed(names) if 0 < debonded[n] < total or _touching(file, n)), names[-1])
     partly = [name for name in names if 0 < debonded[name] < total]
-    shown = list(dict.fromkeys([names[0], last])) if "path" in document else [(partly or [last])[len(partly) // 2]]
+    shown = (
+        list(dict.fromkeys([names[0], last]))
+        if reported(document).is_followed
+        else [(partly or [last])[len(partly) // 2]]
+    )
     return [save(_figure(file, edges, shown, LoadLabels.of(document)), directory / "interface.png")]
 
 

@@ -39,10 +39,9 @@ def shown_entries(points: Sequence[Point]) -> dict[str, tuple[int, int]]:
     return ENTRIES if len(points[0]["stiffness"]) == len(STRAINS) else SPATIAL_ENTRIES
 
 
-def all_numbers(key: str, document: Document, label: str, most: int) -> Table:
-    """The numbers and stresses, or entries of the stiffness, of an angle's or a path's points, of many some."""
+def all_numbers(key: str, document: Document, label: str, numbers: Sequence[int]) -> Table:
+    """The numbers and stresses, or entries of the stiffness, of these points of an angle or a path."""
     points = document[key]
-    numbers = chosen(document, most) if key == "path" else range(min(len(points), most))
     some = "" if len(numbers) == len(points) else f", {len(numbers)} of {len(points)}"
     names = [name for name, value in points[0].items() if isinstance(value, int | float)]
     stiff = points[0].get("stiffness") is not None

@@ -10,6 +10,7 @@ from typing import Any
 
 from feti_homog.case.element_sizes import ASKED
 from feti_homog.materials.plane_state import plane_state_of
+from feti_homog.report.analyses import reported
 from feti_homog.report.text import point_tables, stiffness_tables
 from feti_homog.report.text.point_tables import WIDTH
 from feti_homog.report.text.units import in_brackets
@@ -18,13 +19,6 @@ LABEL = 12  # columns of the labels at the left
 NAME = 28  # columns of the names of checks
 GLUE = "\N{NO-BREAK SPACE}"  # at which no line is broken
 LISTED = 12  # numbers of iterations that are reported one by one
-TITLES = {
-    "stiffness": "effective stiffness",
-    "angle": "debonding angle",
-    "path": "load path",
-    "load": "equilibrium under a load",
-    "envelope": "onset of debonding",
-}
 
 Document = Mapping[str, Any]
 
@@ -66,7 +60,7 @@ def short_summary(document: Document) -> str:
 def title_of(document: Document) -> str:
     """Name, analysis and plane state of the case."""
     case = document["case"]
-    what = TITLES[case["analysis"]["type"]]
+    what = reported(document).title
     return f"{case.get('name', '')}: {what}, plane {case['analysis']['plane']}".lstrip(": ")
 
 
@@ -84,20 +78,29 @@ def _answer(document: Document) -> list[list[str]]:
     output = document["case"].get("output", {})
     unit, length = output.get("stress_unit", ""), output.get("length_unit", "")
     label, toughness = in_brackets(unit), in_brackets(f"{unit} {length}") if unit and length else ""
-    if "angle" in document:
-        points = document["angle"]
-        tables = [point_tables.angle_table(points, label), *point_tables.angle_tip_table(points, toughness)]
-        return [table.lines for table in tables]
-    if "path" in document:
-        return [point_tables.path_table(document, label).lines]
-    if "load" in document:
-        tips = point_tables.tip_table(document["load"].get("tips"), toughness)
-        return [point_tables.load_lines(document, label), *(table.lines for table in tips)]
-    onsets = [point_tables.envelope_lines(document, label)] if "envelope" in document else []
-    return onsets + _stiffness_blocks(document, label, toughness)
+    return ANSWERS[reported(document).name](document, label, toughness)
 
 
-def _stiffness_blocks(document: Document, label: str, toughness: str) -> list[list[str]]:
+def _angle(document: Document, label: str, toughness: str) -> list[list[str]]:
+    points = document["angle"]
+    tables = [point_tables.angle_table(points, label), *point_tables.angle_tip_table(points, toughness)]
+    return [table.lines for table in tables]
+
+
+def _path(document: Document, label: str, toughness: str) -> list[list[str]]:
+    return [point_tables.path_table(document, label).lines]
+
+
+def _load(document: Document, label: str, toughness: str) -> list[list[str]]:
+    tips = point_tables.tip_table(document["load"].get("tips"), toughness)
+    return [point_tables.load_lines(document, label), *(table.lines for table in tips)]
+
+
+def _envelope(document: Document, label: str, toughness: str) -> list[list[str]]:
+    return [point_tables.envelope_lines(document, label), *_stiffness(document, label, toughness)]
+
+
+def _stiffness(document: Document, label: str, toughness: str) -> list[list[str]]:
     """The effective stiffness with what follows from it; units in brackets."""
     blocks = [table.lines for table in stiffness_tables.stiffnesses(document, label)]
     tips = [table.lines for table in point_tables.tip_table(document.get("tips"), toughness)]
@@ -109,6 +112,9 @@ def _stiffness_blocks(document: Document, label: str, toughness: str) -> list[li
     bounds = [table.lines for table in stiffness_tables.bounds(document, label)]
     moduli = stiffness_tables.moduli_lines(document, label)
     return [*blocks, moduli, *(bounds or [["Bounds: none of cells with voids"]])]
+
+
+ANSWERS = {"stiffness": _stiffness, "angle": _angle, "path": _path, "load": _load, "envelope": _envelope}
 
 
 def _cell(document: Document) -> list[str]:

@@ -78,6 +78,8 @@ def made(kind: str, **answer: Any) -> Result:
     if kind == "load":
         case["analysis"]["plane"] = "generalized"
         case["load"] = {"to": {"S22": 50.0, "temperature": -100.0}}
+    if "compliance" in answer:
+        case["analysis"]["plane"] = "generalized"
     if "tips" in answer:
         case["interface"] = {"contact": True}
     return Result(
