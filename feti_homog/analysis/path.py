@@ -90,7 +90,7 @@ def _points(
     cell, waypoints = context.loads.interfaces, [context.loads.load(target) for target in context.case.targets]
     begin = unloaded(cell, context.bonds(None))
     for number in range(known):
-        point, energies = restored(context.checkpoint.read(number))
+        point, energies = restored(context.checkpoint.read(number), cell)
         begin = point.after
         yield point, energies
     if path.method == "events":
@@ -174,7 +174,11 @@ def _kept(
     tips = TipRecorder(context.cell, context.loads.interfaces, law) if law.has_toughness else None
     with context.progress.stage("states") as words:
         for number in context.progress.bar(numbers, "states"):
-            point = last if number == len(entries) - 1 else restored(context.checkpoint.read(number))[0]
+            point = (
+                last
+                if number == len(entries) - 1
+                else restored(context.checkpoint.read(number), context.loads.interfaces)[0]
+            )
             if tips is not None:
                 entries[number]["tips"] = tips.of(point)
             if context.states.has_place:

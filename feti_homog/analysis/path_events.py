@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 
 from feti_homog.feti.dual_solution import DualSolution
+from feti_homog.interface.contact.contact_problem import ContactProblem
+from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BondState, Equilibrium
 from feti_homog.interface.loads.load import Load
 from feti_homog.interface.loads.macroscopic import Macroscopic
@@ -71,13 +73,13 @@ def stored(point: Point, work: Work) -> tuple[dict[str, Any], Arrays]:
     return whole, distributed
 
 
-def restored(event: Arrays) -> tuple[Point, tuple[Energies, float]]:
-    """What `stored` took apart: the point, and `all_equilibria` and `load_controlled` of the energies up to it."""
+def restored(event: Arrays, cell: CoupledInterfaces) -> tuple[Point, tuple[Energies, float]]:
+    """Put together what `stored` took apart of an event of a cell: the point, and the energies up to it."""
     load_factor, scale, leg, position, broke = event["path"].tolist()
     energies = event["energies"].tolist()
-    state = _put_together(event, "")
-    if f"lam{AXIAL}" in event:
-        state = replace(state, axial=_put_together(event, AXIAL))
+    state = _put_together(event, cell.plane, "")
+    if cell.axial is not None:
+        state = replace(state, axial=_put_together(event, cell.axial, AXIAL))
     origin_strain, origin_stress, strain, stress = event["macroscopic"]
     broken = float(event["broken"])
     after = PathState(
@@ -107,13 +109,14 @@ def _taken_apart(state: Equilibrium) -> tuple[dict[str, Any], Arrays]:
     return whole, {"status": state.status, "history": state.bonds.history, "lam": solution.lam, "jump": solution.jump}
 
 
-def _put_together(event: Arrays, suffix: str) -> Equilibrium:
+def _put_together(event: Arrays, interface: ContactProblem, suffix: str) -> Equilibrium:
     """What `_taken_apart` took apart."""
     strain, lam, jump, alpha = (event[f"{name}{suffix}"] for name in ("strain", "lam", "jump", "alpha"))
     iterations, solves, free_motions, last, reason = event[f"numbers{suffix}"].tolist()
-    solution = DualSolution(strain, lam, jump, alpha, last, reason, float(event[f"residual{suffix}"]))
     certificate = dict(zip(KKT_LAWS, event[f"certificate{suffix}"].tolist(), strict=True))
     values, by_stress = event[f"load{suffix}"]
     load = Load(values, by_stress.astype(bool))
     bonds = BondState(event[f"status{suffix}"], event[f"history{suffix}"])
+    residual, C = float(event[f"residual{suffix}"]), interface.compliance(bonds)
+    solution = DualSolution(strain, lam, jump, alpha, last, reason, residual, C)
     return Equilibrium(load, bonds, solution, iterations, solves, free_motions, certificate)

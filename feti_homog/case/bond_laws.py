@@ -21,6 +21,7 @@ class BondLawEntry:
         limits: keys of which one must be finite for any bond to break; none if the law always has a limit.
         description: of what reaches 1 when a bond breaks, for the key `criterion`.
         symbols: (symbol, key) pairs that label the law in pictures.
+        softens: the compliance of springs grows before a bond parts.
         has_process_zone: elements must resolve the length along which bonds break.
     """
 
@@ -31,6 +32,7 @@ class BondLawEntry:
     symbols: tuple[tuple[str, str], ...]
     needs: tuple[str, ...] = ()
     limits: tuple[str, ...] = ()
+    softens: bool = False
     has_process_zone: bool = False
 
 

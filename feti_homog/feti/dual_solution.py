@@ -18,6 +18,7 @@ class DualSolution:
         alpha: (kernel dimension,) rigid-body amplitudes.
         iterations, reason: of the Krylov method (PETSc's KSPConvergedReason).
         residual: |B u* - C lam| on the active rows, relative to the jump of the torn cell.
+        compliance: (owned rows,) C of the springs in this state.
     """
 
     strain: Float
@@ -27,3 +28,4 @@ class DualSolution:
     iterations: int
     reason: int
     residual: float
+    compliance: Float

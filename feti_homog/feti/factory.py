@@ -66,10 +66,11 @@ def build(
     subdomains: Sequence[Subdomain],
     applications: int,
     compliance: Float,
+    soften: bool,
     thresholds: Thresholds = DEFAULTS,
 ) -> SolverParts:
-    """Factor the subdomains and set up what the options and sizes ask for; `compliance` (owned rows,) is C.
-    Collective.
+    """Factor the subdomains and set up what the options and sizes ask for; `compliance` (owned rows,) is C, which may
+    grow if the springs `soften`.  Collective.
 
     Options: `feti_dual_operator`, `feti_pc_type`, `feti_coarse_space`, `feti_coarse_threshold`.
 
@@ -102,8 +103,9 @@ def build(
                 comm, jump_operator, operators, preconditioner, options.threshold, thresholds
             )
         preconditioner = Balanced(preconditioner, adaptive)
-    if plan.preconditioner == "dirichlet" and comm.allreduce(bool(operators.compliance.any()), MPI.LOR):
-        preconditioner = WithSprings(comm, preconditioner, jump_operator.owned[0], operators.compliance)
+    left_out = operators.compliance if plan.preconditioner == "dirichlet" else np.zeros(len(compliance))
+    if soften or comm.allreduce(bool(left_out.any()), MPI.LOR):
+        preconditioner = WithSprings(comm, preconditioner, jump_operator.owned[0], left_out)
     return SolverParts(operators, preconditioner, natural, adaptive)
 
 

@@ -59,6 +59,7 @@ class FetiSolver:
         problem: the displacements and the unit loads.
         jump_operator: B and the layout of the multipliers.
         interface_operators: S and S+ of this rank's subdomains.
+        intact_compliance: (owned rows,) C of the springs before any has softened.
         operator: F + C.
         preconditioner: M^-1, or H_0 with the adaptive coarse space.
         natural: the rigid-body motions, G and P.
@@ -86,8 +87,9 @@ class FetiSolver:
         """
         self.comm, self.subdomains, self.problem = comm, subdomains, problem
         self.jump_operator = JumpOperator(comm, shared, subdomains, lattice, problem)
-        compliance = springs.compliance(self.jump_operator)
-        parts = factory.build(comm, self.jump_operator, subdomains, applications, compliance, thresholds)
+        self.intact_compliance = compliance = springs.compliance(self.jump_operator)
+        options = applications, compliance, springs.soften, thresholds
+        parts = factory.build(comm, self.jump_operator, subdomains, *options)
         self.interface_operators, self.preconditioner = parts.operators, parts.preconditioner
         self.natural, self.adaptive, self.coarse_dimension = parts.natural, parts.adaptive, parts.coarse_dimension
         self.operator = DualOperator(self.jump_operator, self.interface_operators, compliance)
@@ -155,10 +157,15 @@ class FetiSolver:
         forces = self.comm.allreduce(self.d.T @ solution.lam)
         return np.asarray(self.torn_stiffness @ solution.strain + forces)
 
-    def activate(self, active: Float) -> None:
-        """Let only the owned rows where `active` is 1 carry multipliers; refactors the coarse problem alone.
-        Collective."""
-        if self.comm.allreduce(bool((active != self.active.mask).any()), MPI.LOR):
+    def set_state(self, active: Float, compliance: Float) -> None:
+        """Let only the owned rows where `active` is 1 carry multipliers, and springs have this C (owned rows,), no less
+        than at first; refactors the coarse problem alone.  Collective.  Raises as `Preconditioner.soften`."""
+        changed = bool((active != self.active.mask).any()) + 2 * bool((compliance != self.operator.compliance).any())
+        change = self.comm.allreduce(changed, MPI.BOR)
+        if change >= 2:
+            self.preconditioner.soften(compliance - self.intact_compliance)
+            self.operator.compliance = compliance
+        if change:
             self.active.mask = active
             self.natural.activate(active)
             self.preconditioner.activate(active)
@@ -203,7 +210,7 @@ class FetiSolver:
 
     def opening(self, solution: DualSolution) -> Float:
         """(owned rows,) B u*: what the springs give way, and the jump of rows without multipliers."""
-        return solution.jump + self.operator.compliance * solution.lam
+        return solution.jump + solution.compliance * solution.lam
 
     def boundary_displacement(self, solution: DualSolution) -> Float:
         """(boundary dofs,) u* of a solution, Eq. (34).  Collective."""
@@ -269,12 +276,9 @@ class FetiSolver:
             alpha -= self.natural.amplitudes(self.active.restrict(jump))
             jump = jump + self.natural.G @ alpha
         residual = self._jumps.norms(self.active.restrict(jump)) / np.where(scale > 0, scale, 1.0)
-        return [
-            DualSolution(
-                strain, lam[:, k].copy(), jump[:, k].copy(), alpha[:, k].copy(), iterations, reason, float(residual[k])
-            )
-            for k, strain in enumerate(strains)
-        ]
+        C, parts = self.operator.compliance, (strains, lam.T.copy(), jump.T.copy(), alpha.T.copy(), residual)
+        rows = zip(*parts, strict=True)
+        return [DualSolution(E, x, g, a, iterations, reason, float(left), C) for E, x, g, a, left in rows]
 
     def _krylov_for(self, columns: int) -> Krylov:
         """The Krylov method for so many load cases, set up when first asked for."""

@@ -113,7 +113,7 @@ class Homogenization:
         cell, solver = self.cell, self.cell.solver
         strain, u = state.solution.strain, solver.boundary_displacement(state.solution)
         stress, star, energy = self._averages(strain, u)
-        springs = solver.operator.compliance * state.solution.lam
+        springs = state.solution.compliance * state.solution.lam
         active = self.interface.active(state.status)
         opened = state.solution.jump * (1 - active) + springs
         opening = allreduce_sum(cell.comm, self._strain_of_jumps.T @ opened)

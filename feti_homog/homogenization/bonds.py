@@ -18,12 +18,17 @@ from feti_homog.typing import Float, Int
 
 def springs(case: Case) -> InterfaceSprings:
     """Those of the problem in the plane: normal and tangential."""
-    return InterfaceSprings(tuple(map(plane_stiffnesses, case.interfaces)))
+    return InterfaceSprings(tuple(map(plane_stiffnesses, case.interfaces)), _soften(case))
 
 
 def axial_springs(case: Case) -> InterfaceSprings:
     """Those of the problem along the fibres."""
-    return InterfaceSprings(tuple((axial_stiffness(bond),) for bond in case.interfaces))
+    return InterfaceSprings(tuple((axial_stiffness(bond),) for bond in case.interfaces), _soften(case))
+
+
+def _soften(case: Case) -> bool:
+    """Return True if the law of the bonds changes their compliance."""
+    return case.interface is not None and bond_laws.LAWS[case.interface.criterion].softens
 
 
 def plane_stiffnesses(bond: InterfaceSection) -> tuple[float, float]:

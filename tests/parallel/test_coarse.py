@@ -164,8 +164,8 @@ def test_updated_coarse_matrix_equals_one_from_scratch(comm):
     cell, fresh = torn_cells.tear(comm, **BREAKING), torn_cells.tear(comm, **BREAKING)
     steps = masks(cell, range(3))
     for active in steps:
-        cell.solver.activate(active)
-    fresh.solver.activate(steps[-1])
+        cell.solver.set_state(active, cell.solver.intact_compliance)
+    fresh.solver.set_state(steps[-1], fresh.solver.intact_compliance)
     found, scratch = (c.solver.adaptive.part().toarray() for c in (cell, fresh))
     # A rank may have no subdomain.
     assert not found.size or relative_error(found, scratch) < 1e-12
@@ -179,7 +179,7 @@ def test_the_preconditioner_of_active_rows_is_that_of_dense_modes(comm):
     dense = dense_feti.DenseDual(cell)
     V = dense_modes(dense, dense.preconditioner(np.ones(dense.total, bool)))
     for active in masks(cell, range(2)):
-        cell.solver.activate(active)
+        cell.solver.set_state(active, cell.solver.intact_compliance)
         on = dense_feti.gathered(cell, active) > 0
         assert 0.05 < (~on).mean() < 0.5
         H = dense_feti.matrix(cell, lambda z, a=active: cell.solver.preconditioner.apply(a[:, None] * z))
@@ -206,7 +206,7 @@ def test_with_inactive_rows_the_solution_is_that_of_the_natural_space(comm, case
     steps = masks(adaptive, range(3))
     for active in [*steps, np.ones(len(steps[0]))]:
         for cell in (adaptive, natural):
-            cell.solver.activate(active)
+            cell.solver.set_state(active, cell.solver.intact_compliance)
         found, expected = (solve_many(c) for c in (adaptive, natural))
         agree(adaptive, found, expected)
         assert found[0].iterations <= share * expected[0].iterations
@@ -223,7 +223,7 @@ def test_fibres_that_float_keep_the_natural_spaces_solution(comm, case, which):
         fibre = cell.solver.jump_operator.nodes.fibre
         lowest = comm.allreduce(fibre.min(initial=1000), MPI.MIN)
         status = np.where((fibre == lowest) | (which == "all"), OPEN, BONDED).astype(np.int8)
-        cell.solver.activate(torn_cells.interface(cell, False).active(status))
+        cell.solver.set_state(torn_cells.interface(cell, False).active(status), cell.solver.intact_compliance)
         fibres = len(set().union(*comm.allgather(set(fibre)))) if which == "all" else 1
         assert cell.solver.natural.unconstrained_modes.shape[1] == 3 * fibres
         results.append(solve_many(cell))

@@ -46,7 +46,7 @@ def inverse(dense, active):
 def activate(cell, status):
     """Return the active rows, on all ranks, of a status; the solver is set to them."""
     active = torn_cells.interface(cell, True).active(status)
-    cell.solver.activate(active)
+    cell.solver.set_state(active, cell.solver.intact_compliance)
     return gathered(cell, active) > 0
 
 

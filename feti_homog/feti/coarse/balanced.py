@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace
-from feti_homog.feti.preconditioners.scaled import Dirichlet
+from feti_homog.feti.preconditioners.scaled import Dirichlet, never_softens
 from feti_homog.typing import Float
 
 
@@ -19,7 +19,7 @@ class Balanced:
         coarse: the coarse space.
     """
 
-    norm = np.inf
+    norm, soften = np.inf, never_softens
 
     def __init__(self, scaled: Dirichlet, coarse: AdaptiveCoarseSpace) -> None:
         self.scaled, self.coarse = scaled, coarse

@@ -17,9 +17,11 @@ class InterfaceSprings:
     Attributes:
         stiffness: of each interface of the case stress per opening and per slip, or per slip along the fibre;
             infinite ones are glue.
+        soften: their compliance may grow while the cell is loaded.
     """
 
     stiffness: tuple[tuple[float, ...], ...]
+    soften: bool = False
 
     def compliance(self, jump_operator: JumpOperator) -> Float:
         """(owned rows,) C = 1 / (k l) of the rows of interface nodes with the tributary lengths l, 0 of all others."""

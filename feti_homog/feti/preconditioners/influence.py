@@ -24,6 +24,7 @@ from feti_homog.feti.preconditioners.body_ties import BodyTies
 from feti_homog.feti.preconditioners.bordered_inverse import BorderedInverse
 from feti_homog.feti.preconditioners.reference_cell import ReferenceCell, one_sided_jumps
 from feti_homog.feti.preconditioners.response_columns import ResponseColumns
+from feti_homog.feti.preconditioners.scaled import never_softens
 from feti_homog.feti.thresholds import INFLUENCE_BATCH, INFLUENCE_COLUMNS, NORM_ITERATIONS, NORM_MARGIN
 from feti_homog.parallel.distributed_arrays import allreduce_sum, gather_rows, scale_rows
 from feti_homog.typing import Float, Int
@@ -42,6 +43,8 @@ class Influence:
             reference cell, where bodies that follow leave none: a relative error of H.
         factorizations: reference cells so far.
     """
+
+    soften = never_softens
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> None:
         """Factor the cell with all bonds intact; all boundary operators must be dense.  Collective.

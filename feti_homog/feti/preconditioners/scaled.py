@@ -20,16 +20,21 @@ from feti_homog.typing import Float
 
 
 class Preconditioner(Protocol):
-    """z = M^-1 r on the owned rows, for r (owned rows,) or (owned rows, k).  All calls are collective.
+    """z = M^-1 r on the owned rows, for r (owned rows,) or (owned rows, k).  All calls are collective."""
 
-    Attributes:
-        norm: a bound of |M^-1|, inf if none is known.
-    """
-
-    norm: float
+    @property
+    def norm(self) -> float:
+        """Bound of |M^-1|, inf if none is known."""
 
     def activate(self, active: Float) -> None:
         """Restrict to the rows where `active` is 1."""
+
+    def soften(self, more: Float) -> None:
+        """Let springs have `more` compliance (owned rows,) than at first, from the next `activate` on.
+
+        Raises:
+            ValueError: the preconditioner was set up for springs that never soften.
+        """
 
     def apply(self, r: Float) -> Float:
         """M^-1 r; r and the result are 0 on inactive rows."""
@@ -42,10 +47,15 @@ class Preconditioner(Protocol):
         """First multipliers (owned rows, k) of a solve: `previous` ones, or `closing` = P M^-1 P d of the jump d."""
 
 
+def never_softens(preconditioner: Preconditioner, more: Float) -> None:
+    """Raise ValueError: `soften` of those that `WithSprings` does not update."""
+    raise ValueError("springs soften, and the preconditioner was set up for springs that never do")
+
+
 class Identity:
     """z = r."""
 
-    norm = 1.0
+    norm, soften = 1.0, never_softens
 
     def activate(self, active: Float) -> None:
         """Nothing depends on the rows."""
@@ -71,7 +81,7 @@ class StiffnessScaled:
         W_inverse: (owned rows, owned rows) W^-1 of the active rows, 0 on the others.
     """
 
-    norm = np.inf
+    norm, soften = np.inf, never_softens
 
     def __init__(
         self,

@@ -72,14 +72,22 @@ def _factored(block: Float) -> tuple[Float, bool]:
 
 
 class WithSprings:
-    """A preconditioner with the update for the springs of all active rows."""
-
-    norm = np.inf
+    """A preconditioner with the update for the springs of all active rows, and for what they soften."""
 
     def __init__(self, comm: MPI.Intracomm, inner: Preconditioner, first: int, compliance: Float) -> None:
         """Arguments as of `SpringUpdate`; `inner` is H, for all rows active.  Collective."""
-        self._comm, self._inner, self._first, self._compliance = comm, inner, first, compliance
+        self._comm, self._inner, self._first = comm, inner, first
+        self._left_out = self._compliance = compliance
         self._update = SpringUpdate(comm, first, compliance, inner.apply)
+
+    @property
+    def norm(self) -> float:
+        """Bound of |H|, which softer springs make smaller."""
+        return self._inner.norm
+
+    def soften(self, more: Float) -> None:
+        """Let `more` (owned rows,) be what the springs gained in compliance, from the next `activate` on."""
+        self._compliance = self._left_out + more
 
     def activate(self, active: Float) -> None:
         """Restrict to the rows where `active` is 1, and update.  Collective."""
@@ -95,5 +103,5 @@ class WithSprings:
         return self._update.apply(self._inner.close(right, d, E))
 
     def initial_multipliers(self, previous: Float, closing: Float) -> Float:
-        """The previous ones."""
-        return previous
+        """Those without the update."""
+        return self._inner.initial_multipliers(previous, closing)

@@ -75,12 +75,19 @@ class ContactProblem:
         return mask
 
     def prepare(self, bonds: BondState) -> None:
-        """Make the dual problem that of a state of the bonds.  Collective.
+        """Make the dual problem that of a state of the bonds.  Collective."""
+        self.solver.set_state(self.active(bonds.status), self.compliance(bonds))
 
-        Raises:
-            CaseError: the compliance of springs changed and the preconditioner cannot follow.
-        """
-        self.solver.activate(self.active(bonds.status))
+    def compliance(self, bonds: BondState) -> Float:
+        """(owned rows,) C of the springs in a state of the bonds; all are pulled."""
+        C, factor = self.solver.intact_compliance, self.softening(bonds, np.ones(len(bonds.status), bool))
+        if factor is None:
+            return C
+        # Normal and tangential springs belong to the problem of the plane, axial ones to the other.
+        own = slice(2) if self.solver.jump_operator.components == 2 else slice(2, 3)
+        C = C.copy()
+        C[self._pairs] *= factor[:, own]
+        return C
 
     def debond(self, status: Status, which: Bool, lam: Float) -> Status:
         """The status after the bonds of `which` have broken; under tension they start open."""

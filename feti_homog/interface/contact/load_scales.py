@@ -71,7 +71,7 @@ class LoadScales:
             own[s.submesh.body] = np.abs(s.L[:m, :m]).max()
         solver.comm.Allreduce(MPI.IN_PLACE, own, MPI.MAX)
         rows = nodes.row[:, None] + np.arange(solver.jump_operator.components)
-        give = solver.operator.compliance[rows].min(axis=1, initial=np.inf) * nodes.length / self._size.max()
+        give = solver.intact_compliance[rows].min(axis=1, initial=np.inf) * nodes.length / self._size.max()
         return np.asarray(1.0 / (1.0 / own[nodes.bodies].min(axis=1, initial=np.inf) + give))
 
     @cached_property

@@ -114,4 +114,5 @@ def superposed(solver: FetiSolver, solutions: Sequence[DualSolution], factors: F
         max(each.iterations for each in solutions),
         min(each.reason for each in solutions),
         float(left / (scale or 1.0)),
+        solutions[0].compliance,
     )
