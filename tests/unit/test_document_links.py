@@ -28,7 +28,7 @@ MADE = re.compile(r"results/|build/|.*DIR|.*\.\.\.")
 SYMBOL = re.compile(r"`([a-z_]+(?:\.(?!csv|h5|json|png|toml|xdmf)[a-z_]+)+(?:\.[A-Z]\w*)?)`(?: \(`(\w+)`)?")
 
 WIDTH = 100
-NOT_WRAPPED = ["feti_homog/README.md", "feti_homog/THEORY.md"]
+NOT_WRAPPED = ["feti_homog/README.md"]
 # A list's mark, then one formula, one piece of code, one link or one word: nowhere to break the line.
 UNBREAKABLE = re.compile(r"\s*(?:(?:[-*]|\d+\.) )?(?:\$[^$]*\$|`[^`]*`|\[[^\]]*\]\([^)]*\)|\S)+")
 
