@@ -24,10 +24,8 @@ from feti_homog.analysis.result_records import (
     TipRates,
 )
 from feti_homog.materials.bounds import Moduli
-from feti_homog.materials.estimates.fibre_bounds import FibreBounds
-from feti_homog.materials.estimates.methods import Estimates
+from feti_homog.materials.estimates.constituents import Estimates, FibreBounds
 from feti_homog.materials.spatial_constants import EngineeringConstants, TransverselyIsotropic, TransverseModuli
-from feti_homog.report.html.tables import notebook
 from feti_homog.report.text.summary import short_summary
 from feti_homog.results import path_curves
 from feti_homog.results.file_seal import FileSeal
@@ -175,6 +173,8 @@ class Result:
         return short_summary(self.document)
 
     def _repr_html_(self) -> str:
+        from feti_homog.report.html.tables import notebook  # notebooks alone show it
+
         return notebook(self.document)
 
 

@@ -171,6 +171,26 @@ def test_only_a_rank_that_draws_loads_matplotlib():
     assert "matplotlib" not in run.stdout.split()
 
 
+def test_a_stiffness_run_loads_no_other_analysis(tmp_path):
+    """Of pictures, the page, paths and tips, too, a run without them loads nothing."""
+    document = {
+        "cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.3},
+        "material": {phase: {"young": young, "poisson": 0.3} for phase, young in (("matrix", 1.0), ("fibre", 9.0))},
+        "analysis": {"type": "stiffness", "plane": "strain"},
+        "output": {"pictures": False},
+    }
+    program = (
+        f"import sys, feti_homog as f; f.run(f.Case.parse({document!r}), out={str(tmp_path)!r}); print(*sys.modules)"
+    )
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=tmp_path)
+    loaded = {name.removeprefix("feti_homog.") for name in run.stdout.split() if name.startswith("feti_homog.")}
+    others = {f"analysis.{name}" for name in ("angle", "path", "load", "envelope", "tip_rates", "constants_in_space")}
+    others |= {"interface.path", "report.plots", "report.html", "homogenization.energy_release"}
+    others |= {"materials.estimates.methods", "materials.estimates.cylinders", "verify", "sweep"}
+    assert "analysis.stiffness" in loaded and not {"matplotlib", "bokeh"} & {*run.stdout.split()}
+    assert not {name for name in loaded if any(name == other or name.startswith(f"{other}.") for other in others)}
+
+
 def sources(*folders: str) -> list[Path]:
     return sorted(path for folder in folders for path in (ROOT / folder).rglob("*.py"))
 

@@ -1,4 +1,4 @@
-"""What estimates are made of: fibres, the springs of their interfaces; and the record of an estimate."""
+"""Fibres and the springs of their interfaces, of which estimates are made; records of estimates and bounds."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from dataclasses import dataclass
 
 from feti_homog.materials.spatial_constants import PER_TEMPERATURE, TransverselyIsotropic, transverse_constants
 from feti_homog.runtime.records import STRESS, described
+
+Pair = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,31 @@ class Estimate:
     K_transverse: float | None = described("bulk modulus across the fibres in plane strain", STRESS)
     expansion_axial: float | None = described("expansion along the fibres", PER_TEMPERATURE)
     expansion_transverse: float | None = described("expansion across the fibres", PER_TEMPERATURE)
+
+
+@dataclass(frozen=True)
+class Estimates:
+    """Constants by each method."""
+
+    rule_of_mixtures: Estimate = described("rule of mixtures: Voigt along the fibres, Reuss across them")
+    chamis: Estimate = described("Chamis 1984")
+    halpin_tsai: Estimate = described("Halpin and Tsai 1969")
+    mori_tanaka: Estimate = described("Mori and Tanaka 1973, of aligned cylinders")
+    composite_cylinders: Estimate = described("Hashin and Rosen 1964: exact of composite cylinders")
+    self_consistent: Estimate = described("Christensen and Lo 1979, generalized self-consistent")
+
+
+@dataclass(frozen=True)
+class FibreBounds:
+    """Lower and upper bounds of the constants of any arrangement of bonded fibres."""
+
+    E_axial: Pair = described("of Young's modulus along the fibres", STRESS, "(2,)")
+    nu_axial: Pair | None = described(
+        "of the contraction across the fibres under stress along them; null of more than two phases", shape="(2,)"
+    )
+    G_axial: Pair = described("of the shear modulus along the fibres", STRESS, "(2,)")
+    G_transverse: Pair = described("of the shear modulus across the fibres", STRESS, "(2,)")
+    K_transverse: Pair = described("of the bulk modulus across the fibres in plane strain", STRESS, "(2,)")
 
 
 CONSTANTS = tuple(field.name for field in dataclasses.fields(Estimate))

@@ -3,26 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 
+from feti_homog.materials.estimates.constituents import FibreBounds
 from feti_homog.materials.estimates.cylinders import Surroundings, aligned_cylinders
 from feti_homog.materials.spatial_constants import TransverselyIsotropic
-from feti_homog.runtime.records import STRESS, described
-
-Pair = tuple[float, float]
-
-
-@dataclass(frozen=True)
-class FibreBounds:
-    """Lower and upper bounds."""
-
-    E_axial: Pair = described("of Young's modulus along the fibres", STRESS, "(2,)")
-    nu_axial: Pair | None = described(
-        "of the contraction across the fibres under stress along them; null of more than two phases", shape="(2,)"
-    )
-    G_axial: Pair = described("of the shear modulus along the fibres", STRESS, "(2,)")
-    G_transverse: Pair = described("of the shear modulus across the fibres", STRESS, "(2,)")
-    K_transverse: Pair = described("of the bulk modulus across the fibres in plane strain", STRESS, "(2,)")
 
 
 def fibre_bounds(fractions: Sequence[float], phases: Sequence[TransverselyIsotropic]) -> FibreBounds:

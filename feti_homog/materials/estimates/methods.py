@@ -3,27 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 
-from feti_homog.materials.estimates.constituents import NOTHING, Estimate, Fibres
+from feti_homog.materials.estimates.constituents import NOTHING, Estimate, Estimates, Fibres
 from feti_homog.materials.estimates.cylinders import composite_cylinders, mori_tanaka
 from feti_homog.materials.estimates.mixtures import chamis, halpin_tsai, rule_of_mixtures
 from feti_homog.materials.estimates.self_consistent import self_consistent
 from feti_homog.materials.spatial_constants import TransverselyIsotropic, is_transversely_isotropic
-from feti_homog.runtime.records import described
-
-
-@dataclass(frozen=True)
-class Estimates:
-    """What each method says."""
-
-    rule_of_mixtures: Estimate = described("rule of mixtures: Voigt along the fibres, Reuss across them")
-    chamis: Estimate = described("Chamis 1984")
-    halpin_tsai: Estimate = described("Halpin and Tsai 1969")
-    mori_tanaka: Estimate = described("Mori and Tanaka 1973, of aligned cylinders")
-    composite_cylinders: Estimate = described("Hashin and Rosen 1964: exact of composite cylinders")
-    self_consistent: Estimate = described("Christensen and Lo 1979, generalized self-consistent")
-
 
 METHODS: Mapping[str, Callable[[TransverselyIsotropic, Sequence[Fibres]], Estimate]] = {
     "rule_of_mixtures": rule_of_mixtures,
