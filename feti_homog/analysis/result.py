@@ -26,10 +26,9 @@ from feti_homog.analysis.result_records import (
 from feti_homog.materials.bounds import Moduli
 from feti_homog.materials.estimates.constituents import Estimates, FibreBounds
 from feti_homog.materials.spatial_constants import EngineeringConstants, TransverselyIsotropic, TransverseModuli
-from feti_homog.report.text.summary import short_summary
 from feti_homog.results import path_curves
-from feti_homog.results.file_seal import FileSeal
 from feti_homog.results.result_json import SCHEMA
+from feti_homog.results.seals import FileSeal
 from feti_homog.runtime.records import BYTES, SECONDS, STRESS, Key, described, keys, plain, restored
 from feti_homog.typing import Float
 
@@ -169,7 +168,10 @@ class Result:
             raise ValueError("only a path of one leg, followed by events, has a first drop")
         return path_curves.first_drop(document["path"])
 
+    # Most runs print neither: the tables are imported by those that do.
     def __str__(self) -> str:
+        from feti_homog.report.text.summary import short_summary
+
         return short_summary(self.document)
 
     def _repr_html_(self) -> str:

@@ -21,13 +21,11 @@ from feti_homog.errors import ConvergenceError
 from feti_homog.homogenization.unit_cell import TornCell, tear
 from feti_homog.parallel.mpi_errors import all_raise, on_root, on_root_only
 from feti_homog.petsc.options import case_options, refuse_unused
-from feti_homog.report.text.summary import summary
 from feti_homog.results import (
     csv_tables,
     event_log,
     field_file,
     field_parts,
-    folder_contents,
     output_folder,
     result_json,
     xdmf,
@@ -63,7 +61,7 @@ def run(
     if case.output.report:
         require_report()
     on_root(comm, output_folder.usable, directory)
-    on_root(comm, folder_contents.refuse_files_of_others, directory)
+    on_root(comm, output_folder.refuse_files_of_others, directory)
     with output_folder.held(directory, comm, progress.say), _torn(case, comm, progress) as cell:
         result = _run_and_write(cell, directory, progress, resume, keep_fields)
     if result.faults:
@@ -131,7 +129,7 @@ def _run_and_write(cell: TornCell, directory: Path, progress: Progress, resume: 
         if wanted:
             with progress.stage(name) as words:
                 words.append(", ".join(path.name for path in on_root(cell.comm, make, directory)))
-    progress.say("\n" + summary(replace(result, timings=progress.timings()).document))
+    _print_summary(result, progress)
     return result
 
 
@@ -183,6 +181,15 @@ def _draw(directory: Path) -> list[Path]:
     from feti_homog.report.plots import figures
 
     return figures.plot(directory)
+
+
+def _print_summary(result: Result, progress: Progress) -> None:
+    """Print the summary on rank 0; only a rank that prints it loads its tables.  Collective."""
+    document = replace(result, timings=progress.timings()).document
+    if progress.prints:
+        from feti_homog.report.text.summary import summary
+
+        progress.say(f"\n{summary(document)}")
 
 
 def _report(directory: Path) -> list[Path]:

@@ -10,10 +10,10 @@ from feti_homog.errors import FetiHomogError
 from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.parallel.mpi_errors import on_root
-from feti_homog.results import field_parts, file_seal, state_parts
+from feti_homog.results import field_parts, seals
 from feti_homog.results.field_file import FieldFile
 from feti_homog.results.field_layout import StatePart
-from feti_homog.results.file_seal import FileSeal
+from feti_homog.results.seals import FileSeal
 
 
 class StateRecorder:
@@ -45,13 +45,13 @@ class StateRecorder:
         self, plane: Response | None, axial: Response | None, load_factor: float, label: str, point: int
     ) -> StatePart:
         if plane is None or len(self._cell.problems) > 1:
-            return state_parts.spatial_state_part(self._cell, plane, axial, load_factor, label, point)
-        return state_parts.state_part(self._cell, plane, load_factor, label, point)
+            return field_parts.spatial_state_part(self._cell, plane, axial, load_factor, label, point)
+        return field_parts.state_part(self._cell, plane, load_factor, label, point)
 
     def seal(self) -> FileSeal | None:
         """Complete the file; returns its seal, None without a file.  Collective."""
         self._write(FieldFile.close)
-        return None if self._file is None else on_root(self._cell.comm, file_seal.seal, self._file.path)
+        return None if self._file is None else on_root(self._cell.comm, seals.seal, self._file.path)
 
     def _write(self, write: Callable[[FieldFile], object]) -> None:
         """Do it to the file if there is one; if it cannot be written, which all ranks hear, there is none any more."""

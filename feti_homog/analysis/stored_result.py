@@ -9,7 +9,7 @@ from typing import Any
 from feti_homog.analysis.result import Result
 from feti_homog.case.case import Case
 from feti_homog.errors import CaseError
-from feti_homog.results import checkpoint, field_file, file_seal, result_json
+from feti_homog.results import checkpoint, field_file, result_json, seals
 
 
 def read(directory: Path) -> dict[str, Any]:
@@ -69,4 +69,4 @@ def _check_fields(directory: Path, result: Result) -> None:
     if not path.is_file():
         raise CaseError(f"{path}: it is missing; run the case again")
     if result.result_h5 is not None:
-        file_seal.check(path, result.result_h5)
+        seals.check(path, result.result_h5)

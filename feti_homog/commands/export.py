@@ -39,9 +39,9 @@ def add(actions: argparse._SubParsersAction[Any]) -> None:
 def _export(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.parallel.mpi_errors import on_root
     from feti_homog.report.cards import export
-    from feti_homog.results import product_file
+    from feti_homog.results import output_folder
 
     text = on_root(comm, export.card, arguments.directory, arguments.format, arguments.symmetry)
     if arguments.out is not None:
-        text = str(on_root(comm, product_file.write, arguments.out, text))
+        text = str(on_root(comm, output_folder.write_product, arguments.out, text))
     print_product(comm, text)

@@ -29,12 +29,12 @@ def add(actions: argparse._SubParsersAction[Any]) -> None:
 def _fibres(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.commands import fibre_rows
     from feti_homog.parallel.mpi_errors import on_root_only
-    from feti_homog.results import product_file
+    from feti_homog.results import output_folder
 
     text = on_root_only(comm, fibre_rows.table, arguments.source)
     if arguments.out is None:
         on_root_only(comm, print_product, text or "")
     else:
-        path = on_root_only(comm, product_file.write, arguments.out, text or "")
+        path = on_root_only(comm, output_folder.write_product, arguments.out, text or "")
         if path is not None:
             say(str(path))

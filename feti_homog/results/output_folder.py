@@ -1,20 +1,26 @@
-"""The folder that results go to, which one run at a time writes to."""
+"""The folder that results go to: one run at a time writes there, and no file of others is replaced.
+
+A run knows its own files by their content, not by a marker beside them: a file of somebody else may come to a folder of
+results later, under one of their names.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import re
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from feti_homog.runtime.file_locks import LockHeld, LocksUnsupported, TemporaryLock, holder
-from feti_homog.parallel.mpi_errors import on_root
 from feti_homog.materials.voigt import SPATIAL_STRAINS
 from feti_homog.errors import CaseError, FetiHomogError
-from feti_homog.results import atomic
+from feti_homog.parallel.mpi_errors import on_root
+from feti_homog.results import atomic, checkpoint, event_log, field_file, result_json
+from feti_homog.results.field_layout import PROGRAM
+from feti_homog.runtime.file_locks import Lock, LockHeld, LocksUnsupported, holder
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
@@ -27,6 +33,10 @@ RESULT_FILE = re.compile(
     r"|(angle|path|load|envelope)\.csv|(cell|interface|load|envelope|(angle|path)(_states)?)\.png|path\.gif"
     rf"|case_(minus_)?({'|'.join(SPATIAL_STRAINS)}|temperature)\.png|state_\d+\.png"
 )
+# Of these those that show that a run has written to the folder.
+SIGNS = (result_json.NAME, field_file.NAME, event_log.NAME, LOCK)
+HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+HEAD = 1 << 20  # bytes of result.h5 in which its attributes are
 
 
 def usable(directory: Path) -> None:
@@ -53,6 +63,53 @@ def usable(directory: Path) -> None:
         raise _busy(directory, who)
 
 
+def refuse_files_of_others(directory: Path) -> None:
+    """Check that a run may write all its files to `directory`, and replace those that are there.  Call on one rank.
+
+    Raises:
+        CaseError: a folder stands where a file is to be or the other way round, or a file has the name of a run's and
+            no run wrote it.
+    """
+    if not directory.is_dir():
+        return
+    try:
+        paths = [p for p in sorted(directory.iterdir()) if p.name in SIGNS or RESULT_FILE.fullmatch(p.name)]
+        for path in paths:
+            kind = "a folder there" if path.is_dir() else "" if path.exists() else "a link there that leads nowhere"
+            if kind:
+                raise CaseError(f"--out {directory}: {path.name} is {kind}, and a run writes a file of that name")
+        checkpoint.refuse_others(directory)
+        foreign = _foreign(paths)
+    except OSError as error:
+        raise CaseError(f"--out {directory}: its files cannot be read: {error.strerror}") from error
+    if foreign:
+        raise CaseError(
+            f"--out {directory}: no run of this program wrote {foreign[0].name}, and this one would replace it; "
+            "move it away or choose another folder"
+        )
+
+
+def _foreign(paths: Sequence[Path]) -> list[Path]:
+    """The files that no run wrote: those that it would know; without any of these all that are not empty."""
+    signs = [path for path in paths if path.name in SIGNS]
+    return [path for path in signs or paths if path.stat().st_size and not (signs and _is_own(path))]
+
+
+def _is_own(path: Path) -> bool:
+    """Whether a run wrote this result.json, of whatever version, result.h5 or events.log."""
+    if path.name == result_json.NAME:
+        try:
+            document = json.loads(path.read_text(encoding="utf-8"))
+        except ValueError:
+            return False
+        return isinstance(document, dict) and {"version", "case", "solver"} <= document.keys()
+    with path.open("rb") as stream:
+        head = stream.read(HEAD)
+    if path.name == field_file.NAME:
+        return head.startswith(HDF5_SIGNATURE) and PROGRAM.encode() in head
+    return path.name != event_log.NAME or head.startswith(event_log.HEADER.encode())
+
+
 @contextmanager
 def held(directory: Path, comm: Intracomm, say: Callable[[str], object]) -> Iterator[None]:
     """The folder, made with its parents, is this run's alone while the block lasts.  Collective.
@@ -63,7 +120,7 @@ def held(directory: Path, comm: Intracomm, say: Callable[[str], object]) -> Iter
     Raises:
         CaseError: it cannot be made, or another run has it.
     """
-    lock = TemporaryLock(directory / LOCK)
+    lock = Lock(directory / LOCK)
     made, warning = on_root(comm, _hold, lock, directory)
     if warning:
         say(f"warning: {warning}")
@@ -85,7 +142,23 @@ def remove_other_results(directory: Path, written: Collection[str]) -> None:
                 path.unlink()
 
 
-def _hold(lock: TemporaryLock, directory: Path) -> tuple[list[Path], str]:
+def write_product(path: Path, text: str) -> Path:
+    """Write what a command makes in place of a result, a card or a table of fibres, to a file; returns its path.
+
+    Raises:
+        CaseError: `path` is a folder, in no folder, or a file of a result.
+        FetiHomogError: it cannot be written; nothing is left half-written.
+    """
+    if path.is_dir():
+        raise CaseError(f"--out {path}: expected a file, but it is a folder")
+    if not path.parent.is_dir():
+        raise CaseError(f"--out {path}: expected a file in a folder that there is")
+    if RESULT_FILE.fullmatch(path.name):
+        raise CaseError(f"--out {path}: expected another name; results have files of that name")
+    return atomic.replace_text(path, f"{text}\n")
+
+
+def _hold(lock: Lock, directory: Path) -> tuple[list[Path], str]:
     """Make and lock the folder; returns the folders made, the innermost first, and a warning if it is not locked."""
     made = [path for path in (directory, *directory.parents) if not path.exists()]
     try:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.errors import CaseError, FetiHomogError
-from feti_homog.results import atomic, sealed_json
+from feti_homog.results import atomic, seals
 
 NAME = "result.json"
 SCHEMA = 1  # version of the layout: to be raised when a key is renamed, removed or changes its meaning
@@ -35,7 +35,7 @@ def write(directory: Path, document: Mapping[str, Any]) -> Path:
 
     def write_text(part: Path) -> None:
         part.parent.mkdir(parents=True, exist_ok=True)
-        part.write_text(sealed_json.dumps(content), encoding="utf-8")
+        part.write_text(seals.dumps(content), encoding="utf-8")
 
     return atomic.replace(Path(directory) / NAME, write_text)
 
@@ -51,7 +51,7 @@ def read(directory: Path) -> dict[str, Any]:
     try:
         if path.is_fifo():
             raise CaseError(f"cannot read {path}: it is a pipe")
-        document = sealed_json.loads(path.read_text(encoding="utf-8"))
+        document = seals.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise CaseError(f"cannot read {path}: {error.strerror or error}") from error
     except ValueError as error:

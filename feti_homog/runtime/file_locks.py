@@ -21,9 +21,7 @@ LOCK_TIMEOUT_S = 0.2
 # What the system says of a lock that somebody else has, and of a file system that has no locks.
 HELD = (errno.EAGAIN, errno.EACCES)
 UNSUPPORTED = (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP)
-
-
-# Files of temporary locks that this process holds.
+# Files of locks that this process holds.
 _held_files: set[Path] = set()
 
 
@@ -36,7 +34,7 @@ class LocksUnsupported(FetiHomogError):
 
 
 class Lock:
-    """A lock on the file `path`, which stays behind; `shared` ones exclude the others only.
+    """A lock on the file `path`, which its last holder removes; `shared` ones exclude the others only.
 
     It is tried for during `timeout` seconds.  As a context manager it is held while the block lasts.
     """
@@ -53,6 +51,31 @@ class Lock:
             LocksUnsupported: nobody can have one on this file system.
             FetiHomogError: the file cannot be made or locked.
         """
+        self._take()
+        while not self._is_at_path():  # its last holder removed the file after it was opened here
+            self._close()
+            self._take()
+        if not self.shared:
+            _held_files.add(self.path)
+
+    def release(self) -> None:
+        """Give the lock back, if it is held, and remove its file unless others share it."""
+        if self._file >= 0 and self._is_alone():
+            with contextlib.suppress(OSError):
+                self.path.unlink()
+        _held_files.discard(self.path)
+        self._close()
+
+    def __enter__(self) -> Lock:
+        self.acquire()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.release()
+
+    def _take(self) -> None:
         try:
             self._file = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o666)
             self._try_until(time.monotonic() + self.timeout)
@@ -67,19 +90,6 @@ class Lock:
         except LockHeld:
             self._close()
             raise
-
-    def release(self) -> None:
-        """Give the lock back, if it is held."""
-        self._close()
-
-    def __enter__(self) -> Lock:
-        self.acquire()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.release()
 
     def _try_until(self, deadline: float) -> None:
         kind = fcntl.LOCK_SH if self.shared else fcntl.LOCK_EX
@@ -98,27 +108,6 @@ class Lock:
             os.close(self._file)
             self._file = -1
 
-
-class TemporaryLock(Lock):
-    """A lock whose file is removed when its last holder gives it back."""
-
-    def acquire(self) -> None:
-        """Take the lock.  Raises as `Lock.acquire`."""
-        super().acquire()
-        while not self._is_at_path():  # its last holder removed the file after it was opened here
-            self._close()
-            super().acquire()
-        if not self.shared:
-            _held_files.add(self.path)
-
-    def release(self) -> None:
-        """Give the lock back, if it is held, and remove its file unless others share it."""
-        if self._file >= 0 and self._is_alone():
-            with contextlib.suppress(OSError):
-                self.path.unlink()
-        _held_files.discard(self.path)
-        self._close()
-
     def _is_alone(self) -> bool:
         """Whether nobody shares the lock; then it is exclusive."""
         try:
@@ -135,7 +124,7 @@ class TemporaryLock(Lock):
 
 
 def remove_files_of_held_locks() -> None:
-    """Remove the files of temporary locks that this process holds, for it is about to end without giving them back."""
+    """Remove the files of locks that this process holds, for it is about to end without giving them back."""
     for path in tuple(_held_files):
         with contextlib.suppress(OSError):
             path.unlink()

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError
 from feti_homog.parallel.mpi_errors import ARRIVAL_TIMEOUT_S, on_root, on_root_only, others_come
-from feti_homog.runtime.file_locks import LockHeld, TemporaryLock
+from feti_homog.runtime.file_locks import Lock, LockHeld
 from feti_homog.runtime.standard_streams import complain, say
 from feti_homog.sweep import store
 from feti_homog.sweep.description import check_options
@@ -143,7 +143,7 @@ def _reset_failures(directory: Path, sweep: Sweep) -> None:
 @contextmanager
 def _sweep_lock(directory: Path, comm: Intracomm, sweep: Sweep, shared: bool) -> Iterator[None]:
     """The folder made and held: by one sweep, or by any number of single cases.  Collective."""
-    lock = TemporaryLock(directory / LOCK_FILE, shared)
+    lock = Lock(directory / LOCK_FILE, shared)
     on_root(comm, _prepare_and_lock, lock, directory, sweep)
     try:
         yield
@@ -151,7 +151,7 @@ def _sweep_lock(directory: Path, comm: Intracomm, sweep: Sweep, shared: bool) ->
         lock.release()
 
 
-def _prepare_and_lock(lock: TemporaryLock, directory: Path, sweep: Sweep) -> None:
+def _prepare_and_lock(lock: Lock, directory: Path, sweep: Sweep) -> None:
     store.prepare_folder(directory, sweep)
     try:
         lock.acquire()
@@ -184,7 +184,7 @@ class CaseRunner:
         Returns what came of it, and which process has the case if another one has.  Raises FetiHomogError if the
         folder cannot be written.
         """
-        lock = TemporaryLock(self.directory / entry.folder / LOCK_FILE)
+        lock = Lock(self.directory / entry.folder / LOCK_FILE)
         try:
             outcome, holder = on_root(self.comm, self._claim, lock, entry, case)
             if outcome is not Outcome.COMPUTED:
@@ -198,7 +198,7 @@ class CaseRunner:
         finally:
             lock.release()
 
-    def _claim(self, lock: TemporaryLock, entry: SweepCase, case: Case) -> tuple[Outcome, str]:
+    def _claim(self, lock: Lock, entry: SweepCase, case: Case) -> tuple[Outcome, str]:
         """Take the case's lock, and keep it if the case is to be computed."""
         folder = self.directory / entry.folder
         try:

@@ -21,8 +21,8 @@ import tomli_w
 
 from feti_homog.case.case import Case
 from feti_homog.errors import CaseError, FetiHomogError
-from feti_homog.results import atomic, checkpoint, output_folder, result_json, sealed_json
-from feti_homog.runtime.file_locks import LockHeld, TemporaryLock, is_locked
+from feti_homog.results import atomic, checkpoint, output_folder, result_json, seals
+from feti_homog.runtime.file_locks import Lock, LockHeld, is_locked
 from feti_homog.sweep.plan import Sweep, SweepCase, identity_of
 from feti_homog.version import __version__
 
@@ -88,7 +88,7 @@ def prepare_folder(directory: Path, sweep: Sweep) -> None:
     if _existing_entries(directory) == sweep.entries and (directory / TABLE_FILE).exists():
         return
     try:
-        with TemporaryLock(directory / INDEX_LOCK_FILE, timeout=INDEX_LOCK_TIMEOUT_S):
+        with Lock(directory / INDEX_LOCK_FILE, timeout=INDEX_LOCK_TIMEOUT_S):
             known = _existing_entries(directory)
             _refuse_another(directory, known, sweep.entries)
             if not known:
@@ -97,7 +97,7 @@ def prepare_folder(directory: Path, sweep: Sweep) -> None:
             if known != sweep.entries:
                 document = {"version": __version__, "name": sweep.name, "stress_unit": sweep.stress_unit}
                 entries = [asdict(entry) for entry in sweep.entries]
-                atomic.replace_text(directory / INDEX_FILE, sealed_json.dumps(document | {"cases": entries}))
+                atomic.replace_text(directory / INDEX_FILE, seals.dumps(document | {"cases": entries}))
             atomic.replace_text(directory / TABLE_FILE, _table(sweep.entries))
     except LockHeld as error:
         raise CaseError(f"--out {directory}: {error} has been writing its list of cases for long") from error
@@ -111,7 +111,7 @@ def read_index(directory: Path) -> SweepIndex:
     """The cases of a sweep's folder.  Raises CaseError if it is none."""
     path = directory / INDEX_FILE
     try:
-        document = sealed_json.loads(path.read_text(encoding="utf-8"))
+        document = seals.loads(path.read_text(encoding="utf-8"))
         entries = tuple(SweepCase(**entry) for entry in document["cases"])
         return SweepIndex(document["name"], document["stress_unit"], entries)
     except OSError as error:

@@ -88,8 +88,8 @@ def test_a_file_in_the_place_of_the_folder_is_left_alone(tmp_path, ranks):
 HOLDER = """
 import sys
 from pathlib import Path
-from feti_homog.runtime.file_locks import TemporaryLock
-TemporaryLock(Path(sys.argv[1])).acquire()
+from feti_homog.runtime.file_locks import Lock
+Lock(Path(sys.argv[1])).acquire()
 print("held", flush=True)
 sys.stdin.read()
 """

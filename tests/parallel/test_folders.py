@@ -11,7 +11,7 @@ from support.base_case import BASE
 from support.ranks import parallel_assert
 
 from feti_homog import cli
-from feti_homog.results import folder_contents
+from feti_homog.results import output_folder
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
@@ -151,5 +151,5 @@ def test_what_a_run_left_may_be_replaced(comm, shared_path, left):
         contents["events.log"] = b"# feti-homog: events of cell, version 0\n"
         for name in left:
             (shared_path / name).write_bytes(contents.get(name, b"x"))
-        folder_contents.refuse_files_of_others(shared_path)
+        output_folder.refuse_files_of_others(shared_path)
     comm.barrier()

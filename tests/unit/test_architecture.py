@@ -191,6 +191,12 @@ def test_a_stiffness_run_loads_no_other_analysis(tmp_path):
     assert not {name for name in loaded if any(name == other or name.startswith(f"{other}.") for other in others)}
 
 
+def test_only_a_rank_that_prints_or_draws_loads_what_is_for_readers():
+    program = "import sys, feti_homog.analysis.runner; print(*sys.modules)"
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert not [name for name in run.stdout.split() if name.startswith(("feti_homog.report", "feti_homog.sweep"))]
+
+
 def sources(*folders: str) -> list[Path]:
     return sorted(path for folder in folders for path in (ROOT / folder).rglob("*.py"))
 

@@ -8,16 +8,16 @@ import threading
 import pytest
 from support.jobs import PATIENCE
 
-from feti_homog.runtime.file_locks import LockHeld, TemporaryLock, holder, this_process
+from feti_homog.runtime.file_locks import Lock, LockHeld, holder, this_process
 
 
 def test_the_file_is_there_only_while_the_lock_is_held(tmp_path):
     path = tmp_path / "lock"
     assert holder(path) is None
-    with TemporaryLock(path):
+    with Lock(path):
         assert holder(path) == path.read_text() == this_process()
         with pytest.raises(LockHeld, match=f"process {os.getpid()}"):
-            TemporaryLock(path, timeout=0.02).acquire()
+            Lock(path, timeout=0.02).acquire()
         assert path.exists(), "who is refused must not remove the file of the holder"
     assert holder(path) is None and not path.exists()
 
@@ -26,7 +26,7 @@ def test_a_file_that_is_left_behind_is_no_lock(tmp_path):
     path = tmp_path / "lock"
     path.write_text("a process that was killed")
     assert holder(path) is None
-    with TemporaryLock(path):
+    with Lock(path):
         assert holder(path) == this_process()
 
 
@@ -37,7 +37,7 @@ def test_one_at_a_time(tmp_path):
     def work() -> None:
         nonlocal inside, most
         for _ in range(20):
-            with TemporaryLock(tmp_path / "lock", timeout=PATIENCE):
+            with Lock(tmp_path / "lock", timeout=PATIENCE):
                 with mutex:
                     inside += 1
                     most = max(most, inside)

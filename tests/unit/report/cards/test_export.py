@@ -8,7 +8,7 @@ from support.effective_results import DISTINCT, document
 from feti_homog.errors import CaseError
 from feti_homog.report.cards import abaqus, export
 from feti_homog.report.cards.effective_material import in_axes_of_the_cell
-from feti_homog.results import product_file, result_json
+from feti_homog.results import output_folder, result_json
 
 
 @pytest.fixture
@@ -26,7 +26,7 @@ def test_the_card_is_that_of_result_json(folder):
 def test_a_card_replaces_what_was_there(tmp_path):
     path = tmp_path / "card.inp"
     path.write_text("before")
-    assert product_file.write(path, "a\nb") == path
+    assert output_folder.write_product(path, "a\nb") == path
     assert path.read_text() == "a\nb\n" and list(tmp_path.iterdir()) == [path]
 
 
@@ -41,7 +41,7 @@ def test_a_card_replaces_what_was_there(tmp_path):
 def test_cards_are_written_to_files_of_their_own(folder, name, words):
     before = (folder / "result.json").read_text()
     with pytest.raises(CaseError, match=words):
-        product_file.write(folder / name, "card")
+        output_folder.write_product(folder / name, "card")
     assert (folder / "result.json").read_text() == before
 
 

@@ -1,0 +1,84 @@
+"""Recovery of fields from a response: displacements at nodes, strains and stresses of elements, tractions and jumps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from feti_homog.fem.assembly import element_strain
+from feti_homog.homogenization.averaging import Response, displacement, fluctuation
+from feti_homog.homogenization.unit_cell import TornCell
+from feti_homog.materials import laws
+from feti_homog.typing import Float
+
+
+@dataclass(frozen=True)
+class RecoveredFields:
+    """This rank's fields of a response, of c displacements and v loads.
+
+    Attributes:
+        displacement, fluctuation: (n, c).
+        strain, stress: (m, v) means over the elements: the loads in each, and what works on them.
+        traction, jump: (k, c).
+    """
+
+    displacement: Float
+    fluctuation: Float
+    strain: Float
+    stress: Float
+    traction: Float
+    jump: Float
+
+
+def recover(cell: TornCell, response: Response | None) -> RecoveredFields:
+    """Recover the fields of a response; zero without one.  Collective when first called."""
+    nodes, problem = cell.solver.jump_operator.nodes, cell.solver.problem
+    if response is None:
+        c, v = problem.components, len(problem.loads)
+        n, m = (sum(sizes) for sizes in zip(*_sizes(cell), strict=True)) if cell.subdomains else (0, 0)
+        points, elements, pairs = np.zeros((n, c)), np.zeros((m, v)), np.zeros((len(nodes.row), c))
+        return RecoveredFields(points, points, elements, elements, pairs, pairs)
+    solution = response.state.solution
+    u = response.scale * cell.solver.displacement(solution)
+    pair = nodes.row[:, None] + np.arange(problem.components)
+    return RecoveredFields(
+        displacement(cell, response.strain, u),
+        fluctuation(cell, u),
+        *_element_fields(cell, response.strain, u),
+        response.scale * solution.lam[pair] / nodes.length[:, None],
+        response.scale * cell.solver.opening(solution)[pair],
+    )
+
+
+def _sizes(cell: TornCell) -> list[tuple[int, int]]:
+    """Nodes and elements of this rank's subdomains."""
+    return [(len(s.mesh.points), len(s.mesh.triangles)) for s in cell.subdomains]
+
+
+def _element_fields(cell: TornCell, loads: Float, u: Float) -> tuple[Float, Float]:
+    """Means over the elements under the loads (v,): strains with the other loads, and what works on them, (m, v)."""
+    problem = cell.solver.problem
+    of_displacements, others = loads[: problem.strains], loads[problem.strains :]
+    strains, stresses = ([np.zeros((0, len(loads)))] for _ in range(2))
+    for s, offset in zip(cell.subdomains, cell.offsets, strict=False):
+        own = u[offset : offset + len(s.Q)].reshape(-1, problem.components)
+        strain = of_displacements + element_strain(
+            s.mesh.points, s.mesh.triangles, s.mesh.node_class, own, problem
+        )[0]  # fmt: skip
+        strain = np.column_stack([strain, np.tile(others, (len(strain), 1))])
+        strains.append(strain)
+        stresses.append(strain @ s.L)
+    return np.concatenate(strains), np.concatenate(stresses)
+
+
+def out_of_plane(cell: TornCell, stress: Float) -> tuple[Float, Float]:
+    """Stresses 33 and strains 33 (m,) of the stresses (m, 3) in plane strain or stress."""
+    sizes = [elements for _, elements in _sizes(cell)]
+    rules = [
+        laws.out_of_plane(cell.case.material_of(s.submesh.phase), cell.case.analysis.plane) for s in cell.subdomains
+    ]
+    parts = zip(np.split(stress, np.cumsum(sizes)), rules, strict=False)
+    found = [(own @ to_S33, own @ to_E33) for own, (to_S33, to_E33) in parts]
+    S33, E33 = zip(*found, strict=True) if found else ((), ())
+    return np.concatenate([np.zeros(0), *S33]), np.concatenate([np.zeros(0), *E33])

@@ -1,0 +1,89 @@
+"""Checksums by which damaged or edited files of a result are noticed: in a JSON document, and beside a large file.
+
+HDF5 may crash on wrong bytes, so a large file is checked before it is opened.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from feti_homog.errors import CaseError
+from feti_homog.results import atomic
+from feti_homog.runtime.records import BYTES, described
+
+KEY = "checksum"
+BLOCK = 1 << 26  # bytes
+
+
+def dumps(document: Mapping[str, Any]) -> str:
+    """The text of a document with, as its last key, the checksum of the others.  Raises ValueError for NaN."""
+    content = {key: value for key, value in document.items() if key != KEY}
+    return _text(content | {KEY: _checksum(content)}) + "\n"
+
+
+def loads(text: str) -> dict[str, Any]:
+    """The document of a text, without its checksum; one that has none is taken as it is.
+
+    Raises:
+        ValueError: it is not JSON, no table, or not what was written.
+    """
+    try:
+        document = json.loads(text)
+    except RecursionError as error:
+        raise ValueError("it is nested too deeply") from error
+    if not isinstance(document, dict):
+        raise ValueError("it is damaged: no table of keys and values")
+    if KEY in document and document.pop(KEY) != _checksum(document):
+        raise ValueError("it is damaged: its checksum is wrong")
+    return document
+
+
+@dataclass(frozen=True)
+class FileSeal:
+    """Size and checksum of a file."""
+
+    bytes: int = described("size", BYTES)
+    checksum: str = described("CRC-32, in hexadecimal, of the CRC-32s (32 bits, little-endian) of its blocks of 64 MiB")
+
+
+def seal(path: Path, block: int = BLOCK) -> FileSeal:
+    """Seal a file.  Call on the rank that completed it: others may still see an earlier file of its name.
+
+    Raises:
+        FetiHomogError: it cannot be read.
+    """
+    with atomic.file_errors("read", path), path.open("rb", buffering=0) as stream:
+        size = os.fstat(stream.fileno()).st_size
+        checksums = [zlib.crc32(os.pread(stream.fileno(), block, start)) for start in range(0, size, block)]
+    return FileSeal(size, f"{zlib.crc32(np.array(checksums, '<u4').tobytes()):08x}")
+
+
+def check(path: Path, expected: FileSeal, block: int = BLOCK) -> None:
+    """Check that a file is the one of this seal.  Call on one rank.
+
+    Raises:
+        CaseError: it is not.
+        FetiHomogError: it cannot be read.
+    """
+    with atomic.file_errors("read", path):
+        size = os.stat(path).st_size
+    if size != expected.bytes:
+        raise CaseError(f"{path}: it is damaged, or of another run: it has {size} bytes, not {expected.bytes}")
+    if seal(path, block).checksum != expected.checksum:
+        raise CaseError(f"{path}: it is damaged, or of another run: its checksum is wrong")
+
+
+def _checksum(content: Mapping[str, Any]) -> str:
+    return f"{zlib.crc32(_text(content).encode('utf-8', 'surrogatepass')):08x}"
+
+
+def _text(content: Mapping[str, Any]) -> str:
+    return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False)

@@ -1,0 +1,84 @@
+"""A document is read as it was written, or not at all; large files are known by size and checksum."""
+
+from __future__ import annotations
+
+import json
+import zlib
+
+import numpy as np
+import pytest
+
+from feti_homog.errors import CaseError, FetiHomogError
+
+from feti_homog.results import seals
+
+BLOCK = 1000
+SIZES = [0, 1, 999, 1000, 1001, 5003]
+DOCUMENT = {
+    "schema": 1,
+    "numbers": [0.1, 1e-300, 3, True, None],
+    "unit": "µm",
+    "name": "\udcff",
+    "table": {"b": 1, "a": 2},
+}
+
+
+def test_what_was_written_is_read():
+    text = seals.dumps(DOCUMENT)
+    assert seals.loads(text) == DOCUMENT and list(json.loads(text))[-1] == "checksum"
+    assert seals.dumps(seals.loads(text)) == text
+
+
+def test_every_changed_number_or_letter_is_told():
+    text = seals.dumps(DOCUMENT)
+    for place, letter in enumerate(text):
+        if letter.isalnum():
+            other = text[:place] + ("7" if letter != "7" else "8") + text[place + 1 :]
+            if '"checksum"' in other:
+                with pytest.raises(ValueError):
+                    seals.loads(other)
+
+
+def test_another_layout_of_the_same_content_is_right():
+    assert seals.loads(json.dumps(json.loads(seals.dumps(DOCUMENT)))) == DOCUMENT
+
+
+@pytest.mark.parametrize(
+    "text", ["", "[", "[]", "3", "[" * 100_000, '{"a": 1', '{"a": 1, "checksum": "0"}', '{"checksum": 1}']
+)
+def test_other_texts_are_refused(text):
+    with pytest.raises(ValueError):
+        seals.loads(text)
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_the_checksum_is_that_of_the_blocks(tmp_path, size):
+    content = np.random.default_rng(size).bytes(size)
+    (tmp_path / "file").write_bytes(content)
+    found = seals.seal(tmp_path / "file", BLOCK)
+    blocks = [zlib.crc32(content[k : k + BLOCK]) for k in range(0, size, BLOCK)]
+    expected = zlib.crc32(b"".join(block.to_bytes(4, "little") for block in blocks))
+    assert found == seals.FileSeal(size, f"{expected:08x}")
+    seals.check(tmp_path / "file", found, BLOCK)
+
+
+@pytest.mark.parametrize("size", SIZES[1:])
+def test_another_file_is_told(tmp_path, size):
+    path = tmp_path / "file"
+    content = bytearray(np.random.default_rng(size).bytes(size))
+    path.write_bytes(content)
+    found = seals.seal(path, BLOCK)
+    for bit in (0, 4 * size, 8 * size - 1):
+        content[bit // 8] ^= 1 << bit % 8
+        path.write_bytes(content)
+        with pytest.raises(CaseError, match="damaged, or of another run: its checksum is wrong"):
+            seals.check(path, found, BLOCK)
+        content[bit // 8] ^= 1 << bit % 8
+    path.write_bytes(content[:-1])
+    with pytest.raises(CaseError, match=f"it has {size - 1} bytes, not {size}"):
+        seals.check(path, found, BLOCK)
+
+
+def test_a_file_that_is_gone_is_told(tmp_path):
+    with pytest.raises(FetiHomogError, match=r"cannot read .*none: No such file"):
+        seals.check(tmp_path / "none", seals.FileSeal(1, ""))
