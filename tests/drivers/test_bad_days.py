@@ -16,7 +16,7 @@ from support.hostile_inputs import of_mesh, write_grid
 from support.jobs import PATIENCE, ROOT, environment
 
 # A rank waits where a mesher would keep it for long.
-MESHING = "feti_homog.homogenization.coarse_meshes:begun"
+MESHING = "feti_homog.homogenization.coarse_meshes:begin_mesh"
 
 
 @pytest.fixture(autouse=True)
@@ -42,7 +42,7 @@ def test_ctrl_c_is_one_line_and_130(tmp_path, command):
 def test_the_order_to_end_is_one_line_of_all_ranks(tmp_path):
     """SIGTERM, which mpirun sends some seconds after Ctrl-C.  Rank 1, here the first, outlives rank 0."""
     out = tmp_path / "out"
-    here = Hook("feti_homog.homogenization.unit_cell:drawn", "tell(os.getpid()); wait()", rank=None)
+    here = Hook("feti_homog.homogenization.unit_cell:place_nodes", "tell(os.getpid()); wait()", rank=None)
     last = Hook("feti_homog.runtime.interrupts:time.sleep", "tell('ends'); outlive(0)", rank=1)
     with HookedJob(2, [here, last], "run", case_file(tmp_path), "--out", out) as job:
         said = [job.told().split() for _ in range(4)]

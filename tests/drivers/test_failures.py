@@ -160,12 +160,12 @@ WITHOUT_MEMORY = {
     "factorization": (1, "feti.operators.interface_operators:_factor"),
     "Schur complement": (2, "feti.operators.explicit:schur_complement"),
     "coarse space": (1, "feti.coarse.natural:assemble_owned_rows"),
-    "field file": (1, "output.files.field_file:_write_rows"),
-    "contact": (2, "interface.contact:kkt_errors"),
+    "field file": (1, "results.field_file:_write_rows"),
+    "contact": (2, "interface.contact.contact_problem:kkt_errors"),
     "influence columns": (1, "feti.preconditioners.response_columns:ResponseColumns._append"),
-    "checkpoint": (0, "output.files.checkpoint:Checkpoint._write"),
-    "table": (0, "output.files.csv_tables:write"),
-    "picture": (0, "output.plots.figures:plot"),
+    "checkpoint": (0, "results.checkpoint:Checkpoint._write"),
+    "table": (0, "results.csv_tables:write"),
+    "picture": (0, "report.plots.figures:plot"),
 }
 
 
