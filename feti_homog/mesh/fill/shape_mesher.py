@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import product
+from itertools import pairwise, product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import ModuleType
@@ -146,7 +146,11 @@ def _rounded_lines(occ: ModuleType, corners: Float, rounding: float) -> list[int
     lines = []
     for k, corner in enumerate(following):
         onward = starts[(k + 1) % len(starts)]
-        lines += [occ.addLine(starts[k], stops[k]), occ.addCircleArc(stops[k], point(corner), onward)]
+        lines.append(occ.addLine(starts[k], stops[k]))
+        # Half a turn, of two corners, has no sense of its own.
+        middle = [] if len(corners) > 2 else [point(corner + rounding * along[k])]
+        centre, places = point(corner), [stops[k], *middle, onward]
+        lines += [occ.addCircleArc(begin, centre, end) for begin, end in pairwise(places)]
     return lines
 
 
