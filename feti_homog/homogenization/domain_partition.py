@@ -17,10 +17,8 @@ from feti_homog.homogenization.cell_remarks import mesh_remarks, subdomain_remar
 from feti_homog.interface.tips import debonded_arcs
 from feti_homog.interface.tips.debonded_arcs import MovedTips
 from feti_homog.mesh.coarse_mesh import CoarseMesh
-from feti_homog.mesh.fibre_centres import fibre_circles
-from feti_homog.mesh.fibre_numbers import coating_thickness, fibre_numbers
-from feti_homog.mesh.fibre_shapes import fibre_frames
 from feti_homog.mesh.interface_edges import voids
+from feti_homog.mesh.mesh_fibres import coating_thickness, fibre_circles, fibre_frames, fibre_numbers
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.mesh.submesh import SubdomainTable, SubmeshesOfRank, cut_for_ranks, pinned_class

@@ -28,11 +28,10 @@ from feti_homog.homogenization.domain_partition import (
 )
 from feti_homog.mesh.coarse_mesh import representatives
 from feti_homog.mesh.fill.unmeshed_cell import NodedCell
-from feti_homog.mesh.joined_submeshes import joined
 from feti_homog.mesh.outline.curves import MATRIX
 from feti_homog.mesh.periodic_topology import Torus, components, places_by_depth
 from feti_homog.mesh.refinement import ReferenceLattice
-from feti_homog.mesh.submesh import SubdomainTable, SubmeshesOfRank, cut_for_ranks, pinning
+from feti_homog.mesh.submesh import SubdomainTable, SubmeshesOfRank, cut_for_ranks, joined, pinning
 from feti_homog.mesh.tiles.filling import arc_edges
 from feti_homog.mesh.tiles.tile_torus import FilledTile, NumberedTile, Regions, tile_torus
 from feti_homog.parallel.dealing import swap

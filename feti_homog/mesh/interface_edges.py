@@ -6,8 +6,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from feti_homog.mesh.coarse_mesh import CoarseMesh, edge_keys, edges
-from feti_homog.mesh.periodic_sides import paired_sides
+from feti_homog.mesh.coarse_mesh import CoarseMesh, edge_keys, edges, paired_sides
 from feti_homog.typing import Bool, Index, Int32
 
 

@@ -16,8 +16,7 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 
 from feti_homog.case.phase_names import COATING
 from feti_homog.fibres.outlines.ellipses import Ellipses
-from feti_homog.mesh.coarse_mesh import CoarseMesh
-from feti_homog.mesh.periodic_sides import paired_sides
+from feti_homog.mesh.coarse_mesh import CoarseMesh, paired_sides
 from feti_homog.typing import Bool, Float, Int, Int32
 
 

@@ -14,11 +14,10 @@ from feti_homog.fibres.arrangement import Arrangement
 from feti_homog.fibres.outlines.ellipses import Ellipses
 from feti_homog.mesh.lines import Arcs, Segments, on_circle, on_circles
 from feti_homog.mesh.outline.bridges import Bridges, OnCircles
-from feti_homog.mesh.outline.circle_arcs import SAME_PLACE, arcs_within, vertex_angles
+from feti_homog.mesh.outline.circle_arcs import SAME_PLACE, arcs_within, marked, vertex_angles
 from feti_homog.mesh.outline.curves import MATRIX, Curves, Numbering
 from feti_homog.mesh.outline.edge_samples import WHOLE, EdgeSamples, Sampling, Stations
 from feti_homog.mesh.outline.outline import Outline, crossings, disc_at, images, on_side, side_curves
-from feti_homog.mesh.outline.tip_marks import marked
 from feti_homog.mesh.sizes.graded_size import MeshSizes, SizeField, size_field
 from feti_homog.mesh.sizes.size_field import circle_size
 from feti_homog.parallel.dividing import even

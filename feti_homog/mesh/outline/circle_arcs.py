@@ -1,4 +1,4 @@
-"""Vertices of closed curves, and the arcs between them."""
+"""Vertices of closed curves, among them the marks, places such as tips of debonded arcs, and the arcs between them."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from scipy.spatial import cKDTree
 
+from feti_homog.fibres.arrangement import Arrangement
 from feti_homog.mesh.outline.bridges import TURN, OnCircles
 from feti_homog.typing import Float, Int
 
@@ -55,3 +56,12 @@ def arcs_within(
     middle = at(whose, (first + last) / 2)
     within = np.all((middle > 0) & (middle < size), axis=1)
     return whose[within], first[within], last[within]
+
+
+def marked(arrangement: Arrangement, marks: Mapping[int, Sequence[float]]) -> tuple[Int, Float]:
+    """Curve and angle in radians (t,) of the marks on curves that are there: k is the outer curve of fibre k, ~k that
+    within its coating."""
+    there = {*range(len(arrangement.radii)), *(~np.flatnonzero(arrangement.coated)).tolist()}
+    known = {curve: own for curve, own in marks.items() if curve in there}
+    curve = np.repeat(list(known), [len(own) for own in known.values()]).astype(int)
+    return curve, np.radians([mark for own in known.values() for mark in own])

@@ -12,8 +12,8 @@ from feti_homog.case.fibre_table import table_of
 from feti_homog.errors import MeshError
 from feti_homog.fibres.arrange import arrange
 from feti_homog.fibres.periodic_table import MAX_FAULTS
-from feti_homog.mesh.fibre_centres import fibre_circles
 from feti_homog.mesh.fill.gmsh_mesher import generate
+from feti_homog.mesh.mesh_fibres import fibre_circles
 from feti_homog.mesh.periodic_topology import Torus
 
 CELLS = {

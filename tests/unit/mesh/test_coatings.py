@@ -9,9 +9,9 @@ from feti_homog.case.cell_section import Cell
 from feti_homog.fibres.arrange import arrange
 from feti_homog.fibres.arrangement import Arrangement
 from feti_homog.mesh.coarse_mesh import areas, double_arcs
-from feti_homog.mesh.fibre_centres import fibre_circles
 from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.mesh.fill.unmeshed_cell import UnmeshedCell
+from feti_homog.mesh.mesh_fibres import fibre_circles
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.refinement import ReferenceLattice, refine
 from feti_homog.mesh.sizes.graded_size import MeshSizes

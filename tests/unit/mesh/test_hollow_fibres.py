@@ -12,9 +12,9 @@ from feti_homog.case import case as cases
 from feti_homog.commands import fibre_rows
 from feti_homog.errors import CaseError
 from feti_homog.mesh.coarse_mesh import areas
-from feti_homog.mesh.fibre_centres import fibre_circles
 from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.mesh.interface_edges import voids
+from feti_homog.mesh.mesh_fibres import fibre_circles
 from feti_homog.mesh.periodic_topology import Torus
 
 TUBE = {"x": 0.0, "y": 0.0, "radius": 0.2, "inner_radius": 0.12}

@@ -11,7 +11,7 @@ from unit.case.test_interface_pairs import Case, document
 from unit.mesh.faulty_meshes import grid
 
 from feti_homog.homogenization import interface_pairs
-from feti_homog.mesh.fibre_numbers import fibre_numbers
+from feti_homog.mesh.mesh_fibres import fibre_numbers
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.readers.msh_reader import read
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from feti_homog.mesh.periodic_sides import paired_sides
+from feti_homog.mesh.coarse_mesh import paired_sides
 
 PERIOD = np.array([2.0, 3.0])
 

@@ -9,7 +9,7 @@ from unit.mesh.faulty_meshes import grid, node
 from unit.mesh.second_order import FAULTY_MIDDLES, second_order
 
 from feti_homog.errors import MeshError
-from feti_homog.mesh.fibre_centres import fibre_circles
+from feti_homog.mesh.mesh_fibres import fibre_circles
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.readers.msh_reader import read
 

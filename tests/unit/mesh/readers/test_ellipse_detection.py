@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support.users_meshes import fibre_area, polar_cell
 
-from feti_homog.mesh.fibre_centres import fibre_circles
+from feti_homog.mesh.mesh_fibres import fibre_circles
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.readers.ellipse_detection import fit
 from feti_homog.mesh.readers.msh_reader import read

@@ -9,9 +9,8 @@ import pytest
 from support.tiled_cells import mesh_of, noded
 
 from feti_homog.homogenization.tile_tearing import tiles_to_fill
-from feti_homog.mesh.joined_submeshes import joined
 from feti_homog.mesh.periodic_topology import Torus
-from feti_homog.mesh.submesh import SubdomainTable, cut_for_ranks
+from feti_homog.mesh.submesh import SubdomainTable, cut_for_ranks, joined
 from feti_homog.mesh.tiles.filling import fill
 from feti_homog.mesh.tiles.tile_torus import FilledTile, tile_torus
 

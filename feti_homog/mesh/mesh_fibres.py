@@ -1,0 +1,137 @@
+"""Fibres of a mesh: their numbers, centres, radii, semi-axes, and the thickness of their coatings.  On rank 0.
+
+Directions on interfaces are measured about the centres.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from feti_homog.case.phase_names import COATING
+from feti_homog.mesh.coarse_mesh import areas
+from feti_homog.mesh.periodic_topology import Torus
+from feti_homog.mesh.submesh import Submesh, cut_bodies
+from feti_homog.mesh.unwrap import unwrap
+from feti_homog.typing import Bool, Float, Int
+
+# Relative to the radius: circles nearer than this are images of one.
+SAME_CIRCLE = 1e-9
+
+
+def fibre_circles(torus: Torus) -> Float:
+    """(constituents, 3) centre and radius of each fibre's circle, of a coating the outer one; any image of it.
+
+    The centre of a fibre that is not round is that of its area, or the one that the mesh knows, and its radius NaN.
+    NaN for the matrix, and for a fibre that winds around the torus, which has no centre.
+    """
+    circles = _discs(torus)
+    others = np.isnan(circles[torus.constituent, 2]) & (torus.constituent_phase[torus.constituent] > 0)
+    for submesh in cut_bodies(torus, np.flatnonzero(others)):
+        circles[submesh.body] = _centre_of_area(submesh)
+    if torus.mesh.centres is not None:
+        body, first = np.unique(torus.constituent, return_index=True)
+        number = torus.mesh.precedence[first]
+        known = np.isnan(circles[body, 2]) & (number > 0)
+        circles[body[known], :2] = torus.mesh.centres[(number[known] - 1) % len(torus.mesh.centres)]
+    return circles
+
+
+def _discs(torus: Torus) -> Float:
+    """(constituents, 3) the largest circle of those whose boundary is on one circle, or on several around one centre;
+    NaN of others."""
+    edge, body = torus.triangle_torus_edges, torus.constituent
+    left, right, between = torus.sides
+    outer = torus.at_void.copy()
+    outer[between] = body[left] != body[right]
+    triangle, k = np.nonzero(outer[edge])
+    own, around = body[triangle], torus.edge_circles[torus.triangle_edges[triangle, k]]
+    n = len(torus.constituent_phase)
+    order = np.lexsort((torus.triangle_edges[triangle, k], -np.nan_to_num(around[:, 2]), own))
+    bodies, first = np.unique(own[order], return_index=True)
+    circles = np.full((n, 3), np.nan)
+    circles[bodies] = around[order[first]]
+    offset = around[:, :2] - circles[own, :2]
+    offset -= np.round(offset / torus.mesh.period) * torus.mesh.period
+    on_one = (around[:, 2] > 0) & np.all(np.abs(offset) < SAME_CIRCLE * circles[own, 2:], axis=1)
+    is_disc = torus.constituent_phase > 0
+    is_disc[own[~on_one]] = False
+    circles[~is_disc] = np.nan
+    return circles
+
+
+def _centre_of_area(submesh: Submesh) -> Float:
+    """(3,) that of a fibre, and NaN for the radius."""
+    shift, closes = unwrap(submesh)
+    if not closes:
+        return np.full(3, np.nan)
+    middles = submesh.points[submesh.triangles].mean(axis=1) + shift
+    weights = areas(submesh.points, submesh.triangles.astype(np.int32))
+    return np.asarray(np.r_[np.average(middles, axis=0, weights=weights), np.nan])
+
+
+# Relative to the longer semi-axis: ellipses with centres nearer than this are images of one, or one within another.
+SAME_CENTRE = 1e-9
+
+
+def fibre_frames(torus: Torus) -> Float:
+    """(constituents, 2, 2) frame F of the ellipse c + F p, |p| = 1, around each fibre, of a coating the outer one.
+
+    NaN for the matrix, and for fibres whose boundary is not on ellipses about one centre.
+    """
+    edge, body = torus.triangle_edges.ravel(), np.repeat(torus.constituent, 3)
+    low, high = np.full(torus.torus_edge.max() + 1, body.max()), np.zeros(torus.torus_edge.max() + 1, np.int64)
+    np.minimum.at(low, torus.torus_edge[edge], body)
+    np.maximum.at(high, torus.torus_edge[edge], body)
+    is_border = ((low != high) | torus.at_void)[torus.torus_edge[edge]]
+    edge, body = edge[is_border], body[is_border]
+    ellipses = torus.edge_ellipses
+    area = np.abs(np.linalg.det(ellipses.frames))
+    order = np.lexsort((-area[edge], body))
+    bodies, first, place = np.unique(body[order], return_index=True, return_inverse=True)
+    edge = edge[order]
+    outer = ellipses[edge[first]]
+    period = torus.mesh.period
+    offset = (ellipses.centres[edge] - outer.centres[place] + period / 2) % period - period / 2
+    away = (area[edge] == 0) | (np.linalg.norm(offset, axis=1) > SAME_CENTRE * outer.longest[place])
+    is_other = np.bincount(place, away, len(bodies)) > 0
+    frames = np.full((len(torus.constituent_phase), 2, 2), np.nan)
+    known = ~is_other & (torus.constituent_phase[bodies] > 0)
+    frames[bodies[known]] = outer.frames[known]
+    return frames
+
+
+# Relative to the longer semi-axis: coatings whose thicknesses along both differ by less are of one.
+SAME_LENGTH = 1e-6
+
+
+def fibre_numbers(torus: Torus) -> tuple[Int, Bool]:
+    """(constituents,) the number of the fibre that each is, from 1, or that it coats, 0 of the matrix; and which of
+    them (constituents,) are fibres.
+
+    A coating of several fibres has the lowest of their numbers; one that coats none is a fibre itself.
+    """
+    phase, n = torus.constituent_phase, len(torus.constituent_phase)
+    coats = np.array([name == COATING for name in torus.mesh.phases])[phase]
+    sides = torus.constituent[np.stack(torus.sides[:2])]
+    coating, core = np.hstack([sides, sides[::-1]])
+    inside = coats[coating] & ~coats[core] & (phase[core] > 0)
+    is_coating = np.zeros(n, bool)
+    is_coating[coating[inside]] = True
+    is_fibre = (phase > 0) & ~is_coating
+    number = np.where(is_fibre, np.cumsum(is_fibre), n)
+    np.minimum.at(number, coating[inside], number[core[inside]])
+    return np.where(phase > 0, number, 0), is_fibre
+
+
+def coating_thickness(numbers: Int, is_fibre: Bool, semi_axes: Float) -> Float:
+    """(fibres,) by how much coatings make both semi-axes longer, 0 without one, for `fibre_numbers` and the semi-axes
+    (constituents, 2), of discs the radius twice.
+
+    NaN where fibre or coating is neither round nor an ellipse, and where their semi-axes differ by two lengths.
+    """
+    coats, fibres = np.flatnonzero((numbers > 0) & ~is_fibre), np.flatnonzero(is_fibre)
+    thickness, coated = np.zeros(len(fibres)), numbers[coats] - 1
+    outer, inner = np.sort(semi_axes[coats], axis=1), np.sort(semi_axes[fibres[coated]], axis=1)
+    low, high = (outer - inner).T
+    thickness[coated] = np.where(np.abs(high - low) <= SAME_LENGTH * outer[:, 1], low, np.nan)
+    return thickness
