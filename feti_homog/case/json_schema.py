@@ -120,8 +120,10 @@ def _axis() -> Schema:
 
 def _rules_of_one_case() -> Schema:
     """What must be given, by conditions that are independent of each other."""
-    required = [_required(path, contents) for path, contents in PLACES_OF_TABLES]
-    return {"required": list(REQUIRED), "allOf": [*filter(None, required), *map(_rule, RULES), *_material_rules()]}
+    always = [_required(path, contents) for path, contents in PLACES_OF_TABLES]
+    pairs = {"if": {"minItems": 2}, "then": {"items": {"required": ["between"]}}}  # of several [[interface]]
+    rules = [*filter(None, always), *map(_rule, RULES), *_material_rules(), {"properties": {"interface": pairs}}]
+    return {"required": list(REQUIRED), "allOf": rules}
 
 
 def _rule(rule: Rule) -> Schema:
@@ -189,7 +191,6 @@ def _material_rules() -> list[Schema]:
         {"if": _if(GENERALIZED), "then": _each_material({"properties": {"stiffness": {"minItems": 6}}})},
         {"if": coated, "then": _at(("material",), {"required": [COATING]})},
         {"if": uncoated, "then": _at(("material",), {"properties": {COATING: False}})},
-        _at(("interface",), {"if": {"minItems": 2}, "then": {"items": {"required": ["between"]}}}),
     ]
 
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import pytest
+from jsonschema import Draft202012Validator
 
 from feti_homog import Case
+from feti_homog.case.json_schema import json_schema
 from feti_homog.errors import CaseError
 from feti_homog.sweep.plan import case_documents
 
@@ -80,6 +82,12 @@ def test_faults_name_their_section(name):
     with pytest.raises(CaseError) as caught:
         Case.parse(document(interface))
     assert any(words in fault for fault in caught.value.faults), caught.value.faults
+
+
+@pytest.mark.parametrize("name", FAULTY)
+def test_the_schema_refuses_all_but_disagreements_of_sections(name):
+    agree = name not in ("the same pair", "contact", "criteria", "growth")
+    assert Draft202012Validator(json_schema()).is_valid(document(FAULTY[name][0])) != agree
 
 
 def test_sweeps_vary_a_key_of_one_section():
