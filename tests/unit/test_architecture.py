@@ -57,7 +57,6 @@ FLOORS = (
     ("interface",),
     ("homogenization",),
     ("results",),
-    ("report.analyses",),
     ("report.text",),
     ("report.plots",),
     ("report.html",),

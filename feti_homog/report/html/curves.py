@@ -10,9 +10,9 @@ from bokeh.models import ColumnDataSource, HoverTool
 from bokeh.plotting import figure
 
 from feti_homog.materials.voigt import STRESSES, voigt_names
-from feti_homog.report.analyses import reported
 from feti_homog.report.plots.interface_marks import BONDED, CLOSED, OPEN, STATE_COLOURS, STATE_NAMES
 from feti_homog.report.plots.response_curves import INK
+from feti_homog.report.text.analyses import reported
 from feti_homog.report.text.point_tables import shown_entries
 from feti_homog.results import path_curves
 from feti_homog.typing import Array

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feti_homog.materials.voigt import voigt_names
-from feti_homog.report.analyses import reported
 from feti_homog.report.plots.decimation import DrawnMesh, drawn_displacement, drawn_mesh, outline_edges
 from feti_homog.report.plots.deformed_panels import shown_scale
 from feti_homog.report.plots.interface_marks import STATE_COLOURS, STATE_NAMES, STATE_WIDTHS, InterfaceEdges
 from feti_homog.report.plots.plot_helpers import drawn_stress, stress_component, value_range
+from feti_homog.report.text.analyses import reported
 from feti_homog.results.path_curves import FAINT, components_above
 
 MOST_STATES, TRIANGLES = 48, 8000  # of the viewer, which keep a page below some megabytes

@@ -6,12 +6,10 @@ from collections.abc import Mapping
 from html import escape
 from typing import Any
 
-from feti_homog.report.analyses import reported
-from feti_homog.report.text import point_tables, stiffness_tables
+from feti_homog.report.text.analyses import reported
 from feti_homog.report.text.summary import checks, title_of
 from feti_homog.report.text.table import Column, Table
 from feti_homog.report.text.units import in_brackets
-from feti_homog.results.kept_points import chosen
 
 MOST_ROWS, NOTEBOOK_ROWS = 60, 20  # of a table of points
 
@@ -42,37 +40,7 @@ def answers(document: Document, most: int = MOST_ROWS) -> list[Table]:
     """What was asked for: stiffness with moduli, constants and bounds, or points of an angle or path, or onsets, tables
     of points with at most so many rows."""
     label = in_brackets(document["case"].get("output", {}).get("stress_unit", ""))
-    return ANSWERS[reported(document).name](document, label, most)
-
-
-def _stiffness(document: Document, label: str, most: int) -> list[Table]:
-    return [
-        *stiffness_tables.stiffnesses(document, label, "Effective stiffness under minus the unit strains"),
-        *stiffness_tables.thermal(document, label),
-        *stiffness_tables.constants(document, label),
-        *stiffness_tables.moduli(document, document["case"].get("output", {}).get("stress_unit", "")),
-        *stiffness_tables.bounds(document, label),
-    ]
-
-
-def _angle(document: Document, label: str, most: int) -> list[Table]:
-    numbers = range(min(len(document["angle"]), most))
-    return [point_tables.all_numbers("angle", document, label, numbers)]
-
-
-def _path(document: Document, label: str, most: int) -> list[Table]:
-    return [point_tables.all_numbers("path", document, label, chosen(document, most))]
-
-
-def _load(document: Document, label: str, most: int) -> list[Table]:
-    return [point_tables.load_table(document, label)]
-
-
-def _envelope(document: Document, label: str, most: int) -> list[Table]:
-    return [point_tables.envelope_table(document, label, most), *_stiffness(document, label, most)]
-
-
-ANSWERS = {"stiffness": _stiffness, "angle": _angle, "path": _path, "load": _load, "envelope": _envelope}
+    return reported(document).tables(document, label, most)
 
 
 def notebook(document: Document) -> str:

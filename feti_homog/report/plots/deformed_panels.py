@@ -16,7 +16,6 @@ from matplotlib.ticker import MaxNLocator
 from PIL import Image
 
 from feti_homog.errors import FetiHomogError
-from feti_homog.report.analyses import reported
 from feti_homog.report.plots.decimation import DrawnMesh, drawn_displacement, drawn_mesh, largest_scale, outline_edges
 from feti_homog.report.plots.interface_marks import STATE_NAMES, InterfaceEdges, state_legend
 from feti_homog.report.plots.load_labels import LoadLabels
@@ -34,6 +33,7 @@ from feti_homog.report.plots.plot_helpers import (
     unit_label,
     value_range,
 )
+from feti_homog.report.text.analyses import reported
 from feti_homog.results import atomic, field_file, kept_points
 from feti_homog.typing import Array
 

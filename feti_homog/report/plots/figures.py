@@ -17,7 +17,6 @@ from matplotlib.tri import Triangulation
 
 from feti_homog.errors import FetiHomogError
 from feti_homog.materials.voigt import voigt_names
-from feti_homog.report.analyses import reported
 from feti_homog.report.plots import cell_picture, deformed_panels, response_curves, traction_plots
 from feti_homog.report.plots.decimation import (
     DrawnMesh,
@@ -45,6 +44,7 @@ from feti_homog.report.plots.plot_helpers import (
     stress_component,
     unit_label,
 )
+from feti_homog.report.text.analyses import reported
 from feti_homog.results import field_file, result_json
 from feti_homog.typing import Array
 

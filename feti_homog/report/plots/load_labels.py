@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, voigt_names
-from feti_homog.report.analyses import reported
 from feti_homog.report.plots.plot_helpers import strain_symbols
+from feti_homog.report.text.analyses import reported
 from feti_homog.results.path_curves import FAINT, ZERO, components_above, leading_component
 
 SYMBOLS = {

@@ -12,10 +12,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 
 from feti_homog.materials.voigt import STRESSES, voigt_names
-from feti_homog.report.analyses import reported
 from feti_homog.report.plots import envelope_plot
 from feti_homog.report.plots.interface_marks import BONDED, CLOSED, OPEN, STATE_COLOURS, STATE_NAMES
 from feti_homog.report.plots.plot_helpers import bond_limits, interfaces_of, plain, save, strain_symbols, unit_label
+from feti_homog.report.text.analyses import reported
 from feti_homog.report.text.point_tables import shown_entries
 from feti_homog.results import kept_points, path_curves
 from feti_homog.typing import Array

@@ -16,7 +16,6 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components, depth_first_order
 from scipy.spatial import cKDTree
 
-from feti_homog.report.analyses import reported
 from feti_homog.report.plots.interface_marks import (
     BONDED,
     CLOSED,
@@ -28,6 +27,7 @@ from feti_homog.report.plots.interface_marks import (
 )
 from feti_homog.report.plots.load_labels import LoadLabels
 from feti_homog.report.plots.plot_helpers import save, unit_label
+from feti_homog.report.text.analyses import reported
 from feti_homog.typing import Array
 
 DEGREES = (-180.0, 180.0)

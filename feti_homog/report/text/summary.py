@@ -9,9 +9,7 @@ from textwrap import wrap
 from typing import Any
 
 from feti_homog.case.element_sizes import ASKED
-from feti_homog.materials.plane_state import plane_state_of
-from feti_homog.report.analyses import reported
-from feti_homog.report.text import point_tables, stiffness_tables
+from feti_homog.report.text.analyses import reported
 from feti_homog.report.text.point_tables import WIDTH
 from feti_homog.report.text.units import in_brackets
 
@@ -78,43 +76,7 @@ def _answer(document: Document) -> list[list[str]]:
     output = document["case"].get("output", {})
     unit, length = output.get("stress_unit", ""), output.get("length_unit", "")
     label, toughness = in_brackets(unit), in_brackets(f"{unit} {length}") if unit and length else ""
-    return ANSWERS[reported(document).name](document, label, toughness)
-
-
-def _angle(document: Document, label: str, toughness: str) -> list[list[str]]:
-    points = document["angle"]
-    tables = [point_tables.angle_table(points, label), *point_tables.angle_tip_table(points, toughness)]
-    return [table.lines for table in tables]
-
-
-def _path(document: Document, label: str, toughness: str) -> list[list[str]]:
-    return [point_tables.path_table(document, label).lines]
-
-
-def _load(document: Document, label: str, toughness: str) -> list[list[str]]:
-    tips = point_tables.tip_table(document["load"].get("tips"), toughness)
-    return [point_tables.load_lines(document, label), *(table.lines for table in tips)]
-
-
-def _envelope(document: Document, label: str, toughness: str) -> list[list[str]]:
-    return [point_tables.envelope_lines(document, label), *_stiffness(document, label, toughness)]
-
-
-def _stiffness(document: Document, label: str, toughness: str) -> list[list[str]]:
-    """The effective stiffness with what follows from it; units in brackets."""
-    blocks = [table.lines for table in stiffness_tables.stiffnesses(document, label)]
-    tips = [table.lines for table in point_tables.tip_table(document.get("tips"), toughness)]
-    if plane_state_of(document).is_spatial:
-        thermal = [table.lines for table in stiffness_tables.thermal(document, label)]
-        return [*blocks, *thermal, *stiffness_tables.constants_lines(document, label), *tips]
-    if document["case"].get("interface"):  # moduli and bounds are of bonded, linear composites
-        return [*blocks, *tips]
-    bounds = [table.lines for table in stiffness_tables.bounds(document, label)]
-    moduli = stiffness_tables.moduli_lines(document, label)
-    return [*blocks, moduli, *(bounds or [["Bounds: none of cells with voids"]])]
-
-
-ANSWERS = {"stiffness": _stiffness, "angle": _angle, "path": _path, "load": _load, "envelope": _envelope}
+    return reported(document).lines(document, label, toughness)
 
 
 def _cell(document: Document) -> list[str]:

@@ -1,0 +1,152 @@
+"""Results of each analysis as summary, pictures and pages show them: the registry of the report.
+
+Curves of an analysis are found by its name: `response_curves.CURVES`, `deformed_panels.PANELS`, `curves.FIGURES`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from feti_homog.materials.plane_state import plane_state_of
+from feti_homog.report.text import point_tables, stiffness_tables
+from feti_homog.report.text.table import Table
+from feti_homog.results.kept_points import chosen, chosen_states
+
+Document = Mapping[str, Any]
+
+
+def _evenly(document: Document, most: int, count: int) -> list[int]:
+    return sorted({round(k) for k in np.linspace(0, count - 1, min(most, count))})
+
+
+def _never(document: Document) -> bool:
+    return False
+
+
+def _always(document: Document) -> bool:
+    return True
+
+
+def _under_a_strain(document: Document) -> bool:
+    return document.get("case", {}).get("angle", {}).get("strain") is not None
+
+
+def _angle_lines(document: Document, label: str, toughness: str) -> list[list[str]]:
+    points = document["angle"]
+    tables = [point_tables.angle_table(points, label), *point_tables.angle_tip_table(points, toughness)]
+    return [table.lines for table in tables]
+
+
+def _path_lines(document: Document, label: str, toughness: str) -> list[list[str]]:
+    return [point_tables.path_table(document, label).lines]
+
+
+def _load_lines(document: Document, label: str, toughness: str) -> list[list[str]]:
+    tips = point_tables.tip_table(document["load"].get("tips"), toughness)
+    return [point_tables.load_lines(document, label), *(table.lines for table in tips)]
+
+
+def _envelope_lines(document: Document, label: str, toughness: str) -> list[list[str]]:
+    return [point_tables.envelope_lines(document, label), *_stiffness_lines(document, label, toughness)]
+
+
+def _stiffness_lines(document: Document, label: str, toughness: str) -> list[list[str]]:
+    """The effective stiffness with what follows from it; units in brackets."""
+    blocks = [table.lines for table in stiffness_tables.stiffnesses(document, label)]
+    tips = [table.lines for table in point_tables.tip_table(document.get("tips"), toughness)]
+    if plane_state_of(document).is_spatial:
+        thermal = [table.lines for table in stiffness_tables.thermal(document, label)]
+        return [*blocks, *thermal, *stiffness_tables.constants_lines(document, label), *tips]
+    if document["case"].get("interface"):  # moduli and bounds are of bonded, linear composites
+        return [*blocks, *tips]
+    bounds = [table.lines for table in stiffness_tables.bounds(document, label)]
+    moduli = stiffness_tables.moduli_lines(document, label)
+    return [*blocks, moduli, *(bounds or [["Bounds: none of cells with voids"]])]
+
+
+def _stiffness_tables(document: Document, label: str, most: int) -> list[Table]:
+    return [
+        *stiffness_tables.stiffnesses(document, label, "Effective stiffness under minus the unit strains"),
+        *stiffness_tables.thermal(document, label),
+        *stiffness_tables.constants(document, label),
+        *stiffness_tables.moduli(document, document["case"].get("output", {}).get("stress_unit", "")),
+        *stiffness_tables.bounds(document, label),
+    ]
+
+
+def _angle_tables(document: Document, label: str, most: int) -> list[Table]:
+    numbers = range(min(len(document["angle"]), most))
+    return [point_tables.all_numbers("angle", document, label, numbers)]
+
+
+def _path_tables(document: Document, label: str, most: int) -> list[Table]:
+    return [point_tables.all_numbers("path", document, label, chosen(document, most))]
+
+
+def _load_tables(document: Document, label: str, most: int) -> list[Table]:
+    return [point_tables.load_table(document, label)]
+
+
+def _envelope_tables(document: Document, label: str, most: int) -> list[Table]:
+    return [point_tables.envelope_table(document, label, most), *_stiffness_tables(document, label, most)]
+
+
+@dataclass(frozen=True)
+class ReportedAnalysis:
+    """An analysis whose entry in result.json has its name; that of the stiffness has others.
+
+    Attributes:
+        title: the name in words.
+        lines: blocks of the summary, of the units of stresses and of energy release rates in brackets, or empty.
+        tables: the same for pages, of the unit of stresses, and with at most so many rows.
+        is_curve: whether its states are points of a curve, shown side by side.
+        is_followed: whether the first and the last of them say most.
+        picture: name of the picture of a state, "" for that of its unit load.
+        is_load_given: whether states of a result are under a load of the case, not under unit strains.
+        states: numbers of at most so many of the first states, whose count comes last.
+    """
+
+    name: str
+    title: str
+    lines: Callable[[Document, str, str], list[list[str]]]
+    tables: Callable[[Document, str, int], list[Table]]
+    is_curve: bool = False
+    is_followed: bool = False
+    picture: str = ""
+    is_load_given: Callable[[Document], bool] = _never
+    states: Callable[[Document, int, int], list[int]] = _evenly
+
+
+STIFFNESS = ReportedAnalysis("stiffness", "effective stiffness", _stiffness_lines, _stiffness_tables)
+ANALYSES = {
+    each.name: each
+    for each in (
+        ReportedAnalysis(
+            "angle", "debonding angle", _angle_lines, _angle_tables, is_curve=True, is_load_given=_under_a_strain
+        ),
+        ReportedAnalysis(
+            "path",
+            "load path",
+            _path_lines,
+            _path_tables,
+            is_curve=True,
+            is_followed=True,
+            is_load_given=_always,
+            states=chosen_states,
+        ),
+        ReportedAnalysis(
+            "load", "equilibrium under a load", _load_lines, _load_tables, picture="load", is_load_given=_always
+        ),
+        ReportedAnalysis("envelope", "onset of debonding", _envelope_lines, _envelope_tables),
+        STIFFNESS,
+    )
+}
+
+
+def reported(document: Document) -> ReportedAnalysis:
+    """The analysis of a result.json; of an empty one, that of states without numbers, the stiffness."""
+    return next((analysis for name, analysis in ANALYSES.items() if document.get(name)), STIFFNESS)
