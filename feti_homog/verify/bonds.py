@@ -10,6 +10,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from feti_homog.typing import AnyInt, Bool, Int
+from feti_homog.verify.bond_laws.law import BondLaw, law_of
 from feti_homog.verify.cell_tables import Mesh
 from feti_homog.verify.reading import ResultFiles
 from feti_homog.verify.torus import TornSides
@@ -20,7 +21,7 @@ NUMBERS = ("normal_stiffness", "tangential_stiffness", "axial_stiffness", "norma
 DEFAULTS = {"axial_stiffness": "tangential_stiffness", "axial_strength": "tangential_strength"}
 
 
-def bonds_of(files: ResultFiles, nodes: AnyInt | Bool | slice = slice(None)) -> Mapping[str, Any]:
+def _section_at(files: ResultFiles, nodes: AnyInt | Bool | slice) -> Mapping[str, Any]:
     """The section [interface]; of several, with the numbers (p,) of each of the `nodes` in place of one."""
     sections = files.interfaces
     if len(sections) < 2:
@@ -28,6 +29,11 @@ def bonds_of(files: ResultFiles, nodes: AnyInt | Bool | slice = slice(None)) -> 
     pair = files.interface.pair[nodes]
     numbers = {name: np.array([_number(section, name) for section in sections])[pair] for name in NUMBERS}
     return {**sections[0], **numbers}
+
+
+def law_at(files: ResultFiles, nodes: AnyInt | Bool | slice = slice(None)) -> BondLaw:
+    """Law of the bonds at some interface nodes."""
+    return law_of(_section_at(files, nodes))
 
 
 def _number(section: Mapping[str, Any], name: str) -> float:

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from feti_homog.typing import Float
-from feti_homog.verify.bonds import bonds_of
+from feti_homog.verify.bonds import law_at
 from feti_homog.verify.check_arcs import directions
-from feti_homog.verify.check_interfaces import BONDED, mode, shares, utilisation
+from feti_homog.verify.check_interfaces import BONDED
 from feti_homog.verify.check_loads import StateNumbers, tips
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.findings import Findings, relative
@@ -29,12 +29,12 @@ class _Bonds:
     """Tractions and utilisations under any load, from the states of the unit loads."""
 
     def __init__(self, cell: DiscreteCell, states: Sequence[StateNumbers]) -> None:
-        self.section = bonds_of(cell.files)
+        self.law = law_at(cell.files)
         self._loads = np.array([[*state.strain, state.temperature] for state in states]).T
         self._unit = np.stack([state.traction for state in states])
         status = states[0].status
         self._bonded, self.released = status == BONDED, np.zeros(len(status), bool)
-        if self.section.get("growth") == "released":
+        if self.law.grows_by_release:
             self.released = tips(cell, status)
 
     def traction(self, strain: Float, temperature: float) -> Float:
@@ -44,7 +44,7 @@ class _Bonds:
 
     def used(self, traction: Float) -> Float:
         """(k,) 0 of debonded nodes, and of tips whose breaks release what is not in the files."""
-        return np.where(self._bonded & ~self.released, utilisation(self.section, traction), 0.0)
+        return np.where(self._bonded & ~self.released, self.law.utilisation(traction), 0.0)
 
 
 def check_envelope(findings: Findings, cell: DiscreteCell, states: Sequence[StateNumbers]) -> None:
@@ -66,7 +66,7 @@ def check_envelope(findings: Findings, cell: DiscreteCell, states: Sequence[Stat
             strain = unit if of_strains else np.linalg.solve(stiffness, unit)
             least = NOISE_PER_RTOL * float(document["solver"]["rtol"]) * np.abs(stiffness @ strain).max()
             traction = bonds.traction(strain, 0.0)
-            over = bonds.used(traction) > utilisation(bonds.section, np.full_like(traction, least))
+            over = bonds.used(traction) > bonds.law.utilisation(np.full_like(traction, least))
             findings.record("onset", np.inf if over.any() else 0.0, f"{at}, where some load breaks a bond")
 
 
@@ -113,12 +113,5 @@ def _check_bonds(
     node = int(np.flatnonzero(here)[np.argmax(used[here])])
     if not is_tip:
         findings.record("strength", (largest - used[node]) / largest, f"{at}, fibre and bond_angle")
-    for name, value in _mode(bonds_of(cell.files, np.array([node])), traction[node : node + 1]).items():
+    for name, value in law_at(cell.files, np.array([node])).breaks(traction[node : node + 1]).items():
         findings.record("onset", abs(point[name] - value) / (90.0 if name == "psi" else 1.0), f"{at}.{name}")
-
-
-def _mode(section: Mapping[str, Any], traction: Float) -> dict[str, float]:
-    """How a traction (1, c) breaks a bond."""
-    if section.get("criterion") == "energy":
-        return {"psi": float(np.degrees(mode(section, traction))[0])}
-    return dict(zip(("normal", "tangential", "axial"), shares(section, traction)[0].tolist(), strict=False))

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from feti_homog.typing import AnyInt, Bool, Float
-from feti_homog.verify.bonds import bonds_of
-from feti_homog.verify.check_interfaces import BONDED, CLOSED, OPEN, spring_jumps, utilisation
+from feti_homog.verify.bonds import law_at
+from feti_homog.verify.check_interfaces import BONDED, CLOSED, OPEN
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.elements import ElementFields
 from feti_homog.verify.findings import Findings, relative
@@ -74,11 +74,11 @@ class StateNumbers:
     @classmethod
     def of(cls, cell: DiscreteCell, state: State, fields: ElementFields) -> StateNumbers:
         """Those of a state of a cell."""
-        section = bonds_of(cell.files)
-        released = tips(cell, state.status) & (section.get("growth") == "released")
-        used = np.where(state.status == BONDED, utilisation(section, state.traction), 0.0)
+        law = law_at(cell.files)
+        released = tips(cell, state.status) & law.grows_by_release
+        used = np.where(state.status == BONDED, law.utilisation(state.traction), 0.0)
         used[released] = np.nan
-        stretched = state.traction * spring_jumps(cell, state) * cell.files.interface.length[:, None]
+        stretched = state.traction * law.jumps(state.traction) * cell.files.interface.length[:, None]
         in_springs = float(stretched.sum()) / (2 * cell.area)
         heat = _heat(cell, state)
         energies = fields.energy / (2 * cell.area) + state.temperature * heat / 2 + in_springs, in_springs

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from feti_homog.typing import Float, Int
-from feti_homog.verify.bonds import bonds_of
+from feti_homog.verify.bonds import law_at
 from feti_homog.verify.check_arcs import directions
-from feti_homog.verify.check_interfaces import BONDED, mode, spring_energies, toughness
+from feti_homog.verify.check_interfaces import BONDED
 from feti_homog.verify.check_loads import StateNumbers, tips
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.findings import Findings, relative
@@ -46,7 +46,7 @@ def _check_path(
         if not point.get("temperature"):
             off = point["stored"] - float(np.dot(point["strain"], point["stress"])) / 2
             findings.record("energy", relative(np.array(off), scale), f"path[{number}].stored")
-    if cell.files.by_energy:
+    if law_at(cell.files).has_toughness:
         _check_ratios(findings, points)
         _check_toughness(findings, cell, known, points, cell.files.case["path"]["method"] == "events")
         for state in known:
@@ -57,11 +57,11 @@ def tip_shares(cell: DiscreteCell, state: StateNumbers, told: Mapping[str, Seque
     """(t,) the tips of a state, by fibre and direction, and sqrt(G / G_c) by what is told of them; none, if of other
     tips."""
     node = _tips_in_order(cell, state)
-    section = bonds_of(cell.files, node)
+    law = law_at(cell.files, node)
     if len(told["G_I"]) != len(node) or len(told["G_II"]) != len(node):
         return node[:0], np.zeros(0)
     energy = np.array(told["G_I"]) + np.array(told["G_II"])
-    return node, np.sqrt(energy / toughness(section, mode(section, state.traction[node])))
+    return node, np.sqrt(energy / law.lost(law.mode(state.traction[node])))
 
 
 def _tips_in_order(cell: DiscreteCell, state: StateNumbers) -> Int:
@@ -126,12 +126,12 @@ def _check_toughness(
     for state, after in pairwise(states):
         grown = points[after.point]["fracture_energy"] - points[state.point]["fracture_energy"]
         broken = (state.status == BONDED) & (after.status != BONDED)
-        section = bonds_of(cell.files, broken)
+        law = law_at(cell.files, broken)
         if by_events and after.point == state.point + 1:
-            low = high = float(toughness(section, mode(section, state.traction[broken])) @ length[broken])
+            low = high = float(law.lost(law.mode(state.traction[broken])) @ length[broken])
         else:
             modes = np.zeros(int(broken.sum())), np.full(int(broken.sum()), np.pi / 2)
-            low, high = (float(toughness(section, psi) @ length[broken]) for psi in modes)
+            low, high = (float(law.lost(psi) @ length[broken]) for psi in modes)
         off = max(low - grown, grown - high, 0.0)
         findings.record("energy", off / scale, f"{after.name}, fracture_energy")
 
@@ -141,7 +141,7 @@ def _check_tips(
 ) -> None:
     """The tips are the bonds beside broken ones, in the mode of their tractions; by springs also with their energy."""
     node = _tips_in_order(cell, state)
-    section = bonds_of(cell.files, node)
+    law = law_at(cell.files, node)
     fibre, where = cell.files.interface.fibre[node], f"{state.name}, tip {{}}".format
     pair = (cell.files.interface.pair[node] + 1).tolist() if len(cell.files.interfaces) > 1 else None
     if (list(told["fibre"]), told.get("interface")) != (fibre.tolist(), pair) or any(
@@ -149,13 +149,13 @@ def _check_tips(
     ):
         findings.record("tables", np.inf, f"{state.name}, tips")
         return
-    psi = mode(section, state.traction[node])
+    psi = law.mode(state.traction[node])
     away = (np.array(told["angle"]) - _directions(cell)[node] + 180.0) % 360.0 - 180.0
     findings.record("tables", np.abs(away) / 360.0, where)
     findings.record("tables", np.abs(np.array(told["psi"]) - np.degrees(psi)) / 90.0, where)
     first, second = np.array(told["G_I"]), np.array(told["G_II"])
     findings.record("tables", relative(first * np.sin(psi) ** 2 - second * np.cos(psi) ** 2, first + second), where)
-    if section["growth"] == "springs":
-        own = spring_energies(section, state.traction[node])
+    if not law.grows_by_release:
+        own = law.energies(state.traction[node])
         off = np.abs(np.stack([first, second], axis=1) - own).max(axis=1, initial=0.0)
         findings.record("tables", relative(off, own.sum(axis=1)), where)

@@ -113,11 +113,6 @@ class ResultFiles:
         """The sections of interfaces; none of perfect bonding."""
         return _interfaces(self.case)
 
-    @property
-    def by_energy(self) -> bool:
-        """Whether bonds break by energy."""
-        return any(section.get("criterion") == "energy" for section in self.interfaces)
-
     def states(self) -> Iterator[State]:
         """The states in their order, one in memory at a time."""
         for number in sorted(map(int, self.file.get("state", ()))):
