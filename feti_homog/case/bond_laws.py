@@ -17,10 +17,10 @@ class BondLawEntry:
         name: value of [interface] criterion.
         implementation: "module.Class".
         keys: keys of [interface] that belong to this law and others that list them.
-        needs: keys that must be given with this law.
+        needs: keys of all laws that must be given with this one.
         limits: keys of which one must be finite for any bond to break; none if the law always has a limit.
         description: of what reaches 1 when a bond breaks, for the key `criterion`.
-        symbols: (symbol, key) pairs that label the law in pictures.
+        symbols: that label the law in pictures: symbol, key, and whether its unit is that of stress.
         softens: the compliance of springs grows before a bond parts.
         has_process_zone: elements must resolve the length along which bonds break.
     """
@@ -29,7 +29,7 @@ class BondLawEntry:
     implementation: str
     keys: tuple[str, ...]
     description: str
-    symbols: tuple[tuple[str, str], ...]
+    symbols: tuple[tuple[str, str, bool], ...]
     needs: tuple[str, ...] = ()
     limits: tuple[str, ...] = ()
     softens: bool = False
@@ -38,7 +38,7 @@ class BondLawEntry:
 
 STIFFNESSES = ("normal_stiffness", "tangential_stiffness")
 STRENGTHS = ("normal_strength", "tangential_strength", "axial_strength")
-OF_STRENGTHS = ((r"R^\mathrm{n}", "normal_strength"), (r"R^\mathrm{t}", "tangential_strength"))
+OF_STRENGTHS = ((r"R^\mathrm{n}", "normal_strength", True), (r"R^\mathrm{t}", "tangential_strength", True))
 
 REGISTRY = (
     BondLawEntry(
@@ -62,8 +62,8 @@ REGISTRY = (
         "energy.SpringEnergy",
         ("toughness", "growth", "mode_sensitivity"),
         "the energy of its spring / G_c, see toughness",
-        ((r"G_\mathrm{Ic}", "toughness"),),
-        needs=(*STIFFNESSES, "toughness"),
+        ((r"G_\mathrm{Ic}", "toughness", False),),
+        needs=STIFFNESSES,
         has_process_zone=True,
     ),
 )

@@ -6,14 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from feti_homog.case.bond_laws import DEFAULT, LAWS, REGISTRY
 from feti_homog.case.section_values import FIBRES, PAIR, STIFFNESS, STRENGTH, TOUGHNESS
 from feti_homog.case.selectors import ANALYSIS_TYPE, BREAKING, BY_ENERGY, BY_STRENGTH, GENERALIZED
 from feti_homog.schema.keys import TableReader, key
 from feti_homog.schema.values import POSITIVE_OR_INF, boolean, choice, list_of, real, table_of
 from feti_homog.schema.wording import toml_value
 
-STIFFNESSES = ("normal_stiffness", "tangential_stiffness")
-STRENGTHS = ("normal_strength", "tangential_strength", "axial_strength")
 COMMON = ("contact", "criterion", "growth")
 """The keys in which all sections [[interface]] agree."""
 
@@ -114,11 +113,11 @@ class InterfaceSection:
         only=(BREAKING, GENERALIZED, BY_STRENGTH),
     )
     criterion: str = key(
-        choice("max", "quadratic", "energy"),
-        'A bond breaks when this reaches 1: "max": the largest of t_n / R^n, |t_t| / R^t and along the fibre '
-        '|t_a| / R^a; "quadratic": the root of the sum of their squares; "energy": the energy of its spring / G_c, '
-        "see toughness. Compression never breaks a bond.",
-        default="max",
+        choice(*LAWS),
+        "A bond breaks when this reaches 1: "
+        + "; ".join(f'"{law.name}": {law.description}' for law in REGISTRY)
+        + ". Compression never breaks a bond.",
+        default=DEFAULT,
         only=BREAKING,
     )
     toughness: float | None = key(

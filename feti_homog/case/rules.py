@@ -8,10 +8,11 @@ from dataclasses import replace
 from itertools import product
 from typing import Any
 
+from feti_homog.case.bond_laws import REGISTRY, STIFFNESSES, STRENGTHS
 from feti_homog.case.cell_files import FEWEST_MATCHED
 from feti_homog.case.cell_section import MESH, MESHED, TABLE, Cell
 from feti_homog.case.element_sizes import ASKED, CHOSEN
-from feti_homog.case.interface_section import ARCS, STIFFNESSES, STRENGTHS, Arc
+from feti_homog.case.interface_section import ARCS, Arc
 from feti_homog.case.mixed_load import MixedLoad, components
 from feti_homog.case.section_values import MESH_FILE, MESH_SUFFIXES
 from feti_homog.case.sections import OUT_OF_PLANE_STRESSES, SECTIONS, SECTIONS_OF_AN_ANALYSIS
@@ -19,7 +20,7 @@ from feti_homog.case.selectors import (
     ANALYSIS_TYPE,
     ANGLE_ANALYSIS,
     BREAKING,
-    BY_ENERGY,
+    CRITERION,
     ENVELOPE_ANALYSIS,
     GENERALIZED,
     IN_THE_PLANE,
@@ -29,6 +30,7 @@ from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, STRAIN
 from feti_homog.schema.keys import Condition, Selector, keys_of
 from feti_homog.schema.rules import ITEMS, Path, Place, Rule, Schema, belonging, exclusive, misplaced, needed, refused
 from feti_homog.schema.values import INF
+from feti_homog.schema.wording import toml_value
 
 CELL, INTERFACE, LOADS = ("cell",), ("interface",), ("strain", "to", "waypoints")
 PLACES_OF_LOADS: tuple[Path, ...] = (("path", "to"), ("path", "waypoints", ITEMS), ("load", "to"))
@@ -151,14 +153,16 @@ def _bonds() -> Iterator[Rule]:
     line = f"[interface] debonded: missing; expected {ARCS.expected}, or []: nothing else can open"
     unbroken = ANALYSIS_TYPE.among("stiffness", "load")
     yield _document({"properties": {"interface": _any_section(ways)}}, line, unbroken, MESHED)
-    for name in STIFFNESSES:
-        yield needed(INTERFACE, name, 'missing; criterion = "energy" needs it', BREAKING, BY_ENERGY)
-    type_ = ENVELOPE_ANALYSIS.in_words("")
+    for law in REGISTRY:
+        missing = f"missing; criterion = {toml_value(law.name)} needs it"
+        for name in law.needs:
+            yield needed(INTERFACE, name, missing, BREAKING, CRITERION.among(law.name))
+    type_, unlimited = ENVELOPE_ANALYSIS.in_words(""), [law.name for law in REGISTRY if not law.limits]
     yield _document({"required": ["interface"]}, f"[interface]: missing section; {type_} needs it", ENVELOPE_ANALYSIS)
     for plane, names in ((IN_THE_PLANE, STRENGTHS[:2]), (GENERALIZED, STRENGTHS)):
         finite: Schema = {"maximum": sys.float_info.max, "not": {"enum": [INF]}}
         strong: list[Schema] = [{"required": [name], "properties": {name: finite}} for name in names]
-        strong.append({"required": ["criterion"], "properties": {"criterion": {"enum": ["energy"]}}})
+        strong.append({"required": ["criterion"], "properties": {"criterion": {"enum": unlimited}}})
         line = f"[interface] {', '.join(names)}: missing; {type_} needs one"
         bonds = {"properties": {"interface": _any_section({"anyOf": strong})}}
         yield _document(bonds, line, ENVELOPE_ANALYSIS, plane)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from feti_homog.case.bond_laws import laws_with
 from feti_homog.schema.keys import Selector
 
 ANALYSIS_TYPE = Selector("analysis", "type")
@@ -12,7 +13,7 @@ CRITERION = Selector("interface", "criterion")
 ANGLE_ANALYSIS, PATH_ANALYSIS = ANALYSIS_TYPE.among("angle"), ANALYSIS_TYPE.among("path")
 LOAD_ANALYSIS = ANALYSIS_TYPE.among("load")
 ENVELOPE_ANALYSIS, BREAKING = ANALYSIS_TYPE.among("envelope"), ANALYSIS_TYPE.among("path", "envelope")
-BY_ENERGY, BY_STRENGTH = CRITERION.among("energy"), CRITERION.among("max", "quadratic")
+BY_ENERGY, BY_STRENGTH = (CRITERION.among(*laws_with(key)) for key in ("toughness", "normal_strength"))
 
 DRAWN_STRESS = Selector("output", "stress")
 

@@ -12,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil
 
+from feti_homog.case.bond_laws import laws_with
 from feti_homog.case.case import Case
 from feti_homog.case.phase_names import COATING
 from feti_homog.fem.problem import AXIAL, Problem
@@ -61,7 +62,7 @@ def _iterations(case: Case) -> int:
 def _asks_for_tips(case: Case) -> bool:
     """Whether an envelope needs the inverse of the dual operator, which many solves call for."""
     bond = case.interface
-    by_energy = bond is not None and bond.criterion == "energy" and bond.growth == "released"
+    by_energy = bond is not None and bond.criterion in laws_with("growth") and bond.growth == "released"
     return case.section.breaks and by_energy and (bool(case.arcs) or case.cell.has_own_mesh)
 
 

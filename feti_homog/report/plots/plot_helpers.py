@@ -18,6 +18,7 @@ from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Path2D
 from PIL import Image
 
+from feti_homog.case.bond_laws import DEFAULT, LAWS
 from feti_homog.materials.voigt import AXIAL_STRESSES, SPATIAL_STRESSES, STRESSES, voigt_names
 from feti_homog.report.plots.decimation import DrawnMesh, triangle_means
 from feti_homog.results import atomic
@@ -204,11 +205,11 @@ def bond_limits(case: Mapping[str, Any]) -> list[str]:
 
 
 def _limits(bond: Mapping[str, Any], unit: str) -> str:
-    if bond.get("criterion") == "energy":
-        return rf"criterion energy, $G_\mathrm{{Ic}} = {bond['toughness']:g}$"
-    limits = ((r"R^\mathrm{n}", "normal_strength"), (r"R^\mathrm{t}", "tangential_strength"))
-    words = [f"${name} = {bond[key]:g}$ {plain(unit)}".rstrip() for name, key in limits if bond.get(key)]
-    return ", ".join([f"criterion {bond['criterion']}", *words]) if words else "no debonding by load"
+    criterion = bond.get("criterion", DEFAULT)
+    symbols = [each for each in LAWS[criterion].symbols if bond.get(each[1])]
+    given = [(symbol, key, unit if of_stress else "") for symbol, key, of_stress in symbols]
+    words = [f"${symbol} = {bond[key]:g}$ {plain(label)}".rstrip() for symbol, key, label in given]
+    return ", ".join([f"criterion {criterion}", *words]) if words else "no debonding by load"
 
 
 def plain(text: str) -> str:
