@@ -17,6 +17,7 @@ import numpy as np
 
 from feti_homog.materials.voigt import AXIAL_STRESSES, STRESSES
 from feti_homog.results import atomic, field_file
+from feti_homog.results.field_layout import StatePart, tables
 from feti_homog.results.field_views import AXIAL
 
 CELL, INTERFACE = "result.xdmf", "interface.xdmf"
@@ -45,6 +46,17 @@ INTERFACE_POINTS = {
 # Of generalized plane strain there are these too.
 SPATIAL_ELEMENTS = {name: f"column/state/K/{name}" for name in AXIAL_STRESSES}
 SPATIAL_POINTS = {f"{name}_a": f"state/K/axial_{name}" for name in ("traction", "jump")}
+LISTED = {*CELL_ELEMENTS.values(), *INTERFACE_POINTS.values(), *SPATIAL_POINTS.values()}
+
+
+def _described(*shapes: str) -> dict[str, str]:
+    """Fields of a state that `field_layout` describes and that are not named above, under their own names."""
+    fields = {name: d.shape for name, d in tables(StatePart).items() if f"state/K/{name}" not in LISTED}
+    return {name: f"state/K/{name}" for name, shape in fields.items() if shape in shapes}
+
+
+CELL_ELEMENTS |= _described("(m,)")
+INTERFACE_POINTS |= _described("(k,)", "(k, 3)")
 
 
 def write(directory: Path) -> list[Path]:
