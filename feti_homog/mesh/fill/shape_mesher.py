@@ -23,8 +23,7 @@ from feti_homog.mesh.coarse_mesh import CoarseMesh
 from feti_homog.mesh.readers.gmsh_file import triangles_of_model
 from feti_homog.mesh.readers.msh_reader import made
 from feti_homog.mesh.sizes.from_sources import MAX_GROWTH, wrap
-from feti_homog.mesh.sizes.graded_size import MeshSizes
-from feti_homog.mesh.sizes.size_field import MIN_EDGES_AROUND, PASSAGE_EDGE
+from feti_homog.mesh.sizes.graded_size import MIN_EDGES_AROUND, PASSAGE_EDGE, MeshSizes
 from feti_homog.mesh.tiles.filling import gmsh_session
 from feti_homog.typing import Float, Int
 

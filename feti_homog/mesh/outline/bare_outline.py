@@ -18,8 +18,7 @@ from feti_homog.mesh.outline.circle_arcs import SAME_PLACE, arcs_within, marked,
 from feti_homog.mesh.outline.curves import MATRIX, Curves, Numbering
 from feti_homog.mesh.outline.edge_samples import WHOLE, EdgeSamples, Sampling, Stations
 from feti_homog.mesh.outline.outline import Outline, crossings, disc_at, images, on_side, side_curves
-from feti_homog.mesh.sizes.graded_size import MeshSizes, SizeField, size_field
-from feti_homog.mesh.sizes.size_field import circle_size
+from feti_homog.mesh.sizes.graded_size import MeshSizes, SizeField, circle_size, size_field
 from feti_homog.parallel.dividing import even
 from feti_homog.typing import Bool, Float, Int
 

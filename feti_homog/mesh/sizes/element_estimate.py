@@ -13,7 +13,7 @@ from feti_homog.fibres.arrangement import Arrangement
 from feti_homog.fibres.outlines.ellipses import Ellipses
 from feti_homog.fibres.outlines.shapes import elliptic
 from feti_homog.mesh.sizes.from_sources import MAX_GROWTH
-from feti_homog.mesh.sizes.size_field import MIN_EDGES_AROUND
+from feti_homog.mesh.sizes.graded_size import MIN_EDGES_AROUND
 
 # Area of an equilateral triangle / its side squared.
 TRIANGLE_AREA = math.sqrt(3.0) / 4.0

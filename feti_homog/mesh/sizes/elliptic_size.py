@@ -12,8 +12,15 @@ from feti_homog.fibres.outlines.ellipses import Ellipses, gaps
 from feti_homog.fibres.outlines.outlines import directions
 from feti_homog.fibres.torus_pairs import neighbours
 from feti_homog.mesh.sizes.from_sources import MAX_GROWTH, Source, SourcedSize, wrap
-from feti_homog.mesh.sizes.graded_size import MeshSizes, SizeField
-from feti_homog.mesh.sizes.size_field import MIN_EDGES_AROUND, PASSAGE_EDGE, WEDGE, at_vertices, passage_growth
+from feti_homog.mesh.sizes.graded_size import (
+    MIN_EDGES_AROUND,
+    PASSAGE_EDGE,
+    WEDGE,
+    MeshSizes,
+    SizeField,
+    at_vertices,
+    passage_growth,
+)
 from feti_homog.typing import Float, Int
 
 # Points of each ellipse at which its curvature, and its distance from corners, are taken.

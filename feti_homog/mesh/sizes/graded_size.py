@@ -1,18 +1,141 @@
-"""Meshes that are finer on circles, and at the tips of debonded arcs, than elsewhere."""
+"""How fine the coarse mesh is: the size of edges on lines of the cell, finer on circles and at tips of debonded arcs."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from feti_homog.fibres.arrangement import Arrangement
+from feti_homog.fibres.torus_pairs import neighbours
 from feti_homog.mesh.lines import on_circles
-from feti_homog.mesh.sizes.from_sources import MAX_GROWTH, SourcedSize, wrap
-from feti_homog.mesh.sizes.size_field import MIN_EDGES_AROUND, coating_size, line_size
-from feti_homog.typing import Float, Int
+from feti_homog.mesh.sizes.from_sources import MAX_GROWTH, Source, SourcedSize, wrap
+from feti_homog.typing import Bool, Float, Int
+
+# Edges around a fibre, at least.
+MIN_EDGES_AROUND = 16
+# Edge length in a narrow passage, relative to its width.
+PASSAGE_EDGE = 1.5
+# Angle between a circle and a side that it crosses, relative to the turn of the circle along an edge there.
+WEDGE = 3
+
+
+def line_size(arrangement: Arrangement, largest: float, vertices: Float) -> SourcedSize:
+    """The size of edges at positions on the torus.
+
+    The sources (x_k, h_k) are the two faces of each narrow passage between two fibres, or between a fibre and
+    a side or corner of the cell, with h_k proportional to its width, and the `vertices` (v, 2) that the mesh
+    must have, with the distance to the next one.
+    """
+    size, (shells, disc) = arrangement.size, arrangement.shells
+    circles, caps = np.column_stack([shells.centres, shells.radii]), circle_size(arrangement, largest)
+    outer = np.unique(disc, return_index=True)[1]
+    sources = [
+        _between_fibres(circles[outer], size, caps[outer], largest),
+        _at_sides(circles, size, caps, largest),
+        _at_corners(circles, size, caps),
+        at_vertices(vertices, size, largest),
+    ]
+    return SourcedSize(sources, size, largest)
+
+
+def circle_size(arrangement: Arrangement, largest: float) -> Float:
+    """Largest edge length (k,) on the circles of an arrangement, such that each has at least MIN_EDGES_AROUND edges.
+
+    Those on a coating of the thickness t on the radius a have at most sqrt(t a): then they are t / 8 away from their
+    arcs, and elements across the coating do not turn over when their edges are bent.
+    """
+    shells, disc = arrangement.shells
+    caps = np.minimum(largest, 2 * np.pi * shells.radii / MIN_EDGES_AROUND)
+    return np.where(arrangement.coated[disc], np.minimum(caps, coating_size(arrangement)[disc]), caps)
+
+
+def coating_size(arrangement: Arrangement) -> Float:
+    """sqrt(t a) (N,) of the coating of the thickness t on each disc of the radius a."""
+    return np.asarray(np.sqrt(arrangement.coating * arrangement.radii))
+
+
+def _between_fibres(circles: Float, size: Float, caps: Float, largest: float) -> Source:
+    """Facing points of near fibres; the edges at either suit the gap and those of the other fibre."""
+    centres, radii = circles[:, :2], circles[:, 2]
+    first, second, vector = neighbours(centres, size, 2 * radii.max() + largest)
+    distance = np.linalg.norm(vector, axis=1)
+    gap = distance - radii[first] - radii[second]
+    normal = vector / distance[:, None]
+    growth = passage_growth(gap, 1 / radii[first] + 1 / radii[second])
+    places, lengths, growths = [], [], []
+    for here, there, sign in ((first, second, 1.0), (second, first, -1.0)):
+        length = np.minimum(PASSAGE_EDGE * gap, caps[there] + MAX_GROWTH * gap)
+        near = length < caps[here]
+        places.append((centres[here] + sign * radii[here, None] * normal)[near])
+        lengths.append(length[near])
+        growths.append(growth[near])
+    return np.concatenate(places), np.concatenate(lengths), np.concatenate(growths)
+
+
+def passage_growth(width: Float, curvature: Float) -> Float:
+    """Growth with which edges stay below twice the width w + c s^2 / 2 of a passage of curvature c."""
+    return np.asarray(np.minimum(MAX_GROWTH, np.sqrt((4 - 2 * PASSAGE_EDGE) * 2 * width * curvature)))
+
+
+def _at_sides(circles: Float, size: Float, caps: Float, largest: float) -> Source:
+    """Where a circle comes near a side or hardly crosses it: extreme point, foot on the side, crossings."""
+    centres, radii = circles[:, :2] % size, circles[:, 2]
+    sources: list[Source] = []
+    for axis, sign in product((0, 1), (-1.0, 1.0)):
+        distance = centres[:, axis] if sign < 0 else size[axis] - centres[:, axis]
+        extreme, foot = centres.copy(), centres.copy()
+        extreme[:, axis] += sign * radii
+        foot[:, axis] += sign * distance
+        width = np.abs(distance - radii)
+        growth = passage_growth(width, 1 / radii)
+        length = np.minimum(PASSAGE_EDGE * width, caps + MAX_GROWTH * width)
+        sources += [
+            _where(length < caps, extreme, length, growth),
+            _where(length < largest, foot, length, growth),
+        ]
+        angle = np.arccos(np.minimum(distance / radii, 1.0))
+        length = angle * radii / WEDGE
+        for turn in (-1.0, 1.0):
+            crossing = foot.copy()
+            crossing[:, 1 - axis] += turn * radii * np.sin(angle)
+            sharp = (length < caps) & (angle > 0)
+            sources.append(_where(sharp, crossing, length, np.full(len(radii), MAX_GROWTH)))
+    places, lengths, growths = (np.concatenate(parts) for parts in zip(*sources, strict=True))
+    return places, lengths, growths
+
+
+def _where(chosen: Bool, *source: Float) -> Source:
+    """The chosen rows of places, lengths and growths."""
+    places, lengths, growths = (part[chosen] for part in source)
+    return places, lengths, growths
+
+
+def _at_corners(circles: Float, size: Float, caps: Float) -> Source:
+    """Where a circle passes near the corner: the corner and the nearest point of the circle."""
+    offset = (circles[:, :2] + size / 2) % size - size / 2
+    distance = np.linalg.norm(offset, axis=1)
+    length = PASSAGE_EDGE * np.abs(distance - circles[:, 2])
+    near = length < caps
+    facing = offset[near] * (1 - circles[near, 2] / distance[near])[:, None]
+    places = np.concatenate([facing, np.zeros_like(facing)])
+    return places, np.tile(length[near], 2), np.full(len(places), MAX_GROWTH)
+
+
+def at_vertices(vertices: Float, size: Float, largest: float) -> Source:
+    """Vertices, once on the torus, with the distance to the nearest other one."""
+    places = wrap(vertices, size)
+    tree = cKDTree(places, boxsize=size)
+    same = tree.query_pairs(1e-9 * size.max(), output_type="ndarray")
+    places = np.delete(places, same[:, 1], axis=0)
+    if len(places) == 1:
+        return places, np.array([largest]), np.array([MAX_GROWTH])
+    distance, _ = cKDTree(places, boxsize=size).query(places, k=2)
+    return places, distance[:, 1], np.full(len(places), MAX_GROWTH)
+
 
 # Samples of a size on a line for each of its edges, where the size is graded.
 SAMPLES_OF_AN_EDGE = 3
