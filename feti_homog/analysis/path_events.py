@@ -17,8 +17,8 @@ from feti_homog.interface.path.path_points import NO_ENERGIES, Energies, PathSta
 from feti_homog.results.checkpoint import Arrays
 
 KKT_LAWS = ("kkt_complementarity", "kkt_penetration", "kkt_tension")
-# Behind the names of what belongs to the problem along the fibres.
-AXIAL = "_axial"
+# Behind the names of what belongs to each problem.
+SUFFIXES = ("", "_axial")
 
 
 @dataclass
@@ -65,11 +65,10 @@ def stored(point: Point, work: Work) -> tuple[dict[str, Any], Arrays]:
         "broken": np.nan if after.broken is None else after.broken,
     }
     distributed: Arrays = {"used": point.used, "status_after": after.bonds.status, "history_after": after.bonds.history}
-    for suffix, state in (("", point.state), (AXIAL, point.state.axial)):
-        if state is not None:
-            numbers, arrays = _taken_apart(state)
-            whole |= {f"{name}{suffix}": value for name, value in numbers.items()}
-            distributed |= {f"{name}{suffix}": value for name, value in arrays.items()}
+    for suffix, state in zip(SUFFIXES, point.state.problems, strict=False):
+        numbers, arrays = _taken_apart(state)
+        whole |= {f"{name}{suffix}": value for name, value in numbers.items()}
+        distributed |= {f"{name}{suffix}": value for name, value in arrays.items()}
     return whole, distributed
 
 
@@ -77,9 +76,9 @@ def restored(event: Arrays, cell: CoupledInterfaces) -> tuple[Point, tuple[Energ
     """Put together what `stored` took apart of an event of a cell: the point, and the energies up to it."""
     load_factor, scale, leg, position, broke = event["path"].tolist()
     energies = event["energies"].tolist()
-    state = _put_together(event, cell.plane, "")
-    if cell.axial is not None:
-        state = replace(state, axial=_put_together(event, cell.axial, AXIAL))
+    pairs = zip(cell.problems, SUFFIXES, strict=False)
+    state, *others = (_put_together(event, each, suffix) for each, suffix in pairs)
+    state = replace(state, axial=others[0]) if others else state
     origin_strain, origin_stress, strain, stress = event["macroscopic"]
     broken = float(event["broken"])
     after = PathState(

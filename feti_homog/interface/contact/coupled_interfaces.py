@@ -6,7 +6,7 @@ the plane, and a debonded node carries no traction along the fibre.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from mpi4py import MPI
@@ -20,18 +20,17 @@ from feti_homog.interface.loads.macroscopic import Macroscopic
 from feti_homog.typing import Float
 
 
-@dataclass(frozen=True)
 class CoupledInterfaces:
     """The interfaces of a cell in its problems; strains and stresses (n,) are those of the plane problem, then those
     of the axial one.
 
     Attributes:
         plane: with contact.
-        axial: those of the displacement along the fibres, without; None if there is none.
+        problems: `plane` and, where there is one, that of the displacement along the fibres, without contact.
     """
 
-    plane: ContactProblem
-    axial: ContactProblem | None = None
+    def __init__(self, plane: ContactProblem, *axial: ContactProblem) -> None:
+        self.plane, self.problems = plane, (plane, *axial)
 
     @property
     def comm(self) -> MPI.Intracomm:
@@ -53,29 +52,26 @@ class CoupledInterfaces:
         """Names of the n strains."""
         return tuple(name for each in self.problems for name in each.solver.problem.loads)
 
-    @property
-    def problems(self) -> tuple[ContactProblem, ...]:
-        """The interfaces of each problem."""
-        return (self.plane,) if self.axial is None else (self.plane, self.axial)
-
     def no_multipliers(self) -> Multipliers:
         """Those of an unloaded cell."""
-        along = 0 if self.axial is None else self.axial.solver.rows
-        return Multipliers(np.zeros(self.plane.solver.rows), np.zeros(along))
+        return Multipliers(np.zeros(each.solver.rows) for each in self.problems)
 
     def linear(self, load: Load, bonds: BondState, start: Multipliers) -> CoupledSolution:
         """The dual problems with the states as they are.  Collective."""
-        in_plane, along = load.parts(len(self.plane.solver.problem.loads))
-        plane = self.plane.linear(in_plane, bonds, start.plane)
-        return CoupledSolution(plane, None if self.axial is None else self.axial.linear(along, bonds, start.axial))
+        triples = zip(self.problems, self._parts(load), start, strict=True)
+        return CoupledSolution(tuple(each.linear(own, bonds, lam) for each, own, lam in triples))
 
     def equilibrium(self, load: Load, bonds: BondState, start: Multipliers) -> Equilibrium:
         """The state under a load, with `bonds` a first guess of who is in contact.  Collective."""
-        in_plane, along = load.parts(len(self.plane.solver.problem.loads))
-        state = self.plane.equilibrium(in_plane, bonds, start.plane)
-        if self.axial is None:
-            return state
-        return replace(state, axial=self.axial.equilibrium(along, state.bonds, start.axial))
+        loads = self._parts(load)
+        state = self.plane.equilibrium(loads[0], bonds, start.plane)
+        for axial, along, lam in zip(self.problems[1:], loads[1:], start[1:], strict=True):
+            state = replace(state, axial=axial.equilibrium(along, state.bonds, lam))
+        return state
+
+    def _parts(self, load: Load) -> list[Load]:
+        """The load of each problem."""
+        return load.parts([len(each.solver.problem.loads) for each in self.problems])
 
     def leg_start(self, origin: Macroscopic, before: Load | None, end: Load) -> Load:
         """Where a leg begins: at the waypoint before, which the last point, `origin`, need not meet; components that
@@ -91,18 +87,12 @@ class CoupledInterfaces:
 
     def traction(self, found: CoupledSolution) -> Float:
         """(k, 2) normal and tangential traction, tension positive, or (k, 3) with that along the fibre."""
-        in_plane = self.plane.traction(found.plane)
-        if self.axial is None or found.axial is None:
-            return in_plane
-        return np.hstack([in_plane, self.axial.traction(found.axial)])
+        return np.hstack([each.traction(own) for each, own in zip(self.problems, found.parts, strict=True)])
 
     def macroscopic(self, found: CoupledSolution) -> Macroscopic:
         """Strains and stresses.  Collective."""
-        pairs = [(found.plane.strain, self.plane.stress(found.plane))]
-        if self.axial is not None and found.axial is not None:
-            pairs.append((found.axial.strain, self.axial.stress(found.axial)))
-        strains, stresses = zip(*pairs, strict=True)
-        return Macroscopic(np.concatenate(strains), np.concatenate(stresses))
+        stresses = [each.stress(own) for each, own in zip(self.problems, found.parts, strict=True)]
+        return Macroscopic(np.concatenate([own.strain for own in found.parts]), np.concatenate(stresses))
 
     def least_bonded_stress(self, strains: Float) -> Float:
         """(m, n) stresses under strains (m, n) of the least stiffness with all bonds.  Collective."""

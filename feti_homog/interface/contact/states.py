@@ -85,7 +85,7 @@ class Equilibrium:
     @property
     def solutions(self) -> CoupledSolution:
         """Solutions of all problems."""
-        return CoupledSolution(self.solution, None if self.axial is None else self.axial.solution)
+        return CoupledSolution(tuple(each.solution for each in self.problems))
 
     @property
     def multipliers(self) -> Multipliers:

@@ -121,8 +121,8 @@ class ReleasedEnergy(BondLaw):
         H, axial = self.influence.inverse_blocks(rows)[mine], np.zeros(0)
         stiffness = self.influence.stiffness[rows[mine]]
         own = numbers[mine] - self.influence.neighbours.first
-        if self.axial is not None and cell.axial is not None:
-            self._activate(self.axial, cell.axial, bonds)
+        if self.axial is not None:
+            self._activate(self.axial, cell.problems[1], bonds)
             rows = self.axial.neighbours.rows[numbers]
             axial = self.axial.inverse_blocks(np.stack([rows, rows], axis=1))[mine, 0, 0]
             stiffness = np.column_stack([stiffness, self.axial.stiffness[rows[mine]]])

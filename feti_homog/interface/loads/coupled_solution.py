@@ -1,40 +1,45 @@
-"""Solutions of both problems of a cell: in the plane, and along the fibres in generalized plane strain."""
+"""Solutions of all problems of a cell: in the plane and, in generalized plane strain, along the fibres."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
-
-import numpy as np
 
 from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.typing import Float
 
 
-class Multipliers(NamedTuple):
-    """(owned rows,) multipliers in the plane, and along the fibres; the latter empty without such a problem."""
+class Multipliers(tuple[Float, ...]):
+    """(owned rows,) multipliers of each problem, that of the plane first."""
 
-    plane: Float
-    axial: Float
+    __slots__ = ()
+
+    @property
+    def plane(self) -> Float:
+        """Multipliers in the plane."""
+        return self[0]
 
     def towards(self, others: Multipliers, share: float) -> Multipliers:
-        """Those after a share of the way to others."""
-        return Multipliers(*((1.0 - share) * a + share * b for a, b in zip(self, others, strict=True)))
+        """Multipliers after a share of the way to others."""
+        return Multipliers((1.0 - share) * a + share * b for a, b in zip(self, others, strict=True))
 
 
 @dataclass(frozen=True)
 class CoupledSolution:
-    """Solutions with the same bonds; `axial` is None without such a problem."""
+    """Solutions with the same bonds, `parts` of each problem, that of the plane first."""
 
-    plane: DualSolution
-    axial: DualSolution | None
+    parts: tuple[DualSolution, ...]
+
+    @property
+    def plane(self) -> DualSolution:
+        """The solution in the plane."""
+        return self.parts[0]
 
     @property
     def lam(self) -> Multipliers:
         """Their multipliers."""
-        return Multipliers(self.plane.lam, np.zeros(0) if self.axial is None else self.axial.lam)
+        return Multipliers(each.lam for each in self.parts)
 
     @property
     def converged(self) -> bool:
-        """Whether the Krylov method found both."""
-        return self.plane.reason > 0 and (self.axial is None or self.axial.reason > 0)
+        """Return True if the Krylov method found all."""
+        return all(each.reason > 0 for each in self.parts)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,12 +30,10 @@ class Load:
         """The strains (n,)."""
         return cls(values, np.zeros(len(values), bool))
 
-    def parts(self, first: int) -> tuple[Load, Load]:
-        """The first of the components, and the others."""
-        return (
-            Load(self.values[:first], self.by_stress[:first]),
-            Load(self.values[first:], self.by_stress[first:]),
-        )
+    def parts(self, sizes: Sequence[int]) -> list[Load]:
+        """The load in parts of so many components."""
+        ends = np.cumsum(sizes)[:-1]
+        return [Load(*part) for part in zip(np.split(self.values, ends), np.split(self.by_stress, ends), strict=True)]
 
     def after(self, share: float, end: Load) -> Load:
         """The load after a share of the way to another one of the same kinds; what is left of zero by rounding is

@@ -75,6 +75,6 @@ def test_a_component_far_smaller_than_another_is_no_rounding():
 
 def test_a_load_of_two_problems_is_parted():
     load = Load(np.arange(5.0), np.array([True, False, False, True, False]))
-    first, second = load.parts(3)
+    first, second = load.parts([3, len(load.values) - 3])
     assert first.values.tolist() == [0, 1, 2] and second.values.tolist() == [3, 4]
     assert second.by_stress.tolist() == [True, False]
