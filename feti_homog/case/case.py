@@ -45,6 +45,7 @@ from feti_homog.case.sweep_section import SWEEP
 from feti_homog.errors import CaseError
 from feti_homog.materials.forms import Isotropic, Material
 from feti_homog.materials.laws import contrast_faults, contrast_warnings
+from feti_homog.materials.plane_state import PLANE_STATES
 from feti_homog.schema.keys import Selected, TableReader, selected_value, to_table
 from feti_homog.schema.values import text
 from feti_homog.schema.wording import limit_in_words, suggestion, toml_key, toml_value
@@ -119,7 +120,7 @@ class Case:
     def warnings(self) -> tuple[str, ...]:
         """What is allowed but probably not wanted, one line each."""
         contrast = contrast_warnings(self.materials, self.analysis.plane)
-        if self.analysis.plane == "stress":
+        if PLANE_STATES[self.analysis.plane].is_sheet:
             return tuple(contrast)
         solids = {phase: material for phase, material in self.materials.items() if isinstance(material, Isotropic)}
         lines = {

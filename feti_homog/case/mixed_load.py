@@ -10,7 +10,8 @@ from typing import Any
 
 from feti_homog.case.section_values import STRAIN, STRAIN_COMPONENTS
 from feti_homog.case.selectors import GENERALIZED
-from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS, STRESSES
+from feti_homog.materials.plane_state import PLANE_STATES
+from feti_homog.materials.voigt import STRAINS
 from feti_homog.schema.keys import Condition, key
 from feti_homog.schema.values import either, list_of, real, table_of
 
@@ -65,23 +66,16 @@ WAYPOINTS = list_of(
 )
 
 
-def components(plane: str) -> tuple[tuple[str, str], ...]:
-    """The names of strain and stress of each component of a plane state, in the order of its strains."""
-    spatial = plane in GENERALIZED.values
-    names = (SPATIAL_STRAINS, SPATIAL_STRESSES) if spatial else (STRAINS, STRESSES)
-    return tuple(zip(*names, strict=True))
-
-
 def completed(loads: Sequence[Strain | MixedLoad], plane: str) -> tuple[dict[str, float], ...]:
     """The loads of a path in full: of each component one name and value, and the temperature in generalized plane
     strain. What a load does not name is that of the load before, at first a stress of zero.
     """
-    unloaded = {stress: 0.0 for _, stress in components(plane)}
-    unloaded |= {TEMPERATURE: 0.0} if plane in GENERALIZED.values else {}
+    state = PLANE_STATES[plane]
+    unloaded = dict.fromkeys((*state.stresses, *[TEMPERATURE] * state.is_spatial), 0.0)
 
     def after(before: Mapping[str, float], load: Strain | MixedLoad) -> dict[str, float]:
         given, full = named(load), dict[str, float]()
-        for names in components(plane):
+        for names in state.components:
             source = given if not given.keys().isdisjoint(names) else before
             full |= {name: source[name] for name in names if name in source}
         return full | {name: given.get(name, value) for name, value in before.items() if name == TEMPERATURE}
@@ -93,7 +87,7 @@ def first_named(loads: Sequence[Strain | MixedLoad], plane: str) -> dict[str, in
     """By the name of its stress, which load is the first to name each component; len(loads) if none does."""
     return {
         names[1]: next((k for k, load in enumerate(loads) if not named(load).keys().isdisjoint(names)), len(loads))
-        for names in components(plane)
+        for names in PLANE_STATES[plane].components
     }
 
 

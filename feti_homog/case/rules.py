@@ -13,7 +13,7 @@ from feti_homog.case.cell_files import FEWEST_MATCHED
 from feti_homog.case.cell_section import MESH, MESHED, TABLE, Cell
 from feti_homog.case.element_sizes import ASKED, CHOSEN
 from feti_homog.case.interface_section import ARCS, Arc
-from feti_homog.case.mixed_load import MixedLoad, components
+from feti_homog.case.mixed_load import MixedLoad
 from feti_homog.case.section_values import MESH_FILE, MESH_SUFFIXES
 from feti_homog.case.sections import OUT_OF_PLANE_STRESSES, SECTIONS, SECTIONS_OF_AN_ANALYSIS
 from feti_homog.case.selectors import (
@@ -26,6 +26,7 @@ from feti_homog.case.selectors import (
     IN_THE_PLANE,
     PLANE,
 )
+from feti_homog.materials import plane_state
 from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS, STRESSES
 from feti_homog.schema.keys import Condition, Selector, keys_of
 from feti_homog.schema.rules import ITEMS, Path, Place, Rule, Schema, belonging, exclusive, misplaced, needed, refused
@@ -138,7 +139,7 @@ def _loads() -> Iterator[Rule]:
     yield exclusive(("path",), *LOADS)
     line = f"expected a table such as {{E11 = 0.01}} in {GENERALIZED.in_words('path')}"
     yield refused(("path", "waypoints", ITEMS), {"type": "array"}, line, GENERALIZED)
-    for path, pair in product(PLACES_OF_LOADS, components(*GENERALIZED.values)):
+    for path, pair in product(PLACES_OF_LOADS, plane_state.GENERALIZED.components):
         yield exclusive(path, *pair)
 
 

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from feti_homog.case.mixed_load import TEMPERATURE
-from feti_homog.case.mixed_load import MixedLoad, Strain, completed, components, first_named
+from feti_homog.case.mixed_load import MixedLoad, Strain, completed, first_named
+from feti_homog.materials.plane_state import plane_state_of
 from feti_homog.typing import Float
 
 SAME_LOAD = 1e-9  # load factors that differ by less, relatively, are one
@@ -45,7 +46,7 @@ def _given(document: Document) -> list[Strain | MixedLoad]:
 
 def changed_components(document: Document) -> list[int]:
     """The components that the waypoints change, in Voigt order."""
-    pairs, found = components(document["case"]["analysis"]["plane"]), set[int]()
+    pairs, found = plane_state_of(document).components, set[int]()
     before: Mapping[str, float] = {stress: 0.0 for _, stress in pairs}
     for target in targets(document):
         for component, names in enumerate(pairs):
@@ -78,7 +79,7 @@ def shown_stresses(document: Document) -> list[int]:
 def what_rises(document: Document) -> str:
     """What rises on the first leg of a path, in words: "strain" if there is nothing else, or "load"."""
     first = targets(document)[0]
-    others = {stress for _, stress in components(document["case"]["analysis"]["plane"])} | {TEMPERATURE}
+    others = {*plane_state_of(document).stresses, TEMPERATURE}
     return "load" if any(first[name] for name in others & first.keys()) else "strain"
 
 
