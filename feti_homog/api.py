@@ -81,7 +81,7 @@ def run_sweep(
 
     Args:
         ranks_per_case: as many cases run at once as there are groups of so many ranks (default: one, on all).
-        retry: compute again what failed before.
+        retry: compute failed cases again.
         quiet: do not print a line for each case.
 
     Raises:

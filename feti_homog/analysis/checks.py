@@ -24,7 +24,7 @@ class Checks:
         rtol: relative tolerance of the Krylov method.
         iterations, reasons: of every dual solve so far.
         errors: largest error of each law so far.
-        faults: what did not converge or hold, in words.
+        faults: solves that did not converge and checks that failed, in words.
     """
 
     rtol: float

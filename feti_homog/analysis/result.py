@@ -54,16 +54,16 @@ class Result:
     schema: int = described("version of this layout", default=SCHEMA)
     version: str = described("version of the program")
     case: Mapping[str, Any] = described("the case with its defaults, as in a case file", entries={"KEY": "as there"})
-    digest: str = described("short name of what the case computes, whatever its name, output and PETSc options")
+    digest: str = described("short digest of the case without its name, output and PETSc options")
     cell: CellInfo = described("the meshed cell")
     fibres: tuple[FibreInfo, ...] = described("the fibres in the order of their numbers", default=())
     solver: SolverInfo = described("how the dual problem was solved")
     checks: Checks = described("largest relative error of each law over all states")
     check_tolerance: float = described("largest error of a check that passes")
     kkt_tolerance: float = described("the same of the checks of contact")
-    warnings: tuple[str, ...] = described("what is allowed but probably not wanted")
-    remarks: tuple[str, ...] = described("what the case does not say but is assumed", default=())
-    faults: tuple[str, ...] = described("what did not converge or hold")
+    warnings: tuple[str, ...] = described("settings that are valid but probably unintended")
+    remarks: tuple[str, ...] = described("assumptions about settings that the case does not give", default=())
+    faults: tuple[str, ...] = described("solves that did not converge and checks that failed")
     status: str = described("`done`, or `not converged` if there are faults")
     moduli: Moduli | None = described("engineering moduli of a perfectly bonded cell", default=None)
     bounds: StiffnessBounds | None = described("bounds of a perfectly bonded cell", default=None)
@@ -77,7 +77,7 @@ class Result:
         "of generalized plane strain: inverse of L^ef", f"1 / {STRESS}", "(6, 6)", default=None
     )
     thermal_stress: Float | None = described(
-        "stress under a unit of temperature at no strain, of phases whose expansion is given",
+        "stress per unit of temperature at zero strain, if the phases have expansions",
         f"{STRESS} per unit of temperature",
         "(6,)",
         default=None,
@@ -98,7 +98,7 @@ class Result:
         "constants of the nearest transversely isotropic stiffness about x3", default=None
     )
     transverse_moduli: TransverseModuli | None = described(
-        "what Young's and shear moduli across the fibres range over", default=None
+        "ranges of Young's and shear moduli across the fibres", default=None
     )
     estimates: Estimates | None = described("closed estimates of the same, of a cell without debonding", default=None)
     fibre_bounds: FibreBounds | None = described("bounds of the same, of rigid bonds", default=None)
@@ -114,7 +114,7 @@ class Result:
         "of a path: the numbers, from 0, of the points whose fields are kept; /state/K is that of entry K", default=None
     )
     resumed: int | None = described("points of a path that were taken from a checkpoint", default=None)
-    result_h5: FileSeal | None = described("by what result.h5 is known, if the run wrote it", default=None)
+    result_h5: FileSeal | None = described("size and checksum of result.h5, if the run wrote it", default=None)
     timings: Mapping[str, float] = described(
         "wall time of each stage, the largest over ranks", SECONDS, entries={"STAGE": "of mesh, assemble, factor, ..."}
     )

@@ -23,7 +23,7 @@ from feti_homog.typing import Float
 
 EITHER, EITHER_STIFFNESS = "(3,) or (6,)", "(3, 3) or (6, 6)"
 ENERGY = f"{STRESS} times that of the cell"
-TEMPERATURE = "change of temperature, of generalized plane strain whose phases expand"
+TEMPERATURE = "change of temperature, in generalized plane strain with expansions"
 DEBONDED_ANGLE = (
     "the same in degrees of arc, `debonded_length` / radius; of a fibre that is not round, or whose coating has an "
     "interface too, 360 times the share of its interfaces"
@@ -135,8 +135,8 @@ class Tips:
     angle: Float = described(
         "direction from the fibre's centre; of a fibre without centre that of its normal", DEGREES, "(t,)"
     )
-    G_I: Float = described("what drives each tip by opening, with G_II / G_I = tan^2 psi", ENERGY, "(t,)")
-    G_II: Float = described("what drives it by shear", ENERGY, "(t,)")
+    G_I: Float = described("energy release rate in opening, with G_II / G_I = tan^2 psi", ENERGY, "(t,)")
+    G_II: Float = described("energy release rate in shear", ENERGY, "(t,)")
     psi: Float = described("mode of its traction: 0 opens, 90 shears", DEGREES, "(t,)")
     interface: tuple[int, ...] | None = described(OWN_SECTION, default=None)
 
@@ -158,7 +158,7 @@ class TipRates:
     G_I: Float = described("its part in opening", ENERGY, "(t,)")
     G_II: Float = described("its part in shear", ENERGY, "(t,)")
     psi: Float = described("its mode, tan^2 psi = G_II / G_I: 0 opens, 90 shears", DEGREES, "(t,)")
-    length: Float = described("length behind the tip at which the modes of rigid bonds are told apart", LENGTH, "(t,)")
+    length: Float = described("length behind the tip at which the modes of rigid bonds are separated", LENGTH, "(t,)")
     interface: tuple[int, ...] | None = described(OWN_SECTION, default=None)
 
 

@@ -60,7 +60,7 @@ class StateRecorder:
                 write(self._file)
             except FetiHomogError as error:
                 self._file, self.error = None, error
-                self._say(f"warning: {error}; what follows is computed without it")
+                self._say(f"warning: {error}; the remaining results are computed without it")
 
     def kept(self) -> Fields | None:
         """This rank's fields, if they were to be kept."""

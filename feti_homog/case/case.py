@@ -133,7 +133,7 @@ class Case:
             if self.cell.order == 1 and poisson > LOCKING_POISSON
         ]
         rounding = [
-            f"{line}so near to 0.5 rounding may exceed what the checks allow; use at most {ROUNDING_POISSON}"
+            f"{line}so near to 0.5 that rounding may exceed the tolerance of the checks; use at most {ROUNDING_POISSON}"
             for line, poisson in lines.items()
             if poisson > ROUNDING_POISSON
         ]

@@ -62,7 +62,7 @@ def with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
         faults += [f"[cell] match: {fault}" for fault in error.faults]
         return cell
     if not knows_neighbours(window):
-        faults.append(f"{given}: the window is too small to know the nearest and the second neighbour of any fibre")
+        faults.append(f"{given}: the window is too small to find the nearest and second neighbours of any fibre")
     if cell.fibres is None and window.count < FEWEST_MATCHED:
         faults.append(f"[cell] fibres = {window.count}: expected at least {FEWEST_MATCHED} with match")
     count = window.count if cell.fibres is None else cell.fibres

@@ -49,19 +49,19 @@ class Cell:
         "(hexagonal; random, where min_gap lowers it).",
         only=ALL_CIRCULAR,
         unless=("match", "mix"),
-        default_words="required, or that of match or mix",
+        default_words="required, or given by match or mix",
     )
     width: float | None = key(
         real(least=1e-9, most=1e9), "Width of the cell.", unit="length", default=None, only=MESHED,
-        default_words="1, or what fibre_radius or the table make it",
+        default_words="1, or given by fibre_radius or the table",
     )  # fmt: skip
     height: float | None = key(
         real(least=1e-9, most=1e9), "Height of the cell.", unit="length", default=None, only=TABLE,
-        default_words="what the table says",
+        default_words="given by the table",
     )  # fmt: skip
     fibre_radius: float | None = key(
         real(least=1e-9, most=1e9), "Mean radius of the fibres, in place of width.", unit="length", default=None,
-        only=ALL_CIRCULAR, default_words="what width makes it",
+        only=ALL_CIRCULAR, default_words="given by width",
     )  # fmt: skip
     coating: float | None = key(
         real(least=0.01, most=1.0),
@@ -130,7 +130,7 @@ class Cell:
     )
     fibres: int | None = key(
         integer(least=1, most=100_000), "Number of fibres.", only=RANDOM, unless=("match", "radii"),
-        default_words="required, or that of match, or what width and radii make it",
+        default_words="required, or given by match, or by width and radii",
     )  # fmt: skip
     mix: Mapping[str, float] | None = key(
         FRACTIONS,
@@ -218,7 +218,7 @@ class Cell:
         only=MESH,
     )
     fibre_list: tuple[Mapping[str, Any], ...] | None = key(
-        FIBRE_LIST, "The fibres, in place of file.", default=None, only=TABLE, default_words="what file has"
+        FIBRE_LIST, "The fibres, in place of file.", default=None, only=TABLE, default_words="given by file"
     )
     window: str = key(
         choice("periodic", "cut"),

@@ -178,7 +178,7 @@ def _read_sizes(comment: str, row: int, sizes: dict[str, float], faults: _Faults
             expected = "a number above 0" if key in SIZES[:2] else "a number"
             faults.add(row, f"{key} = {word}: expected {expected}")
         elif sizes.setdefault(key, value) != value:
-            faults.add(row, f"{key} = {word}: an earlier line says {sizes[key]:g}")
+            faults.add(row, f"{key} = {word}: an earlier line has {sizes[key]:g}")
 
 
 def _number(word: str, delimiter: str) -> float | None:

@@ -31,7 +31,7 @@ def read_window(path: Path, size: tuple[float, float] | None = None) -> FibrePat
     width, height = size or (table.width, table.height)
     if width is None or height is None:
         raise CaseError(
-            f'{table.name}: the size of the window is not known; expected a line such as "# width = 120, height = 80"'
+            f'{table.name}: the size of the window is missing; expected a line such as "# width = 120, height = 80"'
         )
     centres = table.centres - [table.left or 0.0, table.bottom or 0.0]
     radii = table.radius

@@ -38,7 +38,7 @@ def json_schema() -> Schema:
         "title": "Case file of feti_homog",
         "type": "object",
         "properties": {
-            "name": dict(text.json_schema) | {"description": "Name of the case; by default that of the file."},
+            "name": dict(text.json_schema) | {"description": "Name of the case; by default the name of the file."},
             **{section: _reference(section) for section in SECTIONS},
             "interface": {"anyOf": [_reference("interface"), _several(_reference("interface"))]},
             "material": _materials(),

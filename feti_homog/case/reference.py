@@ -87,7 +87,7 @@ def tables_of(section: str) -> list[TableReference]:
     """The tables of a section. Raises CaseError if there is none of that name."""
     found = [table for table in tables() if table.section == section]
     if not found:
-        raise CaseError(f"{section}: unknown section; known are {', '.join(ORDER)}")
+        raise CaseError(f"{section}: unknown section; expected one of {', '.join(ORDER)}")
     return found
 
 

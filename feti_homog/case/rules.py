@@ -101,7 +101,7 @@ def _cell() -> Iterator[Rule]:
     yield misplaced(CELL, "void_radius", "voids")
     yield exclusive(CELL, "match", "voids", words="exclude each other; cells that match a table have no voids")
     both = {"required": ["match", "radius_spread"], "properties": {"radius_spread": {"exclusiveMinimum": 0}}}
-    line = "exclude each other; the radii are those of the table"
+    line = "exclude each other; the table gives the radii"
     yield Rule(CELL, {"not": {"type": "object", **both}}, lambda at: f"{at.named('match', 'radius_spread')}: {line}")
     enough = {"properties": {"fibres": {"minimum": FEWEST_MATCHED}}}
     yield Rule(

@@ -32,7 +32,7 @@ class Analysis:
     )
     plane: str = key(
         choice("strain", "stress", "generalized"),
-        'Plane state: "strain" is that of long fibres along x3, "stress" that of a thin sheet; "generalized" is '
+        'Plane state: "strain" for long fibres along x3, "stress" for a thin sheet; "generalized" is '
         "generalized plane strain: long fibres under all six strains, also along x3.",
     )
 
@@ -95,8 +95,8 @@ class Output:
     report: bool = key(boolean, "Write report.html: numbers, pictures, curves and states on one page.", default=False)
     stress: str = key(
         choice("auto", "S11", "S22", "S12", *OUT_OF_PLANE_STRESSES),
-        'The component drawn; "auto": that of the unit strain. "S33", "S23" and "S13" are drawn in generalized plane '
-        "strain.",
+        'Component to draw; "auto": the component of the unit strain. "S33", "S23" and "S13" exist in generalized '
+        "plane strain.",
         default="auto",
     )
     deformation_scale: float | None = key(

@@ -25,7 +25,7 @@ RANGE_KEYS = {
     "step": Key(real(above=0.0), "Distance of the values, at most to - from; of linear ranges."),
     "count": Key(
         integer(least=2, most=MAX_CASES),
-        "Number of values, both ends included. Without step and count, samples in [sweep] tells how many.",
+        "Number of values, both ends included. Without step and count, samples in [sweep] gives the number.",
     ),
     "scale": Key(choice("linear", "log"), '"log": values of even ratios, from a number above 0.', default='"linear"'),
 }

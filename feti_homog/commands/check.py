@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 def add(actions: argparse._SubParsersAction[Any]) -> None:
     """Add the command to those of a parser."""
-    parser = actions.add_parser("check", help="validate a case file, mesh its cell and print what would run")
+    parser = actions.add_parser("check", help="validate a case file, mesh its cell and describe the run")
     parser.add_argument("case", type=Path, metavar="CASE.toml")
     parser.set_defaults(action=_check)
 

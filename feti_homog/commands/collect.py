@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 HELP = (
     "Write sweep.h5 and sweep.csv, with the inputs and outputs of all cases and their statistics over realisations, "
-    "and draw what varies. The sweep may still be running: what is there is collected."
+    "and pictures of the varied outputs. The sweep may still be running: finished cases are collected."
 )
 
 

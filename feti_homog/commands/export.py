@@ -23,7 +23,7 @@ def add(actions: argparse._SubParsersAction[Any]) -> None:
     parser = actions.add_parser("export", help="print a result as a material card", description=HELP)
     parser.add_argument("directory", type=folder, metavar="DIR")
     programs = "abaqus, calculix, ansys, moose, csv"
-    parser.add_argument("--format", default="", metavar="PROGRAM", help=f"what is to read the card: {programs}")
+    parser.add_argument("--format", default="", metavar="PROGRAM", help=f"program that reads the card: {programs}")
     parser.add_argument("--out", type=Path, metavar="FILE", help="write the card to a file instead of printing it")
     parser.add_argument(
         "--transversely-isotropic",

@@ -56,7 +56,7 @@ def pattern(source: Path, size: tuple[float, float] | None) -> FibrePattern:
     if source.suffix != ".toml" and not source.is_dir():
         return read_window(source, size)
     if size is not None:
-        raise CaseError(f"--size: only for a table of fibres; {source} says how large the cell is")
+        raise CaseError(f"--size: only for a table of fibres; {source} gives the size of the cell")
     fibres = listed_fibres.read(source)
     width, height = fibres.size.tolist()
     own = [name != VOID for name in fibres.phases]

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 def add(actions: argparse._SubParsersAction[Any]) -> None:
     """Add the commands to those of a parser."""
-    keys = actions.add_parser("keys", help="print what the keys of a case file mean")
+    keys = actions.add_parser("keys", help="print the keys of a case file and their meaning")
     keys.add_argument("section", nargs="?", metavar="SECTION", help="cell, material, ...; by default all of them")
     keys.set_defaults(action=_keys)
     schema = actions.add_parser("schema", help="print the JSON Schema of a case file, for editors")

@@ -32,12 +32,12 @@ def add(actions: argparse._SubParsersAction[Any]) -> None:
         "--model",
         choices=("hard-core", "poisson"),
         default="hard-core",
-        help="what is random: fibres of these radii with at least the smallest gap found (the default), or points",
+        help="random reference: fibres of these radii with at least the smallest gap found (the default), or points",
     )
     parser.add_argument(
         "--simulations", type=_simulations, default=39, metavar="N", help="how many are compared (default 39)"
     )
-    words = "size of the window, in the unit of the table (default: what a comment in the table says)"
+    words = "size of the window, in the unit of the table (default: from a comment in the table)"
     parser.add_argument("--size", type=_length, nargs=2, metavar=("WIDTH", "HEIGHT"), help=words)
     parser.set_defaults(action=_statistics)
 

@@ -27,14 +27,14 @@ def add(actions: argparse._SubParsersAction[Any]) -> None:
     one = parser.add_mutually_exclusive_group()
     one.add_argument("--list", action="store_true", help="print the cases, with --out also their status; run none")
     one.add_argument("--index", type=int, metavar="K", help="run case K alone, counted from 1, as a job array does")
-    parser.add_argument("--retry", action="store_true", help="compute again what failed before")
+    parser.add_argument("--retry", action="store_true", help="compute failed cases again")
     parser.add_argument(
         "--ranks-per-case",
         type=int,
         metavar="R",
         help="run as many cases at once as there are groups of R ranks (by default one, on all ranks)",
     )
-    parser.add_argument("--quiet", action="store_true", help="print nothing but errors and what failed")
+    parser.add_argument("--quiet", action="store_true", help="print errors and failed cases only")
     parser.set_defaults(action=_sweep)
 
 

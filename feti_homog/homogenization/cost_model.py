@@ -98,7 +98,7 @@ def estimate_lines(found: Estimate, n_ranks: int) -> list[str]:
     noun = "rank" if n_ranks == 1 else "ranks"
     return [
         f"estimate   on {n_ranks} {noun} about {_rounded(found.seconds)}, {memory} on the largest, without pictures",
-        f"ranks      {found.ranks} would suit it (one for {DOFS_OF_A_RANK} degrees of freedom, at most one a body)",
+        f"ranks      recommended: {found.ranks} ({DOFS_OF_A_RANK} degrees of freedom per rank, at most one per body)",
     ]
 
 

@@ -52,7 +52,7 @@ def warnings(case: Case, width: float, edge: float) -> list[str]:
     found = f"elements on the interface are up to {edge / 2**case.cell.refine:.3g} long"
     if case.cell.refine:
         found += f" after refine = {case.cell.refine}"
-    wanted = f"their break takes E' G_Ic / sigma_c^2 = {length:.3g}, of which they should be half at most"
+    wanted = f"the process zone is E' G_Ic / sigma_c^2 = {length:.3g} long, elements should be at most half of that"
     law = f'[interface] criterion = "{case.interfaces[0].criterion}"'
     return [f"{law}: {found}; {wanted}: set {_remedies(case, width, edge, length)}"]
 

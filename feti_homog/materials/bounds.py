@@ -106,7 +106,7 @@ def hashin_shtrikman(fractions: ArrayLike, stiffnesses: Sequence[ArrayLike]) -> 
     isotropic.
     """
     if not all(map(is_isotropic, stiffnesses)):
-        raise ValueError("the Hashin-Shtrikman bounds are those of isotropic phases")
+        raise ValueError("the Hashin-Shtrikman bounds hold for isotropic phases")
     c = np.asarray(fractions, dtype=float)
     bulk, shear = np.array([isotropic_part(stiffness) for stiffness in stiffnesses]).T
 

@@ -78,7 +78,7 @@ def spatial_stiffness(material: Material) -> Float:
     if isinstance(material, General):
         stiffness = _given_stiffness(material)
         if len(stiffness) == 3:
-            raise ValueError("stiffness: expected 6x6 in generalized plane strain; 3x3 is that of one plane state")
+            raise ValueError("stiffness: expected 6x6 in generalized plane strain; 3x3 serves one plane state only")
         return stiffness
     return rotated(np.asarray(np.linalg.inv(stable_compliance(material, GENERALIZED.name)), float), _angle(material))
 
@@ -257,7 +257,7 @@ def contrast_warnings(materials: Mapping[str, Material], plane: str) -> list[str
     contrast, phases = _contrast(materials, plane)
     if contrast <= WORRYING_CONTRAST:
         return []
-    return [f"{phases}: stiffnesses differ by a factor of {contrast:.1e}: rounding may exceed what the checks allow"]
+    return [f"{phases}: stiffnesses differ by {contrast:.1e}: rounding may exceed the tolerance of the checks"]
 
 
 def _contrast(materials: Mapping[str, Material], plane: str) -> tuple[float, str]:

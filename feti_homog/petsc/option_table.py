@@ -120,7 +120,7 @@ def is_in_table(name: str) -> bool:
 def suggestion(name: str) -> str:
     """The option of the table that a misspelt name is nearest to, or the prefixes, in words."""
     nearest = difflib.get_close_matches(name, [option.name for option in OPTIONS], n=1)
-    return f"did you mean -{nearest[0]}?" if nearest else f"known prefixes: -{', -'.join(PREFIXES)}"
+    return f"did you mean -{nearest[0]}?" if nearest else f"prefixes: -{', -'.join(PREFIXES)}"
 
 
 def solver_prefix(name: str) -> str:

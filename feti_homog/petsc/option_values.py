@@ -149,7 +149,7 @@ RULES: dict[str, Rule] = {
     "feti_schur_mat_mumps_icntl_14": _integer(0, 10_000),
     "feti_schur_pc_type": Rule("cholesky, for what is condensed is symmetric", "cholesky".__eq__),
     "feti_schur_pc_factor_mat_solver_type": Rule("mumps, which alone makes Schur complements", "mumps".__eq__),
-    "feti_ksp_error_if_not_converged": Rule("nothing: the run says it itself, and keeps what it computed", _never),
+    "feti_ksp_error_if_not_converged": Rule("nothing: the run reports it and keeps its results", _never),
     "fp_trap": Rule("nothing: numbers that are not finite are checked where they may occur", _never),
     "info": Rule("a file of an existing folder, or no value", _is_new_file),
     "malloc_dump": Rule("a file of an existing folder, or no value", _is_new_file),

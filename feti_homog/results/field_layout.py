@@ -75,7 +75,7 @@ class FibrePart:
     body: AnyInt = described("body in /mesh/body", shape="(f,)", dtype="int32")
     phase: AnyInt = described("phase, a place in `phases`", shape="(f,)", dtype="int32")
     centre: Float = described(
-        "centre of the circle, within the cell; of a fibre that is not round that of its area; NaN if it winds around",
+        "centre of the circle, within the cell, or of the area of a fibre that is not round; NaN if it winds around",
         LENGTH,
         "(f, 2)",
     )
@@ -88,7 +88,7 @@ class InterfacePart:
 
     points: Float = described("positions of the interface nodes", LENGTH, "(k, 2)")
     normal: Float = described("unit normals (n1, n2), from fibre to matrix; tangents are (-n2, n1)", shape="(k, 2)")
-    length: Float = described("tributary length: that of the interface which a node stands for", LENGTH, "(k,)")
+    length: Float = described("tributary length: the length of interface that a node represents", LENGTH, "(k,)")
     fibre: AnyInt = described("body of the fibre, or of its coating", shape="(k,)", dtype="int32")
     fibre_number: AnyInt = described("number of the fibre, from 1", shape="(k,)", dtype="int32")
     pair: AnyInt = described(
@@ -111,12 +111,12 @@ class StatePart:
     stress_mean: Float = described(f"macroscopic stress {', '.join(STRESSES)}", STRESS, "(3,)", name="stress")
     load_factor: float = described("position on the path, 0 to 1; 1 of other analyses")
     point: int = described("number, from 0, of its point in `path` or `angle` of result.json; 0 of a stiffness")
-    label: str = described("the state in words, as `E11`, `60 deg E11`, `event 12`")
-    displacement: Float = described("displacement, that of the macroscopic strain included", LENGTH, "(n, 2)")
+    label: str = described("label of the state, as `E11`, `60 deg E11`, `event 12`")
+    displacement: Float = described("displacement, including that of the macroscopic strain", LENGTH, "(n, 2)")
     fluctuation: Float = described("displacement less that of the macroscopic strain, periodic", LENGTH, "(n, 2)")
     stress: Float = described(f"means over the elements, {', '.join(STRESSES)}", STRESS, "(m, 3)")
     stress_33: Float = described(
-        "stress 33, out of the plane: 0 of plane stress, NaN where the material's constants do not say it",
+        "stress 33, out of the plane: 0 in plane stress, NaN where the material's constants do not determine it",
         STRESS,
         "(m,)",
     )

@@ -199,7 +199,7 @@ def range_fault(table: Mapping[str, Any], is_sampled: bool) -> str:
     """What is wrong with a range, empty if nothing."""
     unknown = [name for name in table if name not in RANGE_KEYS]
     if unknown:
-        return f"{unknown[0]}: unknown key; known here: {', '.join(RANGE_KEYS)}"
+        return f"{unknown[0]}: unknown key; expected one of {', '.join(RANGE_KEYS)}"
     return _ends_fault(table) or _spacing_fault(table, is_sampled)
 
 

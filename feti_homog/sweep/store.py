@@ -211,7 +211,7 @@ def _refuse_another(directory: Path, known: Sequence[SweepCase], wanted: Sequenc
     """Raises CaseError unless the known cases are the first of those wanted."""
     for old, new in zip(known, wanted, strict=False):
         if old != new:
-            words = f"its {old.folder} ({old.describe('')}) differs from that of this file ({new.describe('')})"
+            words = f"its {old.folder} ({old.describe('')}) differs from this file ({new.describe('')})"
             raise CaseError(f"--out {directory} holds another sweep: {words}; choose another folder")
     if len(known) > len(wanted):
         raise CaseError(

@@ -76,9 +76,7 @@ def _of(directory: Path) -> Certificate:
                 return _verified(files, directory)
         except (KeyError, TypeError, IndexError, ValueError, AttributeError, MemoryError) as error:
             words = f"{type(error).__name__} {error}"
-            raise CaseError(
-                f"{directory}: its files do not belong together or lack what they must have: {words}"
-            ) from error
+            raise CaseError(f"{directory}: its files do not belong together or are incomplete: {words}") from error
 
 
 def _verified(files: ResultFiles, directory: Path) -> Certificate:
@@ -119,5 +117,5 @@ def _title(files: ResultFiles, states: Sequence[StateNumbers]) -> str:
 
 def _status(files: ResultFiles) -> str:
     faults = files.document["faults"]
-    words = f"the run says: {files.document['status']}"
+    words = f"the run reports: {files.document['status']}"
     return f"{words}: {'; '.join(faults)}" if faults else words

@@ -118,7 +118,7 @@ def check_load(findings: Findings, cell: DiscreteCell, states: Sequence[StateNum
     """Loads against the case, and points or columns of result.json against the states."""
     document, case = cell.files.document, cell.files.case
     same = json.loads(str(cell.files.file.attrs["case"])) == case
-    findings.record("tables", 0.0 if same else np.inf, "the case, which the two files tell otherwise")
+    findings.record("tables", 0.0 if same else np.inf, "the case, which differs between the two files")
     unit = _unit_loads(cell)
     rows = list(zip(_expected_loads(document, case, unit), _entries(document, unit), strict=False))
     scales = _Scales.of(cell, states)
@@ -172,7 +172,7 @@ def _check_kept(
     as the case asks for."""
     count, asked = len(document["path"]), case["output"]["states"]
     told = list(document["states"]) == list(numbers)
-    findings.record("tables", 0.0 if told else np.inf, "states, which the two files tell otherwise")
+    findings.record("tables", 0.0 if told else np.inf, "states, which differ between the two files")
     rising = all(a < b for a, b in pairwise(numbers))
     ends = len(numbers) > 0 and numbers[0] == 0 and numbers[-1] == count - 1
     findings.record(

@@ -118,11 +118,11 @@ def checks(rtol: float, users_mesh: bool, has_coatings: bool) -> tuple[Check, ..
     solver = solver_limit(rtol)
     contact = min(max(CONTACT_PER_RTOL * rtol, LEAST_CONTACT), LARGEST_CHECK)
     rows = (
-        ("files", "the files are those that the run wrote, by their checksums", 0.0),
+        ("files", "the files are unchanged since the run, by their checksums", 0.0),
         ("numbers", "all numbers are finite", 0.0),
         ("mesh", "elements have positive areas and fill the cell; torn sides meet in pairs", shape),
         ("interface", "interface nodes are where one fibre meets the matrix, with its normals and lengths", shape),
-        ("arcs", "debonded from the start is what the case says, in numbers of nodes", 0.0),
+        ("arcs", "the initially debonded nodes are those of the case, in numbers of nodes", 0.0),
         ("displacement", "u = E x + u*, relative to its terms", 1e-13),
         ("stress", "stresses of the elements follow from u and the case's materials", 1e-13),
         ("stress 33", "stresses out of the plane follow from those in it and the case's materials", 1e-13),
@@ -143,9 +143,9 @@ def checks(rtol: float, users_mesh: bool, has_coatings: bool) -> tuple[Check, ..
         ("load", "the states have the strains and temperatures that the case asks for, relative to the largest", 1e-12),
         ("stress load", "the states have the stresses that the case asks for, relative to the largest", solver),
         ("tables", "points and columns in result.json are the states in result.h5, relative to the largest", 1e-12),
-        ("CSV", "the tables of points beside result.json say what that says", 0.0),
+        ("CSV", "the tables of points agree with result.json", 0.0),
         ("symmetry", "stiffnesses of bonded or free faces are symmetric, relative to the largest entry", solver),
-        ("breaks", "bonds break as the points say and never heal, in numbers of bonds", 0.0),
+        ("breaks", "bonds break as the points report and never heal, in numbers of bonds", 0.0),
         ("strength", "bonds that hold are within their strength, those that break are at it", STRENGTH),
         ("onset", "the load of every direction of an envelope is that at which the first bond breaks", ONSET),
         ("energy", "work = stored + dissipated along the path, relative to the largest energy", solver),

@@ -29,7 +29,7 @@ DERIVED: dict[str, tuple[Any, ...]] = {
 # In generalized plane strain stresses 33 are among the stresses, and there are strains along the fibres.
 SPATIAL_DERIVED = {name: shape for name, shape in DERIVED.items() if name != "stress_33"} | {"axial_strain": ("m", 2)}
 ROWS = ("points", "normal", "length", "fibre_number", "fibre")
-MISSING_FIELDS = "only a run with `fields = true` in [output] leaves what there is to verify"
+MISSING_FIELDS = "only a run with `fields = true` in [output] can be verified"
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ def test_keys_of_a_section():
 
 def test_keys_of_no_section():
     job = command_line(2, "keys", "cells")
-    assert job.returncode == 2 and job.stderr.count("cells: unknown section; known are name, cell") == 1
+    assert job.returncode == 2 and job.stderr.count("cells: unknown section; expected one of name, cell") == 1
 
 
 def test_schema():

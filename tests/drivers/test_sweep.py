@@ -97,7 +97,7 @@ def test_a_sweep_is_not_run_as_a_case_nor_a_case_as_a_sweep(tmp_path):
 
 def test_check_tells_cases_points_and_ranks(tmp_path):
     job = command_line(2, "check", sweep_file(tmp_path, "realisations = 3\n" + TWO, RANDOM))
-    assert job.returncode == 0 and "6 cases, 2 points" in job.stdout and "would suit it" in job.stdout
+    assert job.returncode == 0 and "6 cases, 2 points" in job.stdout and "recommended: " in job.stdout
 
 
 @pytest.mark.parametrize("ranks", [1, 2])

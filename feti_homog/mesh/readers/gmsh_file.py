@@ -63,7 +63,7 @@ def _dropped(gmsh: ModuleType, path: Path) -> list[str]:
     read = sum(len(tags) for tags in gmsh.model.mesh.getElements()[1])
     if listed is None or listed == read:
         return []
-    return [f"it says that it has {listed} elements, and {read} can be read: others are missing, or have numbers twice"]
+    return [f"it declares {listed} elements, and {read} can be read: others are missing, or have numbers twice"]
 
 
 def _listed_elements(path: Path) -> int | None:

@@ -84,7 +84,7 @@ def _document(directory: Path) -> dict[str, Any]:
     if not directory.is_dir():
         raise CaseError(f"cannot report {directory}: there is no such folder")
     if (directory / SWEEP).exists():
-        raise CaseError(f"cannot report {directory}: it is the folder of a sweep; name that of one of its cases")
+        raise CaseError(f"cannot report {directory}: it is the folder of a sweep; name the folder of one of its cases")
     return result_json.read(directory)
 
 

@@ -61,7 +61,7 @@ def fibres(axes: Axes, found: FibreStatistics) -> None:
     axes.add_collection(discs)
     axes.set(xlim=(0, pattern.width), ylim=(0, pattern.height), xlabel="$x_1$", ylabel="$x_2$")
     axes.set_aspect("equal")
-    words = "local fibre fraction" + ("" if found.cells.whole.all() else " (grey: not known in the window)")
+    words = "local fibre fraction" + ("" if found.cells.whole.all() else " (grey: undetermined in the window)")
     axes.figure.colorbar(discs, ax=axes, orientation="horizontal", shrink=0.8, pad=0.02, label=words)
 
 

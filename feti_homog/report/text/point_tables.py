@@ -158,7 +158,7 @@ def _path_energies(document: Document, label: str) -> list[str]:
     ]
     if "dissipation_ratio" in last:
         ratio = f"{last['dissipation_ratio']:.4f} times it was dissipated"
-        lines.append(f"Toughness of what broke per area{label}: {last['fracture_energy']:.6g}; {ratio}")
+        lines.append(f"Toughness of broken bonds per area{label}: {last['fracture_energy']:.6g}; {ratio}")
     return [*lines, *_debonded(document, last)]
 
 

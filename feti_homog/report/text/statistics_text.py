@@ -45,7 +45,7 @@ def _spread(values: Float) -> str:
 def _local_fractions(cells: VoronoiCells) -> str:
     known = cells.fractions[cells.whole]
     if not len(known):
-        return "none known: the window is too small"
+        return "undetermined: the window is too small"
     limits = f"from {known.min():.4g} to {known.max():.4g}"
     return f"{cells.mean_fraction:.4g} +- {cells.fraction_deviation:.2g}, {limits}, in {len(known)} Voronoi cells"
 
@@ -55,7 +55,7 @@ def _neighbours(found: FibreStatistics, size: float) -> list[tuple[str, str]]:
     return [
         (f"{name} centre", f"{mean:.4g} +- {deviation:.2g}, {mean / size:.3f} +- {deviation / size:.3f} mean diameters")
         if np.isfinite(mean)
-        else (f"{name} centre", "none known: the window is too small")
+        else (f"{name} centre", "undetermined: the window is too small")
         for name, mean, deviation in zip(ORDINALS, near.means, near.deviations, strict=True)
     ]
 
@@ -67,7 +67,7 @@ def _directions(shares: Float) -> str:
 
 def _randomness(found: FibreStatistics, model: str, simulations: int) -> str:
     value = found.random.p_value
-    verdict = "not told from it" if value > LEVEL else f"not one of its patterns at the level of {100 * LEVEL:g} %"
+    verdict = "indistinguishable from it" if value > LEVEL else f"not one of its patterns at {100 * LEVEL:g} %"
     if 1 / (simulations + 1) > LEVEL:
         verdict = f"too few simulations for a level of {100 * LEVEL:g} %"
     return f"L(r) beside {simulations} simulations of the model {model}: p = {value:.3g}, {verdict}"

@@ -24,7 +24,7 @@ from feti_homog.sweep.report.sweep_table import Statistics, SweepTable
 
 CASE_COLUMNS = (
     Column("row", "", "`case`, or of a point the `count`, `mean`, `std` and `ci95` of its realisations"),
-    Column("folder", "", "folder of the case, in that of the sweep"),
+    Column("folder", "", "folder of the case, below the folder of the sweep"),
     Column("point", "", "number of the point, from 1"),
     Column("realisation", "", "number of the realisation of the point, from 1"),
     Column("status", "", "`done`, `not converged`, `failed`, `damaged`, `running` or `waiting`"),

@@ -42,6 +42,6 @@ FAULTY_TABLES = {
     "width": ("# width = -3\n" + HEAD + ROW, "t.csv: row 1: width = -3: expected a number above 0"),
     "too large a width": ("# width = 1e300\n" + HEAD + ROW, "t.csv: row 1: width = 1e300: expected a number above 0"),
     "no width": ("# width = wide\n" + HEAD + ROW, "t.csv: row 1: width = wide: expected a number above 0"),
-    "two widths": ("# width = 3\n# width = 4\n" + HEAD + ROW, "t.csv: row 2: width = 4: an earlier line says 3"),
+    "two widths": ("# width = 3\n# width = 4\n" + HEAD + ROW, "t.csv: row 2: width = 4: an earlier line has 3"),
     "no text": (b"x,y,radius\n1,2,\xff\n", "t.csv: expected text in UTF-8; it has other bytes at 15"),
 }

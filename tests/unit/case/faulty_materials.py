@@ -170,7 +170,7 @@ FAULTY_MATERIALS: dict[str, tuple[str, tuple[str, ...]]] = {
     ),
     "stiffness_of_the_plane_in_space": (
         fibre("stiffness = [[3, 1, 0], [1, 3, 0], [0, 0, 1]]\n", "generalized"),
-        ("[material.fibre] stiffness: expected 6x6 in generalized plane strain; 3x3 is that of one plane state",),
+        ("[material.fibre] stiffness: expected 6x6 in generalized plane strain; 3x3 serves one plane state only",),
     ),
     "stiffness_not_symmetric_in_space": (
         fibre(SPATIAL.replace("[9, 3,", "[9, 4,"), "generalized"),

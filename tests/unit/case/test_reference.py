@@ -67,5 +67,5 @@ def test_the_text_has_every_key_and_no_long_line():
 
 
 def test_an_unknown_section():
-    with pytest.raises(CaseError, match=r"^cells: unknown section; known are name, cell, material, "):
+    with pytest.raises(CaseError, match=r"^cells: unknown section; expected one of name, cell, material, "):
         reference.tables_of("cells")

@@ -129,7 +129,7 @@ def test_tables_and_picture_hold_what_was_measured(tmp_path):
     [
         (square_lattice(), 39, "p = 0.025, not one of its patterns at the level of 5 %"),
         (square_lattice(), 18, "p = 0.0526, too few simulations for a level of 5 %"),
-        (poisson_points(40), 19, "not told from it"),
+        (poisson_points(40), 19, "indistinguishable from it"),
     ],
 )
 def test_randomness_is_judged_by_enough_simulations(fibres, simulations, words):
@@ -145,7 +145,7 @@ def test_without_out_nothing_is_written(tmp_path):
 def test_windows_too_small_say_so(tmp_path):
     text = f"{SIZE}x,y,radius\n1,2,1\n11,4,1\n"
     lines = fibre_statistics.run(write(tmp_path / "f.csv", text), tmp_path / "out", "poisson", 2)
-    assert "third centre    none known: the window is too small" in lines[0]
+    assert "third centre    undetermined: the window is too small" in lines[0]
     assert np.isnan(columns(tmp_path / "out" / "fibre_statistics.csv")["distance_3"]).all()
 
 

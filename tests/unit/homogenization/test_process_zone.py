@@ -60,9 +60,9 @@ def test_the_longest_edge_is_a_chord(size, edges):
 def test_long_elements_are_warned_of():
     (line,) = warnings(case_of())
     assert line == (
-        '[interface] criterion = "energy": elements on the interface are up to 0.981 long; their break takes '
-        "E' G_Ic / sigma_c^2 = 0.773, of which they should be half at most: set interface_size = 0.018 (or mesh_size, "
-        "of all elements), or refine = 2"
+        '[interface] criterion = "energy": elements on the interface are up to 0.981 long; the process zone '
+        "is E' G_Ic / sigma_c^2 = 0.773 long, elements should be at most half of that: set interface_size = 0.018 "
+        "(or mesh_size, of all elements), or refine = 2"
     )
     (refined,) = warnings(case_of(refine=1))
     assert "up to 0.491 long after refine = 1" in refined and "interface_size = 0.036" in refined

@@ -204,7 +204,7 @@ FAULTY_MESHES: dict[str, tuple[Callable[[Path], None], str]] = {
     "header only": (_text("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n"), "no triangles"),
     "broken off": (_broken, "gmsh cannot read it"),
     "unknown node": (_unknown_node, "gmsh cannot read it"),
-    "a line twice": (_line_twice, "it says that it has 32 elements, and 31 can be read"),
+    "a line twice": (_line_twice, "it declares 32 elements, and 31 can be read"),
     "no elements": (_mesh(lambda: grid().without(*range(1, 33))), "no triangles"),
     "only lines": (_mesh(lambda: MshFile(grid().nodes, {1: (1, 1, 1, (1, 2))})), "no triangles"),
     "quadrilaterals": (
