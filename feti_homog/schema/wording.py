@@ -48,7 +48,7 @@ def suggestion(name: str, known: Iterable[str], owners: Mapping[str, str]) -> st
         return f"it belongs to {owners[name]}"
     if nearest:
         return f"did you mean {toml_key(nearest[0])}?"
-    return "known here: " + ", ".join(map(toml_key, known))
+    return "expected one of " + ", ".join(map(toml_key, known))
 
 
 def limit_in_words(limit: float, value: float, digits: int) -> str:

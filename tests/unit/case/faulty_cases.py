@@ -23,7 +23,7 @@ FAULTY_CASES: dict[str, tuple[str, tuple[str, ...]]] = {
     ),
     "no_analysis": (BASE[: BASE.index("[analysis]")], ("[analysis]: missing section",)),
     "unknown_section": (ended("[anlysis]\n"), ("[anlysis]: unknown section; did you mean analysis?",)),
-    "strange_section": (ended('["a\\nb"]\n'), ('["a\\nb"]: unknown section; known here: cell, analysis',)),
+    "strange_section": (ended('["a\\nb"]\n'), ('["a\\nb"]: unknown section; expected one of cell, analysis',)),
     "cell_is_a_number": (
         "cell = 3\n" + BASE[BASE.index("[material.matrix]") :],
         ("cell = 3: expected a section [cell]",),

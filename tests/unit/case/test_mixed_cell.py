@@ -140,7 +140,10 @@ def test_faults_of_mixes(name):
     ("phases", "fault"),
     [
         (("glass",), "[material.carbon]: missing section"),
-        (("glass", "carbon", "fibre"), "[material.fibre]: unknown phase; known here: matrix, glass, carbon, coating"),
+        (
+            ("glass", "carbon", "fibre"),
+            "[material.fibre]: unknown phase; expected one of matrix, glass, carbon, coating",
+        ),
         (("glass", "carbon", "coating"), "[material.coating]: no fibre has a coating"),
     ],
 )

@@ -76,7 +76,7 @@ def test_ellipses_count_as_discs_of_the_same_area(tmp_path):
 
 
 FAULTY = {
-    "x,y,radius\n1,2,1\n3,4,1\n": ["f.csv: the size of the window is not known"],
+    "x,y,radius\n1,2,1\n3,4,1\n": ["f.csv: the size of the window is missing"],
     f"{SIZE}x,y,radius\n1,2,1\n13,4,1\n1,-0.5,1\n": ["row 4: its centre is outside", "row 5: its centre is outside"],
     f"{SIZE}x,y,radius\n1,2,1\n3,4,1\n1,2,2\n": ["row 5: there is a fibre at the same place before"],
     f"{SIZE}x,y,radius\n1,2,1\n": ["expected at least two fibres, got 1"],
@@ -127,7 +127,7 @@ def test_tables_and_picture_hold_what_was_measured(tmp_path):
 @pytest.mark.parametrize(
     ("fibres", "simulations", "words"),
     [
-        (square_lattice(), 39, "p = 0.025, not one of its patterns at the level of 5 %"),
+        (square_lattice(), 39, "p = 0.025, not one of its patterns at 5 %"),
         (square_lattice(), 18, "p = 0.0526, too few simulations for a level of 5 %"),
         (poisson_points(40), 19, "indistinguishable from it"),
     ],
