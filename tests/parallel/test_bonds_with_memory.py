@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import islice
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -18,6 +20,8 @@ from feti_homog.interface.path.path_points import UTILISATION_TIE, unloaded
 
 pytestmark = pytest.mark.parallel
 STIFFNESS = np.array([400.0, 200.0])
+# Points of a path that does not end, for lack of memory.
+MOST = 300
 LEGS = strains(np.array([[1.0, -0.2, 0.4], [0.2, 0.6, 0.4]]))
 
 
@@ -43,7 +47,7 @@ def path(comm, monkeypatch, request):
     law, k = TwoSteps(30.0, 15.0), len(solver.jump_operator.nodes.row)
     loaded = CoupledInterfaces(ContactProblem(solver, True, np.ones(2), law.softening))
     begin = unloaded(loaded, BondState(np.full(k, BONDED, np.int8), law.begin(k)))
-    return loaded, law, begin, list(events(loaded, law, LEGS, begin))
+    return loaded, law, begin, list(islice(events(loaded, law, LEGS, begin), MOST))
 
 
 @pytest.mark.parametrize("path", ["dirichlet", "influence"], indirect=True)
@@ -67,14 +71,14 @@ def test_bonds_soften_before_they_part(comm, path):
         assert point.broke == comm.allreduce(now_parts.sum())
         parted, softened = parted + point.broke, softened + comm.allreduce(rise.sum()) - point.broke
         assert point.energies.released >= -1e-12
-    assert parted > 2 and softened > parted
+    assert parted > 2 and softened > parted and len(points) < MOST
 
 
 @pytest.mark.parametrize("path", ["dirichlet"], indirect=True)
 def test_a_path_goes_on_from_what_its_bonds_remember(comm, path):
     loaded, law, _, points = path
     middle = len(points) // 2
-    rest = list(events(loaded, law, LEGS, points[middle].after))
+    rest = list(islice(events(loaded, law, LEGS, points[middle].after), MOST))
     assert len(rest) == len(points) - middle - 1
     for found, expected in zip(rest, points[middle + 1 :], strict=True):
         assert found.load_factor == pytest.approx(expected.load_factor, rel=1e-7)
