@@ -14,8 +14,8 @@ from feti_homog.case.case import Case
 from feti_homog.errors import EXIT_DONE, CaseError, LibraryError
 from feti_homog.petsc import libraries
 from feti_homog.petsc.command_words import named_values, petsc_words, split_argv
+from feti_homog.petsc.option_table import unknown_to_petsc
 from feti_homog.petsc.option_values import faulty_values
-from feti_homog.petsc.system_options import unknown_to_petsc
 from feti_homog.runtime import standard_streams
 from feti_homog.runtime.interrupts import end_on_signals, launched_rank
 from feti_homog.runtime.matplotlib_toolkits import prefer_own_toolkits

@@ -23,7 +23,6 @@ from monolithic import factor_and_solve, glued  # noqa: E402
 from mpi4py import MPI  # noqa: E402
 
 from feti_homog.case import case as cases  # noqa: E402
-from feti_homog.feti.preconditioners.influence import Influence  # noqa: E402
 from feti_homog.homogenization.averaging import Homogenization  # noqa: E402
 from feti_homog.homogenization.unit_cell import tear  # noqa: E402
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces  # noqa: E402
@@ -75,8 +74,8 @@ def main() -> None:
     print(f"dual problems an event      {np.mean(solves):8.1f}, Krylov iterations an event {np.mean(iterations):.1f}")
     made, coarse = len(cell.subdomains), cell.solver.natural.factorizations
     print(f"factorizations              {made} of subdomains in all, {coarse} of the coarse problem")
-    if isinstance(cell.solver.preconditioner, Influence):
-        print(f"reference cells factored    {cell.solver.preconditioner.factorizations}")
+    if cell.solver.exact_inverse is not None:
+        print(f"reference cells factored    {cell.solver.exact_inverse.factorizations}")
     print(f"all events with set-up      {setup + sum(seconds):8.1f} s, the peer {peer * len(seconds):.1f} s")
     print(f"memory at most              {peak / 2**30:8.2f} GiB, before the peer")
     cell.solver.destroy()

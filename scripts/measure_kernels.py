@@ -13,13 +13,14 @@ from time import perf_counter
 
 import numpy as np
 from mpi4py import MPI
+from petsc4py import PETSc
 from scipy.linalg.blas import dsymm, dsymv, dtrmm
 from scipy.linalg.lapack import dtrtri
 from scipy.sparse import csr_matrix, diags, kronsum
 
 from feti_homog.feti import thresholds
+from feti_homog.feti.linalg.dense_cholesky import full_from_lower
 from feti_homog.feti.linalg.distributed_solver import DistributedSolver
-from feti_homog.feti.linalg.packed_symmetric import full_from_lower
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
 
 COLUMNS = (1, 2, 3, 4, 6, 8, 12)
@@ -91,9 +92,11 @@ def main() -> None:
     matrix = kronsum(line, line).tocsr()
     n = matrix.shape[0]
     cholmod = DirectSolver(matrix, "measure_")
-    mumps = DistributedSolver(MPI.COMM_SELF, n, np.arange(n), matrix, "measure_")
+    PETSc.Options("measure_")["pc_factor_mat_solver_type"] = "mumps"
+    mumps = DistributedSolver(MPI.COMM_SELF, n, "measure_")
+    mumps.factor(np.arange(n), matrix)
     for solver, name in ((cholmod, "CHOLMOD"), (mumps, "MUMPS")):
-        title = f"{name}_COLUMNS_ONE_BY_ONE = {solver.max_columns_one_by_one}"
+        title = f"{name}_COLUMNS_ONE_BY_ONE = {getattr(thresholds, f'{name}_COLUMNS_ONE_BY_ONE')}"
         compare(title, sparse_columns(solver, matrix), "one by one", "at once")
     title = f"DENSE_COLUMNS_ONE_BY_ONE = {thresholds.DENSE_COLUMNS_ONE_BY_ONE}"
     compare(title, dense_columns(max(dofs // 10, 1)), "one by one", "at once")

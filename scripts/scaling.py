@@ -1,11 +1,10 @@
 """Weak and strong scaling by ranks, cost by size, and a model of what 64 and 1 024 ranks would do.
 
 Each run is an MPI job of its own: a random cell of fibre fraction 0.6 with gaps of 4 %, cut as by default, three unit
-strains together to 1e-8.  `shared` and `multigrid` are the strong study with one coarse factor by MUMPS on all ranks in
-place of elimination, and with the coarse problem solved by multigrid (PETSc's GAMG in CG), on as many ranks as there
-are cores; `large` is the largest cell on one rank, too.  `events` are the first ones of paths of random cells that
-debond.  More ranks than cores take turns: their iterations and messages count,
-their times do not.
+strains together to 1e-8.  `multigrid` is the strong study with the coarse problem solved by multigrid (PETSc's GAMG in
+CG) in place of one factor by MUMPS, on as many ranks as there are cores; `large` is the largest cell on one rank, too.
+`events` are the first ones of paths of random cells that debond.  More ranks than cores take turns: their iterations
+and messages count, their times do not.
 `--threshold` is for all runs of the studies; give it a folder of its own.
 A run whose report is in DIR/scaling is not made again, so that a long list can be worked off in parts.  The tables,
 the picture and the model are of all runs of the studies that are there.  Remove the folder to measure anew.
@@ -24,12 +23,11 @@ from typing import NamedTuple
 
 import numpy as np
 from benchmark import job
-from scaling_elimination import FrontSize, TimedFront
 from scaling_events import study as study_events
 from scaling_forecast import assumptions, checks, forecast, table, verdict
 from scaling_model import Machine, Prediction, measured, network
 from scaling_plot import plot
-from scaling_report import ELIMINATION, MULTIGRID, SHARED, Row, by_ranks, by_size, memory, speedups, write
+from scaling_report import FACTOR, MULTIGRID, Row, by_ranks, by_size, memory, speedups, write
 
 HERE = Path(__file__).parent
 EVENTS = "events"
@@ -38,7 +36,6 @@ BYTES_OF_A_DOF, SHARE_USED = 1500, 0.8
 STUDIES = {
     "weak": "weak scaling: as many dofs on every rank",
     "strong": "strong scaling: one cell",
-    SHARED: "strong scaling with one coarse factor by all ranks",
     MULTIGRID: "strong scaling with the coarse problem solved by multigrid",
     "sizes": "cost by size: microseconds of a rank per dof",
     "large": "the largest of these cells, on one rank too",
@@ -89,10 +86,9 @@ def planned(arguments: argparse.Namespace) -> dict[str, list[Run]]:
     return {
         "weak": [Run(fibres * p, dofs * p, refine, p) for p in arguments.ranks],
         "strong": [Run(fibres * most, dofs * most, refine, p) for p in arguments.ranks],
-        **{
-            way: [Run(fibres * most, dofs * most, refine, p, way) for p in arguments.ranks if p <= arguments.cores]
-            for way in (SHARED, MULTIGRID)
-        },
+        MULTIGRID: [
+            Run(fibres * most, dofs * most, refine, p, MULTIGRID) for p in arguments.ranks if p <= arguments.cores
+        ],
         "sizes": [Run(*cell, refine, arguments.size_ranks) for cell in ladder],
         "large": [Run(*ladder[-1], refine, p) for p in (1, arguments.size_ranks)],
     }
@@ -137,12 +133,9 @@ def read(path: Path) -> list[Row]:
     """Return the run of a report; none if there is no report."""
     if not path.exists():
         return []
-    fields = json.loads(path.read_text())
     try:
-        for name, kind in (("coarse_fronts", FrontSize), ("natural_fronts", FrontSize), ("timed_fronts", TimedFront)):
-            fields[name] = [kind(*each) for each in fields[name]]
-        return [Row(**fields)]
-    except (KeyError, TypeError):
+        return [Row(**json.loads(path.read_text()))]
+    except TypeError:
         sys.exit(f"{path}: a report of another version of this study; remove it to have the run made again")
 
 
@@ -159,8 +152,7 @@ def report(found: dict[str, list[Row]], arguments: argparse.Namespace) -> list[s
     """All tables and what the model says; draws the picture."""
     lines = [line for study, rows in found.items() if rows for line in study_tables(study, rows, arguments.cores)]
     rows = list({(row.dofs, row.ranks, row.way): row for some in found.values() for row in some}.values())
-    # PETSc counts the messages of a factor that ranks share among those of multipliers.
-    miscounted = max((row.miscounted for row in rows if row.way == ELIMINATION), default=0.0)
+    miscounted = max((row.miscounted for row in rows if row.way == FACTOR), default=0.0)
     try:
         rates, here = measured(rows, arguments.cores), network(rows, arguments.cores)
     except ValueError as error:
@@ -198,8 +190,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "studies",
         nargs="*",
-        default=["weak", "strong", SHARED],
-        help="of weak, strong, shared, multigrid, sizes, large, events; by default the first three",
+        default=["weak", "strong"],
+        help="of weak, strong, multigrid, sizes, large, events; by default the first two",
     )
     parser.add_argument("--ranks", type=int, nargs="+", default=[1, 2, 4, 8, 16])
     parser.add_argument("--dofs", type=int, default=40_000, help="of a rank in weak scaling")

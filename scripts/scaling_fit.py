@@ -30,10 +30,6 @@ class Power:
     factor: float
     exponent: float
 
-    def seconds(self, work: float) -> float:
-        """Of so much work."""
-        return float(self.factor * work**self.exponent)
-
 
 def fit_shares(work: Sequence[float], ranks: Sequence[float], seconds: Sequence[float]) -> Shares:
     """Return the shares of `nonnegative` least squares.

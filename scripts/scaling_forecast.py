@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from scaling_fit import Power, Shares
-from scaling_model import COARSE, LOCAL, MESH, Machine, Prediction, Rates, predict
+from scaling_fit import Shares
+from scaling_model import COARSE, LOCAL, MESH, Factor, Machine, Prediction, Rates, predict
 from scaling_report import GATHERS, SCALARS, SUMS, Row
 
 RANKS = (1, 2, 16, 64, 1024)
@@ -30,14 +30,7 @@ def forecast(rates: Rates, machine: Machine, way: str | None = None) -> dict[str
 
 def assumptions(rates: Rates, machine: Machine) -> list[str]:
     """Return the model in words, with its constants."""
-    r, (coarse, natural) = rates, (rates.coarse, rates.natural)
-    factor, solve = coarse.rates.factor, coarse.rates.solve
-    others = []
-    if r.factor_shared and r.solve_shared:
-        powers = (coarse.alone_factor.exponent, coarse.alone_solve.exponent)
-        shared = zip((r.factor_shared, r.solve_shared), powers, strict=True)
-        words = ", ".join(f"{_shares(s)} n^{power:.2f}" for s, power in shared)
-        others.append(f"              by one factor of PETSc's on all ranks: {words}")
+    r, others = rates, []
     if r.multigrid:
         others.append(
             f"              by multigrid: set-up {_shares(r.multigrid.setup)}, a solve {_shares(r.multigrid.solve)} "
@@ -53,33 +46,25 @@ def assumptions(rates: Rates, machine: Machine) -> list[str]:
         f"              times {r.imbalance:.2f} for the fullest rank (measured), or more where few subdomains are left "
         f"to each; {1e3 * r.subdomains:.2f} of them in 1 000 dofs",
         f"  coarse      n = {1e3 * r.vectors:.2f} vectors in 1 000 dofs, up to {r.largest_coarse} timed, and m = "
-        f"{1e3 * r.kernel:.2f} rigid-body motions, eliminated on a tree of ranks; seconds of factor and solves:",
-        f"              on one rank {_powers(coarse.alone_factor, coarse.alone_solve)} of n, "
-        f"{_powers(natural.alone_factor, natural.alone_solve)} of m; of a rank's own n / p and m / p",
-        f"              {_powers(coarse.own_factor, coarse.own_solve)} and "
-        f"{_powers(natural.own_factor, natural.own_solve)}; then at each doubling of the ranks one front",
-        f"              {factor[0]:.2g} s a multiplication, {factor[1]:.2g} over the ranks that share it, "
-        f"{factor[2]:.2g} an entry over these, {factor[3]:.2g} an entry told to them,",
-        f"              {factor[4]:.2g} a front; a solve {solve[0]:.2g} an entry and {solve[1]:.2g}.  Of the unknowns "
-        f"of ranks fronts have up to {coarse.borders.front:.1f} times the root,",
-        f"              leave {coarse.borders.left:.1f}; the last has {coarse.borders.last:.1f} (counted)",
+        f"{1e3 * r.kernel:.2f} rigid-body motions, one factor of all ranks each; seconds of factor and solves:",
+        f"              {_powers(r.coarse, 'n')}; {_powers(r.natural, 'm')}",
         *others,
         f"              of {STRONG_DOFS / 1e6:g} million dofs n is {r.vectors * STRONG_DOFS / r.largest_coarse:.1f} "
         "times the largest that was timed: the further, the less these powers are worth (`sizes` times larger ones)",
         f"  messages    {1e6 * machine.latency:.2g} microseconds each and {machine.bandwidth / 1e9:.2g} GB/s; "
         f"{GATHERS + SUMS} exchanges an iteration, each of {r.neighbours} messages and {r.surface:.1f} values",
-        f"              times the root of the rank's dofs (most that were counted), those of fronts, and {SCALARS} "
-        "sums of single values, log2 p messages deep",
+        f"              times the root of the rank's dofs (most that were counted), sums of coarse vectors, "
+        f"and {SCALARS} sums of single values, log2 p messages deep",
         f"  iterations  {r.iterations} at any size, the most of all runs",
-        "  memory      not in the model: neither what a rank has of fronts, nor whether rank 0 can hold the lines "
-        "of the cell; every rank has the bandwidth",
+        "  memory      not in the model: neither what a rank has of coarse factors, nor whether rank 0 can hold the "
+        "lines of the cell; every rank has the bandwidth",
         "              that the single one had",
     ]
 
 
-def _powers(*powers: Power) -> str:
-    """Powers in words."""
-    return " and ".join(f"{p.factor:.2g} x^{p.exponent:.2f}" for p in powers)
+def _powers(f: Factor, of: str) -> str:
+    """The seconds of a factor and of solves in words."""
+    return f"{_shares(f.factor)} {of}^{f.factor_power:.2f} and {_shares(f.solve)} {of}^{f.solve_power:.2f}"
 
 
 def _shares(s: Shares) -> str:

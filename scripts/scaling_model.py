@@ -1,7 +1,7 @@
 """A cost model of the solver on more ranks than there are here, with rates measured on few.
 
 Every term is one that the program has today: a mesh and a tearing of which some share is dealt to the ranks, work on
-subdomains that ranks share, coarse problems that they eliminate on a tree, and messages.
+subdomains that ranks share, coarse problems that they factor together, and messages.
 """
 
 from __future__ import annotations
@@ -12,9 +12,8 @@ from math import ceil, log2, sqrt
 from statistics import median
 from typing import Any
 
-from scaling_elimination import OF_COARSE, OF_NATURAL, VALUE_BYTES, Elimination, FrontSize, elimination_of
-from scaling_fit import Shares, fit_shares
-from scaling_report import ELIMINATION, GATHERS, MULTIGRID, SCALARS, SHARED, SUMS, Row
+from scaling_fit import Shares, fit_power, fit_shares
+from scaling_report import FACTOR, GATHERS, MULTIGRID, SCALARS, SUMS, VALUE_BYTES, Row
 
 from feti_homog.mesh.tiles.tiles import DEFAULT_TILES
 
@@ -22,6 +21,8 @@ MESH, LOCAL, COARSE, MESSAGES = "mesh", "subdomains", "coarse problem", "message
 # Exchanges with neighbours in one cycle of multigrid: on each of about five levels six, for the products and smoothers
 # before and after the coarser level, the residual and the transfers.
 CYCLE_EXCHANGES = 30
+# Solves for rigid-body motions in an iteration.
+NATURAL_SOLVES = 2
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,21 @@ class Machine:
 
     latency: float
     bandwidth: float
+
+
+@dataclass(frozen=True)
+class Factor:
+    """Seconds of the factor of n unknowns and of the solves of an iteration: shares of n to powers, which are those of
+    the runs on one rank."""
+
+    factor: Shares
+    factor_power: float
+    solve: Shares
+    solve_power: float
+
+    def seconds(self, n: float, ranks: int) -> tuple[float, float]:
+        """Of both."""
+        return self.factor.seconds(n**self.factor_power, ranks), self.solve.seconds(n**self.solve_power, ranks)
 
 
 @dataclass(frozen=True)
@@ -48,10 +64,7 @@ class Rates:
     Attributes:
         mesh: of a coarse triangle.
         assemble, setup, apply: seconds per dof, `apply` of an iteration.
-        coarse, natural: elimination of the coarse vectors, and of the rigid-body motions; their solves are those of an
-            iteration.
-        factor_shared, solve_shared: of one coarse factor by PETSc, per vector to the powers of that on one rank; None
-            if it was not timed.
+        coarse, natural: of the coarse vectors, and of the rigid-body motions.
         multigrid: if it was timed.
         loads: load cases solved together.
         triangles, subdomains, vectors, kernel: per dof.
@@ -66,10 +79,8 @@ class Rates:
     assemble: float
     setup: float
     apply: float
-    coarse: Elimination
-    natural: Elimination
-    factor_shared: Shares | None
-    solve_shared: Shares | None
+    coarse: Factor
+    natural: Factor
     multigrid: Multigrid | None
     loads: int
     triangles: float
@@ -89,7 +100,7 @@ def measured(rows: Sequence[Row], cores: int) -> Rates:
     Raises:
         ValueError: the timed rows are on too few numbers of ranks, or of too few sizes.
     """
-    if not any(row.ranks == 1 and row.way == ELIMINATION for row in rows):
+    if not any(row.ranks == 1 and row.way == FACTOR for row in rows):
         raise ValueError("rates of subdomains need a run on one rank")
     return Rates(**_local_times(rows, cores), **_coarse_times(rows, cores), **_per_dof(rows), **_counts(rows, cores))
 
@@ -109,7 +120,7 @@ def network(rows: Sequence[Row], cores: int) -> Machine:
 def _local_times(rows: Sequence[Row], cores: int) -> dict[str, Any]:
     """Seconds per unit of work: of the subdomains on one rank, of the mesh on all that have a core."""
     timed = [row for row in rows if row.ranks <= cores]
-    alone = [row for row in timed if row.ranks == 1 and row.way == ELIMINATION]
+    alone = [row for row in timed if row.ranks == 1 and row.way == FACTOR]
     cells = _meshed_alike(timed)
     return dict(
         mesh=Shares(
@@ -134,33 +145,40 @@ def _meshed_alike(rows: Sequence[Row]) -> Sequence[Row]:
 
 
 def _coarse_times(rows: Sequence[Row], cores: int) -> dict[str, Any]:
-    """Powers of the coarse vectors where every rank factors, and shares that ranks deal out where all do together."""
-    by_way = {way: [row for row in rows if row.way == way] for way in (ELIMINATION, SHARED, MULTIGRID)}
-    shared, grids = ([row for row in by_way[way] if row.ranks <= cores] for way in (SHARED, MULTIGRID))
-    coarse, natural = (elimination_of(by_way[ELIMINATION], cores, of) for of in (OF_COARSE, OF_NATURAL))
-    factor, solve = coarse.alone_factor.exponent, coarse.alone_solve.exponent
+    """Of one factor of all ranks and, if it was timed, of multigrid."""
+    factored, grids = ([row for row in rows if row.way == way and row.ranks <= cores] for way in (FACTOR, MULTIGRID))
     return dict(
-        coarse=coarse,
-        natural=natural,
-        factor_shared=_dealt(shared, factor, lambda row: row.coarse_factor) if shared else None,
-        solve_shared=_dealt(shared, solve, lambda row: row.coarse_solve) if shared else None,
+        coarse=_factor(factored, "vectors", "coarse_factor", "coarse_solve"),
+        natural=_factor(factored, "kernel", "natural_factor", "natural_solve"),
         multigrid=_multigrid(grids),
     )
+
+
+def _factor(rows: Sequence[Row], unknowns: str, factor: str, solve: str) -> Factor:
+    """From the attributes of rows with these names."""
+
+    def fitted(seconds: str) -> tuple[Shares, float]:
+        alone = [(getattr(row, unknowns), getattr(row, seconds)) for row in rows if row.ranks == 1]
+        power = fit_power(*zip(*alone, strict=True)).exponent
+        return _dealt(rows, lambda row: getattr(row, unknowns) ** power, lambda row: getattr(row, seconds)), power
+
+    return Factor(*fitted(factor), *fitted(solve))
 
 
 def _multigrid(rows: Sequence[Row]) -> Multigrid | None:
     """Of the rows by multigrid, None without any."""
     if not rows:
         return None
-    setup = _dealt(rows, 1.0, lambda row: row.coarse_factor)
-    return Multigrid(setup, _dealt(rows, 1.0, lambda row: row.coarse_solve), max(r.inner for r in rows))
-
-
-def _dealt(rows: Sequence[Row], exponent: float, seconds: Callable[[Row], float]) -> Shares:
-    """Shares of what takes the runs so many seconds, for work that is this power of the coarse vectors."""
-    return fit_shares(
-        [row.vectors**exponent for row in rows], [row.ranks for row in rows], [seconds(row) for row in rows]
+    setup, solve = (
+        _dealt(rows, lambda row: row.vectors, lambda row, name=name: getattr(row, name))
+        for name in ("coarse_factor", "coarse_solve")
     )
+    return Multigrid(setup, solve, max(r.inner for r in rows))
+
+
+def _dealt(rows: Sequence[Row], work: Callable[[Row], float], seconds: Callable[[Row], float]) -> Shares:
+    """Shares of what takes the runs so many seconds for so much work."""
+    return fit_shares([work(row) for row in rows], [row.ranks for row in rows], [seconds(row) for row in rows])
 
 
 def _per_dof(rows: Sequence[Row]) -> dict[str, Any]:
@@ -260,40 +278,19 @@ def _coarse_seconds(rates: Rates, dofs: float, ranks: int, way: str | None) -> t
             raise ValueError("multigrid was not timed")
         setup, solve = (shares.seconds(vectors, ranks) for shares in (rates.multigrid.setup, rates.multigrid.solve))
         return setup, solve
-    if way == SHARED:
-        if rates.factor_shared is None or rates.solve_shared is None:
-            raise ValueError("one factor was not timed")
-        factor = rates.factor_shared.seconds(vectors**rates.coarse.alone_factor.exponent, ranks)
-        return factor, rates.solve_shared.seconds(vectors**rates.coarse.alone_solve.exponent, ranks)
     return rates.coarse.seconds(vectors, ranks)
 
 
 def _messages(rates: Rates, machine: Machine, dofs: float, ranks: int, way: str | None) -> float:
-    """Seconds of all messages: those of the iterations, and what fronts tell."""
+    """Seconds of all messages of the iterations; those within a coarse factor are in its shares."""
     values = rates.surface * sqrt(dofs / ranks)
     exchange = machine.latency * rates.neighbours + VALUE_BYTES * values / machine.bandwidth
     tree = machine.latency * ceil(log2(ranks))
     iteration = (GATHERS + SUMS) * exchange + SCALARS * tree
-    fronts = rates.natural.borders.fronts(rates.kernel * dofs, ranks)
-    iteration += OF_NATURAL.solves * _front_messages(fronts, rates, machine)
-    told = sum(front.left**2 for front in fronts)
-    if way is None or way == ELIMINATION:
-        fronts = rates.coarse.borders.fronts(rates.vectors * dofs, ranks)
-        iteration += _front_messages(fronts, rates, machine)
-        told += sum(front.left**2 for front in fronts)
-    elif rates.multigrid is not None and way == MULTIGRID:
+    # A sum of a long vector over ranks moves it twice; the solution is told to all.  Motions are solved for twice.
+    unknowns = (rates.vectors + NATURAL_SOLVES * rates.kernel) * dofs
+    iteration += (1 + NATURAL_SOLVES) * tree + 3 * VALUE_BYTES * unknowns * rates.loads / machine.bandwidth
+    if rates.multigrid is not None and way == MULTIGRID:
         cycle = CYCLE_EXCHANGES * machine.latency * rates.neighbours + SCALARS * tree
         iteration += rates.loads * rates.multigrid.inner * cycle
-    if way in (SHARED, MULTIGRID):
-        # A sum of a long vector over ranks moves it twice; the solution is told to all.
-        iteration += tree + 3 * VALUE_BYTES * rates.vectors * dofs * rates.loads / machine.bandwidth
-    return rates.iterations * iteration + VALUE_BYTES * told / machine.bandwidth
-
-
-def _front_messages(fronts: Sequence[FrontSize], rates: Rates, machine: Machine) -> float:
-    """Seconds of those of a solve: to and fro between the halves of each, and to those that share it and back."""
-    seconds = 0.0
-    for front in fronts:
-        messages = 2 + 4 * ceil(log2(front.sharers)) if front.sharers > 1 else 2
-        seconds += messages * machine.latency + front.bytes_of_a_solve(rates.loads) / machine.bandwidth
-    return seconds
+    return rates.iterations * iteration

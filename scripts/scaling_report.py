@@ -7,12 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from scaling_elimination import VALUE_BYTES, FrontSize, TimedFront
-
+VALUE_BYTES = 8
 STAGES = ("mesh", "assemble", "set-up", "solve")
 COLUMNS = (
     "fibres", "ranks", "dofs", "subdomains", "vectors", "kernel", "iterations", "converged", "memory", "sent",
-    "messages", "front", "way", "coarse_setup", "coarse_factor", "coarse_solve", "natural_factor", "natural_solve",
+    "messages", "way", "coarse_setup", "coarse_factor", "coarse_solve", "natural_factor", "natural_solve",
     "inner", "solver", "total",
 )  # fmt: skip
 COARSE_TIMES = {
@@ -21,9 +20,8 @@ COARSE_TIMES = {
 # What one iteration does: exchanges of multipliers (a gather and a sum each for the operator and the preconditioner),
 # and sums over ranks of single numbers by the Krylov method.
 GATHERS, SUMS, SCALARS = 2, 2, 3
-# How the coarse problem is solved: by elimination on a tree of ranks, by PETSc with one factor of all ranks, or with
-# multigrid.
-ELIMINATION, SHARED, MULTIGRID = ("elimination", "shared", "multigrid")
+# How the coarse problem is solved: by one factor of all ranks, or with multigrid.
+FACTOR, MULTIGRID = ("factor", "multigrid")
 
 
 @dataclass(frozen=True)
@@ -33,10 +31,9 @@ class Row:
     `wanted` are the dofs asked for, `fullest` those of the rank with most; `way` says how the coarse problem is
     solved, in how many iterations `inner`.  Seconds are those of the coarse problem, of its set-up with the modes and
     the factor, and of that of the rigid-body motions, `natural`, which is solved twice in an iteration.  `peaks` are
-    the MB of each rank by stage, `coarse_memory` those by which both factors let them grow.  `coarse_fronts` and
-    `natural_fronts` are all fronts of the eliminations, and `timed_fronts` made-up ones that were timed.  `latency`
-    (s) and `bandwidth` (bytes / s) are those of messages between two ranks.  Of the seconds of the mesh rank 0 is
-    `alone` for some, while others wait.
+    the MB of each rank by stage, `coarse_memory` those by which both factors let them grow.  `latency` (s) and
+    `bandwidth` (bytes / s) are those of messages between two ranks.  Of the seconds of the mesh rank 0 is `alone` for
+    some, while others wait.
     """
 
     fibres: int
@@ -65,9 +62,6 @@ class Row:
     natural_factor: float
     natural_solve: float
     coarse_memory: list[float]
-    coarse_fronts: list[FrontSize]
-    natural_fronts: list[FrontSize]
-    timed_fronts: list[TimedFront]
     inner: int
     way: str
     latency: float
@@ -111,11 +105,6 @@ class Row:
         return (GATHERS + SUMS) * max(self.neighbours)
 
     @property
-    def front(self) -> int:
-        """Unknowns of the largest front."""
-        return max((int(front.eliminated + front.left) for front in self.coarse_fronts), default=0)
-
-    @property
     def miscounted(self) -> float:
         """Relative difference of the counted bytes from those that PETSc logged, on the worst rank."""
         counted = [VALUE_BYTES * self.exchanges * sum(pair) for pair in zip(self.told, self.heard, strict=True)]
@@ -127,14 +116,14 @@ def by_ranks(rows: Sequence[Row], cores: int) -> list[str]:
     lines = [
         f"{'':50}{'iteration of the busiest rank':^31}{'seconds':^45}",
         f"{'ranks':>5}{'fibres':>8}{'dofs':>10}{'domains':>8}{'coarse':>8}{'iterations':>11}{'kB sent':>10}"
-        f"{'messages':>10}{'front':>11}" + "".join(f"{s:>9}" for s in (*STAGES, "total")),
+        f"{'messages':>10}" + "".join(f"{s:>9}" for s in (*STAGES, "total")),
     ]
     for row in rows:
         times = [*(row.seconds[s] for s in STAGES), row.total]
         shown = (f"{t:9.2f}" if row.ranks <= cores else f"{'-':>9}" for t in times)
         lines.append(
             f"{row.ranks:5}{row.fibres:8}{row.dofs:10}{row.subdomains:8}{row.coarse:8}{row.iterations:11}"
-            f"{row.sent / 1e3:10.1f}{row.messages:10}{row.front:11}{''.join(shown)}"
+            f"{row.sent / 1e3:10.1f}{row.messages:10}{''.join(shown)}"
         )
     return lines
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from feti_homog.errors import CaseError
-from feti_homog.feti.preconditioners.influence import Influence
 from feti_homog.homogenization.bonds import bond_law
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.laws.bond_law import BondLaw
@@ -28,8 +27,8 @@ def criterion_of(cell: TornCell, grows: bool = False) -> BondLaw:
 
 def _at_tips(cell: TornCell, springs: SpringEnergy) -> ReleasedEnergy:
     """Raises CaseError if the solver has no inverse of the dual operator."""
-    inverses = [each.solver.preconditioner for each in cell.problems]
-    known = [inverse for inverse in inverses if isinstance(inverse, Influence)]
+    inverses = [each.solver.exact_inverse for each in cell.problems]
+    known = [inverse for inverse in inverses if inverse is not None]
     if len(known) < len(inverses):
         raise CaseError('[interface] growth = "released": needs -feti_pc_type influence; or growth = "springs"')
     return ReleasedEnergy(springs, *known)

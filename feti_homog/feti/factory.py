@@ -9,18 +9,15 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from feti_homog.case.phase_names import COATING
-from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace
-from feti_homog.feti.coarse.balanced import Balanced
+from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace, Balanced
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.subdomain import Subdomain
-from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.assembled_schur import shared_dofs
-from feti_homog.feti.preconditioners.influence import Influence
+from feti_homog.feti.preconditioners.exact_inverse import ExactInverse
 from feti_homog.feti.preconditioners.scaled import Dirichlet, Identity, Lumped, Preconditioner
-from feti_homog.feti.preconditioners.spring_update import WithSprings
+from feti_homog.feti.preconditioners.spring_update import SpringUpdated
 from feti_homog.feti.solver_plan import ProblemSizes, SolverOptions, choose
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.parallel.mpi_errors import agree
@@ -30,7 +27,7 @@ CLASSES: dict[str, Callable[[MPI.Intracomm, JumpOperator, InterfaceOperators], P
     "none": lambda *_: Identity(),
     "lumped": Lumped,
     "dirichlet": Dirichlet,
-    "influence": Influence,
+    "influence": ExactInverse,
 }
 """What makes the preconditioner of each name of `PRECONDITIONERS` but auto."""
 
@@ -45,9 +42,40 @@ class SolverParts:
     adaptive: AdaptiveCoarseSpace | None
 
     @property
+    def exact_inverse(self) -> ExactInverse | None:
+        """The preconditioner, if it leaves nothing to iterate."""
+        return self.preconditioner if isinstance(self.preconditioner, ExactInverse) else None
+
+    @property
     def coarse_dimension(self) -> int:
         """Coarse displacements, or where only rigid-body motions are, these."""
         return self.natural.kernel_dimension if self.adaptive is None else self.adaptive.coarse_dimension
+
+    def describe(self, comm: MPI.Intracomm) -> str:
+        """Subdomains, operators, preconditioner and coarse space, as -feti_view prints them.  Collective."""
+        operators, adaptive = self.operators, self.adaptive
+        sizes = np.array([n for part in comm.allgather([len(d) for d in operators.dofs]) for n in part])
+        dense = comm.allreduce(sum(o.is_dense for o in operators.operators))
+        lines = [
+            f"FETI: {len(sizes)} subdomains, {dense} with dense boundary operators",
+            f"  boundary dofs of a subdomain: {sizes.min()} to {sizes.max()}, mean {sizes.mean():.0f}",
+            f"  kernels: {self.natural.kernel_dimension} rigid-body modes",
+        ]
+        if self.exact_inverse is not None:
+            size = self.exact_inverse.reference.assembled.size
+            lines.append(f"  influence columns by the bonded cell, {size} dofs on its shared nodes")
+        if adaptive is not None:
+            counts = np.array([n for part in comm.allgather(adaptive.counts) for n in part])
+            lines.append(
+                f"  soft modes below {adaptive.threshold:g}: {counts.sum()}, at most {counts.max()} of a subdomain, "
+                f"mean {counts.mean():.2f}"
+            )
+            facewise = comm.allreduce(sum(operators.facewise))
+            lines += [f"  {facewise} examined face by face"] if facewise else []
+        lines.append(
+            f"  coarse dimension {self.coarse_dimension}, {self.coarse_dimension / len(sizes):.2f} a subdomain"
+        )
+        return "\n".join(lines)
 
 
 def database_options(thresholds: Thresholds = DEFAULTS) -> SolverOptions:
@@ -105,7 +133,7 @@ def build(
         preconditioner = Balanced(preconditioner, adaptive)
     left_out = operators.compliance if plan.preconditioner == "dirichlet" else np.zeros(len(compliance))
     if soften or comm.allreduce(bool(left_out.any()), MPI.LOR):
-        preconditioner = WithSprings(comm, preconditioner, jump_operator.owned[0], left_out)
+        preconditioner = SpringUpdated(comm, preconditioner, jump_operator.owned[0], left_out)
     return SolverParts(operators, preconditioner, natural, adaptive)
 
 
@@ -113,14 +141,14 @@ def _sizes(
     comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators, applications: int
 ) -> ProblemSizes:
     """Those of a torn cell; collective."""
-    dense = [isinstance(o, ExplicitInterfaceOperator) for o in operators.operators]
+    dense = [o.is_dense for o in operators.operators]
     return ProblemSizes(
         applications=applications,
         bodies_are_cut=_are_cut(comm, operators.subdomains),
         all_dense=comm.allreduce(all(dense), MPI.LAND),
         all_searchable=comm.allreduce(all(np.logical_or(dense, operators.facewise)), MPI.LAND),
         shared_dofs=shared_dofs(comm, jump_operator),
-        has_coatings=comm.allreduce(any(s.submesh.phase == COATING for s in operators.subdomains), MPI.LOR),
+        has_thin=comm.allreduce(any(s.is_thin for s in operators.subdomains), MPI.LOR),
     )
 
 

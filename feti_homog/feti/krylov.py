@@ -1,6 +1,6 @@
 """PETSc contexts of the projected dual problem: shell matrix, shell preconditioner, convergence test.
 
-H is the preconditioner: M^-1, or H_0 of `coarse.balanced` with coarse displacements in equilibrium.
+H is the preconditioner: M^-1, or H_0 of `coarse.adaptive.Balanced` with coarse displacements in equilibrium.
 
 A vector holds k multiplier vectors, the k values of a row side by side, so that load cases are solved together.
 What the contexts raise is kept until PETSc has returned (`CallbackErrors`).
@@ -23,6 +23,8 @@ from feti_homog.typing import Float
 # Methods that apply the preconditioner to the residual itself, so that the jump can be read off there.  With the
 # others the test is on the forces alone, and the checks of the response tell of the jump.
 PRECONDITION_TRUE_RESIDUAL = (PETSc.KSP.Type.CG, PETSc.KSP.Type.FCG)
+
+ESTIMATES_SINGULAR_VALUES = (PETSc.KSP.Type.CG, PETSc.KSP.Type.GMRES, PETSc.KSP.Type.FGMRES)
 
 
 class ActiveRows:
@@ -190,6 +192,7 @@ class Krylov:
         columns: int,
     ) -> None:
         """Set up; `vector` is one of the multiplier vectors.  Collective."""
+        self._columns = columns
         own, whole = vector.getSizes()
         sizes = (own * columns, whole * columns)
         self._errors = CallbackErrors(comm)
@@ -224,6 +227,15 @@ class Krylov:
             self.ksp.solve(self._right, self._solution)
         found: Float = self._solution.getArray(readonly=True).reshape(residual.shape).copy()
         return found
+
+    def describe(self, iterations: int) -> str:
+        """Iterations and condition number of the last solve, as the method estimates it and -feti_view prints."""
+        ksp, load_cases = self.ksp, self._columns
+        words = f"FETI: {load_cases} load case{'s' * (load_cases > 1)}, {iterations} iterations"
+        if not iterations or ksp.getType() not in ESTIMATES_SINGULAR_VALUES:
+            return words
+        largest, smallest = ksp.computeExtremeSingularValues()
+        return f"{words}, condition number about {largest / smallest:.3g} ({smallest:.3g} to {largest:.3g})"
 
     def destroy(self) -> None:
         """Free the shell matrix and the Krylov method; collective."""

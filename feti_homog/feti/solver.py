@@ -19,7 +19,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from feti_homog.fem.problem import PLANE, Problem
-from feti_homog.feti import factory, view
+from feti_homog.feti import factory
 from feti_homog.feti.active_jumps import ActiveJumps
 from feti_homog.feti.decomposition.interface_springs import GLUE, InterfaceSprings
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
@@ -28,7 +28,7 @@ from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.feti.krylov import ActiveRows, Krylov
 from feti_homog.feti.operators.dual_operator import DualOperator
-from feti_homog.feti.operators.inner_loads import CondensedLoads
+from feti_homog.feti.operators.implicit import CondensedLoads
 from feti_homog.feti.thresholds import DEFAULTS, MAX_RESTARTS, Thresholds
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.runtime import process_memory
@@ -62,6 +62,7 @@ class FetiSolver:
         intact_compliance: (owned rows,) C of the springs before any has softened.
         operator: F + C.
         preconditioner: M^-1, or H_0 with the adaptive coarse space.
+        exact_inverse: the preconditioner, if it is the inverse of the dual operator; else None.
         natural: the rigid-body motions, G and P.
         adaptive: the coarse space of the preconditioner, if it has one.
         coarse_dimension: coarse displacements, or where only rigid-body motions are, these.
@@ -91,6 +92,7 @@ class FetiSolver:
         options = applications, compliance, springs.soften, thresholds
         parts = factory.build(comm, self.jump_operator, subdomains, *options)
         self.interface_operators, self.preconditioner = parts.operators, parts.preconditioner
+        self.exact_inverse = parts.exact_inverse
         self.natural, self.adaptive, self.coarse_dimension = parts.natural, parts.adaptive, parts.coarse_dimension
         self.operator = DualOperator(self.jump_operator, self.interface_operators, compliance)
         process_memory.trim()
@@ -104,7 +106,7 @@ class FetiSolver:
         self._krylov_for(1)
         self.solves = 0
         if self._view:
-            PETSc.Sys.Print(view.describe_setup(comm, parts), comm=comm)
+            PETSc.Sys.Print(parts.describe(comm), comm=comm)
 
     @property
     def rows(self) -> int:
@@ -194,17 +196,18 @@ class FetiSolver:
         scale = np.where(is_seen, jump, 1.0)
         right = np.where(is_seen, right, 0.0) / scale
         self.solves += k
-        E = np.where(is_seen, strains.T, 0.0) / scale
-        closing = self.natural.project(self.preconditioner.close(right, self.d, E))
+        E, inverse = np.where(is_seen, strains.T, 0.0) / scale, self.exact_inverse
+        closing = self.preconditioner.closing_forces(right) if inverse is None else inverse.multipliers(self.d, E)
+        closing = self.natural.project(closing)
         krylov.test.set_scales(float(np.sqrt(is_seen.sum())), float(np.linalg.norm(self._jumps.norms(closing))))
         starts = np.where(is_seen, self.natural.project(self.active.restrict(starts)), 0.0) / scale
-        lam = self.preconditioner.initial_multipliers(starts, closing)
+        lam = closing if self.preconditioner.is_exact else starts
         found = Iterate(lam, np.zeros_like(lam), right)
         iterations, reason = 0, int(PETSc.KSP.ConvergedReason.CONVERGED_ATOL)
         if is_seen.any():
             found, iterations, reason = self._solve_with_restarts(krylov, lam, right)
             if self._view:
-                PETSc.Sys.Print(view.describe_solve(krylov.ksp, k, iterations), comm=self.comm)
+                PETSc.Sys.Print(krylov.describe(iterations), comm=self.comm)
         lam, jump_left = found.lam * scale, torn_jump - found.applied * scale
         return self._solutions(strains, lam, jump_left, iterations, reason, np.maximum(jump, rounding))
 

@@ -71,7 +71,7 @@ class ProblemSizes:
         all_dense: whether all boundary operators are dense.
         all_searchable: whether all are dense, but of bodies whose faces are searched for soft modes one by one.
         shared_dofs: dofs on the shared nodes, of the cell with all bonds intact.
-        has_coatings: whether there are coatings.  Such a ring bends easily and resists to change its thickness, which
+        has_thin: whether some bodies are thin.  Such a ring bends easily and resists to change its thickness, which
             no scaling meets: with the Dirichlet preconditioner thin ones take hundreds of iterations, or do not
             converge.
     """
@@ -81,7 +81,7 @@ class ProblemSizes:
     all_dense: bool
     all_searchable: bool
     shared_dofs: int
-    has_coatings: bool = False
+    has_thin: bool = False
 
 
 @dataclass(frozen=True)
@@ -127,4 +127,4 @@ def choose(sizes: ProblemSizes, options: SolverOptions, thresholds: Thresholds =
 def _influence_pays(sizes: ProblemSizes, thresholds: Thresholds) -> bool:
     """Whether the columns of influence are worth their set-up, and fit."""
     pays = sizes.applications >= thresholds.influence_applications
-    return sizes.all_dense and (sizes.has_coatings or (pays and sizes.shared_dofs <= thresholds.assembled_schur_dofs))
+    return sizes.all_dense and (sizes.has_thin or (pays and sizes.shared_dofs <= thresholds.assembled_schur_dofs))

@@ -59,16 +59,6 @@ DEFAULTS = Thresholds()
 ITERATIVE_RTOL = 1e-10
 # Per cent more workspace than MUMPS estimates: its own 20 were too little for a matrix of 13 084 rows on two ranks.
 MUMPS_EXTRA_WORKSPACE_PERCENT = 100
-# Columns of a front that several ranks eliminate together, which each gets at once, and blocks of so many that each has
-# of it at least (`scripts/scaling` times fronts alone and together).
-FRONT_BLOCK, BLOCKS_OF_A_RANK = 64, 2
-
-
-def front_sharers(unknowns: float, ranks: int, block: int = FRONT_BLOCK) -> int:
-    """How many of the ranks that meet at a front of so many unknowns eliminate it, in blocks of so many columns."""
-    return min(ranks, max(1, int(unknowns // (BLOCKS_OF_A_RANK * block))))
-
-
 # Entries of dense blocks that wait to be added to a sparse sum, at least: 16 bytes each.
 MAX_BUFFERED_ENTRIES = 4_000_000
 # Right-hand sides up to which the library is faster with one after the other than with all at once.
@@ -103,8 +93,8 @@ DENSE_COLUMNS_ONE_BY_ONE = 6
 # Columns for which sparse factors are solved at once: bounds the memory of their right-hand sides, 8 bytes a dof each.
 SPARSE_COLUMNS_AT_ONCE = 64
 
-# Largest diagonal entries of S and of its regularised inverse, multiplied, above which products of a coating with the
-# inverse are refined: up to 3e3 of fibres and pieces of the matrix, 1.5e4 of rings a twentieth of their radius thick,
+# Largest diagonal entries of S and of its regularised inverse, multiplied, above which products of a thin body with the
+# inverse are refined: up to 3e3 of discs and of pieces around them, 1.5e4 of rings a twentieth of their radius thick,
 # 4e6 of a hundredth.  Forces balance to 4e-12 there, and to 5e-8 without.
 ILL_CONDITIONED = 1e4
 

@@ -23,9 +23,9 @@ from feti_homog.mesh.sizes.element_estimate import ElementEstimate
 from feti_homog.mesh.sizes.graded_size import SizeField
 from feti_homog.mesh.tiles.filling import Filling, Tile, fill
 from feti_homog.mesh.tiles.tiles import TilePolicy
-from feti_homog.parallel.dealing import collect, deal
 from feti_homog.parallel.dividing import balanced
 from feti_homog.parallel.mpi_errors import agree, on_root_only
+from feti_homog.parallel.objects import gather, scatter
 
 T = TypeVar("T")
 
@@ -43,8 +43,8 @@ def place_nodes(case: Case, comm: MPI.Intracomm, policy: TilePolicy) -> NodedCel
         assert not isinstance(found, UnmeshedCell)
         return found
     field: SizeField = comm.bcast(None if unmeshed is None else unmeshed.bare.field)
-    own = deal(comm, [] if unmeshed is None else unmeshed.bare.lines.parts(comm.size))
-    stations = collect(comm, agree(comm, own.stations, field))
+    own = scatter(comm, [] if unmeshed is None else unmeshed.bare.lines.parts(comm.size))
+    stations = gather(comm, agree(comm, own.stations, field))
     return on_root_only(comm, _with_nodes, unmeshed, stations)
 
 
@@ -79,7 +79,7 @@ def fill_tiles(found: NodedCell | CoarseMesh | None, comm: MPI.Intracomm) -> Coa
         MeshError: on every rank, if one cannot fill a tile of its.
     """
     tiles = [] if found is None or isinstance(found, CoarseMesh) else [tile for _, tile in found.parts]
-    gathered = collect(comm, agree(comm, fill_own, deal_tiles(tiles, [len(tile.points) for tile in tiles], comm)))
+    gathered = gather(comm, agree(comm, fill_own, deal_tiles(tiles, [len(tile.points) for tile in tiles], comm)))
     fillings = [filling for _, filling in sorted(chain.from_iterable(gathered), key=itemgetter(0))]
     return on_root_only(comm, _joined, found, fillings)
 
@@ -90,7 +90,7 @@ def deal_tiles(tiles: list[T], loads: list[int], comm: MPI.Intracomm) -> list[tu
     parts: list[list[tuple[int, T]]] = [[] for _ in range(comm.size)]
     for k, rank in enumerate(balanced(np.array(loads, np.int64), comm.size).tolist()):
         parts[rank].append((k, tiles[k]))
-    return deal(comm, parts)
+    return scatter(comm, parts)
 
 
 def fill_own(tiles: list[tuple[int, Tile]]) -> list[tuple[int, Filling]]:

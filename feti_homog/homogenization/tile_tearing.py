@@ -34,8 +34,8 @@ from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.mesh.submesh import SubdomainTable, SubmeshesOfRank, cut_for_ranks, joined, pinning
 from feti_homog.mesh.tiles.filling import arc_edges
 from feti_homog.mesh.tiles.tile_torus import FilledTile, NumberedTile, Regions, tile_torus
-from feti_homog.parallel.dealing import swap
 from feti_homog.parallel.mpi_errors import agree, on_root, on_root_only
+from feti_homog.parallel.objects import alltoall
 from feti_homog.typing import Float, Int
 
 
@@ -68,7 +68,7 @@ def tear_by_tiles(
     table = SubdomainTable(body, rank, facts.nesting, regions.phase)
     shares = agree(comm, _shares, torus, subdomain, table, comm.size, _pinned(torus, comm))
     summary = on_root(comm, summary_of, case, noded, len(body), int(load.sum()))
-    return RankShare(summary, table, facts.pairs, joined(swap(comm, shares)))
+    return RankShare(summary, table, facts.pairs, joined(alltoall(comm, shares)))
 
 
 def _filled(noded: NodedCell | None, regions: Regions, comm: MPI.Intracomm) -> tuple[Torus, Int]:

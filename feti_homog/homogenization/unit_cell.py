@@ -10,6 +10,7 @@ import numpy as np
 from mpi4py import MPI
 
 from feti_homog.case.case import Case
+from feti_homog.case.phase_names import COATING, MATRIX
 from feti_homog.fem.problem import AXIAL
 from feti_homog.feti.decomposition.shared_entities import SharedEntities, share_entities
 from feti_homog.feti.decomposition.subdomain import Subdomain
@@ -30,8 +31,8 @@ from feti_homog.mesh.coarse_mesh import CoarseMesh
 from feti_homog.mesh.fill.unmeshed_cell import NodedCell
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.mesh.submesh import SubmeshesOfRank
-from feti_homog.parallel.dealing import deal
 from feti_homog.parallel.mpi_errors import agree, on_root_only
+from feti_homog.parallel.objects import scatter
 from feti_homog.runtime.progress import Progress
 from feti_homog.typing import Bool, Float, Int
 
@@ -149,7 +150,10 @@ def tear(
 
 def assemble_axial(case: Case, subdomains: Sequence[Subdomain]) -> list[Subdomain]:
     """The subdomains of this rank with the displacement along the fibres, on the meshes that they have."""
-    return [Subdomain.on(s.submesh, s.mesh, phase_laws.axial_law(case, s.submesh.phase), AXIAL) for s in subdomains]
+    return [
+        Subdomain.on(s.submesh, s.mesh, phase_laws.axial_law(case, s.submesh.phase), AXIAL, **_flags(s.submesh.phase))
+        for s in subdomains
+    ]
 
 
 def assemble_subdomains(
@@ -185,10 +189,18 @@ def cut(case: Case, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: Part
         assert not isinstance(found, CoarseMesh)
         return tear_by_tiles(case, found, lattice, comm, policy)
     mesh = fill_tiles(found, comm)
-    return deal(comm, on_root_only(comm, distribute, case, mesh, lattice, comm.size, policy) or [])
+    return scatter(comm, on_root_only(comm, distribute, case, mesh, lattice, comm.size, policy) or [])
 
 
 def _assemble(case: Case, submeshes: SubmeshesOfRank, lattice: ReferenceLattice) -> list[Subdomain]:
     """The subdomains of this rank, refined and assembled."""
     problem = phase_laws.plane_problem(case)
-    return [Subdomain.build(s, lattice, phase_laws.plane_law(case, s.phase), problem) for s in submeshes.cut()]
+    return [
+        Subdomain.build(s, lattice, phase_laws.plane_law(case, s.phase), problem, **_flags(s.phase))
+        for s in submeshes.cut()
+    ]
+
+
+def _flags(phase: str) -> dict[str, bool]:
+    """What the dual solver needs to know of a body of this phase."""
+    return {"is_thin": phase == COATING, "is_outer": phase == MATRIX}

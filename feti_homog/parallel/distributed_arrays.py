@@ -1,11 +1,14 @@
-"""Arrays that every rank has, and arrays whose rows are owned by ranks: sums, gathered rows, scaled rows."""
+"""Sums, gathered, exchanged and scaled rows of arrays that every rank has, or whose rows ranks own."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.typing import Float, Int
+from feti_homog.parallel.dividing import even
+from feti_homog.typing import Array, Float, Int
 
 
 def allreduce_sum(comm: MPI.Intracomm, part: Float) -> Float:
@@ -27,6 +30,50 @@ def gather_rows(comm: MPI.Intracomm, owned: Float, first: int, rows: Int) -> Flo
     values[mine] = owned[rows[mine] - first]
     comm.Allreduce(MPI.IN_PLACE, values)
     return values
+
+
+def allgather_rows(comm: MPI.Intracomm, own: Array, counts: Int) -> Array:
+    """The rows of all ranks below each other, on every rank.  Collective.
+
+    Args:
+        own: (counts[rank],) or (counts[rank], k) rows of this rank.
+        counts: (ranks,) number of rows of each rank.
+
+    Returns:
+        (sum of counts,) or (sum of counts, k).
+    """
+    whole = np.empty((int(counts.sum()), *own.shape[1:]), own.dtype)
+    comm.Allgatherv(np.ascontiguousarray(own), (whole, counts * int(np.prod(own.shape[1:]))))
+    return whole
+
+
+def share_columns(comm: MPI.Intracomm, solve: Callable[[Float], Float], B: Float) -> Float:
+    """solve(B) for B (n,) or (n, k), the same on every rank: each rank solves for some of the columns.  Collective."""
+    columns = B.shape[1] if B.ndim == 2 else 1
+    if comm.size == 1 or columns == 1:
+        return solve(B)
+    ends = even(columns, comm.size)
+    own = slice(*ends[comm.rank : comm.rank + 2])
+    part = solve(B[:, own]).T if own.start < own.stop else np.zeros((0, len(B)))
+    return allgather_rows(comm, part, np.diff(ends)).T
+
+
+def exchange(comm: MPI.Intracomm, to: Int, *columns: Array) -> list[Array]:
+    """The rows of the columns, each (k,) or (k, ...), that the ranks have for this one; row i goes to rank `to[i]`.
+
+    They come in the order of the ranks that sent them, and of one rank in that rank's order.  Collective.
+    """
+    order = np.argsort(to, kind="stable")
+    sent = np.bincount(to, minlength=comm.size)
+    come = np.empty_like(sent)
+    comm.Alltoall(sent, come)
+    received = []
+    for column in columns:
+        width = int(np.prod(column.shape[1:], dtype=np.int64))
+        rows = np.empty((int(come.sum()), *column.shape[1:]), column.dtype)
+        comm.Alltoallv((np.ascontiguousarray(column[order]), sent * width), (rows, come * width))
+        received.append(rows)
+    return received
 
 
 def scale_rows(weights: Float, x: Float) -> Float:

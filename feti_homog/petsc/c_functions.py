@@ -23,6 +23,11 @@ def option_was_used(name: str) -> bool:
     return bool(used.value)
 
 
+def error_words(error: PETSc.Error) -> str:
+    """The last line of an error of PETSc's, without the rank: what was wrong."""
+    return str(error).splitlines()[-1].split("] ", 1)[-1]
+
+
 def finalize() -> int:
     """End PETSc, which prints its logs; the error code, 0 if it could.  Collective over all ranks."""
     return int(_library().PetscFinalize())

@@ -1,4 +1,4 @@
-"""PETSc's options that the solver takes, and names that are almost theirs."""
+"""Names of PETSc's options: those that the solver takes, those of PETSc itself, and names that are almost theirs."""
 
 from __future__ import annotations
 
@@ -26,14 +26,13 @@ def _direct_solver(prefix: str, matrix: str, library: str = "cholmod") -> tuple[
 
 
 def _coarse_solver(prefix: str, matrix: str) -> tuple[Option, ...]:
-    """The options of a matrix of all ranks, eliminated on a tree of these unless a type of solver is given."""
-    given = f"if given, PETSc solves with {matrix}, not elimination"
-    library = "library of what a rank eliminates for itself; of one factor by PETSc: mumps"
+    """The options of a matrix of all ranks."""
+    library = f"library of {matrix}; on one rank cholmod by default"
     return (
-        Option(f"{prefix}ksp_type", "preonly|cg|...", "preonly", given),
-        Option(f"{prefix}ksp_rtol", "<real>", "1e-10", "relative tolerance of cg there"),
-        Option(f"{prefix}pc_type", "cholesky|gamg|...", "cholesky", f"{given}: one factor, or preconditioned cg"),
-        Option(f"{prefix}pc_factor_mat_solver_type", "cholmod|mumps|...", "cholmod", library),
+        Option(f"{prefix}ksp_type", "preonly|cg|...", "preonly", f"one factor of {matrix}, or an iterative method"),
+        Option(f"{prefix}ksp_rtol", "<real>", "1e-10", "relative tolerance of that method"),
+        Option(f"{prefix}pc_type", "cholesky|gamg|...", "cholesky", "that factor, or the method's preconditioner"),
+        Option(f"{prefix}pc_factor_mat_solver_type", "cholmod|mumps|...", "mumps", library),
     )
 
 
@@ -89,6 +88,22 @@ MUMPS_PREFIXES = ("feti_schur_",)
 PREFIXES = ("feti_ksp_", "feti_pc_", *DIRECT_PREFIXES)
 """Prefixes of PETSc solvers: what follows is PETSc's to know."""
 
+# Options that PETSc reads when it starts, logs and ends.
+PETSC_NAMES = (
+    *("help", "version", "info", "info_exclude", "history", "citations", "python", "tmp", "shared_tmp"),
+    *("log_view", "log_view_memory", "log_view_gpu_time", "log_all", "log_trace", "log_sync", "log_mpe", "log_exclude"),
+    *("log_nvtx", "log_perfstubs", "get_total_flops"),
+    *("malloc", "malloc_debug", "malloc_dump", "malloc_view", "malloc_view_threshold", "malloc_test", "malloc_info"),
+    *("malloc_hbw", "malloc_coalesce", "malloc_requested_size", "memory_view", "objects_dump", "checkstack"),
+    *("options_file", "options_file_yaml", "options_string_yaml", "options_left", "options_view", "options_monitor"),
+    *("options_monitor_cancel", "options_suppress_deprecated_warnings", "skip_petscrc"),
+    *("on_error_abort", "on_error_mpiabort", "on_error_emacs", "on_error_attach_debugger", "error_output_stdout"),
+    *("error_output_none", "no_signal_handler", "fp_trap", "start_in_debugger", "stop_for_debugger", "debug_terminal"),
+    *("debugger_ranks", "debugger_nodes", "debugger_pause", "check_pointer_intensity", "mpidump"),
+)
+# More of each beginning, of which every release of PETSc has others.
+PETSC_BEGINNINGS = ("log_", "malloc_", "device_", "cuda_", "hip_", "sf_", "viewer_", "use_gpu_aware_mpi")
+
 CLOSE = 0.9
 """Similarity (difflib's, 1 for equal names) from which on a name is taken for a misspelt one: a letter or two."""
 
@@ -97,6 +112,23 @@ def unknown_options(names: Iterable[str]) -> list[str]:
     """One fault for each name (without dash) that begins with feti_ but is no option of the solver."""
     unknown = [n for n in names if n.startswith("feti_") and not is_in_table(n) and not solver_prefix(n)]
     return [f"-{name}: unknown option; {suggestion(name)}" for name in unknown]
+
+
+def unknown_to_petsc(names: Iterable[str]) -> list[str]:
+    """One fault for each name (without dash) that is neither one of PETSC_NAMES nor begins with feti_, as those of this
+    program's solvers do.
+
+    A name that lacks the prefix of one of OPTIONS is left to `without_prefix`.
+    """
+    others = [n for n in names if n not in PETSC_NAMES and not n.startswith("feti_") and not is_in_table(f"feti_{n}")]
+    faults = []
+    for name in others:
+        nearest = difflib.get_close_matches(name, PETSC_NAMES, 1, CLOSE)
+        if nearest:
+            faults.append(f"-{name}: unknown option; did you mean -{nearest[0]}?")
+        elif not name.startswith(PETSC_BEGINNINGS):
+            faults.append(f"-{name}: unknown option; solvers of this program have options that begin with -feti_")
+    return faults
 
 
 def without_prefix(names: Iterable[str]) -> list[str]:

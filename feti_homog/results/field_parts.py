@@ -83,7 +83,7 @@ def interface_part(cell: TornCell) -> InterfacePart:
         pair=nodes.pair,
         fibre_node=numbers[nodes.fibre_node],
         vertex=(cell.comm.exscan(len(nodes.row)) or 0) + np.arange(len(nodes.row))[:, None],
-        matrix_node=jumps.from_matrix(numbers),
+        matrix_node=jumps.from_outer(numbers),
     )
 
 

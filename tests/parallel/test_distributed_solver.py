@@ -1,4 +1,4 @@
-"""Solves with sums over ranks of sparse parts, by elimination and by PETSc's solvers."""
+"""Solves with sums over ranks of sparse parts."""
 
 from __future__ import annotations
 
@@ -8,19 +8,16 @@ from mpi4py import MPI
 from scipy.sparse import coo_matrix, csr_matrix, kronsum, spdiags
 
 from feti_homog.errors import CaseError
-from feti_homog.feti.linalg import own_unknowns
-from feti_homog.feti.linalg.distributed_solver import DistributedSolver, RenewedSolver
-from feti_homog.feti.linalg.rank_tree import RankTree
-from feti_homog.feti.linalg.tree_elimination import TreeElimination
+from feti_homog.feti.linalg import distributed_solver
+from feti_homog.feti.linalg.distributed_solver import DistributedSolver
 from feti_homog.petsc.c_functions import option_was_used
 from feti_homog.petsc.options import case_options
 
 pytestmark = pytest.mark.parallel
 
 KINDS = {
-    "elimination": {},
-    "own library": {"test_pc_factor_mat_solver_type": "mumps"},
-    "one factor": {"test_pc_type": "cholesky"},
+    "factor": {},
+    "mumps": {"test_pc_factor_mat_solver_type": "mumps"},
     "cg": {"test_ksp_type": "cg", "test_pc_type": "jacobi", "test_ksp_rtol": 1e-13},
 }
 
@@ -43,18 +40,9 @@ def share(comm, matrix, holder):
 
 def made(comm, total, unknowns, part):
     """Return the solver that the options ask for."""
-    solver = RenewedSolver(comm, total, unknowns, "test_")
+    solver = DistributedSolver(comm, total, "test_")
     solver.factor(unknowns, part)
     return solver
-
-
-def eliminated(comm, total, unknowns, part, block):
-    """Elimination with blocks of so many columns."""
-    return TreeElimination(RankTree(comm, total, unknowns), total, unknowns, part, "test_", block)
-
-
-# Fronts are shared from two blocks a rank on: all, some or none of these.
-some_blocks = pytest.mark.parametrize("block", [1, 3, 1000])
 
 
 def by_blocks(comm, n):
@@ -70,16 +58,15 @@ def test_the_sum_of_the_parts_is_solved(comm, kind, columns):
     x = np.random.default_rng(3).standard_normal((A.shape[0], *columns))
     with case_options(KINDS[kind]):
         solver = made(comm, A.shape[0], unknowns, part)
-    assert isinstance(solver.current, DistributedSolver if kind in ("one factor", "cg") else TreeElimination)
+    assert solver.iterations == 1 or kind == "cg"
     # The parts of the right-hand side sum to A x.
     found = solver.solve(part @ x[unknowns])
     solver.destroy()
     np.testing.assert_allclose(found, x[unknowns], atol=1e-12)
 
 
-@some_blocks
 @pytest.mark.parametrize("holder", ["first", "last", "every second", "scattered"])
-def test_ranks_may_have_few_unknowns_of_their_own_or_none(comm, holder, block):
+def test_ranks_may_have_few_unknowns_of_their_own_or_none(comm, holder):
     A = grid(5)
     number = np.arange(A.shape[0])
     holders = {
@@ -90,21 +77,19 @@ def test_ranks_may_have_few_unknowns_of_their_own_or_none(comm, holder, block):
     }
     unknowns, part = share(comm, A, holders[holder])
     x = np.random.default_rng(4).standard_normal((A.shape[0], 3))
-    solver = eliminated(comm, A.shape[0], unknowns, part, block)
+    solver = made(comm, A.shape[0], unknowns, part)
     np.testing.assert_allclose(solver.solve(part @ x[unknowns]), x[unknowns], atol=1e-13)
     solver.destroy()
 
 
-@some_blocks
-def test_an_unknown_that_every_rank_has(comm, block):
-    """And no others: nothing is eliminated before the last ranks meet."""
+def test_an_unknown_that_every_rank_has(comm):
+    """And no others."""
     part = csr_matrix(np.array([[2.0, 1.0], [1.0, 3.0]]))
-    solver = eliminated(comm, 2, np.arange(2), part, block)
+    solver = made(comm, 2, np.arange(2), part)
     np.testing.assert_allclose(solver.solve(np.array([4.0, 7.0])), [1.0, 2.0], rtol=1e-14)
 
 
-@some_blocks
-def test_digits_are_those_of_a_factor_of_the_whole(comm, block):
+def test_digits_are_those_of_a_factor_of_the_whole(comm):
     """Stiffnesses that differ by 1e8, as of fibres and their matrix, scaled to a unit diagonal."""
     side = 12
     stiff = np.where(np.arange(side * side) // 3 % 2, 1.0, 1e8)
@@ -114,7 +99,7 @@ def test_digits_are_those_of_a_factor_of_the_whole(comm, block):
     A = csr_matrix(A * np.outer(weight, weight))
     unknowns, part = share(comm, A, by_blocks(comm, A.shape[0]))
     b = np.random.default_rng(5).standard_normal(A.shape[0])
-    solver = eliminated(comm, A.shape[0], unknowns, part, block)
+    solver = made(comm, A.shape[0], unknowns, part)
     own = b[unknowns] / np.bincount(np.concatenate(comm.allgather(unknowns)))[unknowns]
     x = np.zeros(A.shape[0])
     x[unknowns] = solver.solve(own)
@@ -124,7 +109,7 @@ def test_digits_are_those_of_a_factor_of_the_whole(comm, block):
     assert np.abs(residual).max() < 1e-12 * np.abs(x).max()
 
 
-@pytest.mark.parametrize("kind", ["elimination", "one factor"])
+@pytest.mark.parametrize("kind", ["factor", "mumps"])
 def test_a_matrix_that_is_not_definite_is_told_on_every_rank(comm, kind):
     """Of unknowns that all ranks have, and of those that the last has for itself."""
     shared = np.arange(2), csr_matrix(np.ones((2, 2)) / comm.size)
@@ -136,45 +121,56 @@ def test_a_matrix_that_is_not_definite_is_told_on_every_rank(comm, kind):
 
 
 def test_a_fault_of_one_rank_is_told_on_every_rank(comm, monkeypatch):
-    """As rounding may be: the first rank alone finds its own unknowns singular."""
+    """As rounding may be: the first rank alone finds the matrix singular."""
     A = grid(6)
     unknowns, part = share(comm, A, by_blocks(comm, A.shape[0]))
-    if comm.rank == 0:
-        solver = own_unknowns.DirectSolver
-        monkeypatch.setattr(own_unknowns, "DirectSolver", lambda A, *options: solver(0.0 * A, *options))
-    with pytest.raises(np.linalg.LinAlgError):
+    factored = distributed_solver.factored
+
+    def singular_on_the_first(*arguments):
+        factor = factored(*arguments)
+        if comm.rank == 0:
+            raise np.linalg.LinAlgError("zero pivot")
+        return factor
+
+    monkeypatch.setattr(distributed_solver, "factored", singular_on_the_first)
+    with pytest.raises(np.linalg.LinAlgError, match="zero pivot" if comm.rank == 0 else "on another rank"):
         made(comm, A.shape[0], unknowns, part)
 
 
-@some_blocks
-def test_a_front_that_is_not_definite_is_told_on_every_rank(comm, block):
-    """Where the first two ranks meet, and, of unknowns that every rank has, the last front."""
-    wrong = grid(8).toarray()
-    first = -(-len(wrong) // comm.size) % len(wrong)
-    wrong[first, first] = -1.0
-    everywhere = np.arange(len(wrong)), csr_matrix(wrong / comm.size)
-    for unknowns, part in (share(comm, wrong, by_blocks(comm, len(wrong))), everywhere):
-        with pytest.raises(np.linalg.LinAlgError):
-            eliminated(comm, len(wrong), unknowns, part, block)
+def test_a_matrix_may_change(comm):
+    """Each factor takes the place of the one before; nothing is left after `destroy`."""
+    A = grid(6)
+    unknowns, part = share(comm, A, by_blocks(comm, A.shape[0]))
+    solver, x = made(comm, A.shape[0], unknowns, part), np.cos(np.arange(A.shape[0]))
+    for factor in (2.0, 0.5):
+        solver.factor(unknowns, factor * part)
+        np.testing.assert_allclose(solver.solve(part @ x[unknowns]), x[unknowns] / factor, atol=1e-12)
+    solver.destroy()
+    with pytest.raises(AssertionError, match="nothing is factored"):
+        solver.solve(part @ x[unknowns])
 
 
 LIBRARY = "test_pc_factor_mat_solver_type"
 
 
-@pytest.mark.parametrize("library", ["mumps", "cholmod"])
-def test_the_library_of_the_own_factor_is_an_option(comm, library):
+@pytest.mark.parametrize("library", ["mumps", "cholmod", None])
+def test_the_library_is_an_option(comm, library):
+    """CHOLMOD is the default on one rank, MUMPS on several; CHOLMOD factors no distributed matrix."""
+    default = "cholmod" if comm.size == 1 else "mumps"
     unknowns, part = np.arange(2) + 2 * comm.rank, csr_matrix(np.array([[2.0, 1.0], [1.0, 3.0]]))
-    with case_options({LIBRARY: library}):
+    if library == "cholmod" and comm.size > 1:
+        pytest.skip("see the next test")
+    with case_options({LIBRARY: library} if library else {}):
         solver = made(comm, 2 * comm.size, unknowns, part)
-        assert option_was_used(LIBRARY)
-    assert solver.current._own.solver._ksp.getPC().getFactorSolverType() == library
+        assert option_was_used(LIBRARY) or not library
+    assert solver._ksp.getPC().getFactorSolverType() == (library or default)
     np.testing.assert_allclose(solver.solve(part @ [1.0, 2.0]), [1.0, 2.0], rtol=1e-12)
     solver.destroy()
 
 
 def test_cholmod_factors_no_distributed_matrix(comm):
     arguments = comm, 2, np.arange(2), csr_matrix(np.eye(2))
-    with case_options({LIBRARY: "cholmod", "test_pc_type": "cholesky"}):
+    with case_options({LIBRARY: "cholmod"}):
         if comm.size == 1:
             made(*arguments).destroy()
             return

@@ -45,7 +45,7 @@ ONSET_STRAIN, ONSET_STRESS = GLASS_EPOXY_ONSET.value
 def criterion(cell, growth):
     if growth == "springs":
         return SPRINGS
-    return ReleasedEnergy(SPRINGS, cell.solver.preconditioner)
+    return ReleasedEnergy(SPRINGS, cell.solver.exact_inverse)
 
 
 def path(comm, growth, strain, **case):
@@ -232,7 +232,7 @@ def test_the_inverse_blocks_are_those_of_the_solver(comm):
     for released in (3, 7):
         before = interface.linear(Load.strain(strain), torn_cells.bonds(status), start)
         pairs = neighbours.rows[[released]][:, None] + np.arange(2)
-        H = cell.solver.preconditioner.inverse_blocks(pairs)[0]
+        H = cell.solver.exact_inverse.inverse_blocks(pairs)[0]
         at = released - neighbours.first
         here = 0 <= at < len(status)
         lam = before.lam[interface.nodes.row[at] + np.arange(2)] if here else np.zeros(2)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from feti_homog.feti.thresholds import KEPT_EXCHANGES
-from feti_homog.parallel.dealing import swap
-from feti_homog.parallel.exchange import exchange
+from feti_homog.parallel.distributed_arrays import exchange
+from feti_homog.parallel.objects import alltoall
 
 pytestmark = [pytest.mark.parallel, pytest.mark.quick]
 
@@ -31,7 +31,7 @@ def test_no_rows_and_rows_of_matrices(comm):
 
 def test_parts_are_swapped(comm):
     parts = [{"from": comm.rank, "to": r, "array": np.arange(r)} for r in range(comm.size)]
-    for source, part in enumerate(swap(comm, parts)):
+    for source, part in enumerate(alltoall(comm, parts)):
         assert (part["from"], part["to"], len(part["array"])) == (source, comm.rank, comm.rank)
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from feti_homog.errors import CaseError, MeshError
-from feti_homog.parallel.dealing import collect, deal
 from feti_homog.parallel.mpi_errors import RemoteError, agree, on_root, on_root_only
+from feti_homog.parallel.objects import gather, scatter
 
 pytestmark = pytest.mark.parallel
 
@@ -18,9 +18,9 @@ def fail(*faults):
 
 def test_parts_are_dealt_to_their_ranks(comm):
     parts = [(r, np.full(3, r), np.arange(10)[::-2]) for r in range(comm.size)] if comm.rank == 0 else []
-    number, threes, backwards = deal(comm, parts)
+    number, threes, backwards = scatter(comm, parts)
     assert number == comm.rank and not parts
-    assert collect(comm, number) == (list(range(comm.size)) if comm.rank == 0 else [])
+    assert gather(comm, number) == (list(range(comm.size)) if comm.rank == 0 else [])
     assert np.array_equal(threes, [comm.rank] * 3) and np.array_equal(backwards, [9, 7, 5, 3, 1])
 
 

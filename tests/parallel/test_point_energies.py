@@ -51,7 +51,7 @@ def criterion(cell, name, unit=1.0):
     springs = SpringEnergy(NORMAL * unit, TANGENTIAL * unit, TOUGHNESS / unit, 0.25)
     if name == "springs":
         return springs
-    return ReleasedEnergy(springs, cell.solver.preconditioner)
+    return ReleasedEnergy(springs, cell.solver.exact_inverse)
 
 
 @pytest.mark.parametrize("waypoints", [[STRAIGHT], LEGS], ids=["straight", "legs"])

@@ -188,19 +188,19 @@ CUT = {"geometry": "hexagonal", "mesh_size": 0.12, "refine": 1, "decomposition":
 
 @pytest.mark.parametrize("springs", [(5.0, 2.0), (1e-13, 4e-14)], ids=str)
 @pytest.mark.parametrize("kind", ["explicit", "implicit"])
-def test_the_flexibility_of_a_skin_is_a_generalized_inverse_of_its_stiffness(comm, kind, springs):
+def test_the_flexibility_with_springs_is_a_generalized_inverse_of_its_stiffness(comm, kind, springs):
     """S~ (S+ + C) S~ = S~, S~ R = 0, and S+ + C is symmetric."""
     cell = torn_cells.tear(comm, springs=springs, geometry="hexagonal", petsc={"feti_dual_operator": kind})
     operators, found = cell.solver.interface_operators, 0
-    bodies = zip(cell.subdomains, operators.dofs, operators.operators, operators.skins, strict=True)
-    for subdomain, dofs, body, skin in bodies:
-        if skin is not body:
+    bodies = zip(cell.subdomains, operators.dofs, operators.operators, operators.with_springs, strict=True)
+    for subdomain, dofs, body, sprung in bodies:
+        if sprung is not body:
             unit = np.asfortranarray(np.eye(len(dofs)))
-            S, flexibility = skin.apply_schur(unit), skin.apply_flexibility(unit)
+            S, flexibility = sprung.apply_schur(unit), sprung.apply_flexibility(unit)
             assert np.abs(S @ flexibility @ S - S).max() < 1e-9 * np.abs(S).max()
-            assert np.abs(skin.apply_schur(np.asfortranarray(subdomain.R[dofs]))).max() < 1e-12 * np.abs(S).max()
+            assert np.abs(sprung.apply_schur(np.asfortranarray(subdomain.R[dofs]))).max() < 1e-12 * np.abs(S).max()
             if kind == "explicit":
-                regular = S + skin.regularisation(identity(len(dofs), format="csr"))
+                regular = S + sprung.regularisation(identity(len(dofs), format="csr"))
                 assert np.linalg.cond(regular) < 1e4
             assert np.abs(flexibility - flexibility.T).max() < 1e-9 * np.abs(flexibility).max()
             found += 1

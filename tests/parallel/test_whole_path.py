@@ -54,7 +54,7 @@ def test_whole_paths_are_those_of_brute_force(comm, built, growth):
         assert relative_error(stress, np.array([e.stress for e in expected])) < 1e-8
         assert all(p.state.solution.reason > 0 and max(p.state.certificate.values()) < 1e-8 for p in points)
         # With few columns the cell is factored anew on the way.
-        assert (case.cell.solver.preconditioner.factorizations > 2) == (columns < 100)
+        assert (case.cell.solver.exact_inverse.factorizations > 2) == (columns < 100)
 
 
 def test_a_path_goes_on_from_its_middle_as_if_it_had_not_stopped(comm):
@@ -75,7 +75,7 @@ def test_a_path_goes_on_from_its_middle_as_if_it_had_not_stopped(comm):
 def follow(cell, growth, begin=None):
     """Return the points of the path, or of what is left of it."""
     interface, springs = torn_cells.interface(cell, True), SpringEnergy(*SPRINGS, TOUGHNESS, SENSITIVITY)
-    law = ReleasedEnergy(springs, cell.solver.preconditioner) if growth == "released" else springs
+    law = ReleasedEnergy(springs, cell.solver.exact_inverse) if growth == "released" else springs
     bonded = np.full(len(interface.nodes.row), BONDED, np.int8)
     return list(
         events(

@@ -23,11 +23,10 @@ from feti_homog.feti.coarse.averaged_modes import AveragedModes
 from feti_homog.feti.coarse.geneo import kernels_and_soft_modes, local_columns, scaled_constraints, subdomain_blocks
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.neighbours import Neighbours
-from feti_homog.feti.linalg.dense_block_sum import DenseBlockSum
-from feti_homog.feti.linalg.distributed_solver import RenewedSolver
-from feti_homog.feti.linalg.scaled_sparse import scaled
+from feti_homog.feti.linalg.distributed_solver import DistributedSolver
+from feti_homog.feti.linalg.sparse_matrices import DenseBlockSum, scaled
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
-from feti_homog.feti.preconditioners.scaled import StiffnessScaled
+from feti_homog.feti.preconditioners.scaled import Dirichlet, Preconditioner, StiffnessScaled, never_softens
 from feti_homog.feti.thresholds import (
     COARSE_REGULARISATIONS,
     DEFAULTS,
@@ -45,7 +44,7 @@ class AdaptiveCoarseSpace:
 
     A rank knows those u of the n coarse displacements that reach its subdomains, and no others.
 
-    Of a subdomain S Z_0 is dense: of the matrix left whole it has a column for every mode of every fibre.
+    Of a subdomain S Z_0 is dense: of an outer body left whole it has a column for every mode of every inner one.
 
     Attributes:
         threshold: tau.
@@ -65,7 +64,7 @@ class AdaptiveCoarseSpace:
         thresholds: Thresholds = DEFAULTS,
     ) -> None:
         """Find the modes below the threshold tau and factor.  All boundary operators must be dense but of large
-        bodies.  Options under `feti_coarse_` as of `RenewedSolver`.  Collective.
+        bodies.  Options under `feti_coarse_` as of `DistributedSolver`.  Collective.
 
         Raises:
             MeshError: the neighbourhood of a face, on any rank, is no subdomain.
@@ -80,7 +79,7 @@ class AdaptiveCoarseSpace:
         self.counts = [v.shape[1] - b.R.shape[1] for v, b in zip(V, blocks, strict=True)]
         self._modes = AveragedModes(comm, blocks, self._neighbours, V)
         self.coarse_dimension = self._modes.total
-        self.solver = RenewedSolver(comm, self.coarse_dimension, self._modes.reaching, "feti_coarse_")
+        self.solver = DistributedSolver(comm, self.coarse_dimension, "feti_coarse_")
         self._columns = [np.searchsorted(self._modes.reaching, columns) for columns in self._modes.columns]
         self._translations = self._modes.translations(comm)
         # Of each subdomain S Z_0 on its boundary dofs, and Z_0^T S Z_0.
@@ -110,7 +109,7 @@ class AdaptiveCoarseSpace:
         """S Z_0 and Z_0^T S Z_0 of some subdomains, for their scaled constraints."""
         for i, constraints in zip(which, BW, strict=True):
             Z = self._modes.of_subdomain(i, constraints)
-            self._forces[i] = self._operators.skins[i].apply_schur(Z)
+            self._forces[i] = self._operators.with_springs[i].apply_schur(Z)
             self._energies[i] = Z.T @ self._forces[i]
 
     def part(self) -> csr_matrix:
@@ -162,7 +161,7 @@ class AdaptiveCoarseSpace:
 
     def balanced(self, x: Float) -> Float:
         """The forces S_0 x (boundary dofs,) or (boundary dofs, k) of displacements x of that shape.  Collective."""
-        forces = self._operators.apply_skin(x)
+        forces = self._operators.apply_with_springs(x)
         if not self.coarse_dimension:
             return forces
         work = np.zeros((len(self._modes.reaching), *x.shape[1:]))
@@ -185,3 +184,32 @@ class AdaptiveCoarseSpace:
     def destroy(self) -> None:
         """Free the solver.  Collective."""
         self.solver.destroy()
+
+
+class Balanced(Preconditioner):
+    """z = B_D S_0 B_D^T r with S_0 of `coarse`, the rest as in `scaled`.
+
+    S_0 B_D^T B R = S_0 R = 0 for rigid-body motions R: so G^T z = 0, and a part G a of r makes no z.
+
+    Attributes:
+        scaled: the preconditioner without coarse space.
+        coarse: the coarse space.
+    """
+
+    norm, soften = np.inf, never_softens
+
+    def __init__(self, scaled: Dirichlet, coarse: AdaptiveCoarseSpace) -> None:
+        self.scaled, self.coarse = scaled, coarse
+
+    def activate(self, active: Float) -> None:
+        """Restrict both to the rows where `active` is 1.  Collective."""
+        self.scaled.activate(active)
+        self.coarse.activate(active)
+
+    def apply(self, r: Float) -> Float:
+        """B_D S_0 B_D^T r.  Collective."""
+        return self.scaled.multipliers(self.coarse.balanced(self.scaled.displacement_with_jump(r)))
+
+    def closing_forces(self, jump: Float) -> Float:
+        """B_D S B_D^T of the jump.  Collective."""
+        return self.scaled.apply(jump)

@@ -39,7 +39,7 @@ def subdomain_blocks(
     """The blocks of this rank's subdomains; `rows` are those of their nodes.  Collective."""
     B, BW = operators.B.tocsc(), scaled_constraints(comm, jump_operator, scaling)
     blocks = []
-    for i, (subdomain, operator) in enumerate(zip(operators.subdomains, operators.skins, strict=True)):
+    for i, (subdomain, operator) in enumerate(zip(operators.subdomains, operators.with_springs, strict=True)):
         own, scaled = (local_columns(matrix, operators.slices[i], rows[i]) for matrix in (B, BW))
         blocks.append(SubdomainBlocks(subdomain, operators.dofs[i], operator, own, scaled, operators.facewise[i]))
     return blocks

@@ -24,8 +24,7 @@ from feti_homog.feti.coarse.face_neighbourhoods import face_neighbourhoods
 from feti_homog.feti.coarse.trace_spaces import trace_space
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.linalg.dense_cholesky import cholesky
-from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
-from feti_homog.feti.operators.implicit import ImplicitInterfaceOperator
+from feti_homog.feti.operators.boundary_operator import BoundaryOperator, DenseOperator, is_dense
 from feti_homog.feti.thresholds import DEFAULTS, SINGLE_PRECISION_NULL, Thresholds
 from feti_homog.typing import Float, Float32, Int
 
@@ -44,7 +43,7 @@ class SubdomainBlocks:
 
     subdomain: Subdomain
     dofs: Int
-    operator: ExplicitInterfaceOperator | ImplicitInterfaceOperator
+    operator: BoundaryOperator
     B: csr_matrix
     BW: csr_matrix
     facewise: bool
@@ -61,7 +60,7 @@ class SubdomainEigenproblem:
     def __init__(
         self,
         block: SubdomainBlocks,
-        operator: ExplicitInterfaceOperator,
+        operator: DenseOperator,
         common: Mapping[int, Int],
         min_trace_dofs: int = DEFAULTS.min_trace_dofs,
     ) -> None:
@@ -145,7 +144,7 @@ def eigenproblem(
     """
     if block.facewise:
         return FaceEigenproblems(block, common, thresholds)
-    if not isinstance(block.operator, ExplicitInterfaceOperator):
+    if not is_dense(block.operator):
         raise TypeError("soft modes of small boundaries need dense operators")
     return SubdomainEigenproblem(block, block.operator, common, thresholds.min_trace_dofs)
 

@@ -8,12 +8,12 @@ import numpy as np
 from mpi4py import MPI
 from scipy.sparse import block_diag, csc_matrix, csr_matrix, diags
 
-from feti_homog.feti.coarse.gram_matrix import GramMatrix
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.linalg.distributed_matrix import assemble_owned_rows
-from feti_homog.feti.linalg.distributed_solver import RenewedSolver
+from feti_homog.feti.linalg.distributed_solver import DistributedSolver
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.thresholds import UNCONSTRAINED_EIGENVALUE
+from feti_homog.mesh.periodic_topology import components
 from feti_homog.parallel.distributed_arrays import allreduce_sum
 from feti_homog.typing import Float, Int
 
@@ -43,7 +43,7 @@ class NaturalCoarseSpace:
         jump_operator: JumpOperator,
         operators: InterfaceOperators,
     ) -> None:
-        """Assemble G and factor for all rows.  Options under `feti_natural_` as of `RenewedSolver`.
+        """Assemble G and factor for all rows.  Options under `feti_natural_` as of `DistributedSolver`.
         Collective."""
         subdomains = operators.subdomains
         kernels = [s.R[dofs] for s, dofs in zip(subdomains, operators.dofs, strict=True)]
@@ -64,7 +64,7 @@ class NaturalCoarseSpace:
         self._diagonal = allreduce_sum(comm, np.asarray(self.G.power(2).sum(axis=0)).ravel())
         self.unconstrained_modes = csc_matrix((self.kernel_dimension, 0))
         self._reaching = np.union1d(self.G.indices, columns).astype(np.int64)
-        self.solver = RenewedSolver(comm, self.kernel_dimension, self._reaching, "feti_natural_")
+        self.solver = DistributedSolver(comm, self.kernel_dimension, "feti_natural_")
         self.factor()
 
     def activate(self, active: Float) -> None:
@@ -158,3 +158,46 @@ class NaturalCoarseSpace:
     def destroy(self) -> None:
         """Free the solver.  Collective."""
         self.solver.destroy()
+
+
+class GramMatrix:
+    """Entries of G^T A G in the pattern of G^T G, for active rows A = diag(a): Q a with a matrix Q that is made once.
+
+    And which of its diagonal blocks are not coupled with each other.
+    """
+
+    def __init__(self, comm: MPI.Intracomm, G: csr_matrix) -> None:
+        """`G` (owned rows, m).  Collective."""
+        self._comm, self._m = comm, G.shape[1]
+        count = np.diff(G.indptr)
+        # Pairs of entries of one row.
+        row = np.repeat(np.arange(len(count)), count**2)
+        within = np.arange(len(row)) - np.repeat(np.cumsum(count**2) - count**2, count**2)
+        a, b = G.indptr[row] + within // count[row], G.indptr[row] + within % count[row]
+        key = G.indices[a].astype(np.int64) * self._m + G.indices[b]
+        diagonal = np.arange(self._m) * (self._m + 1)
+        self._keys = np.unique(np.concatenate([diagonal, *comm.allgather(np.unique(key))]))
+        entry = np.searchsorted(self._keys, key)
+        self._Q = csr_matrix((G.data[a] * G.data[b], (entry, row)), shape=(len(self._keys), G.shape[0]))
+        self._rows, self._columns = np.divmod(self._keys, self._m)
+
+    def entries(self, active: Float) -> Float:
+        """(entries,) of G^T A G for the owned rows of which `active` is 1, row by row.  Collective."""
+        return allreduce_sum(self._comm, self._Q @ active)
+
+    def groups(self, some: Int) -> list[Int]:
+        """The numbers `some` in groups that G^T G couples: of each size, (groups, size)."""
+        place = np.full(self._m, -1)
+        place[some] = np.arange(len(some))
+        i, j = place[self._rows], place[self._columns]
+        coupled = (i >= 0) & (j >= 0)
+        group = components(len(some), i[coupled], j[coupled])
+        order, sizes = np.argsort(group, kind="stable"), np.bincount(group)
+        starts = np.cumsum(sizes) - sizes
+        return [some[order[starts[sizes == size][:, None] + np.arange(size)]] for size in np.unique(sizes)]
+
+    def places(self, members: Int) -> Int:
+        """(g, s, s) numbers of the entries that couple the members (g, s) of each group; one too many for none."""
+        key = members[:, :, None] * self._m + members[:, None, :]
+        at = np.minimum(np.searchsorted(self._keys, key), len(self._keys) - 1)
+        return np.asarray(np.where(self._keys[at] == key, at, len(self._keys)))

@@ -24,7 +24,7 @@ class InterfaceNodes:
         row: (k,) local row of the bond; of displacements in the plane that along the normal, and the tangential one
             follows.
         points: (k, 2) position on the fibre.
-        normal: (k, 2) from fibre to matrix; the tangent is (-n_y, n_x).
+        normal: (k, 2) from the inner to the outer body; the tangent is (-n_y, n_x).
         length: (k,) tributary interface length: traction = nodal force / length.
         fibre: (k,) constituent.
         pair: (k,) interface of the case.
@@ -195,11 +195,11 @@ class ConstraintLayout:
         )
 
     def facing(self) -> tuple[Int, Int]:
-        """(local rows, 2) how many copies matrix and fibre, the outer and the inner of two bodies, have where a row is
-        between them, and (local rows,) the inner body; 0 and -1 of other rows."""
+        """(local rows, 2) how many copies the outer and the inner of two bodies have where a row is between them,
+        and (local rows,) the inner body; 0 and -1 of other rows."""
         shared = self.shared
         entity = np.repeat(np.arange(len(shared.key)), shared.copies)
-        # Sharers are sorted inwards: the first is the matrix's.
+        # Sharers are sorted inwards: the first is the outer body's.
         outer, inner = shared.body[shared.pointer[:-1]], shared.body[shared.pointer[1:] - 1]
         of_outer, of_inner = (
             np.bincount(entity[shared.body == own[entity]], minlength=len(outer)) for own in (outer, inner)
@@ -213,9 +213,9 @@ class ConstraintLayout:
             inside[row + component] = inner[e]
         return copies, inside
 
-    def matrix_copies(self) -> tuple[Int, Int]:
-        """The breakable nodes of which this rank has the matrix's first copy: the local row of the bond of each, and
-        that copy among the fine nodes of this rank."""
+    def outer_copies(self) -> tuple[Int, Int]:
+        """The breakable nodes of which this rank has the outer body's first copy: the local row of the bond of each,
+        and that copy among the fine nodes of this rank."""
         shared = self.shared
         first = self.base[shared.pointer[:-1]]
         here = np.flatnonzero((shared.fibre >= 0) & (first >= 0))

@@ -11,7 +11,7 @@ from feti_homog.errors import MeshError
 from feti_homog.feti.decomposition.edge_arcs import mean_speed
 from feti_homog.feti.decomposition.sharers import Sharers, entity_code
 from feti_homog.mesh.submesh import SubdomainTable, Submesh, SubmeshesOfRank
-from feti_homog.parallel.exchange import exchange
+from feti_homog.parallel.distributed_arrays import exchange
 from feti_homog.parallel.mpi_errors import agree
 from feti_homog.typing import Bool, Float, Int
 

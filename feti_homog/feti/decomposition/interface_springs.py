@@ -1,4 +1,4 @@
-"""Elastic bonds between fibres and matrix: springs of finite stiffness in place of glue."""
+"""Elastic bonds between bodies: springs of finite stiffness in place of glue."""
 
 from __future__ import annotations
 

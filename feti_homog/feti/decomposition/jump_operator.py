@@ -1,9 +1,9 @@
 """The gluing constraints B of one rank, and their place in the distributed vector of multipliers.
 
 Of the k copies of a fine node, those within one body are glued in x and y by orthonormal contrasts and can never
-part.  A fibre and the matrix are glued by one pair of rows (n, t) between the means of their copies; this bond can
-break.  So B has full row rank, n.(u_matrix - u_fibre) is the gap, and a multiplier is the nodal force that the faces
-exert on each other: tension is positive.
+part.  A body, such as a fibre, and the one around it are glued by one pair of rows (n, t) between the means of their
+copies; this bond can break.  So B has full row rank, n.(u_outer - u_inner) is the gap, and a multiplier is the nodal
+force that the faces exert on each other: tension is positive.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ class JumpOperator:
         rows: global number of each local row.
         node_rows: first owned row and number of rows of each fine node that this rank owns.
         nodes: the interface nodes that this rank owns.
-        matrix_copies: local rows of the interface nodes of which this rank has a copy of the matrix, and these copies,
-            as `ConstraintLayout.matrix_copies` has them.
-        copies: (local rows, 2) of matrix and fibre where a row is between two bodies, 0 of other rows.
+        outer_copies: local rows of the interface nodes of which this rank has a copy of the outer body, and these
+            copies, as `ConstraintLayout.outer_copies` has them.
+        copies: (local rows, 2) of the outer and the inner body where a row is between two bodies, 0 of other rows.
         inside: (local rows,) the inner of these bodies, the fibre in general; -1 of other rows.
         owned: first global row of this rank and the one after its last.
         global_rows: number of rows on all ranks.
@@ -61,7 +61,7 @@ class JumpOperator:
         self.rows, self.B = layout.rows, layout.matrix()
         self.node_rows = layout.node_rows()
         self.nodes = layout.interface_nodes()
-        self.matrix_copies = layout.matrix_copies()
+        self.outer_copies = layout.outer_copies()
         self.copies, self.inside = layout.facing()
         self.vector = PETSc.Vec().createMPI((self.owned[1] - self.owned[0], self.global_rows), comm=comm)
         self._exchanges: dict[int, _Exchange] = {}
@@ -79,10 +79,10 @@ class JumpOperator:
         """The owned rows of the sum over ranks of `local`, (local rows,) or (local rows, k)."""
         return self._exchange(local).sum(local)
 
-    def from_matrix(self, numbers: Int) -> Int:
-        """(k,) the numbers that the ranks of the matrix give their fine nodes, at the interface nodes that this rank
-        owns; each has one for all of its own fine nodes.  Collective."""
-        rows, copies = self.matrix_copies
+    def from_outer(self, numbers: Int) -> Int:
+        """(k,) the numbers that the ranks of the outer bodies give their fine nodes, at the interface nodes that this
+        rank owns; each has one for all of its own fine nodes.  Collective."""
+        rows, copies = self.outer_copies
         local = np.zeros(len(self.rows))
         local[rows] = numbers[copies]  # exact, as integers below 2^53 are
         return self.sum(local)[self.nodes.row].astype(np.int64)

@@ -16,7 +16,7 @@ from feti_homog.feti.decomposition.interface_geometry import breakable_pairs, in
 from feti_homog.feti.decomposition.sharers import Sharers, find_sharers
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.mesh.submesh import SubdomainTable, SubmeshesOfRank
-from feti_homog.parallel.exchange import exchange
+from feti_homog.parallel.distributed_arrays import exchange
 from feti_homog.typing import Array, Bool, Float, Int
 
 
@@ -32,11 +32,11 @@ class SharedEntities:
         pointer, sharer: the subdomains that share entity i are sharer[pointer[i]:pointer[i + 1]], sorted by body, from
             the outermost to the innermost.
         body: constituent of each sharer.
-        fibre: (n,) the body that may debond here from the one around it, a fibre or a coating in general; or -1 where
-            nothing can break.
+        fibre: (n,) the body that may debond here from the one around it, the inner one; or -1 where nothing can break.
         pair: (n,) the interface of the case that these two bodies have, -1 where nothing can break.
-        normal: (n, 2, 2) normals from fibre to matrix at the start and the end of the edge, as long as dx / ds, s in
-            [0, 1] the place along it; at a vertex, where sides of elements meet, as long as dx / ds on these together.
+        normal: (n, 2, 2) normals from the inner to the outer body at the start and the end of the edge, as long as dx /
+            ds, s in [0, 1] the place along it; at a vertex, where sides of elements meet, as long as dx / ds on these
+            together.
         turn: (n,) of the edge, as in `Submesh`; 0 at vertices.
         precracked: (n,) whether the mesh has the edge, or all edges that meet in the vertex, debonded.
         owned: (2,) first vector constraint of this rank and the one after its last.

@@ -35,6 +35,8 @@ class Subdomain:
         R: (cn, k) orthonormal kernel of K: translations, and a rotation in the plane if the piece can turn,
             less what the pinned class stops.
         positions: (n, 2) unwrapped positions of the classes.
+        is_thin: whether the body is, such as a ring much thinner than its radius: the inverse is ill-conditioned.
+        is_outer: whether no other body lies around it.
     """
 
     submesh: Submesh
@@ -46,21 +48,25 @@ class Subdomain:
     R: Float
     positions: Float
     _built_stiffness: csr_matrix | None = field(repr=False)
+    is_thin: bool = False
+    is_outer: bool = False
 
     @classmethod
-    def build(cls, submesh: Submesh, lattice: ReferenceLattice, L: Float, problem: Problem = PLANE) -> Subdomain:
-        """Refine and assemble, without communication.
+    def build(
+        cls, submesh: Submesh, lattice: ReferenceLattice, L: Float, problem: Problem = PLANE, **flags: bool
+    ) -> Subdomain:
+        """Refine and assemble, without communication; `flags` are `is_thin` and `is_outer`.
 
         Raises:
             MeshError: an element is inverted, or the rigid-body modes are not in the kernel of K.
         """
         mesh = refine(submesh, lattice)
         _check_corners(submesh, mesh)
-        return cls.on(submesh, mesh, L, problem)
+        return cls.on(submesh, mesh, L, problem, **flags)
 
     @classmethod
-    def on(cls, submesh: Submesh, mesh: FineMesh, L: Float, problem: Problem) -> Subdomain:
-        """Assemble on a refined mesh, without communication.  Raises MeshError as `build`."""
+    def on(cls, submesh: Submesh, mesh: FineMesh, L: Float, problem: Problem, **flags: bool) -> Subdomain:
+        """Assemble on a refined mesh, without communication.  Arguments and errors as of `build`."""
         body = assemble(mesh, L, problem)
         shift, closes = unwrap(submesh)
         positions = np.empty((mesh.n_classes, 2))
@@ -71,7 +77,7 @@ class Subdomain:
         Q = body.Q
         if submesh.pinned >= 0:
             Q[problem.dofs(np.array([submesh.pinned]))] = 0.0
-        return cls(submesh, mesh, problem, L, Q, body.area, R, positions, K)
+        return cls(submesh, mesh, problem, L, Q, body.area, R, positions, K, **flags)
 
     def mean_strain(self, dofs: Int) -> Float:
         """(k, m) whose transpose times the displacements u of `dofs` (k,) is their share in int eps* over the subdomain

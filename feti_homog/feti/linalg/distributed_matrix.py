@@ -7,7 +7,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix, diags
 
-from feti_homog.feti.linalg.collectives import allgather_rows
+from feti_homog.parallel.distributed_arrays import allgather_rows
 from feti_homog.typing import Bool, Int
 
 

@@ -1,4 +1,4 @@
-"""Direct solves on one rank, through PETSc's KSP and PC."""
+"""Direct solves through PETSc's KSP and PC: of one rank, and what those of all ranks share."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from scipy.sparse import csr_matrix
 from feti_homog.errors import CaseError
 from feti_homog.feti.linalg.factor_status import check_factor, power_of_two
 from feti_homog.feti.thresholds import CHOLMOD_COLUMNS_ONE_BY_ONE, ITERATIVE_RTOL, MUMPS_EXTRA_WORKSPACE_PERCENT
+from feti_homog.petsc.c_functions import error_words
 from feti_homog.typing import Float
 
 # PETSc's error code for a factorization that the chosen library does not have (PETSC_ERR_MISSING_FACTOR).
@@ -23,7 +24,7 @@ DEFINITE = {"mat_cholmod_final_asis": False, "mat_cholmod_final_ll": True}
 
 
 class DirectSolver:
-    """X = A^-1 B for one symmetric definite matrix A (n, n) and any number of right-hand sides."""
+    """X = A^-1 B for one symmetric definite matrix A (n, n) of one rank and any number of right-hand sides."""
 
     max_columns_one_by_one = CHOLMOD_COLUMNS_ONE_BY_ONE
 
@@ -31,87 +32,74 @@ class DirectSolver:
         """Factorize.  Options under `prefix` (default: cholesky by CHOLMOD).
 
         Raises:
-            LinAlgError, MemoryError, CaseError: as `factor_by_mumps`.
+            LinAlgError, MemoryError, CaseError: as `factored`.
         """
         self._scale = power_of_two(matrix.diagonal())
         scaled = csr_matrix((self._scale * matrix.data, matrix.indices, matrix.indptr), shape=matrix.shape)
-        self._ksp = factor_by_cholmod(scaled, prefix)
+        self._ksp = factored(_sequential(scaled), prefix, PETSc.Mat.SolverType.CHOLMOD)
         self._x, self._b = self._ksp.getOperators()[0].createVecs()
         self._destroy = weakref.finalize(self, _destroy, self._ksp, self._x, self._b)
 
     def solve(self, B: Float) -> Float:
         """A^-1 B for B (n,) or (n, k)."""
-        if B.size <= self.max_columns_one_by_one * len(B) or self._ksp.getType() != PETSc.KSP.Type.PREONLY:
-            X = np.empty_like(B)
-            for x, b in zip(X.reshape(len(B), -1).T, B.reshape(len(B), -1).T, strict=True):
-                self._b.setArray(b)
-                self._ksp.solve(self._b, self._x)
-                np.multiply(self._x.getArray(readonly=True), self._scale, out=x)
-            return X
-        X = np.empty(B.shape, order="F")
-        right = np.asfortranarray(B)
-        matrices = [PETSc.Mat().createDense(X.shape, array=a, comm=PETSc.COMM_SELF) for a in (right, X)]
-        self._ksp.getPC().matApply(*matrices)
-        for matrix in matrices:
-            matrix.destroy()
+        X = solve_columns(self._ksp, self._x, self._b, B if B.ndim == 2 else B[:, None], self.max_columns_one_by_one)
         X *= self._scale
-        return X
+        return X.reshape(B.shape)
 
     def destroy(self) -> None:
         """Free the factor now; otherwise it is freed with this object."""
         self._destroy()
 
 
-def iterations(ksp: PETSc.KSP) -> int:
-    """Of the last solve by an iterative method; 1 by a factor."""
-    return 1 if ksp.getType() == PETSc.KSP.Type.PREONLY else int(ksp.getIterationNumber())
+def is_direct(ksp: PETSc.KSP) -> bool:
+    """Whether a solver applies a factor once, and does not iterate."""
+    return bool(ksp.getType() == PETSc.KSP.Type.PREONLY)
 
 
-def factor_by_cholmod(matrix: csr_matrix, prefix: str) -> PETSc.KSP:
-    """A KSP with the factorization of a symmetric definite matrix; options under `prefix`, CHOLMOD by default.
+def solve_columns(ksp: PETSc.KSP, x: PETSc.Vec, b: PETSc.Vec, B: Float, one_by_one: int) -> Float:
+    """(own rows, k) of A^-1 B in the order of Fortran, for this rank's rows B (own rows, k); `x` and `b` are work
+    vectors.  Up to so many columns, and iterative methods, one after the other.  Collective where the matrix is."""
+    X = np.empty(B.shape, order="F")
+    if B.shape[1] > one_by_one and is_direct(ksp):
+        sizes = (b.getSizes(), B.shape[1])
+        matrices = [PETSc.Mat().createDense(sizes, array=a, comm=b.comm) for a in (np.asfortranarray(B), X)]
+        ksp.getPC().matApply(*matrices)
+        for matrix in matrices:
+            matrix.destroy()
+        return X
+    for column, right in zip(X.T, B.T, strict=True):
+        b.setArray(right)
+        ksp.solve(b, x)
+        column[:] = x.getArray(readonly=True)
+    return X
 
-    Raises as `factor_by_mumps`.
-    """
-    A = _sequential(matrix)
-    A.setOption(PETSc.Mat.Option.SPD, True)
-    with _refusing_indefinite(prefix):
-        ksp = _direct_ksp(A, prefix, PETSc.Mat.SolverType.CHOLMOD)
-        _set_up(ksp)
-    return ksp
 
+def factored(A: PETSc.Mat, prefix: str, library: str, near_kernel: Float | None = None) -> PETSc.KSP:
+    """A KSP with the Cholesky factorization of a symmetric definite matrix by this library; options under `prefix` may
+    choose others.  Collective where the matrix is.
 
-def factor_by_mumps(A: PETSc.Mat, prefix: str, near_kernel: Float | None = None) -> PETSc.KSP:
-    """A KSP with the factorization of a symmetric definite matrix on any communicator; options under `prefix`, MUMPS by
-    default.
-
-    The matrix should have rows and columns of similar size: MUMPS does not scale it here, for its own scaling loses
-    all digits of coarse problems with contrasts of 1e6.  Multigrid learns of the `near_kernel` (n, k), orthonormal
-    vectors of little energy.
+    Rows and columns should have similar size: MUMPS does not scale here, for its own scaling loses all digits of coarse
+    problems with contrasts of 1e6.  Multigrid learns of the `near_kernel` (n, k), orthonormal vectors of little energy.
 
     Raises:
         LinAlgError: the matrix is not positive definite, or too near to one that is singular.
         MemoryError: MUMPS could not factor.
         CaseError: the library that the options name has no such factorization.
     """
-    _tell(A, near_kernel)
+    _set_near_kernel(A, near_kernel)
     A.setOption(PETSc.Mat.Option.SPD, True)
-    ksp = _direct_ksp(A, prefix, PETSc.Mat.SolverType.MUMPS)
-    pc = ksp.getPC()
-    if pc.getFactorSolverType() == PETSc.Mat.SolverType.MUMPS:
-        pc.getFactorMatrix().setMumpsIcntl(8, 0)
-        pc.getFactorMatrix().setMumpsIcntl(14, MUMPS_EXTRA_WORKSPACE_PERCENT)
-    _set_up(ksp)
-    return ksp
-
-
-def _set_up(ksp: PETSc.KSP) -> None:
-    """Factor, and read what the library says of it."""
-    try:
-        ksp.setUp()
-    except PETSc.Error as error:
-        words = str(error).splitlines()[-1].split("] ", 1)[-1]
-        raise np.linalg.LinAlgError(f"not positive definite ({words})") from error
+    with _refusing_indefinite(prefix):
+        ksp = _direct_ksp(A, prefix, library)
+        pc = ksp.getPC()
+        if pc.getFactorSolverType() == PETSc.Mat.SolverType.MUMPS:
+            pc.getFactorMatrix().setMumpsIcntl(8, 0)
+            pc.getFactorMatrix().setMumpsIcntl(14, MUMPS_EXTRA_WORKSPACE_PERCENT)
+        try:
+            ksp.setUp()
+        except PETSc.Error as error:
+            raise np.linalg.LinAlgError(f"not positive definite ({error_words(error)})") from error
     check_factor(ksp.getPC())
+    return ksp
 
 
 @contextmanager
@@ -128,8 +116,8 @@ def _refusing_indefinite(prefix: str) -> Iterator[None]:
             database.delValue(name)
 
 
-def _tell(A: PETSc.Mat, near_kernel: Float | None) -> None:
-    """Let the matrix know of its near-kernel (n, k), the same on all of its ranks."""
+def _set_near_kernel(A: PETSc.Mat, near_kernel: Float | None) -> None:
+    """Attach the near-kernel (n, k) to the matrix, the same on all of its ranks."""
     if near_kernel is None or not near_kernel.shape[1]:
         return
     vectors = [A.createVecLeft() for _ in near_kernel.T]

@@ -21,7 +21,7 @@ class SubdomainSize:
         dofs: degrees of freedom of the subdomain.
         boundary_dofs: those of them that constraints act on.
         is_whole_body: whether all that the subdomain shares, it shares with one other body.
-        has_springs: whether springs hold it, whose soft skin is a dense matrix.
+        has_springs: whether springs hold it, with which its stiffness is a dense matrix.
     """
 
     dofs: int

@@ -11,9 +11,8 @@ import numpy as np
 from scipy.linalg.blas import dsymm, dsymv
 from scipy.sparse import csr_matrix
 
-from feti_homog.case.phase_names import COATING
 from feti_homog.feti.decomposition.subdomain import Subdomain
-from feti_homog.feti.linalg.packed_symmetric import full_from_lower, invert_upper
+from feti_homog.feti.linalg.dense_cholesky import full_from_lower, invert_upper
 from feti_homog.feti.linalg.schur_complement import schur_complement
 from feti_homog.feti.thresholds import DENSE_COLUMNS_ONE_BY_ONE, ILL_CONDITIONED
 from feti_homog.typing import Float, Int
@@ -24,6 +23,8 @@ class ExplicitInterfaceOperator:
 
     With the fixing nodes on the boundary, the inverse of S + rho Rf Rf^T is the boundary part of K+.
     """
+
+    is_dense = True
 
     def __init__(self, subdomain: Subdomain, K: csr_matrix, dofs: Int) -> None:
         """Condense K (2c, 2c) to `dofs` (n,), which are sorted local numbers.  Options under `feti_schur_`.
@@ -47,7 +48,7 @@ class ExplicitInterfaceOperator:
         conditioning = self._schur_diagonal.max(initial=0.0) * self._flexibility_diagonal.max(initial=0.0)
         # Where pieces are ill-conditioned because they are nearly incompressible, refined products and the coarse
         # matrices would no longer agree to rounding.
-        self._refines = subdomain.submesh.phase == COATING and bool(conditioning > ILL_CONDITIONED)
+        self._refines = subdomain.is_thin and bool(conditioning > ILL_CONDITIONED)
         np.fill_diagonal(both, 0.0)
         self._both = both
 
@@ -58,7 +59,7 @@ class ExplicitInterfaceOperator:
     def apply_flexibility(self, x: Float, out: Float | None = None) -> Float:
         """S+ x for x (n,) or (n, k), into `out` if it is given; else in Fortran order.
 
-        Of a thin coating, whose inverse is ill-conditioned, with one step of iterative refinement.
+        Of a thin body, whose inverse is ill-conditioned, with one step of iterative refinement.
         """
         y = self._product(x, out, self._flexibility_diagonal, lower=0)
         if self._refines:

@@ -1,8 +1,9 @@
-"""Boundary operators of a subdomain by sparse factorizations, for boundaries too large for dense matrices."""
+"""Boundary operators of a subdomain by sparse factorizations, where dense matrices are too large; interiors."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -16,6 +17,8 @@ from feti_homog.typing import Float, Int
 
 class ImplicitInterfaceOperator:
     """S and the boundary part of K+ of one subdomain, on its n boundary dofs."""
+
+    is_dense = False
 
     def __init__(self, subdomain: Subdomain, K: csr_matrix, dofs: Int) -> None:
         """Factor K + rho Rf Rf^T; `dofs` (n,) are sorted local numbers.  Options under `feti_sub_`."""
@@ -88,3 +91,39 @@ def _by_columns(apply: Callable[[Float], Float], x: Float, out: Float | None) ->
         some = slice(first, first + SPARSE_COLUMNS_AT_ONCE)
         out[:, some] = apply(x[:, some])
     return out
+
+
+@dataclass(frozen=True)
+class CondensedLoads:
+    """The v unit loads condensed to the boundaries of this rank's subdomains.
+
+    Loads vanish inside uniform bodies but for nodes at voids.  With K_ii u_i = -Q_i E - K_ib u_b the stress integral is
+    C E + q^T u_b and the forces on the boundary are S u_b + q E, of
+
+        q = Q_b - K_bi K_ii^-1 Q_i,  C = |Omega| L - Q_i^T K_ii^-1 Q_i.
+
+    Attributes:
+        boundary: (boundary dofs, v) q.
+        stiffness: (v, v) sum of C.
+        inner: of the subdomains beside voids, by their places, (their dofs, v) -K_ii^-1 Q_i, 0 on the boundary.
+    """
+
+    boundary: Float
+    stiffness: Float
+    inner: dict[int, Float]
+
+    @classmethod
+    def of(cls, subdomains: Sequence[Subdomain], dofs: Sequence[Int], loads: int) -> CondensedLoads:
+        """Condense to the `dofs` of each subdomain; interiors beside voids are factored for it and not kept."""
+        boundary, stiffness = [np.zeros((0, loads))], np.zeros((loads, loads))
+        inner: dict[int, Float] = {}
+        for place, (s, own) in enumerate(zip(subdomains, dofs, strict=True)):
+            q, C = s.Q[own], s.area * s.L
+            if s.submesh.at_void.any():
+                u = inner[place] = np.zeros(s.Q.shape)
+                interior = Interior(s.assemble_stiffness(), own)
+                u[interior.dofs] = interior.solve(-s.Q[interior.dofs])
+                q, C = q + interior.coupling @ u[interior.dofs], C + s.Q.T @ u
+            boundary.append(q)
+            stiffness += C
+        return cls(np.concatenate(boundary), stiffness, inner)

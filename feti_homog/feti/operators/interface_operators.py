@@ -15,14 +15,14 @@ from feti_homog.errors import MeshError
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.shared_entities import SharedEntities
 from feti_homog.feti.decomposition.subdomain import Subdomain, label
+from feti_homog.feti.operators.boundary_operator import BoundaryOperator
 from feti_homog.feti.operators.choice import SubdomainSize, choose
 from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
 from feti_homog.feti.operators.implicit import ImplicitInterfaceOperator, Interior
-from feti_homog.feti.operators.soft_skin import compliance_root, soft_skin
+from feti_homog.feti.operators.with_springs import WithSprings, compliance_root
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.typing import Bool, Float, Int
 
-MATRIX = "matrix"
 InterfaceOperator = ExplicitInterfaceOperator | ImplicitInterfaceOperator
 
 
@@ -34,14 +34,14 @@ class InterfaceOperators:
         offsets: (subdomains + 1,) where each subdomain begins among the n.
         local_dofs: (n,) their numbers among all dofs of this rank.
         operators: dense or factored, of each subdomain.
-        skins: the same for the preconditioner and the coarse space, to whom a fibre on springs has a soft skin.
+        with_springs: the same for the preconditioner and the coarse space: those of a body on springs have these.
         facewise: whether the soft modes of each are to be looked for face by face.
         B: (local rows, n) the constraints on them, and `BT` its transpose.
-        of_fibre: (n,) whether each boundary dof is a fibre's, or the inner of two bodies'.
+        of_inner: (n,) whether each boundary dof is that of the inner of two bodies.
         body_diagonal: (n,) of K.
         diagonal: (n,) the same, with springs that of their chain.
         springs: (owned rows,) compliance of the springs.
-        compliance: the same of those that no skin stands for, where fibre and matrix are both cut.
+        compliance: the same of those that no subdomain has, where both bodies are cut.
     """
 
     def __init__(
@@ -72,31 +72,30 @@ class InterfaceOperators:
         own = _own_rows(jump_operator)
         self.springs = np.zeros(own.stop - own.start) if compliance is None else compliance[own]
         self.compliance = np.where((jump_operator.copies[own] > 1).all(axis=1), self.springs, 0.0)
-        self.of_fibre = self._inner_dofs(jump_operator)
+        self.of_inner = self._inner_dofs(jump_operator)
         roots = self._compliance_roots(jump_operator.copies, compliance)
-        springs = [s.submesh.phase != MATRIX and root is not None for s, root in zip(subdomains, roots, strict=True)]
+        springs = [not s.is_outer and root is not None for s, root in zip(subdomains, roots, strict=True)]
         sizes = [replace(size, has_springs=has) for size, has in zip(sizes, springs, strict=True)]
         chosen = choose(sizes, kind, applications, soft_modes, can_condense, thresholds)
         self.facewise = [choice.facewise for choice in chosen]
         self.operators: list[InterfaceOperator] = []
-        self.skins: list[InterfaceOperator] = []
+        self.with_springs: list[BoundaryOperator] = []
         bodies, diagonals = [np.zeros(0)], [np.zeros(0)]
         for subdomain, dofs, choice, root in zip(subdomains, self.dofs, chosen, roots, strict=True):
             operator, diagonal = _factor(subdomain, dofs, choice.explicit)
             self.operators.append(operator)
+            self.with_springs.append(operator if root is None else WithSprings(operator, root, subdomain.R[dofs]))
             bodies.append(diagonal)
             if root is not None:
-                operator = soft_skin(operator, root, subdomain.R[dofs])
                 diagonal = 1.0 / (1.0 / diagonal + np.asarray(root.multiply(root).sum(axis=1)).ravel())
-            self.skins.append(operator)
             diagonals.append(diagonal)
         self.body_diagonal, self.diagonal = np.concatenate(bodies), np.concatenate(diagonals)
 
     def _compliance_roots(self, copies: Int, compliance: Float | None) -> list[csr_matrix | None]:
-        """Compute the root of the compliance of each subdomain's skin, None without springs."""
+        """Compute the root of the compliance of each subdomain's springs, None without any."""
         if compliance is None:
             return [None for _ in self.subdomains]
-        found = [compliance_root(self.B[:, span], compliance, copies, self.of_fibre[span]) for span in self.slices]
+        found = [compliance_root(self.B[:, span], compliance, copies, self.of_inner[span]) for span in self.slices]
         return [root if root.shape[1] else None for root in found]
 
     @cached_property
@@ -105,28 +104,28 @@ class InterfaceOperators:
         return [slice(a, b) for a, b in pairwise(self.offsets.tolist())]
 
     def _inner_dofs(self, jump_operator: JumpOperator) -> Bool:
-        """`of_fibre`; where more than two bodies meet all but the matrix are fibres."""
+        """`of_inner`; where more than two bodies meet, of all but the outermost."""
         sizes = np.diff(self.offsets)
-        of_fibre = np.repeat(np.array([s.submesh.phase != MATRIX for s in self.subdomains], bool), sizes)
+        of_inner = np.repeat(np.array([not s.is_outer for s in self.subdomains], bool), sizes)
         body = np.repeat(np.array([s.submesh.body for s in self.subdomains], np.int64), sizes)
         between = np.flatnonzero(jump_operator.inside >= 0)
         entries = self.B[between].tocoo()
-        of_fibre[entries.col] = body[entries.col] == jump_operator.inside[between][entries.row]
-        return of_fibre
+        of_inner[entries.col] = body[entries.col] == jump_operator.inside[between][entries.row]
+        return of_inner
 
     def apply_schur(self, x: Float) -> Float:
         """S x for x (n,) or (n, k)."""
         return self._each([o.apply_schur for o in self.operators], x)
 
-    def apply_skin(self, x: Float) -> Float:
-        """S~ x for x (n,) or (n, k): S x, with soft skins where there are springs."""
-        return self._each([o.apply_schur for o in self.skins], x)
+    def apply_with_springs(self, x: Float) -> Float:
+        """S~ x for x (n,) or (n, k): S x, with the springs where there are some."""
+        return self._each([o.apply_schur for o in self.with_springs], x)
 
-    def apply_some_skins(self, which: Sequence[bool], x: Float) -> Float:
+    def apply_some_with_springs(self, which: Sequence[bool], x: Float) -> Float:
         """S~ x for x (n,) or (n, k) on some of the subdomains, 0 on the others."""
         x = np.asfortranarray(x)
         y = np.zeros(x.shape, order="F")
-        for operator, own, is_wanted in zip(self.skins, self.slices, which, strict=True):
+        for operator, own, is_wanted in zip(self.with_springs, self.slices, which, strict=True):
             if is_wanted and x[own].any():
                 operator.apply_schur(x[own], y[own])
         return y

@@ -7,12 +7,12 @@ from mpi4py import MPI
 from scipy.sparse import csr_matrix, diags, hstack
 
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
-from feti_homog.feti.linalg.collectives import share_columns
-from feti_homog.feti.linalg.dense_block_sum import DenseBlockSum
 from feti_homog.feti.linalg.distributed_matrix import allreduce_sparse
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
-from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
+from feti_homog.feti.linalg.sparse_matrices import DenseBlockSum
+from feti_homog.feti.operators.boundary_operator import is_dense
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
+from feti_homog.parallel.distributed_arrays import share_columns
 from feti_homog.typing import Float
 
 # Entries of Z, which are cosines of angles or their products, that rounding leaves of zero.
@@ -22,7 +22,7 @@ DIRECTION_ROUNDING = 1e-14
 class AssembledSchur:
     """Z^T S Z of all subdomains, factored once; every rank holds the factor.
 
-    All copies of a node move together, but along a row that is not active the copies of the fibre move on their own.
+    All copies of a node move together, but along a row that is not active those of the inner body move on their own.
 
     Attributes:
         size: columns of Z, on all ranks.
@@ -42,8 +42,8 @@ class AssembledSchur:
         Z = _released(comm, jump_operator, operators, together, active)
         self.size = Z.shape[1]
         stiffness = DenseBlockSum((self.size, self.size))
-        for operator, span in zip(operators.skins, operators.slices, strict=True):
-            if not isinstance(operator, ExplicitInterfaceOperator):
+        for operator, span in zip(operators.with_springs, operators.slices, strict=True):
+            if not is_dense(operator):
                 raise TypeError("the assembled Schur complement needs dense boundary operators")
             columns = np.unique(Z[span].indices)
             T = Z[span][:, columns].T.tocsr()
@@ -95,11 +95,11 @@ def _released(
     number = np.where(released, sum(counts[: comm.rank]) + np.cumsum(released), 0)
     number = jump_operator.gather(number.astype(float)).astype(np.int64) - 1
     rows = np.flatnonzero(number >= 0)
-    # A row takes the mean of the fibre's copies, with the sign of minus.
+    # A row takes the mean of the inner copies, with the sign of minus.
     e = (
         -diags(jump_operator.copies[rows, 1].astype(float))
         @ operators.B[rows]
-        @ diags(operators.of_fibre.astype(float))
+        @ diags(operators.of_inner.astype(float))
     )
     here = np.asarray(e.multiply(e).sum(axis=1)).ravel()
     rows, e, here = rows[here > 0], e.tocsr()[here > 0], here[here > 0]

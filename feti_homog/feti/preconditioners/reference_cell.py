@@ -1,4 +1,4 @@
-"""The cell with a reference set A of active rows, factored: what unit jumps on A and unit forces on the others do.
+"""The cell with a reference set A of active rows, factored, and columns of its response to unit jumps and forces.
 
 Jumps g on the rows of A and forces f on the others I, each on both faces, make multipliers on A and gaps on I,
 
@@ -19,9 +19,41 @@ from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.assembled_schur import AssembledSchur
 from feti_homog.feti.preconditioners.spring_update import SpringUpdate
-from feti_homog.feti.thresholds import STIFF_FIBRES
-from feti_homog.parallel.distributed_arrays import allreduce_sum, scale_rows
-from feti_homog.typing import Float
+from feti_homog.feti.thresholds import INFLUENCE_CHUNK, STIFF_FIBRES
+from feti_homog.parallel.distributed_arrays import allreduce_sum, gather_rows, scale_rows
+from feti_homog.typing import Float, Int
+
+# Bonds, each in all directions, that let no rigid-body motion pass between two bodies.
+HOLDING_BONDS = 2
+
+
+class BodyTies:
+    """Of every fibre and the body around it two bonds, the second as far as can be from the first."""
+
+    def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator) -> None:
+        """Collective."""
+        nodes = jump_operator.nodes
+        self._comm = comm
+        self._rows = nodes.row[:, None] + np.arange(jump_operator.components)
+        bodies, points = (np.concatenate(comm.allgather(x)) for x in (nodes.bodies, nodes.points))
+        _, first, pair = np.unique(bodies, axis=0, return_index=True, return_inverse=True)
+        pair = pair.ravel()
+        distance = np.linalg.norm(points - points[first[pair]], axis=1)
+        order = np.lexsort([distance, pair])
+        last = order[np.cumsum(np.bincount(pair)) - 1] if len(pair) else first
+        begin = comm.exscan(len(nodes.row)) or 0
+        self._ties = np.stack([first, last], axis=1) - begin
+        self._pair = pair[begin : begin + len(nodes.row)]
+
+    def tied(self, active: Float) -> Float:
+        """`active` (owned rows,) with all rows of the ties where fewer than two bonds hold two bodies.  Collective."""
+        bonded = active[self._rows].prod(axis=1)
+        holding = allreduce_sum(self._comm, np.bincount(self._pair, bonded, len(self._ties)).astype(float))
+        ties = self._ties[holding < HOLDING_BONDS].ravel()
+        own = self._rows[ties[(ties >= 0) & (ties < len(self._rows))]]
+        tied = active.copy()
+        tied[own] = 1.0
+        return tied
 
 
 class ReferenceCell:
@@ -68,8 +100,8 @@ class ReferenceCell:
         g, f = scale_rows(self.active, x), scale_rows(1.0 - self.active, x)
         u = self._BDT @ jump_operator.gather(g)
         pulled = 0.0 if self._is_bonded else operators.BT @ jump_operator.gather(f)
-        u = u + self.assembled.relieving_displacement(operators.apply_some_skins(self._reached, u) - pulled)
-        forces = operators.apply_some_skins(self._reached, u) - pulled
+        u = u + self.assembled.relieving_displacement(operators.apply_some_with_springs(self._reached, u) - pulled)
+        forces = operators.apply_some_with_springs(self._reached, u) - pulled
         lam = scale_rows(self.active, jump_operator.sum(self._BD @ forces))
         if self._is_bonded:
             return lam
@@ -84,13 +116,71 @@ def one_sided_jumps(comm: MPI.Intracomm, jump_operator: JumpOperator, operators:
     is_bond = inside >= 0
     inner, mine = inside[B.row], is_bond[B.row]
     # Of each inner body and what is around it: the mean diagonal stiffness.
-    side = 2 * inner + operators.of_fibre[B.col]
+    side = 2 * inner + operators.of_inner[B.col]
     most = 2 * (comm.allreduce(int(inside.max(initial=-1)), MPI.MAX) + 1)
     weights = B.data[mine] ** 2
     sums = [np.bincount(side[mine], values, most) for values in (weights * operators.diagonal[B.col[mine]], weights)]
     total, count = allreduce_sum(comm, np.stack(sums))
     outer_mean, inner_mean = (total / np.maximum(count, 1.0)).reshape(-1, 2).T
     moves_inner = np.append(inner_mean <= STIFF_FIBRES * outer_mean, False)[inside]
-    moved = ~mine | (operators.of_fibre[B.col] == moves_inner[B.row])
+    moved = ~mine | (operators.of_inner[B.col] == moves_inner[B.row])
     copies = np.where(is_bond, jump_operator.copies[np.arange(len(inside)), moves_inner.astype(int)], 1)
     return csr_matrix(((copies[B.row] * B.data)[moved], (B.row[moved], B.col[moved])), shape=B.shape)
+
+
+class ResponseColumns:
+    """Gamma[:, K] and Gamma[K, K] for a growing set K of rows.
+
+    Attributes:
+        rows: (k,) K, global numbers in the order in which they came.
+    """
+
+    def __init__(self, comm: MPI.Intracomm, cell: ReferenceCell, owned: tuple[int, int], global_rows: int) -> None:
+        """No columns yet; this rank owns the rows from owned[0] up to owned[1]."""
+        self._comm, self._cell, self._first = comm, cell, owned[0]
+        self.rows: Int = np.zeros(0, np.int64)
+        self._position = np.full(global_rows, -1)
+        # Both grow in place; a full buffer doubles.
+        self._columns = np.zeros((owned[1] - owned[0], INFLUENCE_CHUNK), order="F")
+        self._block = np.zeros((INFLUENCE_CHUNK, INFLUENCE_CHUNK))
+
+    @property
+    def owned(self) -> Float:
+        """(owned rows, k) Gamma[:, K]."""
+        return self._columns[:, : len(self.rows)]
+
+    @property
+    def block(self) -> Float:
+        """(k, k) Gamma[K, K] on every rank."""
+        return self._block[: len(self.rows), : len(self.rows)]
+
+    def positions(self, rows: Int) -> Int:
+        """Where rows are in K; -1 if they are not."""
+        return self._position[rows]
+
+    def clear(self) -> None:
+        """Give the memory back; no columns are left."""
+        self.rows, self._columns, self._block = self.rows[:0], self._columns[:, :0].copy(), self._block[:0, :0].copy()
+
+    def add(self, rows: Int) -> None:
+        """Find the columns of those rows that have none.  Collective."""
+        new = np.unique(rows[self._position[rows] < 0])
+        for start in range(0, len(new), INFLUENCE_CHUNK):
+            some = new[start : start + INFLUENCE_CHUNK]
+            unit = np.zeros((len(self._columns), len(some)))
+            mine = np.flatnonzero((some >= self._first) & (some < self._first + len(unit)))
+            unit[some[mine] - self._first, mine] = 1.0
+            self._append(some, self._cell.respond(unit))
+
+    def _append(self, rows: Int, columns: Float) -> None:
+        old = len(self.rows)
+        self._position[rows] = old + np.arange(len(rows))
+        self.rows = np.concatenate([self.rows, rows])
+        n = len(self.rows)
+        if n > len(self._block):
+            more = max(n, 2 * len(self._block)) - len(self._block)
+            self._columns = np.asfortranarray(np.pad(self._columns, ((0, 0), (0, more))))
+            self._block = np.pad(self._block, (0, more))
+        self._columns[:, old:n] = columns
+        self._block[:n, old:n] = gather_rows(self._comm, columns, self._first, self.rows)
+        self._block[old:n, :old] = self._block[:old, old:n].T

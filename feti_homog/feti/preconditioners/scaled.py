@@ -20,7 +20,13 @@ from feti_homog.typing import Float
 
 
 class Preconditioner(Protocol):
-    """z = M^-1 r on the owned rows, for r (owned rows,) or (owned rows, k).  All calls are collective."""
+    """z = M^-1 r on the owned rows, for r (owned rows,) or (owned rows, k).  All calls are collective.
+
+    Attributes:
+        is_exact: whether it is the inverse of the projected dual operator, so that nothing is left to iterate.
+    """
+
+    is_exact: bool = False
 
     @property
     def norm(self) -> float:
@@ -39,20 +45,17 @@ class Preconditioner(Protocol):
     def apply(self, r: Float) -> Float:
         """M^-1 r; r and the result are 0 on inactive rows."""
 
-    def close(self, right: Float, d: Float, E: Float) -> Float:
-        """The forces that close the jumps r = P d E of the torn cell (owned rows, k), `right`: M^-1 r, or what that
-        would be without coarse displacements; d (owned rows, 3) is the same at every call."""
-
-    def initial_multipliers(self, previous: Float, closing: Float) -> Float:
-        """First multipliers (owned rows, k) of a solve: `previous` ones, or `closing` = P M^-1 P d of the jump d."""
+    def closing_forces(self, jump: Float) -> Float:
+        """The forces that close a jump while coarse displacements are held: M^-1 of it where there are none."""
+        return self.apply(jump)
 
 
 def never_softens(preconditioner: Preconditioner, more: Float) -> None:
-    """Raise ValueError: `soften` of those that `WithSprings` does not update."""
+    """Raise ValueError: `soften` of those that `SpringUpdated` does not update."""
     raise ValueError("springs soften, and the preconditioner was set up for springs that never do")
 
 
-class Identity:
+class Identity(Preconditioner):
     """z = r."""
 
     norm, soften = 1.0, never_softens
@@ -64,16 +67,8 @@ class Identity:
         """r."""
         return r.copy()
 
-    def close(self, right: Float, d: Float, E: Float) -> Float:
-        """`right`."""
-        return right.copy()
 
-    def initial_multipliers(self, previous: Float, closing: Float) -> Float:
-        """The previous ones."""
-        return previous
-
-
-class StiffnessScaled:
+class StiffnessScaled(Preconditioner):
     """M^-1 with the scaling of this module around a boundary stiffness.
 
     Attributes:
@@ -116,20 +111,12 @@ class StiffnessScaled:
         """W^-1 B D^-1 S D^-1 B^T W^-1 r."""
         return self.multipliers(self.stiffness(self.displacement_with_jump(r)))
 
-    def close(self, right: Float, d: Float, E: Float) -> Float:
-        """M^-1 of `right`."""
-        return self.apply(right)
-
-    def initial_multipliers(self, previous: Float, closing: Float) -> Float:
-        """The previous ones."""
-        return previous
-
 
 class Dirichlet(StiffnessScaled):
     """Around the Schur complements."""
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> None:
-        super().__init__(comm, jump_operator, operators, operators.apply_skin)
+        super().__init__(comm, jump_operator, operators, operators.apply_with_springs)
 
 
 class Lumped(StiffnessScaled):

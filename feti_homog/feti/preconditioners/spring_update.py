@@ -1,4 +1,4 @@
-"""Springs at the few nodes where both fibre and matrix are cut, which no single body's skin can stand for.
+"""Springs at the few nodes where both bodies are cut, which belong to the boundary of no single subdomain.
 
 With the compliances C of the rows X the preconditioner H, M^-1 or H_0, becomes
 
@@ -71,13 +71,14 @@ def _factored(block: Float) -> tuple[Float, bool]:
     return factor
 
 
-class WithSprings:
+class SpringUpdated(Preconditioner):
     """A preconditioner with the update for the springs of all active rows, and for what they soften."""
 
     def __init__(self, comm: MPI.Intracomm, inner: Preconditioner, first: int, compliance: Float) -> None:
         """Arguments as of `SpringUpdate`; `inner` is H, for all rows active.  Collective."""
         self._comm, self._inner, self._first = comm, inner, first
         self._left_out = self._compliance = compliance
+        self.is_exact = inner.is_exact
         self._update = SpringUpdate(comm, first, compliance, inner.apply)
 
     @property
@@ -98,10 +99,6 @@ class WithSprings:
         """The updated H times r.  Collective."""
         return self._update.apply(self._inner.apply(r))
 
-    def close(self, right: Float, d: Float, E: Float) -> Float:
-        """The same forces with the springs."""
-        return self._update.apply(self._inner.close(right, d, E))
-
-    def initial_multipliers(self, previous: Float, closing: Float) -> Float:
-        """Those without the update."""
-        return self._inner.initial_multipliers(previous, closing)
+    def closing_forces(self, jump: Float) -> Float:
+        """Those of `inner`, updated.  Collective."""
+        return self._update.apply(self._inner.closing_forces(jump))

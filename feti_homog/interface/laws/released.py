@@ -15,7 +15,7 @@ from typing import ClassVar
 import numpy as np
 
 from feti_homog.errors import ConvergenceError
-from feti_homog.feti.preconditioners.influence import Influence
+from feti_homog.feti.preconditioners.exact_inverse import ExactInverse
 from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BONDED, BondState, Status
@@ -38,7 +38,7 @@ class Tips:
         node: (t,) their numbers.
         H: (t, 2, 2) their blocks of the inverse of the dual operator.
         length: (t,) that they stand for.
-        stiffness: (t, c) the most that H can be, as `Influence.stiffness`.
+        stiffness: (t, c) the most that H can be, as `ExactInverse.stiffness`.
         axial: (t,) the same blocks for slip along the fibres; empty where there is none.
     """
 
@@ -76,8 +76,8 @@ class ReleasedEnergy(BondLaw):
     """
 
     springs: SpringEnergy
-    influence: Influence
-    axial: Influence | None = None
+    influence: ExactInverse
+    axial: ExactInverse | None = None
 
     has_toughness: ClassVar[bool] = True
     break_names: ClassVar[tuple[str, ...]] = SpringEnergy.break_names
@@ -129,7 +129,7 @@ class ReleasedEnergy(BondLaw):
         return Tips(own, H, cell.nodes.length[own], stiffness, axial)
 
     @staticmethod
-    def _activate(influence: Influence, interface: ContactProblem, bonds: BondState) -> None:
+    def _activate(influence: ExactInverse, interface: ContactProblem, bonds: BondState) -> None:
         """Let the inverse be that with these bonds.  Collective; raises as `tips`."""
         interface.prepare(bonds)
         if not influence.rounding <= MOST_ROUNDING:

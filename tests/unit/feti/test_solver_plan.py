@@ -121,7 +121,7 @@ def test_unknown_values(given, words):
 
 
 def test_coatings_are_left_to_influence_columns_whatever_their_size():
-    coated = replace(STIFFNESS, has_coatings=True, shared_dofs=10 * DEFAULTS.assembled_schur_dofs)
+    coated = replace(STIFFNESS, has_thin=True, shared_dofs=10 * DEFAULTS.assembled_schur_dofs)
     assert choose(coated, SolverOptions()).preconditioner == "influence"
     assert choose(replace(coated, all_dense=False), SolverOptions()).preconditioner == "dirichlet"
     assert choose(coated, SolverOptions(preconditioner="dirichlet")).preconditioner == "dirichlet"

@@ -6,7 +6,7 @@ import pytest
 
 from feti_homog.feti import solver_plan, thresholds
 from feti_homog.petsc.command_words import split_argv
-from feti_homog.petsc.option_table import OPTIONS, help_text, unknown_options
+from feti_homog.petsc.option_table import OPTIONS, help_text, unknown_options, unknown_to_petsc
 
 
 @pytest.mark.parametrize(
@@ -86,3 +86,31 @@ def test_help_names_every_option():
     lines = help_text().splitlines()
     assert len(lines) == len(OPTIONS) + 1
     assert all(f"-{option.name} " in text for option, text in zip(OPTIONS, lines[1:], strict=True))
+
+
+# Options of PETSc itself pass; misspelt ones, and such as nothing would read, do not.
+
+
+@pytest.mark.parametrize(
+    "name", ["log_view", "malloc_test", "sf_type", "log_view_of_a_release_to_come", "feti_x", "info"]
+)
+def test_known_names_pass(name):
+    assert unknown_to_petsc([name]) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("log_vieww", "did you mean -log_view?"),
+        ("options_lef", "did you mean -options_left?"),
+        ("mat_type", "options that begin with -feti_"),
+        ("prefix_push", "options that begin with -feti_"),
+    ],
+)
+def test_others_are_told(name, words):
+    (fault,) = unknown_to_petsc([name])
+    assert fault.startswith(f"-{name}: unknown option; ") and words in fault
+
+
+def test_a_name_without_its_prefix_is_told_elsewhere():
+    assert unknown_to_petsc(["ksp_rtol"]) == []

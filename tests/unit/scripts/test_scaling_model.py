@@ -4,61 +4,26 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict, replace
-from math import sqrt
 
-import numpy as np
 import pytest
 from scaling import read
-from scaling_elimination import Borders, FrontRates, FrontSize, TimedFront
 from scaling_fit import fit_power, fit_shares
 from scaling_forecast import assumptions, checks, forecast
 from scaling_model import LOCAL, Machine, measured, network, predict
-from scaling_report import ELIMINATION, MULTIGRID, SHARED, Row, by_ranks, memory
+from scaling_report import FACTOR, MULTIGRID, Row, by_ranks, memory
 
 CORES = 2
 NETWORK = Machine(2e-6, 1e10)
 ITERATIONS, LOADS = 20, 3
-FRONTS = FrontRates((3e-11, 5e-11, 5e-9, 4e-9, 1e-4), (1e-9, 3e-5))
-# Unknowns of the last front, relative to the root of all.
-LAST = 10.0
 
 
-def timed_fronts() -> list[TimedFront]:
-    """Fronts whose seconds follow FRONTS."""
-    found = []
-    for e, f in ((60, 200), (200, 600), (500, 1000), (1000, 1600), (2000, 0), (2000, 2000)):
-        for sharers in (1, 2):
-            size = FrontSize(e, f, 2)
-            factor, solve = np.dot(FRONTS.factor, size.work(sharers)), np.dot(FRONTS.solve, size.solve_work(sharers))
-            found.append(TimedFront(e, f, sharers, float(factor), float(solve)))
-    return found
-
-
-def eliminated(unknowns: int, ranks: int, factor: float, solve: float, solves: int) -> tuple[float, float, list]:
-    """Seconds of the factor and of the solves on several ranks, and the fronts: of a rank's own unknowns as of so many
-    on one, half as dear."""
-    if ranks == 1:
-        return factor, solve, []
-    fronts = [FrontSize(round(LAST * sqrt(unknowns)), 0, ranks)]
-    fronts += [FrontSize(70, 200, 2)] * (ranks > 2)
-    of_fronts = FRONTS.seconds(fronts)
-    return 0.5 * factor / ranks + of_fronts[0], 0.5 * solve / ranks + solves * of_fronts[1], fronts
-
-
-def made_up(dofs: int, ranks: int, way: str = ELIMINATION) -> Row:
+def made_up(dofs: int, ranks: int, way: str = FACTOR) -> Row:
     """Return a run whose seconds follow constants that the tests know; its messages take no time."""
     triangles, coarse, kernel = dofs // 50, dofs // 500, dofs // 1000
-    factor, solve = 1e-6 * coarse**1.5, 1e-7 * coarse**1.2
-    natural_factor, natural_solve, natural_fronts = eliminated(kernel, ranks, 2e-5 * kernel, 3e-6 * kernel, 2)
-    coarse_fronts = []
-    if way == SHARED:
-        factor, solve = (1.0 + 4.0 / ranks) * factor, (2.0 + 1.0 / ranks) * solve
-    elif way == MULTIGRID:
+    factor, solve = (1.0 + 4.0 / ranks) * 1e-6 * coarse**1.5, (2.0 + 1.0 / ranks) * 1e-7 * coarse**1.2
+    natural_factor, natural_solve = (0.5 + 0.5 / ranks) * 2e-5 * kernel, 3e-6 * kernel
+    if way == MULTIGRID:
         factor, solve = 1e-5 * coarse * (0.5 + 0.5 / ranks), 3e-5 * coarse / ranks
-    elif ranks > 1:
-        # Powers of n and of n / p: the share of own unknowns is that of so many on one rank.
-        own = 0.5 * 1e-6 * (coarse / ranks) ** 1.5, 0.5 * 1e-7 * (coarse / ranks) ** 1.2
-        factor, solve, coarse_fronts = eliminated(coarse, ranks, 2 * ranks * own[0], 2 * ranks * own[1], 1)
     own = dofs / ranks
     seconds = {
         "mesh": 1e-5 * triangles * (0.25 + 0.75 / ranks),
@@ -73,15 +38,14 @@ def made_up(dofs: int, ranks: int, way: str = ELIMINATION) -> Row:
         told=(0,) * ranks, heard=(0,) * ranks, neighbours=(0,) * ranks, exchanges=0, logged=(0.0,) * ranks,
         coarse_setup=2 * factor, coarse_factor=factor, coarse_solve=solve,
         natural_factor=natural_factor, natural_solve=natural_solve,
-        coarse_memory=[1.0] * ranks, inner=17 if way == MULTIGRID else 0, way=way, coarse_fronts=coarse_fronts,
-        natural_fronts=natural_fronts, timed_fronts=timed_fronts() if ranks == 2 and way == ELIMINATION else [],
+        coarse_memory=[1.0] * ranks, inner=17 if way == MULTIGRID else 0, way=way,
         latency=NETWORK.latency, bandwidth=NETWORK.bandwidth, alone=0.25e-5 * triangles,
     )  # fmt: skip
 
 
 ROWS = [
     *(made_up(dofs, ranks) for dofs in (100_000, 1_000_000) for ranks in (1, 2)),
-    *(made_up(1_000_000, ranks, way) for way in (SHARED, MULTIGRID) for ranks in (1, 2)),
+    *(made_up(1_000_000, ranks, MULTIGRID) for ranks in (1, 2)),
 ]
 
 
@@ -124,21 +88,14 @@ def test_constants_are_found_again():
     rates = measured([*ROWS, slow], CORES)
     assert (rates.mesh.serial, rates.mesh.parallel) == pytest.approx((2.5e-6, 7.5e-6))
     assert (rates.assemble, rates.setup, rates.apply) == pytest.approx((2e-6, 5e-6, 3e-7))
-    for elimination, alone, own, solves in (
-        (rates.coarse, ((1e-6, 1.5), (1e-7, 1.2)), ((5e-7, 1.5), (5e-8, 1.2)), 1),
-        (rates.natural, ((2e-5, 1.0), (3e-6, 1.0)), ((1e-5, 1.0), (1.5e-6, 1.0)), 2),
+    for found, shares, power in (
+        (rates.coarse.factor, (1e-6, 4e-6), (rates.coarse.factor_power, 1.5)),
+        (rates.coarse.solve, (2e-7, 1e-7), (rates.coarse.solve_power, 1.2)),
+        (rates.natural.factor, (1e-5, 1e-5), (rates.natural.factor_power, 1.0)),
+        (rates.natural.solve, (3e-6, 0.0), (rates.natural.solve_power, 1.0)),
     ):
-        for found, (factor, exponent) in zip(
-            (elimination.alone_factor, elimination.alone_solve, elimination.own_factor, elimination.own_solve),
-            (*alone, *own),
-            strict=True,
-        ):
-            assert (found.factor, found.exponent) == pytest.approx((factor, exponent), rel=1e-3)
-        assert elimination.rates.factor == pytest.approx(FRONTS.factor, rel=1e-3)
-        assert elimination.rates.solve == pytest.approx([solves * rate for rate in FRONTS.solve], rel=1e-3)
-        assert elimination.borders.last == pytest.approx(LAST, rel=0.01)
-    assert (rates.factor_shared.serial, rates.factor_shared.parallel) == pytest.approx((1e-6, 4e-6))
-    assert (rates.solve_shared.serial, rates.solve_shared.parallel) == pytest.approx((2e-7, 1e-7))
+        assert (found.serial, found.parallel) == pytest.approx(shares, rel=1e-3, abs=1e-9)
+        assert power[0] == pytest.approx(power[1], rel=1e-3)
     assert (rates.multigrid.setup.serial, rates.multigrid.setup.parallel) == pytest.approx((5e-6, 5e-6))
     assert rates.multigrid.solve.seconds(1000, 50) == pytest.approx(3e-5 * 1000 / 50, rel=1e-2)
     assert rates.multigrid.inner == 17
@@ -161,28 +118,6 @@ def test_model_gives_the_runs_that_it_is_of(row):
     assert p.total == pytest.approx(row.total, rel=1e-3)
     assert p.mesh == pytest.approx(row.seconds["mesh"])
     assert p.setup + p.coarse_factor == pytest.approx(row.seconds["set-up"], rel=1e-3)
-
-
-def test_sizes_of_fronts():
-    """Of the largest that were counted; a group's border has no more unknowns than the last front."""
-    counted = [(1600, 4, FrontSize(30, 90, 2)), (1600, 4, FrontSize(20, 70, 2)), (1600, 4, FrontSize(200, 0, 4))]
-    borders = Borders.of(counted)
-    assert (borders.front, borders.left, borders.last) == pytest.approx((120 / sqrt(800), 90 / sqrt(800), 5.0))
-    assert borders.fronts(1600, 4) == [FrontSize(pytest.approx(30), pytest.approx(90), 2), FrontSize(200, 0, 4)]
-    sizes = borders.fronts(1e6, 1024)
-    assert [size.ranks for size in sizes] == [2**k for k in range(1, 11)]
-    assert sizes[-1].n == pytest.approx(5000) and sizes[-1].left == 0
-    assert all(0 < size.left <= 3200 for size in sizes[:-1])
-
-
-def test_large_fronts_are_shared():
-    """By as many ranks as have two blocks of columns, and as have met."""
-    assert [FrontSize(e, 0, ranks).sharers for e, ranks in ((100, 8), (300, 8), (5000, 8))] == [1, 2, 8]
-
-
-def test_fronts_need_a_run_on_two_ranks():
-    with pytest.raises(ValueError, match="two ranks"):
-        FrontRates.of([])
 
 
 def test_multigrid_is_forecast_where_it_was_timed():
@@ -227,12 +162,9 @@ def test_a_report_is_read_again_and_one_of_another_version_refused(tmp_path):
     """With a field more, or one less."""
     report = tmp_path / "report.json"
     fields = asdict(ROWS[1])
-    fields["timed_fronts"], fields["coarse_fronts"] = (
-        [tuple(t) for t in fields[k]] for k in ("timed_fronts", "coarse_fronts")
-    )
     report.write_text(json.dumps(fields))
     (row,) = read(report)
-    assert row.timed_fronts == ROWS[1].timed_fronts and row.coarse_fronts[0].ranks == 2
+    assert row == replace(ROWS[1], told=[0, 0], heard=[0, 0], neighbours=[0, 0], logged=[0.0, 0.0])
     for other in (fields | {"more": 1}, {name: value for name, value in fields.items() if name != "alone"}):
         report.write_text(json.dumps(other))
         with pytest.raises(SystemExit, match=r"report\.json: a report of another version"):

@@ -6,7 +6,7 @@ import numpy as np
 from mpi4py import MPI
 from scipy.sparse import csr_matrix
 
-from feti_homog.feti.coarse.gram_matrix import GramMatrix
+from feti_homog.feti.coarse.natural import GramMatrix
 
 
 def coupled(rows=40, bodies=5, modes=3, seed=1):

@@ -9,10 +9,10 @@ import pytest
 from mpi4py import MPI
 from scipy.sparse import diags, kronsum
 
-from feti_homog.feti.linalg.dense_block_sum import DenseBlockSum
 from feti_homog.feti.linalg.distributed_matrix import assemble_owned_rows
 from feti_homog.feti.linalg.distributed_solver import DistributedSolver
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
+from feti_homog.feti.linalg.sparse_matrices import DenseBlockSum
 from feti_homog.runtime import process_memory
 
 PAGE, MEGABYTE = 4096, 2**20
@@ -37,7 +37,8 @@ def test_solvers_return_the_unknowns_that_made_the_right_hand_side(columns):
 
 def solved_with_a_near_kernel(A, numbers):
     """By the solver of all ranks."""
-    solver = DistributedSolver(MPI.COMM_WORLD, len(numbers), numbers, A, "test_", np.ones((len(numbers), 3)))
+    solver = DistributedSolver(MPI.COMM_WORLD, len(numbers), "test_")
+    solver.factor(numbers, A, np.ones((len(numbers), 3)))
     solver.solve(np.ones((len(numbers), 20)))
     solver.destroy()
 

@@ -20,17 +20,15 @@ from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
-from feti_homog.feti.preconditioners.body_ties import BodyTies
 from feti_homog.feti.preconditioners.bordered_inverse import BorderedInverse
-from feti_homog.feti.preconditioners.reference_cell import ReferenceCell, one_sided_jumps
-from feti_homog.feti.preconditioners.response_columns import ResponseColumns
-from feti_homog.feti.preconditioners.scaled import never_softens
+from feti_homog.feti.preconditioners.reference_cell import BodyTies, ReferenceCell, ResponseColumns, one_sided_jumps
+from feti_homog.feti.preconditioners.scaled import Preconditioner, never_softens
 from feti_homog.feti.thresholds import INFLUENCE_BATCH, INFLUENCE_COLUMNS, NORM_ITERATIONS, NORM_MARGIN
 from feti_homog.parallel.distributed_arrays import allreduce_sum, gather_rows, scale_rows
 from feti_homog.typing import Float, Int
 
 
-class Influence:
+class ExactInverse(Preconditioner):
     """z = H r on the active rows, H the inverse of the dual operator there: nothing is left to iterate.
 
     Attributes:
@@ -44,7 +42,8 @@ class Influence:
         factorizations: reference cells so far.
     """
 
-    soften = never_softens
+    norm: float = np.inf
+    soften, is_exact = never_softens, True
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> None:
         """Factor the cell with all bonds intact; all boundary operators must be dense.  Collective.
@@ -70,7 +69,7 @@ class Influence:
         self.factorizations = self._tied = 0
         self._answer: Float | None = None
         self._active = np.ones(self._rows)
-        self._refer(self._active)
+        self._rebase(self._active)
         # Rows that leave make H smaller.
         self.norm = NORM_MARGIN * self._largest_eigenvalue()
 
@@ -82,19 +81,22 @@ class Influence:
             # The memory of the old cell goes before the new one takes its own.
             self.reference.destroy()
             self._columns.clear()
-            self._refer(active)
+            self._rebase(active)
             changed = self._changed()
             self._tied = len(changed)
         self._find(changed)
-        self._follow(self._columns.positions(changed))
+        self._update_inverse(self._columns.positions(changed))
 
     def apply(self, r: Float) -> Float:
         """H r for r (owned rows,) or (owned rows, k); 0 on inactive rows.  Collective."""
         return self._restricted(self.reference.respond(scale_rows(self.reference.active, r)), r)
 
-    def close(self, right: Float, d: Float, E: Float) -> Float:
-        """H d E for d (owned rows, v), the same at every call, and E (v, k), from the reference cell's answer to d.
-        Collective."""
+    def multipliers(self, d: Float, E: Float) -> Float:
+        """H d E for d (owned rows, v), the same at every call, and E (v, k): the solution for the loads E, but for
+        rounding.  Collective.
+
+        The reference cell answers to d once.
+        """
         if self._answer is None:
             self._answer = self.reference.respond(scale_rows(self.reference.active, d))
         return self._restricted(self._answer @ E, d @ E)
@@ -117,16 +119,12 @@ class Influence:
         paired = U.reshape(len(pairs), 2, len(members))
         return np.asarray(own - np.matmul((U @ self._inverse.N).reshape(paired.shape), paired.transpose(0, 2, 1)))
 
-    def initial_multipliers(self, previous: Float, closing: Float) -> Float:
-        """What closes the jump is the solution."""
-        return closing
-
     def _changed(self) -> Int:
         """The global rows that are active here or in the reference cell, not both.  Collective."""
         own = self._first + np.flatnonzero(self._active != self.reference.active)
         return np.concatenate(self.comm.allgather(own))
 
-    def _refer(self, active: Float) -> None:
+    def _rebase(self, active: Float) -> None:
         """Take a cell with these active rows, and what it takes to hold its bodies, for the reference.  Collective."""
         tied = self._ties.tied(active)
         self.reference = ReferenceCell(self.comm, self._jump_operator, self._operators, self._BD, tied)
@@ -154,14 +152,14 @@ class Influence:
             bonds = reached
         self._columns.add(beside)
 
-    def _follow(self, changed: Int) -> None:
-        """Let N be that of the columns `changed`.  Collective."""
-        self._border(changed)
+    def _update_inverse(self, changed: Int) -> None:
+        """Let N be that of the columns `changed`, made anew where updates have lost too many digits.  Collective."""
+        self._exchange_members(changed)
         if not self._inverse.holds():
             self._inverse, self._dependent = BorderedInverse(self.comm), np.zeros(0, np.int64)
-            self._border(changed)
+            self._exchange_members(changed)
 
-    def _border(self, changed: Int) -> None:
+    def _exchange_members(self, changed: Int) -> None:
         """Take the columns that are not `changed` out of N, and the others in.  Collective."""
         inverse, M = self._inverse, self._columns.block
         returned = gather_rows(self.comm, self.reference.active, self._first, self._columns.rows[changed]) == 0

@@ -1,4 +1,7 @@
-"""Parts of what rank 0 has, one for each rank, parts that it gets from them, and parts that all have for all."""
+"""Scatter, gather and all-to-all of Python objects of any size.
+
+MPI's own would pickle all parts at once and fail from 2 GiB on; here arrays are sent from where they are.
+"""
 
 from __future__ import annotations
 
@@ -10,12 +13,8 @@ from mpi4py.util import pkl5
 T = TypeVar("T")
 
 
-def deal(comm: MPI.Intracomm, parts: list[T]) -> T:
-    """Part r of rank 0's list on rank r; the list is empty afterwards.  Collective.
-
-    Arrays are sent from where they are, of any size: a scatter would pickle all parts at once, its own too, and fails
-    from 2 GiB on.
-    """
+def scatter(comm: MPI.Intracomm, parts: list[T]) -> T:
+    """Send part r of rank 0's list to rank r and return this rank's; the list is empty afterwards.  Collective."""
     large = pkl5.Intracomm(comm)
     if comm.rank:
         received: T = large.recv(source=0)
@@ -25,8 +24,8 @@ def deal(comm: MPI.Intracomm, parts: list[T]) -> T:
     return parts.pop()
 
 
-def collect(comm: MPI.Intracomm, part: T) -> list[T]:
-    """The parts of all ranks, by rank, on rank 0, and none on others; of any size, as `deal`.  Collective."""
+def gather(comm: MPI.Intracomm, part: T) -> list[T]:
+    """Return the parts of all ranks, by rank, on rank 0, and none on others.  Collective."""
     large = pkl5.Intracomm(comm)
     if comm.rank:
         large.send(part, dest=0)
@@ -34,8 +33,8 @@ def collect(comm: MPI.Intracomm, part: T) -> list[T]:
     return [part, *(large.recv(source=r) for r in range(1, comm.size))]
 
 
-def swap(comm: MPI.Intracomm, parts: list[T]) -> list[T]:
-    """Part r on rank r, of the parts of each rank; those of all ranks in their order.  Collective; of any size."""
+def alltoall(comm: MPI.Intracomm, parts: list[T]) -> list[T]:
+    """Send part r to rank r and return the parts that all ranks have for this one, by rank.  Collective."""
     large = pkl5.Intracomm(comm)
     received = list(parts)
     for step in range(1, comm.size):

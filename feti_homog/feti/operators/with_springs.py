@@ -1,7 +1,8 @@
-"""A fibre that its matrix holds by springs, as the matrix sees it: a fibre with a soft skin.
+"""Boundary operators of a body with springs on its boundary, as the body around it sees them.
 
-At the skin the flexibility is S+ + C, with C = T T^T, and the stiffness is S~ = G - G R (R^T G R)^-1 R^T G,
+At the far ends of the springs the flexibility is S+ + C, with C = T T^T, and the stiffness is
 
+    S~ = G - G R (R^T G R)^-1 R^T G,
     G = A - A T (I + T^T A T)^-1 T^T A,  A = S + s R R^T,
 
 for the kernel R, orthonormal, and a stiffness s of the size of S.  However soft the springs are, nothing cancels: A has
@@ -18,8 +19,7 @@ import numpy as np
 from scipy.linalg import cho_solve, cholesky, solve_triangular
 from scipy.sparse import csr_matrix, diags
 
-from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
-from feti_homog.feti.operators.implicit import ImplicitInterfaceOperator
+from feti_homog.feti.operators.boundary_operator import BoundaryOperator, is_dense
 from feti_homog.typing import Bool, Float, Int
 
 
@@ -67,22 +67,26 @@ class _Softening:
         return np.asarray((G + G.T) / 2 - self._root_of_kernel.T @ self._root_of_kernel, order="F")
 
 
-class DenseSoftSkin(ExplicitInterfaceOperator):
-    """The boundary operators of a body with its skin."""
+class WithSprings:
+    """A body with springs on its boundary: S~ and S+ + C, dense if the body's operators are."""
 
-    def __init__(self, body: ExplicitInterfaceOperator, T: csr_matrix, kernel: Float) -> None:
-        """`T` (n, r) is the root of the springs' compliance on the boundary dofs, `kernel` (n, k) of S there."""
-        self._body, self._T, self.n = body, T, body.n
-        S = body.S
-        self._S = _Softening(T, (T.T @ S).T, kernel).matrix(S)
-        self._softer = float(self._S.diagonal().mean() / S.diagonal().mean())
+    def __init__(self, body: BoundaryOperator, T: csr_matrix, kernel: Float) -> None:
+        """`T` (n, r) is the root of the springs' compliance on the boundary dofs, `kernel` (n, k) that of S there."""
+        self._body, self._T = body, T
+        self.is_dense = body.is_dense
+        if is_dense(body):
+            S = body.S
+            self.S = _Softening(T, (T.T @ S).T, kernel).matrix(S)
+            self._softer = float(self.S.diagonal().mean() / S.diagonal().mean())
+        else:
+            self._softening = _Softening(T, body.apply_schur(T.toarray(order="F")), kernel)
 
     def apply_schur(self, x: Float, out: Float | None = None) -> Float:
         """S~ x for x (n,) or (n, k), into `out` if it is given."""
-        product = self._S @ x
+        y = self.S @ x if self.is_dense else self._softening.apply(x, self._body.apply_schur(x))
         if out is None:
-            return product
-        out[:] = product
+            return y
+        out[:] = y
         return out
 
     def apply_flexibility(self, x: Float, out: Float | None = None) -> Float:
@@ -91,57 +95,24 @@ class DenseSoftSkin(ExplicitInterfaceOperator):
         y += self._T @ (self._T.T @ x)
         return y
 
-    @property
-    def S(self) -> Float:
-        """(n, n) S~."""
-        return self._S
-
     def regularisation(self, P: csr_matrix) -> Float:
-        """(m, m) P^T rho Rf Rf^T P for P (n, m), rho as soft as the skin: what makes S~ definite, whose kernel is that
-        of S."""
+        """(m, m) P^T rho Rf Rf^T P for P (n, m), rho as soft as the springs: it makes S~ definite, whose kernel is that
+        of S.  Of dense operators alone."""
+        assert is_dense(self._body)
         return self._softer * self._body.regularisation(P)
 
 
-class SparseSoftSkin(ImplicitInterfaceOperator):
-    """The same of a body whose operators are sparse factors, for few springs."""
-
-    def __init__(self, body: ImplicitInterfaceOperator, T: csr_matrix, kernel: Float) -> None:
-        """Arguments as of `DenseSoftSkin`."""
-        self._body, self._T = body, T
-        self._softening = _Softening(T, body.apply_schur(T.toarray(order="F")), kernel)
-
-    def apply_schur(self, x: Float, out: Float | None = None) -> Float:
-        """S~ x for x (n,) or (n, k), into `out` if it is given."""
-        y = self._body.apply_schur(x, out)
-        y[:] = self._softening.apply(x, y)
-        return y
-
-    def apply_flexibility(self, x: Float, out: Float | None = None) -> Float:
-        """(S+ + C) x for x (n,) or (n, k), into `out` if it is given."""
-        y = self._body.apply_flexibility(x, out)
-        y += self._T @ (self._T.T @ x)
-        return y
-
-
-def soft_skin(
-    body: ExplicitInterfaceOperator | ImplicitInterfaceOperator, T: csr_matrix, kernel: Float
-) -> ExplicitInterfaceOperator | ImplicitInterfaceOperator:
-    """The operators of a body with the kernel R (n, k) whose springs have the compliance T T^T on its boundary dofs."""
-    make = DenseSoftSkin if isinstance(body, ExplicitInterfaceOperator) else SparseSoftSkin
-    return make(body, T, kernel)  # type: ignore[arg-type]
-
-
-def compliance_root(B: csr_matrix, compliance: Float, copies: Int, of_fibre: Bool) -> csr_matrix:
+def compliance_root(B: csr_matrix, compliance: Float, copies: Int, of_inner: Bool) -> csr_matrix:
     """(n, r) T of the springs on one body, for its constraints B (rows, n) and the compliance C (rows,) of the rows.
 
-    A node's spring belongs to the fibre, but where the fibre is cut, to the matrix: so it softens one body alone.
-    Where both are cut it belongs to neither; see `preconditioners.spring_update`.
+    A node's spring belongs to the inner of two bodies, but where that is cut, to the outer one: so it softens one body
+    alone.  Where both are cut it belongs to neither; see `preconditioners.spring_update`.
 
     Args:
-        copies: (rows, 2) how many copies matrix and fibre have there.
-        of_fibre: (n,) on which of the dofs the body is the fibre: a coating is the matrix of what it coats.
+        copies: (rows, 2) how many copies the outer and the inner body have there.
+        of_inner: (n,) on which of the dofs the body is the inner of two.
     """
     whole = copies[:, 1] == 1
-    own = np.where(abs(B) @ of_fibre > 0, whole, ~whole & (copies[:, 0] == 1))
+    own = np.where(abs(B) @ of_inner > 0, whole, ~whole & (copies[:, 0] == 1))
     rows = np.flatnonzero((compliance > 0) & own & (B.getnnz(axis=1) > 0))
     return (diags(np.sqrt(compliance[rows])) @ B[rows]).T.tocsr()

@@ -1,4 +1,4 @@
-"""Sparse matrices that are sums of dense blocks."""
+"""Sparse matrices: sums of dense blocks, and symmetric scaling."""
 
 from __future__ import annotations
 
@@ -47,3 +47,13 @@ class DenseBlockSum:
         stacked = csr_matrix((values, columns, np.r_[0, np.cumsum(counts)]), shape=(len(rows), n))
         place = csr_matrix((np.ones(len(rows)), (rows, np.arange(len(rows)))), shape=(m, len(rows)))
         self._sum = self._sum + place @ stacked
+
+
+def scaled(A: csr_matrix, weights: Float) -> csr_matrix:
+    """diag(weights) A diag(weights) for weights (n,), in the pattern of A (n, n).
+
+    Products with diagonal matrices would look for that pattern anew.
+    """
+    data = A.data * weights[A.indices] * np.repeat(weights, np.diff(A.indptr))
+    # Indices of its own: sorting one matrix must not shuffle the other.
+    return csr_matrix((data, A.indices.copy(), A.indptr.copy()), shape=A.shape)

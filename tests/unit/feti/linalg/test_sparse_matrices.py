@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import random
 
-from feti_homog.feti.linalg.scaled_sparse import scaled
+from feti_homog.feti.linalg.sparse_matrices import scaled
 
 
 def test_rows_and_columns_are_scaled():
