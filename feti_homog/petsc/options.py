@@ -125,6 +125,7 @@ def faults_of_solvers(given: Mapping[str, str]) -> list[str]:
             own = [name for name in given if _prefix(name) == prefix and name not in (*OWN, *VIEWERS)]
             words = _complaint(solve) if own else ""
             if words:
+                own.sort(key=lambda name: not name.endswith("_type"))  # types first: they decide what others mean
                 faults.append(f"{' '.join(in_words(name, given[name]) for name in own)}: {words}")
     return faults
 
