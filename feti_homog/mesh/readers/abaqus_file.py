@@ -44,25 +44,23 @@ def load(path: Path) -> RawMesh:
     the ELSET of *ELEMENT; names are in lower case unless quoted.
 
     Raises:
-        MeshError: the file cannot be read, or has other elements.
+        OSError: the file cannot be read.
+        MeshError: it is damaged, or has other elements.
     """
-    try:
-        text = path.read_text(encoding="utf-8", errors="replace")
-    except OSError as error:
-        raise MeshError(f"{path}: cannot be read: {error.strerror}") from None
+    text = path.read_text(encoding="utf-8", errors="replace")
     content = _Content()
     for number, words, rows in _blocks(text):
         try:
             _take(content, words, rows)
         except KeyError as error:
-            raise MeshError(f"{path.name}: line {number}, *{words['']}: no {error.args[0]}") from None
+            raise MeshError(f"line {number}, *{words['']}: no {error.args[0]}") from None
         except IndexError:
-            raise MeshError(f"{path.name}: line {number}, *{words['']}: a line below it ends too early") from None
+            raise MeshError(f"line {number}, *{words['']}: a line below it ends too early") from None
         except ValueError as error:
-            raise MeshError(f"{path.name}: line {number}, *{words['']}: {error}") from None
+            raise MeshError(f"line {number}, *{words['']}: {error}") from None
     faults = _faults(content)
     if faults:
-        raise MeshError(*(f"{path.name}: {fault}" for fault in faults))
+        raise MeshError(*faults)
     return _raw(content)
 
 

@@ -24,17 +24,18 @@ def faults(mesh: RawMesh) -> list[str]:
     middles, plane = mesh.middles, mesh.points[:, :2]
     if len(middles.tags) == 0:
         return []
+    finite = np.isfinite(middles.points).all(axis=1)
+    places = np.where(finite[:, None], middles.points, mesh.points[middles.edges].mean(axis=1))
     near = SAME_PLACE * np.ptp(plane, axis=0).max()
     start, stop = plane[middles.edges[:, 0]], plane[middles.edges[:, 1]]
     off_side = np.zeros(len(start), bool)
     for side in (plane.min(axis=0), plane.max(axis=0)):
         on_side = (np.abs(start - side) < near) & (np.abs(stop - side) < near)
-        off_side |= np.any(on_side & (np.abs(middles.points[:, :2] - side) > near), axis=1)
-    along, away, length = _offsets(middles.points[:, :2], start, stop)
-    finite = np.isfinite(middles.points).all(axis=1)
+        off_side |= np.any(on_side & (np.abs(places[:, :2] - side) > near), axis=1)
+    along, away, length = _offsets(places[:, :2], start, stop)
     return [
         *_told(mesh, ~finite, "coordinates are not finite"),
-        *_told(mesh, finite & (np.abs(middles.points[:, 2] - mesh.points[0, 2]) > near), "not in the plane"),
+        *_told(mesh, np.abs(places[:, 2] - mesh.points[0, 2]) > near, "not in the plane"),
         *_told(mesh, off_side, "off the straight side of the cell"),
         *_told(mesh, np.hypot(along, away) >= length / 2, "farther from the middle than half the edge's length"),
         *_unshared(mesh),

@@ -1,23 +1,21 @@
-"""The triangles of a .msh file, as gmsh reads it."""
+"""The triangles of a .msh file, and of gmsh's current model."""
 
 from __future__ import annotations
 
-from mmap import ACCESS_READ, mmap
+from collections.abc import Mapping
 from pathlib import Path
-from struct import unpack
 from types import ModuleType
 
 import numpy as np
 
 from feti_homog.errors import MeshError
-from feti_homog.mesh.readers import mesh_checks
+from feti_homog.mesh.readers import mesh_checks, msh_content
 from feti_homog.mesh.readers.element_blocks import Block, assembled
 from feti_homog.mesh.readers.mesh_checks import RawMesh
-from feti_homog.mesh.tiles.filling import LINE, TRIANGLE, gmsh_session
-from feti_homog.typing import Int
+from feti_homog.mesh.readers.msh_content import KINDS, MshContent
+from feti_homog.mesh.tiles.filling import LINE, TRIANGLE
+from feti_homog.typing import Float, Int
 
-# How a mesh file of gmsh begins; other text would be run as a script.
-HEADERS = ("$MeshFormat", "$Comments", "$PhysicalNames", "$NOD")
 # What to do about other elements, by order and dimension.
 REMEDY = {
     (1, 2): "do not recombine",
@@ -30,76 +28,107 @@ REMEDY = {
 # gmsh's types of elements of second order; how many nodes a triangle of each type has.
 LINE_2, TRIANGLE_2 = 8, 9
 NODES_OF_TRIANGLES = {TRIANGLE: 3, TRIANGLE_2: 6}
-COUNTS_BYTES = 100  # at the beginning of the section of elements, in which their number is
+
+# Numbers (m,), nodes (m, k) and entities (m,) of the elements of one type.
+Elements = tuple[Int, Int, Int]
 
 
 def load(path: Path) -> RawMesh:
-    """The triangles of a file; only their kind has been checked.
+    """Read the triangles of a file; only their kind and their numbers are checked.
 
     Raises:
-        MeshError: if gmsh cannot read it, or if it has other elements.
+        OSError: it cannot be read.
+        MeshError: it is damaged, or it has other elements.
     """
-    try:
-        with path.open("rb") as file:
-            start = file.read(4096).lstrip().decode("latin-1")
-    except OSError as error:
-        raise MeshError(f"{path}: cannot be read: {error.strerror}") from None
-    if not start.startswith(HEADERS):
-        raise MeshError(f"{path.name}: not a gmsh mesh file: it does not begin with {HEADERS[0]}")
-    with gmsh_session() as gmsh:
-        try:
-            gmsh.open(str(path))
-        except Exception as error:  # gmsh raises nothing more specific
-            raise MeshError(f"{path.name}: gmsh cannot read it: {str(error).strip() or 'it is damaged'}") from None
-        faults = _other_kinds(gmsh) or _dropped(gmsh, path)
-        if faults:
-            raise MeshError(*(f"{path.name}: {fault}" for fault in faults))
-        return triangles_of_model(gmsh)
+    content = msh_content.read(path.read_bytes())
+    nodes, points = np.zeros(0, np.int64), np.zeros((0, 3))
+    if content.nodes:
+        nodes, points = (np.concatenate(parts) for parts in zip(*content.nodes, strict=True))
+    elements = {kind: own for kind, blocks in content.elements.items() if len((own := _by_entity(blocks))[0])}
+    faults = _repeated(nodes, elements) or _lost(nodes, elements) or _other_kinds(nodes, points, elements)
+    if faults:
+        raise MeshError(*faults)
+    return assembled(nodes, points, *_triangles(content, elements), _curves_of_content(content, elements))
 
 
-def _dropped(gmsh: ModuleType, path: Path) -> list[str]:
-    """That the file has elements which gmsh leaves out without a word, for their numbers were there before."""
-    listed = _listed_elements(path)
-    read = sum(len(tags) for tags in gmsh.model.mesh.getElements()[1])
-    if listed is None or listed == read:
-        return []
-    return [f"it declares {listed} elements, and {read} can be read: others are missing, or have numbers twice"]
+def _triangles(content: MshContent, elements: Mapping[int, Elements]) -> tuple[list[Block], list[tuple[str, ...]]]:
+    """The triangles, and the names of the physical surfaces of their entities."""
+    blocks, groups = list[Block](), list[tuple[str, ...]]()
+    for kind in NODES_OF_TRIANGLES:
+        if kind in elements:
+            numbers, nodes, entity = elements[kind]
+            entities = np.unique(entity)
+            blocks.append(Block(numbers, nodes, len(groups) + np.searchsorted(entities, entity)))
+            physical = (content.groups.get((2, number), ()) for number in entities.tolist())
+            groups += [tuple(_name(content, 2, group) for group in own_groups) for own_groups in physical]
+    return blocks, groups
 
 
-def _listed_elements(path: Path) -> int | None:
-    """How many elements a file says that it has; None if it does not say so where its format has it."""
-    with path.open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as content:
-        is_binary = content[: content.find(b"$EndMeshFormat")].split()[2:3] == [b"1"]
-        place = content.find(b"$Elements")
-        start = content.find(b"\n", place) + 1
-        return None if place < 0 else _first_count(content[start : start + COUNTS_BYTES], is_binary)
+def _by_entity(blocks: list[Elements]) -> Elements:
+    """The elements of one type, by increasing number of their entity."""
+    numbers, nodes, entity = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
+    order = np.argsort(entity, kind="stable")
+    return numbers[order], nodes[order], entity[order]
 
 
-def _first_count(content: bytes, is_binary: bool) -> int | None:
-    """The number of elements in the line, or in the four binary numbers, that begin their section."""
-    line = content.partition(b"\n")[0].split()
-    if len(line) in (1, 2, 4) and all(word.isdigit() for word in line):  # of formats 2, 4.0 and 4.1
-        return int(line[min(len(line), 2) - 1])
-    return int(unpack("4Q", content[:32])[1]) if is_binary and len(content) >= 32 else None
+def _repeated(nodes: Int, elements: Mapping[int, Elements]) -> list[str]:
+    """Numbers of nodes or of elements that are there twice."""
+    everything = {"node": nodes, "element": np.concatenate([np.zeros(0, np.int64), *(e[0] for e in elements.values())])}
+    faults = []
+    for name, numbers in everything.items():
+        ordered = np.sort(numbers)
+        twice = np.unique(ordered[1:][ordered[1:] == ordered[:-1]])
+        if len(twice):
+            faults.append(f"{name} {mesh_checks.first_of(map(str, twice), len(twice))}: the number is there twice")
+    return faults
 
 
-def _other_kinds(gmsh: ModuleType) -> list[str]:
+def _lost(nodes: Int, elements: Mapping[int, Elements]) -> list[str]:
+    """Nodes of elements that are not there: the first one of each type."""
+    faults = []
+    for numbers, own, _ in elements.values():
+        bad = np.argwhere(~np.isin(own, nodes))
+        if len(bad):
+            row, column = bad[0]
+            faults.append(f"element {numbers[row]}: there is no node {own[row, column]}")
+    return faults
+
+
+def _other_kinds(nodes: Int, points: Float, elements: Mapping[int, Elements]) -> list[str]:
     """Elements that are not triangles of three or six nodes, and the lack of these."""
     faults = []
-    kinds = [kind for dimension in (2, 3) for kind in gmsh.model.mesh.getElementTypes(dimension)]
+    kinds = [kind for kind in sorted(elements) if KINDS[kind][1] >= 2]
     for kind in kinds:
         if kind not in NODES_OF_TRIANGLES:
-            tags, nodes = gmsh.model.mesh.getElementsByType(kind)
-            name, dimension, order, *_ = gmsh.model.mesh.getElementProperties(kind)
-            points = [gmsh.model.mesh.getNode(node)[0] for node in nodes[: len(nodes) // len(tags)]]
-            first = f"element {tags[0]} at {mesh_checks.at(np.mean(points, axis=0))}"
+            name, dimension, order, _ = KINDS[kind]
+            numbers, own, _ = elements[kind]
+            centre = points[np.isin(nodes, own[0])].mean(axis=0)
             faults.append(
-                f"{first}, the first of {len(tags)}, is a {name}: only triangles of three or six nodes can be used "
-                f"({REMEDY[min(order, 3), dimension]})"
+                f"element {numbers[0]} at {mesh_checks.at(centre)}, the first of {len(numbers)}, is a {name}: only "
+                f"triangles of three or six nodes can be used ({REMEDY[min(order, 3), dimension]})"
             )
     if not kinds:
         faults.append("no triangles in it: mesh the surfaces and put them in physical surfaces before saving")
     return faults
+
+
+def _name(content: MshContent, dimension: int, group: int) -> str:
+    return content.names.get((dimension, group)) or f"number {group}"
+
+
+def _curves_of_content(content: MshContent, elements: Mapping[int, Elements]) -> dict[str, Int]:
+    """Node tags (d, 2) of the ends of the lines in each physical curve."""
+    pairs = (
+        (group, entity) for (dimension, entity), groups in content.groups.items() for group in groups if dimension == 1
+    )
+    lines: dict[str, list[Int]] = {}
+    for group, entity in sorted(set(pairs)):
+        own = lines.setdefault(_name(content, 1, group), [np.zeros((0, 2), np.int64)])
+        for kind in (LINE, LINE_2):
+            if kind in elements:
+                _, nodes, entities = elements[kind]
+                own.append(nodes[slice(*np.searchsorted(entities, (entity, entity + 1))), :2])
+    return {name: np.concatenate(ends) for name, ends in lines.items()}
 
 
 def triangles_of_model(gmsh: ModuleType) -> RawMesh:

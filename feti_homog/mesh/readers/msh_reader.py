@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,6 +22,8 @@ from feti_homog.mesh.readers.mesh_checks import RawMesh
 from feti_homog.mesh.readers.snapping import snapped
 from feti_homog.typing import Float
 
+# Characters of a message: words of a file may be of any length.
+LONGEST_LINE = 1000
 LOADERS = {".msh": gmsh_file.load, ".inp": abaqus_file.load, ".vtu": vtk_file.load, ".vtk": vtk_file.load}
 
 
@@ -43,12 +46,12 @@ def read(path: Path, snap: float | None = None) -> CoarseMesh:
         MeshError: with all faults of the first stage that has any: file, labels, shapes, middle nodes, connections,
             sides, debonded lines.
     """
-    raw, moved = LOADERS[path.suffix](path), 0.0
+    raw, moved = _loaded(path), 0.0
     _refuse(path.name, mesh_checks.unlabelled(raw), mesh_checks.unknown_phases(raw), mesh_checks.stray_lines(raw))
     _refuse(path.name, mesh_checks.not_finite(raw))
     if snap is not None:
         raw, moved = snapped(raw, snap)
-    unused = tuple(f"{path.name}: {line}" for line in mesh_checks.unused_curves(raw))
+    unused = tuple(_line(path.name, remark) for remark in mesh_checks.unused_curves(raw))
     return replace(made(raw, path.name), snapped=moved, remarks=unused)
 
 
@@ -74,11 +77,29 @@ def made(raw: RawMesh, path: str) -> CoarseMesh:
     return replace(mesh, precedence=numbers)
 
 
-def _refuse(path: str, *faults: list[str]) -> None:
+def _loaded(path: Path) -> RawMesh:
+    """The triangles of a file, as it has them."""
+    try:
+        if path.exists() and not path.is_file():
+            raise MeshError("not a file that can be read")
+        return LOADERS[path.suffix](path)
+    except OSError as error:
+        raise MeshError(_line(str(path), f"cannot be read: {error.strerror}")) from None
+    except MeshError as error:
+        raise MeshError(*(_line(path.name, fault) for fault in error.faults)) from None
+
+
+def _refuse(path: str, *faults: Sequence[str]) -> None:
     """Raise MeshError if there are faults."""
-    found = [f"{path}: {fault}" for kind in faults for fault in kind]
+    found = [_line(path, fault) for kind in faults for fault in kind]
     if found:
         raise MeshError(*found)
+
+
+def _line(path: str, fault: str) -> str:
+    """The fault of a file in one line; characters that are not printable, which its words may have, are escaped."""
+    line = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in f"{path}: {fault}"[: LONGEST_LINE + 1])
+    return line if len(line) <= LONGEST_LINE else f"{line[:LONGEST_LINE]}..."
 
 
 def _turned(raw: RawMesh) -> RawMesh:

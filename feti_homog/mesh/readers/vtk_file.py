@@ -28,22 +28,23 @@ def load(path: Path) -> RawMesh:
     are 1 on lines that are debonded from the start.  Nodes and elements have the numbers of the file, from 0.
 
     Raises:
+        OSError: the file cannot be read.
         MeshError: meshio is not installed or cannot read the file, it has other elements, or no phases.
     """
     try:
         reader = importlib.import_module(READERS[path.suffix])
     except ImportError:
         wanted = f"{path.suffix} files are read by meshio, which is not installed"
-        raise MeshError(f"{path.name}: {wanted}: pip install 'feti_homog[meshes]'") from None
+        raise MeshError(f"{wanted}: pip install 'feti_homog[meshes]'") from None
     try:
         mesh = reader.read(str(path))
-    except OSError as error:
-        raise MeshError(f"{path}: cannot be read: {error.strerror}") from None
+    except OSError:
+        raise
     except Exception as error:  # meshio's readers raise whatever they meet
-        raise MeshError(f"{path.name}: meshio cannot read it: {str(error).strip() or type(error).__name__}") from None
+        raise MeshError(f"meshio cannot read it: {str(error).strip() or type(error).__name__}") from None
     faults = _faults(mesh)
     if faults:
-        raise MeshError(*(f"{path.name}: {fault}" for fault in faults))
+        raise MeshError(*faults)
     return _raw(mesh)
 
 

@@ -184,7 +184,7 @@ def _unknown_node(path: Path) -> None:
 
 
 def _line_twice(path: Path) -> None:
-    """Write the line of element 12 in place of that of 13; gmsh reads one element without an error."""
+    """Write the line of element 12 in place of that of 13."""
     grid().write(path)
     lines = path.read_text().splitlines()
     own = {line.split()[0]: number for number, line in enumerate(lines) if len(line.split()) == 8}
@@ -202,9 +202,9 @@ FAULTY_MESHES: dict[str, tuple[Callable[[Path], None], str]] = {
     "geometry": (_text("Point(1) = {0, 0, 0};\n"), "not a gmsh mesh file"),
     "other text": (_text("Dear gmsh,\n"), "not a gmsh mesh file"),
     "header only": (_text("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n"), "no triangles"),
-    "broken off": (_broken, "gmsh cannot read it"),
-    "unknown node": (_unknown_node, "gmsh cannot read it"),
-    "a line twice": (_line_twice, "it declares 32 elements, and 31 can be read"),
+    "broken off": (_broken, "$Nodes: there is no $EndNodes: the file is damaged or broken off"),
+    "unknown node": (_unknown_node, "element 1: there is no node 77"),
+    "a line twice": (_line_twice, "element 12: the number is there twice"),
     "no elements": (_mesh(lambda: grid().without(*range(1, 33))), "no triangles"),
     "only lines": (_mesh(lambda: MshFile(grid().nodes, {1: (1, 1, 1, (1, 2))})), "no triangles"),
     "quadrilaterals": (

@@ -75,7 +75,7 @@ def test_debonded_lines_of_every_format_are_those_of_gmsh(suffix, mesh, tmp_path
     expected = read(_written(raw, tmp_path / "one.msh"))
     result = read(_written(raw, tmp_path / f"one{suffix}"))
     assert np.array_equal(_edges(result), _edges(expected)) and len(_edges(result)) == len(RIGHT_SIDE)
-    assert result.unused_curves == ()
+    assert result.remarks == ()
 
 
 @pytest.mark.parametrize(
@@ -89,7 +89,7 @@ def test_debonded_lines_of_every_format_are_those_of_gmsh(suffix, mesh, tmp_path
 def test_curves_that_nothing_uses_are_remarked(suffix, name, expected, tmp_path):
     result = read(_written(grid().with_curve(RIGHT_SIDE, name), tmp_path / f"one{suffix}"))
     assert len(result.debonded_edges) == 0
-    assert [line.startswith(expected) for line in result.unused_curves] == [True]
+    assert [line.startswith(expected) for line in result.remarks] == [True]
 
 
 def test_debonded_lines_may_be_the_set_of_an_element_line(tmp_path):
@@ -99,7 +99,7 @@ def test_debonded_lines_may_be_the_set_of_an_element_line(tmp_path):
 
 def test_lines_in_a_set_of_a_phase_are_not_remarked(tmp_path):
     path = write_inp(tmp_path / "one.inp", grid().with_curve(RIGHT_SIDE, "matrix"))
-    assert read(path).unused_curves == ()
+    assert read(path).remarks == ()
 
 
 def _text(content: str) -> Callable[[Path], Path]:

@@ -13,9 +13,7 @@ from unit.mesh.faulty_meshes import FAULTY_MESHES, MshFile, grid
 
 from feti_homog.errors import MeshError
 from feti_homog.mesh.coarse_mesh import CoarseMesh, areas
-from feti_homog.mesh.readers import gmsh_file
 from feti_homog.mesh.readers.msh_reader import read
-from feti_homog.mesh.tiles.filling import gmsh_session
 
 MESHES = Path(__file__).parents[4] / "meshes"
 
@@ -174,16 +172,3 @@ def _assert_periodic(mesh: CoarseMesh) -> None:
     assert np.all(mesh.points[mesh.representative] < size)
     assert np.array_equal(mesh.representative[mesh.representative], mesh.representative)
     assert areas(mesh.points, mesh.triangles).min() > 0
-
-
-@pytest.mark.parametrize(("version", "binary"), [(2.2, 0), (2.2, 1), (4.0, 0), (4.1, 0), (4.1, 1)])
-def test_the_number_of_elements_is_read_from_every_format(tmp_path, version, binary):
-    with gmsh_session() as gmsh:
-        gmsh.open(str(MESHES / "two_fibres.msh"))
-        gmsh.option.setNumber("Mesh.MshFileVersion", version)
-        gmsh.option.setNumber("Mesh.Binary", binary)
-        gmsh.write(str(tmp_path / "same.msh"))
-        count = sum(map(len, gmsh.model.mesh.getElements()[1]))
-    assert gmsh_file._listed_elements(tmp_path / "same.msh") == count
-    same, first = (gmsh_file.load(path) for path in (tmp_path / "same.msh", MESHES / "two_fibres.msh"))
-    assert len(same.triangles) == len(first.triangles)

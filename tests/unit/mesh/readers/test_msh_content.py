@@ -1,0 +1,227 @@
+"""The reader of .msh files, with gmsh's own reading as the oracle."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import gmsh
+import numpy as np
+import pytest
+from support.users_meshes import polar_cell
+from unit.mesh.binary_msh import write_binary
+from unit.mesh.faulty_meshes import RIGHT_SIDE, grid
+from unit.mesh.second_order import second_order
+
+from feti_homog.errors import MeshError
+from feti_homog.mesh.readers import gmsh_file, msh_content
+from feti_homog.mesh.readers.gmsh_file import triangles_of_model
+from feti_homog.mesh.readers.mesh_checks import RawMesh
+from feti_homog.mesh.readers.msh_reader import read
+from feti_homog.mesh.tiles.filling import gmsh_session
+
+MESHES = Path(__file__).parents[4] / "meshes"
+FORMATS = [(2.2, 0), (2.2, 1), (4.0, 0), (4.1, 0), (4.1, 1)]
+
+
+def by_gmsh(path: Path) -> RawMesh:
+    """Return what gmsh reads from a file."""
+    with gmsh_session() as session:
+        session.open(str(path))
+        return triangles_of_model(session)
+
+
+def written(source: Path, target: Path, version: float, binary: int, **options: float) -> Path:
+    """Return the file that gmsh makes of another in this version."""
+    with gmsh_session() as session:
+        session.open(str(source))
+        if "parts" in options:
+            session.option.setNumber("Mesh.PartitionCreatePhysicals", 0)
+            session.model.mesh.partition(int(options.pop("parts")))
+        for name, value in {"MshFileVersion": version, "Binary": binary, **options}.items():
+            session.option.setNumber(f"Mesh.{name}", value)
+        session.write(str(target))
+    return target
+
+
+def assert_same(result: RawMesh, expected: RawMesh, ordered: bool = True) -> None:
+    """Compare all that was read; elements by their numbers unless they are `ordered` alike.
+
+    gmsh rounds the last digit of some coordinates in files of version 4.
+    """
+    assert np.array_equal(result.node_tags, expected.node_tags)
+    assert result.points == pytest.approx(expected.points, rel=0, abs=4e-16)
+    orders = [slice(None) if ordered else np.argsort(mesh.element_tags) for mesh in (result, expected)]
+    for name in ("element_tags", "triangles"):
+        one, other = (getattr(mesh, name)[order] for mesh, order in zip((result, expected), orders, strict=True))
+        assert np.array_equal(one, other), name
+    one, other = (_labels(mesh)[order] for mesh, order in zip((result, expected), orders, strict=True))
+    assert np.array_equal(one, other)
+    assert list(result.curves) == list(expected.curves)
+    assert all(np.array_equal(_sorted(result.curves[name]), _sorted(expected.curves[name])) for name in result.curves)
+    for name in ("edges", "tags", "points"):
+        one, other = (np.sort(getattr(mesh.middles, name), axis=0) for mesh in (result, expected))
+        assert one == pytest.approx(other, rel=0, abs=4e-16), name
+    assert (result.container, result.curve_container) == (expected.container, expected.curve_container)
+
+
+def _labels(mesh: RawMesh) -> np.ndarray:
+    """Return the physical groups of each element."""
+    return np.array([" and ".join(sorted(names)) for names in mesh.groups])[mesh.group]
+
+
+def _sorted(pairs: np.ndarray) -> np.ndarray:
+    return pairs[np.lexsort(pairs.T)]
+
+
+@pytest.mark.parametrize("name", ["square", "hexagonal", "two_fibres"])
+@pytest.mark.parametrize(("version", "binary"), FORMATS)
+def test_meshes_of_the_repository_are_read_as_by_gmsh(name, version, binary, tmp_path):
+    path = written(MESHES / f"{name}.msh", tmp_path / "a.msh", version, binary)
+    assert_same(gmsh_file.load(path), by_gmsh(path))
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize(
+    "options",
+    [{}, {"SaveAll": 1}, {"SaveParametric": 1}, {"SaveParametric": 1, "SaveAll": 1}, {"parts": 3}],
+    ids=lambda options: "-".join(options) or "plain",
+)
+@pytest.mark.parametrize(("version", "binary"), FORMATS)
+def test_files_of_every_kind_are_read_as_by_gmsh(version, binary, options, order, tmp_path):
+    polar_cell((0.9, 0.1), 0.3, tmp_path / "cell.msh", order=order, size=0.25)
+    path = written(tmp_path / "cell.msh", tmp_path / "a.msh", version, binary, **options)
+    result = gmsh_file.load(path)
+    assert len(result.triangles) > 30
+    assert_same(result, by_gmsh(path), ordered="parts" not in options)
+
+
+@pytest.mark.parametrize("mesh", [grid(), second_order(grid().with_curve(RIGHT_SIDE))], ids=["first", "second"])
+@pytest.mark.parametrize("order", ["<", ">"])
+@pytest.mark.parametrize("version", ["2.2", "4.1"])
+def test_both_byte_orders_are_read_as_by_gmsh(version, order, mesh, tmp_path):
+    path = write_binary(mesh, tmp_path / "a.msh", version, order)
+    mesh.write(tmp_path / "text.msh")
+    assert_same(gmsh_file.load(path), by_gmsh(path))
+    assert_same(gmsh_file.load(path), gmsh_file.load(tmp_path / "text.msh"))
+
+
+def test_types_of_elements_are_those_of_gmsh():
+    with gmsh_session():
+        for kind, expected in msh_content.KINDS.items():
+            assert gmsh.model.mesh.getElementProperties(kind)[:4] == expected
+
+
+HEAD_2, HEAD_4 = (f"$MeshFormat\n{version} 0 8\n$EndMeshFormat\n" for version in ("2.2", "4.1"))
+NODES_2 = "$Nodes\n3\n1 0 0 0\n2 1 0 0\n3 0 1 0\n$EndNodes\n"
+ELEMENTS_2 = "$Elements\n1\n1 2 2 1 1 1 2 3\n$EndElements\n"
+NODES_4 = "$Nodes\n1 3 1 3\n2 1 0 3\n1\n2\n3\n0 0 0\n1 0 0\n0 1 0\n$EndNodes\n"
+ELEMENTS_4 = "$Elements\n1 1 1 1\n2 1 2 1\n1 1 2 3\n$EndElements\n"
+FILE_2, FILE_4 = HEAD_2 + NODES_2 + ELEMENTS_2, HEAD_4 + NODES_4 + ELEMENTS_4
+FAULTS = {
+    "format 3": (FILE_2.replace("2.2", "3"), 'format "3" of gmsh: expected 2.2, 4.0 or 4.1'),
+    "format 1": ("$NOD\n0\n$ENDNOD\n", "format 1 of gmsh: save it in format 2.2 or 4.1"),
+    "short numbers": (FILE_2.replace("0 8", "0 4", 1), '$MeshFormat: "0 4": expected 0 8 of text and 1 8 of binary'),
+    "byte order": (FILE_2.replace("0 8", "1 8", 1), "$MeshFormat: there is no number one that gives the byte order"),
+    "no format": (f"$Comments\n$EndComments\n{NODES_2}", "$Nodes: there is no $MeshFormat before"),
+    "nodes twice": (HEAD_2 + NODES_2 + NODES_2, "$Nodes: it is there twice"),
+    "names": (f'{HEAD_2}$PhysicalNames\n2\n2 1 "a"\n$EndPhysicalNames\n', "$PhysicalNames: 1 names, and not as many"),
+    "open names": (
+        f"{HEAD_2}$PhysicalNames\n0\n",
+        "$PhysicalNames: there is no $EndPhysicalNames: the file is damaged",
+    ),
+    "open comments": (f"{HEAD_2}$Comments\n", "$Comments: there is no $EndComments"),
+    "a word": (FILE_2.replace("2 1 0 0", "2 one 0 0"), '$Nodes: line 7, "one": expected a number'),
+    "an underscore": (FILE_2.replace("2 1 0 0", "2 1_0 0 0"), '$Nodes: line 7, "1_0": expected a number'),
+    "a fraction": (FILE_2.replace("1 2 2 1", "1 2.5 2 1"), '$Elements: line 12, "2.5": expected a whole number'),
+    "half a node": (
+        FILE_2.replace("2 1 0 0", "2.5 1 0 0"),
+        "$Nodes: 2.5: expected a whole number of at most 15 digits",
+    ),
+    "twenty digits": (FILE_2.replace("2 1 0 0", f"{'9' * 20} 1 0 0"), "$Nodes: 1e+20: expected a whole number of at"),
+    "twenty digits of an element": (
+        FILE_2.replace("1 2 3\n$", f"1 2 {'9' * 20}\n$"),
+        "there is no node 9223372036854775807",
+    ),
+    "nan as a count": (FILE_2.replace("Nodes\n3", "Nodes\nnan"), "$Nodes: nan: expected a whole number"),
+    "huge count": (
+        FILE_2.replace("Nodes\n3", "Nodes\n1000000000000"),
+        "$Nodes: 4000000000000 numbers should follow, and",
+    ),
+    "negative count": (FILE_2.replace("Nodes\n3", "Nodes\n-1"), "$Nodes: -4 numbers should follow, and 12 do"),
+    "numbers left": (FILE_2.replace("Nodes\n3", "Nodes\n2"), "$Nodes: 4 numbers are left after those that its counts"),
+    "elements left": (FILE_2.replace("nts\n1\n", "nts\n0\n"), "$Elements: 8 numbers are left after those"),
+    "elements too many": (
+        FILE_2.replace("nts\n1\n", "nts\n1\n2 2 2 1 1 1 2 3\n"),
+        "$Elements: 1 elements are announced, and 2 are there",
+    ),
+    "elements missing": (
+        FILE_2.replace("nts\n1\n", "nts\n2\n"),
+        "$Elements: 2 elements are announced, and 1 are there",
+    ),
+    "element cut": (
+        FILE_2.replace("1 2 3\n$", "1 2\n$"),
+        "$Elements: the file is damaged or broken off in its elements",
+    ),
+    "negative tags": (FILE_2.replace("1 2 2 1", "1 2 -2 1"), "$Elements: the file is damaged or broken off in its"),
+    "strange type": (
+        FILE_2.replace("1 2 2 1", "1 36 2 1"),
+        "$Elements: elements of type 36: only triangles of three or",
+    ),
+    "node twice": (FILE_2.replace("2 1 0 0", "1 1 0 0"), "node 1: the number is there twice"),
+    "strange type in 4": (FILE_4.replace("2 1 2 1\n1 1", "2 1 36 1\n1 1"), "$Elements: elements of type 36: only"),
+    "wrong dimension": (
+        FILE_4.replace("2 1 2 1\n1 1", "1 1 2 1\n1 1"),
+        "$Elements: a Triangle 3 in an entity of dimension",
+    ),
+    "dimension 4": (FILE_4.replace("2 1 0 3", "4 1 0 3"), "$Nodes: there is no entity of dimension 4"),
+    "elements missing in 4": (FILE_4.replace("nts\n1 1", "nts\n1 2"), "2 elements are announced, and 1 are there"),
+    "huge block": (
+        FILE_4.replace("2 1 0 3", "2 1 0 1000000000000"),
+        "$Nodes: 1000000000000 numbers should follow, and",
+    ),
+    "huge number of blocks": (FILE_4.replace("nts\n1 1", "nts\n1000000000000 1"), "$Elements: 3 numbers should follow"),
+    "huge number of entities": (
+        f"{HEAD_4}$Entities\n1000000000000 0 0 0\n$EndEntities\n",
+        "$Entities: 1 numbers should",
+    ),
+    "no group": (FILE_4, "element 1 at (0.333333333, 0.333333333): not in any physical surface"),
+    "no name": (FILE_2, 'physical surface "number 1" is not a phase'),
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_faults_of_the_format_are_named(name, tmp_path):
+    content, message = FAULTS[name]
+    (tmp_path / "a.msh").write_text(content)
+    with pytest.raises(MeshError) as caught:
+        read(tmp_path / "a.msh")
+    assert caught.value.faults[0].startswith("a.msh: ") and message in caught.value.faults[0]
+
+
+def test_what_stands_between_sections_is_passed_over(tmp_path):
+    """Comments, unknown sections, periodic nodes and line ends of another system."""
+    grid().write(tmp_path / "one.msh")
+    text = (tmp_path / "one.msh").read_text()
+    other = "$Comments\nmine\n$Nodes\n$EndComments\n\n" + text.replace("$Nodes", "$Foo\n1 2\n$EndFoo\nwords\n$Nodes")
+    periodic = "$Periodic\n1\n0 1 2\n1\n3 4\n$EndPeriodic\n$NodeData\nx\n$EndNodeData\n"
+    (tmp_path / "other.msh").write_bytes((other + periodic).replace("\n", "\r\n").encode())
+    assert_same(gmsh_file.load(tmp_path / "other.msh"), gmsh_file.load(tmp_path / "one.msh"))
+
+
+def test_any_number_of_tags_is_read_as_by_gmsh(tmp_path):
+    """Partitions of version 2; lines may be broken anywhere."""
+    lines = ["1 15 2 0 1 1", "2 2 5 1 1 2 1 3 1 2 3", "3 1 4 1 1 1 2 1 2"]
+    for name, separator in (("a.msh", "\n"), ("b.msh", " ")):
+        (tmp_path / name).write_text(FILE_2.replace("1\n1 2 2 1 1 1 2 3", "3\n" + separator.join(lines)))
+        assert_same(gmsh_file.load(tmp_path / name), by_gmsh(tmp_path / "a.msh"), ordered=False)
+
+
+@pytest.mark.parametrize("last", [1, 2])
+def test_an_entity_in_two_physical_groups_is_read_as_by_gmsh(last, tmp_path):
+    grid().with_element(1, 2, 2, grid().elements[1][3]).write(tmp_path / "a.msh")
+    text = (tmp_path / "a.msh").read_text().replace("1 2 2 2 2 ", "1 2 2 2 1 ")
+    (tmp_path / "a.msh").write_text(text)
+    path = written(tmp_path / "a.msh", tmp_path / "b.msh", 4.1, 0) if last == 2 else tmp_path / "a.msh"
+    assert_same(gmsh_file.load(path), by_gmsh(path))
+    with pytest.raises(MeshError, match="in 2 physical surfaces: "):
+        read(path)
