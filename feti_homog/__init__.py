@@ -52,7 +52,7 @@ HOMES = {"Result": "analysis.result", "Case": "case.case"}
 
 
 def __getattr__(name: str) -> Any:
-    """What is first asked for: `feti-homog` starts at once, and `verify` loads nothing that analyses are made of."""
+    """Import a public name on first access, so that `feti-homog` starts at once and `verify` loads no analysis."""
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(importlib.import_module(f"{__name__}.{HOMES.get(name, 'api')}"), name)

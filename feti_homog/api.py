@@ -38,7 +38,7 @@ def run(
     resume: bool = False,
     quiet: bool = True,
 ) -> Result:
-    """The result of a case on every rank of `comm` (default: all ranks).
+    """Return the result of a case on every rank of `comm` (default: all ranks).
 
     Collective over `comm`; ranks outside of it need not call it, nor wait.  If the program has not started PETSc,
     this does, without options: those of the case are in its `petsc`.
@@ -181,8 +181,8 @@ def _start_petsc(words: Sequence[str], comm: Intracomm) -> None:
 
 
 def folder(name: str | Path) -> Path:
-    """The folder, or file, of that name.  Raises CaseError for an empty one, by which Path means the current folder,
-    and for one that no system knows."""
+    """Return the folder, or file, of that name. Raises CaseError for an empty one, by which Path means the current
+    folder, and for one that no system knows."""
     if name == "":
         raise CaseError('"" is no name of a folder; the current one is "."')
     if "\0" in str(name):
@@ -191,7 +191,7 @@ def folder(name: str | Path) -> Path:
 
 
 def parsed(parser: argparse.ArgumentParser, words: Sequence[str], comm: Intracomm) -> argparse.Namespace:
-    """The arguments; help, version and argparse's own complaints are printed by rank 0.  Collective."""
+    """Return the arguments; help, version and argparse's own complaints are printed by rank 0. Collective."""
     from feti_homog.parallel.mpi_errors import on_root_only
 
     printed = io.StringIO()
@@ -217,7 +217,7 @@ def _parsed_main(
 
 
 def _started(comm: Intracomm | None) -> Intracomm:
-    """The communicator, all ranks' by default, with PETSc started."""
+    """Return the communicator, all ranks' by default, with PETSc started."""
     prefer_own_toolkits()
     libraries.require()
     from mpi4py import MPI
@@ -229,7 +229,7 @@ def _started(comm: Intracomm | None) -> Intracomm:
 
 
 def _expanded(cases: str | Path | Mapping[str, Any]) -> Sweep:
-    """The sweep of a file or of a document."""
+    """Return the sweep of a file or of a document."""
     from feti_homog.sweep import plan
 
     return plan.expand(cases, Path()) if isinstance(cases, Mapping) else plan.load(cases)

@@ -71,7 +71,7 @@ def _refuse_single_dashes(parser: Parser) -> None:
 
 
 def command_parser() -> Parser:
-    """The parser of all commands."""
+    """Return the parser of all commands."""
     parser = Parser(
         prog="feti-homog",
         description="Effective stiffness of fibre composites by FETI, on any number of MPI ranks.",

@@ -66,7 +66,7 @@ class Checks:
         return min(CHECK_ERROR_PER_RTOL * self.rtol, MAX_CHECK_ERROR)
 
     def warnings(self) -> list[str]:
-        """A line if the solver's tolerance is looser than that of the checks."""
+        """Return a line if the solver's tolerance is looser than that of the checks."""
         if CHECK_ERROR_PER_RTOL * self.rtol <= MAX_CHECK_ERROR:
             return []
         return [

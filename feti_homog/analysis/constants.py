@@ -13,7 +13,7 @@ from feti_homog.typing import Float
 
 
 def constants(cell: TornCell, secants: Mapping[str, Any]) -> dict[str, Any]:
-    """The entries of `Result` that follow from `effective_stiffness` and `thermal_stress`.  Collective."""
+    """Return the entries of `Result` that follow from `effective_stiffness` and `thermal_stress`. Collective."""
     if len(cell.problems) > 1:
         from feti_homog.analysis import constants_in_space  # with closed estimates that nothing else needs
 
@@ -22,7 +22,7 @@ def constants(cell: TornCell, secants: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _moduli_and_bounds(cell: TornCell, stiffness: Float) -> dict[str, Any]:
-    """The moduli of L^ef and the bounds of the phases.  Collective."""
+    """Return the moduli of L^ef and the bounds of the phases. Collective."""
     fractions = cell.fractions()
     case, shares = cell.case, list(fractions.values())
     phases = [plane_stiffness(case.material_of(phase), case.analysis.plane) for phase in fractions]

@@ -28,7 +28,7 @@ SAME_RADIUS = 1e-6
 
 
 def constants(cell: TornCell, secants: Mapping[str, Any]) -> dict[str, Any]:
-    """The entries of `Result` that follow from `effective_stiffness` and `thermal_stress`.  Collective.
+    """Return the entries of `Result` that follow from `effective_stiffness` and `thermal_stress`. Collective.
 
     Nothing follows where faces touch without tension: each column is a secant of its own load.  Estimates and bounds
     are of cells with fibres and without voids and debonding, estimates of round fibres.

@@ -51,7 +51,7 @@ class AnalysisContext:
 
     @classmethod
     def of(cls, cell: TornCell, progress: Progress, states: StateRecorder | None = None) -> AnalysisContext:
-        """That of a cell, without a checkpoint; by default states go nowhere."""
+        """Make the context of a cell without a checkpoint; by default no states are recorded."""
         contact = cell.case.interface is not None and cell.case.interface.contact
         recorder = StateRecorder(cell, None, False, progress.say) if states is None else states
         checks, checkpoint = Checks(cell.solver.rtol), NoCheckpoint(cell.comm)
@@ -79,7 +79,8 @@ class AnalysisContext:
     def unit_responses(
         self, label: str, bonds: BondState, starts: Sequence[Float], sign: float
     ) -> tuple[dict[str, Float], list[Response]]:
-        """The secants, see `CellLoads.secants`, and the responses to plus or minus each unit load.  Collective."""
+        """Return the secants, see `CellLoads.secants`, and the responses to plus or minus each unit load.
+        Collective."""
         responses = list[Response]()
         for problem in self.loads.problems:
             own = starts[len(responses) : len(responses) + len(problem.loads)]
@@ -149,6 +150,6 @@ class AnalysisContext:
         ]
 
     def warnings(self) -> list[str]:
-        """What a user may have meant otherwise, in words."""
+        """List the warnings about settings that a user may not have intended."""
         summary = self.cell.summary
         return [*process_zone.warnings(self.case, summary.width, summary.interface_edge), *self.checks.warnings()]

@@ -26,7 +26,7 @@ def criterion_of(cell: TornCell, grows: bool = False) -> BondLaw:
 
 
 def _at_tips(cell: TornCell, springs: SpringEnergy) -> ReleasedEnergy:
-    """Raises CaseError if the solver has no inverse of the dual operator."""
+    """Raise CaseError if the solver has no inverse of the dual operator."""
     inverses = [each.solver.exact_inverse for each in cell.problems]
     known = [inverse for inverse in inverses if inverse is not None]
     if len(known) < len(inverses):

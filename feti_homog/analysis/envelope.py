@@ -49,7 +49,7 @@ class Rays:
     temperature: float
 
     def at(self, number: int, factor: float) -> dict[str, Any]:
-        """The factor, strain (m,) and stress (m,) on a ray."""
+        """Return the factor, strain (m,) and stress (m,) on a ray."""
         strain = self.strain_before + factor * self.strain[number]
         return {"factor": factor, "strain": strain, "stress": self.stress_before + factor * self.stress[number]}
 
@@ -85,8 +85,8 @@ def run(context: AnalysisContext) -> dict[str, Any]:
 def rays_of(
     plane: Sequence[str], angles: Float, stiffness: Float, thermal_stress: Float | None, temperature: float
 ) -> Rays:
-    """The rays in directions (n,), degrees, of a plane whose axes have these names: of stresses at E = C^-1 S, with no
-    other stresses, or of strains; after a change of temperature at zero stress, or strain."""
+    """Return the rays in directions (n,), degrees, of a plane whose axes have these names: of stresses at E = C^-1
+    S, with no other stresses, or of strains; after a change of temperature at zero stress, or strain."""
     strains, stresses = voigt_names(len(stiffness))
     of_stresses = plane[0] in stresses
     names = stresses if of_stresses else strains
@@ -117,7 +117,7 @@ class _Finder:
         self._order = np.lexsort((np.round(self._direction, DIRECTION_DIGITS), self._pair, self._fibre))
 
     def points(self, rays: Rays) -> Iterator[dict[str, Any]]:
-        """What result.json says of each ray, but its direction.  Collective."""
+        """Yield the entry of each ray in result.json, without its direction.  Collective."""
         names = voigt_names(rays.strain.shape[1])[0]
         at_start = self._tractions(rays.strain_before[None], rays.temperature, names)[0]
         before = at_start if rays.temperature else None
@@ -183,7 +183,7 @@ class _Finder:
         return where | dict(zip(names, bond[4:].tolist(), strict=True))
 
     def _break_names(self, components: int) -> tuple[str, ...]:
-        """What is told of the break of a bond under a traction of so many components."""
+        """Return the keys of a break under a traction with this number of components."""
         return tuple(self._onset.bonds.law.break_names)[:components]
 
     def _breaks(self, node: Int, traction: Float) -> Float:

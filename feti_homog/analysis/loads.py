@@ -36,7 +36,7 @@ class CellLoads:
         return self.problems[0]
 
     def load(self, target: Mapping[str, float]) -> Load:
-        """The load that a waypoint names, of all problems."""
+        """Return the load that a waypoint names, of all problems."""
         stress = dict(zip(SPATIAL_STRAINS, SPATIAL_STRESSES, strict=True)) | {"temperature": "temperature"}
         values = [target.get(name, target.get(stress[name], 0.0)) for name in self.names]
         return Load(np.array(values), np.array([name not in target for name in self.names]))
@@ -46,19 +46,19 @@ class CellLoads:
         return [np.zeros(problem.cell.solver.rows) for problem in self.problems for _ in problem.loads]
 
     def responses(self, state: Equilibrium, scale: float) -> list[Response]:
-        """The averages of `scale` times the equilibrium of all problems.  Collective; raises as
+        """Return the averages of `scale` times the equilibrium of all problems. Collective; raises as
         `Homogenization.response`."""
         return [problem.response(own, scale) for problem, own in zip(self.problems, state.problems, strict=True)]
 
     def undetermined(self, responses: Sequence[Response]) -> list[str]:
-        """The strains under a load that nothing determines.  Collective."""
+        """Return the strains under a load that nothing determines. Collective."""
         pairs = zip(self.problems, responses, strict=True)
         masks = np.concatenate([problem.interface.undetermined(own.state) for problem, own in pairs])
         return [name for name, found in zip(self.names, masks, strict=True) if found]
 
     def secants(self, responses: Sequence[Response], sign: float) -> dict[str, Float]:
-        """The secant stiffness (39) as `stiffness`, (3, 3) or (6, 6), and if a temperature is a load `thermal_stress`
-        (6,), from the responses to plus or minus each unit load."""
+        """Return the secant stiffness (39) as `stiffness`, (3, 3) or (6, 6), and if a temperature is a load
+        `thermal_stress` (6,), from the responses to plus or minus each unit load."""
         matrices, first = list[Float](), 0
         for problem in self.problems:
             end = first + len(problem.loads)

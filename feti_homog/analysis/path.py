@@ -31,7 +31,7 @@ BARS = {"events": EVENTS_BAR, "increments": STEPS_BAR}
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
-    """The path of the case, until its bonds break; see `follow`."""
+    """Return the path of the case, until its bonds break; see `follow`."""
     section = context.case.section
     assert isinstance(section, LoadPath)
     return follow(context, section, criterion_of(context.cell, grows=True))
@@ -86,7 +86,7 @@ def _known(context: AnalysisContext) -> int:
 def _points(
     context: AnalysisContext, path: LoadPath, law: BondLaw, known: int
 ) -> Iterator[tuple[Point, tuple[Energies, float] | None]]:
-    """The points of the checkpoint with the energies up to each, then those still to be found.
+    """Yield the points of the checkpoint with the energies up to each, then those still to be found.
 
     Where nothing carries the stresses any more the path ends with a fault.
 
@@ -129,7 +129,7 @@ def _label(path: LoadPath, number: int) -> str:
 def _entry(
     context: AnalysisContext, law: BondLaw, point: Point, responses: Sequence[Response], work: Work
 ) -> dict[str, Any]:
-    """What result.json says of a point."""
+    """Return the entry of a point in result.json."""
     return {
         "load_factor": point.load_factor,
         "broke": point.broke,
@@ -142,7 +142,7 @@ def _entry(
 
 
 def _fracture(all_equilibria: Energies) -> dict[str, float]:
-    """What bonds that break by energy have lost beside their toughness."""
+    """Return the energy that bonds lost by breaking, beside their toughness."""
     energy = all_equilibria.fracture
     return {"fracture_energy": energy} | ({"dissipation_ratio": all_equilibria.released / energy} if energy else {})
 
@@ -217,7 +217,7 @@ class EventProgress:
         return self
 
     def tell(self, line: str, urgent: bool) -> None:
-        """A line about an event."""
+        """Print or hold back a line about an event."""
         now = self._clock()
         self._left_out += bool(self._held_back)
         self._held_back = ""
@@ -228,7 +228,7 @@ class EventProgress:
             self._held_back = line
 
     def advance(self, share: float, words: str) -> None:
-        """The share of the path that an event is at, and what the bar tells beside it."""
+        """Move the bar to the share of the path at an event, with `words` beside it."""
         if self._bar is not None:
             self._bar.set_postfix_str(words, refresh=False)
             self._bar.update(max(share - self._bar.n, 0.0))

@@ -53,7 +53,7 @@ class Work:
 
 
 def stored(point: Point, work: Work) -> tuple[dict[str, Any], Arrays]:
-    """A point as plain numbers and distributed arrays, for the checkpoint.
+    """Return a point as plain numbers and distributed arrays, for the checkpoint.
 
     A path goes on from the multipliers of its last state.
     """
@@ -95,7 +95,7 @@ def restored(event: Arrays, cell: CoupledInterfaces) -> tuple[Point, tuple[Energ
 
 
 def _taken_apart(state: Equilibrium) -> tuple[dict[str, Any], Arrays]:
-    """The equilibrium of one problem."""
+    """Return the equilibrium of one problem."""
     solution = state.solution
     whole: dict[str, Any] = {
         "numbers": [state.iterations, state.solves, state.free_motions, solution.iterations, solution.reason],
@@ -109,7 +109,7 @@ def _taken_apart(state: Equilibrium) -> tuple[dict[str, Any], Arrays]:
 
 
 def _put_together(event: Arrays, interface: ContactProblem, suffix: str) -> Equilibrium:
-    """What `_taken_apart` took apart."""
+    """Rebuild the equilibrium from the parts of `_taken_apart`."""
     strain, lam, jump, alpha = (event[f"{name}{suffix}"] for name in ("strain", "lam", "jump", "alpha"))
     iterations, solves, free_motions, last, reason = event[f"numbers{suffix}"].tolist()
     certificate = dict(zip(KKT_LAWS, event[f"certificate{suffix}"].tolist(), strict=True))

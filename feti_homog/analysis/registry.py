@@ -27,6 +27,6 @@ class Analysis:
 
 
 def analysis_of(case: Case) -> Analysis:
-    """The analysis that a case asks for."""
+    """Return the analysis that a case asks for."""
     analysis: Analysis = import_module(f"feti_homog.analysis.{case.analysis.type}").ANALYSIS
     return analysis

@@ -127,7 +127,7 @@ class Result:
 
     @classmethod
     def of(cls, document: Mapping[str, Any]) -> Result:
-        """The result of what result.json holds.  Raises KeyError if a key is missing."""
+        """Return the result of what result.json holds. Raises KeyError if a key is missing."""
         return restored(cls, document)
 
     @property
@@ -181,5 +181,5 @@ class Result:
 
 
 def schema_keys() -> Iterator[Key]:
-    """The keys of result.json with type, unit and meaning: its reference table."""
+    """Yield the keys of result.json with type, unit and meaning: its reference table."""
     return keys(Result)

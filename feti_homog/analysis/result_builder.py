@@ -26,7 +26,7 @@ REMARKABLE_LOSS = 0.005
 
 
 def result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields | None) -> Result:
-    """The entries of an analysis with all that belongs to them; collective."""
+    """Return the entries of an analysis with all that belongs to them; collective."""
     cell, progress, checks = context.cell, context.progress, context.checks
     fractions = cell.fractions()
     return Result(
@@ -56,7 +56,7 @@ def result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields
 
 
 def _lost_area(case: Case, fractions: Mapping[str, float]) -> tuple[str, ...]:
-    """A remark if straight edges cut off much of the fibres that the case asks for."""
+    """Return a remark if straight edges cut off much of the fibres that the case asks for."""
     asked = sum(case.cell.fractions.values())
     meshed = sum(share for phase, share in fractions.items() if phase not in AROUND_FIBRES)
     lost = 1.0 - meshed / asked if asked else 0.0
@@ -66,7 +66,7 @@ def _lost_area(case: Case, fractions: Mapping[str, float]) -> tuple[str, ...]:
 
 
 def _cell_info(cell: TornCell, fractions: dict[str, float]) -> CellInfo:
-    """Collective."""
+    """Collect the numbers of the cell.  Collective."""
     return CellInfo(
         width=cell.summary.width,
         height=cell.summary.height,
@@ -83,7 +83,7 @@ def _cell_info(cell: TornCell, fractions: dict[str, float]) -> CellInfo:
 
 
 def _fibres(summary: CellSummary) -> tuple[FibreInfo, ...]:
-    """The fibres of the cell."""
+    """Return the fibres of the cell."""
     bodies = summary.fibre_bodies
     ellipses = Ellipses(summary.centres, summary.frames)
     is_ellipse = np.isnan(summary.radii) & ~np.isnan(ellipses.angles)

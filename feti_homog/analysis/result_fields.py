@@ -37,7 +37,7 @@ class Fields:
     states: tuple[StatePart, ...]
 
     def gathered(self) -> Fields | None:
-        """The fields of all ranks as one part, on rank 0; None on the others.  Collective."""
+        """Return the fields of all ranks as one part, on rank 0; None on the others. Collective."""
         first = self.comm.exscan(len(self.mesh.points)) or 0
         mesh = _gathered(self.comm, replace(self.mesh, triangles=self.mesh.triangles + np.int64(first)))
         fibres, interface = _gathered(self.comm, self.fibres), _gathered(self.comm, self.interface)
@@ -50,7 +50,7 @@ class Fields:
 
 
 def _gathered(comm: Intracomm, part: Part) -> Part | None:
-    """The rows of all ranks, in their order, on rank 0."""
+    """Return the rows of all ranks, in their order, on rank 0."""
     parts = {name: comm.gather(getattr(part, name)) for name in tables(part)}
     if comm.rank:
         return None

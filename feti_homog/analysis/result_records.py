@@ -109,7 +109,7 @@ class Checks:
     symmetry: float | None = described("L^ef is symmetric; of bonded or frictionless free faces only", default=None)
 
     def by_law(self) -> dict[str, float]:
-        """The errors of the laws that were checked, by name."""
+        """Return the errors of the laws that were checked, by name."""
         errors: dict[str, float] = plain(self)
         return errors
 

@@ -70,7 +70,7 @@ def run(
 
 
 def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False) -> Result:
-    """The case's result on every rank, without a file or a word.  Collective.
+    """Return the case's result on every rank, without a file or a word. Collective.
 
     Raises:
         CaseError, MeshError: the case cannot be run.
@@ -90,7 +90,7 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False) -> Resul
 
 @contextmanager
 def _torn(case: Case, comm: MPI.Intracomm, progress: Progress) -> Iterator[TornCell]:
-    """The torn cell, with the case's options set, while the block lasts."""
+    """Provide the torn cell, with the case's options set, while the block lasts."""
     PETSc.garbage_cleanup(comm)  # what earlier cases left: parallel objects are freed by all ranks together
     process_memory.forget_peak()
     with case_options(case.petsc):
@@ -147,7 +147,7 @@ def _field_file(cell: TornCell, directory: Path, progress: Progress) -> FieldFil
 
 
 def _analyse(context: AnalysisContext) -> dict[str, Any]:
-    """The entries of `Result` that the analysis asked for makes."""
+    """Return the entries of `Result` that the analysis asked for makes."""
     with context.progress.stage("solve") as words:
         analysis = analysis_of(context.case).run(context)
         iterations = context.checks.iterations
@@ -177,7 +177,7 @@ def _write(result: Result, directory: Path, cell: TornCell) -> None:
 
 
 def _draw(directory: Path) -> list[Path]:
-    """The pictures; only a rank that draws loads Matplotlib."""
+    """Return the pictures; only a rank that draws loads Matplotlib."""
     from feti_homog.report.plots import figures
 
     return figures.plot(directory)

@@ -63,7 +63,7 @@ class StateRecorder:
                 self._say(f"warning: {error}; the remaining results are computed without it")
 
     def kept(self) -> Fields | None:
-        """This rank's fields, if they were to be kept."""
+        """Return this rank's fields if they are kept."""
         if not self._keep:
             return None
         cell = self._cell

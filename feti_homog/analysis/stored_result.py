@@ -13,7 +13,7 @@ from feti_homog.results import checkpoint, field_file, result_json, seals
 
 
 def read(directory: Path) -> dict[str, Any]:
-    """The document of `directory`/result.json, whose result.h5 is that of its run.  Call on one rank.
+    """Return the document of `directory`/result.json, whose result.h5 is that of its run. Call on one rank.
 
     Raises:
         CaseError: one of both is missing, damaged, or of another program or run.

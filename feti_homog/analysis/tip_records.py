@@ -65,12 +65,12 @@ class TipRecorder:
     """Makes the records of points whose bonds have a toughness."""
 
     def __init__(self, cell: TornCell, loaded: CoupledInterfaces, law: BondLaw) -> None:
-        """`loaded` are the interfaces of the cell.  Collective."""
+        """Prepare the records of tips; `loaded` are the interfaces of the cell.  Collective."""
         self._cell, self._loaded, self._law = cell, loaded, law
         self._neighbours = InterfaceNeighbours(cell.comm, cell.solver.jump_operator, cell.subdomains)
 
     def of(self, point: Point) -> Tips:
-        """The tips of a point on every rank, by fibre, interface and direction.  Collective."""
+        """Return the tips of a point on every rank, by fibre, interface and direction. Collective."""
         cell, nodes = self._cell, self._loaded.nodes
         traction = point.scale * self._loaded.traction(point.state.solutions)
         own = tip_energies(self._law, self._neighbours, point.state.bonds, traction, point.used)

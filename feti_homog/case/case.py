@@ -80,12 +80,12 @@ class Case:
 
     @classmethod
     def load(cls, path: str | Path) -> Case:
-        """The case in a file; see `load`."""
+        """Return the case in a file; see `load`."""
         return load(path)
 
     @classmethod
     def parse(cls, document: Mapping[str, Any], folder: str | Path = ".") -> Case:
-        """The case of nested dictionaries as in the file, with Python's or NumPy's values; see `parse`."""
+        """Return the case of nested dictionaries as in the file, with Python's or NumPy's values; see `parse`."""
         return parse(document, Path(folder))
 
     @property
@@ -114,11 +114,11 @@ class Case:
         return self.angle or self.path or self.single_load or self.envelope or Stiffness()
 
     def material_of(self, phase: str) -> Material:
-        """The material of a phase; "fibre:2" without its own has that of "fibre". Raises KeyError."""
+        """Return the material of a phase; "fibre:2" without its own has that of "fibre". Raises KeyError."""
         return self.materials[provider(phase, self.materials)]
 
     def warnings(self) -> tuple[str, ...]:
-        """What is allowed but probably not wanted, one line each."""
+        """List settings that are valid but probably unintended, a line each."""
         contrast = contrast_warnings(self.materials, self.analysis.plane)
         if PLANE_STATES[self.analysis.plane].is_sheet:
             return tuple(contrast)
@@ -140,11 +140,11 @@ class Case:
         return (*locking, *rounding, *contrast)
 
     def remarks(self) -> tuple[str, ...]:
-        """What is not said but assumed, one line each."""
+        """List the assumptions about settings that are not given, a line each."""
         return stress_free(self.analysis.type, self.section.placed, self.analysis.plane)
 
     def resolved(self) -> dict[str, Any]:
-        """The case with its defaults as a plain document, of which `parse` makes an equal case."""
+        """Return the case with its defaults as a plain document, of which `parse` makes an equal case."""
         selected: Selected = {
             GEOMETRY: self.cell.geometry,
             ANALYSIS_TYPE: self.analysis.type,
@@ -173,12 +173,12 @@ class Case:
 
 
 def load(path: str | Path) -> Case:
-    """The case in a file, named after the file unless it says otherwise. Raises CaseError with all faults."""
+    """Return the case in a file, named after the file unless it says otherwise. Raises CaseError with all faults."""
     return parse(read_document(path), Path(path).parent)
 
 
 def parse(values: Mapping[str, Any], folder: Path) -> Case:
-    """The case of nested dictionaries; its files are relative to `folder`.
+    """Return the case of nested dictionaries; its files are relative to `folder`.
 
     NumPy's scalars and arrays, tuples and paths are as good as TOML's values.
 
@@ -228,7 +228,7 @@ def _relations(sections: Mapping[str, Any], document: Mapping[str, Any], selecte
 
 
 def _selected(document: Mapping[str, Any]) -> Selected:
-    """The values that decide which keys belong to the case."""
+    """Return the values that decide which keys belong to the case."""
     selectors = (GEOMETRY, ANALYSIS_TYPE, PLANE, METHOD, CRITERION)
     tables = dict(document) | {"interface": next(iter(interface_tables(document)), None)}
     return {s: selected_value(SECTIONS[s.section], tables.get(s.section), s.key) for s in selectors}
@@ -255,14 +255,14 @@ def _top_level_faults(document: Mapping[str, Any]) -> list[str]:
 
 
 def _read_section(document: Mapping[str, Any], section: str, reader: TableReader) -> Any:
-    """The dataclass of a section, or None if it is faulty or absent."""
+    """Return the dataclass of a section, or None if it is faulty or absent."""
     if section not in document and section in (*REQUIRED, *SECTIONS_OF_AN_ANALYSIS):
         return None
     return reader.read(SECTIONS[section], document.get(section, {}), section)
 
 
 def _checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
-    """The cell with what its files have; faults between its keys are added to `faults`."""
+    """Return the cell with what its files have; faults between its keys are added to `faults`."""
     cell = with_match(cell, folder, faults)
     if cell.fibre_fraction is not None:
         spacing = (cell.coating or 0.0) + (cell.min_gap if cell.geometry == "random" else 0.0)
@@ -280,7 +280,7 @@ def _checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
 
 
 def _sized_cell(table: Mapping[str, Any], sections: Mapping[str, Any], faults: list[str]) -> Cell:
-    """The cell with the sizes of elements, and unless its table says it the order, that it asks for."""
+    """Return the cell with the sizes of elements, and unless its table says it the order, that it asks for."""
     cell: Cell = sections["cell"]
     plane, free_faces = sections["analysis"].plane, bool(sections["interfaces"]) or cell.has_voids
     orders = (cell.order,) if "order" in table else (1, 2)
@@ -288,7 +288,7 @@ def _sized_cell(table: Mapping[str, Any], sections: Mapping[str, Any], faults: l
 
 
 def check_phases(case: Case, phases: Iterable[str]) -> None:
-    """Raises CaseError if a phase of the mesh has no material, or a material no phase."""
+    """Raise CaseError if a phase of the mesh has no material, or a material no phase."""
     faults = phase_faults(case.materials, phases)
     if faults:
         raise CaseError(*faults)

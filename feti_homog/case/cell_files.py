@@ -22,7 +22,7 @@ FEWEST_MATCHED = 10  # fibres: of fewer, distances have no distribution
 
 
 def with_files(cell: Cell, folder: Path, faults: list[str]) -> Cell:
-    """The cell with its file's path completed and its table read; faults are added to `faults`."""
+    """Return the cell with its file's path completed and its table read; faults are added to `faults`."""
     if cell.geometry not in SUFFIXES or (cell.file is not None and cell.fibre_list is not None):
         return cell
     if cell.file is None:
@@ -45,8 +45,8 @@ def missing(file: Path) -> str:
 
 
 def with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
-    """The cell with its table read, the path of that completed, and the number and the fraction of the table's fibres
-    where it has none of its own; faults are added to `faults`."""
+    """Return the cell with its table read, the path of that completed, and the number and the fraction of the
+    table's fibres where it has none of its own; faults are added to `faults`."""
     if cell.match is None:
         return cell
     file, given = Path(os.path.realpath(folder / cell.match)), f"[cell] match = {toml_value(str(cell.match))}"
@@ -71,7 +71,7 @@ def with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
 
 
 def _with_table(cell: Cell, faults: list[str]) -> Cell:
-    """The cell with its table, which has the size of the cell."""
+    """Return the cell with its table, which has the size of the cell."""
     try:
         table = read_table(cell.file) if cell.file is not None else table_of(cell.fibre_list or (), LIST)
     except CaseError as error:

@@ -20,7 +20,7 @@ TomlPath = tuple[str, ...]
 
 
 def read_document(path: str | Path) -> dict[str, Any]:
-    """The TOML document in a file, named after the file. Raises CaseError if it is none."""
+    """Return the TOML document in a file, named after the file. Raises CaseError if it is none."""
     path = Path(path)
     if "\0" in str(path):
         raise CaseError(f"{str(path)!r}: no file has a name with a null character")
@@ -48,7 +48,7 @@ def _too_deep(path: Path) -> CaseError:
 
 
 def _bytes_of(path: Path) -> bytes:
-    """The content of a file that may be a pipe; of one that does not end too much is refused."""
+    """Return the content of a file that may be a pipe; of one that does not end too much is refused."""
     with path.open("rb") as stream:
         content = stream.read(MAX_BYTES + 1)
     if len(content) > MAX_BYTES:
@@ -66,7 +66,7 @@ def _is_deeper(document: dict[str, Any], depth: int) -> bool:
 
 
 def to_document(values: object) -> dict[str, Any]:
-    """The values with TOML's types: NumPy's scalars as numbers, arrays and tuples as lists, paths as texts.
+    """Return the values with TOML's types: NumPy's scalars as numbers, arrays and tuples as lists, paths as texts.
 
     Values of other types are left as they are: the keys refuse them.
 
@@ -100,7 +100,7 @@ def _to_toml(value: Any, path: TomlPath, faults: list[str]) -> Any:
 
 
 def _named_items(table: Mapping[Any, Any], path: TomlPath, faults: list[str]) -> list[tuple[str, Any]]:
-    """The items of a table; a key that is no text is a fault."""
+    """Return the items of a table; a key that is no text is a fault."""
     wrong = [name for name in table if not isinstance(name, str)]
     place = f"[{dotted_key(path)}] " if path else ""
     faults += [f"{place}{name!r}: expected a text as key, not {_article(name)}" for name in wrong]
@@ -108,6 +108,6 @@ def _named_items(table: Mapping[Any, Any], path: TomlPath, faults: list[str]) ->
 
 
 def _article(value: object) -> str:
-    """The type of a value in words: "an int", "a list"."""
+    """Return the type of a value in words: "an int", "a list"."""
     name = type(value).__name__
     return f"{'an' if name[0] in 'aeiou' else 'a'} {name}"

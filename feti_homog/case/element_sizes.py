@@ -39,7 +39,7 @@ def with_sizes(
     orders: Collection[int],
     faults: list[str],
 ) -> Cell:
-    """The cell with the mesh_size, the refine and the order that its accuracy or its element_size asks for.
+    """Return the cell with the mesh_size, the refine and the order that its accuracy or its element_size asks for.
 
     Of an accuracy eps, the coarsest mesh is refined r times, with r the least for which `coarse_error` / 4^(p r) <= eps
     for elements of order p; of orders the one with the fewest nodes, about p^2 4^r. Of an element_size e, it is refined
@@ -67,19 +67,20 @@ def with_sizes(
 
 
 def _refinements(accuracy: float, materials: Mapping[str, Material], plane: str, order: int, free_faces: bool) -> int:
-    """The least r for which coarse_error / 4^(p r) is at most the accuracy."""
+    """Return the least r for which coarse_error / 4^(p r) is at most the accuracy."""
     error = coarse_error(materials, plane, order, free_faces)
     return max(0, math.ceil(math.log(error / accuracy, 4**order))) if error > 0 else 0
 
 
 def asked(cell: Cell) -> str:
-    """The key of which the sizes follow, with its value, as "accuracy = 0.001"; empty if the cell says them itself."""
+    """Return the key of which the sizes follow, with its value, as "accuracy = 0.001"; empty if the cell says them
+    itself."""
     values = {name: getattr(cell, name) for name in ASKED}
     return next((f"{name} = {value:g}" for name, value in values.items() if value is not None), "")
 
 
 def without_chosen(cell: Cell, table: dict[str, Any]) -> dict[str, Any]:
-    """The table [cell] of a cell without the sizes that it does not say but chooses."""
+    """Return the table [cell] of a cell without the sizes that it does not say but chooses."""
     return {name: value for name, value in table.items() if not (asked(cell) and name in CHOSEN)}
 
 
@@ -96,7 +97,7 @@ def coarsest(cell: Cell) -> float:
 
 
 def coarse_error(materials: Mapping[str, Material], plane: str, order: int, free_faces: bool) -> float:
-    """An upper estimate of the relative error of the strain energy on the coarsest mesh,
+    """Return an upper estimate of the relative error of the strain energy on the coarsest mesh,
 
         C_p kappa max s beta^2,  beta = |lambda - 1| / (lambda + 1),
 
@@ -123,6 +124,6 @@ def _contrast(ratios: Iterable[Float]) -> float:
 
 
 def _orthonormal(stiffness: Float) -> Float:
-    """A stiffness in the plane (3, 3) as one of orthonormal components, of [E11, E22, gamma12 / sqrt(2)]."""
+    """Return a stiffness in the plane (3, 3) as one of orthonormal components, of [E11, E22, gamma12 / sqrt(2)]."""
     scale = np.sqrt([1.0, 1.0, 2.0])
     return np.asarray(stiffness * np.outer(scale, scale))

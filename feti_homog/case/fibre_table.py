@@ -98,7 +98,7 @@ class FibreTable:
 
 
 def read_table(path: Path) -> FibreTable:
-    """The table in a text file, which is not judged as a whole: fibres may overlap.
+    """Return the table in a text file, which is not judged as a whole: fibres may overlap.
 
     A line of names comes first: x, y, radius (or a, b), and phase, coating, angle if there are any, in any order
     and case; then a line for each fibre. Columns are parted by commas, semicolons or tabs; without commas between
@@ -127,7 +127,7 @@ def read_table(path: Path) -> FibreTable:
 
 
 def table_of(entries: Sequence[Mapping[str, Any]], name: str) -> FibreTable:
-    """The table of a list of fibres with the same keys as columns have; its faults count its rows from 1.
+    """Return the table of a list of fibres with the same keys as columns have; its faults count its rows from 1.
 
     Raises:
         CaseError: the list is faulty; a line for each fault.
@@ -182,7 +182,7 @@ def _read_sizes(comment: str, row: int, sizes: dict[str, float], faults: _Faults
 
 
 def _number(word: str, delimiter: str) -> float | None:
-    """The number that a word is; None if it is none."""
+    """Return the number that a word is; None if it is none."""
     try:
         value = float(word if delimiter == "," else word.replace(",", "."))
     except ValueError:
@@ -231,7 +231,7 @@ def _split(
 def _table(
     name: str, rows: Mapping[int, Mapping[str, Any]], names: set[str], sizes: Mapping[str, float], faults: _Faults
 ) -> FibreTable:
-    """The table of rows whose cells are numbers, or texts where they are faulty."""
+    """Return the table of rows whose cells are numbers, or texts where they are faulty."""
     for row, cells in rows.items():
         for words in _cell_faults(cells):
             faults.add(row, words)
@@ -256,7 +256,7 @@ def _table(
 
 
 def _cell_faults(cells: Mapping[str, Any]) -> Iterator[str]:
-    """What is wrong with the cells of one row."""
+    """Yield the faults of one row."""
     has_size = any(set(sizes) <= cells.keys() for sizes in REPLACING)
     for key in ("x", "y", *([] if has_size else ["radius"])):
         if key not in cells:

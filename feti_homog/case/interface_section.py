@@ -151,18 +151,18 @@ class InterfaceSection:
 
 
 def interface_tables(document: Mapping[str, Any]) -> list[Any]:
-    """The section [interface], or all of several sections [[interface]]; none if there is none."""
+    """Return the section [interface], or all of several sections [[interface]]; none if there is none."""
     given = document.get("interface", [])
     return given if isinstance(given, list) else [given]
 
 
 def interface_label(number: int, count: int) -> str:
-    """What faults call an interface of so many; the numbers are from 0, the labels from 1."""
+    """Return the label of an interface in messages; numbers begin at 0, labels at 1."""
     return "interface" if count == 1 else f"interface {number + 1}"
 
 
 def read_interfaces(document: Mapping[str, Any], reader: TableReader) -> tuple[InterfaceSection, ...] | None:
-    """The sections of interfaces with their arcs, in the order of the file; None if one is faulty."""
+    """Return the sections of interfaces with their arcs, in the order of the file; None if one is faulty."""
     tables = interface_tables(document)
     if document.get("interface") == []:
         reader.faults.append("interface = []: expected a section [interface]")

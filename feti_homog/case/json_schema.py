@@ -32,7 +32,7 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def json_schema() -> Schema:
-    """The schema of a case file, with or without [sweep]."""
+    """Return the schema of a case file, with or without [sweep]."""
     return {
         "$schema": DIALECT,
         "title": "Case file of feti_homog",
@@ -69,7 +69,7 @@ def _several(table: Schema) -> Schema:
 
 
 def _definition(form: str) -> str:
-    """The name of a form as references, which have no spaces, take it."""
+    """Return the name of a form as references, which have no spaces, take it."""
     return form.replace(" ", "_")
 
 
@@ -108,18 +108,18 @@ def _sweep() -> Schema:
 
 
 def _axes() -> Schema:
-    """The axes of a section: a list of values, or a table of axes."""
+    """Return the axes of a section: a list of values, or a table of axes."""
     return {"description": AXIS_MEANING, "anyOf": [AXIS_VALUES, AXIS_TABLE]}
 
 
 def _axis() -> Schema:
-    """A list of values, a range, or a table of axes."""
+    """Return a list of values, a range, or a table of axes."""
     no_range = {"not": {"anyOf": [{"required": ["from"]}, {"required": ["to"]}]}}
     return {"description": AXIS_MEANING, "anyOf": [AXIS_VALUES, _reference("range"), AXIS_TABLE | no_range]}
 
 
 def _rules_of_one_case() -> Schema:
-    """What must be given, by conditions that are independent of each other."""
+    """Return the required keys, by independent conditions."""
     always = [_required(path, contents) for path, contents in PLACES_OF_TABLES]
     pairs = {"if": {"minItems": 2}, "then": {"items": {"required": ["between"]}}}  # of several [[interface]]
     rules = [*filter(None, always), *map(_rule, RULES), *_material_rules(), {"properties": {"interface": pairs}}]
@@ -127,13 +127,13 @@ def _rules_of_one_case() -> Schema:
 
 
 def _rule(rule: Rule) -> Schema:
-    """A rule that the reader has too."""
+    """Return a rule that the reader has too."""
     schema = _at(rule.path, rule.schema)
     return {"if": {"allOf": [_if(condition) for condition in rule.when]}, "then": schema} if rule.when else schema
 
 
 def _at(path: Sequence[str], schema: Schema | bool) -> Schema:
-    """The schema for what stands at a path, if it is there; of several sections of one name in each."""
+    """Return the schema for what stands at a path, if it is there; of several sections of one name in each."""
     if not path:
         return {"allOf": [schema]}
     name, *below = path
@@ -145,13 +145,13 @@ def _at(path: Sequence[str], schema: Schema | bool) -> Schema:
 
 
 def _required(path: Sequence[str], contents: type[Any]) -> Schema:
-    """The keys that a table always has; empty if there are none."""
+    """Return the keys that a table always has; empty if there are none."""
     names = [name for name, entry in keys_of(contents).items() if entry.required and not entry.only]
     return _at(path, {"required": names}) if names else {}
 
 
 def _if(condition: Condition) -> Schema:
-    """That a selector has one of some values; its default if it is not given."""
+    """Return the condition that a selector has one of some values, or that it is absent and its default is."""
     selector = condition.selector
     default = defaults_of(SECTIONS[selector.section]).get(selector.key)
     has_value: Schema = {"properties": {selector.key: {"enum": list(condition.values)}}}
@@ -199,14 +199,14 @@ def _each_material(schema: Schema) -> Schema:
 
 
 def _needs(form: type[Any], plane: str, names: Sequence[str]) -> Schema:
-    """What a plane state needs of a form of material, which is told by a key that it always has."""
+    """Return the requirements of a plane state on a form of material, identified by a key that it always has."""
     own = next(name for name, entry in keys_of(form).items() if entry.required)
     of_form = {"if": {"required": [own]}, "then": {"required": [*names]}}
     return {"if": _if(PLANE.among(plane)), "then": _each_material(of_form)}
 
 
 def _there(path: Sequence[str]) -> Schema:
-    """That there is something at a path, of a list in any of its items."""
+    """Return the condition that a path exists, in a list in any of its items."""
     schema: Schema = {}
     for name in reversed(path):
         schema = {"contains": schema} if name == ITEMS else {"required": [name], "properties": {name: schema}}

@@ -18,7 +18,7 @@ CONSTANTS = frozenset(name for form in MATERIAL_FORMS.values() for name in keys_
 
 
 def read_materials(table: object, cell: object, plane: str | None, reader: TableReader) -> dict[str, Material]:
-    """The materials by phase; what depends on a geometry, mix or plane state that is faulty is not checked.
+    """Return the materials by phase; what depends on a geometry, mix or plane state that is faulty is not checked.
 
     `cell` is the section [cell] as it stands in the document.
     """
@@ -43,7 +43,7 @@ def read_materials(table: object, cell: object, plane: str | None, reader: Table
 
 
 def fibre_phases(cell: object) -> tuple[str, ...] | None:
-    """What the fibres of a section [cell] without a file are made of, None if its mix is faulty."""
+    """Return the phases of the fibres of a section [cell] without a file, None if its mix is faulty."""
     mix = cell.get("mix") if isinstance(cell, dict) else None
     if mix is None:
         return (FIBRE,)
@@ -65,7 +65,8 @@ def coating_faults(cell: Cell, materials: Mapping[str, object]) -> list[str]:
 
 
 def _phase_fault(phase: str, known: tuple[str, ...] | None, geometry: str | None, owners: Mapping[str, str]) -> str:
-    """What is wrong with the name of a phase, empty if nothing; `known` are all that a cell has, None if any may be."""
+    """Return the fault of the name of a phase, empty if there is none; `known` are the phases of a cell, None if any
+    may occur."""
     section = f"[material.{toml_key(phase)}]"
     is_unknown = known is not None and ":" not in phase and phase not in known
     if is_unknown or not PHASE.fullmatch(phase) or phase in CONSTANTS:
@@ -77,7 +78,7 @@ def _phase_fault(phase: str, known: tuple[str, ...] | None, geometry: str | None
 
 
 def _read_material(table: object, section: str, plane: str | None, reader: TableReader) -> Material | None:
-    """The material of a section, in the form that its keys tell; None if it is faulty."""
+    """Return the material of a section, in the form that its keys tell; None if it is faulty."""
     given = _keys_by_form(table)
     forms = list(given) or ["isotropic"]
     if len(forms) > 1:
@@ -91,7 +92,7 @@ def _read_material(table: object, section: str, plane: str | None, reader: Table
 
 
 def _law_faults(material: Material, plane: str | None) -> list[str]:
-    """What is wrong with the constants of a material together; of the stiffness only if the plane state is known."""
+    """List the faults of the constants of a material together; of its stiffness only if the plane state is known."""
     faults = []
     try:
         if plane is not None:
@@ -124,7 +125,7 @@ def _expands_unknown(material: Material) -> bool:
 
 
 def _keys_by_form(table: object) -> dict[str, list[str]]:
-    """The keys of a table that belong to one form of a material alone, without the forms that have none."""
+    """Return the keys of a table that belong to one form of a material alone, without the forms that have none."""
     names = table if isinstance(table, dict) else {}
     forms_of = Counter(name for cls in MATERIAL_FORMS.values() for name in keys_of(cls))
     given = {
@@ -135,7 +136,7 @@ def _keys_by_form(table: object) -> dict[str, list[str]]:
 
 
 def provider(phase: str, materials: Mapping[str, Material]) -> str:
-    """The phase whose material a phase has: its own, or that of "fibre" for "fibre:2"."""
+    """Return the phase whose material a phase has: its own, or that of "fibre" for "fibre:2"."""
     return phase if phase in materials else phase.partition(":")[0]
 
 

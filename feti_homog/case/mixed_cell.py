@@ -47,7 +47,7 @@ def void_count(cell: Cell, fibre_radius: float) -> int:
 
 
 def fractions_in_words(cell: Cell) -> str:
-    """The keys with the fractions of a cell without a file, and their values."""
+    """Return the keys with the fractions of a cell without a file, and their values."""
     fibres = f"fibre_fraction = {cell.fibre_fraction:g}" if cell.mix is None else f"mix = {toml_value(dict(cell.mix))}"
     return f"{fibres}, voids = {cell.voids:g}" if cell.voids else fibres
 
@@ -62,7 +62,7 @@ def mixed_width(cell: Cell) -> float | None:
 
 
 def mix_faults(cell: Cell) -> list[str]:
-    """What is wrong with the numbers of a mix together."""
+    """List the faults of the numbers of a mix together."""
     if cell.mix is None:
         return []
     faults, given = [], f"[cell] mix = {toml_value(dict(cell.mix))}"

@@ -67,9 +67,8 @@ WAYPOINTS = list_of(
 
 
 def completed(loads: Sequence[Strain | MixedLoad], plane: str) -> tuple[dict[str, float], ...]:
-    """The loads of a path in full: of each component one name and value, and the temperature in generalized plane
-    strain. What a load does not name is that of the load before, at first a stress of zero.
-    """
+    """Return the loads of a path in full: of each component one name and value, and the temperature in generalized
+    plane strain. What a load does not name is that of the load before, at first a stress of zero."""
     state = PLANE_STATES[plane]
     unloaded = dict.fromkeys((*state.stresses, *[TEMPERATURE] * state.is_spatial), 0.0)
 
@@ -92,5 +91,5 @@ def first_named(loads: Sequence[Strain | MixedLoad], plane: str) -> dict[str, in
 
 
 def named(load: Strain | MixedLoad) -> dict[str, float]:
-    """What a load names, [E11, E22, gamma12] if it is a strain."""
+    """Return the named components of a load, [E11, E22, gamma12] if it is a strain."""
     return load.named if isinstance(load, MixedLoad) else dict(zip(STRAINS, load, strict=True))

@@ -29,7 +29,7 @@ def read_petsc(table: object, faults: list[str]) -> dict[str, Scalar]:
 
 
 def _option_fault(name: str, value: object) -> str:
-    """What is wrong with an option, empty if nothing."""
+    """Return the fault of an option, empty if there is none."""
     if name.startswith("-"):
         return "expected the option's name without its dash"
     if not re.fullmatch(PREFIXED, name):

@@ -84,7 +84,7 @@ def tables() -> list[TableReference]:
 
 
 def tables_of(section: str) -> list[TableReference]:
-    """The tables of a section. Raises CaseError if there is none of that name."""
+    """Return the tables of a section. Raises CaseError if there is none of that name."""
     found = [table for table in tables() if table.section == section]
     if not found:
         raise CaseError(f"{section}: unknown section; expected one of {', '.join(ORDER)}")
@@ -117,7 +117,7 @@ def _row(section: str, place: str, name: str, entry: Key) -> KeyRow:
 
 
 def _first_paragraph(cls: type[Any]) -> str:
-    """The first paragraph of a docstring, in one line."""
+    """Return the first paragraph of a docstring, in one line."""
     return " ".join((inspect.getdoc(cls) or "").partition("\n\n")[0].split())
 
 
@@ -151,7 +151,7 @@ def _range_table() -> TableReference:
 
 
 def as_text(references: Sequence[TableReference]) -> str:
-    """The tables in plain text: each key, then what it accepts and when, and what it means."""
+    """Return the tables in plain text: each key, then what it accepts and when, and what it means."""
     return "\n\n".join(map(_table_text, references))
 
 

@@ -46,12 +46,12 @@ NO_TABLES: Schema = {"not": {"anyOf": [{"type": "object"}, {"type": "array"}]}}
 
 
 def _any_section(schema: Schema) -> Schema:
-    """That a section, or one of several, is valid; what is neither is faulty elsewhere."""
+    """Return the condition that a section, or one of several, is valid; other types are faults elsewhere."""
     return {"anyOf": [{"type": "object", **schema}, {"type": "array", "contains": schema}, NO_TABLES]}
 
 
 def _values(selector: Selector) -> list[str]:
-    """The values that a selector may have."""
+    """Return the values that a selector may have."""
     values: list[str] = keys_of(SECTIONS[selector.section])[selector.key].type.json_schema["enum"]
     return values
 
@@ -77,12 +77,12 @@ def _conditional_keys() -> Iterator[Rule]:
 
 
 def _document(schema: Schema, line: str, *when: Condition) -> Rule:
-    """A rule for the document as a whole."""
+    """Return a rule for the document as a whole."""
     return Rule((), schema, lambda _: line, when)
 
 
 def _cell() -> Iterator[Rule]:
-    """What the keys of [cell] need, and which exclude each other."""
+    """Yield the requirements and exclusions among the keys of [cell]."""
     yield exclusive(CELL, "width", "fibre_radius")
     yield exclusive(CELL, *ASKED)
     yield Rule(
@@ -112,13 +112,13 @@ def _cell() -> Iterator[Rule]:
 
 
 def _sizes(place: Place) -> str:
-    """The fault of a cell that asks for a size or an accuracy, and gives sizes too."""
+    """Return the fault of a cell that asks for a size or an accuracy, and gives sizes too."""
     asked, *others = [name for name in (*ASKED, *CHOSEN) if name in place.value]
     return f"{place.named(asked, *others)}: exclude each other; {asked} chooses the sizes"
 
 
 def _files() -> Iterator[Rule]:
-    """A mesh comes in a file; the fibres of a table come in a file, or in a list beside the size of the cell."""
+    """Yield a mesh comes in a file; the fibres of a table come in a file, or in a list beside the size of the cell."""
     yield exclusive(CELL, "file", "fibre_list")
     yield needed(CELL, "file", f"missing; expected the name of a {MESH_FILE}", MESH)
     line = "missing; expected the name of a .csv file, or fibre_list"
@@ -144,7 +144,7 @@ def _loads() -> Iterator[Rule]:
 
 
 def _bonds() -> Iterator[Rule]:
-    """What is debonded where nothing else can debond, and what energies and envelopes need."""
+    """Yield the rules of debonded arcs, and the requirements of energies and envelopes."""
     line = f"[interface] debonded: missing; {ANGLE_ANALYSIS.in_words('interface')} needs {ARCS.expected}"
     yield _document(
         {"required": ["interface"], "properties": {"interface": _any_section(SOME_ARC)}}, line, ANGLE_ANALYSIS

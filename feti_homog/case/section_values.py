@@ -32,7 +32,7 @@ MESH_FILE = ".msh, .inp, .vtu or .vtk file"
 
 
 def _by_phase(words: str, example: str, number: ValueType) -> ValueType:
-    """A table of numbers by the phases of fibres."""
+    """Return a table of numbers by the phases of fibres."""
 
     def accepts(value: Any) -> bool:
         is_table = isinstance(value, dict) and value != {}
@@ -52,7 +52,7 @@ def _by_phase(words: str, example: str, number: ValueType) -> ValueType:
 
 
 def _positive_or_inf(what: str) -> ValueType:
-    """A number above 0; inf is read as None."""
+    """Return a number above 0; inf is read as None."""
     number = real(above=0.0)
     return ValueType(
         f"{what} above 0, or inf",

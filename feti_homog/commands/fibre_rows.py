@@ -12,8 +12,9 @@ from feti_homog.typing import Float
 
 
 def table(source: Path) -> str:
-    """The table of a case file or a folder of results: a row for each fibre, in the order of their numbers, and for
-    each void; with columns `a`, `b` and `angle` if any is an ellipse, and a column `coating` if any has one.
+    """Return the table of a case file or a folder of results: a row for each fibre, in the order of their numbers,
+    and for each void; with columns `a`, `b` and `angle` if any is an ellipse, and a column `coating` if any has
+    one.
 
     Its numbers are exact, so that it gives the same cell again.  On one rank.
 
@@ -45,5 +46,5 @@ def table(source: Path) -> str:
 
 
 def _words(values: Float) -> list[str]:
-    """The exact numbers (N,), nothing where they are NaN."""
+    """Return the exact numbers (N,), nothing where they are NaN."""
     return ["" if np.isnan(value) else repr(value) for value in values.tolist()]

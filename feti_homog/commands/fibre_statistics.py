@@ -45,7 +45,7 @@ def run(
 
 
 def pattern(source: Path, size: tuple[float, float] | None) -> FibrePattern:
-    """The fibres, at least two, in the source's unit of length.  On one rank.
+    """Return the fibres, at least two, in the source's unit of length. On one rank.
 
     Those of a table are in a window, of this width and height if the table has none; those of a folder or of a case, in
     a periodic cell. Voids are left out; ellipses count as discs of the same centres and areas.

@@ -34,7 +34,7 @@ def _report(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def _written_report(directory: Path) -> Path:
-    """The report; only a rank that writes it loads Bokeh."""
+    """Return the report; only a rank that writes it loads Bokeh."""
     from feti_homog.report.html import page
 
     return page.write(directory)

@@ -96,7 +96,7 @@ def _affine(macro: MacroElement, mesh: FineMesh, part: Int, tensor: Float) -> tu
 
 
 def _curved(macro: MacroElement, mesh: FineMesh, part: Int, tensor: Float) -> tuple[Float, Float, float]:
-    """The same of coarse triangles with curved edges, by integration over each of their elements."""
+    """Return the same of coarse triangles with curved edges, by integration over each of their elements."""
     elements = mesh.lattice.triangles
     g, w = gradients(mesh.points[mesh.nodes[part][:, elements].reshape(-1, elements.shape[1])])
     return macro.couples(products(g, w)) @ tensor, macro.nodes(integrals(g, w)), float(w.sum())
@@ -166,7 +166,7 @@ class MacroElement:
     @classmethod
     @lru_cache(maxsize=4)
     def of(cls, lattice: ReferenceLattice) -> MacroElement:
-        """The element of a lattice."""
+        """Return the element of a lattice."""
         elements, q = lattice.triangles, len(lattice.nodes)
         pair = elements[:, :, None] * q + elements[:, None, :]
         couples, nodes, each = GroupedSum.of(pair), GroupedSum.of(elements), np.unique(pair)

@@ -28,7 +28,7 @@ class Quadrature:
 
 @cache
 def quadrature(nodes: int) -> Quadrature:
-    """The rule for the 3- or 6-node triangle."""
+    """Return the rule for the 3- or 6-node triangle."""
     if nodes == 3:
         return Quadrature(np.array([[[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]]]), np.array([0.5]))
     x, y = _P2_POINTS.T

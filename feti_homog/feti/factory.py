@@ -79,7 +79,7 @@ class SolverParts:
 
 
 def database_options(thresholds: Thresholds = DEFAULTS) -> SolverOptions:
-    """What PETSc's database says.
+    """Read the options from PETSc's database.
 
     Raises:
         CaseError: an option has no such value.

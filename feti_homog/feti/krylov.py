@@ -168,7 +168,7 @@ class PrimalTest:
         return self._go_on(self._jump_stall.is_reached(iteration, jump))
 
     def _go_on(self, stalled: bool) -> PETSc.KSP.ConvergedReason:
-        """Iterating, or a breakdown."""
+        """Return iterating, or a breakdown."""
         if stalled and self.ends_on_stall:
             return PETSc.KSP.ConvergedReason.DIVERGED_BREAKDOWN
         return PETSc.KSP.ConvergedReason.ITERATING
@@ -217,7 +217,8 @@ class Krylov:
         self.ksp.setFromOptions()
 
     def solve(self, residual: Float) -> Float:
-        """The multipliers (rows, k) that remove the residual (rows, k), as far as `ksp` converged.  Collective.
+        """Return the multipliers (rows, k) that remove the residual (rows, k), as far as `ksp` converged.
+        Collective.
 
         Raises what operator, preconditioner or test raise on all ranks; a rank that raises alone ends the job.
         """
@@ -229,7 +230,8 @@ class Krylov:
         return found
 
     def describe(self, iterations: int) -> str:
-        """Iterations and condition number of the last solve, as the method estimates it and -feti_view prints."""
+        """Return iterations and condition number of the last solve, as the method estimates it and -feti_view
+        prints."""
         ksp, load_cases = self.ksp, self._columns
         words = f"FETI: {load_cases} load case{'s' * (load_cases > 1)}, {iterations} iterations"
         if not iterations or ksp.getType() not in ESTIMATES_SINGULAR_VALUES:

@@ -284,7 +284,7 @@ class FetiSolver:
         return [DualSolution(E, x, g, a, iterations, reason, float(left), C) for E, x, g, a, left in rows]
 
     def _krylov_for(self, columns: int) -> Krylov:
-        """The Krylov method for so many load cases, set up when first asked for."""
+        """Return the Krylov method for so many load cases, set up when first asked for."""
         if columns not in self._krylov:
             vector, parts = self.jump_operator.vector, (self.operator, self.preconditioner, self.natural, self.active)
             self._krylov[columns] = Krylov(self.comm, vector, *parts, columns)

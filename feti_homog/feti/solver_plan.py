@@ -36,7 +36,7 @@ class SolverOptions:
         number: Callable[[str, float], float],
         thresholds: Thresholds = DEFAULTS,
     ) -> SolverOptions:
-        """The options that text(name, default) and number(name, default) find, names without `feti_`.
+        """Return the options that text(name, default) and number(name, default) find, names without `feti_`.
 
         Raises:
             CaseError: an option has no such value.
@@ -105,7 +105,7 @@ class SolverPlan:
 
 
 def choose(sizes: ProblemSizes, options: SolverOptions, thresholds: Thresholds = DEFAULTS) -> SolverPlan:
-    """The parts for a problem of these sizes.
+    """Return the parts for a problem of these sizes.
 
     Raises:
         CaseError: two options exclude each other.

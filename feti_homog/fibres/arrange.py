@@ -22,7 +22,7 @@ JAMMED = 0.84
 
 
 def arrange(cell: Cell) -> Arrangement:
-    """The arrangement that a case asks for in a cell of width 1, its fractions `cell.fractions` to rounding.
+    """Return the arrangement that a case asks for in a cell of width 1, its fractions `cell.fractions` to rounding.
 
     square: one disc in the middle of a 1 x 1 cell. hexagonal: 1 x sqrt(3), a disc in the middle and one at
     the corner. random: discs in a 1 x 1 cell, see `random_arrangement`, with
@@ -35,7 +35,8 @@ def arrange(cell: Cell) -> Arrangement:
 
 
 def listed_arrangement(cell: Cell) -> Arrangement | None:
-    """The arrangement of a table; None of other cells, which may be too large to be arranged.  Raises as `arrange`."""
+    """Return the arrangement of a table; None of other cells, which may be too large to be arranged. Raises as
+    `arrange`."""
     return None if cell.table is None else table_arrangement(cell)
 
 

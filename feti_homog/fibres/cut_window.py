@@ -88,7 +88,7 @@ def moves(outlines: Outlines, size: Float) -> Float:
 
 
 def _gap_within(centres: Float, radii: Float, size: Float, reach: float, parting: Parting) -> float:
-    """The smallest gap / sum of the radii of discs that are not across the border, within its limits."""
+    """Return the smallest gap / sum of the radii of discs that are not across the border, within its limits."""
     first, second, vector = neighbours(centres, size, reach)
     across = np.abs(centres[second] - centres[first] - vector).max(axis=1) > TOLERANCE * radii.mean()
     normal, least = parting(first, second, vector)

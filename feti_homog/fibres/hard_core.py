@@ -16,8 +16,9 @@ DENSEST = 0.9
 
 
 def hard_core(pattern: FibrePattern, generator: np.random.Generator, max_steps: int = MAX_STEPS) -> FibrePattern:
-    """The same fibres elsewhere, as those of random cells are placed (`random_arrangement`): no gap is smaller than the
-    smallest one of the pattern.  Across the sides of a window they are placed as in a periodic cell.
+    """Return the same fibres elsewhere, as those of random cells are placed (`random_arrangement`): no gap is
+    smaller than the smallest one of the pattern. Across the sides of a window they are placed as in a periodic
+    cell.
 
     Raises:
         MeshError: no such pattern is found.
@@ -31,7 +32,7 @@ def hard_core(pattern: FibrePattern, generator: np.random.Generator, max_steps: 
 def placed(
     pattern: FibrePattern, gap: float, generator: np.random.Generator, max_steps: int = MAX_STEPS
 ) -> FibrePattern:
-    """The same fibres at random places at least `gap` from each other.  Raises MeshError if none are found."""
+    """Return the same fibres at random places at least `gap` from each other. Raises MeshError if none are found."""
     grown = pattern.radii + gap / 2
     attempts = ATTEMPTS if np.pi * np.sum(grown**2) < DENSEST * pattern.area else 0
     for _ in range(attempts):

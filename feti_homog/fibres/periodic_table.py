@@ -37,8 +37,9 @@ MOST_LISTED = 30  # moved fibres that are listed one by one
 
 
 def table_arrangement(cell: Cell) -> Arrangement:
-    """The fibres of the case's table, in the order of its rows, then its voids; periodic images are one, the first of
-    them. In a window that is cut out of something larger, fibres that overlap across its border are moved apart.
+    """Return the fibres of the case's table, in the order of its rows, then its voids; periodic images are one, the
+    first of them. In a window that is cut out of something larger, fibres that overlap across its border are moved
+    apart.
 
     A table that says where its cell begins keeps that place, if the sides are clear of tangency with its discs; the
     table of a cell gives the mesh of that cell. Else all is shifted (`clear_shift`), rounded and meshed in the order of
@@ -66,8 +67,8 @@ def table_arrangement(cell: Cell) -> Arrangement:
 
 
 def _nested(table: FibreTable, rows: Int, centres: Float, height: float) -> Arrangement:
-    """The rows (k,) about these centres / width of the cell: a ring around each outline that has a coating or that is a
-    void in a hollow fibre."""
+    """Return the rows (k,) about these centres / width of the cell: a ring around each outline that has a coating
+    or that is a void in a hollow fibre."""
     assert table.width is not None
     outlines, core = table.outlines[rows].per(table.width).at(centres), table.inner_radius[rows] / table.width
     radii, is_hollow = outlines.radii, core > 0
@@ -78,7 +79,7 @@ def _nested(table: FibreTable, rows: Int, centres: Float, height: float) -> Arra
 
 
 def _rounded(arrangement: Arrangement) -> Arrangement:
-    """The arrangement with coordinates of TABLE_DECIMALS, 0 on either side, in a cell of HEIGHT_DECIMALS."""
+    """Return the arrangement with coordinates of TABLE_DECIMALS, 0 on either side, in a cell of HEIGHT_DECIMALS."""
     outlines, least = arrangement.outlines.rounded(TABLE_DECIMALS), 10.0**-TABLE_DECIMALS
     return replace(
         arrangement,
@@ -89,7 +90,7 @@ def _rounded(arrangement: Arrangement) -> Arrangement:
 
 
 def _in_mesh_order(arrangement: Arrangement) -> Arrangement:
-    """The arrangement meshed in the order of its coordinates."""
+    """Return the arrangement meshed in the order of its coordinates."""
     x, y = arrangement.centres.T
     return replace(arrangement, mesh_order=np.lexsort((y, x)))
 
@@ -163,7 +164,7 @@ def _outside(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> li
 
 
 def _largest_sizes(table: FibreTable) -> tuple[Float, list[str]]:
-    """The largest of the lengths (N,) that rows give, and their columns."""
+    """Return the largest of the lengths (N,) that rows give, and their columns."""
     names = ["radius", *(name for shape in SHAPES for name in shape.sizes if name != "radius")]
     given = np.nan_to_num(np.stack([table.columns[name] for name in names]))
     return given.max(axis=0), [names[k] for k in given.argmax(axis=0).tolist()]

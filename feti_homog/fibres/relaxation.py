@@ -35,5 +35,5 @@ def relax(centres: Float, radii: Float, max_steps: int, size: tuple[float, float
 
 
 def _sum_at(rows: Int, vectors: Float, count: int) -> Float:
-    """Sums (count, 2) of the vectors (k, 2) of each row, added one after the other."""
+    """Return sums (count, 2) of the vectors (k, 2) of each row, added one after the other."""
     return np.stack([np.bincount(rows, vectors[:, axis], count) for axis in (0, 1)], axis=1)

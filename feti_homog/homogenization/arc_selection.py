@@ -77,7 +77,7 @@ class InterfaceNodes:
 
 
 def fibre_faults(case: Case, centres: Float) -> list[str]:
-    """What is wrong with the fibres of arcs in a cell whose fibres have these centres (fibres, 2), NaN where there is
+    """List the faults of the fibres of arcs in a cell whose fibres have these centres (fibres, 2), NaN where there is
     none."""
     return [
         fault

@@ -100,7 +100,7 @@ class Homogenization:
         return [self.response(self.interface.equilibrium(Load.strain(E), bonds, start), 1.0) for E, start in pairs]
 
     def response(self, state: Equilibrium, scale: float) -> Response:
-        """The averages of `scale` times an equilibrium.  Collective.
+        """Return the averages of `scale` times an equilibrium. Collective.
 
         Raises:
             ConvergenceError: its numbers are not finite.
@@ -134,7 +134,7 @@ class Homogenization:
         return Response(*means, scale, *energies, state, scale * u, checks | state.certificate, counts)
 
     def _unmet_stress(self, state: Equilibrium, stress: Float) -> float:
-        """The error of the prescribed stresses.  Collective."""
+        """Return the error of the prescribed stresses. Collective."""
         load, scales = state.load, self.interface.scales
         # Scaled by the roots of their stiffnesses, so that none is small beside another.
         root, imposed = scales.roots, scales.imposed_strain(state.solution.strain)

@@ -21,7 +21,7 @@ from feti_homog.parallel.mpi_errors import on_root_only
 
 
 def describe(case: Case, comm: MPI.Intracomm) -> str:
-    """What a run of the case on these ranks would do, in words; empty but on rank 0.  Collective.
+    """Describe a run of the case on these ranks; empty except on rank 0.  Collective.
 
     Raises as `tear`.
     """
@@ -41,7 +41,7 @@ def _described(
     loads: Sequence[tuple[int, int]],
     options: SolverOptions,
 ) -> str:
-    """That of `describe`; `loads` are the subdomains and the coarse triangles of each rank."""
+    """Return the text of `describe`; `loads` are the subdomains and the coarse triangles of each rank."""
     own = [subdomains for subdomains, _ in loads]
     nodes = [triangles * lattice.intervals**2 // 2 for _, triangles in loads]
     problems = {problem.components: cost_model.applications(case, problem) for problem in phase_laws.problems(case)}

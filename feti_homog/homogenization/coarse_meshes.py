@@ -49,12 +49,12 @@ def place_nodes(case: Case, comm: MPI.Intracomm, policy: TilePolicy) -> NodedCel
 
 
 def _with_nodes(unmeshed: UnmeshedCell, stations: list[LineStations]) -> NodedCell:
-    """The cell with the nodes that ranks have placed."""
+    """Return the cell with the nodes that ranks have placed."""
     return unmeshed.with_nodes(LineStations.joined(stations, unmeshed.bare.lines.sampling))
 
 
 def begin_mesh(case: Case, policy: TilePolicy) -> UnmeshedCell | NodedCell | CoarseMesh:
-    """A user's mesh, or the cell as far as rank 0 makes it alone.
+    """Return a user's mesh, or the cell as far as rank 0 makes it alone.
 
     Raises:
         CaseError: a phase has no material, or a material no phase.
@@ -73,7 +73,7 @@ def begin_mesh(case: Case, policy: TilePolicy) -> UnmeshedCell | NodedCell | Coa
 
 
 def fill_tiles(found: NodedCell | CoarseMesh | None, comm: MPI.Intracomm) -> CoarseMesh | None:
-    """The mesh on rank 0, the tiles that it has from `place_nodes` filled by all ranks.  Collective.
+    """Return the mesh on rank 0, the tiles that it has from `place_nodes` filled by all ranks. Collective.
 
     Raises:
         MeshError: on every rank, if one cannot fill a tile of its.
@@ -103,5 +103,5 @@ def fill_own(tiles: list[tuple[int, Tile]]) -> list[tuple[int, Filling]]:
 
 
 def _joined(found: NodedCell | CoarseMesh, fillings: list[Filling]) -> CoarseMesh:
-    """The mesh of these filled tiles, if it is not there already."""
+    """Return the mesh of these filled tiles, if it is not there already."""
     return found if isinstance(found, CoarseMesh) else found.mesh(fillings)

@@ -74,7 +74,7 @@ def estimate(
     problems: Mapping[int, int],
     columns: int,
 ) -> Estimate:
-    """What a case takes with `nodes` and `subdomains` on each rank; `problems` has for each problem, by its
+    """Estimate the cost of a case with `nodes` and `subdomains` on each rank; `problems` has for each problem, by its
     displacements of a node, how many times it applies its dual operator, and `columns` multipliers have influence
     columns.
 
@@ -92,7 +92,7 @@ def estimate(
 
 
 def estimate_lines(found: Estimate, n_ranks: int) -> list[str]:
-    """An estimate for `n_ranks` ranks in two lines, each with a label of eleven columns."""
+    """Return an estimate for `n_ranks` ranks in two lines, each with a label of eleven columns."""
     size = found.memory / 2**20
     memory = f"{size:.0f} MiB" if size < 1000 else f"{size / 1024:.1f} GiB"
     noun = "rank" if n_ranks == 1 else "ranks"
@@ -103,7 +103,7 @@ def estimate_lines(found: Estimate, n_ranks: int) -> list[str]:
 
 
 def _rounded(seconds: float) -> str:
-    """A time in words, to two digits."""
+    """Return a time in words, to two digits."""
     if seconds < 120:
         return f"{seconds:.2g} s"
     return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"

@@ -70,7 +70,7 @@ class _Elements:
         self._elements_of = csr_matrix(entries, shape=(len(mesh.points), len(mesh.triangles)))
 
     def energy_change(self, tip: Float, spoke: Float, reach: float, u: Float, E: Float) -> float:
-        """The same of these elements and one tip; u (plane nodes, 2)."""
+        """Return the same of these elements and one tip; u (plane nodes, 2)."""
         near = self._tree.query_ball_point(wrapped(tip, self.period), reach)
         if not near:
             return 0.0
@@ -109,7 +109,7 @@ def body_boundaries(comm: MPI.Comm, subdomains: Sequence[Subdomain]) -> tuple[Fl
 
 
 def _of_all(comm: MPI.Comm, own: list[Array], none: Array) -> Array:
-    """The rows of all ranks; `none` has no rows.  Collective."""
+    """Return the rows of all ranks; `none` has no rows. Collective."""
     rows: Array = np.concatenate(comm.allgather(np.concatenate([none, *own])))
     return rows
 
@@ -145,5 +145,5 @@ def wrapped(points: Float, period: Float) -> Float:
 
 
 def nearest_image(offset: Float, period: Float) -> Float:
-    """The shortest images of offsets (..., 2)."""
+    """Return the shortest images of offsets (..., 2)."""
     return np.asarray(offset - np.round(offset / period) * period)

@@ -121,7 +121,7 @@ class CellSummary:
         return np.asarray(self.numbers[constituent])
 
     def warnings(self) -> list[str]:
-        """What was changed in a user's mesh, in words."""
+        """List the changes made to a user's mesh."""
         moved = f"nodes on the sides of the mesh were moved by up to {self.snapped:.3g} to match"
         return [moved] if self.snapped > 0 else []
 
@@ -209,7 +209,7 @@ def distribute(
 
 
 def match_distance(case: Case, width: float, height: float, centres: Float, radii: Float) -> float | None:
-    """That of `CellSummary`, for fibres of these centres (n, 2) and radii (n,)."""
+    """Return the match distance of fibres with these centres (n, 2) and radii (n,)."""
     window = case.cell.matched
     return None if window is None else distance_of(window, width, height, centres, radii)
 
@@ -249,7 +249,7 @@ def wanted_pieces(
 
 
 def in_cell(points: Float, period: Float) -> Float:
-    """The images of points (k, 2) in [0, period); those that rounding puts at its end are at 0."""
+    """Return the images of points (k, 2) in [0, period); those that rounding puts at its end are at 0."""
     inside = np.mod(points, period)
     return np.where(inside > (1 - ROUNDING) * period, 0.0, inside)
 

@@ -80,7 +80,7 @@ class EnergyReleaseRates:
     """
 
     def __init__(self, cell: TornCell, interface: ContactProblem) -> None:
-        """Collective."""
+        """Find the tips and their neighbours.  Collective."""
         nodes = interface.nodes
         self.cell, self.interface, self._period = cell, interface, cell.summary.period
         neighbours = InterfaceNeighbours(cell.comm, cell.solver.jump_operator, cell.subdomains)
@@ -113,7 +113,7 @@ class EnergyReleaseRates:
         )
 
     def _tips(self, status: Status) -> CrackTips:
-        """The tips on circles, in the order of fibres, interfaces and directions."""
+        """Return the tips on circles, in the order of fibres, interfaces and directions."""
         found = self._chains.tips(status)
         order = np.lexsort((self.direction[found.node], self.pair[found.node], self._numbers(found)))
         return found.chosen(order[np.isfinite(self._radius(found)[order])])
@@ -186,7 +186,7 @@ class EnergyReleaseRates:
         return work, length
 
     def _gathered(self, values: Array) -> Array:
-        """The values of the interface nodes of all ranks.  Collective."""
+        """Return the values of the interface nodes of all ranks. Collective."""
         gathered: Array = np.concatenate(self.cell.comm.allgather(values))
         return gathered
 

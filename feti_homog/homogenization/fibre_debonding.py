@@ -17,7 +17,7 @@ class FibreInterfaces:
     """
 
     def __init__(self, cell: TornCell) -> None:
-        """Collective."""
+        """Sum the lengths of all interfaces.  Collective."""
         self._comm, self._nodes = cell.comm, cell.solver.jump_operator.nodes
         self._fibres, self._pairs = cell.summary.fibres, len(cell.case.interfaces)
         self._fibre = cell.summary.fibre_number(self._nodes.fibre) - 1
@@ -37,7 +37,7 @@ class FibreInterfaces:
         return np.asarray(length * self._degrees)
 
     def share(self, length: Float) -> float:
-        """What lengths (f,) are of all interfaces."""
+        """Return the share of lengths (f,) in all interfaces."""
         return float(length.sum() / (self._length.sum() or 1.0))
 
     def shares(self, status: Status) -> Float:

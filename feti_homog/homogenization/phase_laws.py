@@ -22,8 +22,8 @@ IN_PLANE, AXIAL_SHEAR = [0, 1, 5, 2], [4, 3]
 
 
 def problems(case: Case) -> tuple[Problem, ...]:
-    """The problem of the plane and, if strains along the fibres are loads, the axial one; a temperature is a load if
-    the phases say how they expand."""
+    """Return the problem of the plane and, if strains along the fibres are loads, the axial one; a temperature is a
+    load if the phases say how they expand."""
     if not PLANE_STATES[case.analysis.plane].is_spatial:
         return (PLANE,)
     if any(expansion(material) is None for material in case.materials.values()):
@@ -32,7 +32,7 @@ def problems(case: Case) -> tuple[Problem, ...]:
 
 
 def plane_problem(case: Case) -> Problem:
-    """The problem of the displacements in the plane."""
+    """Return the problem of the displacements in the plane."""
     return problems(case)[0]
 
 

@@ -20,14 +20,14 @@ LARGEST_REFINE, SMALLEST_SIZE = 8, 1e-5
 
 
 def longest_edge(mesh: CoarseMesh) -> float:
-    """The longest edge between phases; 0 if there is none."""
+    """Return the longest edge between phases; 0 if there is none."""
     ends = mesh.points[interface_edges(mesh)]
     return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max(initial=0.0))
 
 
 def process_zone(case: Case) -> float | None:
-    """The length E' G_Ic / sigma_c^2 of bonds that break by energy, sigma_c = sqrt(2 k_n G_Ic), of several interfaces
-    the least; None of others.
+    """Return the length E' G_Ic / sigma_c^2 of bonds that break by energy, sigma_c = sqrt(2 k_n G_Ic), of several
+    interfaces the least; None of others.
 
     E' is Young's modulus of the plane state, E / (1 - nu^2) in plane strain, of the most compliant phase, which the
     matrix is in general, and of its most compliant axis.
@@ -40,7 +40,7 @@ def process_zone(case: Case) -> float | None:
 
 
 def warnings(case: Case, width: float, edge: float) -> list[str]:
-    """A line if elements on the interface do not resolve the process zone, and what would.
+    """Return a line if elements on the interface do not resolve the process zone, and what would.
 
     Args:
         width: of the cell.

@@ -49,7 +49,7 @@ def can_be_torn_by_tiles(case: Case, noded: NodedCell) -> bool:
 def tear_by_tiles(
     case: Case, noded: NodedCell | None, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: PartitionPolicy
 ) -> RankShare:
-    """This rank's share of the cell whose lines rank 0 has with nodes.  Collective.
+    """Return this rank's share of the cell whose lines rank 0 holds with nodes.  Collective.
 
     Raises:
         CaseError, MeshError: on every rank, as `tiled_cell` and `filling.fill`.
@@ -72,7 +72,7 @@ def tear_by_tiles(
 
 
 def _filled(noded: NodedCell | None, regions: Regions, comm: MPI.Intracomm) -> tuple[Torus, Int]:
-    """The torus of the tiles that this rank fills, and the tile (m,) of each triangle.  Collective."""
+    """Return the torus of the tiles that this rank fills, and the tile (m,) of each triangle. Collective."""
     tiles = on_root_only(comm, tiles_to_fill, noded) or []
     own = deal_tiles(tiles, [len(tile.nodes) for tile in tiles], comm)
     fillings = agree(comm, fill_own, [(k, tile.tile) for k, tile in own])
@@ -96,8 +96,8 @@ def _cut(torus: Torus, tile: Int, pieces_per_triangle: Float, longest: float) ->
 
 
 def _numbered(torus: Torus, tile: Int, local: Int, comm: MPI.Intracomm) -> tuple[Int, Int, Int]:
-    """The subdomain (m,) of each triangle, numbered body by body and tile by tile in the whole cell, from those of this
-    rank; the body (s,) and the triangles (s,) of each subdomain.  Collective."""
+    """Return the subdomain (m,) of each triangle, numbered body by body and tile by tile in the whole cell, from
+    those of this rank; the body (s,) and the triangles (s,) of each subdomain. Collective."""
     first = np.unique(local, return_index=True)[1]
     parts = comm.allgather((torus.constituent[first], tile[first], np.bincount(local)))
     body, tiles, load = (np.concatenate(some) for some in zip(*parts, strict=True))
@@ -125,7 +125,7 @@ def _assigned(load: Int, neighbours: list[tuple[Int, Int, Int, Int]], n_ranks: i
 
 
 def _shares(torus: Torus, subdomain: Int, table: SubdomainTable, n_ranks: int, pinned: int) -> list[SubmeshesOfRank]:
-    """What each rank gets of the triangles of this one."""
+    """Yield the triangles of this rank for each rank."""
     return list(cut_for_ranks(torus, subdomain, table, n_ranks, pinned))
 
 
@@ -155,7 +155,7 @@ class TiledCell:
 
 
 def tiled_cell(case: Case, noded: NodedCell) -> TiledCell:
-    """That of a cell without debonded arcs.
+    """Return the tiled cell without debonded arcs.
 
     Raises:
         CaseError: an interface of the case is between phases that do not touch.
@@ -180,14 +180,14 @@ def tiled_cell(case: Case, noded: NodedCell) -> TiledCell:
 
 
 def tiles_to_fill(noded: NodedCell) -> list[NumberedTile]:
-    """The tiles of a noded."""
+    """Return the tiles of a noded."""
     lines, arrangement = noded.lines, noded.arrangement
     stands_for = representatives(lines.points, arrangement.width, arrangement.height).astype(np.int64)
     return [NumberedTile(nodes, stands_for[nodes], tile) for nodes, tile in noded.parts]
 
 
 def summary_of(case: Case, noded: NodedCell, subdomains: int, triangles: int) -> CellSummary:
-    """That of the cell, cut into so many subdomains of so many coarse triangles."""
+    """Return the summary of the cell, cut into so many subdomains of so many coarse triangles."""
     regions, lines, arrangement = noded.regions, noded.lines, noded.arrangement
     own = regions.constituent[:-1]
     solid = np.flatnonzero(own >= 0)

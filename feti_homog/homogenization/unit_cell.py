@@ -124,7 +124,7 @@ def tear(
     thresholds: Thresholds = DEFAULTS,
     policy: PartitionPolicy = DEFAULT_POLICY,
 ) -> TornCell:
-    """The torn cell of a case, its subdomains factored.  Collective.
+    """Return the torn cell of a case, its subdomains factored. Collective.
 
     Raises:
         CaseError, MeshError: on every rank.
@@ -149,7 +149,7 @@ def tear(
 
 
 def assemble_axial(case: Case, subdomains: Sequence[Subdomain]) -> list[Subdomain]:
-    """The subdomains of this rank with the displacement along the fibres, on the meshes that they have."""
+    """Return the subdomains of this rank with the displacement along the fibres, on the meshes that they have."""
     return [
         Subdomain.on(s.submesh, s.mesh, phase_laws.axial_law(case, s.submesh.phase), AXIAL, **_flags(s.submesh.phase))
         for s in subdomains
@@ -183,7 +183,7 @@ def assemble_subdomains(
 
 
 def cut(case: Case, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: PartitionPolicy) -> RankShare:
-    """This rank's share of the cell, meshed and cut.  Collective."""
+    """Return this rank's share of the cell, meshed and cut.  Collective."""
     found = place_nodes(case, comm, policy.tiles)
     if comm.bcast(isinstance(found, NodedCell) and can_be_torn_by_tiles(case, found)):
         assert not isinstance(found, CoarseMesh)
@@ -193,7 +193,7 @@ def cut(case: Case, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: Part
 
 
 def _assemble(case: Case, submeshes: SubmeshesOfRank, lattice: ReferenceLattice) -> list[Subdomain]:
-    """The subdomains of this rank, refined and assembled."""
+    """Return the subdomains of this rank, refined and assembled."""
     problem = phase_laws.plane_problem(case)
     return [
         Subdomain.build(s, lattice, phase_laws.plane_law(case, s.phase), problem, **_flags(s.phase))
@@ -202,5 +202,5 @@ def _assemble(case: Case, submeshes: SubmeshesOfRank, lattice: ReferenceLattice)
 
 
 def _flags(phase: str) -> dict[str, bool]:
-    """What the dual solver needs to know of a body of this phase."""
+    """Return the flags of a subdomain of this phase for the dual solver."""
     return {"is_thin": phase == COATING, "is_outer": phase == MATRIX}

@@ -44,7 +44,7 @@ class Bounds:
 
 
 def engineering_moduli(stiffness: ArrayLike) -> Moduli:
-    """The moduli of a stiffness C, with compliance S = C^-1: E_i = 1/S_ii, nu_ij = -S_ji/S_ii, G12 = 1/S_33.
+    """Return the moduli of a stiffness C, with compliance S = C^-1: E_i = 1/S_ii, nu_ij = -S_ji/S_ii, G12 = 1/S_33.
 
     Raises numpy.linalg.LinAlgError if C is singular.
     """

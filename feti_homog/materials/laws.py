@@ -42,7 +42,8 @@ WORRYING_CONTRAST, LARGEST_CONTRAST = 1e10, 1e14
 
 
 def stiffness_of(material: Material, plane: str) -> Float:
-    """The stiffness (3, 3) in the plane, or (6, 6) if the plane state is one of space.  Raises as `plane_stiffness`."""
+    """Return the stiffness (3, 3) in the plane, or (6, 6) if the plane state is one of space. Raises as
+    `plane_stiffness`."""
     return spatial_stiffness(material) if PLANE_STATES[plane].is_spatial else plane_stiffness(material, plane)
 
 
@@ -143,7 +144,7 @@ def _general_in_plane(stiffness: Float, plane: str) -> Float:
 
 
 def _given_stiffness(material: General) -> Float:
-    """The stiffness of a phase that gives it, (3, 3) or (6, 6), checked."""
+    """Return the stiffness of a phase that gives it, (3, 3) or (6, 6), checked."""
     given = np.array(material.stiffness)
     noise = 1e-9 * np.abs(given).max()
     if not np.allclose(given, given.T, rtol=0.0, atol=noise):
@@ -157,7 +158,7 @@ def _given_stiffness(material: General) -> Float:
 
 
 def _uncoupled(stiffness: Float, noise: float) -> Float:
-    """The stiffness (6, 6) with zeros in place of couplings that are noise; ValueError if one is more."""
+    """Return the stiffness (6, 6) with zeros in place of couplings that are noise; ValueError if one is more."""
     i, j = max(COUPLINGS, key=lambda entry: float(abs(stiffness[entry])))
     if abs(stiffness[i, j]) > noise:
         entry = f"C{i + 1}{j + 1} = {float(stiffness[i, j])}"
@@ -222,12 +223,12 @@ def known_compliance(material: Orthotropic | TransverselyIsotropic) -> Float:
 
 
 def _numbers(*constants: float | None) -> list[float]:
-    """The constants, NaN for those that are not given."""
+    """Return the constants, NaN for those that are not given."""
     return [np.nan if constant is None else constant for constant in constants]
 
 
 def _limit_in_plane(material: Orthotropic | TransverselyIsotropic) -> str:
-    """What is wrong with the constants of the plane."""
+    """Return the fault of the constants of the plane, empty if there is none."""
     if isinstance(material, TransverselyIsotropic):
         return f"nu_transverse = {material.nu_transverse}: expected a number above -1 and below 1"
     limit = limit_in_words(material.E1 / material.E2, material.nu12**2, 6)
@@ -235,7 +236,7 @@ def _limit_in_plane(material: Orthotropic | TransverselyIsotropic) -> str:
 
 
 def _limit_in_space(material: Orthotropic | TransverselyIsotropic) -> str:
-    """What is wrong with constants of which those of the plane are right."""
+    """Return the fault of constants whose plane part is valid, empty if there is none."""
     if isinstance(material, Orthotropic):
         return "E1, E2, E3, nu12, nu13, nu23: expected a positive definite compliance"
     E_transverse, E_axial, nu_axial = _numbers(material.E_transverse, material.E_axial, material.nu_axial)
@@ -245,7 +246,7 @@ def _limit_in_space(material: Orthotropic | TransverselyIsotropic) -> str:
 
 
 def contrast_faults(materials: Mapping[str, Material], plane: str) -> list[str]:
-    """A fault if the phases are too far apart; their constants are those of stable materials."""
+    """Return a fault if the phases are too far apart; their constants are those of stable materials."""
     contrast, phases = _contrast(materials, plane)
     if contrast <= LARGEST_CONTRAST:
         return []
@@ -253,7 +254,7 @@ def contrast_faults(materials: Mapping[str, Material], plane: str) -> list[str]:
 
 
 def contrast_warnings(materials: Mapping[str, Material], plane: str) -> list[str]:
-    """A warning if rounding may matter."""
+    """Return a warning if rounding may matter."""
     contrast, phases = _contrast(materials, plane)
     if contrast <= WORRYING_CONTRAST:
         return []
@@ -261,7 +262,7 @@ def contrast_warnings(materials: Mapping[str, Material], plane: str) -> list[str
 
 
 def _contrast(materials: Mapping[str, Material], plane: str) -> tuple[float, str]:
-    """The largest ratio of the largest entries of two phases' stiffnesses, and the sections of these phases."""
+    """Return the largest ratio of the largest entries of two phases' stiffnesses, and the sections of these phases."""
     with np.errstate(over="ignore"):
         sizes = {phase: float(np.abs(stiffness_of(material, plane)).max()) for phase, material in materials.items()}
     stiffest, softest = max(sizes, key=sizes.__getitem__), min(sizes, key=sizes.__getitem__)

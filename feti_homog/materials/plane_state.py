@@ -54,5 +54,5 @@ PLANE_STATES = {state.name: state for state in (PLANE_STRAIN, PLANE_STRESS, GENE
 
 
 def plane_state_of(document: Mapping[str, Any]) -> PlaneState:
-    """The plane state of a result.json."""
+    """Return the plane state of a result.json."""
     return PLANE_STATES[document["case"]["analysis"]["plane"]]

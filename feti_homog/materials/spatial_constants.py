@@ -68,7 +68,7 @@ class TransverseModuli:
 
 
 def transverse_moduli(stiffness: ArrayLike) -> TransverseModuli:
-    """What 1/E = sigma:S:sigma, sigma = n n, and 1/G, sigma = n t + t n, range over with n across x3, t across both.
+    """Return the ranges of 1/E = sigma:S:sigma, sigma = n n, and 1/G, sigma = n t + t n, n across x3, t across both.
 
     Raises numpy.linalg.LinAlgError if C is singular.
     """
@@ -82,7 +82,8 @@ def transverse_moduli(stiffness: ArrayLike) -> TransverseModuli:
 
 
 def engineering_constants(stiffness: ArrayLike) -> EngineeringConstants:
-    """The constants of a stiffness C, with compliance S = C^-1: E_i = 1/S_ii, nu_ij = -S_ji/S_ii, G_ij = 1/S_kk.
+    """Return the constants of a stiffness C, with compliance S = C^-1: E_i = 1/S_ii, nu_ij = -S_ji/S_ii, G_ij =
+    1/S_kk.
 
     Raises numpy.linalg.LinAlgError if C is singular.
     """

@@ -12,7 +12,7 @@ from feti_homog.typing import Float, Int, Int32
 
 
 def paired_sides(points: Float, period: Float) -> Iterator[tuple[int, Int, Int]]:
-    """The pairs of points that differ by a period; of sides that match, these are the i-th along each.
+    """Yield the pairs of points that differ by a period; of sides that match, these are the i-th along each.
 
     Args:
         points: (n, 2) nodes, or middles of edges; those on sides are exactly at 0 or at the period.

@@ -25,7 +25,7 @@ def void_edges(mesh: CoarseMesh) -> Int32:
 
 
 def voids(mesh: CoarseMesh) -> int:
-    """Number of connected boundaries of voids on the torus."""
+    """Count the connected boundaries of voids on the torus."""
     pairs = mesh.representative[void_edges(mesh)]
     classes, ends = np.unique(pairs, return_inverse=True)
     ends = ends.reshape(-1, 2)
@@ -43,7 +43,7 @@ def can_debond(mesh: CoarseMesh, pairs: Int32) -> Bool:
 
 
 def _neighbours(mesh: CoarseMesh) -> tuple[Int32, Index]:
-    """The triangles' edges (3m, 2), low copies on sides, and the two places (e, 2) of those that have two."""
+    """Return the triangles' edges (3m, 2), low copies on sides, and the two places (e, 2) of those that have two."""
     pairs = _low_copies(mesh, edges(mesh.triangles))
     keys = edge_keys(pairs, len(mesh.points))
     order = np.argsort(keys, kind="stable")

@@ -56,7 +56,7 @@ class Arcs:
         return self.cap[line]
 
     def chosen(self, those: slice) -> Arcs:
-        """Some of them."""
+        """Return some of them."""
         return Arcs(self.circles[those], self.start[those], self.span[those], self.cap[those])
 
 
@@ -91,7 +91,7 @@ class Segments:
         return np.asarray(low + share * (high - low))
 
     def chosen(self, those: slice) -> Segments:
-        """Some of them."""
+        """Return some of them."""
         return Segments(self.begin[those], self.way[those], self.cap[those])
 
 

@@ -202,7 +202,7 @@ def places_by_depth(depth: Float | Int, phase: Int, phases: tuple[str, ...]) -> 
 
 
 def edge_pairs(triangle_edges: Int) -> tuple[Int, Int]:
-    """The triangles on either side of each edge that two of them share: two arrays, in the edges' order."""
+    """Return the triangles on either side of each edge that two of them share: two arrays, in the edges' order."""
     flat = triangle_edges.ravel()
     order = np.argsort(flat, kind="stable")
     twice = flat[order][1:] == flat[order][:-1]
@@ -210,13 +210,13 @@ def edge_pairs(triangle_edges: Int) -> tuple[Int, Int]:
 
 
 def components(n: int, left: Int, right: Int) -> Int:
-    """Connected components of the graph on n vertices with edges (left, right): (n,) labels."""
+    """Return connected components of the graph on n vertices with edges (left, right): (n,) labels."""
     graph = coo_matrix((np.ones(len(left), np.int8), (left, right)), shape=(n, n))
     return np.asarray(connected_components(graph, directed=False)[1], np.int64)
 
 
 def _renumber(label: Int, order: Int) -> Int:
-    """Number the labels by their first appearance in `order`."""
+    """Assign numbers to the labels by their first appearance in `order`."""
     first = np.unique(label[order], return_index=True)[1]
     rank = np.empty_like(first)
     rank[np.argsort(first)] = np.arange(len(first))

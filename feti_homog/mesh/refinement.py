@@ -33,7 +33,7 @@ class ReferenceLattice:
 
     @classmethod
     def of(cls, refine: int, order: int) -> ReferenceLattice:
-        """The lattice of `refine` halvings for elements of the given order (1 or 2)."""
+        """Return the lattice of `refine` halvings for elements of the given order (1 or 2)."""
         m = order * 2**refine
         corners = np.array([[[m, 0, 0], [0, m, 0], [0, 0, m]]])
         for _ in range(refine):

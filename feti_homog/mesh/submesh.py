@@ -79,7 +79,7 @@ class SubdomainTable:
 
     @classmethod
     def of(cls, torus: Torus, subdomain: Int, rank: Int) -> SubdomainTable:
-        """That of a whole cell whose triangles are in these subdomains (m,), numbered from 0 without gaps."""
+        """Make the table of a whole cell whose triangles are in these subdomains (m,), numbered from 0 without gaps."""
         first = np.unique(subdomain, return_index=True)[1]
         return cls(torus.constituent[first], rank, torus.nesting, torus.constituent_phase)
 
@@ -113,7 +113,7 @@ class SubmeshesOfRank:
         return np.bincount(self.member, minlength=len(self.index))
 
     def cut(self) -> list[Submesh]:
-        """The subdomains."""
+        """Return the subdomains."""
         order = np.argsort(self.member, kind="stable")
         members = np.split(order, np.cumsum(self.loads))[:-1]
         pieces = [part(self.whole, those) for those in members]
@@ -124,8 +124,10 @@ class SubmeshesOfRank:
 def cut_for_ranks(
     torus: Torus, subdomain: Int, table: SubdomainTable, n_ranks: int, pinned: int
 ) -> Iterator[SubmeshesOfRank]:
-    """What each rank gets of these triangles, which are in the subdomains `subdomain` (m,); `pinned` is the key of the
-    pinned class."""
+    """Yield the part of each rank in these triangles, which are in the subdomains `subdomain` (m,).
+
+    `pinned` is the key of the pinned class.
+    """
     for r in range(n_ranks):
         members = np.flatnonzero(table.rank[subdomain] == r)
         index, member = np.unique(subdomain[members], return_inverse=True)
@@ -140,7 +142,7 @@ def cut_for_ranks(
 
 
 def cut_bodies(torus: Torus, members: Int) -> Iterator[Submesh]:
-    """The triangles `members` (m,) as a submesh for each constituent that has some; none is pinned."""
+    """Yield the triangles `members` (m,) as a submesh for each constituent that has some; none is pinned."""
     order = members[np.argsort(torus.constituent[members], kind="stable")]
     ends = np.flatnonzero(np.diff(torus.constituent[order])) + 1
     for own in np.split(order, ends) if len(order) else ():
@@ -148,7 +150,7 @@ def cut_bodies(torus: Torus, members: Int) -> Iterator[Submesh]:
 
 
 def part(submesh: Submesh, members: Int) -> Submesh:
-    """The coarse triangles `members` (m,) of a submesh, as a submesh of its own."""
+    """Return the coarse triangles `members` (m,) of a submesh, as a submesh of its own."""
     vertices, triangles = np.unique(submesh.triangles[members], return_inverse=True)
     edges, triangle_edges = np.unique(submesh.triangle_edges[members], return_inverse=True)
     classes, vertex_class = np.unique(submesh.vertex_class[vertices], return_inverse=True)
@@ -175,7 +177,8 @@ def part(submesh: Submesh, members: Int) -> Submesh:
 
 
 def pinned_class(torus: Torus) -> int:
-    """The class of a whole cell that is pinned, Eq. (15): the one inside the matrix nearest to the cell's corner.
+    """Return the class of a whole cell that is pinned, Eq. (15): the one inside the matrix nearest to the cell's
+    corner.
 
     A pinned class on an interface would hold faces together that must be able to part, and one in a fibre would keep
     that from moving when all of its bonds are broken.  u* is the same up to a constant.
@@ -199,7 +202,8 @@ def pinning(torus: Torus, unfit: Int) -> list[tuple[int, float, int]]:
 
 
 def _submesh(torus: Torus, members: Int, pinned: int) -> Submesh:
-    """The triangles `members` (t,) as one submesh, of no body and phase; `pinned` is the key of the pinned class."""
+    """Return the triangles `members` (t,) as one submesh, of no body and phase; `pinned` is the key of the pinned
+    class."""
     mesh = torus.mesh
     vertices, triangles = np.unique(mesh.triangles[members], return_inverse=True)
     edges, triangle_edges = np.unique(torus.triangle_edges[members], return_inverse=True)
@@ -232,7 +236,7 @@ def _submesh(torus: Torus, members: Int, pinned: int) -> Submesh:
 
 
 def joined(parts: Sequence[SubmeshesOfRank]) -> SubmeshesOfRank:
-    """The subdomains of all of these, each of which is in one of them."""
+    """Return the subdomains of all of these, each of which is in one of them."""
     index = _all(parts, "index")
     order = np.argsort(index)
     phase = [name for part in parts for name in part.phase]
@@ -271,11 +275,11 @@ def _joined_meshes(meshes: list[Submesh]) -> Submesh:
 
 
 def _all(parts: Sequence[object], name: str) -> Array:
-    """What each of the parts has of that name, one after the other."""
+    """Concatenate the arrays of that name of all parts."""
     return np.concatenate([getattr(part, name) for part in parts])
 
 
 def _numbers(parts: Sequence[object], name: str, of: str) -> Int:
-    """The same for numbers of what is called `of`, which become numbers in the list of all of these."""
+    """Return the same for numbers of what is called `of`, which become numbers in the list of all of these."""
     ends = np.cumsum([0, *(len(getattr(part, of)) for part in parts)])
     return np.concatenate([getattr(part, name) + end for part, end in zip(parts, ends, strict=False)])

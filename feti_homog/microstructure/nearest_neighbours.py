@@ -69,7 +69,7 @@ def nearest_neighbours(pattern: FibrePattern, count: int = 3) -> NearestNeighbou
 
 
 def _reach(pattern: FibrePattern, count: int) -> float:
-    """A distance within which each fibre of a periodic cell has so many neighbours."""
+    """Return a distance within which each fibre of a periodic cell has so many neighbours."""
     own_images = (count + 1) // 2 * pattern.size.min()
     if not pattern.periodic or pattern.count <= count:
         return float(own_images)

@@ -41,7 +41,7 @@ def envelope(
     count: int,
     seed: int = 0,
 ) -> Envelope:
-    """The function (m,) of `count` simulations of a pattern, estimated in each as in the pattern itself.
+    """Return the function (m,) of `count` simulations of a pattern, estimated in each as in the pattern itself.
 
     The test by the largest deviation is exact: under the model all the functions are exchangeable [Ripley 1977].
     """

@@ -45,7 +45,7 @@ def measure(
     simulations: int,
     seed: int = 0,
 ) -> FibreStatistics:
-    """The statistics of at least two fibres, L beside so many simulations by `simulate`."""
+    """Return the statistics of at least two fibres, L beside so many simulations by `simulate`."""
     neighbours, r = nearest_neighbours(pattern), distances(pattern)
     nearest = neighbours.distances[:, 0]
     return FibreStatistics(

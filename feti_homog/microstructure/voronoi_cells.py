@@ -84,13 +84,13 @@ def _weights(pattern: FibrePattern, lowest: Float, highest: Float) -> Float:
 
 
 def _periodic(pattern: FibrePattern) -> Float:
-    """The centres and their eight images: of no others is an edge of a cell's boundary."""
+    """Return the centres and their eight images: of no others is an edge of a cell's boundary."""
     shifts = [np.array(step) * pattern.size for step in product((-1, 0, 1), repeat=2) if any(step)]
     return np.concatenate([pattern.wrapped, *(pattern.wrapped + shift for shift in shifts)])
 
 
 def _mirrored(pattern: FibrePattern) -> Float:
-    """The centres and their mirror images over the four sides."""
+    """Return the centres and their mirror images over the four sides."""
     margin = OFF_SIDE * pattern.size.min()
     inside = np.clip(pattern.centres, margin, pattern.size - margin)
     points = [inside]

@@ -33,7 +33,7 @@ def gather_rows(comm: MPI.Intracomm, owned: Float, first: int, rows: Int) -> Flo
 
 
 def allgather_rows(comm: MPI.Intracomm, own: Array, counts: Int) -> Array:
-    """The rows of all ranks below each other, on every rank.  Collective.
+    """Return the rows of all ranks below each other, on every rank. Collective.
 
     Args:
         own: (counts[rank],) or (counts[rank], k) rows of this rank.
@@ -59,7 +59,8 @@ def share_columns(comm: MPI.Intracomm, solve: Callable[[Float], Float], B: Float
 
 
 def exchange(comm: MPI.Intracomm, to: Int, *columns: Array) -> list[Array]:
-    """The rows of the columns, each (k,) or (k, ...), that the ranks have for this one; row i goes to rank `to[i]`.
+    """Return the rows of the columns, each (k,) or (k, ...), that the ranks have for this one; row i goes to rank
+    `to[i]`.
 
     They come in the order of the ranks that sent them, and of one rank in that rank's order.  Collective.
     """

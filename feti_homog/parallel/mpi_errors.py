@@ -25,7 +25,7 @@ class RemoteError(RuntimeError):
 
 
 def on_root(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any) -> T:
-    """function(...) of rank 0, on every rank; what it raises is raised on every rank.
+    """Return function(...) of rank 0, on every rank; what it raises is raised on every rank.
 
     Collective; the other ranks' arguments do not matter. The result must be picklable; `function` must
     not communicate.
@@ -39,7 +39,7 @@ def on_root(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any
 
 
 def on_root_only(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any) -> T | None:
-    """function(...) on rank 0, None on the others; what it raises is raised on every rank. Collective."""
+    """Return function(...) on rank 0, None on the others; what it raises is raised on every rank. Collective."""
     result, error = _attempt(function, *args, **kwargs) if comm.rank == 0 else (None, None)
     message = comm.bcast(_portable(comm, error), root=0)
     if message is not None:
@@ -48,7 +48,7 @@ def on_root_only(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs
 
 
 def agree(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any) -> T:
-    """function(...) of each rank on that rank; if it raises on any, every rank raises.
+    """Return function(...) of each rank on that rank; if it raises on any, every rank raises.
 
     A rank that met a defect raises that; all others raise that of the first such rank or, if there was none,
     the FetiHomogError of the first rank that met one. Collective; `function` must not communicate.
@@ -63,7 +63,8 @@ def agree(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any) 
 
 
 def agree_after(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any) -> T:
-    """function(...) of all ranks, a library's collective call; if any raises a FetiHomogError, every rank does.
+    """Return function(...) of all ranks, a library's collective call; if any raises a FetiHomogError, every rank
+    does.
 
     Any other exception is raised by its rank alone, without a word to the others, which may be waiting for it within
     `function`: it must end the job, as does a FetiHomogError for which the others do not come in time.  Collective.
@@ -83,7 +84,7 @@ def agree_after(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs:
 
 
 def run_main(comm: Comm, main: Callable[[], int]) -> int:
-    """The exit code of main(), run by every rank.
+    """Return the exit code of main(), run by every rank.
 
     A FetiHomogError that every rank raises is printed once, by rank 0, and gives its exit code. One that the
     others do not raise in time, and any other exception, is printed by its rank and aborts the job.
@@ -111,7 +112,7 @@ def end_job(comm: Comm, error: BaseException) -> NoReturn:
 
 
 def abort(comm: Comm, exit_code: int) -> NoReturn:
-    """Ends the processes of all ranks; the exit code is that of mpirun."""
+    """End the processes of all ranks; the exit code is that of mpirun."""
     sys.stdout.flush()
     comm.Abort(exit_code)
     raise SystemExit(exit_code)
@@ -139,7 +140,7 @@ def _comes(request: Request, timeout: float) -> bool:
 
 
 def _told(error: FetiHomogError) -> str:
-    """A line for each fault."""
+    """Return a line for each fault."""
     return "\n".join(f"error: {fault}" for fault in error.faults)
 
 
@@ -157,7 +158,7 @@ def _returned(result: T, error: Exception | None) -> T:
 
 
 def _portable(comm: Comm, error: Exception | None) -> Exception | None:
-    """The exception as it is sent to other ranks: a defect as its traceback, for it may not be picklable."""
+    """Return the exception as it is sent to other ranks: a defect as its traceback, for it may not be picklable."""
     if error is None or isinstance(error, FetiHomogError):
         return error
     return RemoteError(f"on rank {comm.rank}:\n{''.join(traceback.format_exception(error))}")

@@ -24,7 +24,7 @@ def option_was_used(name: str) -> bool:
 
 
 def error_words(error: PETSc.Error) -> str:
-    """The last line of an error of PETSc's, without the rank: what was wrong."""
+    """Return the last line of an error of PETSc's, without the rank: what was wrong."""
     return str(error).splitlines()[-1].split("] ", 1)[-1]
 
 
@@ -39,7 +39,7 @@ def set_schur(factor: PETSc.Mat, rows: PETSc.IS) -> None:
 
 
 def schur_complement(factor: PETSc.Mat, size: int) -> Float:
-    """The dense (size, size) Schur complement, in Fortran order, that a symmetric factorization has left."""
+    """Return the dense (size, size) Schur complement, in Fortran order, that a symmetric factorization has left."""
     schur, values = Pointer(), ctypes.POINTER(ctypes.c_double)()
     _call("MatFactorCreateSchurComplement", Pointer(factor.handle), ctypes.byref(schur), None)
     try:

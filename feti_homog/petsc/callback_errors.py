@@ -28,7 +28,7 @@ class CallbackErrors:
         self._error: BaseException | None = None
 
     def call(self, function: Callable[[], T], otherwise: T) -> T:
-        """function(), or `otherwise` if that, or an earlier call, has raised.  Collective.
+        """Return function(), or `otherwise` if that, or an earlier call, has raised. Collective.
 
         An error for the user that all ranks raise is kept on all. A rank that raises alone, or meets a defect, ends
         the job: the others, in the middle of `function`, would wait for it.

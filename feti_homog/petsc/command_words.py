@@ -13,7 +13,7 @@ CASE_FILE = ".toml"
 
 
 def split_argv(argv: Sequence[str]) -> tuple[list[str], list[str]]:
-    """The words that are ours and those that are PETSc's, each in their order.
+    """Return the words that are ours and those that are PETSc's, each in their order.
 
     PETSc's are single-dash options with the word after each as its value, unless that word begins another option
     or cannot be the value; a negative number can.
@@ -48,7 +48,8 @@ def named_values(words: Sequence[str]) -> dict[str, str]:
 
 
 def petsc_words(options: Mapping[str, str]) -> list[str]:
-    """The words of options by name without dash, for PETSc's start: its own flags are there or not, true or false.
+    """Return the words of options by name without dash, for PETSc's start: its own flags are there or not, true or
+    false.
 
     False flags of the solver stay, for a case may have them true.
     """

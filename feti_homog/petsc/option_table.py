@@ -18,7 +18,7 @@ class Option:
 
 
 def _direct_solver(prefix: str, matrix: str, library: str = "cholmod") -> tuple[Option, Option]:
-    """The options of a direct solver."""
+    """Return the options of a direct solver."""
     return (
         Option(f"{prefix}pc_type", "cholesky|lu", "cholesky", f"factorization of {matrix}"),
         Option(f"{prefix}pc_factor_mat_solver_type", "cholmod|mumps|...", library, f"library of {matrix}"),
@@ -26,7 +26,7 @@ def _direct_solver(prefix: str, matrix: str, library: str = "cholmod") -> tuple[
 
 
 def _coarse_solver(prefix: str, matrix: str) -> tuple[Option, ...]:
-    """The options of a matrix of all ranks."""
+    """Return the options of a matrix of all ranks."""
     library = f"library of {matrix}; on one rank cholmod by default"
     return (
         Option(f"{prefix}ksp_type", "preonly|cg|...", "preonly", f"one factor of {matrix}, or an iterative method"),
@@ -150,18 +150,18 @@ def is_in_table(name: str) -> bool:
 
 
 def suggestion(name: str) -> str:
-    """The option of the table that a misspelt name is nearest to, or the prefixes, in words."""
+    """Return the option of the table that a misspelt name is nearest to, or the prefixes, in words."""
     nearest = difflib.get_close_matches(name, [option.name for option in OPTIONS], n=1)
     return f"did you mean -{nearest[0]}?" if nearest else f"prefixes: -{', -'.join(PREFIXES)}"
 
 
 def solver_prefix(name: str) -> str:
-    """The longest of PREFIXES that the name goes on from, empty if there is none."""
+    """Return the longest of PREFIXES that the name goes on from, empty if there is none."""
     return max((prefix for prefix in PREFIXES if name.startswith(prefix) and name != prefix), key=len, default="")
 
 
 def help_text() -> str:
-    """A table of the solver's options, one line each."""
+    """Return a table of the solver's options, one line each."""
     usages = [f"-{option.name} {option.value}".strip() for option in OPTIONS]
     width = max(map(len, usages))
     lines = [

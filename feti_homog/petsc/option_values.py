@@ -36,12 +36,12 @@ def faulty_values(options: Mapping[str, Value]) -> list[str]:
 
 
 def in_words(name: str, value: str) -> str:
-    """An option (name without dash) as on the command line."""
+    """Return an option (name without dash) as on the command line."""
     return f"-{name} {value}".strip()
 
 
 def flag_value(value: Value) -> str | None:
-    """What PETSc takes for the value of a flag: empty if it is set, None if it is not; a viewer stays."""
+    """Return PETSc's value of a flag: empty if it is set, None if it is not; a viewer stays."""
     text = _text(value)
     return "" if text.lower() in TRUE else None if text.lower() in FALSE else text
 

@@ -100,7 +100,7 @@ def _refuse(names: list[str]) -> None:
 
 
 def _unused_names() -> list[str]:
-    """The options with our prefix, but for those of the table, that no solver has read or will read."""
+    """Return the options with our prefix, but for those of the table, that no solver has read or will read."""
     given = [name for name in sorted(PETSc.Options().getAll().keys() - READ_WHEN_SOLVING) if name.startswith("feti_")]
     return [name for name in given if not is_in_table(name) and not option_was_used(name)]
 
@@ -131,7 +131,8 @@ def faults_of_solvers(given: Mapping[str, str]) -> list[str]:
 
 
 def _prefix(name: str) -> str:
-    """The prefix of the solver that an option is for, that of the Krylov method being feti_; empty for others."""
+    """Return the prefix of the solver that an option is for, that of the Krylov method being feti_; empty for
+    others."""
     prefix = solver_prefix(name)
     return "feti_" if prefix in ("feti_ksp_", "feti_pc_") else prefix
 
@@ -193,8 +194,8 @@ def _solve_directly(prefix: str) -> None:
 
 @contextmanager
 def _solver(A: PETSc.Mat, prefix: str) -> Iterator[PETSc.KSP]:
-    """A solver of the 1 x 1 matrix; at the end of the block it solves, as the options under `prefix` say, and is freed
-    with its matrix."""
+    """Provide a solver of the 1 x 1 matrix; at the end of the block it solves, as the options under `prefix` say,
+    and is freed with its matrix."""
     ksp, (x, b) = PETSc.KSP().create(PETSc.COMM_SELF), A.createVecs()
     ksp.setOptionsPrefix(prefix)
     ksp.setOperators(A)

@@ -34,12 +34,12 @@ def replace(path: Path, write: Callable[[Path], object]) -> Path:
 
 
 def replace_text(path: Path, text: str) -> Path:
-    """The same with a text.  Raises FetiHomogError as `replace` does."""
+    """Return the same with a text. Raises FetiHomogError as `replace` does."""
     return replace(path, lambda part: part.write_text(text, encoding="utf-8"))
 
 
 def part_of(path: Path) -> Path:
-    """The name, beside `path`, of a file that is being written: no other process writes one of that name."""
+    """Return the name, beside `path`, of a file that is being written: no other process writes one of that name."""
     return path.with_name(f"{path.name}.{socket.gethostname()}.{os.getpid()}.part")
 
 
@@ -72,7 +72,7 @@ def write_errors(path: Path) -> contextlib.AbstractContextManager[None]:
 
 @contextlib.contextmanager
 def file_errors(verb: str, path: Path) -> Iterator[None]:
-    """The same with another verb."""
+    """Provide the same with another verb."""
     try:
         yield
     except (OSError, RuntimeError) as error:

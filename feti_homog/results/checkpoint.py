@@ -59,7 +59,7 @@ class Checkpoint:
             raise CaseError(*(f"--resume: {fault}" for fault in error.faults)) from error
 
     def read(self, number: int) -> Arrays:
-        """An event: this rank's part of distributed arrays, all of the others.
+        """Return an event: this rank's part of distributed arrays, all of the others.
 
         Raises:
             CaseError: it is unreadable or of another run.
@@ -217,7 +217,7 @@ def _digest(path: Path) -> str:
 
 
 def _image(event: Arrays, attributes: Mapping[str, Any]) -> bytes:
-    """An HDF5 file in memory: on a full disk HDF5 may crash, and writing bytes does not."""
+    """Return an HDF5 file in memory: on a full disk HDF5 may crash, and writing bytes does not."""
     with h5py.File("event", "w", driver="core", backing_store=False) as file:
         for name, value in event.items():
             file[name] = value
@@ -246,7 +246,7 @@ def _check_bytes(path: Path) -> None:
 
 
 def _part(event: Arrays, rank: int) -> Arrays:
-    """The event with a rank's share of the distributed arrays."""
+    """Return the event with a rank's share of the distributed arrays."""
     part = {}
     for name, table in event.items():
         if name.endswith("_ends"):

@@ -24,7 +24,7 @@ class Column:
 
 
 def columns(kind: type) -> Iterator[Column]:
-    """The columns that a record of this class fills: the reference table of its file."""
+    """Yield the columns that a record of this class fills: the reference table of its file."""
     for name, description in _in_columns(kind).items():
         # Those in the plane are among those in space, in the same order.
         for component in description.spatial_components or _names(name, description):
@@ -55,7 +55,7 @@ def write(path: Path, points: Sequence[Any]) -> Path:
 
 
 def _names(name: str, description: Description) -> tuple[str, ...]:
-    """The columns of a field, of an array those of its components in the plane."""
+    """Return the columns of a field, of an array those of its components in the plane."""
     return description.components or (name,)
 
 
@@ -71,7 +71,7 @@ def _row(point: Any, described: Mapping[str, Description]) -> dict[str, Any]:
 
 
 def _in_columns(kind: type) -> dict[str, Description]:
-    """The fields of a record that fill columns: numbers, and arrays whose components have names."""
+    """Return the fields of a record that fill columns: numbers, and arrays whose components have names."""
     hints = get_type_hints(kind)
     found = {name: d for name, d in descriptions(kind).items() if d.components or not d.shape}
     return {name: d for name, d in found.items() if not is_record(hints[name])}

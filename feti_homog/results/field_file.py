@@ -91,7 +91,7 @@ class FieldFile:
         self._write_part("interface", interface)
 
     def write_state(self, number: int, state: StatePart) -> None:
-        """Adds state `number` (0, 1, ...) and flushes. The cell's own numbers are the same on all ranks."""
+        """Add state `number` (0, 1, ...) and flushes. The cell's own numbers are the same on all ranks."""
         group = f"state/{number}"
         self._write_part(group, state)
         self._agreed(agree_after, _set_attributes, self._file, group, attributes(state))
@@ -128,7 +128,7 @@ class FieldFile:
         )
 
     def _write_part(self, group: str, part: Any) -> None:
-        """Makes the tables of a group, each rank giving its rows."""
+        """Make the tables of a group, each rank giving its rows."""
         size = self._bytes(part)
         self._agreed(on_root_only, _reserve, self.part, self._reserved, size)
         self._reserved += size
@@ -139,14 +139,14 @@ class FieldFile:
                 self._write_tables(group, rows, part, own)
 
     def _write_tables(self, group: str, rows: _Rows, part: Any, described: Mapping[str, Description]) -> None:
-        """Makes tables of the same rows of a part."""
+        """Make tables of the same rows of a part."""
         arrays = agree(self._comm, _arrays, group, rows.count, part, described)
         for name, array in arrays.items():
             words = self._words(described[name])
             self._agreed(agree_after, _write_rows, self._file, f"{group}/{name}", rows, array, words)
 
     def _words(self, described: Description) -> dict[str, str]:
-        """The attributes of a dataset: what it holds, and in which unit, by its label if the case gives one."""
+        """Return the attributes of a dataset: what it holds, and in which unit, by its label if the case gives one."""
         unit = self._units.get(described.unit) or described.unit or PURE_NUMBER
         return {"meaning": described.meaning, "unit": unit}
 
@@ -160,7 +160,7 @@ class FieldFile:
             raise
 
     def _remove(self) -> None:
-        """Closes and removes the file, once. On a full disk HDF5 can close it only after it was cut to nothing."""
+        """Close and remove the file, once. On a full disk HDF5 can close it only after it was cut to nothing."""
         self._is_open = False
         if self._comm.rank == 0:
             with contextlib.suppress(OSError):
@@ -180,7 +180,7 @@ def _with_write_errors(path: Path, function: Callable[..., Any], *args: Any) -> 
 
 
 def _create(part: Path, size: int) -> None:
-    """Makes an empty HDF5 file with `size` bytes of space, by plain calls: HDF5 may crash or hang where they fail."""
+    """Make an empty HDF5 file with `size` bytes of space, by plain calls: HDF5 may crash or hang where they fail."""
     part.parent.mkdir(parents=True, exist_ok=True)
     try:
         with part.open("wb") as stream:
@@ -193,7 +193,7 @@ def _create(part: Path, size: int) -> None:
 
 
 def _empty_file() -> bytes:
-    """An HDF5 file without content."""
+    """Return an HDF5 file without content."""
     with h5py.File("empty", "w", driver="core", backing_store=False) as file:
         file.flush()
         return bytes(file.id.get_file_image())
@@ -207,12 +207,12 @@ def _path_for_mpi(part: Path, opened: contextlib.ExitStack) -> str:
 
 
 def _open(path: str, comm: Comm, opened: contextlib.ExitStack) -> Any:
-    """The file, opened by all ranks until `opened` is closed."""
+    """Return the file, opened by all ranks until `opened` is closed."""
     return opened.enter_context(h5py.File(path, "r+", driver="mpio", comm=comm))
 
 
 def _complete(part: Path, path: Path) -> None:
-    """Adds the views and gives the file its name, on one rank: on all each view would cost as much as a table."""
+    """Add the views and gives the file its name, on one rank: on all each view would cost as much as a table."""
     # Nobody else has the file, and some file systems cannot lock.
     with h5py.File(part, "r", locking=False) as file:
         size = bytes_of_views(file)
@@ -237,13 +237,13 @@ def _arrays(group: str, count: int, part: Any, described: Mapping[str, Descripti
 
 
 def _reserve(part: Path, start: int, size: int) -> None:
-    """Takes the space on the disk: were it to end while MPI-IO writes, some ranks might wait for ever."""
+    """Take the space on the disk: were it to end while MPI-IO writes, some ranks might wait for ever."""
     with part.open("r+b") as stream:
         os.posix_fallocate(stream.fileno(), start, size)
 
 
 def _write_rows(file: Any, name: str, rows: _Rows, array: NDArray[Any], words: Mapping[str, str]) -> None:
-    """Makes a table and writes this rank's rows. An empty rank takes part with an empty selection."""
+    """Make a table and writes this rank's rows. An empty rank takes part with an empty selection."""
     table = file.create_dataset(name, (rows.total, *array.shape[1:]), array.dtype)
     _set_attributes(file, name, words)
     memory, place = h5py.h5s.create_simple(array.shape), table.id.get_space()

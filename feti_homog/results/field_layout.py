@@ -169,23 +169,23 @@ def items() -> Iterator[Item]:
 
 
 def tables(part: Any) -> dict[str, Description]:
-    """The fields of a part that are datasets, those with a row for each node, element or interface node."""
+    """Return the fields of a part that are datasets, those with a row for each node, element or interface node."""
     return {name: d for name, d in descriptions(part).items() if rows_of(d)}
 
 
 def attributes(part: Any) -> dict[str, Any]:
-    """The other fields, by the names of the attributes, with their values."""
+    """Return the other fields, by the names of the attributes, with their values."""
     return {d.name or name: getattr(part, name) for name, d in descriptions(part).items() if not rows_of(d)}
 
 
 def rows_of(description: Description) -> str:
-    """What a dataset has rows of: `n` nodes, `m` elements, `k` interface nodes, `f` fibres; empty for attributes."""
+    """Return the meaning of the rows of a dataset: `n` nodes, `m` elements, `k` interface nodes, `f` fibres; empty for attributes."""
     first = description.shape[1:2]
     return first if first in ("n", "m", "k", "f") else ""
 
 
 def items_of(part: type, group: str, views: Iterable[View]) -> Iterator[Item]:
-    """What a group holds, with these views of it."""
+    """Yield the items of a group with these views."""
     hints = typing.get_type_hints(part)
     for name, d in descriptions(part).items():
         if rows_of(d):
@@ -240,6 +240,6 @@ class SpatialStatePart(StatePart):
 
 
 def spatial_items() -> Iterator[Item]:
-    """What result.h5 holds in generalized plane strain, if it is not the same as in `field_layout.items`."""
+    """Yield the items of result.h5 in generalized plane strain that differ from `field_layout.items`."""
     plane = set(items())
     yield from (item for item in items_of(SpatialStatePart, GROUP_OF_STATES, SPATIAL_VIEWS) if item not in plane)

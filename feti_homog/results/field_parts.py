@@ -22,7 +22,7 @@ from feti_homog.homogenization.recovered_fields import out_of_plane, recover
 
 
 def header(cell: TornCell) -> Header:
-    """What the file says of the whole cell."""
+    """Return the attributes of the whole cell."""
     case, plan = cell.case, cell.summary
     return Header(
         title=case.name,
@@ -39,7 +39,7 @@ def header(cell: TornCell) -> Header:
 
 
 def mesh_part(cell: TornCell) -> MeshPart:
-    """The refined meshes of this rank's subdomains, one after the other."""
+    """Return the refined meshes of this rank's subdomains, one after the other."""
     subdomains = cell.subdomains
     nodes = np.cumsum([0, *(len(s.mesh.points) for s in subdomains)])
     columns = 3 * cell.case.cell.order
@@ -57,7 +57,7 @@ def mesh_part(cell: TornCell) -> MeshPart:
 
 
 def fibre_part(cell: TornCell) -> FibrePart:
-    """The fibres on rank 0, none on the others."""
+    """Return the fibres on rank 0, none on the others."""
     summary = cell.summary
     body = summary.fibre_bodies[: None if cell.comm.rank == 0 else 0]
     return FibrePart(
@@ -70,7 +70,7 @@ def fibre_part(cell: TornCell) -> FibrePart:
 
 
 def interface_part(cell: TornCell) -> InterfacePart:
-    """The interface nodes whose multipliers this rank owns.  Collective."""
+    """Return the interface nodes whose multipliers this rank owns. Collective."""
     jumps, nodes = cell.solver.jump_operator, cell.solver.jump_operator.nodes
     first = cell.comm.exscan(sum(len(s.mesh.points) for s in cell.subdomains)) or 0
     numbers = first + cell.class_nodes
@@ -88,7 +88,7 @@ def interface_part(cell: TornCell) -> InterfacePart:
 
 
 def state_part(cell: TornCell, response: Response, load_factor: float, label: str, point: int) -> StatePart:
-    """The fields of a response in plane strain or stress.  Collective when first called."""
+    """Return the fields of a response in plane strain or stress. Collective when first called."""
     fields, nodes = recover(cell, response), cell.solver.jump_operator.nodes
     stress, (S33, E33) = fields.stress, out_of_plane(cell, fields.stress)
     first, second, third = voigt.principal(stress, S33).T
@@ -122,8 +122,8 @@ def state_part(cell: TornCell, response: Response, load_factor: float, label: st
 def spatial_state_part(
     cell: TornCell, plane: Response | None, axial: Response | None, load_factor: float, label: str, point: int
 ) -> SpatialStatePart:
-    """The fields of the responses of the plane problem and of the axial one in generalized plane strain; those of one
-    that is None are zero.  Collective when first called.
+    """Return the fields of the responses of the plane problem and of the axial one in generalized plane strain;
+    those of one that is None are zero. Collective when first called.
 
     Raises:
         ValueError: there is no response, or no axial problem.

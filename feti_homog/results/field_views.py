@@ -53,7 +53,7 @@ def _vector(name: str, third: str = "") -> View:
 
 
 def _tensor(name: str, source: str, entries: Mapping[tuple[int, int], tuple[str, int]]) -> View:
-    """The symmetric tensor [11, 12, 13, 21, 22, 23, 31, 32, 33] with these entries."""
+    """Return the symmetric tensor [11, 12, 13, 21, 22, 23, 31, 32, 33] with these entries."""
     places = [(3 * i + j, (min(i, j), max(i, j))) for i in range(3) for j in range(3)]
     columns = {place: entries[pair] for place, pair in places if pair in entries}
     words = f"tensor of `{source}`, rows of [[11, 12, 13], [12, 22, 23], [13, 23, 33]]"
@@ -102,7 +102,7 @@ BYTES = 1 << 12  # that a view takes at most; 0.9 KB in the mean were measured
 
 
 def add_views(file: Any) -> None:
-    """Makes the views of all groups of an open file whose tables are complete; empty tables have none."""
+    """Make the views of all groups of an open file whose tables are complete; empty tables have none."""
     for group, view in _views_of(file):
         _add_view(file, view, group)
 
@@ -127,7 +127,7 @@ def _has_rows(group: Any, view: View) -> bool:
 
 
 def _add_view(file: Any, view: View, group: str) -> None:
-    """Makes one virtual dataset over the tables of a group, with the unit of its source."""
+    """Make one virtual dataset over the tables of a group, with the unit of its source."""
     original = file[f"{group}/{view.source}"]
     rows = len(original)
     shape = (rows, view.components) if view.components else (rows,)

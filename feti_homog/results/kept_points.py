@@ -47,9 +47,9 @@ def kept(points: Sequence[Point], states: int | str, legs: int) -> list[int]:
 
 
 def drops(points: Sequence[Point], legs: int) -> list[Drop]:
-    """The drops of the stress: from each peak to the valley after it, and on a first leg of events also from each load
-    at which bonds break to the next point that a rising load comes to; and the jumps of the strain at a load that is
-    held, where a stress is given that cannot drop."""
+    """Return the drops of the stress: from each peak to the valley after it, and on a first leg of events also from
+    each load at which bonds break to the next point that a rising load comes to; and the jumps of the strain at a
+    load that is held, where a stress is given that cannot drop."""
     stress, strain = (np.array([point[name] for point in points], float) for name in ("stress", "strain"))
     size, length = _norm(stress, 2.0), _norm(strain, 0.5)
     largest = float(size.max())

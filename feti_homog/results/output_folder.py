@@ -90,7 +90,7 @@ def refuse_files_of_others(directory: Path) -> None:
 
 
 def _foreign(paths: Sequence[Path]) -> list[Path]:
-    """The files that no run wrote: those that it would know; without any of these all that are not empty."""
+    """Return the files that no run wrote: those that it would know; without any of these all that are not empty."""
     signs = [path for path in paths if path.name in SIGNS]
     return [path for path in signs or paths if path.stat().st_size and not (signs and _is_own(path))]
 
@@ -112,7 +112,7 @@ def _is_own(path: Path) -> bool:
 
 @contextmanager
 def held(directory: Path, comm: Intracomm, say: Callable[[str], object]) -> Iterator[None]:
-    """The folder, made with its parents, is this run's alone while the block lasts.  Collective.
+    """Provide the folder, made with its parents, is this run's alone while the block lasts. Collective.
 
     What earlier runs left unfinished in it is removed; so are, at the end, the folders made here that are empty.
     Where the file system has no locks, `say` is told so and the run goes on without one.

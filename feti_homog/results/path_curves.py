@@ -26,26 +26,26 @@ Document = Mapping[str, Any]
 
 
 def targets(document: Document) -> tuple[dict[str, float], ...]:
-    """The waypoints of a path, or the one load, in full: by name the strain or the stress of each component."""
+    """Return the waypoints of a path, or the one load, in full: by name the strain or the stress of each component."""
     return completed(_given(document), document["case"]["analysis"]["plane"])
 
 
 def named_components(document: Document) -> list[int]:
-    """The components that the waypoints name, in Voigt order."""
+    """Return the components that the waypoints name, in Voigt order."""
     loads = _given(document)
     first = first_named(loads, document["case"]["analysis"]["plane"])
     return [component for component, number in enumerate(first.values()) if number < len(loads)]
 
 
 def _given(document: Document) -> list[Strain | MixedLoad]:
-    """The loads as the case gives them."""
+    """Return the loads as the case gives them."""
     section = document["case"].get("path") or document["case"]["load"]
     given = section.get("waypoints") or [section[name] for name in ("strain", "to") if name in section]
     return [MixedLoad(**load) if isinstance(load, Mapping) else tuple(load) for load in given]
 
 
 def changed_components(document: Document) -> list[int]:
-    """The components that the waypoints change, in Voigt order."""
+    """Return the components that the waypoints change, in Voigt order."""
     pairs, found = plane_state_of(document).components, set[int]()
     before: Mapping[str, float] = {stress: 0.0 for _, stress in pairs}
     for target in targets(document):
@@ -71,13 +71,13 @@ def components_above(share: float, values: Float) -> list[int]:
 
 
 def shown_stresses(document: Document) -> list[int]:
-    """The components whose stress is seen on a path; the leading one if there is no stress."""
+    """Return the components whose stress is seen on a path; the leading one if there is no stress."""
     found = components_above(FAINT, np.array([point["stress"] for point in document["path"]], float))
     return found or [leading_component(document)]
 
 
 def what_rises(document: Document) -> str:
-    """What rises on the first leg of a path, in words: "strain" if there is nothing else, or "load"."""
+    """Return the name of the load that rises on the first leg of a path: "strain" if there is no other, or "load"."""
     first = targets(document)[0]
     others = {*plane_state_of(document).stresses, TEMPERATURE}
     return "load" if any(first[name] for name in others & first.keys()) else "strain"

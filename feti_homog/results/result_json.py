@@ -18,7 +18,7 @@ SCHEMA = 1  # version of the layout: to be raised when a key is renamed, removed
 
 
 def write(directory: Path, document: Mapping[str, Any]) -> Path:
-    """Writes `directory`/result.json, whose folder is made if needed; returns its path.
+    """Write `directory`/result.json, whose folder is made if needed; returns its path.
 
     NumPy arrays and scalars become lists and numbers, tuples lists, paths text. The file is replaced in one
     step: a reader finds the old document or the new one. Call on one rank.
@@ -41,7 +41,7 @@ def write(directory: Path, document: Mapping[str, Any]) -> Path:
 
 
 def read(directory: Path) -> dict[str, Any]:
-    """The document of `directory`/result.json.
+    """Return the document of `directory`/result.json.
 
     Raises:
         CaseError: it is missing, not JSON, no table or changed, or its layout is of another version than that
@@ -63,7 +63,7 @@ def read(directory: Path) -> dict[str, Any]:
 
 
 def _json_value(value: Any, place: str) -> Any:
-    """The value in JSON's own types.  Raises TypeError with the place of one that has none."""
+    """Return the value in JSON's own types. Raises TypeError with the place of one that has none."""
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, Mapping):
@@ -78,7 +78,7 @@ def _json_value(value: Any, place: str) -> Any:
 
 
 def _not_finite(value: Any, place: str) -> Iterator[tuple[str, float]]:
-    """The numbers that are not finite, and their places."""
+    """Yield the numbers that are not finite, and their places."""
     if isinstance(value, dict):
         for key, item in value.items():
             yield from _not_finite(item, _inside(place, key))

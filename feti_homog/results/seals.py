@@ -24,13 +24,13 @@ BLOCK = 1 << 26  # bytes
 
 
 def dumps(document: Mapping[str, Any]) -> str:
-    """The text of a document with, as its last key, the checksum of the others.  Raises ValueError for NaN."""
+    """Return the text of a document with, as its last key, the checksum of the others. Raises ValueError for NaN."""
     content = {key: value for key, value in document.items() if key != KEY}
     return _text(content | {KEY: _checksum(content)}) + "\n"
 
 
 def loads(text: str) -> dict[str, Any]:
-    """The document of a text, without its checksum; one that has none is taken as it is.
+    """Return the document of a text, without its checksum; one that has none is taken as it is.
 
     Raises:
         ValueError: it is not JSON, no table, or not what was written.

@@ -60,8 +60,8 @@ INTERFACE_POINTS |= _described("(k,)", "(k, 3)")
 
 
 def write(directory: Path) -> list[Path]:
-    """Writes result.xdmf and, if there are interface nodes, interface.xdmf for the result.h5 of `directory`; returns
-    their paths.  Call on one rank.
+    """Write result.xdmf and, if there are interface nodes, interface.xdmf for the result.h5 of `directory`; returns
+    their paths. Call on one rank.
 
     Each has one temporal collection, the time being the number of the state: of fields on the nodes and elements of the
     cell, or of those at the points of the interface.
@@ -96,14 +96,14 @@ def _write(path: Path, name: str, file: h5py.File, fill: Callable[[ET.Element, h
 
 
 def _grid(collection: ET.Element, state: str, label: str) -> ET.Element:
-    """The grid of a state, in a collection of its own: readers pass on the name of a grid in such a one only."""
+    """Return the grid of a state, in a collection of its own: readers pass on the name of a grid in such a one only."""
     block = ET.SubElement(collection, "Grid", Name=f"state {state}", GridType="Collection", CollectionType="Spatial")
     ET.SubElement(block, "Time", Value=state)
     return ET.SubElement(block, "Grid", Name=label, GridType="Uniform")
 
 
 def _means(grid: ET.Element, attributes: Mapping[str, Any]) -> None:
-    """The cell's own numbers in a state."""
+    """Add the cell's own numbers to a state."""
     _numbers(grid, "load_factor", "Scalar", [float(attributes["load_factor"])])
     strain, stress = attributes["strain"], attributes["stress"]
     if "temperature" not in attributes:
@@ -148,7 +148,7 @@ def _mesh(grid: ET.Element, kind: dict[str, str], connectivity: Any, points: Any
 
 
 def _attributes(grid: ET.Element, file: h5py.File, state: str, arrays: Iterable[tuple[str, str]], centre: str) -> None:
-    """The arrays of a state, each with its dataset."""
+    """Add the arrays of a state, each with its dataset."""
     for name, place in arrays:
         table = file[place.replace("/K/", f"/{state}/")]
         _attribute(grid, name, 1 if table.ndim == 1 else table.shape[1], centre, _table(table))
@@ -159,7 +159,7 @@ def _attribute(grid: ET.Element, name: str, components: int, centre: str, values
 
 
 def _table(table: Any) -> ET.Element:
-    """A whole dataset of result.h5."""
+    """Return a whole dataset of result.h5."""
     number = "Char" if table.dtype == np.int8 else NUMBERS[table.dtype.kind]
     form = {"Format": "HDF", "NumberType": number, "Precision": str(table.dtype.itemsize)}
     item = ET.Element("DataItem", form, Dimensions=" ".join(map(str, table.shape)))

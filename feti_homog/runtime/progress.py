@@ -41,8 +41,8 @@ class Progress:
 
     @contextmanager
     def stage(self, name: str) -> Iterator[list[str]]:
-        """A PETSc log stage; the block may append words to the list, which are printed with its time, that of stages
-        within it left out."""
+        """Provide a PETSc log stage; the block may append words to the list, which are printed with its time, that
+        of stages within it left out."""
         words: list[str] = []
         start = time.perf_counter()
         self._within.append(0.0)
@@ -57,7 +57,7 @@ class Progress:
         self.say(f"{name:<9} {took:8.2f} s  {' '.join(words)}".rstrip())
 
     def bar(self, items: Iterable[T], label: str) -> Iterator[T]:
-        """The items, with a progress bar if rank 0 writes to a terminal."""
+        """Yield the items, with a progress bar if rank 0 writes to a terminal."""
         if not self.on_terminal:
             return iter(items)
         from tqdm import tqdm  # of no use to most runs, and slow to import

@@ -68,18 +68,18 @@ def described(
     spatial_components: tuple[str, ...] = (),
     **options: Any,
 ) -> Any:
-    """A dataclass field with a description; `options` are those of `dataclasses.field`."""
+    """Return a dataclass field with a description; `options` are those of `dataclasses.field`."""
     description = Description(meaning, unit, shape, components, entries or {}, dtype, name, spatial_components)
     return dataclasses.field(metadata={DESCRIPTION: description}, **options)
 
 
 def descriptions(record: type | Any) -> dict[str, Description]:
-    """The described fields of a record, or of its class, by name."""
+    """Return the described fields of a record, or of its class, by name."""
     return {f.name: f.metadata[DESCRIPTION] for f in dataclasses.fields(record) if DESCRIPTION in f.metadata}
 
 
 def plain(value: Any) -> Any:
-    """The value with records as mappings of their described fields.
+    """Return the value with records as mappings of their described fields.
 
     A field whose default is None is left out while it is None.
     """
@@ -95,7 +95,7 @@ def plain(value: Any) -> Any:
 
 
 def restored(kind: type[T], document: Mapping[str, Any]) -> T:
-    """The record of a class from what `plain` made of it; keys that it does not know are left out.
+    """Return the record of a class from what `plain` made of it; keys that it does not know are left out.
 
     Raises:
         KeyError: a key without a default is missing.
@@ -111,7 +111,7 @@ def restored(kind: type[T], document: Mapping[str, Any]) -> T:
 
 
 def keys(kind: type, above: str = "") -> Iterator[Key]:
-    """The keys of a record's document, those of the records in it too."""
+    """Yield the keys of a record's document, those of the records in it too."""
     hints = typing.get_type_hints(kind)
     for name, description in descriptions(kind).items():
         path, hint = f"{above}{name}", _without_none(hints[name])
@@ -152,13 +152,13 @@ def _without_none(hint: Any) -> Any:
 
 
 def _record_of_tuple(hint: Any) -> type | None:
-    """The record's class of `tuple[Record, ...]`."""
+    """Return the record's class of `tuple[Record, ...]`."""
     item = typing.get_args(hint)[0] if typing.get_origin(hint) is tuple else None
     return item if dataclasses.is_dataclass(item) and isinstance(item, type) else None
 
 
 def type_words(hint: Any, description: Description) -> str:
-    """The type of a field for a reference table."""
+    """Return the type of a field for a reference table."""
     if description.shape:
         return f"numbers {description.shape}"
     if dataclasses.is_dataclass(hint) or typing.get_origin(hint) not in (None, tuple):

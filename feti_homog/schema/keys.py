@@ -23,11 +23,11 @@ class Selector:
     key: str
 
     def among(self, *values: str) -> Condition:
-        """The condition that the key has one of these values."""
+        """Return the condition that the key has one of these values."""
         return Condition(self, values)
 
     def in_words(self, section: str) -> str:
-        """The key as a fault in a section names it."""
+        """Return the key as a fault in a section names it."""
         return self.key if section == self.section else f"[{self.section}] {self.key}"
 
 
@@ -39,7 +39,7 @@ class Condition:
     values: tuple[str, ...]
 
     def in_words(self, section: str) -> str:
-        """The condition as it is read in a section."""
+        """Return the condition as it is read in a section."""
         return f"{self.selector.in_words(section)} = {' or '.join(map(toml_value, self.values))}"
 
 
@@ -87,7 +87,7 @@ def key(
     instead: str = "",
     unless: tuple[str, ...] = (),
 ) -> Any:
-    """A dataclass field read from the key of its name; required where it belongs if it has no default.
+    """Return a dataclass field read from the key of its name; required where it belongs if it has no default.
 
     `default_words` stand for a default of None.
     """
@@ -105,18 +105,18 @@ def _default_in_words(default: Any) -> str:
 
 
 def keys_of(table_class: type[Any]) -> dict[str, Key]:
-    """The keys of a table by name; fields that are made of them are none."""
+    """Return the keys of a table by name; fields that are made of them are none."""
     return {each.name: each.metadata["key"] for each in dataclasses.fields(table_class) if "key" in each.metadata}
 
 
 def defaults_of(table_class: type[Any]) -> dict[str, Any]:
-    """The defaults of a table, as TOML has them, of the keys that have one."""
+    """Return the defaults of a table, as TOML has them, of the keys that have one."""
     found = {each.name: each.default for each in dataclasses.fields(table_class) if each.name in keys_of(table_class)}
     return {name: _to_toml(value, {}) for name, value in found.items() if value not in (None, dataclasses.MISSING)}
 
 
 def selected_value(table_class: type[Any], table: object, name: str) -> Any:
-    """The value of a key if it is right, its default if it is not there, None if it is faulty."""
+    """Return the value of a key if it is right, its default if it is not there, None if it is faulty."""
     default = getattr(table_class, name, None)
     value = table.get(name, default) if isinstance(table, Mapping) else default
     return value if keys_of(table_class)[name].type.accepts(value) else None
@@ -137,7 +137,7 @@ class TableReader:
     faults: list[str] = field(default_factory=list)
 
     def read(self, table_class: type[T], table: object, section: str, prefix: str = "") -> T | None:
-        """The table as an instance of `table_class`; None, and a line for each fault, if it is faulty.
+        """Return the table as an instance of `table_class`; None, and a line for each fault, if it is faulty.
 
         `prefix` stands before the keys of a table within a section.
         """
@@ -161,7 +161,7 @@ class TableReader:
         return table_class(**values) if len(self.faults) == before else None
 
     def _stored(self, type_: ValueType, value: Any, section: str, place: str) -> Any:
-        """A right value as its dataclass keeps it, with the tables in it read."""
+        """Return a right value as its dataclass keeps it, with the tables in it read."""
         if type_.item is not None:
             return tuple(self._stored(type_.item, item, section, f"{place}[{k}]") for k, item in enumerate(value))
         if type_.table is not None and isinstance(value, dict):
@@ -169,7 +169,7 @@ class TableReader:
         return type_.store(value)
 
     def _fault(self, name: str, entry: Key, table: Mapping[str, Any]) -> str:
-        """What is wrong with one known key, whatever the case, empty if nothing."""
+        """Return the fault of one known key, whatever the case, empty if there is none."""
         if name not in table:
             return f": missing; expected {entry.type.expected}" if entry.required and not entry.only else ""
         complaint = entry.type.complaint(table[name])
@@ -177,7 +177,7 @@ class TableReader:
 
 
 def to_table(instance: Any, selected: Selected) -> dict[str, Any]:
-    """The table, of TOML's values, that `TableReader.read` makes the instance of.
+    """Return the table, of TOML's values, that `TableReader.read` makes the instance of.
 
     It has neither the keys that do not belong to the case nor those without a value.
     """
@@ -189,7 +189,7 @@ def to_table(instance: Any, selected: Selected) -> dict[str, Any]:
 
 
 def _to_toml(value: Any, selected: Selected) -> Any:
-    """The value as TOML has it."""
+    """Return the value as TOML has it."""
     if isinstance(value, tuple):
         return [_to_toml(entry, selected) for entry in value]
     if isinstance(value, Path):

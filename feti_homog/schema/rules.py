@@ -56,7 +56,7 @@ class Rule:
     when: tuple[Condition, ...] = ()
 
     def faults(self, document: Mapping[str, Any], selected: Selected) -> Iterator[str]:
-        """A line for each place of the document that is not valid."""
+        """Yield a line for each place of the document that is not valid."""
         if all(selected.get(condition.selector) in condition.values for condition in self.when):
             for place in _places(document, self.path):
                 if not holds(self.schema, place.value):
@@ -74,21 +74,21 @@ def exclusive(path: Path, *names: str, words: str = "exclude each other; give on
 
 
 def needed(path: Path, name: str, words: str, *when: Condition, beside: str = "", unless: Sequence[str] = ()) -> Rule:
-    """A key, or one of others in its place, must be given, under some conditions or beside another key."""
+    """Return a key, or one of others in its place, must be given, under some conditions or beside another key."""
     there: Schema = {"anyOf": [{"required": [each]} for each in (name, *unless)]}
     schema = {"if": {"required": [beside]}, "then": there} if beside else there
     return Rule(path, schema, lambda place: f"{place.named(name)}: {words}", when)
 
 
 def misplaced(path: Path, name: str, owner: str, words: str = "") -> Rule:
-    """A key belongs to another one, which must be given with it."""
+    """Return a key belongs to another one, which must be given with it."""
     line = f"belongs to {owner}, which is missing{words}"
     schema = {"if": {"required": [name]}, "then": {"required": [owner]}}
     return Rule(path, schema, lambda place: f"{place.named(name)}: {line}")
 
 
 def belonging(path: Path, condition: Condition, values: Sequence[str], *when: Condition, instead: str = "") -> Rule:
-    """A key or section, at the end of the path, belongs to cases in which a selector has some of its values."""
+    """Return a key or section, at the end of the path, belongs to cases in which a selector has some of its values."""
     others = tuple(value for value in values if value not in condition.values)
 
     def fault(place: Place) -> str:
@@ -100,7 +100,7 @@ def belonging(path: Path, condition: Condition, values: Sequence[str], *when: Co
 
 
 def refused(path: Path, schema: Schema, words: str, *when: Condition) -> Rule:
-    """A value must not be valid by a schema, under some conditions."""
+    """Return a value must not be valid by a schema, under some conditions."""
     return Rule(path, {"not": schema}, lambda place: f"{place.given}: {words}", when)
 
 
@@ -112,7 +112,7 @@ def holds(schema: Schema | bool, value: Any) -> bool:
 
 
 def _of(kind: Any, check: Callable[[Any, Any], bool]) -> Callable[[Any, Any, Schema], bool]:
-    """A word that concerns values of one type."""
+    """Return a word that concerns values of one type."""
     return lambda part, value, _: not isinstance(value, kind) or isinstance(value, bool) or check(part, value)
 
 
@@ -138,7 +138,7 @@ _CHECKS: dict[str, Callable[[Any, Any, Schema], bool]] = {
 
 
 def _places(document: Mapping[str, Any], path: Path) -> Iterator[Place]:
-    """The values at a path; of a list of sections those of each, which are numbered from 1."""
+    """Yield the values at a path; of a list of sections those of each, which are numbered from 1."""
     if not path:
         yield Place("", "", document)
         return

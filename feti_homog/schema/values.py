@@ -38,16 +38,16 @@ class ValueType:
     item: ValueType | None = None
 
     def named(self, expected: str, store: Callable[[Any], Any] | None = None) -> ValueType:
-        """The same values in other words, stored in another way if one is given."""
+        """Return the same values in other words, stored in another way if one is given."""
         return replace(self, expected=expected, store=store or self.store)
 
     def complaint(self, value: Any) -> str:
-        """What is expected of a wrong value, empty if it is right."""
+        """Return the expectation that a value fails, empty if it is valid."""
         return "" if self.accepts(value) else f"expected {self.expected}{magnitudes_in_words(value)}"
 
 
 def magnitudes_in_words(value: Any) -> str:
-    """The limits of magnitudes, where a number in a value is beyond them; else empty."""
+    """Return the limits of magnitudes, where a number in a value is beyond them; else empty."""
     if isinstance(value, list | tuple):
         return next(filter(None, map(magnitudes_in_words, value)), "")
     is_of_type = isinstance(value, int | float) and not isinstance(value, bool)
@@ -91,12 +91,12 @@ def _short(limit: float) -> str:
 
 
 def real(**limits: float) -> ValueType:
-    """A number within `Limits`."""
+    """Return a number within `Limits`."""
     return _numeric("number", is_number, float, Limits(**limits))
 
 
 def integer(**limits: float) -> ValueType:
-    """An integer within `Limits`."""
+    """Return an integer within `Limits`."""
     return _numeric("integer", lambda value: is_number(value) and isinstance(value, int), int, Limits(**limits))
 
 
@@ -113,7 +113,7 @@ def _numeric(name: str, is_of_type: Callable[[Any], bool], store: Callable[[Any]
 def list_of(
     item: ValueType, expected: str, *, least: int = 0, count: int | None = None, unique: bool = False
 ) -> ValueType:
-    """A list of values of one type: at least so many or just so many, none twice if they are unique."""
+    """Return a list of values of one type: at least so many or just so many, none twice if they are unique."""
     fewest = least if count is None else count
 
     def accepts(value: Any) -> bool:
@@ -129,7 +129,7 @@ def list_of(
 
 
 def either(expected: str, *types: ValueType) -> ValueType:
-    """A value of any of some types."""
+    """Return a value of any of some types."""
     table = next((each.table for each in types if each.table is not None), None)
     return ValueType(
         expected,
@@ -141,13 +141,13 @@ def either(expected: str, *types: ValueType) -> ValueType:
 
 
 def table_of(table: type[Any], name: str, expected: str, *, least: int = 0) -> ValueType:
-    """A table of at least so many keys, which `TableReader` reads; `name` is that of its JSON Schema."""
+    """Return a table of at least so many keys, which `TableReader` reads; `name` is that of its JSON Schema."""
     reference = {"$ref": f"#/$defs/{name}"} | ({"minProperties": least} if least else {})
     return ValueType(expected, lambda v: isinstance(v, dict) and len(v) >= least, lambda v: v, reference, table)
 
 
 def file_name(expected: str, *suffixes: str) -> ValueType:
-    """The name of a file with one of some suffixes."""
+    """Return the name of a file with one of some suffixes."""
     pattern = rf"^{PRINTABLE}*\.({'|'.join(suffix[1:] for suffix in suffixes)})$"
     accepts = lambda value: text.accepts(value) and value.endswith(suffixes)  # noqa: E731
     return ValueType(expected, accepts, Path, {"type": "string", "pattern": pattern})

@@ -11,7 +11,7 @@ LONGEST_VALUE = 60  # characters of a value in a message
 
 
 def toml_value(value: object) -> str:
-    """The value nearly as TOML writes it, in one short line."""
+    """Return the value nearly as TOML writes it, in one short line."""
     line = _line(value)
     return line if len(line) <= LONGEST_VALUE else line[: LONGEST_VALUE - 3] + "..."
 
@@ -27,7 +27,7 @@ def _line(value: object) -> str:
 
 
 def toml_key(name: str) -> str:
-    """A key nearly as TOML writes it, in one short line: quoted if it is not bare."""
+    """Return a key nearly as TOML writes it, in one short line: quoted if it is not bare."""
     is_bare = re.fullmatch(rf"[A-Za-z0-9_-]{{1,{LONGEST_VALUE}}}", name)
     return name if is_bare else toml_value(name)
 
@@ -38,7 +38,7 @@ def dotted_key(path: Iterable[str]) -> str:
 
 
 def suggestion(name: str, known: Iterable[str], owners: Mapping[str, str]) -> str:
-    """The end of a fault on an unknown name: where it belongs, the nearest known name, or all of them.
+    """Return the end of a fault on an unknown name: where it belongs, the nearest known name, or all of them.
 
     `owners` gives the place of each key that belongs elsewhere.
     """
@@ -52,6 +52,6 @@ def suggestion(name: str, known: Iterable[str], owners: Mapping[str, str]) -> st
 
 
 def limit_in_words(limit: float, value: float, digits: int) -> str:
-    """A limit that a value is not below, in at least so many digits and in as many as show that."""
+    """Return a limit that a value is not below, in at least so many digits and in as many as show that."""
     texts = (f"{limit:.{count}g}" for count in range(digits, 18))
     return next((text for text in texts if value >= float(text)), repr(limit))

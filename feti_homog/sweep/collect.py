@@ -19,7 +19,7 @@ from feti_homog.typing import Float
 
 
 def read(directory: Path) -> SweepTable:
-    """The table of a sweep's folder, of all its cases, finished or not.  On one rank.
+    """Return the table of a sweep's folder, of all its cases, finished or not. On one rank.
 
     Raises:
         CaseError: it is no folder of a sweep, or its list of cases is damaged.

@@ -24,7 +24,7 @@ from feti_homog.sweep.plan import Sweep, case_names
 
 
 def of_file(path: Path, comm: Intracomm) -> str:
-    """What would run: the case, or the number of cases of a sweep and the first one; empty but on rank 0.  Collective.
+    """Describe the run: the case, or the cases of a sweep and the first one; empty except on rank 0.  Collective.
 
     Raises:
         CaseError, MeshError: the file is faulty, or the cell of its first case.
@@ -43,7 +43,7 @@ def of_file(path: Path, comm: Intracomm) -> str:
 
 
 def check_options(sweep: Sweep) -> None:
-    """Raises CaseError with the faults of the options of all cases, each with the cases that have it."""
+    """Raise CaseError with the faults of the options of all cases, each with the cases that have it."""
     numbers_by_options = dict[str, list[int]]()
     for entry, case in zip(sweep.entries, sweep.cases, strict=True):
         numbers_by_options.setdefault(json.dumps(case.petsc, sort_keys=True), []).append(entry.number)

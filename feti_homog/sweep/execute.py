@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 def list_cases(sweep: Sweep, directory: Path | None) -> list[str]:
-    """The cases in a table, with their status if a folder is given.  On one rank."""
+    """Return the cases in a table, with their status if a folder is given. On one rank."""
     statuses = ["" if directory is None else store.case_state(directory, entry).status for entry in sweep.entries]
     width = max(map(len, statuses))
     return [
@@ -103,7 +103,7 @@ def run_one(sweep: Sweep, number: int, directory: Path, comm: Intracomm, retry: 
 
 
 def _group(comm: Intracomm, ranks: int) -> Any:
-    """This rank's group of so many neighbours.  Collective."""
+    """Return this rank's group of so many neighbours.  Collective."""
     return comm.Split(comm.rank // ranks)
 
 
@@ -126,7 +126,7 @@ def _run_free_cases(runner: CaseRunner, sweep: Sweep) -> FetiHomogError | None:
 
 
 def _raise_together(comm: Intracomm, fault: FetiHomogError | None) -> None:
-    """Raises on all ranks the faults that made any group stop.  Collective."""
+    """Raise on all ranks the faults that made any group stop. Collective."""
     faults = [fault for fault in comm.allgather(fault) if fault is not None]
     if faults:
         kept = "finished cases are kept; the same command goes on with the others"
@@ -142,7 +142,7 @@ def _reset_failures(directory: Path, sweep: Sweep) -> None:
 
 @contextmanager
 def _sweep_lock(directory: Path, comm: Intracomm, sweep: Sweep, shared: bool) -> Iterator[None]:
-    """The folder made and held: by one sweep, or by any number of single cases.  Collective."""
+    """Provide the folder made and held: by one sweep, or by any number of single cases. Collective."""
     lock = Lock(directory / LOCK_FILE, shared)
     on_root(comm, _prepare_and_lock, lock, directory, sweep)
     try:

@@ -45,7 +45,7 @@ class SweepCase:
         return f"case-{self.number:04d}"
 
     def describe(self, stress_unit: str) -> str:
-        """The inputs in one line, with their units."""
+        """Return the inputs in one line, with their units."""
         values = [(f"{name} = {toml_value(value)}", unit(name, stress_unit)) for name, value in self.inputs.items()]
         return ", ".join(f"{text} {own}".rstrip() for text, own in values)
 
@@ -64,7 +64,7 @@ class Sweep:
 
 
 def load(path: str | Path) -> Sweep:
-    """The sweep in a file.  Raises CaseError with all faults of the table [sweep], or else of all its cases."""
+    """Return the sweep in a file. Raises CaseError with all faults of the table [sweep], or else of all its cases."""
     document = read_document(path)
     if SWEEP not in document:
         raise CaseError(f"{path}: [{SWEEP}]: missing section; `feti-homog run` runs a single case")
@@ -72,7 +72,7 @@ def load(path: str | Path) -> Sweep:
 
 
 def expand(values: Mapping[str, Any], folder: Path) -> Sweep:
-    """The sweep of nested dictionaries with a table "sweep"; its files are relative to `folder`.
+    """Return the sweep of nested dictionaries with a table "sweep"; its files are relative to `folder`.
 
     All points come once before any comes in its next realisation, so that more realisations add cases at the end.
     Raises CaseError as `load` does.
@@ -92,7 +92,8 @@ def expand(values: Mapping[str, Any], folder: Path) -> Sweep:
 
 
 def _checked(name: str, unchecked: Sequence[CaseDocument], folder: Path) -> Sweep:
-    """The sweep of its documents.  Raises CaseError with the faults of all cases, each with the cases that have it."""
+    """Return the sweep of its documents. Raises CaseError with the faults of all cases, each with the cases that
+    have it."""
     found, numbers_by_fault = [], dict[str, list[int]]()
     for number, each in enumerate(unchecked, start=1):
         try:
@@ -136,7 +137,7 @@ class CaseDocument:
 def case_documents(
     base: Mapping[str, Any], points: Sequence[Assignment], realisations: int | None, faults: list[str]
 ) -> list[CaseDocument]:
-    """The cases in their order: all points, then the next realisation of those with a random cell.
+    """Return the cases in their order: all points, then the next realisation of those with a random cell.
 
     What is wrong with the points and their number of realisations is added to `faults`.
     """
@@ -162,13 +163,13 @@ def _ordered(
 
 
 def _seed(document: Mapping[str, Any], realisation: int) -> Any:
-    """The seed of a realisation: that of [cell] and those after it; a faulty one stays as it is."""
+    """Return the seed of a realisation: that of [cell] and those after it; a faulty one stays as it is."""
     first = document["cell"].get("seed", 0)
     return first + realisation - 1 if isinstance(first, int) else first
 
 
 def _with_values(base: Mapping[str, Any], point: Assignment, faults: list[str]) -> dict[str, Any]:
-    """The base with the values of a point; a table is merged into the section that it is a value of."""
+    """Return the base with the values of a point; a table is merged into the section that it is a value of."""
     document = copy.deepcopy(dict(base))
     for path, value in point.items():
         table = document
@@ -189,8 +190,8 @@ def _with_values(base: Mapping[str, Any], point: Assignment, faults: list[str]) 
 
 
 def _entry(table: Any, name: str) -> Any:
-    """The table or the list of tables of this name, a new one if there is none, and of a list the table of this number,
-    from 1; None if there is something else."""
+    """Return the table or the list of tables of this name, a new one if there is none, and of a list the table of
+    this number, from 1; None if there is something else."""
     if isinstance(table, list):
         is_one = name.isdecimal() and 0 < int(name) <= len(table)
         found = table[int(name) - 1] if is_one else None
@@ -200,7 +201,7 @@ def _entry(table: Any, name: str) -> Any:
 
 
 def _several(path: Sequence[str], tables: Sequence[Any]) -> str:
-    """What is wrong with a key of several sections of one name."""
+    """Return the fault of a key of several sections of one name."""
     section, key = dotted_key(path[:-1]), path[-1]
     return f"there are {len(tables)} sections [[{section}]]; expected {section}.1.{key} or the like"
 
@@ -227,7 +228,7 @@ def _is_random(document: Mapping[str, Any]) -> bool:
 
 
 def _inputs(point: Assignment) -> dict[str, Any]:
-    """The values of a point by dotted key, tables taken apart."""
+    """Return the values of a point by dotted key, tables taken apart."""
     inputs: dict[str, Any] = {}
     for path, value in point.items():
         parts = {(*path, name): part for name, part in value.items()} if isinstance(value, dict) else {path: value}

@@ -24,7 +24,7 @@ Assignment = dict[TomlPath, Any]
 
 
 def read_points(table: Mapping[str, Any], faults: list[str]) -> tuple[list[Assignment], SweepSection]:
-    """The points of a table [sweep] as values by key, in their order, and its settings.
+    """Return the points of a table [sweep] as values by key, in their order, and its settings.
 
     There are no points, and a line for each fault is added to `faults`, if the table is faulty.
     """
@@ -64,14 +64,14 @@ def _count_faults(axes: Sequence[Axis], settings: SweepSection) -> list[str]:
 
 
 def _lengths(axes: Sequence[Axis], settings: SweepSection) -> list[tuple[str, int]]:
-    """The keys of each axis in words, and how many values it has; sampled keys are one axis."""
+    """Return the keys of each axis in words, and how many values it has; sampled keys are one axis."""
     lengths = [(dotted_key(axis.path), len(axis.values)) for axis in axes if axis.values]
     sampled = [dotted_key(axis.path) for axis in axes if not axis.values]
     return [*lengths, (" and ".join(sampled), settings.samples)] if sampled and settings.samples else lengths
 
 
 def combine(axes: Sequence[Axis], settings: SweepSection) -> list[Assignment]:
-    """The points of axes without fault.
+    """Return the points of axes without fault.
 
     Of a grid the last key in the file runs fastest; sampled keys are one axis of points, the last.
     """
@@ -87,7 +87,8 @@ def _merged(parts: Sequence[Assignment]) -> Assignment:
 
 
 def _samples(axes: Sequence[Axis], settings: SweepSection) -> list[list[Assignment]]:
-    """The points in the box of the sampled axes, a Latin hypercube or independent; no list if there are no axes."""
+    """Return the points in the box of the sampled axes, a Latin hypercube or independent; no list if there are no
+    axes."""
     if not axes or settings.samples is None:
         return []
     if settings.sampling == "latin":
@@ -109,7 +110,7 @@ class Axis:
     log: bool = False
 
     def at(self, shares: ArrayLike) -> list[Any]:
-        """The values at shares in [0, 1] of the way from the first to the second end."""
+        """Return the values at shares in [0, 1] of the way from the first to the second end."""
         low, high = np.log(self.ends) if self.log else self.ends
         found = low + (high - low) * np.asarray(shares)
         return [_rounded(value, self.path) for value in (np.exp(found) if self.log else found).tolist()]
@@ -126,7 +127,7 @@ class Range:
     count: int | None
 
     def axis(self, path: TomlPath) -> Axis:
-        """The axis of the key that has this range."""
+        """Return the axis of the key that has this range."""
         axis = Axis(path, ends=(self.low, self.high), log=self.log)
         if self.step is not None:
             return Axis(path, tuple(_rounded(value, path) for value in _steps(self.low, self.high, self.step)))
@@ -148,7 +149,7 @@ class AxisReader:
     faults: list[str] = field(default_factory=list)
 
     def read(self, table: Mapping[str, Any]) -> list[Axis]:
-        """The axes in the order of the file, but for the faulty ones."""
+        """Return the axes in the order of the file, but for the faulty ones."""
         axes = []
         for path, value in _leaves(table):
             fault = self._fault(path, value)
@@ -159,7 +160,7 @@ class AxisReader:
         return axes
 
     def _fault(self, path: TomlPath, value: Any) -> str:
-        """What is wrong with an axis, empty if nothing."""
+        """Return the fault of an axis, empty if there is none."""
         if path[0] not in TOP_LEVEL or path[0] in ("name", SWEEP):
             known = [*keys_of(SweepSection), *SECTIONS, "material", "petsc"]
             return f"unknown key; {suggestion(path[0], known, {})}"
@@ -169,7 +170,7 @@ class AxisReader:
 
 
 def _leaves(table: Mapping[str, Any], above: TomlPath = ()) -> Iterator[tuple[TomlPath, Any]]:
-    """The paths and values of a nested table; a range is a value, and so is what stands in an unknown section."""
+    """Yield the paths and values of a nested table; a range is a value, and so is what stands in an unknown section."""
     for name, value in table.items():
         path = (*above, *name.split("."))
         is_known = path[0] in TOP_LEVEL and path[0] not in ("name", SWEEP)
@@ -185,18 +186,18 @@ def _is_range(path: TomlPath, value: Any) -> bool:
 
 
 def _axis(path: TomlPath, value: Any) -> Axis:
-    """The axis of a value without fault."""
+    """Return the axis of a value without fault."""
     return Axis(path, tuple(value)) if isinstance(value, list) else _range(value).axis(path)
 
 
 def _range(table: Mapping[str, Any]) -> Range:
-    """The range of a table without fault."""
+    """Return the range of a table without fault."""
     is_log = table.get("scale") == "log"
     return Range(float(table["from"]), float(table["to"]), is_log, table.get("step"), table.get("count"))
 
 
 def range_fault(table: Mapping[str, Any], is_sampled: bool) -> str:
-    """What is wrong with a range, empty if nothing."""
+    """Return the fault of a range, empty if there is none."""
     unknown = [name for name in table if name not in RANGE_KEYS]
     if unknown:
         return f"{unknown[0]}: unknown key; expected one of {', '.join(RANGE_KEYS)}"
@@ -213,7 +214,7 @@ def _ends_fault(table: Mapping[str, Any]) -> str:
 
 
 def _spacing_fault(table: Mapping[str, Any], is_sampled: bool) -> str:
-    """What is wrong with the step or count of a range whose ends are right."""
+    """Return the fault of the step or count of a range with valid ends."""
     step, count = table.get("step"), table.get("count")
     if step is not None and count is not None:
         return "step, count: exclude each other; give one"
@@ -243,7 +244,7 @@ def _steps(low: float, high: float, step: float) -> list[float]:
 
 
 def _rounded(value: float, path: TomlPath) -> Any:
-    """The number without the noise of its last digits; an integer where the key takes nothing else."""
+    """Return the number without the noise of its last digits; an integer where the key takes nothing else."""
     value = float(f"{value:.12g}")
     section = SECTIONS.get(path[0])
     entry = keys_of(section).get(path[1]) if section is not None and len(path) == 2 else None

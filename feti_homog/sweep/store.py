@@ -108,7 +108,7 @@ def _existing_entries(directory: Path) -> tuple[SweepCase, ...]:
 
 
 def read_index(directory: Path) -> SweepIndex:
-    """The cases of a sweep's folder.  Raises CaseError if it is none."""
+    """Return the cases of a sweep's folder. Raises CaseError if it is none."""
     path = directory / INDEX_FILE
     try:
         document = seals.loads(path.read_text(encoding="utf-8"))
@@ -208,7 +208,7 @@ def failure_lines(cases: Sequence[tuple[SweepCase, CaseState]], stress_unit: str
 
 
 def _refuse_another(directory: Path, known: Sequence[SweepCase], wanted: Sequence[SweepCase]) -> None:
-    """Raises CaseError unless the known cases are the first of those wanted."""
+    """Raise CaseError unless the known cases are the first of those wanted."""
     for old, new in zip(known, wanted, strict=False):
         if old != new:
             words = f"its {old.folder} ({old.describe('')}) differs from this file ({new.describe('')})"
@@ -221,7 +221,7 @@ def _refuse_another(directory: Path, known: Sequence[SweepCase], wanted: Sequenc
 
 
 def _refuse_files_of_others(directory: Path) -> None:
-    """Raises CaseError if something stands where a sweep would write its own, in a folder without a list of cases."""
+    """Raise CaseError if something stands where a sweep would write its own, in a folder without a list of cases."""
     for path in sorted(directory.iterdir()):
         if SWEEP_ENTRY.fullmatch(path.name) and (any(path.iterdir()) if path.is_dir() else path.lstat().st_size):
             raise CaseError(

@@ -22,7 +22,7 @@ DEFAULTS = {"axial_stiffness": "tangential_stiffness", "axial_strength": "tangen
 
 
 def _section_at(files: ResultFiles, nodes: AnyInt | Bool | slice) -> Mapping[str, Any]:
-    """The section [interface]; of several, with the numbers (p,) of each of the `nodes` in place of one."""
+    """Return the section [interface]; of several, with the numbers (p,) of each of the `nodes` in place of one."""
     sections = files.interfaces
     if len(sections) < 2:
         return sections[0] if sections else {}
@@ -37,7 +37,7 @@ def law_at(files: ResultFiles, nodes: AnyInt | Bool | slice = slice(None)) -> Bo
 
 
 def _number(section: Mapping[str, Any], name: str) -> float:
-    """That of a section, or of what it follows where it is not given; inf if there is none."""
+    """Return the value of a section, or of the key that it defaults to; inf if there is none."""
     value = section.get(name)
     value = section.get(DEFAULTS.get(name, name)) if value is None else value
     return np.inf if value is None else float(value)

@@ -48,7 +48,7 @@ class _Bonds:
 
 
 def check_envelope(findings: Findings, cell: DiscreteCell, states: Sequence[StateNumbers]) -> None:
-    """The points of `envelope` in result.json."""
+    """Check the points of `envelope` in result.json."""
     document, asked = cell.files.document, cell.files.case["envelope"]
     points, bonds = document["envelope"], _Bonds(cell, states)
     findings.record("load", abs(len(points) - asked["directions"]), "envelope, which lacks directions or has too many")
@@ -81,7 +81,7 @@ def _unit(plane: Sequence[str], angle: float, count: int) -> Float:
 def _check_load(
     findings: Findings, point: Point, plane: Sequence[str], unit: Float, law: tuple[Float, Float], at: str
 ) -> None:
-    """What the case names is factor times cosine and sine, what it does not name none; stress follows from strain."""
+    """Check that named loads are factor times cosine and sine, others zero, and that stress follows from strain."""
     (stiffness, thermal), strain, stress = law, np.array(point["strain"]), np.array(point["stress"])
     told = strain if plane[0] in NAMES[len(strain)][0] else stress
     scale = max(float(point["factor"]), float(np.abs(told).max()))

@@ -40,12 +40,13 @@ def in_axes(cell: DiscreteCell, vectors: Float) -> Float:
 
 
 def largest_displacement(cell: DiscreteCell, state: State) -> float:
-    """A scale of displacements that does not vanish where the fluctuation does."""
+    """Return a scale of displacements that does not vanish where the fluctuation does."""
     return float(np.abs(state.fluctuation).max()) + cell.imposed(state)
 
 
 def _check_copies(findings: Findings, cell: DiscreteCell, state: State) -> None:
-    """Copies of a node have one fluctuation: in a subdomain by periodicity, elsewhere but across a bond by gluing."""
+    """Check that copies of a node have one fluctuation: in a subdomain by periodicity, elsewhere but across a bond by
+    gluing."""
     nodes, scale = cell.nodes, largest_displacement(cell, state)
     values = state.fluctuation[nodes.node]
     sides = _sides(cell)
@@ -68,7 +69,8 @@ def _group_means(group: Int, values: Float) -> Float:
 
 
 def _check_equilibrium(findings: Findings, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
-    """The forces of all copies of a node add up to zero; at an interface node those of each face to its traction."""
+    """Return the forces of all copies of a node add up to zero; at an interface node those of each face to its
+    traction."""
     nodes, faces = cell.nodes, cell.faces
     traction = interface_forces(cell, state)
     scale = max(fields.largest_force, float(np.abs(traction).max(initial=0.0)))
@@ -125,7 +127,7 @@ def _void_strain(cell: DiscreteCell, state: State) -> Float:
 
 
 def check_derived(findings: Findings, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
-    """What is out of the plane, von Mises and principal stresses, vectors, and the faces' displacements."""
+    """Check components out of the plane, von Mises and principal stresses, vectors, and the faces' displacements."""
     _check_elements(findings, cell, state, fields)
     _check_interface(findings, cell, state)
 

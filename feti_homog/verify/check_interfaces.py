@@ -14,7 +14,7 @@ BONDED, CLOSED, OPEN = 0, 1, 2
 
 
 def check_interface_state(findings: Findings, cell: DiscreteCell, state: State) -> None:
-    """The jumps are those of the displacements; bonds hold; debonded faces obey the conditions of contact."""
+    """Check that jumps are those of the displacements, bonds hold, and debonded faces obey the contact conditions."""
     at = f"{state.name}, interface node {{}}".format
     values = state.fluctuation[cell.nodes.node]
     parted = cell.faces.means(values, of_fibre=False) - cell.faces.means(values, of_fibre=True)

@@ -32,7 +32,8 @@ class UnitLoad:
     temperature: float
 
     def entries(self, told: Mapping[str, Any], stiffness: str, suffix: str, sign: float) -> dict[str, Float]:
-        """The stress under it, or under minus it, that is told in a column of a stiffness or in `thermal_stress`."""
+        """Return the stress under it, or under minus it, that is told in a column of a stiffness or in
+        `thermal_stress`."""
         if self.temperature:
             return {"stress": sign * np.array(told[f"thermal_stress{suffix}"])}
         return {"stress": sign * np.array(told[f"{stiffness}{suffix}"]) @ self.strain}
@@ -115,7 +116,7 @@ def tips(cell: DiscreteCell, status: AnyInt) -> Bool:
 
 
 def check_load(findings: Findings, cell: DiscreteCell, states: Sequence[StateNumbers]) -> None:
-    """Loads against the case, and points or columns of result.json against the states."""
+    """Check loads against the case, and points or columns of result.json against the states."""
     document, case = cell.files.document, cell.files.case
     same = json.loads(str(cell.files.file.attrs["case"])) == case
     findings.record("tables", 0.0 if same else np.inf, "the case, which differs between the two files")
@@ -168,8 +169,10 @@ def _check_prescribed(
 def _check_kept(
     findings: Findings, document: Mapping[str, Any], case: Mapping[str, Any], numbers: Sequence[int]
 ) -> None:
-    """The states of a path are of the points that result.json says, in their order: the first, the last, and as many
-    as the case asks for."""
+    """Check that the states of a path are those of the points that result.json lists, in order.
+
+    They include the first and the last, and are as many as the case asks for.
+    """
     count, asked = len(document["path"]), case["output"]["states"]
     told = list(document["states"]) == list(numbers)
     findings.record("tables", 0.0 if told else np.inf, "states, which differ between the two files")
@@ -183,7 +186,7 @@ def _check_kept(
 
 
 def _check_all(findings: Findings, document: Mapping[str, Any], states: Sequence[StateNumbers], count: int) -> None:
-    """The states of other analyses are all that the case asks for, and know their points."""
+    """Check that the states of other analyses are all that the case asks for, with their points."""
     findings.record("load", abs(count - len(states)), f"{len(states)} states, {count} asked for")
     each = count // len(document["angle"]) if "angle" in document else count
     off = [abs(state.point - number // each) for number, state in enumerate(states)]
@@ -191,7 +194,7 @@ def _check_all(findings: Findings, document: Mapping[str, Any], states: Sequence
 
 
 def _check_entries(findings: Findings, state: StateNumbers, entries: Mapping[str, Any], scales: _Scales) -> None:
-    """What result.json says of a state."""
+    """Check the numbers of a state in result.json."""
     told = {"strain": (state.strain, scales.strain), "stress": (state.stress, scales.stress)}
     told |= {TEMPERATURE: (np.array(state.temperature), max(abs(state.temperature), 1.0))}
     for name in told.keys() & entries.keys():
@@ -205,7 +208,7 @@ def _check_entries(findings: Findings, state: StateNumbers, entries: Mapping[str
 
 
 def _unit_loads(cell: DiscreteCell) -> list[UnitLoad]:
-    """The unit loads in the order of their states."""
+    """Return the unit loads in the order of their states."""
     if not cell.files.is_spatial:
         return [UnitLoad(strain, 0.0) for strain in np.eye(3)]
     unit = [UnitLoad(strain, 0.0) for strain in np.eye(6)[SPATIAL_ORDER]]
@@ -216,7 +219,7 @@ def _unit_loads(cell: DiscreteCell) -> list[UnitLoad]:
 def _expected_loads(
     document: Mapping[str, Any], case: Mapping[str, Any], unit: Sequence[UnitLoad]
 ) -> Iterator[Prescribed]:
-    """The loads of the points of a path, or of the states of another case, in their order."""
+    """Yield the loads of the points of a path, or of the states of another case, in their order."""
     if "path" in document:
         yield from at_points(case, document["path"])
     elif "load" in document:
@@ -236,7 +239,7 @@ def _prescribed(unit: Sequence[UnitLoad], sign: float) -> list[Prescribed]:
 
 
 def _entries(document: Mapping[str, Any], unit: Sequence[UnitLoad]) -> Iterator[Mapping[str, Any]]:
-    """What result.json says of each point of a path, or of each state of another case."""
+    """Yield the entry of result.json for each point of a path, or for each state of another case."""
     if "path" in document:
         yield from document["path"]
     elif "load" in document:
@@ -256,7 +259,7 @@ def _entries(document: Mapping[str, Any], unit: Sequence[UnitLoad]) -> Iterator[
 
 
 def _linear_stiffnesses(document: Mapping[str, Any], contact: bool) -> Iterator[tuple[str, Float]]:
-    """The stiffnesses in result.json of cells without one-sided contact, and what they are called."""
+    """Yield the stiffnesses in result.json of cells without one-sided contact, and what they are called."""
     if "effective_stiffness" in document and "effective_stiffness_compression" not in document:
         yield "effective_stiffness", np.array(document["effective_stiffness"])
     for number, point in enumerate(document.get("angle", ())):

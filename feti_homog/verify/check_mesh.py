@@ -48,7 +48,8 @@ def check_interface(findings: Findings, cell: DiscreteCell) -> None:
 
 
 def _shape(cell: DiscreteCell) -> tuple[Float, Float, Bool]:
-    """Normals (k, 2) and tributary lengths (k,) that follow from the mesh, and whether (k,) the fibre is round.
+    """Return normals (k, 2) and tributary lengths (k,) that follow from the mesh, and whether (k,) the fibre is
+    round.
 
     A round fibre has radial normals and sides that are arcs, 2 R arcsin(chord / 2 R); of others sides are taken as
     straight, and a node has the mean normal of its sides.  Of its length a side gives each end one half or, of order 2,

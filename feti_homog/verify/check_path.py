@@ -39,7 +39,7 @@ def check_path(findings: Findings, cell: DiscreteCell, states: Sequence[StateNum
 
 
 def _with_tips(cell: DiscreteCell, state: StateNumbers, point: Point) -> StateNumbers:
-    """The state with what its point says of tips whose strength is not in the fields."""
+    """Return the state with what its point says of tips whose strength is not in the fields."""
     if "tips" not in point:
         return state
     node, shares = tip_shares(cell, state, point["tips"])
@@ -49,7 +49,7 @@ def _with_tips(cell: DiscreteCell, state: StateNumbers, point: Point) -> StateNu
 
 
 def _check_counts(findings: Findings, points: Sequence[Point], by_events: bool) -> None:
-    """The number of bonds falls by those that break."""
+    """Check that the number of bonds falls by those that break."""
     for number, (point, after) in enumerate(pairwise(points)):
         broke = (point if by_events else after)["broke"]
         findings.record("breaks", abs(point["bonded"] - after["bonded"] - broke), f"path[{number + 1}].bonded")
@@ -58,7 +58,7 @@ def _check_counts(findings: Findings, points: Sequence[Point], by_events: bool) 
 
 
 def _check_breaks(findings: Findings, states: Sequence[StateNumbers], points: Sequence[Point], by_events: bool) -> None:
-    """The bonds of two states that follow each other differ by those that the points say broke between them."""
+    """Check that the bonds of consecutive states differ by those that broke between their points."""
     shift = 0 if by_events else 1
     for state, after in pairwise(states):
         bonded, still = state.status == BONDED, after.status == BONDED

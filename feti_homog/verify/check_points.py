@@ -22,7 +22,7 @@ DIRECTION_DIGITS = 9
 
 
 def check_points(findings: Findings, cell: DiscreteCell, states: Sequence[StateNumbers]) -> None:
-    """The numbers of points beside their strains, stresses and counts."""
+    """Check the numbers of points beside their strains, stresses and counts."""
     document = cell.files.document
     single = [document["load"]] if "load" in document else []
     points: Sequence[Point] = document.get("path") or document.get("angle") or single
@@ -41,7 +41,7 @@ def check_points(findings: Findings, cell: DiscreteCell, states: Sequence[StateN
 def _check_path(
     findings: Findings, cell: DiscreteCell, known: Sequence[StateNumbers], points: Sequence[Point], scale: float
 ) -> None:
-    """The energies of all points of a path, and the tips of those whose fields are kept."""
+    """Check the energies of all points of a path, and the tips of points with fields."""
     for number, point in enumerate(points):
         if not point.get("temperature"):
             off = point["stored"] - float(np.dot(point["strain"], point["stress"])) / 2
@@ -118,8 +118,11 @@ def _check_ratios(findings: Findings, points: Sequence[Point]) -> None:
 def _check_toughness(
     findings: Findings, cell: DiscreteCell, states: Sequence[StateNumbers], points: Sequence[Point], by_events: bool
 ) -> None:
-    """The fracture energy grows with the length that breaks: by G_c in the mode of the state before, if that is in the
-    files, else by between G_Ic and G_c in pure shear."""
+    """Check that the fracture energy grows with the length that breaks.
+
+    It grows by G_c in the mode of the state before, if the files have that state, otherwise by between G_Ic and G_c in
+    pure shear.
+    """
     length = cell.files.interface.length / cell.area
     scale = max(points[-1]["fracture_energy"], 1e-300)
     findings.record("energy", points[0]["fracture_energy"] * by_events / scale, "path[0].fracture_energy")
@@ -139,7 +142,8 @@ def _check_toughness(
 def _check_tips(
     findings: Findings, cell: DiscreteCell, state: StateNumbers, told: Mapping[str, Sequence[float]]
 ) -> None:
-    """The tips are the bonds beside broken ones, in the mode of their tractions; by springs also with their energy."""
+    """Check that tips are the bonds beside broken ones, in the mode of their tractions; with springs also their
+    energy."""
     node = _tips_in_order(cell, state)
     law = law_at(cell.files, node)
     fibre, where = cell.files.interface.fibre[node], f"{state.name}, tip {{}}".format

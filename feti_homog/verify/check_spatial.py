@@ -20,7 +20,8 @@ Section = Mapping[str, Any]
 
 
 def check_spatial(findings: Findings, cell: DiscreteCell, states: Sequence[StateNumbers]) -> None:
-    """What follows from the stiffness, and the thermal stress from the states under unit strains."""
+    """Check the quantities that follow from the stiffness, and the thermal stress from the states under unit
+    strains."""
     document = cell.files.document
     if "effective_stiffness" in document:
         _check_stiffness(findings, document)
@@ -90,7 +91,7 @@ def _about_fibres(stiffness: Float, strains: Float | None) -> dict[str, float | 
 
 
 def _across_fibres(stiffness: Float) -> dict[str, float]:
-    """What E1 and G12 range over in axes that are turned about x3."""
+    """Return the ranges of E1 and G12 in axes turned about x3."""
     turned = [_constants(_turned(stiffness, angle)) for angle in np.pi * np.arange(DIRECTIONS) / DIRECTIONS]
     E, G = (np.array([own[name] for own in turned]) for name in ("E1", "G12"))
     return {
@@ -100,7 +101,7 @@ def _across_fibres(stiffness: Float) -> dict[str, float]:
 
 
 def _turned(stiffness: Float, angle: float) -> Float:
-    """The stiffness in axes that are turned about x3 by an angle: stress and strain turn as tensors."""
+    """Return the stiffness in axes that are turned about x3 by an angle: stress and strain turn as tensors."""
     c, s = np.cos(angle), np.sin(angle)
     turn, voigt = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]), VOIGT[6]
     tensor = stiffness[voigt[:, :, None, None], voigt[None, None]]
@@ -112,7 +113,7 @@ def _turned(stiffness: Float, angle: float) -> Float:
 def _thermal_stresses(
     cell: DiscreteCell, states: Sequence[StateNumbers]
 ) -> Iterator[tuple[str, Float, Sequence[StateNumbers]]]:
-    """What is told to be the thermal stress, where, and the states of the same stiffness."""
+    """Yield each reported thermal stress, its place, and the states of the same stiffness."""
     document = cell.files.document
     if cell.expansions is None:
         return

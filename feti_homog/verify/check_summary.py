@@ -18,7 +18,7 @@ Section = Mapping[str, Any]
 
 
 def check_summary(findings: Findings, cell: DiscreteCell) -> None:
-    """The sections `cell`, `moduli` and `bounds` of result.json, where they are."""
+    """Check the sections `cell`, `moduli` and `bounds` of result.json, if present."""
     document = cell.files.document
     _check_cell(findings, cell, document["cell"])
     _check_fibres(findings, cell, document["fibres"])
@@ -46,7 +46,7 @@ def _check_cell(findings: Findings, cell: DiscreteCell, told: Section) -> None:
 
 
 def _check_fibres(findings: Findings, cell: DiscreteCell, told: Sequence[Section]) -> None:
-    """The list of fibres is that of result.h5, in the order of their numbers."""
+    """Check that the list of fibres is that of result.h5, in the order of their numbers."""
     fibres, phases = cell.files.fibres, cell.files.phases
     numbers = np.arange(1, len(fibres.number) + 1)
     findings.record("tables", np.where(np.array_equal(fibres.number, numbers), 0.0, np.inf), "/fibre/number")
@@ -143,7 +143,7 @@ def _check_table(findings: Findings, path: Path, points: Sequence[Mapping[str, s
 
 
 def _columns(point: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    """The names of the numbers of a point, and how a table writes them."""
+    """Yield the names of the numbers of a point, and how a table writes them."""
     for name, value in point.items():
         if name in ("strain", "stress", "thermal_stress"):
             components = NAMES[len(value)][name != "strain"]

@@ -120,7 +120,7 @@ def _expansion(constants: Mapping[str, Any]) -> Float | None:
 
 
 def _given(constants: Mapping[str, Any]) -> Float:
-    """The stiffness that the constants give themselves, (3, 3) or (6, 6); (0, 0) if they do not."""
+    """Return the stiffness that the constants give themselves, (3, 3) or (6, 6); (0, 0) if they do not."""
     given = np.array(constants.get("stiffness", np.zeros((0, 0))), float)
     return np.asarray((given + given.T) / 2)
 

@@ -95,7 +95,7 @@ class DiscreteCell:
 
     @classmethod
     def of(cls, files: ResultFiles) -> DiscreteCell:
-        """The cell of a result.  Raises CaseError if a phase has no material."""
+        """Return the cell of a result. Raises CaseError if a phase has no material."""
         mesh = files.mesh
         stiffnesses = (spatial_stiffnesses if files.is_spatial else plane_stiffnesses)(files.case, files.phases)
         free = expansions(files.case, files.phases) if files.is_spatial else None
@@ -181,7 +181,8 @@ class DiscreteCell:
         return max(own, LEAST_SHARE * self.largest_strain * float(self.files.size.max()))
 
     def least_stress(self, state: Loaded) -> float:
-        """A stress that a state makes in the bonded cell at least, for scales that debonding does not make zero."""
+        """Return a stress that a state makes in the bonded cell at least, for scales that debonding does not make
+        zero."""
         own, most = np.abs(self.reuss @ self.loads(state)).max(), np.abs(self.reuss).max() * self.largest_strain
         return float(max(own, LEAST_SHARE * most))
 
@@ -195,7 +196,7 @@ class DiscreteCell:
         return self.least_stress(state) * self.strain_size(state)
 
     def strain_size(self, state: Loaded) -> float:
-        """The largest of the strains that the loads of a state make."""
+        """Return the largest of the strains that the loads of a state make."""
         return max(float(np.abs(self.loads(state)).max()), LEAST_SHARE * self.largest_strain)
 
 

@@ -57,7 +57,7 @@ class Finding:
         return self.violation <= self.check.limit
 
     def line(self) -> str:
-        """The finding as a line of the certificate."""
+        """Return the finding as a line of the certificate."""
         verdict = "holds" if self.holds else "BROKEN"
         where = f", at {self.where}" if self.where and self.violation > 0 else ""
         numbers = f"{self.violation:9.1e} of {self.check.limit:7.1e}"

@@ -121,8 +121,10 @@ def _numbers(cell: DiscreteCell, states: Sequence[StateNumbers], points: Sequenc
 def _check_events(
     findings: Findings, numbers: Sequence[PointNumbers], points: Sequence[Point], first_leg: float, scale: float
 ) -> None:
-    """What is lost between two points is lost by the bonds that break at the first of them; the first leg ends at the
-    load factor `first_leg`."""
+    """Check that the energy lost between two points is lost by the bonds that break at the first of them.
+
+    The first leg ends at the load factor `first_leg`.
+    """
     findings.record("energy", abs(points[0]["dissipated"]) / scale, f"{numbers[0].name}, dissipated")
     findings.record("energy", abs(points[0]["dissipated_strain_controlled"]) / scale, f"{numbers[0].name}, dissipated")
     largest = 0.0
@@ -147,7 +149,7 @@ def _losses(state: PointNumbers, after: PointNumbers) -> tuple[float, float]:
 
 
 def potentials(load: Prescribed, other: PointNumbers) -> tuple[float, float]:
-    """The least and the largest potential at a load with the bonds of another state, by (P)."""
+    """Return the least and the largest potential at a load with the bonds of another state, by (P)."""
     if (load.by_stress != other.load.by_stress).any():
         return -np.inf, np.inf
     (strains, stresses), (forces, answers) = other.given, other.answered

@@ -34,13 +34,14 @@ class Prescribed:
 
     @classmethod
     def strain(cls, strain: Float, temperature: float) -> Prescribed:
-        """A strain (v,) and a change of temperature, which only generalized plane strain has."""
+        """Return a strain (v,) and a change of temperature, which only generalized plane strain has."""
         values = np.array([*strain, temperature] if len(strain) > 3 else strain, float)
         return cls(values, np.zeros(len(values), bool))
 
 
 def targets(case: Document) -> list[Prescribed]:
-    """The loads that a case names, each in full: what one does not name stays, and is at first free of stress."""
+    """Return the loads that a case names, each in full: what one does not name stays, and is at first free of
+    stress."""
     v = 6 if case["analysis"]["plane"] == "generalized" else 3
     n = v + (v > 3)
     strains, stresses = NAMES[v]
@@ -57,7 +58,7 @@ def targets(case: Document) -> list[Prescribed]:
 
 
 def _given(case: Document) -> Sequence[Any]:
-    """The loads as they stand in the case: strains, or tables of names."""
+    """Return the loads as they stand in the case: strains, or tables of names."""
     if "load" in case:
         return [case["load"]["to"]]
     path = case["path"]
@@ -66,8 +67,11 @@ def _given(case: Document) -> Sequence[Any]:
 
 
 def at_points(case: Document, points: Sequence[Document]) -> Iterator[Prescribed]:
-    """What is prescribed at every point of a path: on the first leg a share of its end; later legs are straight from
-    what was prescribed last to their end, a component that changes its kind from what the last point has of it."""
+    """Yield the prescribed load at every point of a path.
+
+    The first leg has a share of its end. Later legs are straight from the last prescribed load to their end; a component
+    that changes its kind begins at its value in the last point.
+    """
     ends, leg, ended = targets(case), 0, False
     by_events = case["path"]["method"] == "events"
     start, last = np.zeros(len(ends[0].values)), None
@@ -84,6 +88,6 @@ def at_points(case: Document, points: Sequence[Document]) -> Iterator[Prescribed
 
 
 def _values(point: Document, by_stress: Bool) -> Float:
-    """What a point has of components (n,): its strains and temperature, or its stresses."""
+    """Return the components (n,) of a point: its strains and temperature, or its stresses."""
     strain, stress = ([*point[name], point.get(TEMPERATURE, 0.0)][: len(by_stress)] for name in ("strain", "stress"))
     return np.where(by_stress, stress, strain)

@@ -114,7 +114,7 @@ class ResultFiles:
         return _interfaces(self.case)
 
     def states(self) -> Iterator[State]:
-        """The states in their order, one in memory at a time."""
+        """Yield the states in their order, one in memory at a time."""
         for number in sorted(map(int, self.file.get("state", ()))):
             with _reading(Path(self.file.filename)):
                 yield self._state(number)
@@ -144,7 +144,7 @@ class ResultFiles:
         return State(name, strain, mean, factor, point, **arrays, derived=others, temperature=warmer)
 
     def _spatial(self, number: int, plane: Mapping[str, Float]) -> dict[str, Float]:
-        """The tables of a state with what is along the fibres."""
+        """Return the tables of a state with what is along the fibres."""
         rows = {"displacement": "n", "fluctuation": "n", "traction": "k", "jump": "k"}
         count = {"n": len(self.mesh.points), "k": len(self.interface.points)}
         whole = {
@@ -157,7 +157,7 @@ class ResultFiles:
         return whole | {"stress": np.column_stack([S11, S22, S33, S23, S13, S12])}
 
     def _table(self, number: int, name: str, shape: tuple[int, ...]) -> Any:
-        """A table of a state, of the shape that it must have."""
+        """Return a table of a state, of the shape that it must have."""
         array = _rows(self.file[f"state/{number}/{name}"])
         _expect(array.shape == shape, f"/state/{number}/{name} has shape {array.shape}, expected {shape}")
         return array
@@ -181,7 +181,7 @@ def altered(directory: Path) -> tuple[str, ...]:
 
 @contextmanager
 def opened(directory: Path) -> Iterator[ResultFiles]:
-    """The results in a folder, while the block lasts.
+    """Provide the results in a folder, while the block lasts.
 
     Raises:
         CaseError: there are none that can be read; one line.
@@ -210,7 +210,7 @@ def _document(path: Path) -> Mapping[str, Any]:
 
 
 def _contents(document: Mapping[str, Any], file: h5py.File, altered: tuple[str, ...]) -> ResultFiles:
-    """The whole of both files but the states."""
+    """Return the whole of both files but the states."""
     mesh = Mesh(*(_rows(file[f"mesh/{name}"]) for name in ("points", "triangles", "subdomain", "phase", "body")))
     own = file["interface"]
     # Results of before there were several sections have no pairs.
@@ -266,7 +266,7 @@ def _expect(holds: bool, fault: str) -> None:
 
 @contextmanager
 def _reading(path: Path) -> Iterator[None]:
-    """What goes wrong in reading a damaged or foreign file, as one line about it."""
+    """Convert errors of reading a damaged or foreign file into one line."""
     try:
         yield
     except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:

@@ -160,7 +160,8 @@ class AdaptiveCoarseSpace:
         return summed
 
     def balanced(self, x: Float) -> Float:
-        """The forces S_0 x (boundary dofs,) or (boundary dofs, k) of displacements x of that shape.  Collective."""
+        """Return the forces S_0 x (boundary dofs,) or (boundary dofs, k) of displacements x of that shape.
+        Collective."""
         forces = self._operators.apply_with_springs(x)
         if not self.coarse_dimension:
             return forces

@@ -48,7 +48,8 @@ class FaceNeighbourhood:
 def face_neighbourhoods(
     body: Subdomain, dofs: Int, face: Int, thresholds: Thresholds = DEFAULTS
 ) -> list[FaceNeighbourhood]:
-    """The neighbourhoods of a face: one for each connected part of what is near it and has enough of its nodes.
+    """Return the neighbourhoods of a face: one for each connected part of what is near it and has enough of its
+    nodes.
 
     Args:
         dofs: (n,) boundary dofs of the body, sorted.
@@ -72,7 +73,7 @@ def face_neighbourhoods(
 def _neighbourhood(
     body: Subdomain, dofs: Int, triangles: Int, on_face: Bool, on_others: Bool, min_trace_dofs: int
 ) -> FaceNeighbourhood | None:
-    """That of some coarse triangles, if it has enough of the face."""
+    """Return the neighbourhood of some coarse triangles if it has enough of the face."""
     outside = np.zeros_like(on_face)
     outside[body.mesh.node_class[np.delete(body.mesh.nodes, triangles, axis=0)]] = True
     piece = part(body.submesh, triangles)

@@ -36,7 +36,7 @@ def subdomain_blocks(
     scaling: StiffnessScaled,
     rows: Sequence[Int],
 ) -> list[SubdomainBlocks]:
-    """The blocks of this rank's subdomains; `rows` are those of their nodes.  Collective."""
+    """Return the blocks of this rank's subdomains; `rows` are those of their nodes. Collective."""
     B, BW = operators.B.tocsc(), scaled_constraints(comm, jump_operator, scaling)
     blocks = []
     for i, (subdomain, operator) in enumerate(zip(operators.subdomains, operators.with_springs, strict=True)):
@@ -94,7 +94,7 @@ def _eigenproblems(
 
 
 def local_columns(matrix: csc_matrix, span: slice, rows: Int) -> csr_matrix:
-    """The columns `span` on the sorted `rows`, which hold all their entries."""
+    """Return the columns `span` on the sorted `rows`, which hold all their entries."""
     indptr = matrix.indptr[span.start : span.stop + 1]
     part = slice(indptr[0], indptr[-1])
     at = np.searchsorted(rows, matrix.indices[part])

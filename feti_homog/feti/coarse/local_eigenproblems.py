@@ -64,7 +64,7 @@ class SubdomainEigenproblem:
         common: Mapping[int, Int],
         min_trace_dofs: int = DEFAULTS.min_trace_dofs,
     ) -> None:
-        """`common` names the rows that it has in common with each subdomain, itself among them."""
+        """Store the rows of `common` that the subdomain shares with each subdomain, itself included."""
         self.block, self.common, self._operator = block, common, operator
         subdomain, S = block.subdomain, operator.S
         nodes = np.unique(subdomain.problem.nodes(block.dofs))
@@ -137,7 +137,7 @@ class FaceEigenproblems:
 def eigenproblem(
     block: SubdomainBlocks, common: Mapping[int, Int], thresholds: Thresholds = DEFAULTS
 ) -> SubdomainEigenproblem | FaceEigenproblems:
-    """The eigenproblem of a subdomain, or those of its faces.
+    """Return the eigenproblem of a subdomain, or those of its faces.
 
     Raises:
         TypeError: one on the whole boundary is wanted, but its operators are not dense.

@@ -186,7 +186,7 @@ class GramMatrix:
         return allreduce_sum(self._comm, self._Q @ active)
 
     def groups(self, some: Int) -> list[Int]:
-        """The numbers `some` in groups that G^T G couples: of each size, (groups, size)."""
+        """Return the numbers `some` in groups that G^T G couples: of each size, (groups, size)."""
         place = np.full(self._m, -1)
         place[some] = np.arange(len(some))
         i, j = place[self._rows], place[self._columns]

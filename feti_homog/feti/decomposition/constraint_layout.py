@@ -174,7 +174,7 @@ class ConstraintLayout:
         return self._owned_row[mine][entity] + p * size[entity], size[entity]
 
     def interface_nodes(self) -> InterfaceNodes:
-        """The breakable nodes whose rows are owned."""
+        """Return the breakable nodes whose rows are owned."""
         shared = self.shared
         breakable = np.flatnonzero(self._owned & (shared.fibre >= 0))
         entity, p = expand(breakable, shared.nodes[breakable])
@@ -214,8 +214,8 @@ class ConstraintLayout:
         return copies, inside
 
     def outer_copies(self) -> tuple[Int, Int]:
-        """The breakable nodes of which this rank has the outer body's first copy: the local row of the bond of each,
-        and that copy among the fine nodes of this rank."""
+        """Return the breakable nodes of which this rank has the outer body's first copy: the local row of the bond
+        of each, and that copy among the fine nodes of this rank."""
         shared = self.shared
         first = self.base[shared.pointer[:-1]]
         here = np.flatnonzero((shared.fibre >= 0) & (first >= 0))

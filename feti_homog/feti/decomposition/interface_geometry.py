@@ -49,8 +49,8 @@ def breakable_pairs(own: SubmeshesOfRank, table: SubdomainTable, pairs: Int, fou
 def interface_geometry(
     comm: MPI.Intracomm, own: SubmeshesOfRank, table: SubdomainTable, pairs: Int, found: Sharers, side: float
 ) -> InterfaceGeometry:
-    """Normals, turns and precracks of shared entities; `pairs` as in `share_entities`; the side of an element is the
-    share `side` of a coarse edge.  Collective."""
+    """Return normals, turns and precracks of shared entities; `pairs` as in `share_entities`; the side of an
+    element is the share `side` of a coarse edge. Collective."""
     n, owner = len(found.key), table.rank[found.innermost]
     can_part = (owner == comm.rank) & (breakable_pairs(own, table, pairs, found) >= 0)
     # The last sharer of an edge between two bodies is on the side of the fibre.
@@ -106,7 +106,8 @@ def _sums_at_vertices(comm: MPI.Intracomm, found: Sharers, owner: Int, ends: Int
 
 
 def _triangles_beside(own: SubmeshesOfRank, key: Int, subdomain: Int) -> tuple[Int, Int]:
-    """The triangle (n,) of this rank's subdomain (n,), and which of its edges (n,) is the torus edge `key` (n,)."""
+    """Return the triangle (n,) of this rank's subdomain (n,), and which of its edges (n,) is the torus edge `key`
+    (n,)."""
     whole = own.whole
     edge = np.searchsorted(whole.edge_keys, key)
     wanted = np.full(len(whole.edge_keys), -1)
@@ -119,8 +120,8 @@ def _triangles_beside(own: SubmeshesOfRank, key: Int, subdomain: Int) -> tuple[I
 
 
 def _edge_normals(mesh: Submesh, triangle: Int, k: Int) -> tuple[Float, Float]:
-    """Normals (n, 2, 2) out of triangles (n,) at the start and end of their edges k (n,), as in `SharedEntities`, and
-    the turns (n,) of these."""
+    """Return normals (n, 2, 2) out of triangles (n,) at the start and end of their edges k (n,), as in
+    `SharedEntities`, and the turns (n,) of these."""
     a, b = (mesh.points[mesh.triangles[triangle, (k + step) % 3]] for step in (0, 1))
     plane = mesh.triangle_edges[triangle, k]
     turn = mesh.turns[plane]

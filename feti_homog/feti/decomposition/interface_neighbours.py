@@ -26,7 +26,7 @@ class InterfaceNeighbours:
     """
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, subdomains: Sequence[Subdomain]) -> None:
-        """Collective."""
+        """Find the neighbours along interfaces.  Collective."""
         own = jump_operator.owned[0] + jump_operator.nodes.row
         if (np.diff(own) <= 0).any():
             raise ValueError("the interface nodes of a rank are not in the order of their rows")
@@ -69,6 +69,6 @@ def _sides(subdomains: Sequence[Subdomain], number: Int, body: Int, n: int) -> I
 
 
 def _once(values: Int) -> Int:
-    """The values that are there once."""
+    """Return the values that are there once."""
     different, count = np.unique(values, return_counts=True)
     return np.asarray(different[count == 1])

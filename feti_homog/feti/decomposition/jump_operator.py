@@ -72,11 +72,11 @@ class JumpOperator:
         return np.asarray(self._first[entity] + p)
 
     def gather(self, owned: Float) -> Float:
-        """The local rows of vectors (owned rows,) or (owned rows, k) of which each rank has its own rows."""
+        """Return the local rows of vectors (owned rows,) or (owned rows, k) of which each rank has its own rows."""
         return self._exchange(owned).gather(owned)
 
     def sum(self, local: Float) -> Float:
-        """The owned rows of the sum over ranks of `local`, (local rows,) or (local rows, k)."""
+        """Return the owned rows of the sum over ranks of `local`, (local rows,) or (local rows, k)."""
         return self._exchange(local).sum(local)
 
     def from_outer(self, numbers: Int) -> Int:
@@ -88,7 +88,7 @@ class JumpOperator:
         return self.sum(local)[self.nodes.row].astype(np.int64)
 
     def _exchange(self, x: Float) -> _Exchange:
-        """The exchange for vectors of as many columns as x; the KEPT_EXCHANGES that were used last are kept."""
+        """Return the exchange for vectors of as many columns as x; the KEPT_EXCHANGES that were used last are kept."""
         columns = x.size // len(x) if len(x) else int(np.prod(x.shape[1:]))
         exchange = self._exchanges.pop(columns, None) or _Exchange(self.vector, self.rows, columns)
         self._exchanges[columns] = exchange
@@ -112,7 +112,7 @@ class _Exchange:
         here.destroy()
 
     def gather(self, owned: Float) -> Float:
-        """The local rows of x (owned rows,) or (owned rows, k)."""
+        """Return the local rows of x (owned rows,) or (owned rows, k)."""
         if self._same:
             return owned
         self._owned.getArray()[:] = owned.ravel()
@@ -121,7 +121,7 @@ class _Exchange:
         return local.copy()
 
     def sum(self, local: Float) -> Float:
-        """The owned rows of the sum over ranks of x (local rows,) or (local rows, k)."""
+        """Return the owned rows of the sum over ranks of x (local rows,) or (local rows, k)."""
         if self._same:
             return local
         self._owned.zeroEntries()

@@ -28,7 +28,7 @@ class Neighbours:
     """
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, subdomains: Sequence[Subdomain]) -> None:
-        """Collective."""
+        """Find the subdomains that share rows.  Collective."""
         self.comm = comm
         self.index = [s.submesh.index for s in subdomains]
         self.local = {s: i for i, s in enumerate(self.index)}

@@ -67,7 +67,7 @@ class SharedEntities:
 def share_entities(
     comm: MPI.Intracomm, own: SubmeshesOfRank, table: SubdomainTable, pairs: Int, lattice: ReferenceLattice
 ) -> SharedEntities:
-    """The shared entities of this rank; constraints are numbered rank by rank.  Collective.
+    """Return the shared entities of this rank; constraints are numbered rank by rank. Collective.
 
     Args:
         pairs: (phases, phases) the interface of the case between two phases, -1 where they never part.
@@ -108,7 +108,7 @@ def share_entities(
 
 
 def _told_by_owners(comm: MPI.Intracomm, found: Sharers, table: SubdomainTable, *columns: Array) -> list[Array]:
-    """The columns (n,) or (n, ...) of the entities, each row as the owner of the entity has it.  Collective."""
+    """Return the columns (n,) or (n, ...) of the entities, each row as the owner of the entity has it. Collective."""
     rank = table.rank[found.sharer]
     mine = np.repeat(table.rank[found.innermost] == comm.rank, found.copies)
     entity = np.repeat(np.arange(len(found.key)), found.copies)

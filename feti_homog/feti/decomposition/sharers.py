@@ -46,7 +46,7 @@ class Sharers:
         return entity_code(self.key, self.is_edge)
 
     def chosen(self, which: Int) -> Sharers:
-        """The entities of these numbers (k,), in that order."""
+        """Return the entities of these numbers (k,), in that order."""
         copies = self.copies[which]
         sharer = self.sharer[ranges(self.pointer[which], copies)]
         return Sharers(self.key[which], self.is_edge[which], np.r_[0, np.cumsum(copies)], sharer)
@@ -58,8 +58,8 @@ def entity_code(key: Int, is_edge: Bool | bool) -> Int:
 
 
 def find_sharers(comm: MPI.Intracomm, own: SubmeshesOfRank, table: SubdomainTable) -> Sharers:
-    """The vertex classes, but for the pinned one, and the torus edges that several subdomains share, one of them of
-    this rank.  Collective."""
+    """Return the vertex classes, but for the pinned one, and the torus edges that several subdomains share, one of
+    them of this rank. Collective."""
     code, subdomain = _told(own)
     code, subdomain = exchange(comm, code // 2 % comm.size, code, subdomain)
     order = np.lexsort((subdomain, table.nesting[table.body[subdomain]], code))
@@ -100,8 +100,8 @@ def _told(own: SubmeshesOfRank) -> tuple[Int, Int]:
 
 
 def _several(keys: Int, member: Int, at_border: Bool) -> tuple[Int, Int]:
-    """The keys of triangles (t, 3), negative ones left out, that several members (t,) have or that are at the border
-    of all, and these members."""
+    """Return the keys of triangles (t, 3), negative ones left out, that several members (t,) have or that are at
+    the border of all, and these members."""
     n = int(member.max(initial=0)) + 1
     low, high = np.full(len(at_border) + 1, n), np.full(len(at_border) + 1, -1)
     for corner in keys.T:

@@ -149,7 +149,7 @@ def kernel(problem: Problem, positions: Float, rotates: bool, pinned: int) -> Fl
 
 
 def label(submesh: Submesh) -> str:
-    """The subdomain in messages."""
+    """Return the subdomain in messages."""
     x, y = submesh.points[0]
     return f"subdomain {submesh.index} ({submesh.phase}) near ({x:.6g}, {y:.6g})"
 

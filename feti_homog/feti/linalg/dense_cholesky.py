@@ -14,7 +14,8 @@ from feti_homog.typing import Float
 
 
 def cholesky(A: Float, lower: bool = True, clean: bool = True) -> Float:
-    """The triangle L with L L^T = A (n, n), or the upper one L^T, in the memory of A if that is in Fortran order.
+    """Return the triangle L with L L^T = A (n, n), or the upper one L^T, in the memory of A if that is in Fortran
+    order.
 
     Args:
         clean: set the other triangle to 0.
@@ -72,7 +73,8 @@ def _invert_triangle(U: Float) -> None:
 
 
 def full_from_lower(A: Float, block: int = MIRRORED_BLOCK_ROWS) -> Float:
-    """The symmetric matrix, in C order, whose lower triangle is that of A (n, n); by blocks that fit the cache."""
+    """Return the symmetric matrix, in C order, whose lower triangle is that of A (n, n); by blocks that fit the
+    cache."""
     whole, lower = A.copy(order="F"), np.tri(block, dtype=bool)
     for j in range(0, len(A), block):
         some = slice(j, j + block)

@@ -14,7 +14,7 @@ from feti_homog.typing import Bool, Int
 def assemble_owned_rows(
     comm: MPI.Intracomm, local: csr_matrix, rows: Int, columns: Int, owned: tuple[int, int]
 ) -> csr_matrix:
-    """The owned rows of the sum over ranks of `local`.  Collective.
+    """Return the owned rows of the sum over ranks of `local`. Collective.
 
     Args:
         local: (r, c) this rank's contribution.
@@ -70,7 +70,7 @@ def assemble_distributed(comm: MPI.Intracomm, part: csr_matrix, numbers: Int, to
 
 
 def allreduce_sparse(comm: MPI.Intracomm, part: csr_matrix) -> csr_matrix:
-    """The sum over ranks of small sparse square matrices of one shape, on every rank.  Collective."""
+    """Return the sum over ranks of small sparse square matrices of one shape, on every rank. Collective."""
     if comm.size == 1:
         return part
     some = np.union1d(np.flatnonzero(np.diff(part.indptr)), part.indices)
@@ -89,7 +89,7 @@ def _even_share(comm: MPI.Intracomm, n: int) -> int:
 
 
 def _assemble(comm: MPI.Intracomm, local: csr_matrix, rows: Int, columns: Int, owned: tuple[int, int]) -> PETSc.Mat:
-    """The sum of the contributions as PETSc's distributed sparse matrix; arguments as `assemble_owned_rows`."""
+    """Return the sum of the contributions as PETSc's distributed sparse matrix; arguments as `assemble_owned_rows`."""
     maps = [PETSc.LGMap().create(i.astype(PETSc.IntType), comm=comm) for i in (rows, columns)]
     sizes = tuple((n, comm.allreduce(n)) for n in owned)
     A = PETSc.Mat().createIS(sizes, lgmapr=maps[0], lgmapc=maps[1], comm=comm)

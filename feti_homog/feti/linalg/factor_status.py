@@ -20,7 +20,8 @@ LEAST_EXPONENT = -1000
 
 
 def power_of_two(diagonal: Float, comm: MPI.Intracomm | None = None) -> float:
-    """The factor that brings the largest entry of a diagonal, or of all ranks' parts of it, to between 1 and 2.
+    """Return the factor that brings the largest entry of a diagonal, or of all ranks' parts of it, to between 1 and
+    2.
 
     It is 1 where none is positive.  Collective, if there are ranks.
 
@@ -60,7 +61,7 @@ def mumps_error(factor: PETSc.Mat) -> tuple[int, int]:
 
 
 def _read_mumps(factor: PETSc.Mat, is_cholesky: bool) -> int:
-    """The number of negative pivots.  Raises as `check_factor`."""
+    """Return the number of negative pivots. Raises as `check_factor`."""
     first, second = mumps_error(factor)
     if first == SINGULAR:
         raise np.linalg.LinAlgError(f"singular (MUMPS: INFOG(1) = {first}, INFOG(2) = {second})")

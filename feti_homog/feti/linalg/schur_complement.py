@@ -55,7 +55,7 @@ def _by_mumps(matrix: csr_matrix, rows: Int) -> Float:
 
 
 def _with_room(A: PETSc.Mat, rows: PETSc.IS) -> PETSc.PC:
-    """The partial factorization, with the first of MORE_WORKSPACE that is enough, or the last."""
+    """Return the partial factorization, with the first of MORE_WORKSPACE that is enough, or the last."""
     *fewer, last = MORE_WORKSPACE
     for workspace in fewer:
         pc = _factored(A, rows, workspace)
@@ -66,7 +66,7 @@ def _with_room(A: PETSc.Mat, rows: PETSc.IS) -> PETSc.PC:
 
 
 def _factored(A: PETSc.Mat, rows: PETSc.IS, workspace: int | None) -> PETSc.PC:
-    """The partial factorization, as far as it came."""
+    """Return the partial factorization, as far as it came."""
     pc = PETSc.PC().create(PETSc.COMM_SELF)
     pc.setOptionsPrefix("feti_schur_")
     pc.setOperators(A)

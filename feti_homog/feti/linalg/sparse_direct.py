@@ -75,8 +75,8 @@ def solve_columns(ksp: PETSc.KSP, x: PETSc.Vec, b: PETSc.Vec, B: Float, one_by_o
 
 
 def factored(A: PETSc.Mat, prefix: str, library: str, near_kernel: Float | None = None) -> PETSc.KSP:
-    """A KSP with the Cholesky factorization of a symmetric definite matrix by this library; options under `prefix` may
-    choose others.  Collective where the matrix is.
+    """Return a KSP with the Cholesky factorization of a symmetric definite matrix by this library; options under
+    `prefix` may choose others. Collective where the matrix is.
 
     Rows and columns should have similar size: MUMPS does not scale here, for its own scaling loses all digits of coarse
     problems with contrasts of 1e6.  Multigrid learns of the `near_kernel` (n, k), orthonormal vectors of little energy.
@@ -131,7 +131,7 @@ def _set_near_kernel(A: PETSc.Mat, near_kernel: Float | None) -> None:
 
 
 def _direct_ksp(A: PETSc.Mat, prefix: str, library: str) -> PETSc.KSP:
-    """A KSP that applies a Cholesky factorization by `library` once; options under `prefix` may change both."""
+    """Return a KSP that applies a Cholesky factorization by `library` once; options under `prefix` may change both."""
     ksp = PETSc.KSP().create(A.comm)
     ksp.setOptionsPrefix(prefix)
     ksp.setOperators(A)
@@ -162,7 +162,7 @@ def _destroy(ksp: PETSc.KSP, *vectors: PETSc.Vec) -> None:
 
 
 def _sequential(matrix: csr_matrix) -> PETSc.Mat:
-    """The matrix as PETSc's, on this rank alone; both have the same arrays."""
+    """Return the matrix as PETSc's, on this rank alone; both have the same arrays."""
     matrix.sort_indices()
     csr = matrix.indptr, matrix.indices, matrix.data
     return PETSc.Mat().createAIJWithArrays(matrix.shape, csr, comm=PETSc.COMM_SELF)

@@ -32,7 +32,7 @@ class DenseBlockSum:
             self._flush()
 
     def matrix(self) -> csr_matrix:
-        """The sum of all blocks so far."""
+        """Return the sum of all blocks so far."""
         self._flush()
         return self._sum
 

@@ -51,7 +51,7 @@ def choose(
     can_condense: bool,
     thresholds: Thresholds,
 ) -> list[OperatorChoice]:
-    """The choice for each subdomain.
+    """Return the choice for each subdomain.
 
     Dense matrices pay if their inverse takes no longer than all applications of sparse factors would.  Soft modes need
     them, but for large whole bodies, which are examined face by face.

@@ -19,7 +19,7 @@ class DualOperator:
         self.jump_operator, self.boundary, self.compliance = jump_operator, boundary, compliance
 
     def apply(self, x: Float) -> Float:
-        """sum_s B K+ B^T x + C x for x (owned rows,) or (owned rows, k)."""
+        """Return sum_s B K+ B^T x + C x for x (owned rows,) or (owned rows, k)."""
         return self.jump(self.displacement(x)) + scale_rows(self.compliance, x)
 
     def displacement(self, lam: Float) -> Float:

@@ -38,11 +38,11 @@ class ImplicitInterfaceOperator:
         return _by_columns(self.interior.reactions, x, out)
 
     def apply_flexibility(self, x: Float, out: Float | None = None) -> Float:
-        """The boundary part of K+ x for x (n,) or (n, k), into `out` if it is given."""
+        """Return the boundary part of K+ x for x (n,) or (n, k), into `out` if it is given."""
         return _by_columns(self._solve, x, out)
 
     def _solve(self, x: Float) -> Float:
-        """The boundary part of K+ x for few columns."""
+        """Return the boundary part of K+ x for few columns."""
         load = np.zeros((self._subdomain.n_dofs, *x.shape[1:]), order="F")
         load[self.dofs] = x
         return self._solver.solve(load)[self.dofs]

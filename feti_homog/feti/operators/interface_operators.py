@@ -131,11 +131,11 @@ class InterfaceOperators:
         return y
 
     def apply_flexibility(self, x: Float) -> Float:
-        """The boundary part of K+ x for x (n,) or (n, k)."""
+        """Return the boundary part of K+ x for x (n,) or (n, k)."""
         return self._each([o.apply_flexibility for o in self.operators], x)
 
     def _each(self, applied: Sequence[Callable[[Float, Float], Float]], x: Float) -> Float:
-        """The operators of the subdomains, each applied to its part of x (n,) or (n, k)."""
+        """Return the operators of the subdomains, each applied to its part of x (n,) or (n, k)."""
         x = np.asfortranarray(x)
         y = np.empty(x.shape, order="F")
         for apply, own in zip(applied, self.slices, strict=True):
@@ -173,7 +173,8 @@ class InterfaceOperators:
 
 
 def _factor(subdomain: Subdomain, dofs: Int, explicit: bool) -> tuple[InterfaceOperator, Float]:
-    """The boundary operator of a subdomain and the diagonal of K on its boundary `dofs`; K is freed at the end.
+    """Return the boundary operator of a subdomain and the diagonal of K on its boundary `dofs`; K is freed at the
+    end.
 
     Raises:
         MeshError: rounding leaves K no factor.
@@ -188,7 +189,7 @@ def _factor(subdomain: Subdomain, dofs: Int, explicit: bool) -> tuple[InterfaceO
 
 
 def _own_rows(jump_operator: JumpOperator) -> slice:
-    """The owned rows among the local rows."""
+    """Return the owned rows among the local rows."""
     first, last = jump_operator.owned
     at = int(np.searchsorted(jump_operator.rows, first))
     return slice(at, at + last - first)
@@ -202,7 +203,7 @@ def _constrained_dofs(B: csr_matrix, subdomains: Sequence[Subdomain]) -> list[In
 
 
 def _sizes(shared: SharedEntities, subdomains: Sequence[Subdomain], dofs: Sequence[Int]) -> list[SubdomainSize]:
-    """What the choice of the operators depends on, of each subdomain."""
+    """Return the sizes of each subdomain on which the choice of operators depends."""
     entity = np.repeat(np.arange(len(shared.key)), shared.copies)
     first, last = shared.pointer[:-1], shared.pointer[1:] - 1
     between_two_bodies = (shared.copies == 2) & (shared.body[first] != shared.body[last])

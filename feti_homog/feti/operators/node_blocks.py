@@ -20,7 +20,7 @@ class NodeBlocks:
     """
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, local: csr_matrix) -> None:
-        """The owned rows of the sum over ranks of `local` (local rows, local rows).  Collective."""
+        """Sum `local` (local rows, local rows) over ranks and keep the owned rows.  Collective."""
         first, last = jump_operator.owned
         matrix = assemble_owned_rows(comm, local, jump_operator.rows, jump_operator.rows, (last - first, last - first))
         entries = matrix[:, first:last].tocoo()

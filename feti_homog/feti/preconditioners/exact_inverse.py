@@ -120,7 +120,7 @@ class ExactInverse(Preconditioner):
         return np.asarray(own - np.matmul((U @ self._inverse.N).reshape(paired.shape), paired.transpose(0, 2, 1)))
 
     def _changed(self) -> Int:
-        """The global rows that are active here or in the reference cell, not both.  Collective."""
+        """Return the global rows that are active here or in the reference cell, not both. Collective."""
         own = self._first + np.flatnonzero(self._active != self.reference.active)
         return np.concatenate(self.comm.allgather(own))
 
@@ -175,7 +175,7 @@ class ExactInverse(Preconditioner):
         self._dependent = np.setdiff1d(changed, inverse.members)
 
     def _force_of_rigid_motions(self) -> float:
-        """`rounding`.  Collective."""
+        """Return `rounding`. Collective."""
         bodies = zip(self._operators.subdomains, self._operators.dofs, strict=True)
         motions = [s.R[dofs].sum(axis=1) for s, dofs in bodies]
         moved = np.concatenate([np.zeros(0), *(own / (np.abs(own).max(initial=0.0) or 1.0) for own in motions)])

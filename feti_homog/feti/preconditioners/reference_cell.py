@@ -31,7 +31,7 @@ class BodyTies:
     """Of every fibre and the body around it two bonds, the second as far as can be from the first."""
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator) -> None:
-        """Collective."""
+        """Choose the bonds.  Collective."""
         nodes = jump_operator.nodes
         self._comm = comm
         self._rows = nodes.row[:, None] + np.arange(jump_operator.components)
@@ -92,7 +92,7 @@ class ReferenceCell:
         return self._springs.apply(self._without_springs(x))
 
     def _without_springs(self, x: Float) -> Float:
-        """The same without the springs at nodes of A where fibre and matrix are both cut.
+        """Return the same without the springs at nodes of A where fibre and matrix are both cut.
 
         Displacements u = B_D^T g + Z y whose forces S u - B_I^T f vanish on Z; then B_A^T lam = S u - B_I^T f.
         """

@@ -46,7 +46,7 @@ class Preconditioner(Protocol):
         """M^-1 r; r and the result are 0 on inactive rows."""
 
     def closing_forces(self, jump: Float) -> Float:
-        """The forces that close a jump while coarse displacements are held: M^-1 of it where there are none."""
+        """Return the forces that close a jump while coarse displacements are held: M^-1 of it where there are none."""
         return self.apply(jump)
 
 

@@ -50,7 +50,7 @@ class SpringUpdate:
         self._own, self._mine, self._stiffness = own, mine, stiffness[mine]
 
     def apply(self, z: Float) -> Float:
-        """The updated H times r, for z = H r (owned rows,) or (owned rows, k).  Collective."""
+        """Return the updated H times r, for z = H r (owned rows,) or (owned rows, k). Collective."""
         if not len(self.rows):
             return z
         stretch = cho_solve(self._factor, gather_rows(self.comm, z, self.first, self.rows))
@@ -60,7 +60,7 @@ class SpringUpdate:
 
 
 def _factored(block: Float) -> tuple[Float, bool]:
-    """The factor of C^-1 + X^T H X.  Raises ConvergenceError if it is not definite."""
+    """Return the factor of C^-1 + X^T H X. Raises ConvergenceError if it is not definite."""
     try:
         factor: tuple[Float, bool] = cho_factor(block)
     except LinAlgError as error:
@@ -96,7 +96,7 @@ class SpringUpdated(Preconditioner):
         self._update = SpringUpdate(self._comm, self._first, active * self._compliance, self._inner.apply)
 
     def apply(self, r: Float) -> Float:
-        """The updated H times r.  Collective."""
+        """Return the updated H times r. Collective."""
         return self._update.apply(self._inner.apply(r))
 
     def closing_forces(self, jump: Float) -> Float:

@@ -33,7 +33,7 @@ class Ellipses:
 
     @classmethod
     def round(cls, circles: Float) -> Ellipses:
-        """The circles of centre and radius (k, 3)."""
+        """Return the circles of centre and radius (k, 3)."""
         return cls(circles[:, :2], circles[:, 2, None, None] * np.eye(2))
 
     @property
@@ -177,7 +177,7 @@ class Ellipses:
 
 
 def gaps(first: Ellipses, second: Ellipses) -> tuple[Float, Float]:
-    """The gap (k,) between each of the first and of the second, and the direction (k,) in radians across it.
+    """Return the gap (k,) between each of the first and of the second, and the direction (k,) in radians across it.
 
     Of convex bodies it is max_n (c_2 - c_1) . n - |F_1^T n| - |F_2^T n|: the distance where they are apart, else minus
     the shortest way that parts them.

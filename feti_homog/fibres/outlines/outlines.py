@@ -60,14 +60,16 @@ class Outlines(Protocol):
         """Outlines around these with rings of that `thickness` (k,)."""
 
     def joined(self, others: Self) -> Self:
-        """These outlines, then the others."""
+        """Return these outlines, then the others."""
 
     def support(self, normal: Float) -> Float:
         """(k, ...) reach from the centre along unit vectors n (k, ..., 2)."""
 
     def parting(self, first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
-        """The normals n (p, 2) of the lines that part pairs (p,), (p,) at vectors v (p, 2) from first to second best,
-        and the reach r (p,) of both along them: the gap, negative if they overlap, is n . v - r."""
+        """Return the normals n (p, 2) of the lines that separate pairs (p,), (p,) best, and the reach r (p,) of both along n.
+
+        v (p, 2) are the vectors from first to second; the gap, negative if they overlap, is n . v - r.
+        """
 
     def distances(self, offsets: Float) -> Float:
         """(n, k) distance from each outline of points at these vectors (n, k, 2) from its centre; about, of those that
@@ -120,8 +122,8 @@ def directions(angle: Float) -> Float:
 
 
 def widest(vector: Float, gap: Callable[[Float], Float]) -> tuple[Float, Float]:
-    """The largest gap (k,) of pairs at these vectors (k, 2) from the first to the second, and its direction (k,) in
-    radians; gap(a) are those across directions a (k, m)."""
+    """Return the largest gap (k,) of pairs at these vectors (k, 2) from the first to the second, and its direction
+    (k,) in radians; gap(a) are those across directions a (k, m)."""
     step = 2 * np.pi / DIRECTIONS
     around = np.arctan2(vector[:, 1], vector[:, 0])[:, None] + step * np.arange(DIRECTIONS)
     best = around[np.arange(len(vector)), gap(around).argmax(axis=1)]

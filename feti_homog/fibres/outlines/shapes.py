@@ -23,7 +23,7 @@ REPLACING = tuple(shape.sizes for shape in SHAPES if "radius" not in shape.sizes
 
 
 def given_shapes(rows: Columns, has_tips: bool) -> list[Shape]:
-    """The shapes that some rows have and whose meshes may, or may not, have nodes at tips."""
+    """Return the shapes that some rows have and whose meshes may, or may not, have nodes at tips."""
     return [shape for shape in SHAPES if shape.has_tips == has_tips and shape.given(rows).any()]
 
 
@@ -42,7 +42,7 @@ def have_both_sizes(rows: Columns) -> Bool:
 
 
 def outlines_of(rows: Columns) -> Outlines:
-    """The outlines (N,) of rows without faults, without their coatings, in the unit of the table."""
+    """Return the outlines (N,) of rows without faults, without their coatings, in the unit of the table."""
     centres, radius = (
         np.column_stack([rows["x"], rows["y"]]),
         np.where(np.isnan(rows["radius"]), rows["a"], rows["radius"]),
@@ -56,7 +56,8 @@ def outlines_of(rows: Columns) -> Outlines:
 
 
 def with_parts(outlines: Outlines, parts: Sequence[tuple[Bool, Outlines]]) -> Outlines:
-    """The outlines, but those of the rows (N,) of each part in its place: discs, ellipses or sums, if need be."""
+    """Return the outlines, but those of the rows (N,) of each part in its place: discs, ellipses or sums, if need
+    be."""
     parts = [(own, part) for own, part in parts if own.any()]
     if not parts:
         return outlines

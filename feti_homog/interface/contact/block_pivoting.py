@@ -30,14 +30,15 @@ class BlockPivoting:
     _left: int = field(default=0, init=False)
 
     def choose(self, wrong: Bool, count: int) -> Bool:
-        """The nodes (k,) of this rank that change, of those that are `wrong`, `count` on all ranks.  Collective."""
+        """Return the nodes (k,) of this rank that change, of those that are `wrong`, `count` on all ranks.
+        Collective."""
         self._left -= 1
         if count < self._fewest:
             self._fewest, self._left = count, self.block_pivots
         return wrong if self._left > 0 else self._first(wrong)
 
     def _first(self, wrong: Bool) -> Bool:
-        """The first wrong node of the lowest rank that has one."""
+        """Return the first wrong node of the lowest rank that has one."""
         rank = self.comm.allreduce(self.comm.rank if wrong.any() else self.comm.size, MPI.MIN)
         first = np.zeros_like(wrong)
         if rank == self.comm.rank:

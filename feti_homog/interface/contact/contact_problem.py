@@ -90,7 +90,7 @@ class ContactProblem:
         return C
 
     def debond(self, status: Status, which: Bool, lam: Float) -> Status:
-        """The status after the bonds of `which` have broken; under tension they start open."""
+        """Return the status after the bonds of `which` have broken; under tension they start open."""
         force = lam[self.nodes.row]
         released = np.where((force < 0) & self.contact, CLOSED, OPEN).astype(np.int8)
         return np.where(which & (status == BONDED), released, status)
@@ -154,7 +154,7 @@ class ContactProblem:
         return self._searched(load, bonds.with_status(closed), start)
 
     def _searched(self, load: Load, bonds: BondState, start: Float) -> Equilibrium:
-        """The equilibrium, from these states on.  Collective; raises as `linear`."""
+        """Return the equilibrium, from these states on. Collective; raises as `linear`."""
         pivoting = BlockPivoting(self.solver.comm, self.block_pivots)
         iterations = solves = 0
         while True:
@@ -182,7 +182,7 @@ class ContactProblem:
         return bool(self.solver.comm.allreduce(bool(which.any()), MPI.LOR))
 
     def _placed(self, status: Status, solution: DualSolution) -> tuple[DualSolution, Bool]:
-        """The solution with free fibres where they have room, and which nodes (k,) break the KKT conditions."""
+        """Return the solution with free fibres where they have room, and which nodes (k,) break the KKT conditions."""
         if not self.contact:
             return solution, np.zeros(len(status), bool)
         pressed = np.zeros(len(status), bool)
@@ -199,7 +199,7 @@ class ContactProblem:
     def _equilibrium(
         self, load: Load, bonds: BondState, solution: DualSolution, iterations: int, solves: int
     ) -> Equilibrium:
-        """The state that a search ended with, its free motions and its certificate."""
+        """Return the state that a search ended with, its free motions and its certificate."""
         status = bonds.status
         certificate = kkt_errors(
             self.solver.comm,
@@ -216,7 +216,8 @@ class ContactProblem:
         return Equilibrium(load, bonds.with_status(status), solution, iterations, solves, motions, certificate)
 
     def _without_idle(self, status: Status, solution: DualSolution) -> tuple[Status, int]:
-        """The status and the number of rigid motions that neither a bond nor a face under compression resists.
+        """Return the status and the number of rigid motions that neither a bond nor a face under compression
+        resists.
 
         A fibre may touch its hole without a force: such nodes count as open if it moves without them, lest they seem
         to hold it; those of other fibres stay closed.  Collective.

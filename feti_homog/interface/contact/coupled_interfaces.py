@@ -57,12 +57,12 @@ class CoupledInterfaces:
         return Multipliers(np.zeros(each.solver.rows) for each in self.problems)
 
     def linear(self, load: Load, bonds: BondState, start: Multipliers) -> CoupledSolution:
-        """The dual problems with the states as they are.  Collective."""
+        """Return the dual problems with the states as they are. Collective."""
         triples = zip(self.problems, self._parts(load), start, strict=True)
         return CoupledSolution(tuple(each.linear(own, bonds, lam) for each, own, lam in triples))
 
     def equilibrium(self, load: Load, bonds: BondState, start: Multipliers) -> Equilibrium:
-        """The state under a load, with `bonds` a first guess of who is in contact.  Collective."""
+        """Return the state under a load, with `bonds` a first guess of who is in contact. Collective."""
         loads = self._parts(load)
         state = self.plane.equilibrium(loads[0], bonds, start.plane)
         for axial, along, lam in zip(self.problems[1:], loads[1:], start[1:], strict=True):
@@ -70,7 +70,7 @@ class CoupledInterfaces:
         return state
 
     def _parts(self, load: Load) -> list[Load]:
-        """The load of each problem."""
+        """Return the load of each problem."""
         return load.parts([len(each.solver.problem.loads) for each in self.problems])
 
     def leg_start(self, origin: Macroscopic, before: Load | None, end: Load) -> Load:

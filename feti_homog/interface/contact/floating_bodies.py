@@ -185,7 +185,8 @@ def _shares_of_all(fibres: _Fibres, here: Float, ahead: Float, noise: float) -> 
 
 
 def _block(first: int, last: int, *matrices: csr_matrix) -> tuple[Array, list[Float]]:
-    """The columns (c,) in which rows of these matrices have entries, and the rows there, dense (rows, c) each."""
+    """Return the columns (c,) in which rows of these matrices have entries, and the rows there, dense (rows, c)
+    each."""
     spans = [slice(*matrix.indptr[[first, last]]) for matrix in matrices]
     parts = [(matrix.indices[span], matrix.data[span]) for matrix, span in zip(matrices, spans, strict=True)]
     columns, dense = np.unique(np.concatenate([indices for indices, _ in parts])), []

@@ -115,7 +115,8 @@ class LoadScales:
         return float(np.abs(corners @ self._solver.problem.gradient(self.imposed_strain(loads)).T).max())
 
     def stress_scale(self, loads: Float) -> float:
-        """A stress that the loads (v,) would make in the bonded cell at least, whatever their signs.  Collective."""
+        """Return a stress that the loads (v,) would make in the bonded cell at least, whatever their signs.
+        Collective."""
         m = self._solver.problem.strains
         return float(np.abs(self.least_bonded_stiffness[:m, :m] @ self.imposed_strain(loads)).max())
 

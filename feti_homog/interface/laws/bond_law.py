@@ -51,7 +51,7 @@ class BondLaw(ABC):
         """(p, d) how bonds break under tractions (p, c), with the first d of `break_names`."""
 
     def at(self, node: Int) -> Self:
-        """The law of the nodes (p,), one after the other."""
+        """Return the law of the nodes (p,), one after the other."""
         fields = [field.name for field in dataclasses.fields(self)]  # type: ignore[arg-type]  # laws are dataclasses
         return type(self)(*(at_nodes(getattr(self, name), node) for name in fields))
 
@@ -103,7 +103,7 @@ class Utilisation:
         return self.law.share(traction)
 
     def at(self, node: Int) -> Utilisation:
-        """The same of the nodes (p,), one after the other."""
+        """Return the same of the nodes (p,), one after the other."""
         return Utilisation(self.law.at(node))
 
     def is_convex(self, p: int) -> Bool:
@@ -130,5 +130,5 @@ class Utilisation:
 
 
 def at_nodes(value: float | Float, node: Int) -> float | Float:
-    """A value of all nodes, or those (k,) of each, at the nodes (p,)."""
+    """Return a value of all nodes, or those (k,) of each, at the nodes (p,)."""
     return value[node] if isinstance(value, np.ndarray) else value

@@ -49,7 +49,7 @@ class Tips:
     axial: Float
 
     def chosen(self, which: Int) -> Tips:
-        """Some of them."""
+        """Return some of them."""
         axial = self.axial[which] if len(self.axial) else self.axial
         return Tips(self.node[which], self.H[which], self.length[which], self.stiffness[which], axial)
 
@@ -83,7 +83,7 @@ class ReleasedEnergy(BondLaw):
     break_names: ClassVar[tuple[str, ...]] = SpringEnergy.break_names
 
     def at(self, node: Int) -> ReleasedEnergy:
-        """The law of the nodes (p,), one after the other."""
+        """Return the law of the nodes (p,), one after the other."""
         return replace(self, springs=self.springs.at(node))
 
     def share(self, traction: Float) -> Float:
@@ -110,7 +110,7 @@ class ReleasedEnergy(BondLaw):
         return ReleasedUtilisation(self.springs, tips, number, cell.plane.contact)
 
     def tips(self, cell: CoupledInterfaces, bonds: BondState) -> Tips:
-        """The tips that this rank owns.  Collective.
+        """Return the tips that this rank owns. Collective.
 
         Raises:
             ConvergenceError: rounding hides what breaks release.
@@ -151,7 +151,7 @@ class ReleasedUtilisation(Utilisation):
     """sqrt(released / (G_c l)) at tips, the utilisation of the springs at other nodes."""
 
     def __init__(self, law: SpringEnergy, tips: Tips, number: Int, contact: bool) -> None:
-        """`number` (p,) is that of the tip that a node is, or -1; with `contact` faces do not overlap."""
+        """Store the tips; `number` (p,) is the number of the tip at a node, or -1; with `contact` faces do not overlap."""
         super().__init__(law)
         self._springs, self._tips, self._number, self._contact = law, tips, number, contact
 
@@ -165,7 +165,7 @@ class ReleasedUtilisation(Utilisation):
         return used
 
     def at(self, node: Int) -> ReleasedUtilisation:
-        """The same of the nodes (p,), one after the other."""
+        """Return the same of the nodes (p,), one after the other."""
         return ReleasedUtilisation(self._springs.at(node), self._tips, self._number[node], self._contact)
 
     def is_convex(self, p: int) -> Bool:

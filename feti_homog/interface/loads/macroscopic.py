@@ -30,14 +30,16 @@ class Macroscopic:
         return 0.5 * float(self.strain @ self.stress)
 
     def scaled(self, factor: float) -> Macroscopic:
-        """The state under `factor` times the load."""
+        """Return the state under `factor` times the load."""
         return Macroscopic(factor * self.strain, factor * self.stress)
 
     def load(self, by_stress: Bool) -> Load:
-        """The load that holds the state, with these (n,) components given by their stress."""
+        """Return the load that holds the state, with these (n,) components given by their stress."""
         return Load(np.where(by_stress, self.stress, self.strain), by_stress)
 
     def released_to(self, after: Macroscopic) -> float:
-        """What a break at constant load loses, work - change of stored energy = 1/2 (E'.Sigma - E.Sigma'), with ' after
-        it; at constant strain 1/2 E.(Sigma - Sigma')."""
+        """Return the energy lost by a break at constant load: 1/2 (E'.Sigma - E.Sigma'), with ' after the break.
+
+        It is the work less the change of stored energy; at constant strain 1/2 E.(Sigma - Sigma').
+        """
         return 0.5 * float(after.strain @ self.stress - self.strain @ after.stress)

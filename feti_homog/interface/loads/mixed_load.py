@@ -40,7 +40,8 @@ class Noise:
 
 
 def solve(solver: FetiSolver, load: Load, start: Float, area: float, noise: Noise) -> DualSolution:
-    """The solution under a load on the cell of this area, beginning with the multipliers `start` (owned rows,).
+    """Return the solution under a load on the cell of this area, beginning with the multipliers `start` (owned
+    rows,).
 
     Strains that meet no more than noise stay zero.  Collective.
 
@@ -98,7 +99,7 @@ def unresisted(solver: FetiSolver, by_stress: Bool, voigt: Float) -> Bool:
 
 
 def superposed(solver: FetiSolver, solutions: Sequence[DualSolution], factors: Float) -> DualSolution:
-    """The sum of solutions with the same active rows, each times its factor.  Collective."""
+    """Return the sum of solutions with the same active rows, each times its factor. Collective."""
     strain, lam, jump, alpha = (
         np.stack([getattr(each, name) for each in solutions], axis=1) @ factors
         for name in ("strain", "lam", "jump", "alpha")

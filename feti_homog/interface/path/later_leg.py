@@ -74,7 +74,7 @@ class LaterLeg:
         return self.start.after(share, self.end)
 
     def points(self) -> Iterator[Point]:
-        """The points of the leg; if a solve does not converge, up to there.  Collective."""
+        """Yield the points of the leg; if a solve does not converge, up to there. Collective."""
         yield from self._break_overloaded()
         while self._share < 1.0 and self._state.converged:
             ahead = self._ahead()
@@ -82,7 +82,7 @@ class LaterLeg:
         yield self._point(0, self._path_state(self.leg + 1, 0.0))
 
     def _ahead(self) -> CoupledSolution | None:
-        """The end of the leg with the contact states as they are; None if they do not carry its stresses."""
+        """Return the end of the leg with the contact states as they are; None if they do not carry its stresses."""
         try:
             return self.cell.linear(self.end, self._state.bonds, self._state.multipliers)
         except NotCarriedError:
@@ -191,7 +191,7 @@ class LaterLeg:
             yield self._turn(self._share)
 
     def _turn(self, position: float) -> Point:
-        """The state here as a point at which nothing breaks and from which the path goes on at `position`."""
+        """Return the state here as a point at which nothing breaks and from which the path goes on at `position`."""
         return self._point(0, self._path_state(self.leg, position))
 
     def _break_overloaded(self) -> Iterator[Point]:

@@ -36,7 +36,7 @@ class Onset:
 
     @classmethod
     def of(cls, law: BondLaw, cell: CoupledInterfaces, bonds: BondState) -> Onset:
-        """That of a law with these bonds.  Collective."""
+        """Make the onset of a law with these bonds.  Collective."""
         return cls(law.utilisation(cell, bonds), np.asarray(bonds.status == BONDED))
 
     def utilisation(self, traction: Float, node: Int) -> Float:

@@ -50,7 +50,7 @@ def increments(
     worst_only: bool,
     begin: PathState,
 ) -> Iterator[Point]:
-    """The paper's loop: at each of `steps` equal load steps, release overloaded bonds until none is left.
+    """Yield the paper's loop: at each of `steps` equal load steps, release overloaded bonds until none is left.
 
     A point's state is the one after its bonds broke.  `begin.leg` is the number of steps done.  With `worst_only`
     just the most overloaded bonds are released at a time.  The last point is one that did not converge, if there is
@@ -71,7 +71,7 @@ def increments(
 
 
 def _increment(cell: CoupledInterfaces, law: BondLaw, load: Load, worst_only: bool, begin: PathState) -> Point:
-    """The state under a load after all overloaded bonds have broken."""
+    """Return the state under a load after all overloaded bonds have broken."""
     bonds, lam, here, broke = begin.bonds, begin.lam, begin, 0
     energies = NO_ENERGIES
     while True:

@@ -100,7 +100,7 @@ class Break(NamedTuple):
 
 
 def unloaded(cell: CoupledInterfaces, bonds: BondState) -> PathState:
-    """The beginning of a path with the debonded nodes of `bonds`."""
+    """Return the beginning of a path with the debonded nodes of `bonds`."""
     nothing = Macroscopic(np.zeros(len(cell.loads)), np.zeros(len(cell.loads)))
     return PathState(0, 0.0, bonds, cell.no_multipliers(), nothing, nothing)
 
@@ -133,5 +133,5 @@ def most_utilised(cell: CoupledInterfaces, law: BondLaw, state: Equilibrium) -> 
 
 
 def _count_on_all_ranks(cell: CoupledInterfaces, which: Bool) -> int:
-    """Number of nodes of `which` (k,) on all ranks; collective."""
+    """Count the nodes of `which` (k,) on all ranks.  Collective."""
     return int(cell.comm.allreduce(int(which.sum())))

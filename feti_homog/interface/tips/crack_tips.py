@@ -25,7 +25,7 @@ class InterfaceChains:
         self.neighbours[two] = adjacency.indices[adjacency.indptr[:-1][two][:, None] + np.arange(2)]
 
     def tips(self, status: Status) -> CrackTips:
-        """The tips under the states (n,): one bonded node beside a debonded one.  A node between two is none."""
+        """Return the tips under the states (n,): one bonded node beside a debonded one. A node between two is none."""
         known = self.neighbours[:, 0] >= 0
         debonded = (status != BONDED)[self.neighbours] & known[:, None]
         node = np.flatnonzero((status == BONDED) & (debonded[:, 0] != debonded[:, 1]))
@@ -57,7 +57,7 @@ class CrackTips:
     ahead: Int
 
     def chosen(self, which: Int | Bool) -> CrackTips:
-        """Some of them."""
+        """Return some of them."""
         return CrackTips(self.node[which], self.behind[which], self.ahead[which])
 
 

@@ -95,7 +95,7 @@ def _ends(arc: Arc, half: float, fibre: Int, moved: MovedTips) -> Float:
 
 
 def faults(arcs: Sequence[Arc], centres: Float, label: str = "interface") -> list[str]:
-    """What is wrong with the arcs of the interface of this label on a cell whose fibres have these centres (fibres, 2),
+    """List the faults of the arcs of the interface of this label on a cell whose fibres have these centres (fibres, 2),
     NaN where there is none."""
     found = []
     for place, arc in enumerate(arcs):

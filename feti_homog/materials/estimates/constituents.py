@@ -83,7 +83,7 @@ NOTHING = Estimate(**dict.fromkeys(CONSTANTS))
 
 
 def estimate_of(constants: TransverselyIsotropic) -> Estimate:
-    """The estimate that says all of these constants."""
+    """Return the estimate that says all of these constants."""
     return Estimate(**{name: getattr(constants, name) for name in CONSTANTS})
 
 
@@ -103,7 +103,8 @@ def expansions(phase: TransverselyIsotropic) -> tuple[float, float] | None:
 
 
 def equivalent_fibre(family: Fibres, matrix: TransverselyIsotropic) -> TransverselyIsotropic:
-    """The bonded fibre that does for the matrix what one on springs does, in a field that is uniform far away.
+    """Return the bonded fibre that does for the matrix what one on springs does, in a field that is uniform far
+    away.
 
     E_axial, nu_axial and the expansions stay;
 

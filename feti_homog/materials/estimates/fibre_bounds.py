@@ -28,7 +28,7 @@ def fibre_bounds(fractions: Sequence[float], phases: Sequence[TransverselyIsotro
 
 
 def _extreme(phases: Sequence[TransverselyIsotropic], pick: Callable[[Iterable[float]], float]) -> Surroundings:
-    """The least or the greatest of each modulus."""
+    """Return the least or the greatest of each modulus."""
     return Surroundings(
         pick(phase.K_transverse for phase in phases),
         pick(phase.G_transverse for phase in phases),

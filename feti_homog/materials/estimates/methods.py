@@ -21,7 +21,7 @@ METHODS: Mapping[str, Callable[[TransverselyIsotropic, Sequence[Fibres]], Estima
 
 
 def estimates(matrix: TransverselyIsotropic, fibres: Sequence[Fibres]) -> Estimates:
-    """What each method says of fibres in a matrix.
+    """Return the estimates of each method for fibres in a matrix.
 
     The rule of mixtures and Mori and Tanaka's estimate are defined for any kinds of fibres, the others for one; on
     springs the last three.  No method says anything if a phase is not transversely isotropic about x3, and none says

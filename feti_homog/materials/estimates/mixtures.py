@@ -44,7 +44,7 @@ def rule_of_mixtures(matrix: TransverselyIsotropic, fibres: Sequence[Fibres]) ->
 
 
 def chamis(matrix: TransverselyIsotropic, fibres: Sequence[Fibres]) -> Estimate:
-    """The simplified equations of Chamis; one kind of fibres.
+    """Return the simplified equations of Chamis; one kind of fibres.
 
         E_A, nu_A: rule of mixtures,  M = M_m / (1 - sqrt(c) (1 - M_m/M_f)) for M = E_T, G_A, G_T,
         nu_T = E_T/(2 G_T) - 1,  alpha_A = (c E_f alpha_f + (1 - c) E_m alpha_m)/E_A,
@@ -82,7 +82,7 @@ def chamis(matrix: TransverselyIsotropic, fibres: Sequence[Fibres]) -> Estimate:
 
 
 def halpin_tsai(matrix: TransverselyIsotropic, fibres: Sequence[Fibres]) -> Estimate:
-    """The equations of Halpin and Tsai; one kind of fibres.
+    """Return the equations of Halpin and Tsai; one kind of fibres.
 
         E_A, nu_A: rule of mixtures,  M = M_m (1 + xi eta c)/(1 - eta c),  eta = (M_f - M_m)/(M_f + xi M_m),
 

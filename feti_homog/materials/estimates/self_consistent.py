@@ -34,7 +34,8 @@ def self_consistent(matrix: TransverselyIsotropic, fibres: Sequence[Fibres]) -> 
 
 
 def transverse_shear(matrix: TransverselyIsotropic, family: Fibres) -> float:
-    """The shear modulus m* of the medium in which a coated fibre under shear across it has the energy of the medium.
+    """Return the shear modulus m* of the medium in which a coated fibre under shear across it has the energy of the
+    medium.
 
     On a circle, u_1 + i u_2 and the resultant F = phi + z conj(phi') + conj(psi) of Muskhelishvili's potentials have
     two harmonics, exp(-i t) and exp(3 i t).  In the medium phi has no term 1/z, as the energies are equal, and so
@@ -63,7 +64,7 @@ def transverse_shear(matrix: TransverselyIsotropic, family: Fibres) -> float:
 
 
 def _compliance(family: Fibres, matrix: TransverselyIsotropic) -> tuple[float, float, float, float]:
-    """What a fibre does for the matrix: m_e/m, (m_e/m) V31/(1 + V33), V13/(1 + V33), 1/(1 + V33).
+    """Return the effect of a fibre on the matrix: m_e/m, (m_e/m) V31/(1 + V33), V13/(1 + V33), 1/(1 + V33).
 
     A homogeneous fibre has V = diag(-m/m_f, m/m_f + 2 m/k_f); springs with q_i = 1/(k_i a) add
     m [[-(q_n + q_t), 3 (q_n - q_t)], [-(q_n - q_t), 3 (q_n + q_t)]].  m_e, that of `equivalent_fibre`, has

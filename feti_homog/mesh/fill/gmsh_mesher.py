@@ -28,7 +28,7 @@ SMALLEST_RADIUS = 1e-6
 def generate(
     cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS, policy: TilePolicy = DEFAULT_TILES
 ) -> CoarseMesh:
-    """The mesh that `begin` begins, all of it made here."""
+    """Return the mesh that `begin` begins, all of it made here."""
     found = begin(cell, listed_arrangement(cell), marks, policy)
     noded = found.with_nodes() if isinstance(found, UnmeshedCell) else found
     return noded if isinstance(noded, CoarseMesh) else noded.filled()
@@ -40,8 +40,8 @@ def begin(
     marks: Mapping[int, Sequence[float]] = NO_MARKS,
     policy: TilePolicy = DEFAULT_TILES,
 ) -> UnmeshedCell | NodedCell | CoarseMesh:
-    """The periodic coarse mesh of a square, hexagonal or random cell, or of a table: of round fibres the bare lines, of
-    ellipses all but the triangles, of polygons all.
+    """Return the periodic coarse mesh of a square, hexagonal or random cell, or of a table: of round fibres the
+    bare lines, of ellipses all but the triangles, of polygons all.
 
     Elements have about the size mesh_size * width, on circles interface_size * width.
 

@@ -46,7 +46,7 @@ SizeAt = Callable[[Float], Float]
 
 
 def mesh_outlines(arrangement: Arrangement, sizes: MeshSizes, scale: float) -> CoarseMesh:
-    """The mesh that `gmsh_mesher.begin` begins, of fibres with outlines of any convex shape."""
+    """Return the mesh that `gmsh_mesher.begin` begins, of fibres with outlines of any convex shape."""
     with gmsh_session() as gmsh:
         number = _add_surfaces(gmsh, arrangement)
         _match_sides(gmsh, arrangement)
@@ -110,12 +110,12 @@ def _add_outlines(gmsh: ModuleType, arrangement: Arrangement) -> tuple[list[Surf
 
 
 def _sums(outlines: Outlines) -> ConvexSums:
-    """The outlines as sums of polygons and ellipses."""
+    """Return the outlines as sums of polygons and ellipses."""
     return ConvexSums(outlines.centres, outlines.cores, outlines.frames)
 
 
 def _add_shape(gmsh: ModuleType, shapes: ConvexSums, number: int, shift: Float) -> int:
-    """The plane surface of one shape, moved."""
+    """Return the plane surface of one shape, moved."""
     occ, (x, y) = gmsh.model.occ, (shapes.centres[number] + shift).tolist()
     frame, core = shapes.frames[number], shapes.cores[number]
     a, b = np.linalg.norm(frame, axis=0).tolist()
@@ -130,7 +130,8 @@ def _add_shape(gmsh: ModuleType, shapes: ConvexSums, number: int, shift: Float) 
 
 
 def _rounded_lines(occ: ModuleType, corners: Float, rounding: float) -> list[int]:
-    """The straight sides and the arcs of a polygon with a margin around, whose corners (n, 2) run counter-clockwise."""
+    """Return the straight sides and the arcs of a polygon with a margin around, whose corners (n, 2) run
+    counter-clockwise."""
     following = np.roll(corners, -1, axis=0)
     along = (following - corners) / np.linalg.norm(following - corners, axis=1, keepdims=True)
     outward = np.column_stack([along[:, 1], -along[:, 0]]) * rounding
@@ -184,8 +185,8 @@ def _set_sizes(gmsh: ModuleType, path: Path, arrangement: Arrangement, least: fl
 
 
 def _sizes_at(arrangement: Arrangement, sizes: MeshSizes) -> tuple[float, SizeAt]:
-    """The least size of elements, and the sizes at positions (n, 2): h = min_k h_k + g |x - x_k| over points x_k of all
-    outlines.
+    """Return the least size of elements, and the sizes at positions (n, 2): h = min_k h_k + g |x - x_k| over points
+    x_k of all outlines.
 
     h_k is at most that of interfaces, that of the curvature, and PASSAGE_EDGE times the distance of the next outline or
     of a side of the cell that the outline faces there.

@@ -51,7 +51,7 @@ class UnmeshedCell:
         scale: float = 1.0,
         policy: TilePolicy = DEFAULT_TILES,
     ) -> UnmeshedCell:
-        """The bare lines of round discs, and their tiles; see `gmsh_mesher.begin`."""
+        """Return the bare lines of round discs, and their tiles; see `gmsh_mesher.begin`."""
         tiles = tiling(arrangement, sizes.largest, marks, policy)
         if tiles is None:
             bare = BareOutline.of(arrangement, sizes, marks)
@@ -65,7 +65,7 @@ class UnmeshedCell:
         return self.arrangement.phases
 
     def with_nodes(self, stations: LineStations | None = None) -> NodedCell:
-        """The cell with these nodes on its lines, by default all placed here.
+        """Return the cell with these nodes on its lines, by default all placed here.
 
         Raises:
             MeshError: the lines would have too many.
@@ -94,7 +94,7 @@ class NodedCell:
     def of(
         cls, arrangement: Arrangement, lines: Outline, sizes: MeshSizes, tiles: Tiling | None, scale: float
     ) -> NodedCell:
-        """The cell of an arrangement with this outline, cut into tiles."""
+        """Return the cell of an arrangement with this outline, cut into tiles."""
         whole = Tile(lines.points, lines.curves, sizes.largest, sizes.are_graded(arrangement))
         return cls(arrangement, lines, tuple(cut(lines, whole, tiles)), scale)
 
@@ -104,11 +104,11 @@ class NodedCell:
         return self.arrangement.phases
 
     def filled(self) -> CoarseMesh:
-        """The mesh, all tiles filled here."""
+        """Return the mesh, all tiles filled here."""
         return self.mesh([fill(tile) for _, tile in self.parts])
 
     def mesh(self, fillings: Sequence[Filling]) -> CoarseMesh:
-        """The mesh of which these are the filled tiles, in their order."""
+        """Return the mesh of which these are the filled tiles, in their order."""
         arrangement, lines, scale = self.arrangement, self.lines, self.scale
         points, triangles, circle = self._joined(fillings)
         phase, precedence = self._within
@@ -175,8 +175,8 @@ class NodedCell:
 
 
 def _without_voids(mesh: CoarseMesh, void: int) -> CoarseMesh:
-    """The mesh without the triangles of the phase number `void`, which has no name in it, and without nodes that no
-    other triangle has."""
+    """Return the mesh without the triangles of the phase number `void`, which has no name in it, and without nodes
+    that no other triangle has."""
     kept = mesh.phase != void
     used = np.zeros(len(mesh.points), bool)
     used[mesh.triangles[kept]] = True

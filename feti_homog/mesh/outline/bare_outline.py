@@ -168,8 +168,8 @@ class BareOutline:
 def _arcs(
     circles: Float, border: Float, vertices: OnCircles, size: Float, chosen: Bool
 ) -> tuple[tuple[Int, Float, Float], Float]:
-    """The arcs of `arcs_within`, and the points (v, 2) at which those of the `chosen` (k,) circles begin, but for those
-    on the border, near its points (b, 2)."""
+    """Return the arcs of `arcs_within`, and the points (v, 2) at which those of the `chosen` (k,) circles begin,
+    but for those on the border, near its points (b, 2)."""
     arcs = arcs_within(len(circles), *vertices, partial(on_circles, circles), size)
     ends, same = on_circles(circles, *arcs[:2]), SAME_PLACE * size.max()
     away = np.all((ends > same) & (ends < size - same), axis=1)
@@ -185,7 +185,7 @@ def _caps(arrangement: Arrangement, largest: float, disc: Int, around: Int) -> F
 
 
 def _segments(circles: Float, bridges: Bridges, caps: Float, field: SizeField) -> Segments:
-    """The bridges between circles, on which edges are at most `caps` (k,).
+    """Return the bridges between circles, on which edges are at most `caps` (k,).
 
     Where elements are not graded, edges are no longer than the sizes at both ends, interpolated: so gmsh does it across
     the matrix.
@@ -200,7 +200,7 @@ def _segments(circles: Float, bridges: Bridges, caps: Float, field: SizeField) -
 
 
 def _tips(arrangement: Arrangement, marks: Mapping[int, Sequence[float]], vertices: Float) -> Float:
-    """The vertices (t, 2) that the marks have become; those of curves that are not there are none."""
+    """Return the vertices (t, 2) that the marks have become; those of curves that are not there are none."""
     curve, angle = marked(arrangement, marks)
     size, fibre = arrangement.size, np.where(curve < 0, ~curve, curve)
     radii = np.where(curve < 0, arrangement.radii[fibre], arrangement.outer_radii[fibre])

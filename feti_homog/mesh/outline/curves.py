@@ -57,7 +57,7 @@ class Curves:
         return [Curve(*parts) for parts in zip(nodes, *beside, strict=True)]
 
     def chosen(self, those: Int) -> Curves:
-        """The curves `those` (k,)."""
+        """Return the curves `those` (k,)."""
         node, first = rows_of(self.first, those)
         return Curves(self.node[node], first, self.circle[those], self.inside[those], self.outside[those])
 
@@ -80,7 +80,7 @@ def rows_of(first: Int, those: Int) -> tuple[Int, Int]:
 
 
 def backwards(node: Int, first: Int, turned: Bool) -> Int:
-    """The nodes of the curves with those of the curves `turned` (c,) in reverse."""
+    """Return the nodes of the curves with those of the curves `turned` (c,) in reverse."""
     counts = np.diff(first)
     place = np.arange(len(node))
     mirror = np.repeat(first[:-1] + first[1:] - 1, counts) - place

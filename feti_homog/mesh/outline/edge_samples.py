@@ -79,7 +79,7 @@ class EdgeSamples:
 
     @classmethod
     def of(cls, field: SizeField, lines: Lines, least: int) -> EdgeSamples:
-        """Samples at `least` equidistant positions, and between them as far as the field asks for more."""
+        """Return samples at `least` equidistant positions, and between them as far as the field asks for more."""
         lengths = lines.lengths
         count = len(lengths)
         line, share = np.repeat(np.arange(count), least), np.tile(np.linspace(0, 1, least), count)
@@ -122,7 +122,7 @@ class EdgeSamples:
         return measure
 
     def _at(self, measure: Float, line: Int, target: Float) -> Float:
-        """The positions (m,) where the measure of lines (m,) is `target` (m,), linear between samples."""
+        """Return the positions (m,) where the measure of lines (m,) is `target` (m,), linear between samples."""
         last = self.first[1:] - 1
         # All in one ascending row, the lines 1 apart; the rounding of large sums may miss an interval by one.
         shift = np.concatenate([[0.0], np.cumsum(measure[last] + 1)])[: len(last)]

@@ -124,7 +124,7 @@ def _on_upright(places: Float, size: Float) -> Float:
 
 
 def _tips(arrangement: Arrangement, inner: Ellipses, marks: Mapping[int, Sequence[float]], vertices: Float) -> Float:
-    """The vertices (t, 2) that the marks have become; those of curves that are not there are none."""
+    """Return the vertices (t, 2) that the marks have become; those of curves that are not there are none."""
     curve, angle = marked(arrangement, marks)
     fibre, size = np.where(curve < 0, ~curve, curve), arrangement.size
     own = inner[fibre].grown(np.where(curve < 0, 0.0, arrangement.coating[fibre]))
@@ -133,7 +133,7 @@ def _tips(arrangement: Arrangement, inner: Ellipses, marks: Mapping[int, Sequenc
 
 
 def _ellipse_at(ellipses: Ellipses, points: Float) -> Int:
-    """The smallest ellipse (k,) around each point, or MATRIX."""
+    """Return the smallest ellipse (k,) around each point, or MATRIX."""
     holds, area = ellipses.level(points) < 1, np.abs(np.linalg.det(ellipses.frames))
     return np.where(holds.any(axis=1), np.where(holds, area, np.inf).argmin(axis=1), MATRIX)
 

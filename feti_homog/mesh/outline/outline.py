@@ -101,8 +101,8 @@ def side_curves(
     numbering: Numbering,
     sampling: Sampling,
 ) -> Curves:
-    """The pieces of the two sides along `axis`, with the same nodes on both; `disc_at` tells the smallest closed curve
-    around points, which is a number of `around` or MATRIX."""
+    """Return the pieces of the two sides along `axis`, with the same nodes on both; `disc_at` tells the smallest
+    closed curve around points, which is a number of `around` or MATRIX."""
     begin, span = places[:-1], np.diff(places)
     longest = np.full((len(span), 2), field.base.largest)
     pieces = Segments(on_side(begin, axis, 0.0), on_side(span, axis, 0.0), longest)
@@ -130,7 +130,7 @@ def side_curves(
 
 
 def disc_at(circles: Float, points: Float) -> Int:
-    """The smallest circle (k,) around each point on a line, or MATRIX."""
+    """Return the smallest circle (k,) around each point on a line, or MATRIX."""
     beyond = circles[:, :2] - np.clip(circles[:, :2], points.min(axis=0), points.max(axis=0))
     near = np.flatnonzero(np.linalg.norm(beyond, axis=1) < circles[:, 2])
     if not len(near):

@@ -45,7 +45,7 @@ class ElementEstimate:
 
     @classmethod
     def of(cls, cell: Cell, listed: Arrangement | None) -> ElementEstimate:
-        """That of a cell, with the arrangement of its table if it has one."""
+        """Estimate the elements of a cell, with the arrangement of its table if it has one."""
         if listed is not None:
             ellipses, radius = elliptic(listed.outlines), float(listed.radii.mean())
             ovals = ellipses[~ellipses.are_round]

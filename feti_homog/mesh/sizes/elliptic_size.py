@@ -130,7 +130,7 @@ def _beside_sides(ellipses: Ellipses, size: Float, largest: float) -> Source:
 
 
 def _at_corner(points: Float, size: Float, largest: float) -> Source:
-    """The corner and the nearest of the points (n, 2) of ellipses."""
+    """Return the corner and the nearest of the points (n, 2) of ellipses."""
     offset = (points + size / 2) % size - size / 2
     nearest = offset[np.argmin(np.linalg.norm(offset, axis=1))]
     length = min(PASSAGE_EDGE * float(np.linalg.norm(nearest)), largest)

@@ -24,7 +24,7 @@ WEDGE = 3
 
 
 def line_size(arrangement: Arrangement, largest: float, vertices: Float) -> SourcedSize:
-    """The size of edges at positions on the torus.
+    """Return the size of edges at positions on the torus.
 
     The sources (x_k, h_k) are the two faces of each narrow passage between two fibres, or between a fibre and
     a side or corner of the cell, with h_k proportional to its width, and the `vertices` (v, 2) that the mesh
@@ -109,7 +109,7 @@ def _at_sides(circles: Float, size: Float, caps: Float, largest: float) -> Sourc
 
 
 def _where(chosen: Bool, *source: Float) -> Source:
-    """The chosen rows of places, lengths and growths."""
+    """Return the chosen rows of places, lengths and growths."""
     places, lengths, growths = (part[chosen] for part in source)
     return places, lengths, growths
 
@@ -233,7 +233,7 @@ class _FromLines:
 
     @classmethod
     def of(cls, arrangement: Arrangement, sizes: MeshSizes, tips: Float) -> _FromLines:
-        """That of a cell."""
+        """Make the sizes of a cell."""
         size, caps = arrangement.size, sizes.on_circles(arrangement)
         radii = arrangement.outer_radii
         counts = np.ceil(2 * np.pi * radii / caps).astype(int)

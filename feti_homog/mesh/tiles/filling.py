@@ -86,7 +86,7 @@ def gmsh_session() -> Iterator[ModuleType]:
 
 
 def fill(tile: Tile) -> Filling:
-    """The triangles of a tile; as few as possible have two edges on one circle.
+    """Return the triangles of a tile; as few as possible have two edges on one circle.
 
     Raises:
         MeshError: gmsh cannot fill it.
@@ -210,7 +210,7 @@ def _bounding_lines(curves: list[Curve]) -> list[Signed]:
 
 
 def _loops(lines: list[Signed]) -> list[list[Signed]]:
-    """Closed chains of lines that have one region on their left; each vertex of a region starts one line."""
+    """Return closed chains of lines that have one region on their left; each vertex of a region starts one line."""
     after = {(curve.inside, int(curve.nodes[0])): (tag, curve) for tag, curve in lines}
     loops = []
     while after:
@@ -222,7 +222,7 @@ def _loops(lines: list[Signed]) -> list[list[Signed]]:
 
 
 def _with_holes(loops: list[list[Signed]], points: Float) -> list[list[list[Signed]]]:
-    """Groups of loops, each an outer one followed by the holes, which run clockwise, within it."""
+    """Return groups of loops, each an outer one followed by the holes, which run clockwise, within it."""
     polygons = [_polygon(loop, points) for loop in loops]
     is_hole = [_area(polygon) < 0 for polygon in polygons]
     groups = {k: [loop] for k, loop in enumerate(loops) if not is_hole[k]}
@@ -240,7 +240,7 @@ def _polygon(loop: list[Signed], points: Float) -> Float:
 
 
 def _area(polygon: Float) -> float:
-    """That of a polygon (k, 2), negative if it runs clockwise."""
+    """Return the area of a polygon (k, 2), negative if it runs clockwise."""
     a, b = polygon - polygon[0], np.roll(polygon, -1, axis=0) - polygon[0]
     return float((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum() / 2)
 

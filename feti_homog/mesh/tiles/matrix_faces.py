@@ -39,7 +39,7 @@ class HalfLines:
 
     @classmethod
     def of(cls, nodes: Int, centres: Float, starts: Float) -> HalfLines:
-        """The halves of lines between `nodes` (l, 2), which have these centres (n, 2), from starts[:, 0] to
+        """Return the halves of lines between `nodes` (l, 2), which have these centres (n, 2), from starts[:, 0] to
         starts[:, 1] (l, 2, 2); those from the second node come last."""
         node, start = nodes.T.ravel(), np.concatenate([starts[:, 0], starts[:, 1]])
         other = np.concatenate([starts[:, 1], starts[:, 0]])
@@ -49,13 +49,13 @@ class HalfLines:
         return cls(node, angle, start, (np.arange(len(node)) + len(nodes)) % len(node))
 
     def chosen(self, those: Int) -> HalfLines:
-        """The half-lines `those` (k,), which are both halves of lines."""
+        """Return the half-lines `those` (k,), which are both halves of lines."""
         place = np.full(len(self.node), NOWHERE)
         place[those] = np.arange(len(those))
         return HalfLines(self.node[those], self.angle[those], self.start[those], place[self.twin[those]])
 
     def faces(self) -> tuple[Int, Int]:
-        """The half-line (h,) after each around the face on its left, and the number of that face (h,)."""
+        """Return the half-line (h,) after each around the face on its left, and the number of that face (h,)."""
         order = np.lexsort((self.angle, self.node))
         place = np.empty_like(order)
         place[order] = np.arange(len(order))
@@ -88,8 +88,8 @@ class MatrixTiles:
 
 
 def beside(lines: HalfLines, label: Int, alone: Int, disc: Int, angle: Float) -> Int:
-    """The label (k,) of the matrix beside discs (k,) at these angles: that of the half-line clockwise from there, of
-    labels (h,), or that of discs that are alone (n,)."""
+    """Return the label (k,) of the matrix beside discs (k,) at these angles: that of the half-line clockwise from
+    there, of labels (h,), or that of discs that are alone (n,)."""
     order = np.lexsort((lines.angle, lines.node))
     node, at = lines.node[order], lines.angle[order]
     # Twice a turn apart, so that those of one disc stay together.
@@ -108,7 +108,7 @@ def matrix_tiles(
     size: Float,
     grid: Int,
 ) -> MatrixTiles | None:
-    """The faces dealt to the cells of a grid (2,) by their centroids.
+    """Return the faces dealt to the cells of a grid (2,) by their centroids.
 
     Args:
         circles: (k, 3).
@@ -145,7 +145,7 @@ def matrix_tiles(
 
 
 def grid_cell(points: Float, size: Float, grid: Int) -> Int:
-    """Number (k,) of the cell of a grid (2,) over [0, size] that each point is in."""
+    """Return the number (k,) of the cell of a grid (2,) over [0, size] that contains each point."""
     share = (points / size).round(PLACE_DECIMALS)
     column, row = np.clip((share * grid).astype(np.int64), 0, grid - 1).T
     return np.asarray(column * grid[1] + row)

@@ -72,7 +72,8 @@ class FilledTile:
 
 
 def tile_torus(regions: Regions, tiles: Sequence[FilledTile], all_nodes: int) -> tuple[Torus, Int]:
-    """The torus of the triangles of these tiles, without voids, and the number (m,) of the tile that each is in.
+    """Return the torus of the triangles of these tiles, without voids, and the number (m,) of the tile that each is
+    in.
 
     `all_nodes` is how many there are in the cell.
     """

@@ -66,7 +66,7 @@ def is_tiled(arrangement: Arrangement, policy: TilePolicy) -> bool:
 def tiling(
     arrangement: Arrangement, largest: float, marks: Mapping[int, Sequence[float]], policy: TilePolicy
 ) -> Tiling | None:
-    """That of a large cell of round fibres; None of others, and where there is no room for bridges.
+    """Return the tiling of a large cell of round fibres; None for others, and where there is no room for bridges.
 
     `largest` is the size of elements, and `marks` are as in `BareOutline.of`.
     """
@@ -100,7 +100,8 @@ def tiling(
 
 
 def _side_pieces(circles: Float, outer: Int, size: Float) -> tuple[Int, Float]:
-    """The pieces of sides in the matrix, as `matrix_tiles` takes them; `outer` (n,) are the circles that bound it."""
+    """Return the pieces of sides in the matrix, as `matrix_tiles` takes them; `outer` (n,) are the circles that
+    bound it."""
     nodes, ends = [], []
     for axis, (level, low) in product((0, 1), ((0.0, True), (1.0, False))):
         places = crossings(circles[outer], axis, size)
@@ -118,8 +119,8 @@ def _side_pieces(circles: Float, outer: Int, size: Float) -> tuple[Int, Float]:
 
 
 def cut(lines: Outline, cell: Tile, tiles: Tiling | None) -> list[tuple[Int, Tile]]:
-    """The tiles of a cell whose outline is `lines`, each with the numbers (n,) of its nodes; the cell as it is without
-    a tiling."""
+    """Return the tiles of a cell whose outline is `lines`, each with the numbers (n,) of its nodes; the cell as it
+    is without a tiling."""
     if tiles is None:
         return [(np.arange(len(cell.points)), cell)]
     curves = cell.curves
@@ -141,7 +142,7 @@ def cut(lines: Outline, cell: Tile, tiles: Tiling | None) -> list[tuple[Int, Til
 
 
 def _tiles_beside(lines: Outline, tiles: Tiling) -> tuple[Int, Int]:
-    """The tiles (c,) on the left and on the right of curves, OUTSIDE beyond the sides."""
+    """Return the tiles (c,) on the left and on the right of curves, OUTSIDE beyond the sides."""
     curves = lines.curves
     left, right = tiles.within[curves.inside], tiles.within[curves.outside]
     is_side = curves.outside == OUTSIDE

@@ -22,7 +22,7 @@ ENTRIES = tuple((ORDER[row], ORDER[column]) for column in range(6) for row in ra
 
 
 def text(material: EffectiveMaterial) -> str:
-    """The card.  Raises CaseError for an expansion with shears."""
+    """Return the card. Raises CaseError for an expansion with shears."""
     if material.expansion is not None and material.expansion[3:].any():
         # Abaqus' guide does not say whether alpha12 of TYPE=ANISO is the tensor's shear or the engineering one.
         raise CaseError(
@@ -56,6 +56,6 @@ def expansion(kind: str, values: Float) -> list[str]:
 
 
 def data_lines(values: Iterable[float]) -> list[str]:
-    """The numbers, separated by commas, eight to a line."""
+    """Return the numbers, separated by commas, eight to a line."""
     fields = [number(value, WIDTH) for value in values]
     return [", ".join(fields[k : k + PER_LINE]) for k in range(0, len(fields), PER_LINE)]

@@ -23,7 +23,7 @@ NUMBER, PER_LINE = 1, 6
 
 
 def text(material: EffectiveMaterial) -> str:
-    """The card.  Raises CaseError for an expansion with shears."""
+    """Return the card. Raises CaseError for an expansion with shears."""
     alpha = material.expansion
     if alpha is not None and alpha[3:].any():
         raise CaseError(

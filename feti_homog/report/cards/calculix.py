@@ -16,7 +16,7 @@ TENSOR_SHEARS = np.array([1.0, 1.0, 1.0, 0.5, 0.5, 0.5])
 
 
 def text(material: EffectiveMaterial) -> str:
-    """The card."""
+    """Return the card."""
     lines = [*comments(material, "**"), *abaqus.elastic(material, "ANISO")]
     if material.expansion is not None and material.is_orthotropic:
         lines += abaqus.expansion("ORTHO", material.expansion[:3])

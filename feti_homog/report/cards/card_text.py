@@ -16,7 +16,7 @@ AXES = (
 
 
 def comments(material: EffectiveMaterial, mark: str) -> list[str]:
-    """The first lines of a card, each after the mark of a comment, in ASCII."""
+    """Return the first lines of a card, each after the mark of a comment, in ASCII."""
     stress = material.stress_unit or "the unit of the moduli in the case file"
     paragraphs = [
         f"Effective material of {material.name}, by feti_homog {material.version}.",
@@ -31,14 +31,15 @@ def comments(material: EffectiveMaterial, mark: str) -> list[str]:
 
 
 def number(value: float, width: int = 24) -> str:
-    """The value in at most `width` characters, at least 12: all 17 digits if they fit, else as many as do."""
+    """Return the value in at most `width` characters, at least 12: all 17 digits if they fit, else as many as do."""
     value = float(value) + 0.0  # no -0.0
     forms = [repr(value), *(f"{value:.{digits}E}" for digits in range(16, 3, -1))]
     return next(form for form in forms if len(form) <= width)
 
 
 def identifier(name: str) -> str:
-    """The name in letters, digits and single underscores, of at most 60 characters, the first of them a letter."""
+    """Return the name in letters, digits and single underscores, of at most 60 characters, the first of them a
+    letter."""
     word = re.sub(r"[\W_]+", "_", name, flags=re.ASCII)[:60].strip("_")
     return word if word[:1].isalpha() else f"material_{word}".strip("_")
 

@@ -16,7 +16,7 @@ COMPONENTS = ("11", "22", "33", "gamma23", "gamma13", "gamma12")
 
 
 def text(material: EffectiveMaterial) -> str:
-    """The table: engineering constants, expansions, and the stiffness in the order [11, 22, 33, 23, 13, 12]."""
+    """Return the table: engineering constants, expansions, and the stiffness in the order [11, 22, 33, 23, 13, 12]."""
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(COLUMNS)

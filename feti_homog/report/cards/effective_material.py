@@ -73,7 +73,8 @@ class EffectiveMaterial:
 
 
 def in_axes_of_the_cell(document: Mapping[str, Any]) -> EffectiveMaterial:
-    """The material of the stiffness and expansion of a result: orthotropic if its other entries are negligible.
+    """Return the material of the stiffness and expansion of a result: orthotropic if its other entries are
+    negligible.
 
     Raises:
         CaseError: the result has no linear spatial stiffness, or did not converge.
@@ -99,7 +100,7 @@ def in_axes_of_the_cell(document: Mapping[str, Any]) -> EffectiveMaterial:
 
 
 def nearest_transversely_isotropic(document: Mapping[str, Any]) -> EffectiveMaterial:
-    """The material of the transversely isotropic constants of a result.
+    """Return the material of the transversely isotropic constants of a result.
 
     Raises:
         CaseError: the result has none, or did not converge.
@@ -157,7 +158,7 @@ def _stiffness(document: Mapping[str, Any]) -> Float:
 
 
 def _numbers(value: Any, shape: tuple[int, ...]) -> Float:
-    """The array of this shape.  Raises TypeError or ValueError if it is none, or not finite."""
+    """Return the array of this shape. Raises TypeError or ValueError if it is none, or not finite."""
     array = np.array(value, float)
     if array.shape != shape or not np.isfinite(array).all():
         raise ValueError(f"expected {' x '.join(map(str, shape))} finite numbers")
@@ -165,6 +166,6 @@ def _numbers(value: Any, shape: tuple[int, ...]) -> Float:
 
 
 def _first(faults: Sequence[str]) -> str:
-    """The first of some faults, and how many more there are."""
+    """Return the first of some faults, and how many more there are."""
     more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
     return f"{faults[0] if faults else 'it was not finished'}{more}"

@@ -29,7 +29,7 @@ SYMMETRIES: dict[str, Callable[[Mapping[str, Any]], EffectiveMaterial]] = {
 
 
 def card(directory: Path, form: str, symmetry: str) -> str:
-    """The card, in one of `FORMATS`, of the material of one of `SYMMETRIES` of the result in a folder.
+    """Return the card, in one of `FORMATS`, of the material of one of `SYMMETRIES` of the result in a folder.
 
     Raises:
         CaseError: there is no such format or result, it is damaged, or it has no material that the format can carry;

@@ -17,7 +17,7 @@ SYMMETRIC21 = tuple((row, column) for row in range(6) for column in range(row, 6
 
 
 def text(material: EffectiveMaterial) -> str:
-    """The card: a block [Materials]."""
+    """Return the card: a block [Materials]."""
     name, C = identifier(material.name), material.stiffness
     method, entries = ("symmetric9", SYMMETRIC9) if material.is_orthotropic else ("symmetric21", SYMMETRIC21)
     lines = [*comments(material, "#"), "[Materials]"]

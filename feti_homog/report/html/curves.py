@@ -26,7 +26,7 @@ Curves = Mapping[str, Array]
 
 
 def figures(document: Document) -> dict[str, Any]:
-    """The figures of a result by name; none for a stiffness with debonded faces, which is not linear."""
+    """Return the figures of a result by name; none for a stiffness with debonded faces, which is not linear."""
     unit = document["case"]["output"].get("stress_unit", "") or "unit of the moduli"
     name = reported(document).name
     return FIGURES[name](document, unit) if name in FIGURES else {}

@@ -57,7 +57,7 @@ def write(directory: Path) -> Path:
 
 
 def page(document: Document, directory: Path) -> str:
-    """The page of a result.  Raises OSError, KeyError or ValueError where its files are damaged."""
+    """Return the page of a result. Raises OSError, KeyError or ValueError where its files are damaged."""
     figures = curves.figures(document)
     script, boxes = components(figures, wrap_script=False) if figures else ("", {})
     shown = _shown(document, directory)
@@ -89,7 +89,7 @@ def _document(directory: Path) -> dict[str, Any]:
 
 
 def _shown(document: Document, directory: Path) -> dict[str, Any] | None:
-    """What the viewer of deformed states shows, if the case has fields."""
+    """Return the data of the viewer of deformed states, if the case has fields."""
     if not document["case"]["output"].get("fields", True):
         return None
     with h5py.File(directory / field_file.NAME, "r") as file:

@@ -25,7 +25,7 @@ Document = Mapping[str, Any]
 
 
 def viewer_data(file: Any, document: Document) -> dict[str, Any]:
-    """What the viewer draws of an open result.h5: tables as base64 of little-endian numbers.
+    """Return the data of the viewer from an open result.h5: tables as base64 of little-endian numbers.
 
     Displacements are shorts, to be multiplied by `unit` of the state; stresses are bytes between the `low` and `high`
     of component and state, which leave out the extreme 0.5 %.

@@ -17,7 +17,7 @@ Document = Mapping[str, Any]
 
 
 def facts(document: Document) -> list[tuple[str, str]]:
-    """What was computed, of what, and by what."""
+    """Return the facts of a result: case, cell and solver."""
     case, cell, solver = document["case"], document["cell"], document["solver"]
     length = case["output"].get("length_unit", "")
     fractions = ", ".join(f"{phase} {share:.4f}" for phase, share in cell["fractions"].items())
@@ -37,8 +37,10 @@ def facts(document: Document) -> list[tuple[str, str]]:
 
 
 def answers(document: Document, most: int = MOST_ROWS) -> list[Table]:
-    """What was asked for: stiffness with moduli, constants and bounds, or points of an angle or path, or onsets, tables
-    of points with at most so many rows."""
+    """Return the tables of a result: stiffness with moduli, constants and bounds, points of an angle or path, or onsets.
+
+    Tables of points have at most so many rows.
+    """
     label = in_brackets(document["case"].get("output", {}).get("stress_unit", ""))
     return reported(document).tables(document, label, most)
 

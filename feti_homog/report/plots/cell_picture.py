@@ -32,7 +32,7 @@ LEAST_SIZE, LARGEST_SIZE = 3.0, 11.0  # of the letters, in points
 
 
 def figure(file: Any, drawn: DrawnMesh, borders: Array) -> Figure:
-    """The phases, each body in a shade of its own and with the fibre's number, beside the subdomains."""
+    """Return the phases, each body in a shade of its own and with the fibre's number, beside the subdomains."""
     attributes = file.attrs
     picture, (left, right) = figure_of(attributes, panels=2)
     edges = len(drawn.triangles) <= MESH_LINES
@@ -53,7 +53,7 @@ def figure(file: Any, drawn: DrawnMesh, borders: Array) -> Figure:
 
 
 def _shades(drawn: DrawnMesh, phases: list[str]) -> tuple[Array, list[Patch]]:
-    """A colour (bodies, 4) for each body, a shade of its phase's; and the legend of the phases."""
+    """Return a colour (bodies, 4) for each body, a shade of its phase's; and the legend of the phases."""
     colours = np.zeros((drawn.body.max() + 1, 4))
     legend = []
     for index, phase in enumerate(phases):

@@ -35,7 +35,7 @@ class DrawnMesh:
 
 
 def drawn_mesh(file: Any, limit: int = TRIANGLE_LIMIT, block: int = BLOCK_ROWS) -> DrawnMesh:
-    """The finest nested mesh of an open result.h5 with at most `limit` triangles, or else its coarsest.
+    """Return the finest nested mesh of an open result.h5 with at most `limit` triangles, or else its coarsest.
 
     Its tables are read `block` rows at a time.
     """
@@ -55,19 +55,19 @@ def drawn_mesh(file: Any, limit: int = TRIANGLE_LIMIT, block: int = BLOCK_ROWS) 
 
 
 def nodal_values(table: Any, drawn: DrawnMesh) -> Array:
-    """The rows (p, 2) of a table on nodes at the nodes drawn."""
+    """Return the rows (p, 2) of a table on nodes at the nodes drawn."""
     return _picked(table, drawn.nodes, drawn.block)
 
 
 def triangle_means(table: Any, column: int | None, drawn: DrawnMesh) -> Array:
-    """The means (q,) of a column of a table on elements, or of one that has none, over each triangle drawn."""
+    """Return the means (q,) of a column of a table on elements, or of one that has none, over each triangle drawn."""
     own = ... if column is None else (..., column)
     means = _blocks(table, drawn.group, drawn.block, lambda rows: rows[own].mean(axis=1))
     return np.repeat(means, drawn.pieces)
 
 
 def outline_edges(drawn: DrawnMesh, label: Array) -> Array:
-    """The edges (e, 2) between triangles of different label, on both sides, and those of the cell.
+    """Return the edges (e, 2) between triangles of different label, on both sides, and those of the cell.
 
     Nodes are torn, so an edge with one triangle is on the border of a subdomain; it has a twin in the same
     place across the border, and none on the border of the cell.
@@ -87,7 +87,7 @@ def outline_edges(drawn: DrawnMesh, label: Array) -> Array:
 
 
 def _corners(rows: Array, pieces: int) -> Array:
-    """The drawn triangles (q, 3) of rows (g, group, 3 or 6): corner i is vertex i of one of the group."""
+    """Return the drawn triangles (q, 3) of rows (g, group, 3 or 6): corner i is vertex i of one of the group."""
     if pieces > 1:
         quarters: Array = rows[:, 0][:, QUARTERS].reshape(-1, 3)
         return quarters
@@ -97,14 +97,14 @@ def _corners(rows: Array, pieces: int) -> Array:
 
 
 def _blocks(table: Any, group: int, block: int, function: Callable[[Array], Array]) -> Array:
-    """function of each block of a table, its rows in groups: (g, group, columns)."""
+    """Return function of each block of a table, its rows in groups: (g, group, columns)."""
     step = max(group, block - block % group)
     blocks = (table[start : start + step] for start in range(0, len(table), step))
     return np.concatenate([function(rows.reshape(-1, group, *rows.shape[1:])) for rows in blocks])
 
 
 def _picked(table: Any, numbers: Array, block: int) -> Array:
-    """The rows `numbers` (ascending) of a table."""
+    """Return the rows `numbers` (ascending) of a table."""
     return np.concatenate(list(_picks(table, numbers, block)))
 
 
@@ -128,8 +128,8 @@ def drawn_displacement(state: Any, drawn: DrawnMesh) -> Array:
 
 
 def largest_scale(displacement: Array, drawn: DrawnMesh) -> float:
-    """The largest s with det(I + s' grad u) >= LEAST_AREA in every triangle drawn for all s' up to s; infinity if there
-    is none.
+    """Return the largest s with det(I + s' grad u) >= LEAST_AREA in every triangle drawn for all s' up to s;
+    infinity if there is none.
 
     In each the determinant is 1 + s tr(grad u) + s^2 det(grad u).
     """

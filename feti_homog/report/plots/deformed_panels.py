@@ -60,7 +60,7 @@ class DeformedCell:
 
     @classmethod
     def of(cls, file: Any, numbers: Sequence[int], document: Document, scale: float, limit: int) -> DeformedCell:
-        """The stress that the case chooses, or that suits all these states."""
+        """Return the stress that the case chooses, or that suits all these states."""
         drawn = drawn_mesh(file, limit)
         borders = outline_edges(drawn, drawn.body)
         chosen = document["case"]["output"].get("stress", "auto")
@@ -74,7 +74,7 @@ class DeformedCell:
         return places
 
     def draw(self, axes: Axes, number: int, moved: Array) -> None:
-        """The cell of a state, drawn nodes at `moved`, in its own range of colours: stresses grow along a path."""
+        """Draw the cell of a state, drawn nodes at `moved`, in its own range of colours: stresses grow along a path."""
         state = self.file[f"state/{number}"]
         stress = drawn_stress(state, self.component, self.drawn)
         norm, extend = value_range(stress)
@@ -153,9 +153,9 @@ PANELS = {"angle": _angle, "path": _path}
 
 
 def shown_scale(file: Any, document: Mapping[str, Any]) -> float:
-    """The factor of displacements in all pictures of an angle or a path and in the report: that of the case or, by
-    default, one at which the largest displacement and opening are seen and no triangle turns over, but at least 1 under
-    a given load."""
+    """Return the factor of displacements in all pictures of an angle or a path and in the report: that of the case
+    or, by default, one at which the largest displacement and opening are seen and no triangle turns over, but at
+    least 1 under a given load."""
     chosen = document.get("case", {}).get("output", {}).get("deformation_scale")
     if chosen is not None:
         return float(chosen)

@@ -23,7 +23,7 @@ Document = Mapping[str, Any]
 
 
 def figure(document: Document) -> Figure:
-    """The curve, with equal axes, in the colours of the mode in which the first bond breaks."""
+    """Return the curve, with equal axes, in the colours of the mode in which the first bond breaks."""
     case, points = document["case"], document["envelope"]
     plane, known = case["envelope"]["plane"], [point for point in points if "factor" in point]
     picture = Figure(figsize=(6.6, 5.6), layout="constrained")
@@ -68,7 +68,7 @@ def modes(points: Sequence[Document]) -> Array:
 
 
 def axis_label(name: str, stress_unit: str) -> str:
-    """The symbol of a macroscopic stress or strain, with its unit."""
+    """Return the symbol of a macroscopic stress or strain, with its unit."""
     digits = name[-2:]
     if name.startswith("S"):
         return f"$\\Sigma_{{{digits}}}$ " + (f"({plain(stress_unit)})" if stress_unit else "(unit of the moduli)")
@@ -76,7 +76,7 @@ def axis_label(name: str, stress_unit: str) -> str:
 
 
 def _curve(axes: Axes, places: Array, mode: Array) -> LineCollection:
-    """The closed curve through the loads (n, 2), open where there is no onset."""
+    """Return the closed curve through the loads (n, 2), open where there is no onset."""
     ends = np.roll(places, -1, axis=0)
     whole = ~np.isnan(places[:, 0]) & ~np.isnan(ends[:, 0])
     if whole.all():

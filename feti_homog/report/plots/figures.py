@@ -80,13 +80,13 @@ def plot(directory: Path) -> list[Path]:
 
 
 def _output(document: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The section [output] of the case, empty without a result.json."""
+    """Return the section [output] of the case, empty without a result.json."""
     found: Mapping[str, Any] = document.get("case", {}).get("output", {})
     return found
 
 
 def _pictures(directory: Path, document: Mapping[str, Any]) -> list[Path]:
-    """The pictures of result.h5."""
+    """Return the pictures of result.h5."""
     with h5py.File(directory / field_file.NAME, "r") as file:
         drawn = drawn_mesh(file)
         borders = outline_edges(drawn, drawn.body)
@@ -122,7 +122,7 @@ def _deformed(
     interface_edges: InterfaceEdges,
     document: Mapping[str, Any],
 ) -> Figure:
-    """The magnified deformed cell with a stress component in colour, and the outline it has left."""
+    """Return the magnified deformed cell with a stress component in colour, and the outline it has left."""
     displacement = drawn_displacement(state, drawn)
     size = float(np.ptp(drawn.points, axis=0).min())
     seen = magnification(largest_length(displacement), size, largest=largest_scale(displacement, drawn))
@@ -147,8 +147,8 @@ def _sheared(
     interface_edges: InterfaceEdges,
     document: Mapping[str, Any],
 ) -> Figure:
-    """The cell with an axial stress in colour and lines of equal displacement along the fibres, which moves nothing in
-    the plane."""
+    """Return the cell with an axial stress in colour and lines of equal displacement along the fibres, which moves
+    nothing in the plane."""
     figure, axes = _coloured(file, state, drawn, drawn.points, _output(document))
     step = draw_levels(axes, state, drawn)
     length = plain(file.attrs["length_unit"])
@@ -160,7 +160,7 @@ def _sheared(
 
 
 def _coloured(file: Any, state: Any, drawn: DrawnMesh, moved: Array, output: Mapping[str, Any]) -> tuple[Figure, Axes]:
-    """The cell, its nodes at `moved`, in the colours of a stress."""
+    """Return the cell, its nodes at `moved`, in the colours of a stress."""
     attributes = file.attrs
     figure, (axes,) = figure_of(attributes, panels=1, beside=BAR_INCHES)
     component = stress_component(output.get("stress", "auto"), [state])
@@ -190,7 +190,7 @@ def _outlined(
 
 
 def _left(attributes: Any, drawn: DrawnMesh, borders: Array) -> Array:
-    """The undeformed outlines (e, 2, 2): of the bodies if they are few, else of the cell alone."""
+    """Return the undeformed outlines (e, 2, 2): of the bodies if they are few, else of the cell alone."""
     if drawn.body.max() < OUTLINED_BODIES:
         outline: Array = drawn.points[borders]
         return outline

@@ -62,7 +62,7 @@ def state_legend(kinds: list[int]) -> list[Line2D]:
 
 
 def _wrapped(points: Array, period: Array, near: float) -> Array:
-    """The points' images in [0, period), those within `near` of the upper ends at 0."""
+    """Return the points' images in [0, period), those within `near` of the upper ends at 0."""
     inside = np.mod(points, period)
     inside[inside > period - near] = 0.0
     wrapped: Array = inside

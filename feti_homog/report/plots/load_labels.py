@@ -45,8 +45,8 @@ class LoadLabels:
         return cls(given=document["case"][analysis.name]["to"] if analysis.picture else None)
 
     def words(self, attributes: Any) -> list[str]:
-        """The strains that are seen, and the temperature, of a state with these attributes, as formulas; of a path on
-        which many are seen the leading one and its stress; of a load what it gives."""
+        """Return the strains that are seen, and the temperature, of a state with these attributes, as formulas; of
+        a path on which many are seen the leading one and its stress; of a load what it gives."""
         if self.given is not None:
             return [_formula(name, value) for name, value in self.given.items()]
         strain, temperature = np.asarray(attributes["strain"]), float(attributes.get("temperature", 0.0))
@@ -62,7 +62,7 @@ class LoadLabels:
         return [_formula(name, value) for name, value in loads] or ["no strain"]
 
     def label(self, attributes: Any, in_line: int = 4) -> str:
-        """These words, so many in a line."""
+        """Join these words, so many in a line."""
         words = self.words(attributes)
         return ",\n".join(", ".join(words[k : k + in_line]) for k in range(0, len(words), in_line))
 

@@ -53,7 +53,7 @@ def save(figure: Figure, path: Path) -> Path:
 
 
 def pixels_of(figure: Figure) -> Array:
-    """The drawn figure (rows, columns, 3).  Letters that the font lacks are boxes, without a warning each."""
+    """Return the drawn figure (rows, columns, 3). Letters that the font lacks are boxes, without a warning each."""
     canvas: Any = FigureCanvasAgg(figure)
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", r"Glyph \d+")
@@ -62,7 +62,7 @@ def pixels_of(figure: Figure) -> Array:
 
 
 def _trimmed(pixels: Array, padding: int) -> Array:
-    """The part of an image (rows, columns, 3) that is not white, with some white around."""
+    """Return the part of an image (rows, columns, 3) that is not white, with some white around."""
     drawn = (pixels != 255).any(axis=2)
     places = []
     for axis in (1, 0):
@@ -74,7 +74,7 @@ def _trimmed(pixels: Array, padding: int) -> Array:
 
 
 def figure_of(attributes: Any, panels: int, beside: float = 0.0) -> tuple[Figure, Sequence[Axes]]:
-    """A figure with panels for pictures of the cell, and so many inches beside them."""
+    """Return a figure with panels for pictures of the cell, and so many inches beside them."""
     width, height = float(attributes["width"]), float(attributes["height"])
     inches = cell_scale(attributes)
     figure = Figure(
@@ -99,7 +99,7 @@ def label_cell_axes(axes: Axes, attributes: Any) -> None:
 
 
 def fill_triangles(axes: Axes, drawn: DrawnMesh, points: Array, colours: Array, edges: bool, **mapping: Any) -> Any:
-    """Fills the triangles with values, or with colours (q, 4); antialiasing would leave seams."""
+    """Return fills the triangles with values, or with colours (q, 4); antialiasing would leave seams."""
     fill = {"array": colours} if colours.ndim == 1 else {"facecolors": colours}
     border = {"edgecolors": "0.55", "linewidths": 0.15} if edges else {"edgecolors": "none", "antialiased": False}
     style: dict[str, Any] = fill | border | mapping
@@ -165,7 +165,7 @@ def magnification(displacement: float, size: float, opening: float = 0.0, larges
 
 
 def largest_length(vectors: Array) -> float:
-    """The largest length of vectors (n, 2)."""
+    """Return the largest length of vectors (n, 2)."""
     return float(np.linalg.norm(vectors, axis=1).max(initial=0.0))
 
 
@@ -175,8 +175,8 @@ def strain_symbols(count: int) -> tuple[str, ...]:
 
 
 def stress_component(chosen: str, states: Sequence[Any]) -> str:
-    """The stress that is chosen, else that of the largest strain of these states on which a macroscopic stress works;
-    of all strains if there is no stress."""
+    """Return the stress that is chosen, else that of the largest strain of these states on which a macroscopic
+    stress works; of all strains if there is no stress."""
     if chosen in STRESS_SYMBOLS:
         return chosen
     strains, stresses = (np.array([state.attrs[name] for state in states]) for name in ("strain", "stress"))
@@ -185,19 +185,19 @@ def stress_component(chosen: str, states: Sequence[Any]) -> str:
 
 
 def drawn_stress(state: Any, component: str, drawn: DrawnMesh) -> Array:
-    """The stress (q,) of a state in each triangle drawn."""
+    """Return the stress (q,) of a state in each triangle drawn."""
     table, column = STRESS_TABLES[component]
     return triangle_means(state[table], column, drawn)
 
 
 def interfaces_of(case: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
-    """The section [interface] of a resolved case, or all sections [[interface]]; none of perfect bonding."""
+    """Return the section [interface] of a resolved case, or all sections [[interface]]; none of perfect bonding."""
     sections = case.get("interface", [])
     return sections if isinstance(sections, list) else [sections]
 
 
 def bond_limits(case: Mapping[str, Any]) -> list[str]:
-    """What breaks the bonds of each interface of a case, a line each; of several with the phases that it is between."""
+    """Describe the law of each interface of a case, a line each; of several with the phases that it is between."""
     bonds, unit = interfaces_of(case) or [{}], case.get("output", {}).get("stress_unit", "")
     if len(bonds) == 1:
         return [_limits(bonds[0], unit)]
@@ -213,7 +213,7 @@ def _limits(bond: Mapping[str, Any], unit: str) -> str:
 
 
 def plain(text: str) -> str:
-    """A user's text for Matplotlib, which would read formulas between dollars."""
+    """Return a user's text for Matplotlib, which would read formulas between dollars."""
     return text.replace("$", r"\$")
 
 

@@ -67,7 +67,7 @@ def _angle_columns(points: Sequence[Mapping[str, Any]], stiff: bool) -> list[tup
 
 
 def _symbol(stress: str) -> str:
-    """The macroscopic stress of this name."""
+    """Return the macroscopic stress of this name."""
     return rf"\Sigma_{{{stress[1:]}}}"
 
 
@@ -105,7 +105,7 @@ def _path(document: Document) -> Figure:
 def _stress_curves(
     axes: Axes, document: Document, strain: Array, shown: Sequence[int], style: Mapping[str, Any]
 ) -> None:
-    """The first leg with its snap-back, and thick what a load that is controlled follows on it and on later legs."""
+    """Draw the first leg with its snap-back, and thick the response to a controlled load on all legs."""
     points, first = document["path"], path_curves.first_leg(document)
     stress = np.array([point["stress"] for point in points])
     names = voigt_names(stress.shape[1])[1]
@@ -130,7 +130,7 @@ def _stress_curves(
 
 
 def _temperature(axes: Axes, points: Sequence[Mapping[str, Any]], style: Mapping[str, Any]) -> None:
-    """The change of temperature along a path, on an axis of its own, if there is any."""
+    """Draw the change of temperature along a path, if there is any, on its own axis."""
     if any(point.get("temperature") for point in points):
         beside = axes.twinx()
         label = r"change of temperature $\Delta T$"
@@ -151,7 +151,7 @@ def _count_curves(axes: Axes, points: Sequence[Mapping[str, Any]], style: Mappin
 
 
 def _number_points(upper: Axes, below: Sequence[Axes], curve: Array, numbers: Sequence[int], ink: str) -> None:
-    """A curve (points, 2): points as ringed numbers, arrows in its ink, and lines at their numbers below."""
+    """Draw a curve (points, 2): points as ringed numbers, arrows in its ink, and lines at their numbers below."""
     ring = {"boxstyle": "circle,pad=0.15", "facecolor": "white", "edgecolor": "0.3", "linewidth": 0.6}
     for number in numbers:
         style: dict[str, Any] = {"color": "0.3", "fontsize": 7, "ha": "center", "va": "center", "bbox": ring}
@@ -167,7 +167,7 @@ def _number_points(upper: Axes, below: Sequence[Axes], curve: Array, numbers: Se
 
 
 def _direction_marks(curve: Array) -> list[tuple[Array, Array]]:
-    """Starts and ends of arrows on a curve (points, 2): in the middles of its longest steps, and few."""
+    """Return starts and ends of arrows on a curve (points, 2): in the middles of its longest steps, and few."""
     steps = np.diff(np.vstack([np.zeros(2), curve]), axis=0)
     extent = np.ptp(np.vstack([np.zeros(2), curve]), axis=0)
     length = np.linalg.norm(steps / np.where(extent > 0.0, extent, 1.0), axis=1)
@@ -178,7 +178,7 @@ def _direction_marks(curve: Array) -> list[tuple[Array, Array]]:
 
 
 def _path_title(case: Mapping[str, Any]) -> str:
-    """What the case is and what breaks its bonds; of several interfaces a line for each."""
+    """Return the title: the case and its laws, a line per interface if there are several."""
     title = f"{plain(case.get('name', ''))}: plane {case['analysis']['plane']}".lstrip(": ")
     return "\n".join([title, *bond_limits(case)])
 

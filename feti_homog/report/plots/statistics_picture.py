@@ -29,7 +29,7 @@ def write(directory: Path, found: FibreStatistics, name: str, model: str) -> Pat
 
 
 def figure(found: FibreStatistics, name: str, model: str) -> Figure:
-    """The fibres on the left, six panels beside them; lengths in mean radii or diameters."""
+    """Return the fibres on the left, six panels beside them; lengths in mean radii or diameters."""
     picture = Figure(figsize=(16.5, 6.8), layout="constrained")
     left, right = picture.subfigures(1, 2, width_ratios=(1.0, 1.75))
     fibres(left.subplots(), found)
@@ -46,7 +46,8 @@ def figure(found: FibreStatistics, name: str, model: str) -> Figure:
 
 
 def fibres(axes: Axes, found: FibreStatistics) -> None:
-    """The fibres in the colours of their local fractions; what leaves a periodic cell returns on the other side."""
+    """Draw the fibres in the colours of their local fractions; parts outside a periodic cell return on the other
+    side."""
     pattern, fractions = found.pattern, np.where(found.cells.whole, found.cells.fractions, np.nan)
     shifts = np.array(list(product((-1, 0, 1), repeat=2)) if pattern.periodic else [(0, 0)]) * pattern.size
     centres = (pattern.wrapped if pattern.periodic else pattern.centres) + shifts[:, None]

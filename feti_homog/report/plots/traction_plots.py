@@ -63,7 +63,7 @@ def _touching(file: Any, name: str) -> bool:
 
 
 def _figure(file: Any, edges: InterfaceEdges, names: list[str], labels: LoadLabels) -> Figure:
-    """A row for each of the fibres that are most debonded: tractions, and jumps."""
+    """Return a row for each of the fibres that are most debonded: tractions, and jumps."""
     fibre, status = file["interface/fibre"][:], file[f"state/{names[-1]}/status"][:]
     bodies, count = np.unique(fibre[status != BONDED], return_counts=True)
     chosen = np.sort(bodies[np.argsort(-count, kind="stable")][:MAX_FIBRES])
@@ -102,7 +102,7 @@ def _values(state: Any, quantity: str) -> Array:
 
 
 def _curves(axes: Axes, quantity: str, place: Coordinate, values: Array, last: bool) -> None:
-    """The values at the nodes of a fibre, around it if they are all around."""
+    """Draw the values at the nodes of a fibre, as a closed curve if the nodes surround it."""
     at, turn = place.values, place.ends[1] - place.ends[0]
     if place.ends == DEGREES and len(at) > 1 and at[0] + turn - at[-1] < MOST_UNEVEN * np.diff(at).max():
         at, values = (
@@ -115,7 +115,7 @@ def _curves(axes: Axes, quantity: str, place: Coordinate, values: Array, last: b
 
 
 def _shade(axes: Axes, place: Coordinate, status: Array) -> None:
-    """The debonded parts of the last state; each node stands for half of the way to its neighbours."""
+    """Mark the debonded parts of the last state; each node stands for half the distance to its neighbours."""
     middle = (place.values[1:] + place.values[:-1]) / 2
     edges = np.concatenate([[place.ends[0]], middle, [place.ends[1]]])
     for kind in (OPEN, CLOSED):
@@ -149,7 +149,7 @@ def _labels(file: Any, figure: Figure, grid: Any, shaded: Array) -> None:
 
 
 def _title(file: Any, names: list[str], labels: LoadLabels) -> str:
-    """The last state and, of more, the first."""
+    """Return the last state and, of more, the first."""
     first, last = (file[f"state/{name}"].attrs for name in (names[0], names[-1]))
     title = f"{last['label']}: {labels.label(last, LOADS_IN_LINE)}"
     if len(names) > 1:
@@ -200,8 +200,8 @@ def _arc_length(points: Array, normal: Array, own: Array, chain: Array, period: 
 
 
 def _lines(chain: Array, normal: Array, points: Array, period: Array) -> list[Array]:
-    """The boundaries that edges make, each as its nodes in counterclockwise order, of a closed one the first again at
-    the end. It begins where the normal is nearest to x1, or at its end if it is open."""
+    """Return the boundaries that edges make, each as its nodes in counterclockwise order, of a closed one the first
+    again at the end. It begins where the normal is nearest to x1, or at its end if it is open."""
     vertices, ends = np.unique(chain, return_inverse=True)
     first, second = ends.reshape(-1, 2).T
     size = len(vertices)
@@ -236,6 +236,6 @@ def _along(points: Array, starts: Array, steps: Array, before: Array, period: Ar
 
 
 def _shortest(vectors: Array, period: Array) -> Array:
-    """The shortest images of vectors on the torus."""
+    """Return the shortest images of vectors on the torus."""
     shortest: Array = vectors - period * np.round(vectors / period)
     return shortest

@@ -55,7 +55,7 @@ def _envelope_lines(document: Document, label: str, toughness: str) -> list[list
 
 
 def _stiffness_lines(document: Document, label: str, toughness: str) -> list[list[str]]:
-    """The effective stiffness with what follows from it; units in brackets."""
+    """Return the effective stiffness with what follows from it; units in brackets."""
     blocks = [table.lines for table in stiffness_tables.stiffnesses(document, label)]
     tips = [table.lines for table in point_tables.tip_table(document.get("tips"), toughness)]
     if plane_state_of(document).is_spatial:
@@ -148,5 +148,5 @@ ANALYSES = {
 
 
 def reported(document: Document) -> ReportedAnalysis:
-    """The analysis of a result.json; of an empty one, that of states without numbers, the stiffness."""
+    """Return the analysis of a result.json; of an empty one, that of states without numbers, the stiffness."""
     return next((analysis for name, analysis in ANALYSES.items() if document.get(name)), STIFFNESS)

@@ -40,7 +40,7 @@ def shown_entries(points: Sequence[Point]) -> dict[str, tuple[int, int]]:
 
 
 def all_numbers(key: str, document: Document, label: str, numbers: Sequence[int]) -> Table:
-    """The numbers and stresses, or entries of the stiffness, of these points of an angle or a path."""
+    """Return the numbers and stresses, or entries of the stiffness, of these points of an angle or a path."""
     points = document[key]
     some = "" if len(numbers) == len(points) else f", {len(numbers)} of {len(points)}"
     names = [name for name, value in points[0].items() if isinstance(value, int | float)]
@@ -56,8 +56,8 @@ def all_numbers(key: str, document: Document, label: str, numbers: Sequence[int]
 
 
 def angle_table(points: Sequence[Point], label: str) -> Table:
-    """A row for each angle: stiffnesses or stresses, and the states of the interface nodes; `label` is the unit of
-    stresses in brackets, or empty."""
+    """Return a row for each angle: stiffnesses or stresses, and the states of the interface nodes; `label` is the
+    unit of stresses in brackets, or empty."""
     stiff = "stiffness" in points[0]
     entries = shown_entries(points) if stiff else {}
     counts = COUNTS if len(entries) <= len(ENTRIES) else []
@@ -89,8 +89,10 @@ def path_table(document: Document, label: str) -> Table:
 
 
 def _path_columns(document: Document) -> dict[str, Any]:
-    """What varies along a path: the leading strain, stresses that are named or there, the temperature, other strains
-    under given stresses."""
+    """Return the columns that vary along a path.
+
+    They are the leading strain, stresses that are named or present, the temperature, and other strains under stresses.
+    """
     points = document["path"]
     strain, stress = (_without_noise([point[name] for point in points]) for name in ("strain", "stress"))
     strains, stresses = voigt_names(strain.shape[1])
@@ -112,7 +114,7 @@ def _without_noise(values: Sequence[Sequence[float]]) -> Any:
 
 
 def load_lines(document: Document, label: str) -> list[str]:
-    """The equilibrium under one load: strains, stresses, energies, and the states of the interface nodes."""
+    """Return the equilibrium under one load: strains, stresses, energies, and the states of the interface nodes."""
     point = document["load"]
     strain, sigma = (map(without_noise, _without_noise([point[name]])[0]) for name in ("strain", "stress"))
     strains, stresses = voigt_names(len(point["strain"]))
@@ -146,8 +148,11 @@ def load_table(document: Document, label: str) -> Table:
 
 
 def _path_energies(document: Document, label: str) -> list[str]:
-    """What the loads have done along a path, what is stored at its end, what breaks have lost, also if the load only
-    rose, and what debonded."""
+    """Return the lines about energies along a path.
+
+    They give the work of the loads, the energy stored at the end, the energy lost by breaks, along all equilibria and
+    under a rising load, and the debonded share.
+    """
     last = document["path"][-1]
     where = " on the first leg" if path_curves.legs(document) > 1 else ""
     rising = f"{last['dissipated_strain_controlled']:.6g} if the {path_curves.what_rises(document)} only rises{where}"
@@ -168,7 +173,7 @@ def _energies(point: Point, label: str) -> list[str]:
 
 
 def _debonded(document: Document, point: Point) -> list[str]:
-    """The share of the interfaces that has debonded, and those of the pairs of phases if there are several."""
+    """Return the share of the interfaces that has debonded, and those of the pairs of phases if there are several."""
     text = f"Debonded: {100 * point['debonded_share']:.1f} % of the interfaces"
     if "debonded_shares" in point:
         shares = zip(document["case"]["interface"], point["debonded_shares"], strict=True)
@@ -182,7 +187,7 @@ def _counts(point: Point) -> list[int]:
 
 
 def envelope_lines(document: Document, label: str) -> list[str]:
-    """The least and the largest load, and the first bond that breaks in some directions."""
+    """Return the least and the largest load, and the first bond that breaks in some directions."""
     section, points = document["case"]["envelope"], document["envelope"]
     axes, known = section["plane"], [point for point in points if "factor" in point]
     unit = label if axes[0].startswith("S") else ""
@@ -199,7 +204,7 @@ def envelope_lines(document: Document, label: str) -> list[str]:
 
 
 def _onset_lines(points: Sequence[Point], axes: Sequence[str], first: Point) -> list[str]:
-    """Some directions, with the numbers that `first`, one with an onset, has."""
+    """Return some directions, with the numbers that `first`, one with an onset, has."""
     several, names = "interface" in first, [name for name in SHARES if name in first]
     used = "psi of its traction" if names == ["psi"] else "traction / strength"
     columns = [
@@ -216,7 +221,7 @@ def _onset_lines(points: Sequence[Point], axes: Sequence[str], first: Point) -> 
 
 
 def envelope_table(document: Document, label: str, most: int) -> Table:
-    """The two components at onset, where the bond is, and how it breaks; of many directions some."""
+    """Return the two components at onset, where the bond is, and how it breaks; of many directions some."""
     axes, points = document["case"]["envelope"]["plane"], document["envelope"]
     step = -(-len(points) // most)
     names = [name for name in ENVELOPE_NUMBERS if any(name in point for point in points)]
@@ -227,7 +232,7 @@ def envelope_table(document: Document, label: str, most: int) -> Table:
 
 
 def components(point: Point) -> tuple[float, float]:
-    """The two components of the load at onset."""
+    """Return the two components of the load at onset."""
     angle, load = radians(point["angle"]), _load(point)
     return without_noise(load * cos(angle), load), without_noise(load * sin(angle), load)
 
@@ -271,7 +276,7 @@ def angle_tip_table(points: Sequence[Document], label: str) -> list[Table]:
 
 
 def _largest(tips: Document | None) -> dict[str, Document]:
-    """The tip of the largest G of each load, in the order of the loads."""
+    """Return the tip of the largest G of each load, in the order of the loads."""
     best: dict[str, Document] = {}
     names = ["load", *(column.name for column in RATES), *([SECTION.name] if tips and SECTION.name in tips else [])]
     for values in zip(*(tips[name] for name in names), strict=True) if tips else ():

@@ -21,7 +21,7 @@ LEVEL = 0.05  # of the test of randomness
 
 
 def text(found: FibreStatistics, model: str, simulations: int) -> str:
-    """A line for each quantity; lengths in the unit of the fibres' table, and in mean diameters."""
+    """Return a line for each quantity; lengths in the unit of the fibres' table, and in mean diameters."""
     pattern, cells = found.pattern, found.cells
     kind = "periodic cell" if pattern.periodic else "window, corrected for its edges,"
     size = 2 * pattern.mean_radius
@@ -84,7 +84,8 @@ def write(directory: Path, found: FibreStatistics) -> list[Path]:
 
 
 def fibre_columns(found: FibreStatistics) -> dict[str, Array]:
-    """A row for each fibre: its three nearest neighbours with the weights of their distances, and its Voronoi cell."""
+    """Return a row for each fibre: its three nearest neighbours with the weights of their distances, and its
+    Voronoi cell."""
     pattern, near, cells = found.pattern, found.neighbours, found.cells
     columns: dict[str, Array] = {
         "number": np.arange(1, pattern.count + 1),
@@ -106,7 +107,7 @@ def fibre_columns(found: FibreStatistics) -> dict[str, Array]:
 
 
 def pair_columns(found: FibreStatistics) -> dict[str, Array]:
-    """A row for each distance r between centres: g, K and L, and L of the simulations."""
+    """Return a row for each distance r between centres: g, K and L, and L of the simulations."""
     pairs, random = found.pairs, found.random
     return {
         "r": pairs.r,
@@ -126,5 +127,5 @@ def _write(columns: Mapping[str, Array], path: Path) -> None:
 
 
 def _cell(value: Any) -> str:
-    """A number as Python reads it back; nothing for one that is not there."""
+    """Return a number as Python reads it back; nothing for one that is not there."""
     return repr(value) if np.isfinite(value) else ""

@@ -56,7 +56,7 @@ def _matrix(title: str, rows: Sequence[Sequence[float]]) -> Table:
 
 
 def thermal(document: Document, label: str) -> list[Table]:
-    """What a unit of temperature does: a row for each component, a column for each of what is known."""
+    """Return the table of thermal constants: a row per component, a column per known quantity."""
     known = {key: title for key, title in THERMAL.items() if document.get(key) is not None}
     names = [stress[1:] for stress in SPATIAL_STRESSES]
     rows = list(zip(names, *(_rounded(document[key]) for key in known), strict=True))
@@ -76,7 +76,7 @@ def moduli(document: Document, unit: str) -> list[Table]:
 
 
 def moduli_lines(document: Document, label: str) -> list[str]:
-    """The same as text: moduli on the left, ratios on the right."""
+    """Return the same as text: moduli on the left, ratios on the right."""
     values = document["moduli"]
     left = [f"{name:<6}{values[name]:>13.7g}" for name in STRESS_MODULI if name in values]
     right = [f"{name:<11}{number(v, '.6f'):>13}" for name, v in values.items() if name not in STRESS_MODULI]
@@ -117,7 +117,7 @@ def constants(document: Document, label: str) -> list[Table]:
 
 
 def constants_lines(document: Document, label: str) -> list[list[str]]:
-    """The same as blocks of text; empty blocks where nothing is known."""
+    """Return the same as blocks of text; empty blocks where nothing is known."""
     values, block = document.get("constants"), list[str]()
     if values is not None:
         rows = ("    ".join(f"{name:<5}{values[name]:>13.7g}" for name in names) for names in ENGINEERING)
@@ -138,7 +138,7 @@ def estimates(document: Document, label: str) -> list[Table]:
 
 
 def _sources(document: Document) -> dict[str, Document]:
-    """The constants of this cell, by each method, and the bounds."""
+    """Return the constants of this cell, by each method, and the bounds."""
     limits = _known(document.get("fibre_bounds") or {})
     sources = {THIS_CELL: document["transversely_isotropic"]}
     sources |= {name.replace("_", " "): row for name, row in (document.get("estimates") or {}).items()}
@@ -146,7 +146,7 @@ def _sources(document: Document) -> dict[str, Document]:
 
 
 def _estimates_lines(document: Document, table: Table) -> list[str]:
-    """A few constants beside each other, the others below them."""
+    """Return a few constants beside each other, the others below them."""
     cell, across = document["transversely_isotropic"], document.get("transverse_moduli")
     lines = [f"{table.title}; {100 * cell['deviation']:.2g} % from transversely isotropic"]
     if across is not None:
@@ -164,7 +164,7 @@ def _estimates_lines(document: Document, table: Table) -> list[str]:
 
 
 def _why_no_estimates(document: Document) -> str:
-    """The cells of which there are estimates, where there are none of this one; empty if there are."""
+    """Return the cells of which there are estimates, where there are none of this one; empty if there are."""
     case, cell = document.get("case", {}), document.get("cell", {})
     if document.get("estimates") is not None:
         return ""

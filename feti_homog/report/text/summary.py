@@ -22,8 +22,8 @@ Document = Mapping[str, Any]
 
 
 def summary(document: Document) -> str:
-    """The document in lines of at most 79 columns, tables of at most 100 (but for long names), without a newline at the
-    end.
+    """Return the document in lines of at most 79 columns, tables of at most 100 (but for long names), without a
+    newline at the end.
 
     Cell, solver, effective stiffness with moduli and bounds or else the points of `angle` or `path`, the state of
     `load`, onsets, checks, timings, memory, warnings and status.
@@ -49,7 +49,7 @@ def summary(document: Document) -> str:
 
 
 def short_summary(document: Document) -> str:
-    """What was asked for, the largest error of all checks, and the status."""
+    """Return the answer, the largest error of all checks, and the status."""
     law, error = max(document["checks"].items(), key=lambda check: check[1])
     checks = _field("Checks", [f"largest relative error {error:.1e} ({law})"])
     return _joined([_heading(document), *_answer(document), [*checks, *_field("Status", [str(document["status"])])]])
@@ -72,7 +72,7 @@ def _joined(blocks: Iterable[Sequence[str]]) -> str:
 
 
 def _answer(document: Document) -> list[list[str]]:
-    """The blocks of what was asked for."""
+    """Return the blocks of what was asked for."""
     output = document["case"].get("output", {})
     unit, length = output.get("stress_unit", ""), output.get("length_unit", "")
     label, toughness = in_brackets(unit), in_brackets(f"{unit} {length}") if unit and length else ""
@@ -151,7 +151,7 @@ class Check:
 
 
 def checks(document: Document) -> list[Check]:
-    """The laws that were checked; those of contact do not apply where all is bonded."""
+    """Return the laws that were checked; those of contact do not apply where all is bonded."""
     limit, has_interface = document.get("check_tolerance"), bool(document["case"].get("interface"))
     contact = document.get("kkt_tolerance", limit)
     return [
@@ -182,7 +182,7 @@ def _remarks(label: str, remarks: Iterable[str]) -> list[str]:
 
 
 def _field(label: str, words: Sequence[str]) -> list[str]:
-    """A label and its words, separated by commas, in as many lines as it takes."""
+    """Return a label and its words, separated by commas, in as many lines as it takes."""
     text = ", ".join(words).replace(", (", " (")
     return wrap(text, WIDTH, initial_indent=f"{label:<{LABEL}}", subsequent_indent=" " * LABEL, break_long_words=False)
 

@@ -32,7 +32,7 @@ class Column:
         return f"{self.name:<{-self.width}}" if self.width < 0 else f"{self.name:>{self.width}}"
 
     def cell(self, value: Any) -> str:
-        """An entry in text: texts as they are, numbers in the format of the column."""
+        """Return an entry in text: texts as they are, numbers in the format of the column."""
         if self.width < 0:
             return f"{' ' * self.indent + value:<{-self.width}}"
         return f" {number(value, self.form):>{self.width - 1}}"
@@ -79,7 +79,7 @@ class Table:
 
 
 def number(value: Any, form: str) -> str:
-    """A number in a format, without the sign of a zero that it is rounded to; texts as they are."""
+    """Return a number in a format, without the sign of a zero that it is rounded to; texts as they are."""
     if isinstance(value, str):
         return value
     text = format(value, form)
@@ -87,7 +87,7 @@ def number(value: Any, form: str) -> str:
 
 
 def without_noise(value: Any, size: float = 1.0) -> Any:
-    """The value; zero in place of a number that is what the solver leaves of zero beside `size`."""
+    """Return the value; zero in place of a number that is what the solver leaves of zero beside `size`."""
     return 0.0 if isinstance(value, float) and abs(value) <= NOISE * size else value
 
 

@@ -12,7 +12,7 @@ FIXED = {"angle": "degrees", "centre": "degrees", "values": "degrees", "memory":
 
 
 def unit(name: str, stress_unit: str) -> str:
-    """The unit of a key of a case file, dotted, or of a column of a sweep's table; empty if it has none."""
+    """Return the unit of a key of a case file, dotted, or of a column of a sweep's table; empty if it has none."""
     last = name.rpartition(".")[2]
     if last.startswith("seconds_"):
         return "s"
@@ -22,10 +22,10 @@ def unit(name: str, stress_unit: str) -> str:
 
 
 def with_unit(name: str, stress_unit: str) -> str:
-    """The name and, in brackets, the unit that it has."""
+    """Return the name and, in brackets, the unit that it has."""
     return name + in_brackets(unit(name, stress_unit))
 
 
 def in_brackets(unit: str) -> str:
-    """The unit for a title: in brackets after a space; empty if there is none."""
+    """Return the unit for a title: in brackets after a space; empty if there is none."""
     return f" ({unit})" if unit else ""

@@ -67,13 +67,13 @@ def curves_figure(table: SweepTable) -> Figure:
 
 
 def _leads(table: SweepTable, point: int) -> tuple[str, str]:
-    """The plane state and the leading strain of the paths of a point."""
+    """Return the plane state and the leading strain of the paths of a point."""
     document = next(d for d in table.results_of(point) if d.get("path"))
     return document["case"]["analysis"]["plane"], str(path_curves.leading_component(document))
 
 
 def _others(table: SweepTable, points: Sequence[int], along: int) -> list[int]:
-    """The other stresses that are seen, the largest first."""
+    """Return the other stresses that are seen, the largest first."""
     largest = np.max([np.abs(table.curves(point)[1]).max(axis=(0, 1)) for point in points], axis=0)
     seen = [k for k in path_curves.components_above(path_curves.FAINT, largest[None]) if k != along]
     return sorted(seen, key=lambda k: -largest[k])
@@ -93,7 +93,7 @@ def _bundle(axes: Axes, table: SweepTable, point: int, component: int, colour: s
 
 
 def convergence_names(table: SweepTable) -> tuple[str, ...]:
-    """The outputs that are drawn: moduli, or the strength of paths."""
+    """Return the outputs that are drawn: moduli, or the strength of paths."""
     return next(
         (chosen for chosen in (*CHOICES, _strength_names(table)) if all(name in table.outputs for name in chosen)), ()
     )
@@ -131,7 +131,7 @@ def cell_size_figure(table: SweepTable, key: str) -> Figure:
 
 
 def _scatter(axes: Axes, table: SweepTable, series: Series, name: str, style: int) -> None:
-    """Standard deviation of one cell and half-width of the mean's interval, relative to the mean."""
+    """Draw the standard deviation of one cell and the half-width of the mean's interval, relative to the mean."""
     statistics = table.statistics[name]
     numbers = [table.points.index(point) for point in series.points]
     mean = np.abs(statistics.mean[numbers])

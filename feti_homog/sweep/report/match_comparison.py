@@ -26,13 +26,14 @@ TABLE_STYLE: dict[str, Any] = {"color": "black", "linewidth": 1.8, "zorder": 3}
 
 
 def tables(table: SweepTable) -> list[Path]:
-    """The tables of fibres that finished cases match, as far as they are still there."""
+    """Return the tables of fibres that finished cases match, as far as they are still there."""
     paths = dict.fromkeys(path for d in table.finished if (path := d["case"]["cell"].get("match")) is not None)
     return [path for path in map(Path, paths) if path.is_file()]
 
 
 def figure(table: SweepTable) -> Figure:
-    """A row for each table: distances of neighbours, which are matched, L(r) and local fractions, which follow."""
+    """Return a row for each table: distances of neighbours, which are matched, L(r) and local fractions, which
+    follow."""
     found = tables(table)[:MOST_TABLES]
     picture = Figure(figsize=(13.0, 0.9 + 3.8 * len(found)), layout="constrained")
     panels = picture.subplots(len(found), 3, squeeze=False)
@@ -45,7 +46,7 @@ def figure(table: SweepTable) -> Figure:
 
 
 def pattern_of(document: Document) -> FibrePattern:
-    """The fibres of a result, in its periodic cell."""
+    """Return the fibres of a result, in its periodic cell."""
     cell, fibres = document["cell"], document["fibres"]
     centres, radii = (np.array([fibre[key] for fibre in fibres]) for key in ("centre", "radius"))
     return FibrePattern(cell["width"], cell["height"], centres, radii, periodic=True)
@@ -79,7 +80,7 @@ def _compare(row: Sequence[Axes], path: Path, documents: Sequence[Document]) -> 
 
 
 def _distribution(pattern: FibrePattern, k: int) -> tuple[Float, Float]:
-    """The distances to the k-th neighbour that count, in mean diameters, and the weighted share up to each."""
+    """Return the distances to the k-th neighbour that count, in mean diameters, and the weighted share up to each."""
     near = nearest_neighbours(pattern, k + 1)
     order = np.argsort(near.distances[:, k])
     order = order[near.weights[order, k] > 0]

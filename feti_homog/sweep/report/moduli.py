@@ -43,7 +43,7 @@ class PanelBounds:
 
 
 def panels_of(table: SweepTable) -> tuple[str, ...]:
-    """The outputs that are drawn; none if the cases have no moduli."""
+    """Return the outputs that are drawn; none if the cases have no moduli."""
     spatial = {plane_state_of(document).is_spatial for document in table.finished}
     in_space = (COMMON_PANELS,) if False in spatial else (SPATIAL_PANELS, SECANTS)
     choices = in_space if True in spatial else (PANELS,)
@@ -95,7 +95,7 @@ def _why_no_bounds(table: SweepTable) -> str:
 
 
 def _bounds(table: SweepTable) -> PanelBounds | None:
-    """The bounds, if there are any."""
+    """Return the bounds, if there are any."""
     if _why_no_bounds(table):
         return None
     case = table.finished[0]["case"]

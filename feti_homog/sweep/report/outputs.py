@@ -24,7 +24,8 @@ def numbers(planes: Iterable[str | None]) -> tuple[int, ...]:
 
 
 def outputs(document: Document, numbers: Sequence[int] = PLANE_STRAIN.numbers) -> dict[str, float]:
-    """The numbers of a result.json by the names of the table's columns; `numbers` of strains in the plane, in names."""
+    """Return the numbers of a result.json by the names of the table's columns; `numbers` of strains in the plane,
+    in names."""
     solver = document["solver"]
     found = _cell(document["cell"])
     found |= {name: solver[name] for name in ("ranks", "subdomains", "dofs", "multipliers")}
@@ -45,7 +46,7 @@ def outputs(document: Document, numbers: Sequence[int] = PLANE_STRAIN.numbers) -
 
 
 def _cell(cell: Mapping[str, Any]) -> dict[str, float]:
-    """What the mesh is like."""
+    """Return the numbers of the mesh."""
     found = {"fraction_meshed": cell["fibre_fraction"], "elements": cell["elements"], "nodes": cell["nodes"]}
     fractions = cell.get("fractions", {})
     if len(fractions) > PHASES_OF_ONE_FIBRE:
@@ -72,7 +73,8 @@ def _thermal(document: Document) -> dict[str, float]:
 
 
 def _envelope(document: Document) -> dict[str, float]:
-    """The load at onset along the first axis of an envelope, the least, and the largest if every direction has one."""
+    """Return the load at onset along the first axis of an envelope, the least, and the largest if every direction
+    has one."""
     if not document.get("envelope"):
         return {}
     first, second = document["case"]["envelope"]["plane"]
@@ -115,7 +117,7 @@ def _angles(points: Sequence[Document], numbers: Sequence[int]) -> dict[str, flo
 
 
 def _path(points: Sequence[Document]) -> dict[str, float]:
-    """The first break, the largest stresses and the end."""
+    """Return the first break, the largest stresses and the end."""
     if not points:
         return {}
     stress = np.array([point["stress"] for point in points])

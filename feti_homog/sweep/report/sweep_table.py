@@ -48,7 +48,7 @@ class SweepTable:
         return sorted(set(self.point))
 
     def rows(self, point: int) -> list[int]:
-        """The rows of the realisations of a point."""
+        """Return the rows of the realisations of a point."""
         return [row for row, number in enumerate(self.point) if number == point]
 
     @cached_property
@@ -62,7 +62,7 @@ class SweepTable:
         return [document for document in self.documents if document is not None]
 
     def input_of(self, point: int, name: str) -> Any:
-        """The value of an input at a point, None if it does not vary there."""
+        """Return the value of an input at a point, None if it does not vary there."""
         return self.inputs[name][self.rows(point)[0]]
 
     def results_of(self, point: int) -> list[Document]:
@@ -74,7 +74,7 @@ class SweepTable:
         return Statistics(*(np.array([getattr(s, part) for s in found]) for part in ("count", "mean", "std", "ci95")))
 
     def label(self, point: int, without: Sequence[str] = ()) -> str:
-        """The inputs of a point in words, but for some keys and for what its realisations differ by."""
+        """Return the inputs of a point in words, but for some keys and for what its realisations differ by."""
         keys = [name for name in self.inputs if name not in without and name != "cell.seed"]
         varied = [name for name in keys if len({repr(value) for value in self.inputs[name]}) > 1]
         values = [(name, self.input_of(point, name)) for name in varied]
@@ -97,7 +97,7 @@ class SweepTable:
 
 
 def _short(key: str) -> str:
-    """A dotted key without its section, but of a material with the phase and of an interface with its number."""
+    """Return a dotted key without its section, but of a material with the phase and of an interface with its number."""
     section, _, rest = key.partition(".")
     words = rest if section == "material" else key.partition("interface.")[2] or key.rpartition(".")[2]
     return words.replace(".", " ").replace("_", " ")
@@ -142,7 +142,7 @@ class Series:
 
 
 def series_over(table: SweepTable, key: str) -> list[Series]:
-    """The series over a key, of the points with finished cases.
+    """Return the series over a key, of the points with finished cases.
 
     What varies along with the key, one value to one, makes no other series.
     """

@@ -105,7 +105,7 @@ def write(directory: Path, table: SweepTable) -> list[Path]:
 
 
 def _csv(table: SweepTable, path: Path) -> None:
-    """A row for each case; then, for each point, the count, mean, std and ci95 of its realisations.
+    """Write a row for each case; then, for each point, the count, mean, std and ci95 of its realisations.
 
     The column `row` says which; names have their units in brackets.
     """
@@ -134,7 +134,7 @@ def _statistics_rows(table: SweepTable) -> Iterator[list[Any]]:
 
 
 def _cell(value: Any) -> Any:
-    """The value as it stands in the table: nothing for what is not there."""
+    """Return the value as it stands in the table: nothing for what is not there."""
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return ""
     return json.dumps(value) if isinstance(value, list | dict) else value
@@ -161,7 +161,7 @@ def _hdf5(table: SweepTable, path: Path) -> None:
 
 
 def _put_inputs(file: Any, table: SweepTable) -> None:
-    """The inputs of all cases and, but for the seed, of all points."""
+    """Write the inputs of all cases and, except for the seed, of all points."""
     first = [table.rows(point)[0] for point in table.points]
     _put(file, "points/number", table.points, "")
     for name, values in table.inputs.items():
@@ -185,7 +185,7 @@ def _put_curves(file: Any, table: SweepTable, point: int) -> None:
 
 
 def _put(file: Any, name: str, values: Any, own_unit: str) -> None:
-    """A table of numbers if they all are, else of texts."""
+    """Write a dataset of numbers if all values are numbers, otherwise of texts."""
     column = values if isinstance(values, np.ndarray) else _column(values)
     file[name] = column
     if own_unit:

@@ -30,5 +30,5 @@ class SpringEnergy(BondLaw):
         return np.asarray(np.asarray(self.section["toughness"], float) * (1 + np.tan(turned) ** 2))
 
     def breaks(self, traction: Float) -> dict[str, float]:
-        """The mode in degrees."""
+        """Return the mode in degrees."""
         return {"psi": float(np.degrees(self.mode(traction))[0])}
