@@ -44,8 +44,10 @@ def document(given: argparse.Namespace) -> dict[str, Any]:
 
 
 def report(table: Any) -> list[str]:
-    """Return a line for each point; isotropy is |C33 - (C11 - C12)/2| / C33, +- the 95 % confidence interval of a
-    mean."""
+    """Return a line for each point.
+
+    Isotropy is |C33 - (C11 - C12)/2| / C33, +- the 95 % confidence interval of a mean.
+    """
     lines = [f"stiffness in {table.stress_unit}", HEADS]
     for number, point in enumerate(table.points):
         row = table.rows(point)[0]

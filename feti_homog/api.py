@@ -181,8 +181,10 @@ def _start_petsc(words: Sequence[str], comm: Intracomm) -> None:
 
 
 def folder(name: str | Path) -> Path:
-    """Return the folder, or file, of that name. Raises CaseError for an empty one, by which Path means the current
-    folder, and for one that no system knows."""
+    """Return the folder, or file, of that name.
+
+    Raises CaseError for an empty one, by which Path means the current folder, and for one that no system knows.
+    """
     if name == "":
         raise CaseError('"" is no name of a folder; the current one is "."')
     if "\0" in str(name):

@@ -65,8 +65,10 @@ class Row:
 
 
 def compare(rows: Sequence[Row]) -> None:
-    """Fill in `difference` to the first direct solver of the same plane state that is done, or else to the first tool;
-    mark wrong results."""
+    """Fill in `difference` to the first direct solver of the same plane state that is done, or else to the first tool.
+
+    Mark wrong results.
+    """
     done = [row for row in rows if row.status == "done"]
     for row in done:
         of_plane = [other for other in done if other.plane == row.plane]

@@ -106,8 +106,10 @@ class Glued:
     problem: Problem
 
     def rigid(self) -> PETSc.NullSpace:
-        """Return the translations, and in the plane a rotation, which leaps where the cell's sides meet;
-        orthonormal."""
+        """Return the translations, and in the plane a rotation, which leaps where the cell's sides meet.
+
+        Orthonormal.
+        """
         values = [np.tile(translation, (len(self.points), 1)) for translation in np.eye(self.problem.components)]
         if self.problem.turns:
             values.append((self.points - 0.5) @ np.array([[0.0, 1.0], [-1.0, 0.0]]))

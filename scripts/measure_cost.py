@@ -67,8 +67,10 @@ def fits(runs: list[dict[str, Any]]) -> dict[str, tuple[Any, Any]]:
 
 
 def memory_fit(runs: list[dict[str, Any]], coated: list[dict[str, Any]]) -> dict[str, tuple[Any, Any]]:
-    """Return the same for the memory of all runs, by twice the nodes of their meshes; those with coatings have
-    influence columns."""
+    """Return the same for the memory of all runs, by twice the nodes of their meshes.
+
+    Those with coatings have influence columns.
+    """
     memory, dofs = np.array([(run["memory"], 2 * run["cell"]["nodes"]) for run in [*runs, *coated]]).T
     columns = np.array([*(0 for _ in runs), *(run["solver"]["multipliers"] for run in coated)])
     return {"BASE_BYTES, DOF_BYTES, COLUMN_BYTES": fitted(memory, np.ones(len(memory)), dofs, columns)}

@@ -56,10 +56,13 @@ POROSITY = 0.05
 
 @dataclass(frozen=True)
 class Cell:
-    """One combination; `pieces` of the matrix per fibre, `gap` in fibre diameters, `coating` thickness / radius, 0 of
-    none, with a stiffness over that of the matrix of `coating_contrast`.  `mix` is the radius of fibres of a second
-    phase / that of the others, 0 of none; they have half the fraction, and the stiffness `mix_contrast`.  `voids` is
-    the radius of voids / that of the fibres, 0 of none; their fraction is POROSITY."""
+    """One combination.
+
+    `pieces` of the matrix per fibre, `gap` in fibre diameters, `coating` thickness / radius, 0 of none, with a
+    stiffness over that of the matrix of `coating_contrast`. `mix` is the radius of fibres of a second phase / that of
+    the others, 0 of none; they have half the fraction, and the stiffness `mix_contrast`. `voids` is the radius of voids
+    / that of the fibres, 0 of none; their fraction is POROSITY.
+    """
 
     fibres: int
     fraction: float
@@ -79,8 +82,10 @@ class Cell:
         return not (self.fraction >= 0.65 and self.gap > 0.1)
 
     def case(self, space: str) -> Case:
-        """Return the case, with that kind of coarse space; where there are coatings it and the cut are the program's
-        own."""
+        """Return the case, with that kind of coarse space.
+
+        Where there are coatings it and the cut are the program's own.
+        """
         coating = {"coating": {"young": 3.0 * self.coating_contrast, "poisson": 0.3}} if self.coating else {}
         other = {"other": {"young": 3.0 * self.mix_contrast, "poisson": 0.3}} if self.mix else {}
         return cases.parse(

@@ -159,8 +159,10 @@ class _Finder:
         return self._noise * total
 
     def _first(self, factors: Float, before: Float, ahead: Float) -> Float:
-        """(n, 4 + d) least factor of each ray, fibre, interface and direction of its bond, and how it breaks; of those
-        that break together the one of the first fibre and interface and the least direction.  Collective."""
+        """(n, 4 + d) least factor of each ray, fibre, interface and direction of its bond, and how it breaks.
+
+        Of those that break together the one of the first fibre and interface and the least direction. Collective.
+        """
         n, d = len(factors), len(self._break_names(ahead.shape[2]))
         least = factors.min(axis=1, initial=np.inf)
         self._comm.Allreduce(MPI.IN_PLACE, least, MPI.MIN)

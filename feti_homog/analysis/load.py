@@ -11,8 +11,10 @@ from feti_homog.analysis.tip_rates import IN_PLANE_LOADS
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
-    """`load`: the state under the load, with what is debonded from the start, open or in contact; `tips` of its arcs
-    if only strains of the plane are there."""
+    """`load`: the state under the load, with what is debonded from the start, open or in contact.
+
+    `tips` of its arcs if only strains of the plane are there.
+    """
     cell, (target,) = context.loads.interfaces, context.case.targets
     bonds = context.bonds(None)
     state = cell.equilibrium(context.loads.load(target), bonds, cell.no_multipliers())

@@ -46,8 +46,10 @@ class CellLoads:
         return [np.zeros(problem.cell.solver.rows) for problem in self.problems for _ in problem.loads]
 
     def responses(self, state: Equilibrium, scale: float) -> list[Response]:
-        """Return the averages of `scale` times the equilibrium of all problems. Collective; raises as
-        `Homogenization.response`."""
+        """Return the averages of `scale` times the equilibrium of all problems.
+
+        Collective; raises as `Homogenization.response`.
+        """
         return [problem.response(own, scale) for problem, own in zip(self.problems, state.problems, strict=True)]
 
     def undetermined(self, responses: Sequence[Response]) -> list[str]:

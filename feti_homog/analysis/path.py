@@ -172,8 +172,10 @@ def _kept(
     entries: Sequence[dict[str, Any]],
     last: Point | None,
 ) -> dict[str, Any]:
-    """Tips and fields of the points that are kept, from the checkpoint, in which the last one may not be; `states`, the
-    numbers of those whose fields are recorded."""
+    """Tips and fields of the points that are kept, from the checkpoint, in which the last one may not be.
+
+    `states`, the numbers of those whose fields are recorded.
+    """
     if last is None or not (law.has_toughness or context.states.has_place):
         return {}
     numbers = kept(entries, context.case.output.states, len(context.case.targets) if path.method == "events" else 0)

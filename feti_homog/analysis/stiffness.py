@@ -11,10 +11,13 @@ from feti_homog.homogenization.averaging import asymmetry
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
-    """`effective_stiffness`, whose columns are the stresses under the unit strains; with contact between debonded
-    faces also `effective_stiffness_compression`, its columns -Sigma(-E); `tips` of debonded arcs under each of them.
+    """`effective_stiffness`, whose columns are the stresses under the unit strains.
 
-    If a temperature is a load, `thermal_stress` under a unit of it, and `thermal_stress_compression`."""
+    With contact between debonded faces also `effective_stiffness_compression`, its columns -Sigma(-E); `tips` of
+    debonded arcs under each of them.
+
+    If a temperature is a load, `thermal_stress` under a unit of it, and `thermal_stress_compression`.
+    """
     bonds = context.bonds(None)
     starts = context.loads.zero_multipliers()
     one_sided = context.plane.interface.contact and context.plane.counts(bonds.status)["open"] > 0

@@ -20,8 +20,10 @@ DIRECTION_DIGITS = 9
 
 
 def bond_directions(cell: TornCell) -> Float:
-    """(k,) directions in degrees, above -180, of this rank's interface nodes about the centres of their fibres; of a
-    fibre without centre those of their normals."""
+    """(k,) directions in degrees, above -180, of this rank's interface nodes about the centres of their fibres.
+
+    Of a fibre without centre those of their normals.
+    """
     normal = cell.solver.jump_operator.nodes.normal
     own = np.degrees(np.arctan2(normal[:, 1], normal[:, 0]))
     direction = np.where(np.isnan(cell.directions), own, cell.directions)

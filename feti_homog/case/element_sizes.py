@@ -73,8 +73,10 @@ def _refinements(accuracy: float, materials: Mapping[str, Material], plane: str,
 
 
 def asked(cell: Cell) -> str:
-    """Return the key of which the sizes follow, with its value, as "accuracy = 0.001"; empty if the cell says them
-    itself."""
+    """Return the key of which the sizes follow, with its value, as "accuracy = 0.001".
+
+    Empty if the cell says them itself.
+    """
     values = {name: getattr(cell, name) for name in ASKED}
     return next((f"{name} = {value:g}" for name, value in values.items() if value is not None), "")
 

@@ -48,9 +48,10 @@ ARCS = list_of(table_of(Arc, "arc", ""), "a list of arcs {fibre, centre, angle}"
 
 @dataclass(frozen=True, kw_only=True)
 class InterfaceSection:
-    """Bonding of fibres and matrix: what is debonded from the start, and the tractions that debond more. Without this
-    section bonding is perfect. Several sections [[interface]], each with its pair of phases, have the same contact,
-    criterion and growth.
+    """Bonding of fibres and matrix: what is debonded from the start, and the tractions that debond more.
+
+    Without this section bonding is perfect. Several sections [[interface]], each with its pair of phases, have the same
+    contact, criterion and growth.
 
     A strength of None is unlimited.
     """

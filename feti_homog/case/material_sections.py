@@ -65,8 +65,10 @@ def coating_faults(cell: Cell, materials: Mapping[str, object]) -> list[str]:
 
 
 def _phase_fault(phase: str, known: tuple[str, ...] | None, geometry: str | None, owners: Mapping[str, str]) -> str:
-    """Return the fault of the name of a phase, empty if there is none; `known` are the phases of a cell, None if any
-    may occur."""
+    """Return the fault of the name of a phase, empty if there is none.
+
+    `known` are the phases of a cell, None if any may occur.
+    """
     section = f"[material.{toml_key(phase)}]"
     is_unknown = known is not None and ":" not in phase and phase not in known
     if is_unknown or not PHASE.fullmatch(phase) or phase in CONSTANTS:
@@ -107,8 +109,9 @@ def _law_faults(material: Material, plane: str | None) -> list[str]:
 
 
 def missing_expansions(materials: Mapping[str, Material], needed_by: str) -> list[str]:
-    """Faults of materials that do not say how they expand, which something needs; what they say wrongly is told
-    elsewhere.
+    """Faults of materials that do not say how they expand, which something needs.
+
+    What they say wrongly is told elsewhere.
     """
     return [
         f"[material.{toml_key(phase)}] expansion: missing; {needed_by} needs it"

@@ -29,8 +29,9 @@ def _stress(name: str, *only: Condition) -> Any:
 
 @dataclass(frozen=True, kw_only=True)
 class MixedLoad:
-    """What is prescribed of a macroscopic load: of a component its strain or its stress, never both. What a load of a
-    path does not name stays as it was prescribed last; what none has named so far is free of stress.
+    """What is prescribed of a macroscopic load: of a component its strain or its stress, never both.
+
+    What a load of a path does not name stays as it was prescribed last; what none has named so far is free of stress.
     """
 
     E11: float | None = _strain("E11")

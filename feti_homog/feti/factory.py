@@ -97,8 +97,9 @@ def build(
     soften: bool,
     thresholds: Thresholds = DEFAULTS,
 ) -> SolverParts:
-    """Factor the subdomains and set up what the options and sizes ask for; `compliance` (owned rows,) is C, which may
-    grow if the springs `soften`.  Collective.
+    """Factor the subdomains and set up what the options and sizes ask for.  Collective.
+
+    `compliance` (owned rows,) is C, which may grow if the springs `soften`.
 
     Options: `feti_dual_operator`, `feti_pc_type`, `feti_coarse_space`, `feti_coarse_threshold`.
 

@@ -217,8 +217,7 @@ class Krylov:
         self.ksp.setFromOptions()
 
     def solve(self, residual: Float) -> Float:
-        """Return the multipliers (rows, k) that remove the residual (rows, k), as far as `ksp` converged.
-        Collective.
+        """Return the multipliers (rows, k) that remove the residual (rows, k), as far as `ksp` converged.  Collective.
 
         Raises what operator, preconditioner or test raise on all ranks; a rank that raises alone ends the job.
         """

@@ -35,8 +35,10 @@ def arrange(cell: Cell) -> Arrangement:
 
 
 def listed_arrangement(cell: Cell) -> Arrangement | None:
-    """Return the arrangement of a table; None of other cells, which may be too large to be arranged. Raises as
-    `arrange`."""
+    """Return the arrangement of a table; None of other cells, which may be too large to be arranged.
+
+    Raises as `arrange`.
+    """
     return None if cell.table is None else table_arrangement(cell)
 
 

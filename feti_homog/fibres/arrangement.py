@@ -95,8 +95,10 @@ class Arrangement:
         return tuple(VOID if void else own for own, void in both), tuple(own if void else COATING for own, void in both)
 
     def precedence(self, fibre: Int, is_ring: Bool) -> Int:
-        """(k,) numbers from 1 of what is in the rings, or within them, of fibres (k,); those of coatings come behind
-        all fibres, in the same order."""
+        """(k,) numbers from 1 of what is in the rings, or within them, of fibres (k,).
+
+        Those of coatings come behind all fibres, in the same order.
+        """
         return np.asarray(fibre + 1 + np.where(is_ring & ~self.is_hollow[fibre], self.fibres, 0))
 
     @property

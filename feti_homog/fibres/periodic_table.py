@@ -37,9 +37,10 @@ MOST_LISTED = 30  # moved fibres that are listed one by one
 
 
 def table_arrangement(cell: Cell) -> Arrangement:
-    """Return the fibres of the case's table, in the order of its rows, then its voids; periodic images are one, the
-    first of them. In a window that is cut out of something larger, fibres that overlap across its border are moved
-    apart.
+    """Return the fibres of the case's table, in the order of its rows, then its voids.
+
+    Periodic images are one, the first of them. In a window that is cut out of something larger, fibres that overlap
+    across its border are moved apart.
 
     A table that says where its cell begins keeps that place, if the sides are clear of tangency with its discs; the
     table of a cell gives the mesh of that cell. Else all is shifted (`clear_shift`), rounded and meshed in the order of
@@ -202,8 +203,10 @@ def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool
 
 
 def _contacts(table: FibreTable, kept: Int, outer: Outlines, size: Float, is_cut: bool) -> list[str]:
-    """Faults of fibres, the rows `kept` (k,) with their coatings, that overlap or touch; of a cut window only of those
-    that do within."""
+    """Faults of fibres, the rows `kept` (k,) with their coatings, that overlap or touch.
+
+    Of a cut window only of those that do within.
+    """
     centres, radius = outer.centres, table.outer_radius[kept]
     first, second, vector = neighbours(centres, size, 2 * outer.longest.max() * (1 + LEAST_GAP))
     together = radius[first] + radius[second]

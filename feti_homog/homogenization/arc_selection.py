@@ -32,8 +32,10 @@ class InterfaceNodes:
 
     @classmethod
     def of(cls, torus: Torus, lattice: ReferenceLattice, pairs: Int, numbers: Int, centres: Float) -> InterfaceNodes:
-        """Place the nodes on edges that may debond, on their chords, but for vertices that never part; `pairs` as in
-        `share_entities`, `numbers` (constituents,) those of fibres."""
+        """Place the nodes on edges that may debond, on their chords, but for vertices that never part.
+
+        `pairs` as in `share_entities`, `numbers` (constituents,) those of fibres.
+        """
         left, right, edge = torus.sides
         pair = pairs[torus.mesh.phase[left], torus.mesh.phase[right]]
         sides = torus.constituent[np.stack([left, right])][:, pair >= 0]
@@ -54,8 +56,10 @@ class InterfaceNodes:
         )
 
     def moved_tips(self, case: Case, fibres: int) -> tuple[MovedTips, ...]:
-        """Find the tips of each interface, on so many fibres, that the mesher has put into a vertex near them; a user's
-        mesh has its vertices where they are."""
+        """Find the tips of each interface, on so many fibres, that the mesher has put into a vertex near them.
+
+        A user's mesh has its vertices where they are.
+        """
         if case.cell.has_own_mesh:
             return (debonded_arcs.NOT_MOVED,) * len(case.interfaces)
         most, moved = float(np.degrees(MERGED)), []

@@ -31,8 +31,9 @@ T = TypeVar("T")
 
 
 def place_nodes(case: Case, comm: MPI.Intracomm, policy: TilePolicy) -> NodedCell | CoarseMesh | None:
-    """On rank 0 a user's mesh, or the cell with its tiles still to be filled; the nodes on its lines are placed by all
-    ranks.  Collective.
+    """On rank 0 a user's mesh, or the cell with its tiles still to be filled.  Collective.
+
+    The nodes on its lines are placed by all ranks.
 
     Raises:
         CaseError, MeshError: on every rank, as `begin_mesh`.
@@ -86,7 +87,9 @@ def fill_tiles(found: NodedCell | CoarseMesh | None, comm: MPI.Intracomm) -> Coa
 
 def deal_tiles(tiles: list[T], loads: list[int], comm: MPI.Intracomm) -> list[tuple[int, T]]:
     """Those of the tiles of rank 0 that this rank fills, with their numbers; `loads` says how large they are.
-    Collective."""
+
+    Collective.
+    """
     parts: list[list[tuple[int, T]]] = [[] for _ in range(comm.size)]
     for k, rank in enumerate(balanced(np.array(loads, np.int64), comm.size).tolist()):
         parts[rank].append((k, tiles[k]))

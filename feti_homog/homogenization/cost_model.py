@@ -74,9 +74,10 @@ def estimate(
     problems: Mapping[int, int],
     columns: int,
 ) -> Estimate:
-    """Estimate the cost of a case with `nodes` and `subdomains` on each rank; `problems` has for each problem, by its
-    displacements of a node, how many times it applies its dual operator, and `columns` multipliers have influence
-    columns.
+    """Estimate the cost of a case with `nodes` and `subdomains` on each rank.
+
+    `problems` has for each problem, by its displacements of a node, how many times it applies its dual operator, and
+    `columns` multipliers have influence columns.
 
     As many ranks are suggested as there are bodies at most, for more would cut bodies, which costs iterations.
     """

@@ -32,8 +32,10 @@ class FibreInterfaces:
         return self._sums(self._nodes.length * (status != BONDED))
 
     def angle(self, length: Float) -> Float:
-        """(f,) degrees of arc of lengths (f,); of a fibre that is not round, or whose coating has an interface too, 360
-        times the share of its interfaces."""
+        """(f,) degrees of arc of lengths (f,).
+
+        Of a fibre that is not round, or whose coating has an interface too, 360 times the share of its interfaces.
+        """
         return np.asarray(length * self._degrees)
 
     def share(self, length: Float) -> float:

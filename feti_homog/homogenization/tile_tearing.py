@@ -107,8 +107,10 @@ def _numbered(torus: Torus, tile: Int, local: Int, comm: MPI.Intracomm) -> tuple
 
 
 def _neighbours(torus: Torus, subdomain: Int) -> tuple[Int, Int, Int, Int]:
-    """Subdomains (n,) and (n,) that meet here, in a row for each edge; and the edges (k,) that have a triangle here and
-    another one elsewhere, with its subdomain (k,)."""
+    """Subdomains (n,) and (n,) that meet here, in a row for each edge.
+
+    And the edges (k,) that have a triangle here and another one elsewhere, with its subdomain (k,).
+    """
     left, right, _ = torus.sides
     apart = subdomain[left] != subdomain[right]
     edges = torus.triangle_torus_edges

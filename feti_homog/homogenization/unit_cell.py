@@ -65,8 +65,10 @@ class TornCell:
 
     @cached_property
     def class_nodes(self) -> Int:
-        """(c,) a plane node of each class of this rank's subdomains, one subdomain after the other; the nodes are
-        numbered alike."""
+        """(c,) a plane node of each class of this rank's subdomains, one subdomain after the other.
+
+        The nodes are numbered alike.
+        """
         nodes, first = [np.zeros(0, np.int64)], 0
         for mesh in (s.mesh for s in self.subdomains):
             own = np.empty(mesh.n_classes, np.int64)

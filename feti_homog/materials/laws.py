@@ -42,8 +42,10 @@ WORRYING_CONTRAST, LARGEST_CONTRAST = 1e10, 1e14
 
 
 def stiffness_of(material: Material, plane: str) -> Float:
-    """Return the stiffness (3, 3) in the plane, or (6, 6) if the plane state is one of space. Raises as
-    `plane_stiffness`."""
+    """Return the stiffness (3, 3) in the plane, or (6, 6) if the plane state is one of space.
+
+    Raises as `plane_stiffness`.
+    """
     return spatial_stiffness(material) if PLANE_STATES[plane].is_spatial else plane_stiffness(material, plane)
 
 

@@ -11,8 +11,10 @@ from feti_homog.typing import Bool, Index, Int32
 
 
 def interface_edges(mesh: CoarseMesh) -> Int32:
-    """Edges (k, 2) between triangles of different phases, or beside a void, on the torus; of those on sides the low
-    copy."""
+    """Edges (k, 2) between triangles of different phases, or beside a void, on the torus.
+
+    Of those on sides the low copy.
+    """
     pairs, order = _neighbours(mesh)
     between = mesh.phase[order[:, 0] // 3] != mesh.phase[order[:, 1] // 3]
     return np.concatenate([pairs[order[between, 0]], pairs[_alone(pairs, order)]])

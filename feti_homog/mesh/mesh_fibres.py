@@ -37,8 +37,10 @@ def fibre_circles(torus: Torus) -> Float:
 
 
 def _discs(torus: Torus) -> Float:
-    """(constituents, 3) the largest circle of those whose boundary is on one circle, or on several around one centre;
-    NaN of others."""
+    """(constituents, 3) the largest circle of those whose boundary is on one circle, or on several around one centre.
+
+    NaN of others.
+    """
     edge, body = torus.triangle_torus_edges, torus.constituent
     left, right, between = torus.sides
     outer = torus.at_void.copy()
@@ -105,8 +107,9 @@ SAME_LENGTH = 1e-6
 
 
 def fibre_numbers(torus: Torus) -> tuple[Int, Bool]:
-    """(constituents,) the number of the fibre that each is, from 1, or that it coats, 0 of the matrix; and which of
-    them (constituents,) are fibres.
+    """(constituents,) the number of the fibre that each is, from 1, or that it coats, 0 of the matrix.
+
+    And which of them (constituents,) are fibres.
 
     A coating of several fibres has the lowest of their numbers; one that coats none is a fibre itself.
     """

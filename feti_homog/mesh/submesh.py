@@ -177,8 +177,9 @@ def part(submesh: Submesh, members: Int) -> Submesh:
 
 
 def pinned_class(torus: Torus) -> int:
-    """Return the class of a whole cell that is pinned, Eq. (15): the one inside the matrix nearest to the cell's
-    corner.
+    """Return the class of a whole cell that is pinned, Eq.
+
+    (15): the one inside the matrix nearest to the cell's corner.
 
     A pinned class on an interface would hold faces together that must be able to part, and one in a fibre would keep
     that from moving when all of its bonds are broken.  u* is the same up to a constant.
@@ -202,8 +203,10 @@ def pinning(torus: Torus, unfit: Int) -> list[tuple[int, float, int]]:
 
 
 def _submesh(torus: Torus, members: Int, pinned: int) -> Submesh:
-    """Return the triangles `members` (t,) as one submesh, of no body and phase; `pinned` is the key of the pinned
-    class."""
+    """Return the triangles `members` (t,) as one submesh, of no body and phase.
+
+    `pinned` is the key of the pinned class.
+    """
     mesh = torus.mesh
     vertices, triangles = np.unique(mesh.triangles[members], return_inverse=True)
     edges, triangle_edges = np.unique(torus.triangle_edges[members], return_inverse=True)

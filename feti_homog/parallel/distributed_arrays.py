@@ -59,8 +59,9 @@ def share_columns(comm: MPI.Intracomm, solve: Callable[[Float], Float], B: Float
 
 
 def exchange(comm: MPI.Intracomm, to: Int, *columns: Array) -> list[Array]:
-    """Return the rows of the columns, each (k,) or (k, ...), that the ranks have for this one; row i goes to rank
-    `to[i]`.
+    """Return the rows of the columns, each (k,) or (k, ...), that the ranks have for this one.
+
+    Row i goes to rank `to[i]`.
 
     They come in the order of the ranks that sent them, and of one rank in that rank's order.  Collective.
     """

@@ -21,8 +21,10 @@ def balanced(load: AnyInt, n_ranks: int) -> Int:
 
 
 def even(count: int, parts: int) -> Int:
-    """(parts + 1,) where ranges of the numbers 0 .. count - 1 begin, and the last ends; their lengths differ by one at
-    most."""
+    """(parts + 1,) where ranges of the numbers 0 .. count - 1 begin, and the last ends.
+
+    Their lengths differ by one at most.
+    """
     return np.arange(parts + 1) * count // parts
 
 

@@ -84,8 +84,9 @@ def _refuse_early() -> None:
 
 
 def refuse_unused() -> None:
-    """Call when all solvers are set up.  Options of the table, and of direct solvers that the run does not make, or
-    only when it writes fields, are accepted.
+    """Call when all solvers are set up.
+
+    Options of the table, and of direct solvers that the run does not make, or only when it writes fields, are accepted.
 
     Raises:
         CaseError: an option with our prefix is no option of any solver.
@@ -131,8 +132,10 @@ def faults_of_solvers(given: Mapping[str, str]) -> list[str]:
 
 
 def _prefix(name: str) -> str:
-    """Return the prefix of the solver that an option is for, that of the Krylov method being feti_; empty for
-    others."""
+    """Return the prefix of the solver that an option is for, that of the Krylov method being feti_.
+
+    Empty for others.
+    """
     prefix = solver_prefix(name)
     return "feti_" if prefix in ("feti_ksp_", "feti_pc_") else prefix
 
@@ -194,8 +197,10 @@ def _solve_directly(prefix: str) -> None:
 
 @contextmanager
 def _solver(A: PETSc.Mat, prefix: str) -> Iterator[PETSc.KSP]:
-    """Provide a solver of the 1 x 1 matrix; at the end of the block it solves, as the options under `prefix` say,
-    and is freed with its matrix."""
+    """Provide a solver of the 1 x 1 matrix.
+
+    At the end of the block it solves, as the options under `prefix` say, and is freed with its matrix.
+    """
     ksp, (x, b) = PETSc.KSP().create(PETSc.COMM_SELF), A.createVecs()
     ksp.setOptionsPrefix(prefix)
     ksp.setOperators(A)

@@ -151,8 +151,10 @@ class FieldFile:
         return {"meaning": described.meaning, "unit": unit}
 
     def _agreed(self, agreed: Callable[..., Any], function: Callable[..., Any], *args: Any) -> Any:
-        """function(*args) by `agree_after` where HDF5 communicates; if it cannot write, the file is removed and all
-        raise."""
+        """function(*args) by `agree_after` where HDF5 communicates.
+
+        If it cannot write, the file is removed and all raise.
+        """
         try:
             return agreed(self._comm, _with_write_errors, self.path, function, *args)
         except FetiHomogError:

@@ -122,8 +122,9 @@ def state_part(cell: TornCell, response: Response, load_factor: float, label: st
 def spatial_state_part(
     cell: TornCell, plane: Response | None, axial: Response | None, load_factor: float, label: str, point: int
 ) -> SpatialStatePart:
-    """Return the fields of the responses of the plane problem and of the axial one in generalized plane strain;
-    those of one that is None are zero. Collective when first called.
+    """Return the fields of the responses of the plane problem and of the axial one in generalized plane strain.
+
+    Those of one that is None are zero. Collective when first called.
 
     Raises:
         ValueError: there is no response, or no axial problem.

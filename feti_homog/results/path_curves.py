@@ -57,8 +57,10 @@ def changed_components(document: Document) -> list[int]:
 
 
 def leading_component(document: Document) -> int:
-    """Of the components that the waypoints of a path change the one of the largest strain; of all if they change but
-    the temperature."""
+    """Of the components that the waypoints of a path change the one of the largest strain.
+
+    Of all if they change but the temperature.
+    """
     largest = np.abs([point["strain"] for point in document["path"]]).max(axis=0)
     changed = changed_components(document) or list(range(len(largest)))
     return changed[int(largest[changed].argmax())]

@@ -60,8 +60,9 @@ INTERFACE_POINTS |= _described("(k,)", "(k, 3)")
 
 
 def write(directory: Path) -> list[Path]:
-    """Write result.xdmf and, if there are interface nodes, interface.xdmf for the result.h5 of `directory`; returns
-    their paths. Call on one rank.
+    """Write result.xdmf and, if there are interface nodes, interface.xdmf for the result.h5 of `directory`.
+
+    Returns their paths. Call on one rank.
 
     Each has one temporal collection, the time being the number of the state: of fields on the nodes and elements of the
     cell, or of those at the points of the interface.

@@ -38,8 +38,10 @@ def end_on_signals() -> None:
 
 
 def launched_rank() -> int:
-    """Return the rank of this process among those that a launcher started, as far as that says it; does not need
-    MPI."""
+    """Return the rank of this process among those that a launcher started, as far as that says it.
+
+    Does not need MPI.
+    """
     return int(next((os.environ[name] for name in RANK_VARIABLES if os.environ.get(name, "").isdecimal()), 0))
 
 

@@ -41,8 +41,10 @@ class Progress:
 
     @contextmanager
     def stage(self, name: str) -> Iterator[list[str]]:
-        """Provide a PETSc log stage; the block may append words to the list, which are printed with its time, that
-        of stages within it left out."""
+        """Provide a PETSc log stage.
+
+        The block may append words to the list, which are printed with its time, that of stages within it left out.
+        """
         words: list[str] = []
         start = time.perf_counter()
         self._within.append(0.0)

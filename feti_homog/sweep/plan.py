@@ -92,8 +92,10 @@ def expand(values: Mapping[str, Any], folder: Path) -> Sweep:
 
 
 def _checked(name: str, unchecked: Sequence[CaseDocument], folder: Path) -> Sweep:
-    """Return the sweep of its documents. Raises CaseError with the faults of all cases, each with the cases that
-    have it."""
+    """Return the sweep of its documents.
+
+    Raises CaseError with the faults of all cases, each with the cases that have it.
+    """
     found, numbers_by_fault = [], dict[str, list[int]]()
     for number, each in enumerate(unchecked, start=1):
         try:

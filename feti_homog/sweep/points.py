@@ -87,8 +87,10 @@ def _merged(parts: Sequence[Assignment]) -> Assignment:
 
 
 def _samples(axes: Sequence[Axis], settings: SweepSection) -> list[list[Assignment]]:
-    """Return the points in the box of the sampled axes, a Latin hypercube or independent; no list if there are no
-    axes."""
+    """Return the points in the box of the sampled axes, a Latin hypercube or independent.
+
+    No list if there are no axes.
+    """
     if not axes or settings.samples is None:
         return []
     if settings.sampling == "latin":

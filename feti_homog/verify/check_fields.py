@@ -69,8 +69,10 @@ def _group_means(group: Int, values: Float) -> Float:
 
 
 def _check_equilibrium(findings: Findings, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
-    """Return the forces of all copies of a node add up to zero; at an interface node those of each face to its
-    traction."""
+    """Return the forces of all copies of a node add up to zero.
+
+    At an interface node those of each face to its traction.
+    """
     nodes, faces = cell.nodes, cell.faces
     traction = interface_forces(cell, state)
     scale = max(fields.largest_force, float(np.abs(traction).max(initial=0.0)))

@@ -70,8 +70,10 @@ def _check_breaks(findings: Findings, states: Sequence[StateNumbers], points: Se
 def _check_strength(
     findings: Findings, states: Sequence[StateNumbers], points: Sequence[Point], by_events: bool, near: float
 ) -> None:
-    """No bond is over its strength but where a jump at this load overloads it and it breaks at once; events break the
-    worst bonds."""
+    """No bond is over its strength but where a jump at this load overloads it and it breaks at once.
+
+    Events break the worst bonds.
+    """
     for state in states:
         where = f"{state.name}, interface node {{}}".format
         used = np.nan_to_num(state.used)
@@ -90,8 +92,10 @@ def _check_strength(
 
 
 def _overloaded_by_jump(state: StateNumbers, points: Sequence[Point], near: float) -> Bool:
-    """(k,) which bonds may be over their strength where some break: all in a cascade, where one break overloads
-    others; tips where only the contact changed, with which the energy jumps that their break releases."""
+    """(k,) which bonds may be over their strength where some break: all in a cascade, where one break overloads others.
+
+    Tips where only the contact changed, with which the energy jumps that their break releases.
+    """
     if points[state.point]["broke"] == 0:
         return np.zeros(len(state.used), bool)
     if _in_cascade(points, state.point):

@@ -54,8 +54,10 @@ def _check_path(
 
 
 def tip_shares(cell: DiscreteCell, state: StateNumbers, told: Mapping[str, Sequence[float]]) -> tuple[Int, Float]:
-    """(t,) the tips of a state, by fibre and direction, and sqrt(G / G_c) by what is told of them; none, if of other
-    tips."""
+    """(t,) the tips of a state, by fibre and direction, and sqrt(G / G_c) by what is told of them.
+
+    None, if of other tips.
+    """
     node = _tips_in_order(cell, state)
     law = law_at(cell.files, node)
     if len(told["G_I"]) != len(node) or len(told["G_II"]) != len(node):
@@ -142,8 +144,10 @@ def _check_toughness(
 def _check_tips(
     findings: Findings, cell: DiscreteCell, state: StateNumbers, told: Mapping[str, Sequence[float]]
 ) -> None:
-    """Check that tips are the bonds beside broken ones, in the mode of their tractions; with springs also their
-    energy."""
+    """Check that tips are the bonds beside broken ones, in the mode of their tractions.
+
+    With springs also their energy.
+    """
     node = _tips_in_order(cell, state)
     law = law_at(cell.files, node)
     fibre, where = cell.files.interface.fibre[node], f"{state.name}, tip {{}}".format

@@ -215,8 +215,10 @@ def _inner_sides(files: ResultFiles, sides: TornSides, inwards: Int) -> Bool:
 
 
 def _faces(files: ResultFiles, nodes: TornNodes, on_line: Bool, parts: Int, inwards: Int, radius: float) -> Faces:
-    """Where the interface nodes of a result are on its mesh; `inwards` (parts,) as `inwardness` has it, `on_line`
-    (places,) as `along_one_line`."""
+    """Where the interface nodes of a result are on its mesh.
+
+    `inwards` (parts,) as `inwardness` has it, `on_line` (places,) as `along_one_line`.
+    """
     depth = inwards[parts[nodes.subdomain]]
     members = np.unique(np.column_stack([nodes.place, depth, nodes.phase]), axis=0)
     two = np.flatnonzero((np.bincount(members[:, 0], minlength=nodes.places) == 2) & on_line)

@@ -98,8 +98,10 @@ def check_path_energies(
 
 
 def _numbers(cell: DiscreteCell, states: Sequence[StateNumbers], points: Sequence[Point]) -> list[PointNumbers]:
-    """Those of every point, the energy from the fields where they are kept, else by Hill E.Sigma / 2; what works on a
-    temperature follows from what is stored."""
+    """Those of every point, the energy from the fields where they are kept, else by Hill E.Sigma / 2.
+
+    What works on a temperature follows from what is stored.
+    """
     kept, found = {state.point: state for state in states}, []
     for number, (point, load) in enumerate(zip(points, at_points(cell.files.case, points), strict=True)):
         strain, stress = np.array(point["strain"]), np.array(point["stress"])

@@ -69,8 +69,8 @@ def _given(case: Document) -> Sequence[Any]:
 def at_points(case: Document, points: Sequence[Document]) -> Iterator[Prescribed]:
     """Yield the prescribed load at every point of a path.
 
-    The first leg has a share of its end. Later legs are straight from the last prescribed load to their end; a component
-    that changes its kind begins at its value in the last point.
+    The first leg has a share of its end. Later legs are straight from the last prescribed load to their end. A
+    component that changes its kind begins at its value in the last point.
     """
     ends, leg, ended = targets(case), 0, False
     by_events = case["path"]["method"] == "events"

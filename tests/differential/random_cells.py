@@ -30,8 +30,10 @@ class DrawnCell:
 
 
 def random_cell(rng: np.random.Generator, folder: Path, small: bool) -> DrawnCell:
-    """Return a cell of some hundred nodes, fewer if it is to be `small`; the file of a user's mesh is written to
-    `folder`."""
+    """Return a cell of some hundred nodes, fewer if it is to be `small`.
+
+    The file of a user's mesh is written to `folder`.
+    """
     names, shares = zip(*GEOMETRIES.items(), strict=True)
     geometry = str(rng.choice(names, p=shares))
     order = int(rng.choice([1, 2], p=[0.7, 0.3]))
@@ -123,8 +125,10 @@ def _distance(dx: float, dy: float, width: float, height: float) -> float:
 
 
 def _shape(rng: np.random.Generator, radius: float, coated: bool) -> Document:
-    """Return a shape within a circle: round, elliptic, a polygon, or hollow; round or elliptic ones with their
-    coating."""
+    """Return a shape within a circle: round, elliptic, a polygon, or hollow.
+
+    Round or elliptic ones with their coating.
+    """
     if coated and rng.random() < 0.7:
         thickness = rng.uniform(0.15, 0.3)
         return {"radius": radius / (1 + thickness), "coating": thickness}

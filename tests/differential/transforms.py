@@ -40,8 +40,10 @@ def sections(document: Mapping[str, Any]) -> list[Document]:
 
 
 def reordered(rng: np.random.Generator, document: Document) -> tuple[Document, list[int], list[int]]:
-    """Return the case with keys, fibres, arcs and sections of interfaces in another order; of each fibre, and of each
-    section, the place that it had."""
+    """Return the case with keys, fibres, arcs and sections of interfaces in another order.
+
+    Of each fibre, and of each section, the place that it had.
+    """
     case = copy.deepcopy(document)
     fibres, places = _shuffled_rows(rng, case["cell"])
     for section in sections(case):

@@ -136,8 +136,10 @@ def test_increments_dissipate_the_work_that_is_not_stored(torn, worst_only):
 
 
 def breaks(cell, points):
-    """Return (breaks, 3): share of the strain STRAIGHT, broken bonds, and energy dissipated along the snap-back; and
-    the last at rising strain."""
+    """Return (breaks, 3): share of the strain STRAIGHT, broken bonds, and energy dissipated along the snap-back.
+
+    And the last at rising strain.
+    """
     energies = dissipated(points)
     rows = [
         (strain(p) @ STRAIGHT / (STRAIGHT @ STRAIGHT), p.broke, *e)

@@ -98,8 +98,10 @@ def test_elastic_bonds_release_the_energy_of_the_spring_at_the_tip(comm, strain)
 
 @pytest.mark.parametrize(("bond", "strain"), [(FREE, [1.0, 0.0, 0.0]), (TOUCHING, [-1.0, 0.0, 0.0])])
 def test_the_energy_lost_edge_by_edge_is_the_integral_of_the_rate(comm, bond, strain):
-    """On one mesh, in analyses whose arcs differ by one or two edges of one size at each tip.  The energy errs by the
-    size of the triangles at a tip, which are others at the next vertex: single steps by some per cent, all by less.
+    """On one mesh, in analyses whose arcs differ by one or two edges of one size at each tip.
+
+    The energy errs by the size of the triangles at a tip, which are others at the next vertex: single steps by some per
+    cent, all by less.
     """
     edges = 80
     size = 2 * np.pi * RADIUS / edges

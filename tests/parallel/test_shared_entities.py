@@ -70,8 +70,10 @@ def test_coarse_cells_have_vertices_alone(torus, comm):
 
 
 def test_normals_are_radii_of_the_fibres(torus, comm):
-    """As long as dx / ds: of an edge its circle's radius times the angle that it turns by, with fine nodes or not; of
-    a vertex the mean of both sides of elements."""
+    """As long as dx / ds: of an edge its circle's radius times the angle that it turns by, with fine nodes or not.
+
+    Of a vertex the mean of both sides of elements.
+    """
     for intervals in (1, 2):
         _, share = shared_by_ranks(torus, comm, intervals)
         at = share.fibre >= 0

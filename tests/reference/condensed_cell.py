@@ -59,8 +59,10 @@ class State:
 
 
 class CondensedCell:
-    """The cell of a programme with bonds of glue, or of the `springs` (d,) per length; `contact` keeps debonded faces
-    from overlapping."""
+    """The cell of a programme with bonds of glue, or of the `springs` (d,) per length.
+
+    `contact` keeps debonded faces from overlapping.
+    """
 
     def __init__(self, programme, contact, springs=None):
         self.programme, self.contact = programme, contact

@@ -17,9 +17,11 @@ SLIGHT = 1e-14  # share of the largest stiffness that makes that of free fibres 
 
 @dataclass(frozen=True)
 class SlowEnergyPath:
-    """A cell on springs of the stiffnesses `springs` (normal, tangential), numbers or (k,) as
-    the toughness; bonds beside a broken one break by what that
-    releases, with growth "released", or by the energy of their own springs."""
+    """A cell on springs of the stiffnesses `springs` (normal, tangential), numbers or (k,) as the toughness.
+
+    Bonds beside a broken one break by what that releases, with growth "released", or by the energy of their own
+    springs.
+    """
 
     programme: QuadraticProgramme
     springs: tuple[float | np.ndarray, float | np.ndarray]

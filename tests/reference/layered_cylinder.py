@@ -12,8 +12,10 @@ from reference.coated_fibre import hill, michell
 
 
 def carried(layers, states_of):
-    """(2 k, k) states at the outermost radius of the k fields that are finite at the axis; `states_of(phase, r)`
-    (2 k, 2 k) has first these."""
+    """(2 k, k) states at the outermost radius of the k fields that are finite at the axis.
+
+    `states_of(phase, r)` (2 k, 2 k) has first these.
+    """
     (core, radius), *others = layers
     states = states_of(core, radius)
     states = states[:, : len(states) // 2]
@@ -24,8 +26,10 @@ def carried(layers, states_of):
 
 
 def excess_energy(layers, medium):
-    """Eshelby's integral of T0 u - T u0 over pi, around the layers in a medium under sigma_22 = -sigma_11 = 2 far away;
-    0 is that of the medium alone."""
+    """Eshelby's integral of T0 u - T u0 over pi, around the layers in a medium under sigma_22 = -sigma_11 = 2 far away.
+
+    0 is that of the medium alone.
+    """
     inner, outer = carried(layers, michell), michell(medium, layers[-1][1])
     solution = np.linalg.solve(np.hstack([inner, -outer[:, 2:]]), outer[:, 0])
     state, alone = inner @ solution[:2], outer[:, 0]

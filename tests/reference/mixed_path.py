@@ -86,8 +86,10 @@ def released(cell, state, bonded, i):
 
 @dataclass(frozen=True)
 class Event:
-    """Share of the whole path, the state before the break, which nodes (k,) break, none at the end of a leg; and per
-    area up to the state what breaks have lost, on the first leg as it is and at rising load."""
+    """Share of the whole path, the state before the break, which nodes (k,) break, none at the end of a leg.
+
+    And per area up to the state what breaks have lost, on the first leg as it is and at rising load.
+    """
 
     load_factor: float
     state: State

@@ -31,8 +31,10 @@ def effective_stiffness(points, triangles, stiffness, width, height):
 
 
 def periodic_numbers(points, width, height):
-    """Assign a number to the class of each node, by rounded position modulo the periods; returns the number of
-    classes too."""
+    """Assign a number to the class of each node, by rounded position modulo the periods.
+
+    Returns the number of classes too.
+    """
     period = np.array([width, height])
     reduced = np.round(points / period * 1e8).astype(np.int64) % 10**8
     # Torn copies have the same position, so they become one node here.

@@ -37,8 +37,10 @@ class PartedLayers:
         self.along = [k for k in range(v) if k != across]
 
     def state(self, given, temperature=0.0):
-        """Strains and stresses (v,) and whether the layers touch; `given` has a strain "E11" or a stress "S11" of each
-        component.  What nothing determines is NaN."""
+        """Strains and stresses (v,) and whether the layers touch.
+
+        `given` has a strain "E11" or a stress "S11" of each component. What nothing determines is NaN.
+        """
         v = len(self.along) + 1
         strain = np.array([given.get(f"E{k + 1}{k + 1}", np.nan) for k in range(v)])
         stress = np.array([given.get(f"S{k + 1}{k + 1}", np.nan) for k in range(v)])

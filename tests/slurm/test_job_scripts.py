@@ -74,8 +74,10 @@ def test_a_case_is_run_from_any_folder(slurm, elsewhere):
 
 
 def test_a_case_submitted_by_hand_finds_the_repository(slurm, tmp_path):
-    """sbatch runs a copy of the script, in the folder that it is called from.  Ranks may run on every core, for others
-    may have the first one."""
+    """sbatch runs a copy of the script, in the folder that it is called from.
+
+    Ranks may run on every core, for others may have the first one.
+    """
     sweep_file(tmp_path, "", CASE, "case")
     (tmp_path / "sitecustomize.py").write_text("import os\nprint('cores', sorted(os.sched_getaffinity(0)))\n")
     words = ["sbatch", "--parsable", "--ntasks=1", SCRIPTS / "case", "case.toml", "out"]

@@ -21,8 +21,10 @@ COSINES = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 
 @dataclass(frozen=True)
 class Sample:
-    """Orthotropic constants in the order E1, E2, E3, nu12, nu13, nu23, G12, G13, G23, with expansions; turned about the
-    fibre by so many degrees against the cell."""
+    """Orthotropic constants in the order E1, E2, E3, nu12, nu13, nu23, G12, G13, G23, with expansions.
+
+    Turned about the fibre by so many degrees against the cell.
+    """
 
     constants: tuple[float, ...]
     expansion: tuple[float, float, float] | None

@@ -62,7 +62,9 @@ def envelope(
 @contextmanager
 def torn(comm: Any, plane: str, interface: dict[str, Any], **sections: Any) -> Iterator[Any]:
     """Provide the torn cell of a path, in generalized plane strain of an envelope, in the cell of `envelope`.
-    Collective."""
+
+    Collective.
+    """
     PETSc.garbage_cleanup(comm)
     if plane == "generalized":
         more = {"analysis": {"type": "envelope"}, "envelope": {"plane": ["E11", "E22"]}}

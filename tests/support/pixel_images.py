@@ -16,8 +16,10 @@ SYMMETRIES = [
 
 
 def random_image(size: int, seed: int, share: float = 0.4, phases: int = 1, voids: float = 0.0) -> np.ndarray:
-    """(size, size) phases of pixels [row, column], 0 the matrix, of which about that `share` are others; one body of
-    each phase, grown pixel by pixel in thin branches that touch, and -1 of that share of inner pixels."""
+    """(size, size) phases of pixels [row, column], 0 the matrix, of which about that `share` are others.
+
+    One body of each phase, grown pixel by pixel in thin branches that touch, and -1 of that share of inner pixels.
+    """
     rng = np.random.default_rng(seed)
     image = np.zeros((size, size), int)
     for phase in range(1, phases + 1):

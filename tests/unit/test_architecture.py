@@ -75,8 +75,10 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 
 
 def floor_of(name: str) -> str | None:
-    """Return the floor of a module or of a name in one, both without the package's name; None for the package
-    itself."""
+    """Return the floor of a module or of a name in one, both without the package's name.
+
+    None for the package itself.
+    """
     words = name.split(".")
     return next((floor for n in (2, 1) if (floor := ".".join(words[:n])) in LEVEL), None)
 

@@ -194,8 +194,10 @@ def paths_of(value: Any, above: str = "") -> Iterator[str]:
 
 
 def unmatched(names: Iterable[str], patterns: Iterable[str]) -> tuple[set[str], set[str]]:
-    """Return the names that are of no pattern and the patterns that are of no name; capitals, i and j stand for
-    anything."""
+    """Return the names that are of no pattern and the patterns that are of no name.
+
+    Capitals, i and j stand for anything.
+    """
     expressions = {pattern: expression(pattern) for pattern in patterns}
     names = set(names)
     unknown = {name for name in names if not any(e.fullmatch(name) for e in expressions.values())}

@@ -63,8 +63,10 @@ class AdaptiveCoarseSpace:
         threshold: float,
         thresholds: Thresholds = DEFAULTS,
     ) -> None:
-        """Find the modes below the threshold tau and factor.  All boundary operators must be dense but of large
-        bodies.  Options under `feti_coarse_` as of `DistributedSolver`.  Collective.
+        """Find the modes below the threshold tau and factor.  Collective.
+
+        All boundary operators must be dense but of large bodies. Options under `feti_coarse_` as of
+        `DistributedSolver`.
 
         Raises:
             MeshError: the neighbourhood of a face, on any rank, is no subdomain.
@@ -121,6 +123,7 @@ class AdaptiveCoarseSpace:
 
     def factor(self, part: csr_matrix) -> None:
         """Factor Z_0^T S Z_0, the sum of all parts, scaled to a unit diagonal, with a small multiple of the identity.
+
         Collective.
 
         Modes of a fibre that nothing holds have no energy, and are left out; others may depend on each other.  What is

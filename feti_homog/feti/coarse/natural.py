@@ -43,8 +43,10 @@ class NaturalCoarseSpace:
         jump_operator: JumpOperator,
         operators: InterfaceOperators,
     ) -> None:
-        """Assemble G and factor for all rows.  Options under `feti_natural_` as of `DistributedSolver`.
-        Collective."""
+        """Assemble G and factor for all rows.  Collective.
+
+        Options under `feti_natural_` as of `DistributedSolver`.
+        """
         subdomains = operators.subdomains
         kernels = [s.R[dofs] for s, dofs in zip(subdomains, operators.dofs, strict=True)]
         modes = sum(R.shape[1] for R in kernels)

@@ -21,8 +21,10 @@ FOLDED = 1e-9
 
 @dataclass(frozen=True)
 class InterfaceGeometry:
-    """Of n shared entities that this rank owns; the attributes are those of `SharedEntities`, 0 of other entities and
-    where no bond may break."""
+    """Of n shared entities that this rank owns.
+
+    The attributes are those of `SharedEntities`, 0 of other entities and where no bond may break.
+    """
 
     normal: Float
     turn: Float
@@ -34,8 +36,10 @@ class InterfaceGeometry:
 
 
 def breakable_pairs(own: SubmeshesOfRank, table: SubdomainTable, pairs: Int, found: Sharers) -> Int:
-    """(n,) the interface of the two bodies that meet there; -1 where it never parts, where a third body meets them, and
-    where they do not meet along one line."""
+    """(n,) the interface of the two bodies that meet there.
+
+    -1 where it never parts, where a third body meets them, and where they do not meet along one line.
+    """
     body, copies = table.body[found.sharer], found.copies
     outer, inner = body[found.pointer[:-1]], body[found.pointer[1:] - 1]
     third = (body != np.repeat(outer, copies)) & (body != np.repeat(inner, copies))
@@ -49,8 +53,10 @@ def breakable_pairs(own: SubmeshesOfRank, table: SubdomainTable, pairs: Int, fou
 def interface_geometry(
     comm: MPI.Intracomm, own: SubmeshesOfRank, table: SubdomainTable, pairs: Int, found: Sharers, side: float
 ) -> InterfaceGeometry:
-    """Return normals, turns and precracks of shared entities; `pairs` as in `share_entities`; the side of an
-    element is the share `side` of a coarse edge. Collective."""
+    """Return normals, turns and precracks of shared entities.  Collective.
+
+    `pairs` as in `share_entities`; the side of an element is the share `side` of a coarse edge.
+    """
     n, owner = len(found.key), table.rank[found.innermost]
     can_part = (owner == comm.rank) & (breakable_pairs(own, table, pairs, found) >= 0)
     # The last sharer of an edge between two bodies is on the side of the fibre.

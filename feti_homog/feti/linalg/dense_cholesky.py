@@ -73,8 +73,10 @@ def _invert_triangle(U: Float) -> None:
 
 
 def full_from_lower(A: Float, block: int = MIRRORED_BLOCK_ROWS) -> Float:
-    """Return the symmetric matrix, in C order, whose lower triangle is that of A (n, n); by blocks that fit the
-    cache."""
+    """Return the symmetric matrix, in C order, whose lower triangle is that of A (n, n).
+
+    By blocks that fit the cache.
+    """
     whole, lower = A.copy(order="F"), np.tri(block, dtype=bool)
     for j in range(0, len(A), block):
         some = slice(j, j + block)

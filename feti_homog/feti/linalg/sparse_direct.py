@@ -57,8 +57,11 @@ def is_direct(ksp: PETSc.KSP) -> bool:
 
 
 def solve_columns(ksp: PETSc.KSP, x: PETSc.Vec, b: PETSc.Vec, B: Float, one_by_one: int) -> Float:
-    """(own rows, k) of A^-1 B in the order of Fortran, for this rank's rows B (own rows, k); `x` and `b` are work
-    vectors.  Up to so many columns, and iterative methods, one after the other.  Collective where the matrix is."""
+    """(own rows, k) of A^-1 B in the order of Fortran, for this rank's rows B (own rows, k).
+
+    `x` and `b` are work vectors. Up to so many columns, and iterative methods, one after the other. Collective where
+    the matrix is.
+    """
     X = np.empty(B.shape, order="F")
     if B.shape[1] > one_by_one and is_direct(ksp):
         sizes = (b.getSizes(), B.shape[1])
@@ -75,8 +78,9 @@ def solve_columns(ksp: PETSc.KSP, x: PETSc.Vec, b: PETSc.Vec, B: Float, one_by_o
 
 
 def factored(A: PETSc.Mat, prefix: str, library: str, near_kernel: Float | None = None) -> PETSc.KSP:
-    """Return a KSP with the Cholesky factorization of a symmetric definite matrix by this library; options under
-    `prefix` may choose others. Collective where the matrix is.
+    """Return a KSP with the Cholesky factorization of a symmetric definite matrix by this library.
+
+    Options under `prefix` may choose others. Collective where the matrix is.
 
     Rows and columns should have similar size: MUMPS does not scale here, for its own scaling loses all digits of coarse
     problems with contrasts of 1e6.  Multigrid learns of the `near_kernel` (n, k), orthonormal vectors of little energy.

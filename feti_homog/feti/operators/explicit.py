@@ -69,8 +69,10 @@ class ExplicitInterfaceOperator:
         return y
 
     def _product(self, x: Float, out: Float | None, diagonal: Float, lower: int) -> Float:
-        """Return the symmetric matrix of one triangle of the array, and of a diagonal, times x; fastest in Fortran
-        order."""
+        """Return the symmetric matrix of one triangle of the array, and of a diagonal, times x.
+
+        Fastest in Fortran order.
+        """
         A = self._both
         if out is None:
             out = np.empty(x.shape, order="F")

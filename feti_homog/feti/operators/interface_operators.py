@@ -173,8 +173,9 @@ class InterfaceOperators:
 
 
 def _factor(subdomain: Subdomain, dofs: Int, explicit: bool) -> tuple[InterfaceOperator, Float]:
-    """Return the boundary operator of a subdomain and the diagonal of K on its boundary `dofs`; K is freed at the
-    end.
+    """Return the boundary operator of a subdomain and the diagonal of K on its boundary `dofs`.
+
+    K is freed at the end.
 
     Raises:
         MeshError: rounding leaves K no factor.

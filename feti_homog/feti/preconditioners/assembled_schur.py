@@ -32,7 +32,8 @@ class AssembledSchur:
         self, comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators, active: Float
     ) -> None:
         """Assemble and factor for the owned rows of which `active` is 1; they must leave no rigid-body motion free.
-        Options under `feti_bonded_` (default: cholesky by CHOLMOD).  Collective.
+
+        Options under `feti_bonded_` (default: cholesky by CHOLMOD). Collective.
 
         Raises:
             TypeError: a boundary operator is not dense.

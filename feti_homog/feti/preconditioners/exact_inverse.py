@@ -135,8 +135,10 @@ class ExactInverse(Preconditioner):
         self._answer, self._tied, self.rounding = None, 0, self._force_of_rigid_motions()
 
     def _find(self, rows: Int) -> None:
-        """Find the columns that these rows lack; with few also those of bonds near them, which break next, for columns
-        are cheaper together.  Collective."""
+        """Find the columns that these rows lack.  Collective.
+
+        With few also those of bonds near them, which break next, for columns are cheaper together.
+        """
         rows = rows[self._columns.positions(rows) < 0]
         if not len(rows):
             return

@@ -66,14 +66,16 @@ class Outlines(Protocol):
         """(k, ...) reach from the centre along unit vectors n (k, ..., 2)."""
 
     def parting(self, first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
-        """Return the normals n (p, 2) of the lines that separate pairs (p,), (p,) best, and the reach r (p,) of both along n.
+        """Return normals n (p, 2) of the lines that separate pairs (p,), (p,) best, and the reach r (p,) of both along n.
 
         v (p, 2) are the vectors from first to second; the gap, negative if they overlap, is n . v - r.
         """
 
     def distances(self, offsets: Float) -> Float:
-        """(n, k) distance from each outline of points at these vectors (n, k, 2) from its centre; about, of those that
-        are not round."""
+        """(n, k) distance from each outline of points at these vectors (n, k, 2) from its centre.
+
+        About, of those that are not round.
+        """
 
 
 class Column(NamedTuple):

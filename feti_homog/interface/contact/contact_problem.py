@@ -170,7 +170,9 @@ class ContactProblem:
 
     def undetermined(self, state: Equilibrium) -> Bool:
         """(v,) strains that nothing determines: their stresses are given, and what is open lets them be any.
-        Collective."""
+
+        Collective.
+        """
         if not state.load.by_stress.any() or not self._any(state.status != BONDED):
             return np.zeros(len(state.load.values), bool)
         self.prepare(state.bonds)

@@ -21,8 +21,9 @@ from feti_homog.typing import Float
 
 
 class CoupledInterfaces:
-    """The interfaces of a cell in its problems; strains and stresses (n,) are those of the plane problem, then those
-    of the axial one.
+    """The interfaces of a cell in its problems.
+
+    Strains and stresses (n,) are those of the plane problem, then those of the axial one.
 
     Attributes:
         plane: with contact.
@@ -74,8 +75,10 @@ class CoupledInterfaces:
         return load.parts([len(each.solver.problem.loads) for each in self.problems])
 
     def leg_start(self, origin: Macroscopic, before: Load | None, end: Load) -> Load:
-        """Where a leg begins: at the waypoint before, which the last point, `origin`, need not meet; components that
-        are given in another way now are as that has them, stresses without the solver's error.  Collective."""
+        """Where a leg begins: at the waypoint before, which the last point, `origin`, need not meet.  Collective.
+
+        Components that are given in another way now are as that has them, stresses without the solver's error.
+        """
         parts = np.split(origin.strain, [len(self.plane.solver.problem.loads)])
         scales = [each.scales for each in self.problems]
         noise = [np.full(len(own), each.stress_noise(own)) for own, each in zip(parts, scales, strict=False)]

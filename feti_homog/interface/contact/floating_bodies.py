@@ -52,8 +52,10 @@ class Placement:
 
 @dataclass(frozen=True)
 class _Fibres:
-    """On rank 0, of all open nodes: the change of gap and slip with each free motion, (k, motions), and the fibre; a
-    fibre and its coating, which may part too, are one, and so are layers with others between them."""
+    """On rank 0, of all open nodes: the change of gap and slip with each free motion, (k, motions), and the fibre.
+
+    A fibre and its coating, which may part too, are one, and so are layers with others between them.
+    """
 
     is_open: Bool
     opening: csr_matrix
@@ -118,8 +120,9 @@ def admissible_share(
 
 
 def shares_to_zero(here: Float, ahead: Float, noise: float | Float) -> tuple[float, float]:
-    """Shares of the way from values here (k,) to ahead (k,) at which the first is 0, and is -2 noise, a number or (k,);
-    else 1, 1.
+    """Shares of the way from values here (k,) to ahead (k,) at which the first is 0, and is -2 noise, a number or (k,).
+
+    Else 1, 1.
 
     Values that end above -2 noise may be the solver's error and do not count.
     """

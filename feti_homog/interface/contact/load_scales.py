@@ -64,7 +64,9 @@ class LoadScales:
     @cached_property
     def _bond_stiffness(self) -> Float:
         """(k,) stress at each bond of this rank per strain of the cell: of the softer body, its springs in a row.
-        Collective."""
+
+        Collective.
+        """
         solver, nodes = self._solver, self._solver.jump_operator.nodes
         m, own = solver.problem.strains, np.zeros(self._bodies)
         for s in solver.subdomains:
@@ -116,7 +118,9 @@ class LoadScales:
 
     def stress_scale(self, loads: Float) -> float:
         """Return a stress that the loads (v,) would make in the bonded cell at least, whatever their signs.
-        Collective."""
+
+        Collective.
+        """
         m = self._solver.problem.strains
         return float(np.abs(self.least_bonded_stiffness[:m, :m] @ self.imposed_strain(loads)).max())
 

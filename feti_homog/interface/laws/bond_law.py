@@ -69,8 +69,10 @@ class BondLaw(ABC):
         return bonds.history, which
 
     def softening(self, bonds: BondState, pulled: Bool) -> Float | None:
-        """(k, 3) C / C_0 of the normal, tangential and axial springs of bonds `pulled` (k,) or pressed; None of a
-        law that never changes C."""
+        """(k, 3) C / C_0 of the normal, tangential and axial springs of bonds `pulled` (k,) or pressed.
+
+        None of a law that never changes C.
+        """
         return None
 
     def fracture(self, bonds: BondState, which: Bool, traction: Float) -> Float:
@@ -83,8 +85,10 @@ class BondLaw(ABC):
         return np.asarray(np.arctan2(shear, np.maximum(traction[:, 0], 0.0)))
 
     def first_factor(self, before: Float, ahead: Float) -> Float | None:
-        """(p,) the least f >= 0 at which `before` + f `ahead`, tractions (p, c), break, inf where none does; None of a
-        law that has no formula for it.  `before` breaks nothing."""
+        """(p,) the least f >= 0 at which `before` + f `ahead`, tractions (p, c), break, inf where none does.
+
+        None of a law that has no formula for it. `before` breaks nothing.
+        """
         return None
 
 

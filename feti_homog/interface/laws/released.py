@@ -66,8 +66,9 @@ class Tips:
 
 @dataclass(frozen=True)
 class ReleasedEnergy(BondLaw):
-    """Bonds beside a broken one break when that releases G_c l, l being the length that they stand for; others when
-    the energy of their spring reaches G_c.
+    """Bonds beside a broken one break when that releases G_c l, l being the length that they stand for.
+
+    Others when the energy of their spring reaches G_c.
 
     Attributes:
         springs: the criterion of the others, and the toughness.
@@ -151,7 +152,8 @@ class ReleasedUtilisation(Utilisation):
     """sqrt(released / (G_c l)) at tips, the utilisation of the springs at other nodes."""
 
     def __init__(self, law: SpringEnergy, tips: Tips, number: Int, contact: bool) -> None:
-        """Store the tips; `number` (p,) is the number of the tip at a node, or -1; with `contact` faces do not overlap."""
+        """Store the tips; `number` (p,) is the number of the tip at a node, or -1; with `contact` faces do not
+        overlap."""
         super().__init__(law)
         self._springs, self._tips, self._number, self._contact = law, tips, number, contact
 

@@ -36,8 +36,10 @@ class Load:
         return [Load(*part) for part in zip(np.split(self.values, ends), np.split(self.by_stress, ends), strict=True)]
 
     def after(self, share: float, end: Load) -> Load:
-        """Return the load after a share of the way to another one of the same kinds; what is left of zero by
-        rounding is zero."""
+        """Return the load after a share of the way to another one of the same kinds.
+
+        What is left of zero by rounding is zero.
+        """
         values = (1.0 - share) * self.values + share * end.values
         largest = np.abs([self.values, end.values]).max(axis=0)
         return Load(np.where(np.abs(values) <= LOAD_ROUNDING * largest, 0.0, values), self.by_stress)

@@ -12,8 +12,9 @@ from feti_homog.typing import Bool, Float
 
 @dataclass(frozen=True)
 class Macroscopic:
-    """Strains E and the stresses Sigma that work on them, energy per area of the cell; a change of temperature is a
-    strain.
+    """Strains E and the stresses Sigma that work on them, energy per area of the cell.
+
+    A change of temperature is a strain.
 
     With the bonds as they are the cell stores E.Sigma / 2, and E'.Sigma = E.Sigma' of two states (Betti).
 

@@ -68,8 +68,10 @@ def solve(solver: FetiSolver, load: Load, start: Float, area: float, noise: Nois
 
 
 def _strains(stiffness: Float, stress: Float, noise: Noise) -> Float | None:
-    """(u,) the strains that make the stresses (u,) by a stiffness (u, u) that may be singular; None if it carries them
-    not.  Each is scaled by the root of its own stiffness, so that none is small beside another."""
+    """(u,) the strains that make the stresses (u,) by a stiffness (u, u) that may be singular.
+
+    None if it carries them not. Each is scaled by the root of its own stiffness, so that none is small beside another.
+    """
     roots = noise.roots
     eigenvalues, vectors = np.linalg.eigh((stiffness + stiffness.T) / (2 * np.outer(roots, roots)))
     along, resists = vectors.T @ (stress / roots), eigenvalues > noise.share

@@ -102,8 +102,10 @@ def _legs(cell: CoupledInterfaces, law: BondLaw, waypoints: Sequence[Load], begi
 
 
 def _first_leg(cell: CoupledInterfaces, law: BondLaw, load: Load, legs: int, begin: PathState) -> Iterator[Point]:
-    """From zero to the load through all equilibria; with the bonds of now, a state under t times the load is t times
-    the state, for t >= 0."""
+    """From zero to the load through all equilibria.
+
+    With the bonds of now, a state under t times the load is t times the state, for t >= 0.
+    """
     factor = begin.position
     while True:
         state = cell.equilibrium(load, begin.bonds, begin.lam)

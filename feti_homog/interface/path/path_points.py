@@ -123,8 +123,10 @@ def _fracture_energy(cell: CoupledInterfaces, law: BondLaw, which: Bool, bonds: 
 
 
 def most_utilised(cell: CoupledInterfaces, law: BondLaw, state: Equilibrium) -> tuple[Float, float, Bool]:
-    """(k,) share of strength that the nodes of this rank use, 0 of debonded ones; the largest of all, and which (k,)
-    have it.  Collective, rank 0 decides."""
+    """(k,) share of strength that the nodes of this rank use, 0 of debonded ones.
+
+    The largest of all, and which (k,) have it. Collective, rank 0 decides.
+    """
     comm = cell.comm
     used = law.utilisation(cell, state.bonds)(cell.traction(state.solutions))
     used = np.where(state.status == BONDED, used, 0.0)

@@ -73,8 +73,10 @@ class Curves:
 
 
 def rows_of(first: Int, those: Int) -> tuple[Int, Int]:
-    """Where the rows of the groups `those` (k,) are, and where each of these groups begins among them; group i has the
-    rows from first[i] up to first[i + 1]."""
+    """Where the rows of the groups `those` (k,) are, and where each of these groups begins among them.
+
+    Group i has the rows from first[i] up to first[i + 1].
+    """
     counts = first[those + 1] - first[those]
     return ranges(first[those], counts), np.concatenate([[0], np.cumsum(counts)])
 

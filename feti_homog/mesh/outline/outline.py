@@ -101,8 +101,10 @@ def side_curves(
     numbering: Numbering,
     sampling: Sampling,
 ) -> Curves:
-    """Return the pieces of the two sides along `axis`, with the same nodes on both; `disc_at` tells the smallest
-    closed curve around points, which is a number of `around` or MATRIX."""
+    """Return the pieces of the two sides along `axis`, with the same nodes on both.
+
+    `disc_at` tells the smallest closed curve around points, which is a number of `around` or MATRIX.
+    """
     begin, span = places[:-1], np.diff(places)
     longest = np.full((len(span), 2), field.base.largest)
     pieces = Segments(on_side(begin, axis, 0.0), on_side(span, axis, 0.0), longest)

@@ -37,8 +37,11 @@ def size_field(
     crossings: tuple[Float, Float],
     tips: Float,
 ) -> SizeField:
-    """As `graded_size.size_field`, for the ellipses `inner`; `crossings` are where sides of the cell meet ellipses
-    (c, 2), and the length (c,) R phi of the angle phi between them where the radius of curvature is R."""
+    """As `graded_size.size_field`, for the ellipses `inner`.
+
+    `crossings` are where sides of the cell meet ellipses (c, 2), and the length (c,) R phi of the angle phi between
+    them where the radius of curvature is R.
+    """
     size, largest = arrangement.size, sizes.largest
     shells, disc = arrangement.shells
     ellipses, disc = _in_mesh_order(arrangement, Ellipses(shells.centres, shells.frames), disc)

@@ -100,8 +100,10 @@ def tiling(
 
 
 def _side_pieces(circles: Float, outer: Int, size: Float) -> tuple[Int, Float]:
-    """Return the pieces of sides in the matrix, as `matrix_tiles` takes them; `outer` (n,) are the circles that
-    bound it."""
+    """Return the pieces of sides in the matrix, as `matrix_tiles` takes them.
+
+    `outer` (n,) are the circles that bound it.
+    """
     nodes, ends = [], []
     for axis, (level, low) in product((0, 1), ((0.0, True), (1.0, False))):
         places = crossings(circles[outer], axis, size)
@@ -119,8 +121,10 @@ def _side_pieces(circles: Float, outer: Int, size: Float) -> tuple[Int, Float]:
 
 
 def cut(lines: Outline, cell: Tile, tiles: Tiling | None) -> list[tuple[Int, Tile]]:
-    """Return the tiles of a cell whose outline is `lines`, each with the numbers (n,) of its nodes; the cell as it
-    is without a tiling."""
+    """Return the tiles of a cell whose outline is `lines`, each with the numbers (n,) of its nodes.
+
+    The cell as it is without a tiling.
+    """
     if tiles is None:
         return [(np.arange(len(cell.points)), cell)]
     curves = cell.curves

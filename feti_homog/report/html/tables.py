@@ -37,7 +37,7 @@ def facts(document: Document) -> list[tuple[str, str]]:
 
 
 def answers(document: Document, most: int = MOST_ROWS) -> list[Table]:
-    """Return the tables of a result: stiffness with moduli, constants and bounds, points of an angle or path, or onsets.
+    """Return the tables of a result: stiffness with moduli and bounds, points of an angle or path, or onsets.
 
     Tables of points have at most so many rows.
     """

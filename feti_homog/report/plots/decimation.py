@@ -128,8 +128,9 @@ def drawn_displacement(state: Any, drawn: DrawnMesh) -> Array:
 
 
 def largest_scale(displacement: Array, drawn: DrawnMesh) -> float:
-    """Return the largest s with det(I + s' grad u) >= LEAST_AREA in every triangle drawn for all s' up to s;
-    infinity if there is none.
+    """Return the largest s with det(I + s' grad u) >= LEAST_AREA in every triangle drawn for all s' up to s.
+
+    Infinity if there is none.
 
     In each the determinant is 1 + s tr(grad u) + s^2 det(grad u).
     """

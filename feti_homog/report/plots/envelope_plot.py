@@ -91,8 +91,10 @@ def _curve(axes: Axes, places: Array, mode: Array) -> LineCollection:
 
 
 def _limit(axes: Axes, places: Array) -> list[str]:
-    """Let the axes hold all loads (n, 2), or those that are not far away from the others, and zero; what is not shown,
-    in words."""
+    """Let the axes hold all loads (n, 2), or those that are not far away from the others, and zero.
+
+    What is not shown, in words.
+    """
     size = np.linalg.norm(places, axis=1)
     usual = float(np.median(size))
     far = size > FARTHEST * usual

@@ -45,8 +45,10 @@ class LoadLabels:
         return cls(given=document["case"][analysis.name]["to"] if analysis.picture else None)
 
     def words(self, attributes: Any) -> list[str]:
-        """Return the strains that are seen, and the temperature, of a state with these attributes, as formulas; of
-        a path on which many are seen the leading one and its stress; of a load what it gives."""
+        """Return the strains that are seen, and the temperature, of a state with these attributes, as formulas.
+
+        Of a path on which many are seen the leading one and its stress; of a load what it gives.
+        """
         if self.given is not None:
             return [_formula(name, value) for name, value in self.given.items()]
         strain, temperature = np.asarray(attributes["strain"]), float(attributes.get("temperature", 0.0))

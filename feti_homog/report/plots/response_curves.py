@@ -72,8 +72,11 @@ def _symbol(stress: str) -> str:
 
 
 def _path(document: Document) -> Figure:
-    """Stresses against the leading strain; below, they and the numbers of bonded, open and closed nodes against the
-    number of the point, for the first folds back. Some points are numbered in all three."""
+    """Stresses against the leading strain.
+
+    Below, they and the numbers of bonded, open and closed nodes against the number of the point, for the first folds
+    back. Some points are numbered in all three.
+    """
     points, case = document["path"], document["case"]
     component, shown = path_curves.leading_component(document), path_curves.shown_stresses(document)
     strains, stress = (np.array([point[name] for point in points]) for name in ("strain", "stress"))

@@ -46,8 +46,10 @@ def figure(found: FibreStatistics, name: str, model: str) -> Figure:
 
 
 def fibres(axes: Axes, found: FibreStatistics) -> None:
-    """Draw the fibres in the colours of their local fractions; parts outside a periodic cell return on the other
-    side."""
+    """Draw the fibres in the colours of their local fractions.
+
+    Parts outside a periodic cell return on the other side.
+    """
     pattern, fractions = found.pattern, np.where(found.cells.whole, found.cells.fractions, np.nan)
     shifts = np.array(list(product((-1, 0, 1), repeat=2)) if pattern.periodic else [(0, 0)]) * pattern.size
     centres = (pattern.wrapped if pattern.periodic else pattern.centres) + shifts[:, None]

@@ -168,9 +168,11 @@ class Coordinate:
 
 
 def coordinate(file: Any, edges: InterfaceEdges, body: int) -> Coordinate:
-    """Of a body that is a round fibre, or its coating, the direction of the normal, in degrees; of any other the arc
-    length, counterclockwise from where the normal is nearest to x1 (around each of its boundaries, if it has several,
-    one after the other)."""
+    """Of a body that is a round fibre, or its coating, the direction of the normal, in degrees.
+
+    Of any other the arc length, counterclockwise from where the normal is nearest to x1 (around each of its boundaries,
+    if it has several, one after the other).
+    """
     own = np.flatnonzero(file["interface/fibre"][:] == body)
     normal = file["interface/normal"][:]
     radius = file["fibre/radius"][:][np.isin(file["fibre/number"][:], file["interface/fibre_number"][:][own])]

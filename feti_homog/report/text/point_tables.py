@@ -56,8 +56,10 @@ def all_numbers(key: str, document: Document, label: str, numbers: Sequence[int]
 
 
 def angle_table(points: Sequence[Point], label: str) -> Table:
-    """Return a row for each angle: stiffnesses or stresses, and the states of the interface nodes; `label` is the
-    unit of stresses in brackets, or empty."""
+    """Return a row for each angle: stiffnesses or stresses, and the states of the interface nodes.
+
+    `label` is the unit of stresses in brackets, or empty.
+    """
     stiff = "stiffness" in points[0]
     entries = shown_entries(points) if stiff else {}
     counts = COUNTS if len(entries) <= len(ENTRIES) else []

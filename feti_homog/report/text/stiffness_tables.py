@@ -39,8 +39,10 @@ Document = Mapping[str, Any]
 
 
 def stiffnesses(document: Document, label: str, under_minus: str = "Under minus E") -> list[Table]:
-    """L^ef, also under minus the unit strains, to the digit that is the last of its largest entry; `label` is the unit
-    of stresses in brackets, or empty."""
+    """L^ef, also under minus the unit strains, to the digit that is the last of its largest entry.
+
+    `label` is the unit of stresses in brackets, or empty.
+    """
     titles = {"effective_stiffness": "Effective stiffness", "effective_stiffness_compression": under_minus}
     return [_matrix(f"{title}{label}", document[key]) for key, title in titles.items() if document.get(key) is not None]
 

@@ -100,8 +100,10 @@ def convergence_names(table: SweepTable) -> tuple[str, ...]:
 
 
 def _strength_names(table: SweepTable) -> tuple[str, ...]:
-    """Of the stress along the leading strain of paths, the first and the largest; of a given stress the strain at the
-    end instead of the latter."""
+    """Of the stress along the leading strain of paths, the first and the largest.
+
+    Of a given stress the strain at the end instead of the latter.
+    """
     document = next((d for d in table.finished if d.get("path")), None)
     if document is None:
         return ()

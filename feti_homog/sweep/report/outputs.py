@@ -24,8 +24,10 @@ def numbers(planes: Iterable[str | None]) -> tuple[int, ...]:
 
 
 def outputs(document: Document, numbers: Sequence[int] = PLANE_STRAIN.numbers) -> dict[str, float]:
-    """Return the numbers of a result.json by the names of the table's columns; `numbers` of strains in the plane,
-    in names."""
+    """Return the numbers of a result.json by the names of the table's columns.
+
+    `numbers` of strains in the plane, in names.
+    """
     solver = document["solver"]
     found = _cell(document["cell"])
     found |= {name: solver[name] for name in ("ranks", "subdomains", "dofs", "multipliers")}

@@ -33,8 +33,10 @@ class BondLaw(ABC):
 
     @abstractmethod
     def utilisation(self, traction: Float) -> Float:
-        """(k,) share of their strength that tractions (k, 2), or with that along the fibre (k, 3), use; compression
-        uses none."""
+        """(k,) share of their strength that tractions (k, 2), or with that along the fibre (k, 3), use.
+
+        Compression uses none.
+        """
 
     @abstractmethod
     def breaks(self, traction: Float) -> dict[str, float]:

@@ -68,8 +68,10 @@ def test_an_accuracy_chooses_the_order_with_fewer_nodes(young, accuracy):
 
 
 def test_the_estimate_of_isotropic_phases_in_closed_form():
-    """In plane strain the eigenvalues are the ratios of the bulk moduli k = mu / (1 - 2 nu) and of the shear moduli mu;
-    kappa is the largest k / mu."""
+    """In plane strain the eigenvalues are the ratios of the bulk moduli k = mu / (1 - 2 nu) and of the shear moduli mu.
+
+    Kappa is the largest k / mu.
+    """
     stiff, soft = Isotropic(young=70.0, poisson=0.2), Isotropic(**MATRIX)
     shear = (70.0 / 1.2) / (3.5 / 1.35)
     bulk = shear * 0.3 / 0.6

@@ -91,8 +91,10 @@ COMPLIANCE = np.diag([2.0, 3.0, 1.0, 6.0, 7.0, 5.0]) - 0.5 * (np.ones((6, 6)) - 
 
 
 def mixed(waypoints: Any, stresses: Any, plane: str = "generalized", **more: Any) -> dict[str, Any]:
-    """Return a path through stresses (n, 6) or (n, 3) of one elastic law; components in the plane are the first, second
-    and last."""
+    """Return a path through stresses (n, 6) or (n, 3) of one elastic law.
+
+    Components in the plane are the first, second and last.
+    """
     stresses = np.array(stresses, float)
     places = list(range(6)) if plane == "generalized" else [0, 1, 5]
     law = COMPLIANCE[np.ix_(places, places)]

@@ -23,8 +23,10 @@ DIGITS = 1e-6  # of the seven that CalculiX prints
 
 
 def deck(card):
-    """Return the cube on supports without reactions; steps of unit stresses in the order of PAIRS, then of
-    temperature."""
+    """Return the cube on supports without reactions.
+
+    Steps of unit stresses in the order of PAIRS, then of temperature.
+    """
     nodes = "\n".join(f"{k}, {x}., {y}., {z}." for k, (x, y, z) in enumerate(CORNERS, start=1))
     steps = [f"*CLOAD, OP=NEW\n{forces(pair)}\n*TEMPERATURE, OP=NEW\nALL, 0." for pair in PAIRS]
     steps += [f"*CLOAD, OP=NEW\n1, 1, 0.\n*TEMPERATURE, OP=NEW\nALL, {HOTTER}"]
