@@ -66,7 +66,7 @@ class Outlines(Protocol):
         """(k, ...) reach from the centre along unit vectors n (k, ..., 2)."""
 
     def parting(self, first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
-        """Return normals n (p, 2) of the lines that separate pairs (p,), (p,) best, and the reach r (p,) of both along n.
+        """Return normals n (p, 2) of the lines that best separate pairs (p,), (p,), and their reach r (p,) along n.
 
         v (p, 2) are the vectors from first to second; the gap, negative if they overlap, is n . v - r.
         """
