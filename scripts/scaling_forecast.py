@@ -63,7 +63,7 @@ def assumptions(rates: Rates, machine: Machine) -> list[str]:
 
 
 def _powers(f: Factor, of: str) -> str:
-    """The seconds of a factor and of solves in words."""
+    """Return the seconds of a factor and of solves in words."""
     return f"{_shares(f.factor)} {of}^{f.factor_power:.2f} and {_shares(f.solve)} {of}^{f.solve_power:.2f}"
 
 

@@ -252,7 +252,7 @@ def fastest(work: Callable[[], object]) -> float:
 
 
 def seconds_of(work: Callable[[], object]) -> float:
-    """That it takes."""
+    """Return the seconds that `work` takes."""
     start = time.perf_counter()
     work()
     return time.perf_counter() - start

@@ -43,7 +43,7 @@ def faults(mesh: RawMesh) -> list[str]:
 
 
 def with_bent_edges(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
-    """The mesh whose interface edges follow the circle through their ends and their middle node.
+    """Return the mesh whose interface edges follow the circle through their ends and their middle node.
 
     Those already on circles stay there, and so do straight ones, whose middle node is within STRAIGHT of the chord.
     Edges are flipped where a triangle has two on one curve, which has no corner there.

@@ -31,7 +31,7 @@ class Loop:
 
 
 def with_circles(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
-    """The mesh with the round interfaces as circles, their nodes moved onto them exactly.
+    """Return the mesh with the round interfaces as circles, their nodes moved onto them exactly.
 
     A closed interface between two phases is a circle if all its nodes are within ROUNDNESS_TOLERANCE radii of one,
     there are at least MIN_CIRCLE_EDGES edges, none on a side of the cell or longer than the radius, and no corner of
@@ -65,7 +65,7 @@ def with_circles(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
 
 
 def closed_loops(mesh: CoarseMesh, pairs: Int32, size: Float, least: int) -> list[Loop]:
-    """The interfaces that are simple closed curves of at least so many edges and contractible on the torus."""
+    """Return the interfaces that are simple closed curves of at least so many edges and contractible on the torus."""
     if len(pairs) == 0:
         return []
     classes, ends = np.unique(mesh.representative[pairs], return_inverse=True)
@@ -139,7 +139,7 @@ def _through(images: list[tuple[Float, Int]], bends: Float) -> bool:
 
 
 def _images(mesh: CoarseMesh, loop: Loop, circle: Float, own: Int32) -> list[tuple[Float, Int]]:
-    """The images of a circle in the plane, each with the numbers of its edges among the loop's own (a, 2)."""
+    """Return the images of a circle in the plane, each with the numbers of its edges among the loop's own (a, 2)."""
     return [(np.append(circle[:2] - step, circle[2]), mine) for step, mine in loop_images(mesh, loop, own)]
 
 
@@ -160,7 +160,7 @@ def _copied(mesh: CoarseMesh, points: Float, size: Float) -> Float:
 
 
 def _with_arcs(mesh: CoarseMesh, circles: list[Float], arc_edges: list[Int32]) -> CoarseMesh:
-    """The mesh with these circles (3,) and their edges (a, 2)."""
+    """Return the mesh with these circles (3,) and their edges (a, 2)."""
     counts = np.array([len(own) for own in arc_edges], dtype=np.intp)
     return replace(
         mesh,
@@ -171,7 +171,7 @@ def _with_arcs(mesh: CoarseMesh, circles: list[Float], arc_edges: list[Int32]) -
 
 
 def _without_double_arcs(mesh: CoarseMesh) -> CoarseMesh:
-    """The mesh with edges flipped where a triangle has two on one circle; if this fails, it is a polygon."""
+    """Return the mesh with edges flipped where a triangle has two on one circle; if this fails, it is a polygon."""
     nodes = len(mesh.points)
     triangles = flip_double_arcs(mesh.triangles, mesh.phase, mesh.arc_edges, mesh.arc_circle, nodes)
     bad, _ = double_arcs(triangles, mesh.arc_edges, mesh.arc_circle, nodes)

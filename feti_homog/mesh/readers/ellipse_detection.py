@@ -45,7 +45,7 @@ class Ellipse:
 
 
 def with_ellipses(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
-    """The mesh whose elliptic interfaces that are no circles follow their ellipses.
+    """Return the mesh whose elliptic interfaces that are no circles follow their ellipses.
 
     A closed interface between two phases is an ellipse if all its nodes are within ROUNDNESS_TOLERANCE of one, and it
     has at least MIN_ELLIPSE_EDGES edges, none on a side of the cell, none that spans more than one radian of its
@@ -77,7 +77,7 @@ def _follow(ellipse: Ellipse, ends: Float, bends: Float) -> bool:
 
 
 def _with_arcs(mesh: CoarseMesh, found: list[Ellipse], arcs: list[Int32]) -> CoarseMesh:
-    """The mesh with these ellipses and their edges (a, 2) as well."""
+    """Return the mesh with these ellipses and their edges (a, 2) as well."""
     if not found:
         return mesh
     edges, number = np.concatenate(arcs), np.repeat(np.arange(len(arcs), dtype=np.int32), [len(own) for own in arcs])
@@ -92,7 +92,8 @@ def _with_arcs(mesh: CoarseMesh, found: list[Ellipse], arcs: list[Int32]) -> Coa
 
 
 def fit(places: Float) -> Ellipse | None:
-    """The ellipse through a closed chain of places (k, 2) in order; None if they are on none or too far apart.
+    """Return the ellipse through a closed chain of places (k, 2) in order; None if they are on none or too far
+    apart.
 
     The conic d.A.d + b.d = 1 that fits best, d from the mean of the places, is |F^-1 (d - c)| = 1.
     """

@@ -52,7 +52,7 @@ def load(path: Path) -> RawMesh:
 
 
 def _triangles(content: MshContent, elements: Mapping[int, Elements]) -> tuple[list[Block], list[tuple[str, ...]]]:
-    """The triangles, and the names of the physical surfaces of their entities."""
+    """Return the triangles, and the names of the physical surfaces of their entities."""
     blocks, groups = list[Block](), list[tuple[str, ...]]()
     for kind in NODES_OF_TRIANGLES:
         if kind in elements:
@@ -65,7 +65,7 @@ def _triangles(content: MshContent, elements: Mapping[int, Elements]) -> tuple[l
 
 
 def _by_entity(blocks: list[Elements]) -> Elements:
-    """The elements of one type, by increasing number of their entity."""
+    """Return the elements of one type, by increasing number of their entity."""
     numbers, nodes, entity = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
     order = np.argsort(entity, kind="stable")
     return numbers[order], nodes[order], entity[order]
@@ -132,7 +132,7 @@ def _curves_of_content(content: MshContent, elements: Mapping[int, Elements]) ->
 
 
 def triangles_of_model(gmsh: ModuleType) -> RawMesh:
-    """The triangles of gmsh's current model, with the nodes that they use."""
+    """Return the triangles of gmsh's current model, with the nodes that they use."""
     blocks, groups = list[Block](), list[tuple[str, ...]]()
     for _, entity in gmsh.model.getEntities(2):
         for kind, count in NODES_OF_TRIANGLES.items():

@@ -58,26 +58,26 @@ class RawMesh:
         return self.curves.get(DEBONDED, np.zeros((0, 2), np.int64))
 
     def node(self, number: int) -> str:
-        """A node in words."""
+        """Return a node in words."""
         return f"node {self.node_tags[number]} {at(self.points[number])}"
 
     def element(self, number: int) -> str:
-        """An element in words, with the position of its centre."""
+        """Return an element in words, with the position of its centre."""
         centre = self.points[self.triangles[number]].mean(axis=0)
         return f"element {self.element_tags[number]} at {at(centre)}"
 
     def edge(self, pair: Iterable[int]) -> str:
-        """An edge in words."""
+        """Return an edge in words."""
         return "the edge between " + " and ".join(self.node(int(end)) for end in pair)
 
 
 def at(point: Float) -> str:
-    """A position in words, (x, y)."""
+    """Return a position in words, (x, y)."""
     return f"({point[0]:.9g}, {point[1]:.9g})"
 
 
 def first_of(names: Iterable[str], total: int, shown: int = 3) -> str:
-    """The first few names and how many more there are."""
+    """Return the first few names and how many more there are."""
     listed = ", ".join(name for name, _ in zip(names, range(shown), strict=False))
     return listed if total <= shown else f"{listed} and {total - shown} more"
 

@@ -28,13 +28,13 @@ LOADERS = {".msh": gmsh_file.load, ".inp": abaqus_file.load, ".vtu": vtk_file.lo
 
 
 def read_cell(cell: Cell) -> CoarseMesh:
-    """The user's mesh of a cell, repaired as the case asks for.  Raises as `read`."""
+    """Return the user's mesh of a cell, repaired as the case asks for. Raises as `read`."""
     assert cell.file is not None
     return read(cell.file, cell.snap_tolerance if cell.repair == "snap" else None)
 
 
 def read(path: Path, snap: float | None = None) -> CoarseMesh:
-    """The coarse mesh in a file of one of the LOADERS, moved to [0, width] x [0, height].
+    """Return the coarse mesh in a file of one of the LOADERS, moved to [0, width] x [0, height].
 
     It consists of triangles of three or six nodes, in either sense, in physical surfaces "matrix", "fibre", "glass",
     ..., fills a rectangle but for voids, and has matching nodes on opposite sides. Lines in the curve
@@ -56,7 +56,7 @@ def read(path: Path, snap: float | None = None) -> CoarseMesh:
 
 
 def made(raw: RawMesh, path: str) -> CoarseMesh:
-    """The coarse mesh of triangles in phases; `path` names them in faults. Raises as `read`."""
+    """Return the coarse mesh of triangles in phases; `path` names them in faults. Raises as `read`."""
     _refuse(path, mesh_checks.not_planar(raw), mesh_checks.flat(raw), mesh_checks.duplicate_nodes(raw))
     raw = _turned(raw)
     _refuse(path, bent_edges.faults(raw))
@@ -78,7 +78,7 @@ def made(raw: RawMesh, path: str) -> CoarseMesh:
 
 
 def _loaded(path: Path) -> RawMesh:
-    """The triangles of a file, as it has them."""
+    """Return the triangles of a file, as it has them."""
     try:
         if path.exists() and not path.is_file():
             raise MeshError("not a file that can be read")
@@ -97,13 +97,15 @@ def _refuse(path: str, *faults: Sequence[str]) -> None:
 
 
 def _line(path: str, fault: str) -> str:
-    """The fault of a file in one line; characters that are not printable, which its words may have, are escaped."""
+    """Return the fault of a file in one line; characters that are not printable, which its words may have, are
+    escaped."""
     line = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in f"{path}: {fault}"[: LONGEST_LINE + 1])
     return line if len(line) <= LONGEST_LINE else f"{line[:LONGEST_LINE]}..."
 
 
 def _turned(raw: RawMesh) -> RawMesh:
-    """The mesh with all triangles counter-clockwise; middle nodes are those of edges, whichever way these run."""
+    """Return the mesh with all triangles counter-clockwise; middle nodes are those of edges, whichever way these
+    run."""
     clockwise = areas(raw.points[:, :2], raw.triangles) < 0
     return replace(raw, triangles=np.where(clockwise[:, None], raw.triangles[:, ::-1], raw.triangles))
 
@@ -127,7 +129,7 @@ def _matched(plane: Float, size: Float) -> Float:
 
 
 def _coarse_mesh(raw: RawMesh, plane: Float, size: Float) -> CoarseMesh:
-    """A checked mesh without circles."""
+    """Return a checked mesh without circles."""
     names = [group[0] for group in raw.groups]
     phases = ("matrix", *sorted(set(names) - {"matrix"}))
     number = np.array([phases.index(name) for name in names], dtype=np.int32)

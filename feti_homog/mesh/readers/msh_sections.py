@@ -76,7 +76,7 @@ class Section:
         raise NotImplementedError
 
     def checked(self, values: Numbers) -> Int:
-        """The numbers as whole ones."""
+        """Return the numbers as whole ones."""
         if len(values) == 0 or (np.abs(values.max()) < LARGEST and np.abs(values.min()) < LARGEST):
             whole = values.astype(np.int64)
             if np.array_equal(whole, values):
@@ -187,7 +187,8 @@ def end_of(name: str, content: bytes, start: int) -> int:
 
 
 def chain(following: Int) -> Int:
-    """Indices that are met from 0 on, where following[i] comes after i, in order; the last one's is out of range."""
+    """Return indices that are met from 0 on, where following[i] comes after i, in order; the last one's is out of
+    range."""
     size = len(following)
     onward = np.clip(following, 0, size)
     graph = csr_array((np.ones(size), onward, np.append(np.arange(size + 1), size)), shape=(size + 1, size + 1))

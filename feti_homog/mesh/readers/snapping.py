@@ -13,8 +13,8 @@ from feti_homog.typing import Float, Int
 
 
 def snapped(raw: RawMesh, tolerance: float) -> tuple[RawMesh, float]:
-    """The mesh with the nodes of its outer edges on the sides of a rectangle and opposite each other, and how far the
-    one that moved most has moved.
+    """Return the mesh with the nodes of its outer edges on the sides of a rectangle and opposite each other, and
+    how far the one that moved most has moved.
 
     A side lies at the median of the nodes within `tolerance`, relative to the width, of the outermost. Partners, each
     other's nearest within the tolerance along the side, both move to the middle between them. Middle nodes of
@@ -59,7 +59,7 @@ def _match(plane: Float, low: Int, high: Int, along: int, reach: float) -> None:
 
 
 def _with_straight_sides(raw: RawMesh, sides: list[Int]) -> RawMesh:
-    """The mesh with middle nodes on its sides midway between their ends."""
+    """Return the mesh with middle nodes on its sides midway between their ends."""
     middles = raw.middles
     on_side = np.zeros(len(middles.tags), bool)
     for side in sides:

@@ -18,7 +18,7 @@ VALIDATORS = [(rule.schema, Draft202012Validator(rule.schema)) for rule in RULES
 
 
 def values_in(value: Any, depth: int) -> Iterator[Any]:
-    """The value and, to some depth, those in it."""
+    """Yield the value and, to some depth, those in it."""
     yield value
     if depth and isinstance(value, dict | list):
         for item in value.values() if isinstance(value, dict) else value:
