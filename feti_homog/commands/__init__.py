@@ -1,5 +1,6 @@
 """Commands of `feti-homog`, one module each: `add(actions)` gives the parser its options and its action.
 
-May use every floor but `cli`.  The modules import what a command computes with in its action: `--help` and `--version`
-start without NumPy and MPI.  Main entry: `cli.main`.
+Imports `analysis`, `api`, `case`, `fibres`, `mesh`, `microstructure`, `parallel`, `petsc`, `report`, `results`,
+`runtime`, `sweep` and `verify`.  Modules import the computation inside their action, so that `--help` and `--version`
+start without NumPy and MPI.  Main entries: `run` and the other commands.
 """

@@ -1,9 +1,10 @@
 """The dual problem of the torn cell: subdomains, multipliers, dual operator, coarse spaces, preconditioners, solver.
 
-May use `fem`, `mesh`, `parallel` and `petsc`.  Main entry: `solver.FetiSolver`.  Its own floors, each on those below:
+Imports `fem`, `feti.coarse`, `feti.decomposition`, `feti.operators`, `feti.preconditioners`, `mesh`, `parallel`,
+`petsc` and `runtime`.  Main entry: `solver.FetiSolver`. Its own floors, each on those below:
 
-    solver, view, factory, solver_plan, krylov
-    coarse           natural and adaptive coarse space, the preconditioner with the latter, projector
+    solver, factory, solver_plan, krylov, active_jumps
+    coarse           natural and adaptive coarse space, the preconditioner with the latter
     preconditioners  lumped, Dirichlet, influence columns
     operators        S and S+ of subdomains, the dual operator F
     decomposition    subdomains, kernels, the jump operator B

@@ -1,4 +1,4 @@
 """Where fibres lie: random, regular, matched and tabulated arrangements, windows cut from images.
 
-May use `case`, `microstructure` and `errors`; `outlines`, below `case`, none of them.  Main entry: `arrange.arrange`.
+Imports `case`, `fibres.outlines` and `microstructure`.  Main entry: `arrange.arrange`.
 """

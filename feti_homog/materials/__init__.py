@@ -1,5 +1,4 @@
 """Materials: their constants, laws and bounds, Voigt's notation, closed formulas of the mechanics of composites.
 
-May use `schema`, `runtime` and `errors`.  Main entries: `forms`, `laws`, `bounds`, `spatial_constants`,
-`estimates.methods`.
+Imports `runtime` and `schema`.  Main entries: `forms`, `laws`, `bounds`, `spatial_constants`, `estimates.methods`.
 """

@@ -1,5 +1,5 @@
 """The coarse periodic mesh, its topology on the torus, submeshes and their refinement.
 
-May use `fibres`, `case` and `errors`.  Main entries: `fill.gmsh_mesher.begin`, `readers.msh_reader.read`,
-`periodic_topology.Torus` and `refinement.refine`.  gmsh is loaded where there is something to fill.
+Imports `case` and `fibres`.  Main entries: `fill.gmsh_mesher.begin`, `readers.msh_reader.read`,
+`periodic_topology.Torus` and `refinement.refine`. gmsh is loaded where there is something to fill.
 """

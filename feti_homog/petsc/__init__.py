@@ -1,4 +1,4 @@
 """PETSc's options and their faults, its libraries, errors of its callbacks, C functions that petsc4py lacks.
 
-May use `parallel`, `runtime` and `errors`.  Main entry: `options.case_options`.
+Imports `parallel` and `runtime`.  Main entry: `options.case_options`.
 """

@@ -18,8 +18,8 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from feti_homog.parallel.mpi_errors import on_root, on_root_only
 from feti_homog.errors import CaseError
+from feti_homog.parallel.mpi_errors import on_root, on_root_only
 from feti_homog.results import atomic
 
 FOLDER, DROPPED = "checkpoint", "checkpoint.dropped"  # the second while it is removed

@@ -6,9 +6,9 @@ import contextlib
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
-from feti_homog.version import __version__
 from feti_homog.errors import FetiHomogError
 from feti_homog.results import atomic
+from feti_homog.version import __version__
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -4,29 +4,17 @@ Lengths are in the unit of the cell, stresses in that of the moduli.  n nodes, m
 are all of the file's, of which each rank has a part; nodes are torn, so that each subdomain has its own.
 """
 
-
 from __future__ import annotations
-
 
 import typing
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from feti_homog.materials.voigt import AXIAL_STRESSES, SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS, STRESSES
+from feti_homog.results.field_views import GROUP_OF_STATES, SPATIAL_VIEWS, VIEWS, View
 from feti_homog.runtime.records import LENGTH, STRESS, Description, described, descriptions, type_words
-from feti_homog.materials.voigt import STRAINS, STRESSES
-from feti_homog.results.field_views import GROUP_OF_STATES, VIEWS, View
 from feti_homog.typing import AnyInt, Float, Float32
-
-
-from collections.abc import Iterator
-from dataclasses import dataclass
-
-from feti_homog.runtime.records import LENGTH, STRESS, described
-from feti_homog.materials.voigt import AXIAL_STRESSES, SPATIAL_STRAINS, SPATIAL_STRESSES
-from feti_homog.results.field_views import GROUP_OF_STATES, SPATIAL_VIEWS
-from feti_homog.typing import Float, Float32
-
 
 PROGRAM = "feti_homog"
 
@@ -179,7 +167,7 @@ def attributes(part: Any) -> dict[str, Any]:
 
 
 def rows_of(description: Description) -> str:
-    """Return the meaning of the rows of a dataset: `n` nodes, `m` elements, `k` interface nodes, `f` fibres; empty for attributes."""
+    """Return the kind of rows of a dataset: `n` nodes, `m` elements, `k` interface nodes, `f` fibres; empty if none."""
     first = description.shape[1:2]
     return first if first in ("n", "m", "k", "f") else ""
 

@@ -7,18 +7,14 @@ import os
 
 import numpy as np
 
-from feti_homog.version import __version__
-from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.results.field_layout import FibrePart, Header, InterfacePart, MeshPart
-from feti_homog.fem.assembly import element_strain
 from feti_homog.homogenization import phase_laws
-from feti_homog.homogenization.averaging import Response, displacement, fluctuation
-from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.materials import laws, voigt
-from feti_homog.results.field_layout import StatePart
-from feti_homog.results.field_layout import SpatialStatePart
-from feti_homog.typing import Float, Float32
+from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.recovered_fields import out_of_plane, recover
+from feti_homog.homogenization.unit_cell import TornCell
+from feti_homog.materials import voigt
+from feti_homog.results.field_layout import FibrePart, Header, InterfacePart, MeshPart, SpatialStatePart, StatePart
+from feti_homog.typing import Float, Float32
+from feti_homog.version import __version__
 
 
 def header(cell: TornCell) -> Header:

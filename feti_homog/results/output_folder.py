@@ -15,8 +15,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from feti_homog.materials.voigt import SPATIAL_STRAINS
 from feti_homog.errors import CaseError, FetiHomogError
+from feti_homog.materials.voigt import SPATIAL_STRAINS
 from feti_homog.parallel.mpi_errors import on_root
 from feti_homog.results import atomic, checkpoint, event_log, field_file, result_json
 from feti_homog.results.field_layout import PROGRAM

@@ -12,8 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.case.mixed_load import TEMPERATURE
-from feti_homog.case.mixed_load import MixedLoad, Strain, completed, first_named
+from feti_homog.case.mixed_load import TEMPERATURE, MixedLoad, Strain, completed, first_named
 from feti_homog.materials.plane_state import plane_state_of
 from feti_homog.typing import Float
 

@@ -1,4 +1,4 @@
 """The process: memory, progress, locks of files, interrupts, standard streams; records that become documents.
 
-May use `errors` alone.  Main entries: `progress.Progress`, `file_locks`, `standard_streams`.
+Imports nothing.  Main entries: `progress.Progress`, `file_locks`, `standard_streams`.
 """

@@ -128,12 +128,6 @@ def modules_of(imported: set[str], names: list[str]) -> set[str]:
     return {name if name in names else name.rpartition(".")[0] for name in imported}
 
 
-@pytest.mark.parametrize("path", sorted(PACKAGE.rglob("__init__.py")), ids=lambda path: str(path.parent.name))
-def test_packages_say_what_they_are_for(path):
-    words = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
-    assert "Main entr" in words or path.parent == PACKAGE
-
-
 def test_importing_starts_nothing():
     program = "import sys, feti_homog, feti_homog.case.case, feti_homog.cli; print(*sys.modules)"
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)

@@ -1,4 +1,5 @@
 """Coarse spaces: rigid-body motions (natural) and soft modes of the subdomains beside them (adaptive, GenEO).
 
-May use `preconditioners`, `operators`, `decomposition` and `linalg`.  Main entries: `natural` and `balanced`.
+Imports `fem`, `feti`, `feti.decomposition`, `feti.linalg`, `feti.operators`, `feti.preconditioners`, `mesh`, `parallel`
+and `runtime`.  Main entries: `natural.NaturalCoarseSpace`, `adaptive.AdaptiveCoarseSpace` and `adaptive.Balanced`.
 """

@@ -1,4 +1,5 @@
 """Preconditioners of the dual problem: none, lumped and Dirichlet (scaled by stiffness), and influence columns.
 
-May use `operators`, `decomposition` and `linalg`.  Main entries: `scaled` and `influence`.
+Imports `feti`, `feti.decomposition`, `feti.linalg`, `feti.operators` and `parallel`.  Main entries: `scaled` and
+`exact_inverse`.
 """

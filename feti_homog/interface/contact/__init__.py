@@ -1,4 +1,4 @@
-"""Which debonded nodes are open and which closed, at one load.
+"""Open and closed nodes of debonded interfaces at one load.
 
-May use `interface.loads`.  Main entry: `contact_problem.ContactProblem`.
+Imports `feti`, `interface.loads`, `materials`, `mesh` and `parallel`.  Main entry: `contact_problem.ContactProblem`.
 """

@@ -1,4 +1,4 @@
 """Paths of load: from event to event, onsets, later legs.
 
-May use `interface.laws`.  Main entry: `path_following`.
+Imports `feti`, `interface.contact`, `interface.laws` and `interface.loads`.  Main entry: `path_following`.
 """

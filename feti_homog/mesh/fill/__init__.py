@@ -1,4 +1,5 @@
 """Generated cells: from an arrangement of fibres to a coarse mesh.
 
-May use `mesh.readers`.  Main entries: `gmsh_mesher.begin` and `drawing`.
+Imports `case`, `fibres`, `mesh`, `mesh.outline`, `mesh.readers`, `mesh.sizes` and `mesh.tiles`.  Main entries:
+`gmsh_mesher.begin` and `unmeshed_cell`.
 """

@@ -1,4 +1,5 @@
-"""Pictures, drawn from the files of a result folder; loads Matplotlib.
+"""Pictures, drawn from the files of a result folder.
 
-May use `results` and `report.text`.  Main entry: `figures.plot`.
+Imports `case`, `materials`, `microstructure`, `report.text` and `results`.  Loads Matplotlib.  Main entry:
+`figures.plot`.
 """

@@ -1,4 +1,5 @@
-"""What the cases of a sweep come to: tables, statistics over realisations, pictures.
+"""Tables, statistics over realisations and pictures of a sweep.
 
-May use `report` and the floors below it.  Main entries: `sweep_table.SweepTable`, `tables.write` and `figures.plot`.
+Imports `case`, `materials`, `microstructure`, `report`, `results`, `runtime` and `schema`.  Main entries:
+`sweep_table.SweepTable`, `tables.write` and `figures.plot`.
 """

@@ -1,4 +1,4 @@
-"""Laws of bonds by formulas of their own, to check results by; a module for each of `interface/laws`.
+"""Laws of bonds by independent formulas, a module for each of `interface/laws`.
 
-May use `case.bond_laws`.  Main entry: `law.law_of`.
+Imports `case`.  Main entry: `law.law_of`.
 """

@@ -7,8 +7,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from feti_homog.results.path_curves import changed_components, ends_of_legs, first_drop, first_leg, leading_component, load_controlled, named_components, rising_strain, shown_stresses, targets, what_rises
 from feti_homog.results.kept_points import chosen, chosen_states
+from feti_homog.results.path_curves import (
+    changed_components,
+    ends_of_legs,
+    first_drop,
+    first_leg,
+    leading_component,
+    load_controlled,
+    named_components,
+    rising_strain,
+    shown_stresses,
+    targets,
+    what_rises,
+)
 
 
 def point(load: float, stiffness: float, broke: int = 1) -> dict[str, Any]:

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from feti_homog.errors import CaseError, FetiHomogError
-
 from feti_homog.results import seals
 
 BLOCK = 1000
