@@ -18,23 +18,49 @@ from feti_homog.typing import Int
 TRIANGLE = re.compile(r"(CPE|CPS|CPEG|DC2D|M3D|S|STRI)(3|6|65)[A-Z]*")
 LINE = re.compile(r"(T2D|T3D|B2|B3|DC1D)\w*")
 LINE_NODES = (2, 3)
+# Keywords that make or move nodes and elements, and the parameters that are read of others that have them.
+REFUSED = {
+    *("SYSTEM", "NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "IMPERFECTION", "IMPORT", "PARAMETER"),
+    "SYMMETRIC MODEL GENERATION",
+}
+PARAMETERS = {
+    "NODE": {"NSET", "SYSTEM"},
+    "ELEMENT": {"TYPE", "ELSET"},
+    "ELSET": {"ELSET", "GENERATE", "INTERNAL", "INSTANCE", "UNSORTED"},
+}
+# Members that sets may have together, in any file; in one with more characters as many as these.
+MOST_MEMBERS = 10**6
 # From which of its sets an element has its phase: those before come first.
 BY_SECTION, BY_SET, BY_ELEMENTS = range(3)
 
 
 @dataclass
 class _Content:
-    """Nodes, triangles and lines (each with its nodes) of a file, and its sets with their elements."""
+    """Nodes, triangles and lines (each with its nodes) of a file, and its sets with their elements.
 
+    Attributes:
+        left: how many members sets may still get from ranges and from other sets.
+        is_assembly: whether what follows belongs to the assembly, and not to a part or an instance of it.
+    """
+
+    left: int
     nodes: dict[int, list[float]] = field(default_factory=dict)
     triangles: dict[int, list[int]] = field(default_factory=dict)
     lines: dict[int, list[int]] = field(default_factory=dict)
     sets: dict[tuple[int, str], set[int]] = field(default_factory=dict)
     sections: list[str] = field(default_factory=list)
     parts: int = 0
+    instances: int = 0
+    is_assembly: bool = False
 
     def members(self, level: int, name: str) -> set[int]:
         return self.sets.setdefault((level, name), set())
+
+    def spend(self, members: int) -> None:
+        """Count members that a set gets; a fault if they are more than a file of this length has elements."""
+        self.left -= members
+        if self.left < 0:
+            raise ValueError("its sets have more members than a file of this length can have elements")
 
 
 def load(path: Path) -> RawMesh:
@@ -48,7 +74,7 @@ def load(path: Path) -> RawMesh:
         MeshError: it is damaged, or has other elements.
     """
     text = path.read_text(encoding="utf-8", errors="replace")
-    content = _Content()
+    content = _Content(left=max(MOST_MEMBERS, len(text)))
     for number, words, rows in _blocks(text):
         try:
             _take(content, words, rows)
@@ -80,7 +106,7 @@ def _blocks(text: str) -> Iterator[tuple[int, dict[str, str], list[list[str]]]]:
                 yield number, words, rows
             number, words, rows, open_line = place, _words(open_line), [], ""
         elif words:
-            rows.append([word.strip() for word in line.split(",") if word.strip()])
+            rows.append([word.strip() for word in line.rstrip(", \t").split(",")])
     if words:
         yield number, words, rows
 
@@ -93,17 +119,18 @@ def _words(line: str) -> dict[str, str]:
 
 
 def _integer(word: str) -> int:
-    try:
-        return int(word)
-    except ValueError:
-        raise ValueError(f"{toml_value(word)}: expected a whole number") from None
+    if not re.fullmatch(r"[+-]?[0-9]{1,15}", word):
+        raise ValueError(f"{toml_value(word)}: expected a whole number of at most 15 digits")
+    return int(word)
 
 
 def _real(word: str) -> float:
     try:
-        return float(word)
+        if "_" not in word and word.isascii():
+            return float(word)
     except ValueError:
-        raise ValueError(f"{toml_value(word)}: expected a number") from None
+        pass
+    raise ValueError(f"{toml_value(word)}: expected a number")
 
 
 def _name(word: str) -> str:
@@ -113,13 +140,19 @@ def _name(word: str) -> str:
 
 def _take(content: _Content, words: dict[str, str], rows: list[list[str]]) -> None:
     """Read one block."""
-    match words[""]:
-        case "PART":
-            content.parts += 1
+    keyword = words[""]
+    unread = [word for word in words if word and word not in PARAMETERS.get(keyword, words)]
+    if unread:
+        raise ValueError(f"its parameter {toml_value(unread[0])} is not read: write nodes and elements out without it")
+    if keyword in REFUSED:
+        raise ValueError("it makes or moves nodes or elements, and is not read: write them out")
+    match keyword:
+        case "PART" | "INSTANCE" | "END INSTANCE" | "ASSEMBLY" | "END ASSEMBLY":
+            _enter(content, keyword, rows)
         case "INCLUDE":
             raise ValueError("other files are not read: expected all in one file")
-        case "NODE":
-            content.nodes |= {_integer(row[0]): [*map(_real, row[1:4]), 0.0, 0.0][:3] for row in rows}
+        case "NODE" if not content.is_assembly:
+            _take_nodes(content, words, rows)
         case "ELEMENT":
             _take_elements(content, words, rows)
         case "ELSET" if "INSTANCE" not in words:
@@ -128,18 +161,40 @@ def _take(content: _Content, words: dict[str, str], rows: list[list[str]]) -> No
             content.sections.append(words["ELSET"])
 
 
+def _enter(content: _Content, keyword: str, rows: list[list[str]]) -> None:
+    """Begin or end a part, an instance or the assembly."""
+    content.parts += keyword == "PART"
+    content.instances += keyword == "INSTANCE"
+    content.is_assembly = keyword in ("ASSEMBLY", "END INSTANCE")
+    if keyword == "INSTANCE" and len(rows) > 1:
+        raise ValueError("its rotation is not read: rotate the part")
+
+
+def _take_nodes(content: _Content, words: dict[str, str], rows: list[list[str]]) -> None:
+    if words.get("SYSTEM", "r") != "r":
+        raise ValueError("its parameter SYSTEM is not read: expected Cartesian coordinates")
+    for tag, *place in rows:
+        number = _integer(tag)
+        if not place:
+            raise ValueError(f"node {number} has no coordinates")
+        if number in content.nodes:
+            raise ValueError(f"node {number} is there twice")
+        content.nodes[number] = [*map(_real, place[:3]), 0.0, 0.0][:3]
+
+
 def _take_elements(content: _Content, words: dict[str, str], rows: list[list[str]]) -> None:
     kind = words.get("TYPE", "").upper()
     counts = _node_counts(kind)
-    elements = {_integer(row[0]): [_integer(word) for word in row[1:]] for row in rows}
-    for tag, nodes in elements.items():
+    found = content.lines if counts == LINE_NODES else content.triangles
+    for row in rows:
+        tag, *nodes = map(_integer, row)
         if len(nodes) not in counts:
             raise ValueError(f"element {tag} has {len(nodes)} nodes: expected {' or '.join(map(str, counts))}")
         if tag in content.triangles or tag in content.lines:
             raise ValueError(f"element {tag} is there twice")
-    (content.lines if counts == LINE_NODES else content.triangles).update(elements)
-    if "ELSET" in words:
-        content.members(BY_ELEMENTS, words["ELSET"]).update(elements)
+        found[tag] = nodes
+        if "ELSET" in words:
+            content.members(BY_ELEMENTS, words["ELSET"]).add(tag)
 
 
 def _node_counts(kind: str) -> tuple[int, ...]:
@@ -156,11 +211,22 @@ def _take_set(content: _Content, words: dict[str, str], rows: list[list[str]]) -
     members = content.members(BY_SET, words["ELSET"])
     for row in rows:
         if "GENERATE" in words:
-            numbers = [_integer(word) for word in [*row, "1"]]
-            members.update(range(numbers[0], numbers[1] + 1, numbers[2] or 1))
+            numbers = _range(row)
+            content.spend(len(numbers))
+            members.update(numbers)
             continue
-        for word in row:
-            members.update([_integer(word)] if word.isdecimal() else _members(content, _name(word)))
+        for word in filter(None, row):
+            own = {_integer(word)} if word.isdecimal() else _members(content, _name(word))
+            content.spend(len(own))
+            members.update(own)
+
+
+def _range(row: list[str]) -> range:
+    """Numbers from the first to the last, in steps of the third or of one."""
+    first, last, step = [*map(_integer, row), 1][:3] if len(row) in (2, 3) else (0, 0, 0)
+    if step < 1 or last < first:
+        raise ValueError(f"{', '.join(row)}: expected the first element, the last and a step of at least 1")
+    return range(first, last + 1, step)
 
 
 def _members(content: _Content, name: str) -> set[int]:
@@ -176,6 +242,8 @@ def _faults(content: _Content) -> list[str]:
     faults = []
     if content.parts > 1:
         faults.append(f"{content.parts} parts: expected one")
+    if content.instances > 1:
+        faults.append(f"{content.instances} instances: expected one")
     if not content.triangles:
         faults.append("no triangles in it")
     elements = content.triangles | content.lines
@@ -187,7 +255,7 @@ def _faults(content: _Content) -> list[str]:
 
 
 def _raw(content: _Content) -> RawMesh:
-    for name in content.sections:
+    for name in dict.fromkeys(content.sections):
         content.members(BY_SECTION, name).update(_members(content, name))
     labels: dict[int, tuple[str, ...]] = {}
     for level in (BY_ELEMENTS, BY_SET, BY_SECTION):
@@ -215,8 +283,8 @@ def _curves(content: _Content, labels: Mapping[int, tuple[str, ...]]) -> dict[st
 
 def _labels(content: _Content, level: int) -> dict[int, tuple[str, ...]]:
     """The names of the sets of one level that each element is in."""
-    found: dict[int, tuple[str, ...]] = {}
+    found: dict[int, list[str]] = {}
     for (own, name), members in content.sets.items():
         for tag in members if own == level else ():
-            found[tag] = (*found.get(tag, ()), name)
-    return found
+            found.setdefault(tag, []).append(name)
+    return {tag: tuple(names) for tag, names in found.items()}

@@ -15,6 +15,8 @@ from feti_homog.typing import Bool, Float, Int, Int32
 
 # Nodes nearer than this, relative to the cell, are at the same place: files may round coordinates.
 SAME_PLACE = 1e-7
+# Nodes at the same place of which all pairs are listed: their number grows as the square of that of nodes.
+MOST_PAIRS = 1000
 # A node nearer to an edge than this, relative to its length, hangs on it; an element that flat would be of no use.
 HANGING_DISTANCE = 1e-2
 # Area of a triangle, relative to its longest edge squared, up to which it is zero but for rounding of coordinates.
@@ -88,9 +90,10 @@ def unlabelled(mesh: RawMesh) -> list[str]:
     none = np.flatnonzero(np.isin(mesh.group, [k for k, names in enumerate(mesh.groups) if not names]))
     if len(none):
         faults.append(f"{first_of(map(mesh.element, none), len(none))}: not in any {mesh.container}")
-    for number, names in enumerate(mesh.groups):
+    used, first = np.unique(mesh.group, return_index=True)
+    for names, number in zip([mesh.groups[group] for group in used], first, strict=True):
         if len(names) > 1:
-            element = mesh.element(int(np.argmax(mesh.group == number)))
+            element = mesh.element(int(number))
             faults.append(f"{element} is in {len(names)} {mesh.container}s: {', '.join(names)}")
     return faults
 
@@ -141,7 +144,14 @@ def flat(mesh: RawMesh) -> list[str]:
 def duplicate_nodes(mesh: RawMesh) -> list[str]:
     """Different nodes at the same place."""
     plane = mesh.points[:, :2]
-    pairs = cKDTree(plane).query_pairs(SAME_PLACE * np.ptp(plane, axis=0).max(), output_type="ndarray")
+    near = SAME_PLACE * np.ptp(plane, axis=0).max()
+    column, row = ((plane - plane.min(axis=0)) // (near / 2)).astype(np.int64).T
+    square = column * (row.max() + 1) + row  # all of whose nodes are nearer than that to each other
+    order = np.argsort(square, kind="stable")
+    same = square[order[1:]] == square[order[:-1]]
+    pairs = np.sort(np.column_stack([order[:-1][same], order[1:][same]]), axis=1)
+    if len(pairs) < MOST_PAIRS:
+        pairs = cKDTree(plane).query_pairs(near, output_type="ndarray")
     pairs = pairs[np.lexsort(pairs.T[::-1])]
     names = (f"{mesh.node(a)} and {mesh.node(b)}" for a, b in pairs)
     return [f"nodes at the same place: {first_of(names, len(pairs))}"] if len(pairs) else []

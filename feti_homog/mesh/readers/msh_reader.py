@@ -22,8 +22,8 @@ from feti_homog.mesh.readers.mesh_checks import RawMesh
 from feti_homog.mesh.readers.snapping import snapped
 from feti_homog.typing import Float
 
-# Characters of a message: words of a file may be of any length.
-LONGEST_LINE = 1000
+# Characters of a message and number of messages: a file may have any number of faults with words of any length.
+LONGEST_LINE, MOST_FAULTS = 1000, 50
 LOADERS = {".msh": gmsh_file.load, ".inp": abaqus_file.load, ".vtu": vtk_file.load, ".vtk": vtk_file.load}
 
 
@@ -86,14 +86,21 @@ def _loaded(path: Path) -> RawMesh:
     except OSError as error:
         raise MeshError(_line(str(path), f"cannot be read: {error.strerror}")) from None
     except MeshError as error:
-        raise MeshError(*(_line(path.name, fault) for fault in error.faults)) from None
+        raise _error(path.name, error.faults) from None
 
 
 def _refuse(path: str, *faults: Sequence[str]) -> None:
     """Raise MeshError if there are faults."""
-    found = [_line(path, fault) for kind in faults for fault in kind]
+    found = [fault for kind in faults for fault in kind]
     if found:
-        raise MeshError(*found)
+        raise _error(path, found)
+
+
+def _error(path: str, faults: Sequence[str]) -> MeshError:
+    """The faults of a file, at most MOST_FAULTS of them."""
+    more = len(faults) - MOST_FAULTS
+    lines = [*faults[:MOST_FAULTS], *([f"{more} more faults"] if more > 0 else [])]
+    return MeshError(*(_line(path, line) for line in lines))
 
 
 def _line(path: str, fault: str) -> str:
@@ -132,7 +139,8 @@ def _coarse_mesh(raw: RawMesh, plane: Float, size: Float) -> CoarseMesh:
     """Return a checked mesh without circles."""
     names = [group[0] for group in raw.groups]
     phases = ("matrix", *sorted(set(names) - {"matrix"}))
-    number = np.array([phases.index(name) for name in names], dtype=np.int32)
+    place = {name: k for k, name in enumerate(phases)}
+    number = np.array([place[name] for name in names], dtype=np.int32)
     width, height = size.tolist()
     return CoarseMesh(
         width=width,

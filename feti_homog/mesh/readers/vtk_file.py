@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.errors import MeshError
+from feti_homog.mesh.readers import vtk_limits
 from feti_homog.mesh.readers.element_blocks import Block, assembled
 from feti_homog.mesh.readers.mesh_checks import DEBONDED, RawMesh
 from feti_homog.typing import Int
@@ -19,6 +20,7 @@ NODES = {"triangle": 3, "triangle6": 6}
 LINES = ("line", "line3")
 VERTEX = "vertex"
 PHASE = "phase"
+MOST_PHASES = 10**9
 
 
 def load(path: Path) -> RawMesh:
@@ -36,13 +38,14 @@ def load(path: Path) -> RawMesh:
     except ImportError:
         wanted = f"{path.suffix} files are read by meshio, which is not installed"
         raise MeshError(f"{wanted}: pip install 'feti_homog[meshes]'") from None
+    content = path.read_bytes()
+    vtk_limits.check(content, path.suffix)
     try:
-        mesh = reader.read(str(path))
-    except OSError:
-        raise
+        with vtk_limits.bounded(reader, len(content)):
+            mesh = reader.read(str(path))
     except Exception as error:  # meshio's readers raise whatever they meet
         raise MeshError(f"meshio cannot read it: {str(error).strip() or type(error).__name__}") from None
-    faults = _faults(mesh)
+    faults = _faults(mesh) or _misfits(mesh)
     if faults:
         raise MeshError(*faults)
     return _raw(mesh)
@@ -60,9 +63,26 @@ def _faults(mesh: Any) -> list[str]:
         faults.append(f"no cell data named {PHASE}, but {', '.join(mesh.cell_data) or 'none'}: {expected}")
     elif not faults:
         values = np.concatenate([np.ravel(data) for data in mesh.cell_data[PHASE]])
-        bad = values[(values != np.round(values)) | (values < 0)]
+        bad = values[~((values == np.round(values)) & (values >= 0) & (values < MOST_PHASES))]
         if len(bad):
-            faults.append(f"cell data {PHASE} = {bad[0]:g}: expected 0, 1, 2, ...")
+            faults.append(f"cell data {PHASE} = {bad[0]:g}: expected 0, 1, 2, ... below {MOST_PHASES}")
+    return faults
+
+
+def _misfits(mesh: Any) -> list[str]:
+    """Nodes of elements that are not there, and data of another number of elements or coordinates."""
+    count, faults = len(mesh.points), []
+    if mesh.points.ndim != 2 or mesh.points.shape[1] not in (2, 3):
+        faults.append("points have neither two nor three coordinates")
+    for number, cells in enumerate(mesh.cells):
+        nodes = np.asarray(cells.data)
+        bad = nodes[(nodes < 0) | (nodes >= count)]
+        if len(bad):
+            faults.append(f"a {cells.type} has the node {bad[0]}: expected 0 to {count - 1}")
+        for name in {PHASE, DEBONDED} & set(mesh.cell_data):
+            own = mesh.cell_data[name][number : number + 1]
+            if [np.size(values) for values in own] != [len(nodes)]:
+                faults.append(f"cell data {name}: expected one value for each of {len(nodes)} {cells.type}")
     return faults
 
 
@@ -73,12 +93,10 @@ def _raw(mesh: Any) -> RawMesh:
         first += len(tags)
         if cells.type in NODES:
             blocks.append(Block(tags, np.asarray(cells.data, np.int64), np.ravel(data).astype(np.int64)))
-    most = max(int(block.group.max(initial=0)) for block in blocks)
     points = np.zeros((len(mesh.points), 3))
     points[:, : mesh.points.shape[1]] = mesh.points
-    names = ["matrix", "fibre", *(f"fibre:{k}" for k in range(2, most + 1))]
     containers = (f"value of {PHASE}", "cells")
-    return assembled(np.arange(len(points)), points, *_used(blocks, names), _curves(mesh), containers)
+    return assembled(np.arange(len(points)), points, *_used(blocks), _curves(mesh), containers)
 
 
 def _curves(mesh: Any) -> dict[str, Int]:
@@ -94,8 +112,8 @@ def _curves(mesh: Any) -> dict[str, Int]:
     return {name: np.concatenate(ends) for name, ends in curves.items()}
 
 
-def _used(blocks: list[Block], names: list[str]) -> tuple[list[Block], list[tuple[str, ...]]]:
+def _used(blocks: list[Block]) -> tuple[list[Block], list[tuple[str, ...]]]:
     """The blocks with groups numbered without gaps, and the names of these groups."""
     used: Int = np.unique(np.concatenate([block.group for block in blocks]))
     renumbered = [Block(block.tags, block.nodes, np.searchsorted(used, block.group)) for block in blocks]
-    return renumbered, [(names[k],) for k in used]
+    return renumbered, [(("matrix", "fibre")[k] if k < 2 else f"fibre:{k}",) for k in used.tolist()]

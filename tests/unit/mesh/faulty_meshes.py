@@ -227,6 +227,13 @@ FAULTY_MESHES: dict[str, tuple[Callable[[Path], None], str]] = {
         _mesh(lambda: replace(grid(), names={1: "matrix", 2: "fibre:"})),
         '"fibre:" is not a phase',
     ),
+    **{
+        f"variant {number}": (
+            _mesh(lambda number=number: replace(grid(), names={1: "matrix", 2: f"fibre:{number}"})),
+            f'physical surface "fibre:{number}" is not a phase',
+        )
+        for number in ("0", "02", "9" * 20)
+    },
     "no matrix": (_mesh(lambda: replace(grid(), names={1: "fibre:2", 2: "fibre"})), 'named "matrix"'),
     "nan": (
         _mesh(lambda: grid().moved(n7=(float("nan"), 0.25))),
@@ -243,6 +250,10 @@ FAULTY_MESHES: dict[str, tuple[Callable[[Path], None], str]] = {
     "duplicate nodes": (
         _mesh(lambda: _split_node(13, [11, 12])),
         "nodes at the same place: node 13 (0.5, 0.5) and node 99 (0.5, 0.5)",
+    ),
+    "nearly duplicate nodes": (
+        _mesh(lambda: _split_node(13, [11, 12]).moved(n99=(0.5 + 9e-8, 0.5))),
+        "nodes at the same place: node 13 (0.5, 0.5) and node 99 (0.50000009, 0.5)",
     ),
     "repeated element": (
         _mesh(lambda: grid().with_element(77, 2, 1, (1, 2, 7))),

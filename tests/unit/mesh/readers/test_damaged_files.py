@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from support.abaqus import write_inp
 from support.damaged_files import damaged
+from support.other_formats import written
 from unit.mesh.binary_msh import write_binary
 from unit.mesh.faulty_meshes import RIGHT_SIDE, MshFile, grid
 from unit.mesh.second_order import second_order
@@ -29,6 +30,13 @@ SEEDS: dict[str, Callable[[Path], object]] = {
     "binary-2.2.msh": lambda path: write_binary(MESH, path, "2.2", "<"),
     "binary-4.1.msh": lambda path: write_binary(MESH, path, "4.1", "<"),
     "second-4.1.msh": lambda path: write_binary(second_order(MESH), path, "4.1", ">"),
+    "one.inp": lambda path: write_inp(path, MESH),
+    "second.inp": lambda path: write_inp(path, second_order(MESH), sets=False),
+    "packed.vtu": lambda path: written(MESH, path),
+    "text.vtu": lambda path: written(MESH, path, binary=False),
+    "binary.vtk": lambda path: written(second_order(MESH), path),
+    "text.vtk": lambda path: written(MESH, path, binary=False),
+    "old.vtk": lambda path: written(MESH, path, file_format="vtk42"),
     "text-4.1.msh": lambda path: path.write_bytes((Path(__file__).parents[4] / "meshes/square.msh").read_bytes()),
 }
 
@@ -44,7 +52,7 @@ def outcome(path: Path) -> str:
 
 
 @pytest.mark.parametrize("name", SEEDS)
-def test_damaged_files_are_read_or_refused(name, tmp_path, count=150, seed=1):
+def test_damaged_files_are_read_or_refused(name, tmp_path, count=100, seed=1):
     ends = _ends(name, tmp_path, count, seed)
     assert ends["refused"] > count / 4
 
@@ -102,6 +110,25 @@ def test_long_words_of_a_file_are_cut(tmp_path):
     with pytest.raises(MeshError) as caught:
         read(tmp_path / "a.msh")
     assert len(str(caught.value)) < 1100
+
+
+def test_faults_of_many_kinds_are_counted(tmp_path):
+    kinds = range(1, 81)
+    elements = {kind: (2, kind, kind, (1, 2, 7)) for kind in kinds}
+    MshFile(grid().nodes, elements, {kind: f"kind {kind}" for kind in kinds}).write(tmp_path / "a.msh")
+    with pytest.raises(MeshError) as caught:
+        read(tmp_path / "a.msh")
+    assert len(caught.value.faults) == 51 and caught.value.faults[-1] == "a.msh: 31 more faults"
+
+
+def test_many_nodes_at_one_place_are_counted(tmp_path):
+    """Their pairs would not fit in the memory."""
+    count = 20000
+    nodes = {k: (float(k % 2), 0.0, 0.0) for k in range(count)} | {count: (0.5, 1.0, 0.0)}
+    elements = {k: (2, 1, 1, (k, k + 1, count)) for k in range(0, count, 2)}
+    MshFile(nodes, elements).write(tmp_path / "a.msh")
+    with pytest.raises(MeshError, match=r"nodes at the same place: node 0 \(0, 0\) and node 2 .* and 19995 more$"):
+        read(tmp_path / "a.msh")
 
 
 def test_what_is_no_file_is_refused(tmp_path):

@@ -16,10 +16,11 @@ from feti_homog.errors import MeshError
 from feti_homog.mesh.readers import gmsh_file, msh_content
 from feti_homog.mesh.readers.gmsh_file import triangles_of_model
 from feti_homog.mesh.readers.mesh_checks import RawMesh
-from feti_homog.mesh.readers.msh_reader import read
+from feti_homog.mesh.readers.msh_reader import made, read
 from feti_homog.mesh.tiles.filling import gmsh_session
 
 MESHES = Path(__file__).parents[4] / "meshes"
+TOLERANCE = 1e-12
 FORMATS = [(2.2, 0), (2.2, 1), (4.0, 0), (4.1, 0), (4.1, 1)]
 
 
@@ -46,10 +47,10 @@ def written(source: Path, target: Path, version: float, binary: int, **options: 
 def assert_same(result: RawMesh, expected: RawMesh, ordered: bool = True) -> None:
     """Compare all that was read; elements by their numbers unless they are `ordered` alike.
 
-    gmsh rounds the last digit of some coordinates in files of version 4.
+    gmsh moves periodic nodes of some files to their partners.
     """
     assert np.array_equal(result.node_tags, expected.node_tags)
-    assert result.points == pytest.approx(expected.points, rel=0, abs=4e-16)
+    assert result.points == pytest.approx(expected.points, rel=0, abs=TOLERANCE)
     orders = [slice(None) if ordered else np.argsort(mesh.element_tags) for mesh in (result, expected)]
     for name in ("element_tags", "triangles"):
         one, other = (getattr(mesh, name)[order] for mesh, order in zip((result, expected), orders, strict=True))
@@ -60,7 +61,7 @@ def assert_same(result: RawMesh, expected: RawMesh, ordered: bool = True) -> Non
     assert all(np.array_equal(_sorted(result.curves[name]), _sorted(expected.curves[name])) for name in result.curves)
     for name in ("edges", "tags", "points"):
         one, other = (np.sort(getattr(mesh.middles, name), axis=0) for mesh in (result, expected))
-        assert one == pytest.approx(other, rel=0, abs=4e-16), name
+        assert one == pytest.approx(other, rel=0, abs=TOLERANCE), name
     assert (result.container, result.curve_container) == (expected.container, expected.curve_container)
 
 
@@ -78,6 +79,13 @@ def _sorted(pairs: np.ndarray) -> np.ndarray:
 def test_meshes_of_the_repository_are_read_as_by_gmsh(name, version, binary, tmp_path):
     path = written(MESHES / f"{name}.msh", tmp_path / "a.msh", version, binary)
     assert_same(gmsh_file.load(path), by_gmsh(path))
+
+
+@pytest.mark.parametrize("name", ["square", "hexagonal", "two_fibres"])
+def test_cells_of_the_repository_are_those_of_gmsh_to_the_last_bit(name):
+    result, expected = read(MESHES / f"{name}.msh"), made(by_gmsh(MESHES / f"{name}.msh"), "oracle")
+    for key in ("width", "height", "points", "triangles", "phase", "representative", "circles", "arc_edges"):
+        assert np.array_equal(getattr(result, key), getattr(expected, key), equal_nan=True), key
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -214,6 +222,14 @@ def test_any_number_of_tags_is_read_as_by_gmsh(tmp_path):
     for name, separator in (("a.msh", "\n"), ("b.msh", " ")):
         (tmp_path / name).write_text(FILE_2.replace("1\n1 2 2 1 1 1 2 3", "3\n" + separator.join(lines)))
         assert_same(gmsh_file.load(tmp_path / name), by_gmsh(tmp_path / "a.msh"), ordered=False)
+
+
+def test_groups_that_turn_an_entity_have_their_name(tmp_path):
+    """Their numbers are negative in the entity: `Physical Surface("fibre") = {-2}`."""
+    text, (old, new) = (MESHES / "square.msh").read_text(), ("0 1 2 4 5 6 7 8", "0 1 -2 4 5 6 7 8")
+    assert old in text
+    (tmp_path / "a.msh").write_text(text.replace(old, new))
+    assert_same(gmsh_file.load(tmp_path / "a.msh"), gmsh_file.load(MESHES / "square.msh"))
 
 
 @pytest.mark.parametrize("last", [1, 2])
