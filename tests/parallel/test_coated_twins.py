@@ -83,7 +83,9 @@ def compare(case, expected, strain):
     interface = torn_cells.interface(case.cell, True)
     bonded = np.full(case.here, BONDED, np.int8)
     begin = unloaded(CoupledInterfaces(interface), torn_cells.bonds(bonded))
-    points = list(events(CoupledInterfaces(interface), criterion_of(case.cell), strains(np.array([strain])), begin))
+    points = list(
+        events(CoupledInterfaces(interface), criterion_of(case.cell, grows=True), strains(np.array([strain])), begin)
+    )
     found = np.array([case.in_reference_order(p.after.bonds.status) != BONDED for p in points])
     np.testing.assert_array_equal(found, np.cumsum([e.broke for e in expected], axis=0) > 0)
     assert relative_error(np.array([p.load_factor for p in points]), [e.load_factor for e in expected]) < 1e-8

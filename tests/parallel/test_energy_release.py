@@ -219,7 +219,7 @@ def test_beside_a_void_rates_are_those_beside_a_fibre_that_nothing_holds(comm, s
     cell = {"geometry": "random", "fibres": 2, "fibre_fraction": 0.35, "min_gap": 0.1, "seed": 1, "mesh_size": 0.08}
     if comm.rank == 0:
         write_voids(shared_path / "fibres.msh", voids=[], **cell)
-        write_voids(shared_path / "void.msh", voids=[2], **cell)
+        write_voids(shared_path / "void.msh", voids=[0], **cell)  # fibre 2
     comm.barrier()
     own, other = {"fibre": 1, "centre": centre}, {"fibre": 2, "centre": 0.0, "angle": 360.0}
     mesh = {"geometry": "mesh", "order": 2}

@@ -87,7 +87,7 @@ def first_break(cell, axes, values, temperature):
     legs = [load(loaded.loads, of_stresses, np.zeros(6), temperature)] if temperature else []
     legs.append(load(loaded.loads, of_stresses, whole, temperature))
     status = np.where(cell.debonded(None), OPEN, BONDED).astype(np.int8)
-    points = events(loaded, criterion_of(cell), legs, unloaded(loaded, BondState.without_memory(status)))
+    points = events(loaded, criterion_of(cell, grows=True), legs, unloaded(loaded, BondState.without_memory(status)))
     point = next(point for point in points if point.broke)
     state = loaded.macroscopic(point.state.solutions).scaled(point.scale)
     order = [loaded.loads.index(name) for name in STRAINS]
