@@ -1,8 +1,4 @@
-"""Damage to the bytes of a file, for tests of what reads it.
-
-`python tests/support/damaged_files.py 20000 [seed]` reads so many damaged meshes, with a limit of memory and of time
-for each; from `tests/`, with the package in the path.
-"""
+"""Damage to the bytes of a file, for tests of what reads it."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +17,8 @@ from feti_homog.typing import Bool, Float, Int, Int32
 SAME_PLACE = 1e-7
 # Nodes at the same place of which all pairs are listed: their number grows as the square of that of nodes.
 MOST_PAIRS = 1000
+# Pairs of an edge and a node near it that are looked at; they may grow as the square too.
+MOST_CANDIDATES = 10**7
 # A node nearer to an edge than this, relative to its length, hangs on it; an element that flat would be of no use.
 HANGING_DISTANCE = 1e-2
 # Area of a triangle, relative to its longest edge squared, up to which it is zero but for rounding of coordinates.
@@ -189,18 +191,21 @@ def hanging_nodes(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
     inner = single[~on_side]
     if len(inner) == 0:
         return []
-    hanging = _hanging(plane, inner)
+    nodes = np.unique(inner)
+    tree, middle = cKDTree(plane[nodes]), plane[inner].mean(axis=1)
+    reach = np.linalg.norm(plane[inner[:, 1]] - plane[inner[:, 0]], axis=1) / 2
+    some = slice(None, None, 1 + len(inner) // 1000)
+    if some.step * tree.query_ball_point(middle[some], reach[some], return_length=True).sum() > MOST_CANDIDATES:
+        return [f"{len(inner)} edges within the cell have one triangle only, and long ones cross: no mesh of a cell"]
+    hanging = _hanging(plane, inner, nodes, tree.query_ball_point(middle, reach))
     names = (f"{mesh.node(node)} on {mesh.edge(pair)}" for node, pair in hanging)
     return [f"hanging nodes: {first_of(names, len(hanging))}"] if hanging else []
 
 
-def _hanging(plane: Float, pairs: Int32) -> list[tuple[int, tuple[int, int]]]:
-    """Nodes of the edges (k, 2) that lie within others, not at their ends, with these edges."""
+def _hanging(plane: Float, pairs: Int32, nodes: Int32, near: Sequence[list[int]]) -> list[tuple[int, tuple[int, int]]]:
+    """Nodes that lie within edges (k, 2), not at their ends, with these edges; of `nodes` those `near` each edge."""
     found = []
-    nodes = np.unique(pairs)
-    tree = cKDTree(plane[nodes])
     start, stop = plane[pairs[:, 0]], plane[pairs[:, 1]]
-    near = tree.query_ball_point((start + stop) / 2, np.linalg.norm(stop - start, axis=1) / 2)
     for candidates, pair, a, b in zip(near, pairs, start, stop, strict=True):
         others = np.setdiff1d(nodes[candidates], pair)
         along, away = b - a, plane[others] - a

@@ -138,7 +138,10 @@ def _names(content: bytes, start: int) -> dict[tuple[int, int], str]:
     count = text.split(maxsplit=1)[:1]
     if count != [str(len(found)).encode()]:
         raise MeshError(f"$PhysicalNames: {len(found)} names, and not as many as its first line announces")
-    return {(int(dimension), int(number)): name.decode(errors="replace") for dimension, number, name in found}
+    names = {(int(dimension), int(number)): name.decode(errors="replace") for dimension, number, name in found}
+    if len(names) < len(found):
+        raise MeshError("$PhysicalNames: one of the numbers has two names")
+    return names
 
 
 def _entities(section: Section, version: str, result: MshContent) -> None:

@@ -131,6 +131,17 @@ def test_many_nodes_at_one_place_are_counted(tmp_path):
         read(tmp_path / "a.msh")
 
 
+def test_many_long_edges_are_not_compared_with_all_nodes(tmp_path):
+    """Strips across the cell: each edge is near all nodes."""
+    count = 5000
+    nodes = {3 * k + j: (j / 2, (k + 0.5 * (j == 1)) / count, 0.0) for k in range(count) for j in range(3)}
+    corners = {3 * count + j: (float(j % 2), float(j // 2), 0.0) for j in range(4)}
+    elements = {k + 1: (2, 1, 1, (3 * k, 3 * k + 1, 3 * k + 2)) for k in range(count)}
+    MshFile(nodes | corners, elements).write(tmp_path / "a.msh")
+    with pytest.raises(MeshError, match="14999 edges within the cell have one triangle only, and long ones cross"):
+        read(tmp_path / "a.msh")
+
+
 def test_what_is_no_file_is_refused(tmp_path):
     os.mkfifo(tmp_path / "a.msh")
     (tmp_path / "b.msh").symlink_to("/dev/zero")

@@ -133,6 +133,10 @@ FAULTS = {
     "no format": (f"$Comments\n$EndComments\n{NODES_2}", "$Nodes: there is no $MeshFormat before"),
     "nodes twice": (HEAD_2 + NODES_2 + NODES_2, "$Nodes: it is there twice"),
     "names": (f'{HEAD_2}$PhysicalNames\n2\n2 1 "a"\n$EndPhysicalNames\n', "$PhysicalNames: 1 names, and not as many"),
+    "two names": (
+        f'{HEAD_2}$PhysicalNames\n2\n2 1 "a"\n2 1 "b"\n$EndPhysicalNames\n',
+        "$PhysicalNames: one of the numbers has two names",
+    ),
     "open names": (
         f"{HEAD_2}$PhysicalNames\n0\n",
         "$PhysicalNames: there is no $EndPhysicalNames: the file is damaged",
