@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from feti_homog.errors import MeshError
-from feti_homog.mesh.readers.msh_sections import INT, SIZE, BinarySection, Section, TextSection, chain, end_of
+from feti_homog.mesh.readers.msh_sections import INT, SIZE, BinarySection, Section, chain, end_of
 from feti_homog.schema.wording import toml_value
 from feti_homog.typing import Float, Int
 
@@ -109,11 +109,8 @@ def read(content: bytes) -> MshContent:
 
 def _read_section(name: str, content: bytes, start: int, version: str, order: str, result: MshContent) -> int:
     """Read a section of numbers; the place in the file behind it."""
-    section: Section
-    if order:
-        section = BinarySection(name, content, start, order)
-    else:
-        section = TextSection(name, content, start, "i8" if name == "Elements" else "f8")
+    kind = "i8" if name == "Elements" else "f8"
+    section = BinarySection(name, content, start, order) if order else Section(name, content, start, kind)
     READERS[name](section, version, result)
     return section.end()
 

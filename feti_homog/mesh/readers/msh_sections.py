@@ -31,70 +31,16 @@ WRONG_WORD = {
 
 
 class Section:
-    """Take the numbers of a section `$name` one after the other; they begin at `start` in the file's content."""
+    """Take the numbers of a section `$name` of a text file one after the other.
+
+    They begin at `start` in the file's content, and are read as whole (`i8`) or as real ones (`f8`), all of them.
+    """
 
     order = ""
     """Byte order of a binary file, `<` or `>`."""
 
-    def __init__(self, name: str, content: bytes, start: int) -> None:
-        self.name, self.content, self.start = name, content, start
-
-    def refuse(self, fault: str) -> NoReturn:
-        """Raise MeshError."""
-        raise MeshError(f"${self.name}: {fault}")
-
-    def whole(self, count: int, kind: str = INT) -> Int:
-        """Take (count,) whole numbers, of this type in a binary file."""
-        return self.records(count, 0, kind)[0]
-
-    def reals(self, count: int) -> Float:
-        """Take (count,) real numbers."""
-        raise NotImplementedError
-
-    def records(self, count: int, reals: int, kind: str = INT) -> tuple[Int, Float]:
-        """Take (count,) whole numbers and, after each, so many real ones (count, reals)."""
-        raise NotImplementedError
-
-    def count(self) -> int:
-        """Take one whole number, a count of what follows."""
-        return int(self.whole(1, SIZE)[0])
-
-    def line(self) -> int:
-        """Take one whole number, which is a line of text in binary files too."""
-        raise NotImplementedError
-
-    def rest(self) -> Numbers:
-        """All numbers that are left, as C's int in a binary file, where they go on to the end of the file."""
-        raise NotImplementedError
-
-    def skip(self, numbers: int) -> None:
-        """Leave out so many of the numbers of `rest`."""
-        raise NotImplementedError
-
-    def end(self) -> int:
-        """Place in the file after the numbers, all of which must have been taken."""
-        raise NotImplementedError
-
-    def checked(self, values: Numbers) -> Int:
-        """Return the numbers as whole ones."""
-        if len(values) == 0 or (np.abs(values.max()) < LARGEST and np.abs(values.min()) < LARGEST):
-            whole = values.astype(np.int64)
-            if np.array_equal(whole, values):
-                return whole
-        bad = next(value for value in values.tolist() if not (abs(value) < LARGEST and value == int(value)))
-        self.refuse(f"{bad:g}: expected a whole number of at most 15 digits")
-
-    def _bound(self, count: int, left: int) -> None:
-        if not 0 <= count <= left:
-            self.refuse(f"{count} numbers should follow, and {left} do: the file is damaged or broken off")
-
-
-class TextSection(Section):
-    """The numbers of a section of a text file, all of them read as whole (`i8`) or as real ones (`f8`)."""
-
     def __init__(self, name: str, content: bytes, start: int, kind: str = "f8") -> None:
-        super().__init__(name, content, start)
-        self.stop = end_of(name, content, start)
+        self.name, self.content, self.start, self.stop = name, content, start, end_of(name, content, start)
         self.values, self.place = self._numbers(content[start : self.stop], kind), 0
 
     def _numbers(self, text: bytes, kind: str) -> Numbers:
@@ -112,36 +58,66 @@ class TextSection(Section):
         what = "whole number" if kind == "i8" else "number"
         self.refuse(f"line {line}, {toml_value(wrong[0].decode(errors='replace'))}: expected a {what}")
 
+    def refuse(self, fault: str) -> NoReturn:
+        """Raise MeshError."""
+        raise MeshError(f"${self.name}: {fault}")
+
+    def whole(self, count: int, kind: str = INT) -> Int:
+        """Take (count,) whole numbers, of this type in a binary file."""
+        return self.records(count, 0, kind)[0]
+
+    def count(self) -> int:
+        """Take one whole number, a count of what follows."""
+        return int(self.whole(1, SIZE)[0])
+
     def reals(self, count: int) -> Float:
+        """Take (count,) real numbers."""
         self._bound(count, len(self.values) - self.place)
         self.place += count
         return np.asarray(self.values[self.place - count : self.place])
 
     def records(self, count: int, reals: int, kind: str = INT) -> tuple[Int, Float]:
+        """Take (count,) whole numbers and, after each, so many real ones (count, reals)."""
         rows = self.reals(count * (1 + reals)).reshape(count, 1 + reals)
         return self.checked(rows[:, 0]), rows[:, 1:]
 
     def line(self) -> int:
+        """Take one whole number, which is a line of text in binary files too."""
         return self.count()
 
     def rest(self) -> Numbers:
+        """Return all numbers that are left, as C's int in a binary file, where they go on to the end of the file."""
         return self.values[self.place :]
 
     def skip(self, numbers: int) -> None:
+        """Leave out so many of the numbers of `rest`."""
         self.reals(numbers)
 
     def end(self) -> int:
+        """Return the place in the file after the numbers, all of which must have been taken."""
         if self.place < len(self.values):
             self.refuse(f"{len(self.values) - self.place} numbers are left after those that its counts announce")
         return self.stop
+
+    def checked(self, values: Numbers) -> Int:
+        """Return the numbers as whole ones."""
+        if len(values) == 0 or (np.abs(values.max()) < LARGEST and np.abs(values.min()) < LARGEST):
+            whole = values.astype(np.int64)
+            if np.array_equal(whole, values):
+                return whole
+        bad = next(value for value in values.tolist() if not (abs(value) < LARGEST and value == int(value)))
+        self.refuse(f"{bad:g}: expected a whole number of at most 15 digits")
+
+    def _bound(self, count: int, left: int) -> None:
+        if not 0 <= count <= left:
+            self.refuse(f"{count} numbers should follow, and {left} do: the file is damaged or broken off")
 
 
 class BinarySection(Section):
     """The numbers of a section of a binary file."""
 
     def __init__(self, name: str, content: bytes, start: int, order: str) -> None:
-        super().__init__(name, content, start)
-        self.order, self.place = order, start
+        self.name, self.content, self.order, self.place = name, content, order, start
 
     def reals(self, count: int) -> Float:
         return np.asarray(self._take(count, np.dtype(f"{self.order}f8")), float)
