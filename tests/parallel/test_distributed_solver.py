@@ -15,6 +15,14 @@ from feti_homog.petsc.options import case_options
 
 pytestmark = pytest.mark.parallel
 
+
+@pytest.fixture(params=[True, False], ids=["replicated", "together"])
+def replicated(request, monkeypatch) -> bool:
+    """Provide whether every rank factors the matrix whole, as small ones, or all ranks factor it together."""
+    monkeypatch.setattr(distributed_solver, "REPLICATED_UNKNOWNS", 10**9 if request.param else 0)
+    return request.param
+
+
 KINDS = {
     "factor": {},
     "mumps": {"test_pc_factor_mat_solver_type": "mumps"},
@@ -52,6 +60,7 @@ def by_blocks(comm, n):
 
 @pytest.mark.parametrize("columns", [(), (1,), (2,), (7,)])
 @pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.usefixtures("replicated")
 def test_the_sum_of_the_parts_is_solved(comm, kind, columns):
     A = grid(8)
     unknowns, part = share(comm, A, by_blocks(comm, A.shape[0]))
@@ -154,11 +163,11 @@ LIBRARY = "test_pc_factor_mat_solver_type"
 
 
 @pytest.mark.parametrize("library", ["mumps", "cholmod", None])
-def test_the_library_is_an_option(comm, library):
-    """CHOLMOD is the default on one rank, MUMPS on several; CHOLMOD factors no distributed matrix."""
-    default = "cholmod" if comm.size == 1 else "mumps"
+def test_the_library_is_an_option(comm, replicated, library):
+    """CHOLMOD is the default of a rank alone, MUMPS of several together; CHOLMOD factors no distributed matrix."""
+    default = "cholmod" if comm.size == 1 or replicated else "mumps"
     unknowns, part = np.arange(2) + 2 * comm.rank, csr_matrix(np.array([[2.0, 1.0], [1.0, 3.0]]))
-    if library == "cholmod" and comm.size > 1:
+    if library == "cholmod" and default == "mumps":
         pytest.skip("see the next test")
     with case_options({LIBRARY: library} if library else {}):
         solver = made(comm, 2 * comm.size, unknowns, part)
@@ -168,7 +177,8 @@ def test_the_library_is_an_option(comm, library):
     solver.destroy()
 
 
-def test_cholmod_factors_no_distributed_matrix(comm):
+def test_cholmod_factors_no_distributed_matrix(comm, monkeypatch):
+    monkeypatch.setattr(distributed_solver, "REPLICATED_UNKNOWNS", 0)
     arguments = comm, 2, np.arange(2), csr_matrix(np.eye(2))
     with case_options({LIBRARY: "cholmod"}):
         if comm.size == 1:

@@ -31,6 +31,14 @@ def assemble_owned_rows(
     return csr_matrix((values, indices, indptr), shape=sizes)
 
 
+def gathered_sum(comm: MPI.Intracomm, part: csr_matrix, unknowns: Int, total: int) -> csr_matrix:
+    """Return the sum (n, n) over ranks of `part` (u, u) in the `unknowns` (u,), the same on every rank.  Collective."""
+    entries = part.tocoo()
+    own = unknowns[entries.row], unknowns[entries.col], entries.data
+    rows, columns, values = (np.concatenate(parts) for parts in zip(*comm.allgather(own), strict=True))
+    return csr_matrix((values, (rows, columns)), shape=(total, total))
+
+
 def add_shared_rows(comm: MPI.Intracomm, local: csr_matrix, rows: Int, is_shared_row: Bool, owned: int) -> csr_matrix:
     """`local` with what other ranks have in the same rows added.  Collective.
 

@@ -7,10 +7,14 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
-from feti_homog.feti.linalg.distributed_matrix import assemble_distributed
+from feti_homog.feti.linalg.distributed_matrix import assemble_distributed, gathered_sum
 from feti_homog.feti.linalg.factor_status import power_of_two
-from feti_homog.feti.linalg.sparse_direct import factored, is_direct, solve_columns
-from feti_homog.feti.thresholds import CHOLMOD_COLUMNS_ONE_BY_ONE, MUMPS_COLUMNS_ONE_BY_ONE
+from feti_homog.feti.linalg.sparse_direct import factored, is_direct, sequential, solve_columns
+from feti_homog.feti.thresholds import (
+    CHOLMOD_COLUMNS_ONE_BY_ONE,
+    MUMPS_COLUMNS_ONE_BY_ONE,
+    REPLICATED_UNKNOWNS,
+)
 from feti_homog.parallel.distributed_arrays import allgather_rows, allreduce_sum
 from feti_homog.typing import Float, Int
 
@@ -18,14 +22,18 @@ from feti_homog.typing import Float, Int
 class DistributedSolver:
     """X = A^-1 B for a definite matrix A (n, n) that is a sum over ranks and changes from time to time.
 
-    Options under its prefix choose the method (default: cholesky by MUMPS, on one rank by CHOLMOD).
+    Every rank factors a small matrix whole, by CHOLMOD; all ranks factor a large one together, by MUMPS. Options under
+    the prefix choose others; `ksp_type` and `pc_type` mean all ranks together.
     """
 
     def __init__(self, comm: MPI.Intracomm, total: int, prefix: str) -> None:
         """`total` is n.  Nothing is factored yet."""
         self.comm, self.total, self._prefix = comm, total, prefix
         self._ksp: PETSc.KSP | None = None
-        self.max_columns_one_by_one = MUMPS_COLUMNS_ONE_BY_ONE if comm.size > 1 else CHOLMOD_COLUMNS_ONE_BY_ONE
+        options = PETSc.Options(prefix)
+        together = total > REPLICATED_UNKNOWNS or any(options.hasName(name) for name in ("ksp_type", "pc_type"))
+        self.is_distributed = comm.size > 1 and together
+        self.max_columns_one_by_one = MUMPS_COLUMNS_ONE_BY_ONE if self.is_distributed else CHOLMOD_COLUMNS_ONE_BY_ONE
 
     def factor(self, unknowns: Int, part: csr_matrix, near_kernel: Float | None = None) -> None:
         """Assemble and factor A, and free the factor before.  Collective.
@@ -52,11 +60,14 @@ class DistributedSolver:
             raise np.linalg.LinAlgError(f"a coarse matrix is singular: {error or 'on another rank'}") from error
 
     def _factor(self, unknowns: Int, part: csr_matrix, near_kernel: Float | None) -> None:
-        matrix = assemble_distributed(self.comm, part, unknowns, self.total)
         self._unknowns = unknowns
+        if self.is_distributed:
+            matrix = assemble_distributed(self.comm, part, unknowns, self.total)
+        else:
+            matrix = sequential(gathered_sum(self.comm, part, unknowns, self.total))
         self._scale = power_of_two(matrix.getDiagonal().getArray(readonly=True), self.comm)
         matrix.scale(self._scale)
-        library = PETSc.Mat.SolverType.MUMPS if self.comm.size > 1 else PETSc.Mat.SolverType.CHOLMOD
+        library = PETSc.Mat.SolverType.MUMPS if self.is_distributed else PETSc.Mat.SolverType.CHOLMOD
         near_kernel = None if near_kernel is None else self._orthonormal(near_kernel)
         # Before a factor that may fail on one rank alone.
         self._x, self._b = matrix.createVecs()
@@ -75,8 +86,9 @@ class DistributedSolver:
         right = self._sum(B if B.ndim == 2 else B[:, None])[slice(*self._b.getOwnershipRange())]
         X = solve_columns(self._ksp, self._x, self._b, right, self.max_columns_one_by_one)
         X *= self._scale
-        whole = allgather_rows(self.comm, X, np.diff(self._b.getOwnershipRanges()))
-        return np.asarray(whole[self._unknowns]).reshape(B.shape)
+        if self.is_distributed:
+            X = allgather_rows(self.comm, X, np.diff(self._b.getOwnershipRanges()))
+        return np.asarray(X[self._unknowns]).reshape(B.shape)
 
     def _sum(self, B: Float) -> Float:
         """(n, k) the sum over ranks of B (u, k)."""

@@ -36,7 +36,7 @@ class DirectSolver:
         """
         self._scale = power_of_two(matrix.diagonal())
         scaled = csr_matrix((self._scale * matrix.data, matrix.indices, matrix.indptr), shape=matrix.shape)
-        self._ksp = factored(_sequential(scaled), prefix, PETSc.Mat.SolverType.CHOLMOD)
+        self._ksp = factored(sequential(scaled), prefix, PETSc.Mat.SolverType.CHOLMOD)
         self._x, self._b = self._ksp.getOperators()[0].createVecs()
         self._destroy = weakref.finalize(self, _destroy, self._ksp, self._x, self._b)
 
@@ -165,7 +165,7 @@ def _destroy(ksp: PETSc.KSP, *vectors: PETSc.Vec) -> None:
         petsc_object.destroy()
 
 
-def _sequential(matrix: csr_matrix) -> PETSc.Mat:
+def sequential(matrix: csr_matrix) -> PETSc.Mat:
     """Return the matrix as PETSc's, on this rank alone; both have the same arrays."""
     matrix.sort_indices()
     csr = matrix.indptr, matrix.indices, matrix.data
