@@ -65,9 +65,9 @@ MAX_BUFFERED_ENTRIES = 4_000_000
 # `scripts/measure_kernels.py` measures these and the two below.
 CHOLMOD_COLUMNS_ONE_BY_ONE, MUMPS_COLUMNS_ONE_BY_ONE = 2, 1
 # Unknowns of a coarse problem up to which every rank factors it whole. Paths of small cells factor at every event, in
-# milliseconds; one factor of all ranks waits for messages. With 2 700 unknowns on two ranks both cost alike
+# milliseconds; one factor of all ranks waits for messages. With 1 812 unknowns on two ranks both cost alike
 # (`scripts/benchmark scripts/cases/benchmark_1m.toml`, with and without `-feti_coarse_pc_type cholesky`).
-REPLICATED_UNKNOWNS = 4000
+REPLICATED_UNKNOWNS = 2000
 # Rows up to which LAPACK's dtrtri inverts a triangle faster than halving it.
 TRIANGLE_INVERSE_ROWS = 48
 # Rows of the blocks in which a triangle is mirrored, so that they fit the cache.
