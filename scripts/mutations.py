@@ -1,7 +1,7 @@
 """Put deliberate errors of one line into copies of the program, and show which of them the tests notice.
 
-`python scripts/mutations.py [WORD ...]` tries those of tests/mutations.toml whose printed line has one of the words, or
-all; it ends with 1 if one survives, or if tests fail without any.
+`.venv/bin/python scripts/mutations.py [WORD ...]` tries those of tests/mutations.toml whose printed line has one of the
+words, or all; it ends with 1 if one survives, or if tests fail without any.
 """
 
 from __future__ import annotations
