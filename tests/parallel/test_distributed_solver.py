@@ -10,17 +10,15 @@ from scipy.sparse import coo_matrix, csr_matrix, kronsum, spdiags
 from feti_homog.errors import CaseError
 from feti_homog.feti.linalg import distributed_solver
 from feti_homog.feti.linalg.distributed_solver import DistributedSolver
+from feti_homog.feti.thresholds import REPLICATED_UNKNOWNS
 from feti_homog.petsc.c_functions import option_was_used
 from feti_homog.petsc.options import case_options
 
 pytestmark = pytest.mark.parallel
 
 
-@pytest.fixture(params=[True, False], ids=["replicated", "together"])
-def replicated(request, monkeypatch) -> bool:
-    """Provide whether every rank factors the matrix whole, as small ones, or all ranks factor it together."""
-    monkeypatch.setattr(distributed_solver, "REPLICATED_UNKNOWNS", 10**9 if request.param else 0)
-    return request.param
+# The largest matrix that every rank factors whole: any, or none.
+most_whole = pytest.mark.parametrize("most_whole", [REPLICATED_UNKNOWNS, 0], ids=["replicated", "together"])
 
 
 KINDS = {
@@ -46,9 +44,9 @@ def share(comm, matrix, holder):
     return unknowns, csr_matrix((C.data[mine], tuple(at)), (len(unknowns),) * 2)
 
 
-def made(comm, total, unknowns, part):
+def made(comm, total, unknowns, part, most_whole=0):
     """Return the solver that the options ask for."""
-    solver = DistributedSolver(comm, total, "test_")
+    solver = DistributedSolver(comm, total, "test_", most_whole)
     solver.factor(unknowns, part)
     return solver
 
@@ -60,13 +58,13 @@ def by_blocks(comm, n):
 
 @pytest.mark.parametrize("columns", [(), (1,), (2,), (7,)])
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.usefixtures("replicated")
-def test_the_sum_of_the_parts_is_solved(comm, kind, columns):
+@most_whole
+def test_the_sum_of_the_parts_is_solved(comm, most_whole, kind, columns):
     A = grid(8)
     unknowns, part = share(comm, A, by_blocks(comm, A.shape[0]))
     x = np.random.default_rng(3).standard_normal((A.shape[0], *columns))
     with case_options(KINDS[kind]):
-        solver = made(comm, A.shape[0], unknowns, part)
+        solver = made(comm, A.shape[0], unknowns, part, most_whole)
     assert solver.iterations == 1 or kind == "cg"
     # The parts of the right-hand side sum to A x.
     found = solver.solve(part @ x[unknowns])
@@ -163,22 +161,22 @@ LIBRARY = "test_pc_factor_mat_solver_type"
 
 
 @pytest.mark.parametrize("library", ["mumps", "cholmod", None])
-def test_the_library_is_an_option(comm, replicated, library):
+@most_whole
+def test_the_library_is_an_option(comm, most_whole, library):
     """CHOLMOD is the default of a rank alone, MUMPS of several together; CHOLMOD factors no distributed matrix."""
-    default = "cholmod" if comm.size == 1 or replicated else "mumps"
+    default = "cholmod" if comm.size == 1 or most_whole else "mumps"
     unknowns, part = np.arange(2) + 2 * comm.rank, csr_matrix(np.array([[2.0, 1.0], [1.0, 3.0]]))
     if library == "cholmod" and default == "mumps":
         pytest.skip("see the next test")
     with case_options({LIBRARY: library} if library else {}):
-        solver = made(comm, 2 * comm.size, unknowns, part)
+        solver = made(comm, 2 * comm.size, unknowns, part, most_whole)
         assert option_was_used(LIBRARY) or not library
     assert solver._ksp.getPC().getFactorSolverType() == (library or default)
     np.testing.assert_allclose(solver.solve(part @ [1.0, 2.0]), [1.0, 2.0], rtol=1e-12)
     solver.destroy()
 
 
-def test_cholmod_factors_no_distributed_matrix(comm, monkeypatch):
-    monkeypatch.setattr(distributed_solver, "REPLICATED_UNKNOWNS", 0)
+def test_cholmod_factors_no_distributed_matrix(comm):
     arguments = comm, 2, np.arange(2), csr_matrix(np.eye(2))
     with case_options({LIBRARY: "cholmod"}):
         if comm.size == 1:

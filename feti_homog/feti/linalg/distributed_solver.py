@@ -26,12 +26,12 @@ class DistributedSolver:
     the prefix choose others; `ksp_type` and `pc_type` mean all ranks together.
     """
 
-    def __init__(self, comm: MPI.Intracomm, total: int, prefix: str) -> None:
-        """`total` is n.  Nothing is factored yet."""
+    def __init__(self, comm: MPI.Intracomm, total: int, prefix: str, most_whole: int = REPLICATED_UNKNOWNS) -> None:
+        """`total` is n, `most_whole` the largest n that every rank factors whole.  Nothing is factored yet."""
         self.comm, self.total, self._prefix = comm, total, prefix
         self._ksp: PETSc.KSP | None = None
         options = PETSc.Options(prefix)
-        together = total > REPLICATED_UNKNOWNS or any(options.hasName(name) for name in ("ksp_type", "pc_type"))
+        together = total > most_whole or any(options.hasName(name) for name in ("ksp_type", "pc_type"))
         self.is_distributed = comm.size > 1 and together
         self.max_columns_one_by_one = MUMPS_COLUMNS_ONE_BY_ONE if self.is_distributed else CHOLMOD_COLUMNS_ONE_BY_ONE
 
