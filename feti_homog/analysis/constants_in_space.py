@@ -71,7 +71,7 @@ def _comparisons(cell: TornCell, fractions: Mapping[str, float]) -> dict[str, An
 
 
 def _is_plain(cell: TornCell) -> bool:
-    """Whether there are fibres without coatings, all in the matrix and bonded alike."""
+    """Return whether there are fibres without coatings, all in the matrix and bonded alike."""
     no_pairs = all(interface.between is None for interface in cell.case.interfaces)
     return no_pairs and COATING not in cell.summary.phases
 
@@ -83,8 +83,10 @@ def _of_phase(cell: TornCell, phase: str) -> Bool:
 
 
 def _no_estimate(radii: Float, has_springs: bool) -> bool:
-    """Whether estimates say nothing of fibres of these radii, NaN where they are not round: of springs they ask for
-    one."""
+    """Return whether no estimate covers fibres of these radii, NaN where they are not round.
+
+    With springs the estimates need one radius.
+    """
     return bool(np.isnan(radii).any() or (has_springs and np.ptp(radii) > SAME_RADIUS * radii.max()))
 
 

@@ -152,7 +152,7 @@ def _counts(entry: Mapping[str, Any]) -> str:
 
 
 def _goes_on(context: AnalysisContext, path: LoadPath, point: Point, count: int) -> bool:
-    """Whether the path goes on after the last of so many points."""
+    """Return whether the path goes on after the last of so many points."""
     if not point.state.converged:
         # What broke next was decided on a state that does not hold.
         return False

@@ -38,7 +38,7 @@ def check_to_draw(directory: Path) -> None:
 
 
 def finished(directory: Path, case: Case) -> bool:
-    """Whether `directory` has the whole result of this case and no checkpoint of a later run.  Call on one rank.
+    """Return whether `directory` has the whole result of this case and no checkpoint of a later run.  Call on one rank.
 
     Raises:
         CaseError: the result is damaged, or of another case.

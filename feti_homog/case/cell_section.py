@@ -240,13 +240,13 @@ class Cell:
 
     @property
     def has_voids(self) -> bool:
-        """Whether there are voids, as far as is known before a user's mesh is read."""
+        """Return whether there are voids, as far as is known before a user's mesh is read."""
         table = self.table
         return bool(self.voids) or (table is not None and bool(table.is_void.any() or table.inner_radius.any()))
 
     @property
     def has_own_mesh(self) -> bool:
-        """Whether the user brings the mesh."""
+        """Return whether the user brings the mesh."""
         return self.geometry == "mesh"
 
 

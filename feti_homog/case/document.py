@@ -57,7 +57,7 @@ def _bytes_of(path: Path) -> bytes:
 
 
 def _is_deeper(document: dict[str, Any], depth: int) -> bool:
-    """Whether tables and arrays stand in each other more than so deep."""
+    """Return whether tables and arrays stand in each other more than so deep."""
     level: list[Any] = [document]
     for _ in range(depth):
         entries = (entry for each in level for entry in (each.values() if isinstance(each, dict) else each))

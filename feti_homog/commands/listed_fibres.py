@@ -94,7 +94,8 @@ def _of_records(fibres: Sequence[Mapping[str, Any]], cell: Mapping[str, Any]) ->
 
 
 def _is_complete(document: Mapping[str, Any]) -> bool:
-    """Whether a result has all outlines: it lacks those of voids, and those that are neither round nor elliptic."""
+    """Return whether a result has all outlines: it lacks those of voids, and those that are neither round nor
+    elliptic."""
     are_known = all("radius" in fibre or "semi_axes" in fibre for fibre in document["fibres"])
     return are_known and not document["cell"].get("porosity")
 

@@ -154,6 +154,6 @@ def _sizes(
 
 
 def _are_cut(comm: MPI.Intracomm, subdomains: Sequence[Subdomain]) -> bool:
-    """Whether there are more subdomains than bodies; collective."""
+    """Return whether there are more subdomains than bodies; collective."""
     bodies = comm.allreduce(max((s.submesh.body for s in subdomains), default=-1), MPI.MAX) + 1
     return bool(comm.allreduce(len(subdomains)) > bodies)

@@ -99,7 +99,7 @@ class ProjectedPreconditioner:
 
 
 class Stall:
-    """Whether a norm has not halved for `patience` iterations."""
+    """Return whether a norm has not halved for `patience` iterations."""
 
     def __init__(self, patience: int) -> None:
         self._patience = patience
@@ -135,11 +135,11 @@ class PrimalTest:
         self._jump_scale, self._force_scale = jump, forces
 
     def is_met(self, rtol: float, jump: float, forces: float) -> bool:
-        """Whether norms of the jump and of the forces are both below rtol; no jump at all is."""
+        """Return whether norms of the jump and of the forces are both below rtol; no jump at all is."""
         return jump <= rtol * self._jump_scale and (forces <= rtol * self._force_scale or jump == 0.0)
 
     def __call__(self, ksp: PETSc.KSP, iteration: int, residual: float) -> PETSc.KSP.ConvergedReason:
-        """Whether to go on; `residual` is the norm of the preconditioned one, |P H r|.  Collective."""
+        """Return whether to go on; `residual` is the norm of the preconditioned one, |P H r|.  Collective."""
         ended = PETSc.KSP.ConvergedReason.DIVERGED_NANORINF
         return self._errors.call(lambda: self._judge(ksp, iteration, residual), ended)
 

@@ -57,7 +57,8 @@ class SolverOptions:
         )
 
     def want_soft_modes(self, bodies_are_cut: bool) -> bool:
-        """Whether soft modes are looked for: asked for, or bodies are cut, for the webs that METIS makes have them."""
+        """Return whether soft modes are looked for: asked for, or bodies are cut, for the webs that METIS makes have
+        them."""
         return self.coarse_space == "adaptive" or (self.coarse_space == "auto" and bodies_are_cut)
 
 
@@ -125,6 +126,6 @@ def choose(sizes: ProblemSizes, options: SolverOptions, thresholds: Thresholds =
 
 
 def _influence_pays(sizes: ProblemSizes, thresholds: Thresholds) -> bool:
-    """Whether the columns of influence are worth their set-up, and fit."""
+    """Return whether the columns of influence are worth their set-up, and fit."""
     pays = sizes.applications >= thresholds.influence_applications
     return sizes.all_dense and (sizes.has_thin or (pays and sizes.shared_dofs <= thresholds.assembled_schur_dofs))

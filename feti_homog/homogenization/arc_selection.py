@@ -75,7 +75,7 @@ class InterfaceNodes:
         return InterfaceNodes(self.fibre[own], self.pair[own], self.direction[own], self.is_vertex[own])
 
     def selects(self, arc: Arc, opening: float | None, fibre: int | None, moved: MovedTips) -> bool:
-        """Whether any node, of that fibre if it is given, is within the arc."""
+        """Return whether any node, of that fibre if it is given, is within the arc."""
         inside = debonded_arcs.debonded([arc], opening, self.fibre, self.direction, moved)
         return bool((inside if fibre is None else inside[self.fibre == fibre]).any())
 

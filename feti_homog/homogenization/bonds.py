@@ -42,7 +42,7 @@ def axial_stiffness(bond: InterfaceSection) -> float:
 
 
 def has_springs(case: Case) -> bool:
-    """Whether any bond gives way."""
+    """Return whether any bond gives way."""
     stiffnesses = (*springs(case).stiffness, *axial_springs(case).stiffness)
     return any(math.isfinite(stiffness) for own in stiffnesses for stiffness in own)
 

@@ -60,7 +60,7 @@ def _iterations(case: Case) -> int:
 
 
 def _asks_for_tips(case: Case) -> bool:
-    """Whether an envelope needs the inverse of the dual operator, which many solves call for."""
+    """Return whether an envelope needs the inverse of the dual operator, which many solves call for."""
     bond = case.interface
     by_energy = bond is not None and bond.criterion in laws_with("growth") and bond.growth == "released"
     return case.section.breaks and by_energy and (bool(case.arcs) or case.cell.has_own_mesh)

@@ -40,8 +40,10 @@ from feti_homog.typing import Float, Int
 
 
 def can_be_torn_by_tiles(case: Case, noded: NodedCell) -> bool:
-    """Whether no choice of the case needs the whole mesh: tips of arcs, bodies cut by the sides, the matrix in fewer
-    pieces than there are tiles."""
+    """Return whether no choice of the case needs the whole mesh.
+
+    Such are tips of arcs, bodies cut by the sides, the matrix in fewer pieces than there are tiles.
+    """
     whole = case.arcs or case.cell.bodies == "plane" or case.decomposition.subdomains is not None
     return len(noded.parts) > 1 and not whole
 

@@ -142,7 +142,7 @@ def transverse_constants(E_axial: float, nu_axial: float, bulk: float, shear: fl
 
 
 def is_transversely_isotropic(constants: TransverselyIsotropic) -> bool:
-    """Whether the stiffness of which these are the constants is, up to rounding."""
+    """Return whether the stiffness of which these are the constants is, up to rounding."""
     return constants.deviation < TRANSVERSELY_ISOTROPIC
 
 

@@ -50,7 +50,7 @@ def strain_rotation(angle: float) -> Float:
 
 
 def is_positive_definite(matrix: Float) -> bool:
-    """Whether a symmetric matrix, scaled to a unit diagonal, has no eigenvalue below 1e-12."""
+    """Return whether a symmetric matrix, scaled to a unit diagonal, has no eigenvalue below 1e-12."""
     diagonal = np.diag(matrix)
     if diagonal.min() <= 0.0:
         return False

@@ -36,7 +36,7 @@ def voids(mesh: CoarseMesh) -> int:
 
 
 def can_debond(mesh: CoarseMesh, pairs: Int32) -> Bool:
-    """Whether edges (k, 2) are between a fibre and the matrix on the torus; either copy on sides."""
+    """Return whether edges (k, 2) are between a fibre and the matrix on the torus; either copy on sides."""
     own, order = _neighbours(mesh)
     in_matrix = mesh.phase[order // 3] == 0
     between = own[order[in_matrix[:, 0] != in_matrix[:, 1], 0]]

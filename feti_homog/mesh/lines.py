@@ -44,15 +44,15 @@ class Arcs:
 
     @property
     def lengths(self) -> Float:
-        """As in `Lines`."""
+        """See `Lines`."""
         return np.asarray(self.span * self.circles[:, 2])
 
     def points(self, line: Int, share: Float) -> Float:
-        """As in `Lines`."""
+        """See `Lines`."""
         return on_circle(self.circles[line], self.start[line] + self.span[line] * share)
 
     def caps(self, line: Int, share: Float) -> Float:
-        """As in `Lines`."""
+        """See `Lines`."""
         return self.cap[line]
 
     def chosen(self, those: slice) -> Arcs:
@@ -78,15 +78,15 @@ class Segments:
 
     @property
     def lengths(self) -> Float:
-        """As in `Lines`."""
+        """See `Lines`."""
         return np.asarray(np.linalg.norm(self.way, axis=1))
 
     def points(self, line: Int, share: Float) -> Float:
-        """As in `Lines`."""
+        """See `Lines`."""
         return np.asarray(self.begin[line] + share[:, None] * self.way[line])
 
     def caps(self, line: Int, share: Float) -> Float:
-        """As in `Lines`."""
+        """See `Lines`."""
         low, high = self.cap[line].T
         return np.asarray(low + share * (high - low))
 

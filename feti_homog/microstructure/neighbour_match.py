@@ -19,7 +19,7 @@ CLOSE = 0.002
 
 
 def knows_neighbours(measured: FibrePattern) -> bool:
-    """Whether a pattern has distances of nearest and of second neighbours that count."""
+    """Return whether a pattern has distances of nearest and of second neighbours that count."""
     return bool(nearest_neighbours(measured, SHELLS).weights.any(axis=0).all())
 
 

@@ -120,12 +120,12 @@ def abort(comm: Comm, exit_code: int) -> NoReturn:
 
 
 def others_come(comm: Comm, timeout: float) -> bool:
-    """Whether every rank calls this within `timeout` seconds of this one."""
+    """Return whether every rank calls this within `timeout` seconds of this one."""
     return _comes(comm.Ibarrier(), timeout)
 
 
 def all_raise(comm: Comm, error: BaseException) -> bool:
-    """Whether all ranks have met an error for the user, so that they can clean up together.
+    """Return whether all ranks have met an error for the user, so that they can clean up together.
 
     Each rank with such an error calls it, and waits ARRIVAL_TIMEOUT_S for the others; a defect is one rank's own.
     """

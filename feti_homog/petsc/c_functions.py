@@ -17,7 +17,7 @@ Pointer = ctypes.c_void_p
 
 
 def option_was_used(name: str) -> bool:
-    """Whether any object has read the option `name` (without dash)."""
+    """Return whether any object has read the option `name` (without dash)."""
     used = ctypes.c_int()
     _call("PetscOptionsUsed", None, name.encode(), ctypes.byref(used))
     return bool(used.value)

@@ -63,7 +63,8 @@ def _is_petsc(word: str) -> bool:
 
 
 def _may_be_value(name: str, word: str) -> bool:
-    """Whether a word is the value, right or wrong, of the option before it: no case file, and no path after a flag."""
+    """Return whether a word is the value, right or wrong, of the option before it: no case file, and no path after a
+    flag."""
     if word.endswith(CASE_FILE) and name != "options_file":
         return False
     return not is_flag(name) or is_flag_value(word) or not _is_path(word)

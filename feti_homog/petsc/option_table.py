@@ -138,14 +138,14 @@ def without_prefix(names: Iterable[str]) -> list[str]:
 
 
 def almost_in_table(name: str) -> bool:
-    """Whether the name is probably one of OPTIONS misspelt, behind the prefix of a PETSc solver."""
+    """Return whether the name is probably one of OPTIONS misspelt, behind the prefix of a PETSc solver."""
     prefix = solver_prefix(name)
     table = [option.name for option in OPTIONS if solver_prefix(option.name) == prefix]
     return bool(prefix and not is_in_table(name) and difflib.get_close_matches(name, table, 1, CLOSE))
 
 
 def is_in_table(name: str) -> bool:
-    """Whether OPTIONS has the name (without dash)."""
+    """Return whether OPTIONS has the name (without dash)."""
     return any(name == option.name for option in OPTIONS)
 
 

@@ -47,17 +47,17 @@ def flag_value(value: Value) -> str | None:
 
 
 def is_flag(name: str) -> bool:
-    """Whether an option (name without dash) is a flag, which needs no value and may have that of a viewer."""
+    """Return whether an option (name without dash) is a flag, which needs no value and may have that of a viewer."""
     return name in FLAGS or name in VIEWERS
 
 
 def is_own_flag(name: str) -> bool:
-    """Whether an option (name without dash) is a flag of PETSc itself, which it reads when it starts or ends."""
+    """Return whether an option (name without dash) is a flag of PETSc itself, which it reads when it starts or ends."""
     return is_flag(name) and not name.startswith("feti_")
 
 
 def is_flag_value(text: str) -> bool:
-    """Whether a word after a flag is its value."""
+    """Return whether a word after a flag is its value."""
     return SWITCH.holds(text) or VIEWER.fullmatch(text) is not None
 
 
@@ -87,13 +87,13 @@ def _names(known: list[str]) -> Rule:
 
 
 def _is_viewer(text: str) -> bool:
-    """Whether the text says where to print, in a folder that exists."""
+    """Return whether the text says where to print, in a folder that exists."""
     match = VIEWER.fullmatch(text)
     return match is not None and (not match["file"] or can_be_written(match["file"]))
 
 
 def _is_new_file(text: str) -> bool:
-    """Whether the text is empty, or what may stand before its first colon is a file that can be written."""
+    """Return whether the text is empty, or what may stand before its first colon is a file that can be written."""
     file = text.partition(":")[0]
     return not file or SWITCH.holds(file) or can_be_written(file)
 
@@ -103,7 +103,7 @@ def _never(text: str) -> bool:
 
 
 def _has_options(file: str) -> bool:
-    """Whether a file can be read, and its lines are options, comments or aliases."""
+    """Return whether a file can be read, and its lines are options, comments or aliases."""
     if not can_be_read(file):
         return False
     with open(file, encoding="utf-8", errors="replace") as stream:

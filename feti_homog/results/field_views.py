@@ -121,7 +121,7 @@ def _views_of(file: Any) -> list[tuple[str, View]]:
 
 
 def _has_rows(group: Any, view: View) -> bool:
-    """Whether the tables that a view shows are there, and not empty."""
+    """Return whether the tables that a view shows are there, and not empty."""
     names = {name for name, _ in view.columns.values()} | {view.source}
     return names <= group.keys() and len(group[view.source]) > 0
 

@@ -96,7 +96,7 @@ def _foreign(paths: Sequence[Path]) -> list[Path]:
 
 
 def _is_own(path: Path) -> bool:
-    """Whether a run wrote this result.json, of whatever version, result.h5 or events.log."""
+    """Return whether a run wrote this result.json, of whatever version, result.h5 or events.log."""
     if path.name == result_json.NAME:
         try:
             document = json.loads(path.read_text(encoding="utf-8"))

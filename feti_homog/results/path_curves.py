@@ -106,7 +106,8 @@ def ends_of_legs(document: Document) -> list[int]:
 
 
 def is_proportional(document: Document) -> bool:
-    """Whether every point is on a ray of its own from zero: events along one leg, where the response is homogeneous."""
+    """Return whether every point is on a ray of its own from zero: events along one leg, where the response is
+    homogeneous."""
     return document["case"]["path"]["method"] == "events" and legs(document) == 1
 
 

@@ -109,7 +109,7 @@ class Lock:
             self._file = -1
 
     def _is_alone(self) -> bool:
-        """Whether nobody shares the lock; then it is exclusive."""
+        """Return whether nobody shares the lock; then it is exclusive."""
         try:
             fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
@@ -146,7 +146,7 @@ def holder(path: Path) -> str | None:
 
 
 def is_locked(path: Path) -> bool:
-    """Whether somebody holds the lock exclusively just now."""
+    """Return whether somebody holds the lock exclusively just now."""
     return holder(path) is not None
 
 

@@ -126,7 +126,7 @@ def keys(kind: type, above: str = "") -> Iterator[Key]:
 
 
 def is_record(hint: Any) -> bool:
-    """Whether a field of this type holds a record, or may."""
+    """Return whether a field of this type holds a record, or may."""
     return dataclasses.is_dataclass(_without_none(hint))
 
 

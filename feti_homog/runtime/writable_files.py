@@ -7,7 +7,7 @@ import stat
 
 
 def can_be_written(file: str) -> bool:
-    """Whether a file of this name can be opened for writing: there is one that can, or a folder for it.
+    """Return whether a file of this name can be opened for writing: there is one that can, or a folder for it.
 
     A pipe can if somebody reads from it; else opening it would wait.
     """
@@ -26,7 +26,7 @@ def can_be_written(file: str) -> bool:
 
 
 def can_be_read(file: str) -> bool:
-    """Whether it is a regular file that can be opened for reading."""
+    """Return whether it is a regular file that can be opened for reading."""
     return "\0" not in file and os.path.isfile(file) and os.access(file, os.R_OK)
 
 

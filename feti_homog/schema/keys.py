@@ -72,7 +72,7 @@ class Key:
     unless: tuple[str, ...] = ()
 
     def belongs(self, selected: Selected) -> bool:
-        """Whether the key belongs to the table; not, if that depends on a faulty selector."""
+        """Return whether the key belongs to the table; not, if that depends on a faulty selector."""
         return all(selected.get(condition.selector) in condition.values for condition in self.only)
 
 

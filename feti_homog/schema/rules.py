@@ -105,7 +105,7 @@ def refused(path: Path, schema: Schema, words: str, *when: Condition) -> Rule:
 
 
 def holds(schema: Schema | bool, value: Any) -> bool:
-    """Whether a value is valid by a JSON Schema, of the words that are needed here."""
+    """Return whether a value is valid by a JSON Schema, of the words that are needed here."""
     if isinstance(schema, bool):
         return schema
     return all(_CHECKS[word](part, value, schema) for word, part in schema.items())

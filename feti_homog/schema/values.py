@@ -55,7 +55,7 @@ def magnitudes_in_words(value: Any) -> str:
 
 
 def is_number(value: object) -> bool:
-    """Whether the value is a finite number of sensible magnitude (true and false are none)."""
+    """Return whether the value is a finite number of sensible magnitude (true and false are none)."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
     return value == 0 or SMALLEST <= abs(value) <= LARGEST

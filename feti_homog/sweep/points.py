@@ -183,7 +183,7 @@ def _leaves(table: Mapping[str, Any], above: TomlPath = ()) -> Iterator[tuple[To
 
 
 def _is_range(path: TomlPath, value: Any) -> bool:
-    """Whether the value of a key is meant as a range; a section, which may have a key "to", is none."""
+    """Return whether the value of a key is meant as a range; a section, which may have a key "to", is none."""
     return len(path) > 1 and isinstance(value, dict) and bool(value.keys() & {"from", "to"})
 
 

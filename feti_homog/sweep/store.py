@@ -52,7 +52,7 @@ class Status(StrEnum):
 
     @property
     def is_failure(self) -> bool:
-        """Whether the case was computed in vain; --retry computes it again."""
+        """Return whether the case was computed in vain; --retry computes it again."""
         return self in (Status.UNCONVERGED, Status.FAILED)
 
 

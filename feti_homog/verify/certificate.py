@@ -43,7 +43,7 @@ class Certificate:
 
     @property
     def holds(self) -> bool:
-        """Whether every law does."""
+        """Return whether every law does."""
         return all(finding.holds for finding in self.findings)
 
     @property

@@ -104,7 +104,7 @@ def _overloaded_by_jump(state: StateNumbers, points: Sequence[Point], near: floa
 
 
 def _in_cascade(points: Sequence[Point], number: int) -> bool:
-    """Whether bonds broke at the same load just before."""
+    """Return whether bonds broke at the same load just before."""
     before = points[number - 1] if number else None
     return before is not None and before["broke"] > 0 and _same_load(before, points[number])
 

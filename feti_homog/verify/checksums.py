@@ -15,7 +15,7 @@ BLOCK = 1 << 26  # bytes
 
 
 def is_as_written(document: Mapping[str, Any]) -> bool:
-    """Whether `checksum` in result.json is the CRC-32 of the rest, in the layout in which it is written."""
+    """Return whether `checksum` in result.json is the CRC-32 of the rest, in the layout in which it is written."""
     content = {key: value for key, value in document.items() if key != "checksum"}
     text = json.dumps(content, indent=1, ensure_ascii=False)
     return bool(document.get("checksum") == f"{zlib.crc32(text.encode('utf-8', 'surrogatepass')):08x}")

@@ -79,7 +79,7 @@ def _out_of_plane(constants: Mapping[str, Any], plane: str) -> Float:
 
 
 def _says_out_of_plane(constants: Mapping[str, Any], plane: str) -> bool:
-    """Whether the constants say what S33 or E33 is."""
+    """Return whether the constants say what S33 or E33 is."""
     if "stiffness" in constants:
         return len(constants["stiffness"]) == 6
     wanted = {"young": ("poisson",), "E_transverse": ("E_axial", "nu_axial"), "E1": ("nu13", "nu23")}

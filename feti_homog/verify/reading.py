@@ -100,12 +100,12 @@ class ResultFiles:
 
     @property
     def is_spatial(self) -> bool:
-        """Whether it is one of generalized plane strain."""
+        """Return whether it is one of generalized plane strain."""
         return bool(self.case["analysis"]["plane"] == "generalized")
 
     @property
     def contact(self) -> bool:
-        """Whether debonded faces must not overlap."""
+        """Return whether debonded faces must not overlap."""
         return any(section.get("contact", False) for section in self.interfaces)
 
     @property

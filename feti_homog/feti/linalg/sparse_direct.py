@@ -52,7 +52,7 @@ class DirectSolver:
 
 
 def is_direct(ksp: PETSc.KSP) -> bool:
-    """Whether a solver applies a factor once, and does not iterate."""
+    """Return whether a solver applies a factor once, and does not iterate."""
     return bool(ksp.getType() == PETSc.KSP.Type.PREONLY)
 
 

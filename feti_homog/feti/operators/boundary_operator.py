@@ -37,5 +37,5 @@ class DenseOperator(BoundaryOperator, Protocol):
 
 
 def is_dense(operator: BoundaryOperator) -> TypeGuard[DenseOperator]:
-    """Whether the operator is a `DenseOperator`."""
+    """Return whether the operator is a `DenseOperator`."""
     return operator.is_dense

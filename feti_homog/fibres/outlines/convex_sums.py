@@ -41,30 +41,30 @@ class ConvexSums:
 
     @property
     def longest(self) -> Float:
-        """As in `Outlines`."""
+        """See `Outlines`."""
         core = np.linalg.norm(self.cores, axis=2).max(axis=1)
         return np.asarray(core + np.linalg.norm(self.frames, axis=1).max(axis=1))
 
     @property
     def extents(self) -> Float:
-        """As in `Outlines`."""
+        """See `Outlines`."""
         axes = np.broadcast_to([[-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0]], (len(self), 4, 2))
         return self.support(axes).reshape(-1, 2, 2)
 
     def at(self, centres: Float) -> ConvexSums:
-        """As in `Outlines`."""
+        """See `Outlines`."""
         return replace(self, centres=centres)
 
     def per(self, unit: float) -> ConvexSums:
-        """As in `Outlines`."""
+        """See `Outlines`."""
         return ConvexSums(self.centres / unit, self.cores / unit, self.frames / unit)
 
     def rounded(self, decimals: int) -> ConvexSums:
-        """As in `Outlines`."""
+        """See `Outlines`."""
         return ConvexSums(*(each.round(decimals) for each in (self.centres, self.cores, self.frames)))
 
     def grown(self, thickness: Float) -> ConvexSums:
-        """As in `Outlines`."""
+        """See `Outlines`."""
         frames, some = self.frames.copy(), thickness > 0
         is_sharp = some & ~frames.any(axis=(1, 2))
         frames[is_sharp] = thickness[is_sharp, None, None] * np.eye(2)

@@ -23,7 +23,7 @@ class Discs:
 
     @property
     def frames(self) -> Float:
-        """As in `Outlines`."""
+        """See `Outlines`."""
         return np.asarray(self.radii[:, None, None] * np.eye(2))
 
     @property
@@ -43,27 +43,27 @@ class Discs:
         return Discs(self.centres[rows], self.radii[rows])
 
     def at(self, centres: Float) -> Discs:
-        """As in `Outlines`."""
+        """See `Outlines`."""
         return replace(self, centres=centres)
 
     def per(self, unit: float) -> Discs:
-        """As in `Outlines`."""
+        """See `Outlines`."""
         return Discs(self.centres / unit, self.radii / unit)
 
     def rounded(self, decimals: int) -> Discs:
-        """As in `Outlines`."""
+        """See `Outlines`."""
         return Discs(self.centres.round(decimals), self.radii.round(decimals))
 
     def grown(self, thickness: Float) -> Discs:
-        """As in `Outlines`."""
+        """See `Outlines`."""
         return replace(self, radii=self.radii + thickness)
 
     def joined(self, others: Discs) -> Discs:
-        """As in `Outlines`."""
+        """See `Outlines`."""
         return Discs(np.concatenate([self.centres, others.centres]), np.concatenate([self.radii, others.radii]))
 
     def support(self, normal: Float) -> Float:
-        """As in `Outlines`."""
+        """See `Outlines`."""
         return np.broadcast_to(self.radii.reshape(-1, *[1] * (normal.ndim - 2)), normal.shape[:-1])
 
     def parting(self, first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
@@ -73,5 +73,5 @@ class Discs:
         return normal, self.radii[first] + self.radii[second]
 
     def distances(self, offsets: Float) -> Float:
-        """As in `Outlines`."""
+        """See `Outlines`."""
         return np.asarray(np.abs(np.linalg.norm(offsets, axis=2) - self.radii))

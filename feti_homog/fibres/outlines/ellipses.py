@@ -49,28 +49,28 @@ class Ellipses:
 
     @property
     def radii(self) -> Float:
-        """As in `Outlines`."""
+        """See `Outlines`."""
         return np.asarray(np.sqrt(np.abs(np.linalg.det(self.frames))))
 
     @property
     def extents(self) -> Float:
-        """As in `Outlines`."""
+        """See `Outlines`."""
         return np.repeat(self.reach[:, :, None], 2, axis=2)
 
     def at(self, centres: Float) -> Ellipses:
-        """As in `Outlines`."""
+        """See `Outlines`."""
         return Ellipses(centres, self.frames)
 
     def per(self, unit: float) -> Ellipses:
-        """As in `Outlines`."""
+        """See `Outlines`."""
         return Ellipses(self.centres / unit, self.frames / unit)
 
     def rounded(self, decimals: int) -> Ellipses:
-        """As in `Outlines`."""
+        """See `Outlines`."""
         return Ellipses(self.centres.round(decimals), self.frames.round(decimals))
 
     def joined(self, others: Ellipses) -> Ellipses:
-        """As in `Outlines`."""
+        """See `Outlines`."""
         pairs = (self.centres, others.centres), (self.frames, others.frames)
         return Ellipses(*(np.concatenate(pair) for pair in pairs))
 
@@ -151,7 +151,7 @@ class Ellipses:
         return np.asarray(np.linalg.norm(np.einsum("kij,k...i->k...j", self.frames, normal), axis=-1))
 
     def parting(self, first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
-        """As in `Outlines`."""
+        """See `Outlines`."""
         one, other = self[first], self[second]
         normal = directions(gaps(one, other.at(one.centres + vector))[1])
         return normal, one.support(normal) + other.support(normal)
@@ -204,12 +204,12 @@ class EllipticRows:
         return np.asarray(~np.isnan(rows["a"]) & (rows["a"] != rows["b"]))
 
     def faults(self, rows: Columns) -> Iterator[tuple[Bool, str]]:
-        """As in `Shape`."""
+        """See `Shape`."""
         a, b = rows["a"], rows["b"]
         thin = np.minimum(a, b) < THINNEST * np.maximum(a, b)
         yield thin, f"expected a / b from {THINNEST:g} to {1 / THINNEST:g}"
         yield self.given(rows) & (rows["inner_radius"] > 0), "has an inner_radius, which only round fibres may have"
 
     def outlines(self, rows: Columns, centres: Float) -> Ellipses:
-        """As in `Shape`."""
+        """See `Shape`."""
         return Ellipses.of(centres, rows["a"], rows["b"], rows["angle"])

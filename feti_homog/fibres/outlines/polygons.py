@@ -27,7 +27,7 @@ class PolygonalRows:
         return np.asarray(rows["sides"] != 0)
 
     def faults(self, rows: Columns) -> Iterator[tuple[Bool, str]]:
-        """As in `Shape`."""
+        """See `Shape`."""
         (least, most), sides, corner, given = SIDES, rows["sides"], rows["corner"], self.given(rows)
         are_odd = given & ((sides != np.round(sides)) | (sides < least) | (sides > most))
         yield are_odd, f"expected sides from {least} to {most}, a whole number, or 0"
@@ -37,7 +37,7 @@ class PolygonalRows:
             yield given & (np.nan_to_num(rows[name]) > 0), f"has sides and {name}; give one"
 
     def outlines(self, rows: Columns, centres: Float) -> ConvexSums:
-        """As in `Shape`."""
+        """See `Shape`."""
         sides, radius = np.maximum(rows["sides"].astype(np.intp), SIDES[0]), rows["radius"]
         rounding = rows["corner"] * radius * np.cos(np.pi / sides)
         # Corners of the polygon of the centres of the rounding circles.

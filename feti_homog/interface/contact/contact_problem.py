@@ -130,7 +130,7 @@ class ContactProblem:
         return mixed_load.solve(self.solver, load, start, float(self.size.prod()), noise)
 
     def is_linear(self, status: Status) -> bool:
-        """Whether no face can come to touch another; collective."""
+        """Return whether no face can come to touch another; collective."""
         return not (self.contact and self._any(status != BONDED))
 
     def equilibria(self, strains: Float, bonds: BondState, starts: Sequence[Float]) -> list[Equilibrium]:

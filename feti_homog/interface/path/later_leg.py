@@ -106,7 +106,7 @@ class LaterLeg:
         yield from self._break_overloaded()
 
     def _is_due(self) -> bool:
-        """Whether the worst bonds are at their strength."""
+        """Return whether the worst bonds are at their strength."""
         return self._used_at_worst > 1.0 - UTILISATION_TIE
 
     def _predict(self, ahead: CoupledSolution) -> tuple[float, float, float]:
@@ -142,7 +142,8 @@ class LaterLeg:
         return reached
 
     def _continues(self, ahead: CoupledSolution, way: float, state: Equilibrium) -> bool:
-        """Whether no bond is overloaded in a state, and its response on the line from here to `ahead`; collective."""
+        """Return whether no bond is overloaded in a state, and its response on the line from here to `ahead`;
+        collective."""
         cell = self.cell
         _, used, _ = most_utilised(cell, self.law, state)
         here, there = self._from.last, cell.macroscopic(ahead)
@@ -230,7 +231,7 @@ class LaterLeg:
         self._from = PathState(self.leg, share, state.bonds, state.multipliers, self.origin, here)
 
     def _differs(self, before: Equilibrium) -> bool:
-        """Whether contact states are other than before; collective."""
+        """Return whether contact states are other than before; collective."""
         return bool(self.cell.comm.allreduce(bool((self._state.status != before.status).any()), MPI.LOR))
 
 

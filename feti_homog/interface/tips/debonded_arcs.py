@@ -63,7 +63,7 @@ def moved_tips(marks: Mapping[int, Sequence[float]], fibre: Int, direction: Floa
 def debonded(
     arcs: Sequence[Arc], opening: float | None, fibre: Int, angle: Float, moved: MovedTips = NOT_MOVED
 ) -> Bool:
-    """Whether nodes are within an arc of their fibre: (k,) for the fibres' numbers from 1 and directions (k,).
+    """Return whether nodes are within an arc of their fibre: (k,) for the fibres' numbers from 1 and directions (k,).
 
     `opening` is that of arcs without an angle; `moved` says which tips the mesh has elsewhere.
     """

@@ -166,7 +166,7 @@ class _EllipticArcs:
         return cls(ellipses, angle, way, length[:, -1], cap)
 
     def points(self, line: Int, share: Float) -> Float:
-        """As in `Lines`."""
+        """See `Lines`."""
         after = np.clip((self.way[line] <= share[:, None]).sum(axis=1), 1, LENGTH_STEPS)
         low, high = self.way[line, after - 1], self.way[line, after]
         part = (share - low) / (high - low)
@@ -174,5 +174,5 @@ class _EllipticArcs:
         return self.ellipses[line].points(parameter)
 
     def caps(self, line: Int, share: Float) -> Float:
-        """As in `Lines`."""
+        """See `Lines`."""
         return np.full(len(line), self.cap)

@@ -128,12 +128,12 @@ def _moved(points: Float, places: Float, circle: Float, size: Float) -> Float | 
 
 
 def on_sides(ends: Float, size: Float) -> Bool:
-    """Whether edges with ends (k, 2, 2) lie on a side of the cell."""
+    """Return whether edges with ends (k, 2, 2) lie on a side of the cell."""
     return np.asarray(np.any(np.all(ends == 0, axis=1) | np.all(ends == size, axis=1), axis=1))
 
 
 def _through(images: list[tuple[Float, Int]], bends: Float) -> bool:
-    """Whether all middle nodes (a, 2) lie on the circles of their edges."""
+    """Return whether all middle nodes (a, 2) lie on the circles of their edges."""
     away = [np.abs(np.linalg.norm(bends[mine] - image[:2], axis=1) / image[2] - 1) for image, mine in images]
     return bool(np.all(np.concatenate(away) <= ROUNDNESS_TOLERANCE))
 

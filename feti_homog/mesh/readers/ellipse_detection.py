@@ -69,7 +69,8 @@ def with_ellipses(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
 
 
 def _follow(ellipse: Ellipse, ends: Float, bends: Float) -> bool:
-    """Whether edges with ends (k, 2, 2) and middle nodes (k, 2), NaN if there are none, may follow the ellipse."""
+    """Return whether edges with ends (k, 2, 2) and middle nodes (k, 2), NaN if there are none, may follow the
+    ellipse."""
     chord = ends[:, 1] - ends[:, 0]
     bulge = ellipse.between(ends[:, 0], ends[:, 1]) - ends.mean(axis=1)
     off = np.abs(np.linalg.norm(np.linalg.solve(ellipse.frame, (bends - ellipse.centre).T), axis=0) - 1)

@@ -164,7 +164,8 @@ class MeshSizes:
         return cls(largest, largest, largest)
 
     def are_graded(self, arrangement: Arrangement) -> bool:
-        """Whether the mesh is finer on circles or at tips than elsewhere, as it is on thin coatings and tiny discs."""
+        """Return whether the mesh is finer on circles or at tips than elsewhere, as it is on thin coatings and tiny
+        discs."""
         return bool(min(self.tip, self.on_circles(arrangement).min()) < self.largest)
 
     def on_circles(self, arrangement: Arrangement) -> Float:

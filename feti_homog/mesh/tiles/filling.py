@@ -246,7 +246,7 @@ def _area(polygon: Float) -> float:
 
 
 def _contains(polygon: Float, point: Float) -> bool:
-    """Whether a polygon (k, 2) contains a point, by counting the edges to its right."""
+    """Return whether a polygon (k, 2) contains a point, by counting the edges to its right."""
     a, b = polygon - point, np.roll(polygon, -1, axis=0) - point
     crossing = (a[:, 1] > 0) != (b[:, 1] > 0)
     rise = np.where(crossing, b[:, 1] - a[:, 1], 1.0)

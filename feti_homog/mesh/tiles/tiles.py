@@ -59,7 +59,7 @@ class Tiling:
 
 
 def is_tiled(arrangement: Arrangement, policy: TilePolicy) -> bool:
-    """Whether it is large and has round discs only."""
+    """Return whether it is large and has round discs only."""
     return len(arrangement.phase) >= policy.least_discs and isinstance(arrangement.outlines, Discs)
 
 

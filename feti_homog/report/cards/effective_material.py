@@ -50,7 +50,7 @@ class EffectiveMaterial:
 
     @property
     def is_orthotropic(self) -> bool:
-        """Whether the compliance and the expansion have no coupling of shears."""
+        """Return whether the compliance and the expansion have no coupling of shears."""
         shears = np.zeros(3) if self.expansion is None else self.expansion[3:]
         return not self.compliance[COUPLINGS].any() and not shears.any()
 

@@ -199,7 +199,7 @@ def _left(attributes: Any, drawn: DrawnMesh, borders: Array) -> Array:
 
 
 def is_axial(state: Any) -> bool:
-    """Whether a state shears the cell along the fibres alone."""
+    """Return whether a state shears the cell along the fibres alone."""
     strain = state.attrs["strain"]
     others = [*strain[[0, 1, -1]], strain[2], state.attrs["temperature"]] if len(strain) > 3 else strain
     return not np.any(others) and bool(np.any(strain))

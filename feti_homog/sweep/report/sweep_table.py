@@ -161,12 +161,12 @@ def _series(table: SweepTable, key: str, label: str, points: Sequence[int]) -> S
 
 
 def _follows(table: SweepTable, points: Sequence[int], name: str, key: str) -> bool:
-    """Whether an input has one value for each value of the key."""
+    """Return whether an input has one value for each value of the key."""
     pairs = {(repr(table.input_of(point, key)), repr(table.input_of(point, name))) for point in points}
     return len(pairs) == len({value for value, _ in pairs})
 
 
 def varies(table: SweepTable, key: str) -> bool:
-    """Whether a key has more than one value among finished cases."""
+    """Return whether a key has more than one value among finished cases."""
     values = table.inputs.get(key, ())
     return len({v for v, d in zip(values, table.documents, strict=False) if v is not None and d is not None}) > 1
