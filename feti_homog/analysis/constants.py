@@ -1,4 +1,4 @@
-"""What follows from the stiffness of a linear cell: moduli and bounds in the plane, constants in space."""
+"""Constants that follow from the stiffness of a linear cell: moduli and bounds in the plane, constants in space."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What follows from a stiffness in space: constants by their usual names, and what closed estimates say of them."""
+"""Constants that follow from a stiffness in space, by their usual names, and their closed estimates."""
 
 from __future__ import annotations
 

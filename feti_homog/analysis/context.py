@@ -111,7 +111,7 @@ class AnalysisContext:
 
     @cached_property
     def fibre_interfaces(self) -> FibreInterfaces:
-        """Those of the cell.  Collective."""
+        """Interfaces of the fibres of the cell.  Collective."""
         return FibreInterfaces(self.cell)
 
     def point(self, responses: Sequence[Response]) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""What a case comes to: the answer to a program that asks for it in Python, and the content of result.json."""
+"""Result of a case: the object that Python programs receive, and the content of result.json."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the floors above ask of the section of an analysis, whichever it is."""
+"""Questions that the section of every analysis answers for the floors above."""
 
 from __future__ import annotations
 

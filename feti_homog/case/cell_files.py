@@ -1,4 +1,4 @@
-"""What a cell takes from files: a mesh, a table of its fibres with the size of the cell, or one that it matches."""
+"""Files of a cell: a mesh, a table of its fibres with the size of the cell, or a table that it matches."""
 
 from __future__ import annotations
 

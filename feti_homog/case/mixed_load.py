@@ -29,7 +29,7 @@ def _stress(name: str, *only: Condition) -> Any:
 
 @dataclass(frozen=True, kw_only=True)
 class MixedLoad:
-    """What is prescribed of a macroscopic load: of a component its strain or its stress, never both.
+    """Prescribed components of a macroscopic load: the strain or the stress of each, never both.
 
     What a load of a path does not name stays as it was prescribed last; what none has named so far is free of stress.
     """

@@ -22,7 +22,7 @@ OUT_OF_PLANE_STRESSES = ("S33", "S23", "S13")
 
 @dataclass(frozen=True, kw_only=True)
 class Analysis:
-    """What is computed, and in which plane state."""
+    """Type of the analysis and its plane state."""
 
     type: str = key(
         choice("stiffness", "angle", "path", "load", "envelope"),
@@ -56,7 +56,7 @@ class Angle(AnalysisSection):
         return self.values
 
     def solves(self, loads: int, one_sided: bool) -> int:
-        """Those of each opening."""
+        """Return the number of solves of all openings."""
         return len(self.values) * (loads if self.strain is None else 1)
 
 
@@ -80,7 +80,7 @@ class Decomposition:
 
 @dataclass(frozen=True, kw_only=True)
 class Output:
-    """What is written and drawn."""
+    """Files and pictures of a run."""
 
     fields: bool = key(boolean, "Write result.h5 and result.xdmf.", default=True)
     states: int | str = key(

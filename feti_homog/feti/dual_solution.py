@@ -1,4 +1,4 @@
-"""What a solve of the dual problem finds."""
+"""Solution of the dual problem."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ COARSE_SPACES = ("auto", "natural", "adaptive")
 
 @dataclass(frozen=True)
 class SolverOptions:
-    """What the options say.
+    """Values of the options.
 
     Attributes:
         preconditioner: of PRECONDITIONERS, `-feti_pc_type`.
@@ -87,7 +87,7 @@ class ProblemSizes:
 
 @dataclass(frozen=True)
 class SolverPlan:
-    """What is made.
+    """Chosen parts of the solver.
 
     Attributes:
         preconditioner: of PRECONDITIONERS, not auto.

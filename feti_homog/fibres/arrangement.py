@@ -90,7 +90,7 @@ class Arrangement:
 
     @property
     def within(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """What is in each outline (N,), and what is in the ring around it if there is one (N,)."""
+        """Phases within each outline (N,), and in the ring around it if there is one (N,)."""
         both = list(zip(self.phase, self.is_hollow.tolist(), strict=True))
         return tuple(VOID if void else own for own, void in both), tuple(own if void else COATING for own, void in both)
 

@@ -1,4 +1,4 @@
-"""What a case takes: seconds, memory, and how many ranks are worth while; estimates before anything is solved.
+"""Cost of a case: seconds, memory, and how many ranks are worth while; estimates before anything is solved.
 
 About linear in the degrees of freedom, for bodies are cut into pieces of one size.  The constants are those that
 `.venv/bin/python scripts/measure_cost.py` prints, on a 2-core machine.  Times are good to a factor of about two, and

@@ -1,4 +1,4 @@
-"""What result.h5 holds: the parts that each rank hands over, and where the file has them.
+"""Layout of result.h5: the parts that each rank hands over, and where the file has them.
 
 Lengths are in the unit of the cell, stresses in that of the moduli.  n nodes, m elements, k interface nodes, f fibres
 are all of the file's, of which each rank has a part; nodes are torn, so that each subdomain has its own.

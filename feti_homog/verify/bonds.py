@@ -1,4 +1,4 @@
-"""What the case says of the bonds of each interface node, and which of two bodies is the inner one."""
+"""Bonds of each interface node by the case, and the inner one of two bodies."""
 
 from __future__ import annotations
 

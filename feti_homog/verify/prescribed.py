@@ -1,4 +1,4 @@
-"""What the case of a result prescribes: of every component its strain or its stress, and a temperature.
+"""Loads that the case of a result prescribes: of every component its strain or its stress, and a temperature.
 
 Components are those of strain, 3 or 6, and last in generalized plane strain a change of temperature, of which the
 strain is given.

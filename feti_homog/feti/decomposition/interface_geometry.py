@@ -21,7 +21,7 @@ FOLDED = 1e-9
 
 @dataclass(frozen=True)
 class InterfaceGeometry:
-    """Of n shared entities that this rank owns.
+    """Geometry of the n shared entities that this rank owns.
 
     The attributes are those of `SharedEntities`, 0 of other entities and where no bond may break.
     """

@@ -28,7 +28,7 @@ HOLDING_BONDS = 2
 
 
 class BodyTies:
-    """Of every fibre and the body around it two bonds, the second as far as can be from the first."""
+    """Two bonds of every fibre and the body around it, the second as far as can be from the first."""
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator) -> None:
         """Choose the bonds.  Collective."""

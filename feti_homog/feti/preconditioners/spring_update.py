@@ -100,5 +100,5 @@ class SpringUpdated(Preconditioner):
         return self._update.apply(self._inner.apply(r))
 
     def closing_forces(self, jump: Float) -> Float:
-        """Those of `inner`, updated.  Collective."""
+        """Return the forces of `inner`, updated.  Collective."""
         return self._update.apply(self._inner.closing_forces(jump))

@@ -32,7 +32,7 @@ class ConvexSums:
 
     @property
     def radii(self) -> Float:
-        """As in `Outlines`, by Steiner's formula: A + P r + pi r^2 of a core around which the disc of radius r runs."""
+        """See `Outlines`; by Steiner's formula A + P r + pi r^2 of a core around which the disc of radius r runs."""
         onward = np.roll(self.cores, -1, axis=1)
         area = (self.cores[..., 0] * onward[..., 1] - self.cores[..., 1] * onward[..., 0]).sum(axis=1) / 2
         around = np.linalg.norm(onward - self.cores, axis=2).sum(axis=1)
@@ -73,7 +73,7 @@ class ConvexSums:
         return replace(self, frames=frames)
 
     def joined(self, others: ConvexSums) -> ConvexSums:
-        """As in `Outlines`, for cores of as many corners."""
+        """See `Outlines`; for cores of as many corners."""
         pairs = ((self.centres, others.centres), (self.cores, others.cores), (self.frames, others.frames))
         return ConvexSums(*(np.concatenate(pair) for pair in pairs))
 

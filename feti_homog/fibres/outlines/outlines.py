@@ -1,4 +1,4 @@
-"""What is asked of the outlines of fibres, whichever shape they have."""
+"""Protocols of the outlines of fibres and of the shapes of rows."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is imposed on a cell: strains, or the stresses that work on them."""
+"""Loads on a cell: strains, or the stresses that work on them."""
 
 from __future__ import annotations
 

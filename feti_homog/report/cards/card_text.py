@@ -1,4 +1,4 @@
-"""What cards have in common: their first comments, numbers in fields of a given width, names."""
+"""Parts that cards share: their first comments, numbers in fields of a given width, names."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What pictures say of the load of a state."""
+"""Labels of the load of a state in pictures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the pictures have in common: their style, the frame of a cell, triangles and lines, colour ranges, labels."""
+"""Parts that pictures share: their style, the frame of a cell, triangles and lines, colour ranges, labels."""
 
 from __future__ import annotations
 

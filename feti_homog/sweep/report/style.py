@@ -1,4 +1,4 @@
-"""What the pictures of a sweep have in common: colours, scatter with means, labels and the legend."""
+"""Parts that the pictures of a sweep share: colours, scatter with means, labels and the legend."""
 
 from __future__ import annotations
 
