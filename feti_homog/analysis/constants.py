@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from feti_homog.analysis.result_records import StiffnessBounds
+from feti_homog.analysis.cell_records import StiffnessBounds
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.materials import bounds
 from feti_homog.materials.laws import plane_stiffness

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from feti_homog.errors import CaseError
-from feti_homog.homogenization.bonds import bond_law
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.laws.energy import SpringEnergy
@@ -16,8 +15,7 @@ def criterion_of(cell: TornCell, grows: bool = False) -> BondLaw:
     Raises:
         CaseError: tips of debonding ask for what the solver does not have.
     """
-    bonds = cell.case.interfaces
-    law = bond_law(bonds, cell.solver.jump_operator.nodes.pair)
+    law, bonds = cell.bond_law, cell.case.interfaces
     if not (isinstance(law, SpringEnergy) and bonds[0].growth == "released"):
         return law
     has_tips = grows or cell.sum_over_ranks(int(cell.debonded(None).sum())) > 0

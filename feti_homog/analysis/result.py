@@ -9,18 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from feti_homog.analysis.cell_records import CellInfo, Checks, FibreInfo, SolverInfo, StiffnessBounds
 from feti_homog.analysis.result_fields import Fields
 from feti_homog.analysis.result_records import (
     EITHER_STIFFNESS,
     AnglePoint,
-    CellInfo,
-    Checks,
     EnvelopePoint,
-    FibreInfo,
     LoadPoint,
     PathPoint,
-    SolverInfo,
-    StiffnessBounds,
     TipRates,
 )
 from feti_homog.materials.bounds import Moduli

@@ -7,14 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from feti_homog.analysis.cell_records import CellInfo, Checks, FibreInfo, SolverInfo
 from feti_homog.analysis.checks import CONTACT_TOLERANCE
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result import Result
 from feti_homog.analysis.result_fields import Fields
-from feti_homog.analysis.result_records import CellInfo, Checks, FibreInfo, SolverInfo
 from feti_homog.case.case import Case
 from feti_homog.fibres.outlines.ellipses import Ellipses
-from feti_homog.homogenization.domain_partition import CellSummary
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.parallel.mpi_errors import on_root
 from feti_homog.version import __version__
@@ -34,7 +33,7 @@ def result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields
         case=cell.case.resolved(),
         digest=on_root(cell.comm, cell.case.digest),
         cell=_cell_info(cell, fractions),
-        fibres=_fibres(cell.summary),
+        fibres=_fibres(cell),
         solver=_solver_info(context),
         checks=Checks(**checks.errors),
         check_tolerance=checks.tolerance("jump"),
@@ -82,9 +81,10 @@ def _cell_info(cell: TornCell, fractions: dict[str, float]) -> CellInfo:
     )
 
 
-def _fibres(summary: CellSummary) -> tuple[FibreInfo, ...]:
+def _fibres(cell: TornCell) -> tuple[FibreInfo, ...]:
     """Return the fibres of the cell."""
-    bodies = summary.fibre_bodies
+    summary, factors = cell.summary, cell.strength_factors
+    bodies, varies = summary.fibre_bodies, not (factors == 1.0).all()
     ellipses = Ellipses(summary.centres, summary.frames)
     is_ellipse = np.isnan(summary.radii) & ~np.isnan(ellipses.angles)
     return tuple(
@@ -96,8 +96,9 @@ def _fibres(summary: CellSummary) -> tuple[FibreInfo, ...]:
             semi_axes=ellipses.semi_axes[body] if is_ellipse[body] else None,
             angle=float(ellipses.angles[body]) if is_ellipse[body] else None,
             coating=float(thickness) if thickness > 0 else None,
+            strength=float(factor) if varies else None,
         )
-        for number, (body, thickness) in enumerate(zip(bodies, summary.coatings, strict=True), start=1)
+        for number, (body, thickness, factor) in enumerate(zip(bodies, summary.coatings, factors, strict=True), start=1)
     )
 
 

@@ -75,6 +75,11 @@ class FibreTable:
         return self.columns["inner_radius"]
 
     @property
+    def strength(self) -> Float:
+        """(N,) strength of the bonds of each fibre / that of the case, 1 where the table gives none."""
+        return self.columns["strength"]
+
+    @property
     def centres(self) -> Float:
         """(N, 2)."""
         return np.column_stack([self.columns["x"], self.columns["y"]])

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from feti_homog.case.bond_laws import DEFAULT, LAWS, REGISTRY
-from feti_homog.case.section_values import FIBRES, PAIR, STIFFNESS, STRENGTH, TOUGHNESS
+from feti_homog.case.section_values import FIBRES, PAIR, SEED, STIFFNESS, STRENGTH, TOUGHNESS
 from feti_homog.case.selectors import ANALYSIS_TYPE, BREAKING, BY_ENERGY, BY_STRENGTH, GENERALIZED
-from feti_homog.schema.keys import TableReader, key
+from feti_homog.schema.keys import TableReader, key, to_table
 from feti_homog.schema.values import POSITIVE_OR_INF, boolean, choice, list_of, real, table_of
 from feti_homog.schema.wording import toml_value
 
-COMMON = ("contact", "criterion", "growth")
+COMMON = ("contact", "criterion", "growth", "scatter")
 """The keys in which all sections [[interface]] agree."""
 
 
@@ -43,6 +43,22 @@ class Arc:
     )
 
 
+@dataclass(frozen=True, kw_only=True)
+class Scatter:
+    """Scatter of strengths from fibre to fibre: a factor of Weibull's distribution with mean 1 for each fibre."""
+
+    shape: float = key(
+        real(least=1.0, most=1000.0),
+        "Weibull modulus m. Strengths have the coefficient of variation sqrt(Gamma(1 + 2/m) / Gamma(1 + 1/m)^2 - 1), "
+        "about 1.2 / m: 0.23 of m = 5, 0.15 of 8, 0.06 of 20.",
+    )
+    seed: int = key(
+        SEED,
+        "Seed of the factors: with it fibre N has the same factor in any cell and mesh, on any number of ranks.",
+        default=0,
+    )
+
+
 ARCS = list_of(table_of(Arc, "arc", ""), "a list of arcs {fibre, centre, angle}")
 
 
@@ -51,7 +67,7 @@ class InterfaceSection:
     """Bonding of fibres and matrix: what is debonded from the start, and the tractions that debond more.
 
     Without this section bonding is perfect. Several sections [[interface]], each with its pair of phases, have the same
-    contact, criterion and growth.
+    contact, criterion, growth and scatter.
 
     A strength of None is unlimited.
     """
@@ -142,6 +158,16 @@ class InterfaceSection:
         default=0.25,
         only=BY_ENERGY,
     )
+    scatter: Scatter | None = key(
+        table_of(Scatter, "scatter", "a table such as {shape = 8.0, seed = 1}"),
+        "Strengths that differ from fibre to fibre: each fibre has a random factor f of mean 1, by which all strengths "
+        "of its interfaces are multiplied, and toughnesses by f^2; stiffnesses stay, and so does the length of the "
+        "process zone. Strengths and toughness of this section are then those of a mean fibre, f = 1. The column "
+        "strength of a table of fibres gives factors too; both are multiplied.",
+        default=None,
+        default_words="none",
+        only=BREAKING,
+    )
     between: tuple[str, str] | None = key(
         PAIR,
         "The two phases whose interfaces these are, in any order; pairs that no section names never part. Needed where "
@@ -191,6 +217,12 @@ def _faults_between(interfaces: tuple[InterfaceSection, ...]) -> list[str]:
         for name in COMMON:
             value, common = getattr(interface, name), getattr(interfaces[0], name)
             if value != common:
-                expected = f"expected {toml_value(common)}, as of [interface 1]"
-                faults.append(f"[{label}] {name} = {toml_value(value)}: {expected}: all interfaces agree in it")
+                expected = f"expected {_written(common)}, as of [interface 1]"
+                faults.append(f"[{label}] {name} = {_written(value)}: {expected}: all interfaces agree in it")
     return faults
+
+
+def _written(value: Any) -> str:
+    """Return the value of a key that interfaces agree in, as TOML has it."""
+    table = to_table(value, {}) if isinstance(value, Scatter) else value
+    return "none" if table is None else toml_value(table)

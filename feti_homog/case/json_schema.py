@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from feti_homog.case.cell_section import ALL_CIRCULAR
-from feti_homog.case.interface_section import Arc
+from feti_homog.case.interface_section import Arc, Scatter
 from feti_homog.case.material_sections import CONSTANTS
 from feti_homog.case.mixed_load import TEMPERATURE, MixedLoad
 from feti_homog.case.petsc_section import PREFIXED
@@ -50,6 +50,7 @@ def json_schema() -> Schema:
             **{section: _table(contents) for section, contents in SECTIONS.items()},
             **{_definition(form): _table(contents) for form, contents in MATERIAL_FORMS.items()},
             "arc": _table(Arc),
+            "scatter": _table(Scatter),
             "mixed_load": _table(MixedLoad),
             "axis": _axis(),
             "axes": _axes(),

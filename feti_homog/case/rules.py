@@ -12,7 +12,7 @@ from feti_homog.case.bond_laws import REGISTRY, STIFFNESSES, STRENGTHS
 from feti_homog.case.cell_files import FEWEST_MATCHED
 from feti_homog.case.cell_section import MESH, MESHED, TABLE, Cell
 from feti_homog.case.element_sizes import ASKED, CHOSEN
-from feti_homog.case.interface_section import ARCS, Arc
+from feti_homog.case.interface_section import ARCS, Arc, Scatter
 from feti_homog.case.mixed_load import MixedLoad
 from feti_homog.case.section_values import MESH_FILE, MESH_SUFFIXES
 from feti_homog.case.sections import OUT_OF_PLANE_STRESSES, SECTIONS, SECTIONS_OF_AN_ANALYSIS
@@ -38,6 +38,7 @@ PLACES_OF_LOADS: tuple[Path, ...] = (("path", "to"), ("path", "waypoints", ITEMS
 PLACES_OF_TABLES: tuple[tuple[Path, type[Any]], ...] = (
     *(((section,), contents) for section, contents in SECTIONS.items()),
     (("interface", "debonded", ITEMS), Arc),
+    (("interface", "scatter"), Scatter),
     *((place, MixedLoad) for place in PLACES_OF_LOADS),
 )
 ALONG_FIBRES = [name for name in (*SPATIAL_STRESSES, *SPATIAL_STRAINS) if name not in (*STRESSES, *STRAINS)]

@@ -69,6 +69,7 @@ NUMBERS = {
     "radius": Column(math.nan, above=0.0),
     "coating": Column(0.0, least=0.0),
     "inner_radius": Column(0.0, least=0.0),
+    "strength": Column(1.0, above=0.0),
 } | {name: column for shape in SHAPES for name, column in shape.columns.items()}
 FIBRE_CELLS: Mapping[str, ValueType] = {
     name: real(least=column.least, above=column.above) for name, column in NUMBERS.items()

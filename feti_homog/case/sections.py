@@ -8,7 +8,7 @@ from typing import Any
 from feti_homog.case.asked import AnalysisSection
 from feti_homog.case.cell_section import Cell
 from feti_homog.case.envelope_section import Envelope
-from feti_homog.case.interface_section import Arc, InterfaceSection
+from feti_homog.case.interface_section import Arc, InterfaceSection, Scatter
 from feti_homog.case.load_section import LoadPath, SingleLoad
 from feti_homog.case.mixed_load import MixedLoad, Strain
 from feti_homog.case.section_values import OPENINGS, STATES, STRAIN
@@ -155,6 +155,7 @@ TABLES = (
     *(Table(section, f"[{section}]", contents) for section, contents in SECTIONS.items()),
     *(Table("material", "[material.PHASE]", contents, form) for form, contents in MATERIAL_FORMS.items()),
     Table("interface", "an arc of [interface] debonded", Arc),
+    Table("interface", "[interface] scatter", Scatter),
     Table("path", "a load of [path] to or waypoints", MixedLoad),
     Table("load", "[load] to", MixedLoad),
 )

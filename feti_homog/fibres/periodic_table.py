@@ -132,6 +132,13 @@ def on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]:
         raise MeshError(f'[cell] {table.name}: window = "cut": {words}; leave some of them out') from error
 
 
+def fibre_rows(table: FibreTable, window: str) -> Int:
+    """(fibres,) places in the table of the fibres of its cell, in the order of their numbers."""
+    size = np.array([table.width, table.height], float)
+    first, _ = _without_images(table, table.centres - _corner(table), size, window == "cut")
+    return np.flatnonzero(first & ~table.is_void)
+
+
 def _corner(table: FibreTable) -> Float:
     """(2,) the lower left corner of the cell; the lowest coordinates of centres if the table does not say."""
     given = np.array([table.left, table.bottom], float)
@@ -182,7 +189,7 @@ def _unlikely_coatings(table: FibreTable) -> list[str]:
 def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> tuple[Bool, list[str]]:
     """(N,) which rows are the first of their fibre, and faults of rows at one place that are not one fibre."""
     first, second, vector = neighbours(centres, size, SAME_FIBRE * table.radius.max())
-    radius, apart = table.radius, np.linalg.norm(vector, axis=1)
+    radius, strength, apart = table.radius, table.strength, np.linalg.norm(vector, axis=1)
     smaller = np.minimum(radius[first], radius[second])
     near = (first != second) & (apart < SAME_FIBRE * smaller)
     first, second, vector = first[near], second[near], vector[near]
@@ -195,8 +202,8 @@ def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool
         rows = f"rows {table.row[i]} and {table.row[j]}"
         if is_here:
             faults.append(f"{rows}: are at one place; expected each fibre once")
-        elif not is_cut and (not is_alike or table.phase[i] != table.phase[j]):
-            faults.append(f"{rows}: are images of one fibre, a period apart; expected one shape and one phase")
+        elif not is_cut and (not is_alike or table.phase[i] != table.phase[j] or strength[i] != strength[j]):
+            faults.append(f"{rows}: are images of one fibre, a period apart; expected one shape, phase and strength")
     is_first = np.ones(len(radius), bool)
     is_first[np.maximum(first, second)] = is_cut
     return is_first, faults

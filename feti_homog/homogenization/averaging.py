@@ -14,7 +14,6 @@ from mpi4py import MPI
 
 from feti_homog.errors import ConvergenceError
 from feti_homog.feti.operators.node_blocks import NodeBlocks
-from feti_homog.homogenization.bonds import bond_law
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, Equilibrium, Status
@@ -66,13 +65,13 @@ class Homogenization:
     """Averages over a torn cell with its interfaces.
 
     Attributes:
-        law: of the bonds, by the sections of interfaces alone.
+        law: of the bonds, without what tips release.
         interface: the contact problem.
     """
 
     def __init__(self, cell: TornCell, contact: bool) -> None:
         self.cell, size = cell, np.array([cell.summary.width, cell.summary.height])
-        self.law = bond_law(cell.case.interfaces, cell.solver.jump_operator.nodes.pair)
+        self.law = cell.bond_law
         self.interface = ContactProblem(cell.solver, contact, size, self.law.softening)
 
     @property

@@ -11,6 +11,7 @@ from feti_homog.case import bond_laws
 from feti_homog.case.case import Case
 from feti_homog.case.interface_section import InterfaceSection
 from feti_homog.feti.decomposition.interface_springs import InterfaceSprings
+from feti_homog.fibres.periodic_table import fibre_rows
 from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.laws.registry import law_class
 from feti_homog.typing import Float, Int
@@ -47,13 +48,38 @@ def has_springs(case: Case) -> bool:
     return any(math.isfinite(stiffness) for own in stiffnesses for stiffness in own)
 
 
-def bond_law(bonds: Sequence[InterfaceSection], pair: Int) -> BondLaw:
-    """Law of the bonds at the nodes (k,) of the interfaces `pair` (k,); without sections of interfaces none breaks."""
+# Power of a fibre's factor by which keys of these endings are multiplied: laws remain similar, for all openings grow by
+# the factor too, and the length of the process zone stays.
+POWERS = {"strength": 1, "toughness": 2}
+
+
+def strength_factors(case: Case, fibres: int) -> Float:
+    """(fibres,) strength of the bonds of each fibre / that of the case.
+
+    f = (-ln(1 - U))^(1/m) / Gamma(1 + 1/m) with U of a uniform distribution, Weibull's of modulus m and mean 1, times
+    the column `strength` of a table of fibres.  Fibre N takes the N-th number of the generator, whatever the cell.
+    """
+    factors, scatter = np.ones(fibres), case.interface.scatter if case.interface else None
+    if scatter is not None:
+        # A stream of its own: of one seed the arrangement takes other numbers.
+        uniform = np.random.default_rng(np.random.SeedSequence(scatter.seed, spawn_key=(1,))).random(fibres)
+        factors = (-np.log1p(-uniform)) ** (1.0 / scatter.shape) / math.gamma(1.0 + 1.0 / scatter.shape)
+    table = case.cell.table
+    return factors if table is None else factors * table.strength[fibre_rows(table, case.cell.window)]
+
+
+def bond_law(bonds: Sequence[InterfaceSection], pair: Int, factor: float | Float = 1.0) -> BondLaw:
+    """Law of the bonds at the nodes (k,) of the interfaces `pair` (k,); without sections of interfaces none breaks.
+
+    `factor` (k,) is that of the fibre of each node, which multiplies its strengths, and squared its toughness.
+    """
 
     def value(key: str, *others: str) -> float | Float:
         given = [next((v for name in (key, *others) if (v := getattr(bond, name)) is not None), None) for bond in bonds]
         finite = [math.inf if own is None else own for own in given] or [math.inf]
-        return finite[0] if len(finite) == 1 else np.array(finite)[pair]
+        values = finite[0] if len(finite) == 1 else np.array(finite)[pair]
+        power = POWERS.get(key.rpartition("_")[2], 0)
+        return values * factor**power if power else values
 
     return law_class(bonds[0].criterion if bonds else bond_laws.DEFAULT).of_keys(value)
 

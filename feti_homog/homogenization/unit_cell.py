@@ -26,6 +26,7 @@ from feti_homog.homogenization.domain_partition import (
     distribute,
 )
 from feti_homog.homogenization.tile_tearing import can_be_torn_by_tiles, tear_by_tiles
+from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.tips import debonded_arcs
 from feti_homog.mesh.coarse_mesh import CoarseMesh
 from feti_homog.mesh.fill.unmeshed_cell import NodedCell
@@ -76,6 +77,19 @@ class TornCell:
             nodes.append(own)
             first += len(mesh.points)
         return np.concatenate(nodes)
+
+    @cached_property
+    def strength_factors(self) -> Float:
+        """(fibres,) those of `bonds.strength_factors`."""
+        return bonds.strength_factors(self.case, self.summary.fibres)
+
+    @cached_property
+    def bond_law(self) -> BondLaw:
+        """Law of the bonds at this rank's interface nodes, by the sections of interfaces and the fibres' factors."""
+        nodes = self.solver.jump_operator.nodes
+        varies = not (self.strength_factors == 1.0).all()
+        factor = self.strength_factors[self.summary.fibre_number(nodes.fibre) - 1] if varies else 1.0
+        return bonds.bond_law(self.case.interfaces, nodes.pair, factor)
 
     @cached_property
     def directions(self) -> Float:

@@ -68,6 +68,7 @@ class FibrePart:
         "(f, 2)",
     )
     radius: Float = described("radius; NaN of a fibre that is not round", LENGTH, "(f,)")
+    strength: Float = described("strength of the bonds of the fibre / that of [interface]", shape="(f,)")
 
 
 @dataclass(frozen=True)

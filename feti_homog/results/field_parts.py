@@ -62,6 +62,7 @@ def fibre_part(cell: TornCell) -> FibrePart:
         phase=summary.constituent_phase[body],
         centre=summary.centres[body],
         radius=summary.radii[body],
+        strength=cell.strength_factors[: len(body)],
     )
 
 

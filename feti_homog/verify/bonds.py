@@ -22,13 +22,15 @@ DEFAULTS = {"axial_stiffness": "tangential_stiffness", "axial_strength": "tangen
 
 
 def _section_at(files: ResultFiles, nodes: AnyInt | Bool | slice) -> Mapping[str, Any]:
-    """Return the section [interface]; of several, with the numbers (p,) of each of the `nodes` in place of one."""
-    sections = files.interfaces
-    if len(sections) < 2:
+    """Return the section [interface]; of several, or of fibres of different strengths, with the numbers (p,) of each of
+    the `nodes` in place of one."""
+    sections, strength = files.interfaces, files.fibres.strength
+    if not sections or (len(sections) == 1 and (strength == 1).all()):
         return sections[0] if sections else {}
-    pair = files.interface.pair[nodes]
+    pair, factor = files.interface.pair[nodes], strength[files.interface.fibre[nodes] - 1]
     numbers = {name: np.array([_number(section, name) for section in sections])[pair] for name in NUMBERS}
-    return {**sections[0], **numbers}
+    scaled = {name: numbers[name] * factor for name in NUMBERS if name.endswith("strength")}
+    return {**sections[0], **numbers, **scaled, "toughness": numbers["toughness"] * factor**2}
 
 
 def law_at(files: ResultFiles, nodes: AnyInt | Bool | slice = slice(None)) -> BondLaw:

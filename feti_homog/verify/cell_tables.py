@@ -47,10 +47,12 @@ class InterfaceRows:
 
 @dataclass(frozen=True)
 class Fibres:
-    """The f fibres by number: numbers, bodies and phases (f,), centres (f, 2), radii (f,); NaN where there is none."""
+    """The f fibres by number: numbers, bodies and phases (f,), centres (f, 2), radii (f,), NaN where there is none; and
+    the strength of their bonds / that of the case (f,)."""
 
     number: AnyInt
     body: AnyInt
     phase: AnyInt
     centre: Float
     radius: Float
+    strength: Float

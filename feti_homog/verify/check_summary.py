@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.special import gammaln
 
 from feti_homog.typing import Float
 from feti_homog.verify.discrete_cell import DiscreteCell
@@ -59,6 +60,22 @@ def _check_fibres(findings: Findings, cell: DiscreteCell, told: Sequence[Section
         stored = np.column_stack([fibres.centre, fibres.radius])
         off = np.where(np.isnan(circles) & np.isnan(stored), 0.0, circles - stored)
         findings.record("tables", relative(off, cell.files.size.max()).max(axis=1), lambda i: f"fibres[{i}]")
+        factors = np.array([fibre.get("strength", 1.0) for fibre in told]) - fibres.strength
+        findings.record("tables", np.abs(factors), lambda i: f"fibres[{i}].strength")
+        findings.record("tables", _unlike_scatter(cell), "/fibre/strength at fibre {}".format)
+
+
+def _unlike_scatter(cell: DiscreteCell) -> Float:
+    """(f,) errors of the strengths of fibres, but for those that a table may have given: quantiles of Weibull's
+    distribution with mean 1."""
+    strength, scatter = cell.files.fibres.strength, next(iter(cell.files.interfaces), {}).get("scatter")
+    if cell.files.case["cell"]["geometry"] == "table":
+        return np.zeros_like(strength)
+    if scatter is None:
+        return np.abs(strength - 1.0)
+    stream = np.random.default_rng(np.random.SeedSequence(scatter["seed"], spawn_key=(1,)))
+    hazard, m = -np.log(1.0 - stream.random(len(strength))), scatter["shape"]
+    return np.abs(np.log(strength) - np.log(hazard) / m + gammaln(1.0 + 1.0 / m))
 
 
 def _moduli(stiffness: Float) -> dict[str, float]:

@@ -217,7 +217,10 @@ def _contents(document: Mapping[str, Any], file: h5py.File, altered: tuple[str, 
     pair = _rows(own["pair"]) if "pair" in own else np.zeros(len(own["points"]), np.int32)
     points, normal, length, number, body = (_rows(own[name]) for name in ROWS)
     rows = InterfaceRows(points, normal, length, number, body, pair)
-    fibres = Fibres(*(_rows(file[f"fibre/{name}"]) for name in ("number", "body", "phase", "centre", "radius")))
+    columns = [_rows(file[f"fibre/{name}"]) for name in ("number", "body", "phase", "centre", "radius")]
+    # Results of before bonds could scatter have no strengths.
+    strength = _rows(file["fibre/strength"]) if "strength" in file["fibre"] else np.ones(len(columns[0]))
+    fibres = Fibres(*columns, strength)
     faces = np.stack([_rows(file[f"interface/{name}"]) for name in ("fibre_node", "matrix_node")], axis=1)
     size = np.array([file.attrs["width"], file.attrs["height"]], float)
     phases = tuple(map(str, file.attrs["phases"]))
@@ -234,7 +237,8 @@ def _contents(document: Mapping[str, Any], file: h5py.File, altered: tuple[str, 
     lengths = {table.shape for table in (rows.length, rows.fibre, rows.body, rows.pair)}
     _expect(lengths == {(k,)}, "/interface has tables of different lengths")
     _expect_known_pairs(_interfaces(document["case"]), rows, phases)
-    _expect(len(fibres.body) == len(fibres.radius), "/fibre has tables of different lengths")
+    lengths = {table.shape for table in (fibres.body, fibres.radius, fibres.strength)}
+    _expect(len(lengths) == 1, "/fibre has tables of different lengths")
     _expect(fibres.centre.shape == (len(fibres.radius), 2), "/fibre has tables of different lengths")
     _expect(faces.shape == (k, 2), "/interface has tables of different lengths")
     _expect(bool((faces >= 0).all() and (faces < n).all()), "/interface names unknown nodes")

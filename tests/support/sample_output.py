@@ -51,7 +51,8 @@ def sample(cells: int = 8, refine: int = 0, order: int = 1) -> Sample:
     phase = (submesh == 2).astype(int)
     mesh = MeshPart(points, triangles, body=phase, subdomain=submesh, phase=phase, fibre_number=phase)
     header = Header("sample", "0", 1.0, 1.0, order, refine, ("matrix", "fibre"), "mm", "GPa")
-    fibres = FibrePart(*(np.array([number]) for number in (1, 1, 1)), np.array([[0.5, 0.5]]), np.array([np.nan]))
+    one = np.array([1])
+    fibres = FibrePart(one, one, one, np.array([[0.5, 0.5]]), np.array([np.nan]), np.ones(1))
     return Sample(
         header,
         mesh,

@@ -9,18 +9,9 @@ import numpy as np
 import pytest
 
 from feti_homog import Result
+from feti_homog.analysis.cell_records import CellInfo, Checks, SolverInfo, StiffnessBounds
 from feti_homog.analysis.result import schema_keys
-from feti_homog.analysis.result_records import (
-    AnglePoint,
-    CellInfo,
-    Checks,
-    LoadPoint,
-    PathPoint,
-    SolverInfo,
-    StiffnessBounds,
-    TipRates,
-    Tips,
-)
+from feti_homog.analysis.result_records import AnglePoint, LoadPoint, PathPoint, TipRates, Tips
 from feti_homog.materials.bounds import Bounds, engineering_moduli
 from feti_homog.materials.spatial_constants import engineering_constants, transversely_isotropic_part
 from feti_homog.results import csv_tables, result_json

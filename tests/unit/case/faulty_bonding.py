@@ -92,6 +92,18 @@ FAULTY_BONDINGS: dict[str, tuple[str, tuple[str, ...]]] = {
         ),
         ("[interface] mode_sensitivity = 1.5: expected",),
     ),
+    "scatter_without_shape": (
+        of_type("path", PATH, "[interface]", "scatter = {seed = 1}"),
+        ("[interface] scatter.shape: missing; expected a number at least 1 and at most 1000",),
+    ),
+    "scatter_is_a_number": (
+        of_type("path", PATH, "[interface]", "scatter = 8"),
+        ("[interface] scatter = 8: expected a table such as {shape = 8.0, seed = 1}",),
+    ),
+    "scatter_of_stiffness": (
+        ended(f"[interface]\ndebonded = [{ARC}]\nscatter = {{shape = 8.0}}\n"),
+        ("[interface] scatter = {shape = 8.0}: belongs to [analysis] type = ",),
+    ),
     "stiffness_zero": (
         of_type("path", PATH, "[interface]", "normal_stiffness = 0.0"),
         ("[interface] normal_stiffness = 0.0: expected",),

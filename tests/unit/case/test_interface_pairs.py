@@ -59,6 +59,10 @@ FAULTY = {
         [ENERGY | {"between": OUTER}, ENERGY | {"between": INNER, "growth": "springs"}],
         '[interface 2] growth = "springs": expected "released", as of [interface 1]',
     ),
+    "scatter": (
+        [STRONG | {"between": OUTER}, STRONG | {"between": INNER, "scatter": {"shape": 8.0}}],
+        "[interface 2] scatter = {shape = 8.0, seed = 0}: expected none, as of [interface 1]",
+    ),
     "a value of the second": (
         [STRONG | {"between": OUTER}, {"normal_strength": -1.0, "between": INNER}],
         "[interface 2] normal_strength = -1.0: expected",
@@ -86,7 +90,7 @@ def test_faults_name_their_section(name):
 
 @pytest.mark.parametrize("name", FAULTY)
 def test_the_schema_refuses_all_but_disagreements_of_sections(name):
-    agree = name not in ("the same pair", "contact", "criteria", "growth")
+    agree = name not in ("the same pair", "contact", "criteria", "growth", "scatter")
     assert Draft202012Validator(json_schema()).is_valid(document(FAULTY[name][0])) != agree
 
 

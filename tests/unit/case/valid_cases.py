@@ -70,6 +70,7 @@ VALID_CASES = {
         "[interface]\nnormal_stiffness = 10\ntangential_stiffness = 5",
         'criterion = "energy"\ntoughness = 2\ngrowth = "springs"\nmode_sensitivity = 0',
     ),
+    "scatter": of_type("path", "[path]\nstrain = [0.1, 0, 0]", "[interface]\nscatter = {shape = 8.0, seed = 2}"),
     "curve of a mesh": MESH + "[interface]\n",
     "angle": of_type("angle", ANGLE, BARE_ARC, "contact = false"),
     "angle under a strain": of_type(

@@ -102,7 +102,7 @@ FAULTY = {
     "images of two phases": (
         ([[0.0, 0.5], [1.0, 0.5]], [0.1, 0.1]),
         {"phases": ["a", "b"]},
-        "rows 1 and 2: are images of one fibre, a period apart; expected one shape and one phase",
+        "rows 1 and 2: are images of one fibre, a period apart; expected one shape, phase and strength",
     ),
     "outside at the left": (
         ([[-0.3, 0.5], [0.5, 0.5]], [0.1, 0.1]),

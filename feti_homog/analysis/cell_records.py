@@ -1,0 +1,103 @@
+"""Records of the cell, its fibres, the solver and the checks in result.json; `result.Result` has them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from feti_homog.materials.bounds import Bounds
+from feti_homog.runtime.records import DEGREES, LENGTH, STRESS, described, plain
+from feti_homog.typing import Float
+
+
+@dataclass(frozen=True)
+class CellInfo:
+    """The meshed cell."""
+
+    width: float = described("width of the cell", LENGTH)
+    height: float = described("height of the cell", LENGTH)
+    area: float = described("area of the cell", f"{LENGTH} squared")
+    fibre_fraction: float = described("share of all phases but matrix and coating in the area of the cell")
+    fractions: Mapping[str, float] = described(
+        "share of each phase in the area of the cell", entries={"PHASE": "that of one phase"}
+    )
+    elements: int = described("triangles of the refined mesh")
+    nodes: int = described("nodes of the refined mesh, those on cuts once for each subdomain")
+    mesh_size: float | None = described(
+        "size of the elements before refinement / width, as the case says or as `accuracy` chooses; absent of users' "
+        "meshes",
+        default=None,
+    )
+    refine: int = described("how many times elements were split in four, likewise", default=0)
+    porosity: float = described("share of voids in the area of the cell", default=0.0)
+    match_distance: float | None = described(
+        "of a cell that matches a table, in mean diameters: root mean square difference of the sorted distances of "
+        "nearest and second neighbours",
+        default=None,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class FibreInfo:
+    """One fibre, as `fibre = N` of a case file selects it."""
+
+    number: int = described("number in `fibre = N` of case files, from 1")
+    phase: str = described("name of its phase")
+    centre: Float | None = described(
+        "that of its circle, else of its area, in the cell; absent if it winds around it", LENGTH, "(2,)", default=None
+    )
+    radius: float | None = described("radius of its circle; absent if it is not round", LENGTH, default=None)
+    semi_axes: Float | None = described("of an ellipse; absent of other shapes", LENGTH, "(2,)", default=None)
+    angle: float | None = described("from x1 to the first semi-axis of an ellipse", DEGREES, default=None)
+    coating: float | None = described("thickness of its coating; absent without one", LENGTH, default=None)
+    strength: float | None = described(
+        "strength of its bonds / that of [interface]; absent where all fibres have the same", default=None
+    )
+
+
+@dataclass(frozen=True)
+class SolverInfo:
+    """How the dual problem was solved."""
+
+    ranks: int = described("MPI ranks")
+    bodies: int = described("bodies, the matrix and the fibres")
+    subdomains: int = described("subdomains that the bodies are cut into")
+    dofs: int = described("degrees of freedom of all subdomains")
+    multipliers: int = described("Lagrange multipliers of the dual problem")
+    interface_nodes: int = described("nodes of the fibre-matrix interfaces, periodic images once")
+    kernel_dim: int = described("rigid-body motions of all subdomains")
+    coarse_dim: int = described("vectors of the coarse space, rigid-body motions included")
+    factorizations: int = described("subdomains that were factored, each once")
+    coarse_factorizations: int = described("factorizations of the coarse problem")
+    rtol: float = described("relative tolerance of the dual problem")
+    solves: int = described("dual problems solved")
+    iterations: tuple[int, ...] = described("Krylov iterations of each state")
+    converged_reason: tuple[int, ...] = described("PETSc's KSPConvergedReason of each state, negative if it failed")
+
+
+@dataclass(frozen=True)
+class Checks:
+    """The largest relative error of each law over all states."""
+
+    strain: float = described("mean strain, with the opening of debonded faces, equals E")
+    hill: float = described("Hill's lemma: mean of stress times strain equals Sigma E")
+    jump: float = described("no jump where faces are glued, relative to the largest displacement")
+    stress: float | None = described("prescribed stresses are met, relative to stress or stiffness", default=None)
+    kkt_complementarity: float | None = described("contact: traction times gap vanishes", default=None)
+    kkt_penetration: float | None = described("contact: no gap is negative", default=None)
+    kkt_tension: float | None = described("contact: no closed node is pulled", default=None)
+    symmetry: float | None = described("L^ef is symmetric; of bonded or frictionless free faces only", default=None)
+
+    def by_law(self) -> dict[str, float]:
+        """Return the errors of the laws that were checked, by name."""
+        errors: dict[str, float] = plain(self)
+        return errors
+
+
+@dataclass(frozen=True)
+class StiffnessBounds:
+    """What the phases bound L^ef by, whatever their arrangement."""
+
+    voigt: Float = described("upper bound of the stiffness: uniform strain", STRESS, "(3, 3)")
+    reuss: Float = described("lower bound of the stiffness: uniform stress", STRESS, "(3, 3)")
+    hashin_shtrikman: Bounds | None = described("bounds of isotropic composites; null if a phase is not isotropic")
