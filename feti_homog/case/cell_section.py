@@ -198,8 +198,8 @@ class Cell:
         'meshio reads, cell data "phase" are 0 in the matrix, 1 in fibre, 2 in fibre:2, ... Of "table" the fibres, a '
         "row for each: columns x, y, radius and, if there are any, phase, coating (thickness / radius) and strength "
         "(of its bonds / that of [interface]); of ellipses a and b, the semi-axes, in place of the radius, and angle "
-        "from x to a in degrees; of hollow fibres inner_radius; of rounded polygons sides and corner, with the angle of "
-        "the first corner. Rows of the phase void are voids. What "
+        "from x to a in degrees; of hollow fibres inner_radius; of rounded polygons sides and corner, with the angle "
+        "of the first corner. Rows of the phase void are voids. What "
         'follows # is a comment, of which "# width = 120, height = 80" says the size of the cell.',
         default=None,
         only=FROM_A_FILE,

@@ -217,10 +217,7 @@ def _contents(document: Mapping[str, Any], file: h5py.File, altered: tuple[str, 
     pair = _rows(own["pair"]) if "pair" in own else np.zeros(len(own["points"]), np.int32)
     points, normal, length, number, body = (_rows(own[name]) for name in ROWS)
     rows = InterfaceRows(points, normal, length, number, body, pair)
-    columns = [_rows(file[f"fibre/{name}"]) for name in ("number", "body", "phase", "centre", "radius")]
-    # Results of before bonds could scatter have no strengths.
-    strength = _rows(file["fibre/strength"]) if "strength" in file["fibre"] else np.ones(len(columns[0]))
-    fibres = Fibres(*columns, strength)
+    fibres = _fibres(file["fibre"])
     faces = np.stack([_rows(file[f"interface/{name}"]) for name in ("fibre_node", "matrix_node")], axis=1)
     size = np.array([file.attrs["width"], file.attrs["height"]], float)
     phases = tuple(map(str, file.attrs["phases"]))
@@ -237,14 +234,21 @@ def _contents(document: Mapping[str, Any], file: h5py.File, altered: tuple[str, 
     lengths = {table.shape for table in (rows.length, rows.fibre, rows.body, rows.pair)}
     _expect(lengths == {(k,)}, "/interface has tables of different lengths")
     _expect_known_pairs(_interfaces(document["case"]), rows, phases)
-    lengths = {table.shape for table in (fibres.body, fibres.radius, fibres.strength)}
-    _expect(len(lengths) == 1, "/fibre has tables of different lengths")
-    _expect(fibres.centre.shape == (len(fibres.radius), 2), "/fibre has tables of different lengths")
     _expect(faces.shape == (k, 2), "/interface has tables of different lengths")
     _expect(bool((faces >= 0).all() and (faces < n).all()), "/interface names unknown nodes")
     within = (rows.fibre >= 1) & (rows.fibre <= len(fibres.radius))
     _expect(bool(within.all()), "/interface/fibre_number names unknown fibres")
     return ResultFiles(document, size, phases, mesh, rows, fibres, faces, file, altered)
+
+
+def _fibres(own: h5py.Group) -> Fibres:
+    columns = [_rows(own[name]) for name in ("number", "body", "phase", "centre", "radius")]
+    # Results of before bonds could scatter have no strengths.
+    fibres = Fibres(*columns, _rows(own["strength"]) if "strength" in own else np.ones(len(columns[0])))
+    lengths = {table.shape for table in (fibres.body, fibres.radius, fibres.strength)}
+    alike = len(lengths) == 1 and fibres.centre.shape == (len(fibres.radius), 2)
+    _expect(alike, "/fibre has tables of different lengths")
+    return fibres
 
 
 def _expect_known_pairs(sections: Sequence[Mapping[str, Any]], rows: InterfaceRows, phases: tuple[str, ...]) -> None:
