@@ -72,10 +72,10 @@ def _unlike_scatter(cell: DiscreteCell) -> Float:
     if cell.files.case["cell"]["geometry"] == "table":
         return np.zeros_like(strength)
     if scatter is None:
-        return np.abs(strength - 1.0)
+        return np.asarray(np.abs(strength - 1.0))
     stream = np.random.default_rng(np.random.SeedSequence(scatter["seed"], spawn_key=(1,)))
     hazard, m = -np.log(1.0 - stream.random(len(strength))), scatter["shape"]
-    return np.abs(np.log(strength) - np.log(hazard) / m + gammaln(1.0 + 1.0 / m))
+    return np.asarray(np.abs(np.log(strength) - np.log(hazard) / m + gammaln(1.0 + 1.0 / m)))
 
 
 def _moduli(stiffness: Float) -> dict[str, float]:

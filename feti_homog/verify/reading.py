@@ -242,9 +242,10 @@ def _contents(document: Mapping[str, Any], file: h5py.File, altered: tuple[str, 
 
 
 def _fibres(own: h5py.Group) -> Fibres:
-    columns = [_rows(own[name]) for name in ("number", "body", "phase", "centre", "radius")]
+    number, body, phase, centre, radius = (_rows(own[name]) for name in ("number", "body", "phase", "centre", "radius"))
     # Results of before bonds could scatter have no strengths.
-    fibres = Fibres(*columns, _rows(own["strength"]) if "strength" in own else np.ones(len(columns[0])))
+    strength = _rows(own["strength"]) if "strength" in own else np.ones(len(number))
+    fibres = Fibres(number, body, phase, centre, radius, strength)
     lengths = {table.shape for table in (fibres.body, fibres.radius, fibres.strength)}
     alike = len(lengths) == 1 and fibres.centre.shape == (len(fibres.radius), 2)
     _expect(alike, "/fibre has tables of different lengths")
