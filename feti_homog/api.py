@@ -17,8 +17,8 @@ from feti_homog.petsc.command_words import named_values, petsc_words, split_argv
 from feti_homog.petsc.option_table import unknown_to_petsc
 from feti_homog.petsc.option_values import faulty_values
 from feti_homog.runtime import standard_streams
+from feti_homog.runtime.environment import prefer_own_toolkits
 from feti_homog.runtime.interrupts import end_on_signals, launched_rank
-from feti_homog.runtime.matplotlib_toolkits import prefer_own_toolkits
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

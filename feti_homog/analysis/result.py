@@ -1,16 +1,15 @@
-"""Result of a case: the object that Python programs receive, and the content of result.json."""
+"""Result of a case: the object that Python programs receive, the content of result.json, and fields in memory."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feti_homog.analysis.cell_records import CellInfo, Checks, FibreInfo, SolverInfo, StiffnessBounds
-from feti_homog.analysis.result_fields import Fields
 from feti_homog.analysis.result_records import (
     EITHER_STIFFNESS,
     AnglePoint,
@@ -23,10 +22,60 @@ from feti_homog.materials.bounds import Moduli
 from feti_homog.materials.estimates.constituents import Estimates, FibreBounds
 from feti_homog.materials.spatial_constants import EngineeringConstants, TransverselyIsotropic, TransverseModuli
 from feti_homog.results import path_curves
+from feti_homog.results.field_layout import FibrePart, Header, InterfacePart, MeshPart, StatePart, tables
 from feti_homog.results.result_json import SCHEMA
 from feti_homog.results.seals import FileSeal
 from feti_homog.runtime.records import BYTES, SECONDS, STRESS, Key, described, keys, plain, restored
 from feti_homog.typing import Float
+
+if TYPE_CHECKING:
+    from mpi4py.MPI import Intracomm
+
+
+Part = TypeVar("Part", MeshPart, FibrePart, InterfacePart, StatePart)
+
+
+@dataclass(frozen=True)
+class Fields:
+    """This rank's part of the fields; `gathered` has all of them.
+
+    Attributes:
+        header: size of the cell, phases, units.
+        mesh: points (n, 2), triangles (m, 3 or 6) and what they belong to; nodes are torn between subdomains.
+        fibres: number as in case files (f,), body, phase, centre (f, 2) and radius (f,), on rank 0.
+        interface: points (k, 2), normal (k, 2), length (k,) and fibre (k,) of the fibre-matrix interface nodes, and the
+            numbers of their nodes in the gathered mesh.
+        states: of each load case, or point of an angle or path: displacement and fluctuation (n, 2), stress (m, 3),
+            traction, jump (k, 2) and status (k,), with the strain, mean stress, load factor and label of the state.
+    """
+
+    comm: Intracomm
+    header: Header
+    mesh: MeshPart
+    fibres: FibrePart
+    interface: InterfacePart
+    states: tuple[StatePart, ...]
+
+    def gathered(self) -> Fields | None:
+        """Return the fields of all ranks as one part, on rank 0; None on the others. Collective."""
+        first = self.comm.exscan(len(self.mesh.points)) or 0
+        mesh = _gathered(self.comm, replace(self.mesh, triangles=self.mesh.triangles + np.int64(first)))
+        fibres, interface = _gathered(self.comm, self.fibres), _gathered(self.comm, self.interface)
+        states = [_gathered(self.comm, state) for state in self.states]
+        if mesh is None or fibres is None or interface is None:
+            return None
+        return Fields(
+            self.comm, self.header, mesh, fibres, interface, tuple(state for state in states if state is not None)
+        )
+
+
+def _gathered(comm: Intracomm, part: Part) -> Part | None:
+    """Return the rows of all ranks, in their order, on rank 0."""
+    parts = {name: comm.gather(getattr(part, name)) for name in tables(part)}
+    if comm.rank:
+        return None
+    whole: dict[str, Any] = {name: np.concatenate(rows or []) for name, rows in parts.items()}
+    return replace(part, **whole)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)  # arrays have no single answer to "equal"

@@ -10,8 +10,7 @@ import numpy as np
 from feti_homog.analysis.cell_records import CellInfo, Checks, FibreInfo, SolverInfo
 from feti_homog.analysis.checks import CONTACT_TOLERANCE
 from feti_homog.analysis.context import AnalysisContext
-from feti_homog.analysis.result import Result
-from feti_homog.analysis.result_fields import Fields
+from feti_homog.analysis.result import Fields, Result
 from feti_homog.case.case import Case
 from feti_homog.fibres.outlines.ellipses import Ellipses
 from feti_homog.homogenization.unit_cell import TornCell

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from itertools import count
 
-from feti_homog.analysis.result_fields import Fields
+from feti_homog.analysis.result import Fields
 from feti_homog.errors import FetiHomogError
 from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.unit_cell import TornCell

@@ -10,8 +10,7 @@ from feti_homog.commands import listed_fibres
 from feti_homog.errors import CaseError
 from feti_homog.fibres.hard_core import hard_core
 from feti_homog.microstructure.fibre_pattern import FibrePattern
-from feti_homog.microstructure.randomness import poisson
-from feti_homog.microstructure.statistics import measure
+from feti_homog.microstructure.statistics import measure, poisson
 from feti_homog.report.text import statistics_text
 from feti_homog.results import output_folder
 

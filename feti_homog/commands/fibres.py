@@ -27,11 +27,11 @@ def add(actions: argparse._SubParsersAction[Any]) -> None:
 
 
 def _fibres(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    from feti_homog.commands import fibre_rows
+    from feti_homog.commands import listed_fibres
     from feti_homog.parallel.mpi_errors import on_root_only
     from feti_homog.results import output_folder
 
-    text = on_root_only(comm, fibre_rows.table, arguments.source)
+    text = on_root_only(comm, listed_fibres.table, arguments.source)
     if arguments.out is None:
         on_root_only(comm, print_product, text or "")
     else:

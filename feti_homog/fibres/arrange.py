@@ -12,9 +12,9 @@ from feti_homog.case.mixed_cell import fibre_counts, fractions_in_words, void_co
 from feti_homog.case.phase_names import FIBRE, VOID
 from feti_homog.errors import MeshError
 from feti_homog.fibres.arrangement import Arrangement, clear_shift
+from feti_homog.fibres.hard_core import MAX_STEPS, relax
 from feti_homog.fibres.matched_arrangement import matched_arrangement
 from feti_homog.fibres.periodic_table import table_arrangement
-from feti_homog.fibres.relaxation import MAX_STEPS, relax
 from feti_homog.typing import Float
 
 # Quenched random packings jam near this area fraction.

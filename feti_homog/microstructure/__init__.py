@@ -1,4 +1,4 @@
 """Spatial statistics of fibres in a cross-section, of a periodic cell or of a window of a micrograph: pure functions.
 
-Imports nothing.  Main entries: `statistics.measure`, `randomness.envelope` and `neighbour_match`.
+Imports nothing.  Main entries: `statistics.measure`, `statistics.envelope` and `neighbour_match`.
 """

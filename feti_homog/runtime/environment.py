@@ -2,10 +2,29 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import MutableMapping
 from importlib.util import find_spec
+from pathlib import Path
 
 from feti_homog.errors import LibraryError
+
+
+def prefer_own_toolkits() -> None:
+    """Let `mpl_toolkits` be found beside the `matplotlib` that will be imported; Matplotlib itself is not imported.
+
+    An environment with --system-site-packages takes `matplotlib` from its own folder, but Debian's
+    matplotlib-nspkg.pth has bound `mpl_toolkits` to Debian's at the start of Python: Matplotlib cannot import its 3-D
+    axes from there, and says so whenever it is loaded.
+    """
+    matplotlib = find_spec("matplotlib")
+    if matplotlib is None or matplotlib.origin is None:
+        return
+    own = Path(matplotlib.origin).parents[1] / "mpl_toolkits"
+    if own.is_dir():
+        toolkits = importlib.import_module("mpl_toolkits")
+        toolkits.__path__ = [str(own), *(path for path in toolkits.__path__ if path != str(own))]
+
 
 SETTINGS = {
     "OMP_NUM_THREADS": "1",  # one core per rank: threads of BLAS would compete with the ranks

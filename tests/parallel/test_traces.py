@@ -7,7 +7,7 @@ import pytest
 from support import torn_cells
 from support.coarse_space_cells import NARROW, solve_many
 
-from feti_homog.feti.coarse.trace_spaces import trace_space
+from feti_homog.feti.coarse.face_neighbourhoods import trace_space
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.mesh.refinement import edge_node
 

@@ -20,8 +20,7 @@ import numpy as np
 from scipy.linalg import eigh
 from scipy.sparse import csr_matrix
 
-from feti_homog.feti.coarse.face_neighbourhoods import face_neighbourhoods
-from feti_homog.feti.coarse.trace_spaces import trace_space
+from feti_homog.feti.coarse.face_neighbourhoods import face_neighbourhoods, trace_space
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.linalg.dense_cholesky import cholesky
 from feti_homog.feti.operators.boundary_operator import BoundaryOperator, DenseOperator, is_dense

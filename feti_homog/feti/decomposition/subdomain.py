@@ -12,9 +12,9 @@ from feti_homog.fem.assembly import assemble
 from feti_homog.fem.problem import PLANE, Problem
 from feti_homog.fem.void_boundary import void_integrals
 from feti_homog.feti.thresholds import KERNEL_TOLERANCE
+from feti_homog.mesh.mesh_fibres import unwrap
 from feti_homog.mesh.refinement import FineMesh, ReferenceLattice, refine
 from feti_homog.mesh.submesh import Submesh
-from feti_homog.mesh.unwrap import unwrap
 from feti_homog.typing import Float, Int
 
 

@@ -16,9 +16,8 @@ from feti_homog.case import case as cases
 from feti_homog.commands import fibre_statistics
 from feti_homog.errors import CaseError, MeshError
 from feti_homog.fibres.hard_core import hard_core
-from feti_homog.microstructure.nearest_neighbours import nearest_neighbours
-from feti_homog.microstructure.randomness import poisson
-from feti_homog.microstructure.statistics import measure
+from feti_homog.microstructure.neighbour_match import nearest_neighbours
+from feti_homog.microstructure.statistics import measure, poisson
 from feti_homog.report.text import statistics_text
 
 MESHES = Path(__file__).parents[3] / "meshes"

@@ -9,10 +9,10 @@ from reference import monolithic
 from feti_homog.case.cell_section import Cell
 from feti_homog.fem.assembly import assemble, element_strain
 from feti_homog.mesh.fill.gmsh_mesher import generate
+from feti_homog.mesh.mesh_fibres import unwrap
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.refinement import ReferenceLattice, refine
 from feti_homog.mesh.submesh import cut
-from feti_homog.mesh.unwrap import unwrap
 
 STIFFNESS = np.array([[5.0, 1.5, 0.4], [1.5, 3.0, -0.2], [0.4, -0.2, 1.2]])
 LATTICES = [(0, 1), (2, 1), (0, 2), (1, 2)]

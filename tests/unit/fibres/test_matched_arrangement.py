@@ -21,8 +21,7 @@ from feti_homog.errors import CaseError
 from feti_homog.fibres.arrange import arrange
 from feti_homog.fibres.matched_arrangement import distance_of
 from feti_homog.microstructure.fibre_pattern import FibrePattern
-from feti_homog.microstructure.nearest_neighbours import nearest_neighbours
-from feti_homog.microstructure.neighbour_match import match_distance, matched, wanted_distances
+from feti_homog.microstructure.neighbour_match import match_distance, matched, nearest_neighbours, wanted_distances
 
 
 @pytest.fixture(scope="module")

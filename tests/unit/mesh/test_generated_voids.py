@@ -11,7 +11,7 @@ from support.void_cells import write_voids
 
 from feti_homog import run
 from feti_homog.case import case as cases
-from feti_homog.commands import fibre_rows, fibre_statistics
+from feti_homog.commands import fibre_statistics, listed_fibres
 from feti_homog.errors import CaseError, MeshError
 from feti_homog.fibres.arrange import arrange
 from feti_homog.mesh.coarse_mesh import areas
@@ -84,7 +84,7 @@ def test_a_cell_of_voids_alone(tmp_path):
 def test_the_table_of_a_cell_with_voids_gives_it_again(tmp_path, cell):
     case = case_of(tmp_path, cell)
     (tmp_path / "case.toml").write_text(_toml(case))
-    (tmp_path / "again.csv").write_text(fibre_rows.table(tmp_path / "case.toml"))
+    (tmp_path / "again.csv").write_text(listed_fibres.table(tmp_path / "case.toml"))
     again = {"geometry": "table", "file": "again.csv", "mesh_size": case.cell.mesh_size}
     one, other = (generate(each) for each in (case.cell, case_of(tmp_path, again).cell))
     assert voids(one) == voids(other) > 0
@@ -146,7 +146,7 @@ def test_the_folder_of_a_result_has_the_table_of_its_case(tmp_path):
     case = case_of(tmp_path, RANDOM | {"fibres": 3, "voids": 0.05, "mesh_size": 0.2})
     (tmp_path / "case.toml").write_text(_toml(case))
     run(case, MPI.COMM_SELF, out=tmp_path / "run")
-    assert fibre_rows.table(tmp_path / "run") == fibre_rows.table(tmp_path / "case.toml")
+    assert listed_fibres.table(tmp_path / "run") == listed_fibres.table(tmp_path / "case.toml")
     assert fibre_statistics.pattern(tmp_path / "run", None).count == 3
 
 
@@ -155,7 +155,7 @@ def test_voids_of_a_users_mesh_are_not_listed(tmp_path):
     write_voids(tmp_path / "cell.msh", voids=[0], **RANDOM | {"fibres": 3, "mesh_size": 0.1})
     (tmp_path / "case.toml").write_text(_toml(case_of(tmp_path, {"geometry": "mesh", "file": "cell.msh"})))
     with pytest.raises(CaseError, match="has voids, which only a case of a table or of a random cell lists"):
-        fibre_rows.table(tmp_path / "case.toml")
+        listed_fibres.table(tmp_path / "case.toml")
     assert fibre_statistics.pattern(tmp_path / "case.toml", None).count == 2
 
 

@@ -9,7 +9,7 @@ import pytest
 import tomli_w
 
 from feti_homog.case import case as cases
-from feti_homog.commands import fibre_rows
+from feti_homog.commands import listed_fibres
 from feti_homog.errors import CaseError
 from feti_homog.mesh.coarse_mesh import areas
 from feti_homog.mesh.fill.gmsh_mesher import generate
@@ -50,7 +50,7 @@ def test_the_table_of_hollow_fibres_gives_the_cell_again(tmp_path, more):
     case = case_of(TUBE, COATED, VOID, *more, coated=True)
     document = {k: v for k, v in case.resolved().items() if k in ("cell", "material", "analysis")}
     (tmp_path / "case.toml").write_text(tomli_w.dumps(document))
-    (tmp_path / "again.csv").write_text(fibre_rows.table(tmp_path / "case.toml"))
+    (tmp_path / "again.csv").write_text(listed_fibres.table(tmp_path / "case.toml"))
     document["cell"] = {"geometry": "table", "file": "again.csv", "mesh_size": 0.03}
     again = generate(cases.parse(document, tmp_path).cell)
     mesh = generate(case.cell)

@@ -8,7 +8,7 @@ from unit.fibres.test_arrangement import smallest_gap
 
 from feti_homog.case.cell_section import Cell
 from feti_homog.case.mixed_cell import fibre_counts
-from feti_homog.commands.fibre_rows import table
+from feti_homog.commands.listed_fibres import table
 from feti_homog.errors import MeshError
 from feti_homog.fibres.arrange import arrange
 from feti_homog.mesh.fill.gmsh_mesher import arrangement_scale, generate

@@ -12,7 +12,7 @@ from unit.mesh.fill.test_gmsh_mesher import least_angle
 
 from feti_homog import run
 from feti_homog.case import case as cases
-from feti_homog.commands import fibre_rows
+from feti_homog.commands import listed_fibres
 from feti_homog.errors import CaseError, MeshError
 from feti_homog.fibres.arrange import arrange
 from feti_homog.fibres.arrangement import Arrangement
@@ -126,13 +126,13 @@ def test_the_table_of_polygons_gives_the_cell_again(tmp_path):
     case = case_of(*ROWS)
     document = {k: v for k, v in case.resolved().items() if k in ("cell", "material", "analysis")}
     (tmp_path / "case.toml").write_text(tomli_w.dumps(document))
-    (tmp_path / "again.csv").write_text(fibre_rows.table(tmp_path / "case.toml"))
+    (tmp_path / "again.csv").write_text(listed_fibres.table(tmp_path / "case.toml"))
     document["cell"] = {"geometry": "table", "file": "again.csv", "mesh_size": 0.06}
     mesh, again = generate(case.cell), generate(cases.parse(document, tmp_path).cell)
     sums = [[areas(m.points, m.triangles)[m.phase == phase].sum() for phase in range(3)] for m in (mesh, again)]
     assert sums[0] == pytest.approx(sums[1], rel=1e-3) and voids(again) == 1
     run(case, MPI.COMM_SELF, out=tmp_path / "run")
-    assert fibre_rows.table(tmp_path / "run") == (tmp_path / "again.csv").read_text()
+    assert listed_fibres.table(tmp_path / "run") == (tmp_path / "again.csv").read_text()
 
 
 @pytest.mark.parametrize(("row", "fault"), [

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support.fibre_patterns import hexagonal_lattice, square_lattice
 
-from feti_homog.microstructure.nearest_neighbours import nearest_neighbours
+from feti_homog.microstructure.neighbour_match import nearest_neighbours
 from feti_homog.microstructure.pair_functions import SECTORS, distances, pair_directions, pair_functions
 from feti_homog.microstructure.voronoi_cells import voronoi_cells
 

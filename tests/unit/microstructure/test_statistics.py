@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 from support.fibre_patterns import pattern, poisson_points, square_lattice
 
-from feti_homog.microstructure.nearest_neighbours import nearest_neighbours
+from feti_homog.microstructure.neighbour_match import nearest_neighbours
 from feti_homog.microstructure.pair_functions import pair_directions, pair_functions
-from feti_homog.microstructure.randomness import envelope, poisson
-from feti_homog.microstructure.statistics import measure
+from feti_homog.microstructure.statistics import envelope, measure, poisson
 from feti_homog.microstructure.voronoi_cells import voronoi_cells
 
 r = np.linspace(0.1, 4.0, 40)

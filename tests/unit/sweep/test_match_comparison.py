@@ -11,8 +11,8 @@ from support.fibre_patterns import poisson_points
 from support.measured_fibres import clustered_table
 
 from feti_homog.case.fibre_window import read_window
-from feti_homog.microstructure.nearest_neighbours import nearest_neighbours
-from feti_homog.sweep.report import figures, match_comparison
+from feti_homog.microstructure.neighbour_match import nearest_neighbours
+from feti_homog.sweep.report import figures
 from feti_homog.sweep.report.sweep_table import SweepTable
 
 
@@ -39,8 +39,8 @@ def two(tmp_path):
 def test_a_row_for_each_table_with_its_cells(two):
     a, b = two
     table = sweep_table([document(a, 1), document(b, 2), document(a, 3), None, document(None, 4)])
-    assert match_comparison.tables(table) == two
-    axes = match_comparison.figure(table).axes
+    assert figures.tables(table) == two
+    axes = figures.figure(table).axes
     assert [each.get_title() for each in axes[::3]] == [
         "a.csv, 40 fibres; cells to 0.0300 mean diameters",
         "b.csv, 40 fibres; cells to 0.0200 mean diameters",

@@ -6,7 +6,7 @@ import os
 
 import pytest
 
-from feti_homog.runtime.writable_files import can_be_written
+from feti_homog.petsc.option_values import can_be_written
 
 NAMES = {
     "new": True, "there": True, "folder": False, "folder/": False, "folder/new": True, "none/new": False,

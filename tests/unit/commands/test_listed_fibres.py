@@ -15,7 +15,7 @@ from unit.mesh.faulty_meshes import grid
 from feti_homog.analysis.runner import run
 from feti_homog.case.case import load
 from feti_homog.case.fibre_table import read_table
-from feti_homog.commands import fibre_rows
+from feti_homog.commands import listed_fibres
 from feti_homog.errors import CaseError, MeshError
 from feti_homog.fibres.arrange import arrange
 from feti_homog.mesh.tiles.filling import gmsh_session
@@ -41,7 +41,7 @@ def case_of(path, cell, more=""):
 @pytest.mark.parametrize("name", CELLS)
 def test_the_table_of_a_cell_gives_the_cell(name, tmp_path):
     source = case_of(tmp_path / "case.toml", CELLS[name], SECOND if "fibre:2" in CELLS[name] else "")
-    (tmp_path / "t.csv").write_text(fibre_rows.table(source))
+    (tmp_path / "t.csv").write_text(listed_fibres.table(source))
     again = case_of(tmp_path / "again.toml", 'geometry = "table"\nfile = "t.csv"\n', SECOND)
     found, expected = arrange(load(again).cell), arrange(load(source).cell)
     assert found.phase == expected.phase and found.height == pytest.approx(expected.height, rel=1e-15)
@@ -52,7 +52,7 @@ def test_the_table_of_a_cell_gives_the_cell(name, tmp_path):
 def test_coatings_are_a_column(tmp_path):
     coating = "[material.coating]\nyoung = 3.0\npoisson = 0.2\n"
     source = case_of(tmp_path / "case.toml", f"{CELLS['random']}coating = 0.07\n", coating)
-    (tmp_path / "t.csv").write_text(fibre_rows.table(source))
+    (tmp_path / "t.csv").write_text(listed_fibres.table(source))
     again = case_of(tmp_path / "again.toml", 'geometry = "table"\nfile = "t.csv"\n', coating)
     found, expected = arrange(load(again).cell), arrange(load(source).cell)
     assert found.coating == pytest.approx(expected.coating, rel=1e-13)
@@ -80,7 +80,7 @@ def test_the_table_of_ellipses_gives_the_cell(of, tmp_path):
     source.write_text(source.read_text().replace("mesh_size = 0.05\n", ""))
     if of == "result":
         run(load(source), tmp_path / "result", MPI.COMM_SELF, quiet=True)
-    (tmp_path / "t.csv").write_text(fibre_rows.table(tmp_path / "result" if of == "result" else source))
+    (tmp_path / "t.csv").write_text(listed_fibres.table(tmp_path / "result" if of == "result" else source))
     assert (tmp_path / "t.csv").read_text().splitlines()[1] == "x,y,radius,phase,a,b,angle,coating"
     again = case_of(tmp_path / "again.toml", 'geometry = "table"\nfile = "t.csv"\n', coating)
     for found, expected in zip(squares(load(again).cell), squares(load(source).cell), strict=True):
@@ -89,7 +89,7 @@ def test_the_table_of_ellipses_gives_the_cell(of, tmp_path):
 
 def test_ellipses_of_a_users_mesh_are_found(tmp_path):
     """Of 0.4 x 0.3 beside a disc, as meshes/README.md says."""
-    rows = fibre_rows.table(Path(__file__).parents[3] / "drivers" / "two_fibres.toml")
+    rows = listed_fibres.table(Path(__file__).parents[3] / "drivers" / "two_fibres.toml")
     (tmp_path / "t.csv").write_text(rows)
     table = read_table(tmp_path / "t.csv")
     a, b, angle = (table.columns[name][0] for name in ("a", "b", "angle"))
@@ -105,7 +105,7 @@ def test_the_table_of_a_users_mesh_has_its_round_fibres(tmp_path):
     source = case_of(tmp_path / "case.toml", 'geometry = "mesh"\nfile = "cell.msh"\n')
     source.write_text(source.read_text().replace("mesh_size = 0.05\n", ""))
     with pytest.raises(CaseError, match=r"case.toml: fibres that are neither round nor ellipses have no radius: 1$"):
-        fibre_rows.table(source)
+        listed_fibres.table(source)
 
 
 def test_sides_of_a_users_mesh_are_snapped(tmp_path):
@@ -113,7 +113,7 @@ def test_sides_of_a_users_mesh_are_snapped(tmp_path):
     polar_cell((0.5, 0.5), 0.3, tmp_path / "cell.msh")
     source = case_of(tmp_path / "case.toml", 'geometry = "mesh"\nfile = "cell.msh"\n')
     source.write_text(source.read_text().replace("mesh_size = 0.05\n", ""))
-    expected = fibre_rows.table(source)
+    expected = listed_fibres.table(source)
     with gmsh_session() as gmsh:
         gmsh.open(str(tmp_path / "cell.msh"))
         tags, places, _ = gmsh.model.mesh.getNodes()
@@ -124,14 +124,14 @@ def test_sides_of_a_users_mesh_are_snapped(tmp_path):
     # What gmsh knows of periodic curves would move the node back.
     (tmp_path / "cell.msh").write_text((tmp_path / "cell.msh").read_text().partition("$Periodic")[0])
     with pytest.raises(MeshError, match="not periodic"):
-        fibre_rows.table(source)
+        listed_fibres.table(source)
     source.write_text(source.read_text().replace('file = "cell.msh"\n', 'file = "cell.msh"\nrepair = "snap"\n'))
-    assert fibre_rows.table(source) == expected
+    assert listed_fibres.table(source) == expected
 
 
 def test_units_and_names(tmp_path):
     source = case_of(tmp_path / "case.toml", CELLS["with a radius"])
-    (tmp_path / "t.csv").write_text(fibre_rows.table(source))
+    (tmp_path / "t.csv").write_text(listed_fibres.table(source))
     table = read_table(tmp_path / "t.csv")
     assert table.radius.mean() == pytest.approx(3.5, rel=1e-14) and table.phase == ("fibre",) * 9
     assert np.pi * np.sum(table.radius**2) / (table.width * table.height) == pytest.approx(0.5, rel=1e-14)
