@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
 
     from feti_homog.analysis.result import Result
+    from feti_homog.results.viewed_states import ViewedState
     from feti_homog.sweep.plan import Sweep
     from feti_homog.sweep.report.sweep_table import SweepTable
 
@@ -122,6 +123,17 @@ def draw_state(axes: Axes, out: str | Path, number: int = 0, **choices: Any) -> 
     from feti_homog.report.plots import deformed_panels
 
     return deformed_panels.draw_state(axes, Path(out), number, **choices)
+
+
+def read_state(out: str | Path, number: int = 0) -> ViewedState:
+    """Return a state of `out`/result.h5 as arrays: the mesh, displacements, stresses and what follows from them.
+
+    `nodes` and `elements` are dictionaries: displacement, stress, strain, von_mises, ...; see `ViewedState`.  Call it
+    on one rank.
+    """
+    from feti_homog.results import viewed_states
+
+    return viewed_states.read_state(out, number)
 
 
 def launch(

@@ -16,6 +16,7 @@ from feti_homog.commands import (
     collect,
     export,
     fibres,
+    fields,
     plot,
     reference,
     report,
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
 
 
 LAUNCHER_HELP = "Switches of Open MPI go to mpirun: --allow-run-as-root, --oversubscribe (more ranks than cores)."
-COMMANDS = (run, check, plot, report, export, verify, statistics, fibres, sweep, collect, reference)
+COMMANDS = (run, check, plot, report, fields, export, verify, statistics, fibres, sweep, collect, reference)
 
 
 class Parser(argparse.ArgumentParser):

@@ -45,7 +45,7 @@ class Fields:
         fibres: number as in case files (f,), body, phase, centre (f, 2) and radius (f,), on rank 0.
         interface: points (k, 2), normal (k, 2), length (k,) and fibre (k,) of the fibre-matrix interface nodes, and the
             numbers of their nodes in the gathered mesh.
-        states: of each load case, or point of an angle or path: displacement and fluctuation (n, 2), stress (m, 3),
+        states: of each load case, or point of an angle or path: displacement (n, 2), stress (m, 3),
             traction, jump (k, 2) and status (k,), with the strain, mean stress, load factor and label of the state.
     """
 

@@ -88,7 +88,7 @@ class Output:
         "The points of a path whose fields are written: at most so many, the first, the last, those around the deepest "
         'drops of the stress, up to half, the others evenly between; "peaks": the ends and those around all drops of '
         'more than 1 % of the largest stress; "all". The curve has every point.',
-        default=100,
+        default=20,
         only=PATH_ANALYSIS,
     )
     pictures: bool = key(boolean, "Draw the PNG files; without fields, the curves alone.", default=True)

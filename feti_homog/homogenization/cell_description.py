@@ -44,6 +44,7 @@ def _described(
     """Return the text of `describe`; `loads` are the subdomains and the coarse triangles of each rank."""
     own = [subdomains for subdomains, _ in loads]
     nodes = [triangles * lattice.intervals**2 // 2 for _, triangles in loads]
+    elements = summary.coarse_triangles * len(lattice.triangles)
     problems = {problem.components: cost_model.applications(case, problem) for problem in phase_laws.problems(case)}
     plan = _plan(case, summary, multipliers, max(problems.values()), options)
     columns = multipliers if plan.preconditioner == "influence" else 0
@@ -53,7 +54,7 @@ def _described(
         f"case       {case.name}: {case.analysis.type}, plane {case.analysis.plane}",
         f"cell       {summary.width:g} x {summary.height:g}, phases {', '.join(summary.phases)}",
         *([f"voids      {summary.voids}"] if summary.voids else []),
-        f"mesh       {summary.coarse_triangles} coarse triangles, {summary.coarse_triangles * len(lattice.triangles)} "
+        f"mesh       {summary.coarse_triangles} coarse triangles, {elements} "
         f"elements of order {case.cell.order}, about {2 * sum(nodes)} degrees of freedom",
         *(
             [f"sizes      mesh_size = {case.cell.mesh_size:g}, refine = {case.cell.refine}, as asked for by {asked}"]
@@ -70,6 +71,11 @@ def _described(
             for rank, (count, n) in enumerate(zip(own, nodes, strict=True))
         ),
         *cost_model.estimate_lines(taken, len(loads)),
+        *(
+            [cost_model.fields_line(case, sum(nodes), elements, multipliers // 2, len(loads))]
+            if case.output.fields
+            else []
+        ),
         *(f"warning    {warning}" for warning in (*case.warnings(), *summary.warnings(), *unresolved)),
         *(f"remark     {remark}" for remark in (*case.remarks(), *summary.remarks)),
         "the case is valid",

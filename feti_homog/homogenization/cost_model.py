@@ -12,10 +12,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil
 
+import numpy as np
+
 from feti_homog.case.bond_laws import laws_with
 from feti_homog.case.case import Case
 from feti_homog.case.phase_names import COATING
 from feti_homog.fem.problem import AXIAL, Problem
+from feti_homog.homogenization import phase_laws
+from feti_homog.materials.plane_state import PLANE_STATES
 
 # Seconds to start Python, MPI, PETSc and gmsh.
 START_SECONDS = 0.9
@@ -27,6 +31,12 @@ SETUP_SECONDS, SUBDOMAIN_SECONDS = 4.4e-6, 2.9e-3
 APPLY_SECONDS = 4.2e-8
 # Bytes of a rank without degrees of freedom, for each of these, and for each multiplier that has influence columns.
 BASE_BYTES, DOF_BYTES, COLUMN_BYTES = 1.8e8, 1.5e3, 2.0e4
+# Bytes of result.h5: of a state for each node, element and interface node in the plane, and what is along the fibres
+# besides; of the mesh for each node and element, and of the interface's nodes.
+STATE_BYTES, AXIAL_BYTES = np.array([16, 32, 129]), np.array([8, 16, 16])
+MESH_BYTES, CORNER_BYTES = np.array([16, 16, 80]), 8
+# Seconds to make and write the fields of a state, for each element.
+STATE_SECONDS = 6e-7
 # Degrees of freedom of a rank; with fewer, its waiting for others takes more than it saves.
 DOFS_OF_A_RANK = 50_000
 # Typical numbers, by which a case is estimated and its operators are chosen.
@@ -92,15 +102,40 @@ def estimate(
     )
 
 
+def fields_line(case: Case, nodes: int, elements: int, interface_nodes: int, ranks: int) -> str:
+    """Return how many states result.h5 has, its size, and the time that they take, in a line as `estimate_lines`."""
+    asked = case.output.states
+    is_spatial = PLANE_STATES[case.analysis.plane].is_spatial
+    rows = np.array([nodes, elements, interface_nodes])
+    state = int(rows @ (STATE_BYTES + is_spatial * AXIAL_BYTES))
+    mesh = int(rows @ MESH_BYTES) + 3 * case.cell.order * CORNER_BYTES * elements
+    if case.section.is_followed and isinstance(asked, str):
+        return f"fields     {_size(mesh)} of result.h5, and {_size(state)} for each state"
+    contact = case.interface is not None and case.interface.contact and bool(case.arcs)
+    loads = sum(len(problem.loads) for problem in phase_laws.problems(case))
+    count = asked if case.section.is_followed else case.section.solves(loads, contact)
+    assert isinstance(count, int)
+    noun = "state" if count == 1 else "states"
+    words = f"{'at most ' if case.section.is_followed else ''}{count} {noun} of {_size(state)}"
+    seconds = _rounded(count * elements * STATE_SECONDS / ranks)
+    return f"fields     {words}, {_size(mesh + count * state)} in result.h5, {seconds}"
+
+
 def estimate_lines(found: Estimate, n_ranks: int) -> list[str]:
     """Return an estimate for `n_ranks` ranks in two lines, each with a label of eleven columns."""
-    size = found.memory / 2**20
-    memory = f"{size:.0f} MiB" if size < 1000 else f"{size / 1024:.1f} GiB"
+    memory = _size(found.memory)
     noun = "rank" if n_ranks == 1 else "ranks"
     return [
         f"estimate   on {n_ranks} {noun} about {_rounded(found.seconds)}, {memory} on the largest, without pictures",
         f"ranks      recommended: {found.ranks} ({DOFS_OF_A_RANK} degrees of freedom per rank, at most one per body)",
     ]
+
+
+def _size(size: float) -> str:
+    """Return bytes in words."""
+    size /= 2**20
+    digits = 1 if size < 10 else 0
+    return f"{size:.{digits}f} MiB" if size < 1000 else f"{size / 1024:.1f} GiB"
 
 
 def _rounded(seconds: float) -> str:

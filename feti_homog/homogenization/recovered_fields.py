@@ -72,13 +72,9 @@ def _element_fields(cell: TornCell, loads: Float, u: Float) -> tuple[Float, Floa
     return np.concatenate(strains), np.concatenate(stresses)
 
 
-def out_of_plane(cell: TornCell, stress: Float) -> tuple[Float, Float]:
-    """Stresses 33 and strains 33 (m,) of the stresses (m, 3) in plane strain or stress."""
+def out_of_plane_stress(cell: TornCell, stress: Float) -> Float:
+    """Stresses 33 (m,) of the stresses (m, 3) in plane strain or stress."""
+    plane = cell.case.analysis.plane
+    rules = [laws.out_of_plane(cell.case.material_of(s.submesh.phase), plane)[0] for s in cell.subdomains]
     sizes = [elements for _, elements in _sizes(cell)]
-    rules = [
-        laws.out_of_plane(cell.case.material_of(s.submesh.phase), cell.case.analysis.plane) for s in cell.subdomains
-    ]
-    parts = zip(np.split(stress, np.cumsum(sizes)), rules, strict=False)
-    found = [(own @ to_S33, own @ to_E33) for own, (to_S33, to_E33) in parts]
-    S33, E33 = zip(*found, strict=True) if found else ((), ())
-    return np.concatenate([np.zeros(0), *S33]), np.concatenate([np.zeros(0), *E33])
+    return np.asarray(np.einsum("ev,ev->e", stress, np.repeat(np.reshape(rules, (-1, 3)), sizes, axis=0)))

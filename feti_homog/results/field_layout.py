@@ -14,7 +14,7 @@ from typing import Any
 from feti_homog.materials.voigt import AXIAL_STRESSES, SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS, STRESSES
 from feti_homog.results.field_views import GROUP_OF_STATES, SPATIAL_VIEWS, VIEWS, View
 from feti_homog.runtime.records import LENGTH, STRESS, Description, described, descriptions, type_words
-from feti_homog.typing import AnyInt, Float, Float32
+from feti_homog.typing import AnyInt, Float
 
 PROGRAM = "feti_homog"
 
@@ -102,23 +102,12 @@ class StatePart:
     point: int = described("number, from 0, of its point in `path` or `angle` of result.json; 0 of a stiffness")
     label: str = described("label of the state, as `E11`, `60 deg E11`, `event 12`")
     displacement: Float = described("displacement, including that of the macroscopic strain", LENGTH, "(n, 2)")
-    fluctuation: Float = described("displacement less that of the macroscopic strain, periodic", LENGTH, "(n, 2)")
     stress: Float = described(f"means over the elements, {', '.join(STRESSES)}", STRESS, "(m, 3)")
     stress_33: Float = described(
         "stress 33, out of the plane: 0 in plane stress, NaN where the material's constants do not determine it",
         STRESS,
         "(m,)",
     )
-    element_strain: Float32 = described(
-        "strains of the means over the elements, components of the tensor 11, 22, 12 = gamma12 / 2, 33 (NaN as of "
-        "`stress_33`)",
-        shape="(m, 4)",
-        dtype="float32",
-    )
-    von_mises: Float32 = described("von Mises stress of `stress` and `stress_33`", STRESS, "(m,)", dtype="float32")
-    principal_1: Float32 = described("largest principal stress of the same", STRESS, "(m,)", dtype="float32")
-    principal_2: Float32 = described("middle principal stress", STRESS, "(m,)", dtype="float32")
-    principal_3: Float32 = described("smallest principal stress", STRESS, "(m,)", dtype="float32")
     traction: Float = described("sigma n, normal (tension positive) and tangential", STRESS, "(k, 2)")
     jump: Float = described(
         "gap and slip: displacement of the matrix minus that of the fibre, normal and tangential", LENGTH, "(k, 2)"
@@ -197,25 +186,10 @@ class SpatialStatePart(StatePart):
     stress_mean: Float = described(f"macroscopic stress {', '.join(SPATIAL_STRESSES)}", STRESS, "(6,)", name="stress")
     temperature: float = described("change of temperature", "temperature")
     stress_33: Float = described("stress 33, along the fibres", STRESS, "(m,)")
-    element_strain: Float32 = described(
-        "strains of the means over the elements, thermal ones included, components of the tensor 11, 22, "
-        "12 = gamma12 / 2, 33",
-        shape="(m, 4)",
-        dtype="float32",
-    )
-    von_mises: Float32 = described("von Mises stress of all six components", STRESS, "(m,)", dtype="float32")
     axial_displacement: Float = described(
         "displacement along x3 at x3 = 0, that of the macroscopic strain included", LENGTH, "(n,)"
     )
-    axial_fluctuation: Float = described(
-        "displacement along x3 less that of the macroscopic strain, periodic", LENGTH, "(n,)"
-    )
     axial_stress: Float = described(f"means over the elements, {', '.join(AXIAL_STRESSES)}", STRESS, "(m, 2)")
-    axial_strain: Float32 = described(
-        "strains of the means over the elements, components of the tensor 23 = gamma23 / 2, 13 = gamma13 / 2",
-        shape="(m, 2)",
-        dtype="float32",
-    )
     axial_traction: Float = described("sigma n along x3", STRESS, "(k,)")
     axial_jump: Float = described("slip along x3: displacement of the matrix minus that of the fibre", LENGTH, "(k,)")
     traction_vector: Float = described("`traction` and `axial_traction` as (x, y, z)", STRESS, "(k, 3)")

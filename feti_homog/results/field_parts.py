@@ -9,11 +9,10 @@ import numpy as np
 
 from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response
-from feti_homog.homogenization.recovered_fields import out_of_plane, recover
+from feti_homog.homogenization.recovered_fields import out_of_plane_stress, recover
 from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.materials import voigt
 from feti_homog.results.field_layout import FibrePart, Header, InterfacePart, MeshPart, SpatialStatePart, StatePart
-from feti_homog.typing import Float, Float32
+from feti_homog.typing import Float
 from feti_homog.version import __version__
 
 
@@ -87,8 +86,6 @@ def interface_part(cell: TornCell) -> InterfacePart:
 def state_part(cell: TornCell, response: Response, load_factor: float, label: str, point: int) -> StatePart:
     """Return the fields of a response in plane strain or stress. Collective when first called."""
     fields, nodes = recover(cell, response), cell.solver.jump_operator.nodes
-    stress, (S33, E33) = fields.stress, out_of_plane(cell, fields.stress)
-    first, second, third = voigt.principal(stress, S33).T
     opening = _in_axes(nodes.normal, fields.jump)
     fibre = fields.displacement[cell.class_nodes[nodes.fibre_node]]
     return StatePart(
@@ -98,14 +95,8 @@ def state_part(cell: TornCell, response: Response, load_factor: float, label: st
         point=point,
         label=label,
         displacement=fields.displacement,
-        fluctuation=fields.fluctuation,
-        stress=stress,
-        stress_33=S33,
-        element_strain=_single(np.column_stack([fields.strain * [1.0, 1.0, 0.5], E33])),
-        von_mises=_single(voigt.von_mises(stress, S33)),
-        principal_1=_single(first),
-        principal_2=_single(second),
-        principal_3=_single(third),
+        stress=fields.stress,
+        stress_33=out_of_plane_stress(cell, fields.stress),
         traction=fields.traction,
         jump=fields.jump,
         traction_vector=_vectors(_in_axes(nodes.normal, fields.traction)),
@@ -130,10 +121,6 @@ def spatial_state_part(
     if response is None or cell.axial is None:
         raise ValueError("expected a response of a cell with an axial problem")
     in_plane, along = recover(cell, plane), recover(cell.axial, axial)
-    stress, S33 = in_plane.stress[:, :3], in_plane.stress[:, 3]
-    # The axial problem has [13, 23], the file [23, 13].
-    shears = np.ascontiguousarray(along.stress[:, ::-1])
-    first, second, third = voigt.spatial_principal(stress, S33, shears).T
     nodes = cell.solver.jump_operator.nodes
     opening = _vectors(_in_axes(nodes.normal, in_plane.jump), along.jump)
     fibre = _vectors(in_plane.displacement, along.displacement)[cell.class_nodes[nodes.fibre_node]]
@@ -145,18 +132,10 @@ def spatial_state_part(
         point=point,
         label=label,
         displacement=in_plane.displacement,
-        fluctuation=in_plane.fluctuation,
-        stress=stress,
-        stress_33=S33,
-        element_strain=_single(in_plane.strain[:, :4] * [1.0, 1.0, 0.5, 1.0]),
-        von_mises=_single(voigt.spatial_von_mises(stress, S33, shears)),
-        principal_1=_single(first),
-        principal_2=_single(second),
-        principal_3=_single(third),
+        stress=in_plane.stress[:, :3],
+        stress_33=in_plane.stress[:, 3],
         axial_displacement=along.displacement[:, 0],
-        axial_fluctuation=along.fluctuation[:, 0],
-        axial_stress=shears,
-        axial_strain=_single(along.strain[:, ::-1] / 2),
+        axial_stress=along.stress[:, ::-1],  # the axial problem has [13, 23], the file [23, 13]
         traction=in_plane.traction,
         jump=in_plane.jump,
         axial_traction=along.traction[:, 0],
@@ -178,9 +157,3 @@ def _in_axes(normal: Float, pairs: Float) -> Float:
 def _vectors(in_plane: Float, along: Float | None = None) -> Float:
     """(k, 3) vectors of components (k, 2) in the plane and (k, 1) along x3, by default 0."""
     return np.pad(in_plane, [(0, 0), (0, 1)]) if along is None else np.hstack([in_plane, along])
-
-
-def _single(values: Float) -> Float32:
-    """In single precision: these follow from displacements and stresses, and are made to be looked at."""
-    with np.errstate(over="ignore"):  # to infinity
-        return values.astype(np.float32)

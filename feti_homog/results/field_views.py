@@ -66,7 +66,6 @@ def _column(name: str, source: str, column: int) -> View:
 
 PLACES = ((0, 0), (1, 1), (0, 1), (2, 2))  # of 11, 22, 12, 33
 STRESS_TENSOR = dict(zip(PLACES, (("stress", 0), ("stress", 1), ("stress", 2), ("stress_33", WHOLE)), strict=True))
-STRAIN_TENSOR = {place: ("element_strain", column) for column, place in enumerate(PLACES)}
 PAIRS = [(f"{source}_{name}", source, column) for source in ("traction", "jump") for column, name in enumerate("nt")]
 
 COLUMNS = (
@@ -81,9 +80,7 @@ VIEWS: dict[str, tuple[View, ...]] = {
     "interface": (_vector("normal"),),
     GROUP_OF_STATES: (
         _vector("displacement"),
-        _vector("fluctuation"),
         _tensor("stress", "stress", STRESS_TENSOR),
-        _tensor("strain", "element_strain", STRAIN_TENSOR),
         *COLUMNS,
     ),
 }
@@ -91,9 +88,7 @@ VIEWS: dict[str, tuple[View, ...]] = {
 # The same of a state of generalized plane strain.
 SPATIAL_VIEWS: tuple[View, ...] = (
     _vector("displacement", AXIAL),
-    _vector("fluctuation", "axial_fluctuation"),
     _tensor("stress", "stress", STRESS_TENSOR | {at: ("axial_stress", k) for k, at in enumerate(AXIAL_PLACES)}),
-    _tensor("strain", "element_strain", STRAIN_TENSOR | {at: ("axial_strain", k) for k, at in enumerate(AXIAL_PLACES)}),
     *COLUMNS,
     *(_column(name, "axial_stress", column) for column, name in enumerate(AXIAL_STRESSES)),
 )

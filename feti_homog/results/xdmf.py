@@ -25,13 +25,12 @@ TENSOR = np.array([0, 5, 4, 5, 1, 3, 4, 3, 2])  # places of the tensor's rows in
 NUMBERS = {"f": "Float", "i": "Int"}
 SHAPES = {1: "Scalar", 3: "Vector", 9: "Tensor"}  # by the number of components
 # The arrays of the cell and of the interface, and the datasets of result.h5, or of one of its states, that they are.
-CELL_NODES = {name: f"vector/state/K/{name}" for name in ("displacement", "fluctuation")}
+CELL_NODES = {"displacement": "vector/state/K/displacement"}
 CELL_ELEMENTS = {
     **{name: f"mesh/{name}" for name in ("body", "fibre_number", "phase", "subdomain")},
-    **{name: f"tensor/state/K/{name}" for name in ("stress", "strain")},
+    "stress": "tensor/state/K/stress",
     **{name: f"column/state/K/{name}" for name in STRESSES},
     "S33": "state/K/stress_33",
-    **{name: f"state/K/{name}" for name in ("von_mises", "principal_1", "principal_2", "principal_3")},
 }
 INTERFACE_POINTS = {
     "displacement": "state/K/displacement_fibre",

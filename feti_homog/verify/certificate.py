@@ -92,7 +92,7 @@ def _verified(files: ResultFiles, directory: Path) -> Certificate:
         terms = np.abs(state.displacement) + np.abs(state.fluctuation)
         fields = cell.elements.fields(state.displacement, terms, state.along, cell.free_strains(state))
         check_fields(findings, cell, state, fields)
-        check_derived(findings, cell, state, fields)
+        check_derived(findings, cell, state)
         check_interface_state(findings, cell, state)
         states.append(StateNumbers.of(cell, state, fields))
     check_load(findings, cell, states)

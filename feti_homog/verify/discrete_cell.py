@@ -13,7 +13,7 @@ from feti_homog.typing import Bool, Float, Int
 from feti_homog.verify.bonds import inwardness, pairs_of
 from feti_homog.verify.constitutive_law import expansions, plane_stiffnesses, spatial_stiffnesses
 from feti_homog.verify.elements import Elements
-from feti_homog.verify.reading import ResultFiles
+from feti_homog.verify.reading import ResultFiles, gradient
 from feti_homog.verify.torus import TornNodes, TornSides, along_one_line, constituents, torn, wrapped
 
 # Scales of a state are no less than this share of those of the run: a path may come back to zero strain.
@@ -198,13 +198,6 @@ class DiscreteCell:
     def strain_size(self, state: Loaded) -> float:
         """Return the largest of the strains that the loads of a state make."""
         return max(float(np.abs(self.loads(state)).max()), LEAST_SHARE * self.largest_strain)
-
-
-def gradient(strain: Float) -> Float:
-    """(c, 2) H of the displacements H x, without rotation in the plane, that make a strain (v,)."""
-    E11, E22, gamma12 = strain[[0, 1, -1]]
-    plane = [[E11, gamma12 / 2], [gamma12 / 2, E22]]
-    return np.array(plane if len(strain) == 3 else [*plane, strain[[4, 3]]])
 
 
 def _inner_sides(files: ResultFiles, sides: TornSides, inwards: Int) -> Bool:

@@ -19,15 +19,14 @@ from feti_homog.verify.checksums import is_as_written, seal_of
 
 JSON, FIELDS = "result.json", "result.h5"
 SCHEMA = 1
-# Tables of a state that are there to be looked at: rows of elements or of interface nodes, and columns.
+# Tables of a state that follow from others: rows of elements or of interface nodes, and columns.
 DERIVED: dict[str, tuple[Any, ...]] = {
-    "stress_33": ("m",), "element_strain": ("m", 4), "von_mises": ("m",),
-    "principal_1": ("m",), "principal_2": ("m",), "principal_3": ("m",),
+    "stress_33": ("m",),
     "traction_vector": ("k", 3), "jump_vector": ("k", 3),
     "displacement_fibre": ("k", 3), "displacement_matrix": ("k", 3),
 }  # fmt: skip
-# In generalized plane strain stresses 33 are among the stresses, and there are strains along the fibres.
-SPATIAL_DERIVED = {name: shape for name, shape in DERIVED.items() if name != "stress_33"} | {"axial_strain": ("m", 2)}
+# In generalized plane strain stresses 33 are among the stresses.
+SPATIAL_DERIVED = {name: shape for name, shape in DERIVED.items() if name != "stress_33"}
 ROWS = ("points", "normal", "length", "fibre_number", "fibre")
 MISSING_FIELDS = "only a run with `fields = true` in [output] can be verified"
 
@@ -42,7 +41,7 @@ class State:
     Attributes:
         strain, mean_stress: (v,) macroscopic.
         point: number of its point in `path` or `angle` of result.json.
-        displacement, fluctuation: (n, c).
+        displacement, fluctuation: (n, c); the latter is the displacement less that of the strain.
         stress: (m, v) means over the elements.
         traction, jump: (k, c) normal, tangential and along the fibres.
         status: (k,) 0 bonded, 1 closed, 2 open.
@@ -122,10 +121,7 @@ class ResultFiles:
     def _state(self, number: int) -> State:
         group = self.file[f"state/{number}"]
         n, m, k = len(self.mesh.points), len(self.mesh.triangles), len(self.interface.points)
-        basic = {
-            "displacement": (n, 2), "fluctuation": (n, 2), "stress": (m, 3),
-            "traction": (k, 2), "jump": (k, 2), "status": (k,),
-        }  # fmt: skip
+        basic = {"displacement": (n, 2), "stress": (m, 3), "traction": (k, 2), "jump": (k, 2), "status": (k,)}
         shown = SPATIAL_DERIVED if self.is_spatial else DERIVED
         derived = {name: (m if of == "m" else k, *columns) for name, (of, *columns) in shown.items()}
         arrays, others = (
@@ -140,12 +136,13 @@ class ResultFiles:
         )
         label, factor, point = str(group.attrs["label"]), float(group.attrs["load_factor"]), int(group.attrs["point"])
         warmer = float(group.attrs["temperature"]) if self.is_spatial else 0.0
+        arrays["fluctuation"] = arrays["displacement"] - self.mesh.points @ gradient(strain).T
         name = f"state {number} ({label})"
         return State(name, strain, mean, factor, point, **arrays, derived=others, temperature=warmer)
 
     def _spatial(self, number: int, plane: Mapping[str, Float]) -> dict[str, Float]:
         """Return the tables of a state with what is along the fibres."""
-        rows = {"displacement": "n", "fluctuation": "n", "traction": "k", "jump": "k"}
+        rows = {"displacement": "n", "traction": "k", "jump": "k"}
         count = {"n": len(self.mesh.points), "k": len(self.interface.points)}
         whole = {
             name: np.column_stack([plane[name], self._table(number, f"axial_{name}", (count[of],))])
@@ -161,6 +158,13 @@ class ResultFiles:
         array = _rows(self.file[f"state/{number}/{name}"])
         _expect(array.shape == shape, f"/state/{number}/{name} has shape {array.shape}, expected {shape}")
         return array
+
+
+def gradient(strain: Float) -> Float:
+    """(c, 2) H of the displacements H x, without rotation in the plane, that make a strain (v,)."""
+    E11, E22, gamma12 = strain[[0, 1, -1]]
+    plane = [[E11, gamma12 / 2], [gamma12 / 2, E22]]
+    return np.array(plane if len(strain) == 3 else [*plane, strain[[4, 3]]])
 
 
 def altered(directory: Path) -> tuple[str, ...]:

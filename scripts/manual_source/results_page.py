@@ -27,7 +27,12 @@ numbers.
 
 In ParaView `result.xdmf` opens the cell and `interface.xdmf` the interface; there `displacement` is that of the fibre's
 face. The filter Python Annotation, of the field data, shows a state's label by
-`label.astype("u1").tobytes().decode()`, and its load factor by `load_factor`."""
+`label.astype("u1").tobytes().decode()`, and its load factor by `load_factor`.
+
+What follows from these fields is not stored: `feti-homog fields DIR` writes all states with fluctuations, strains, von
+Mises and principal stresses as `cell.vtkhdf` and `interface.vtkhdf` (ParaView from 5.12 on, PyVista), and with
+`--format vtu` as a `.vtu` for each state (meshio, too). In Python `feti_homog.read_state(DIR, K)` returns them as
+arrays."""
 
 SWEEP_CSV = """\
 A row for each case, then four for each point: the statistics of its realisations. Names have their units in brackets; i

@@ -86,7 +86,6 @@ def assert_fields(out):
     k = len(tables["interface/points"])
     for state in map(str, range(3)):
         assert tables[f"state/{state}/displacement"].shape == (nodes, 2)
-        assert tables[f"state/{state}/fluctuation"].shape == (nodes, 2)
         assert tables[f"state/{state}/stress"].shape == (elements, 3)
         assert tables[f"state/{state}/traction"].shape == tables[f"state/{state}/jump"].shape == (k, 2)
         assert tables[f"state/{state}/status"].shape == (k,) and not tables[f"state/{state}/status"].any()

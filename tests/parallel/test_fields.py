@@ -38,7 +38,7 @@ def test_the_ranks_parts_make_the_whole_file(comm: Any, shared_path: Path, order
         assert sorted(file["state"]) == ["0", "1", "2"]
         for k, state in enumerate(whole.states):
             group = file[f"state/{k}"]
-            for name in ("displacement", "fluctuation", "stress", "traction", "jump", "status"):
+            for name in ("displacement", "stress", "traction", "jump", "status"):
                 np.testing.assert_array_equal(group[name][:], getattr(state, name))
             np.testing.assert_array_equal(group.attrs["strain"], state.strain)
             np.testing.assert_array_equal(group.attrs["stress"], state.stress_mean)

@@ -119,11 +119,9 @@ def _is_cell(file: Any, number: int, seen: Any) -> None:
     state = file[f"state/{number}"]
     _are_equal(file, number, seen.nodes, xdmf.CELL_NODES)
     _are_equal(file, number, seen.elements, xdmf.CELL_ELEMENTS | (SPACE if "axial_stress" in state else {}))
-    for name in ("displacement", "fluctuation"):
-        axial = state.get(f"axial_{name}", np.zeros(len(seen.points)))
-        np.testing.assert_array_equal(seen.nodes[name], np.column_stack([state[name][:], axial]))
+    axial = state.get("axial_displacement", np.zeros(len(seen.points)))
+    np.testing.assert_array_equal(seen.nodes["displacement"], np.column_stack([state["displacement"][:], axial]))
     _is_tensor(seen.elements["stress"], np.column_stack([state["stress"][:], state["stress_33"][:]]), state, "stress")
-    _is_tensor(seen.elements["strain"], state["element_strain"][:], state, "strain")
     for column, name in enumerate(("S11", "S22", "S12")):
         np.testing.assert_array_equal(seen.elements[name], state["stress"][:, column])
 

@@ -180,7 +180,7 @@ def document(kind: str) -> dict[str, Any]:
     analysis = next((name for name in ("angle", "path", "envelope", "load") if name in parts), "stiffness")
     material = {"matrix": parts.pop("matrix", MATRIX), "fibre": parts.pop("fibre", FIBRE)}
     plane = {"type": analysis, "plane": parts.pop("plane", "strain")}
-    output = {"pictures": False} | ({"states": parts.pop("states")} if "states" in parts else {})
+    output = {"pictures": False} | ({"states": parts.pop("states", "all")} if "path" in parts else {})
     return {"name": kind, "material": material, "analysis": plane, "output": output} | parts
 
 

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from support.cases import FIBRE, MATRIX, make_case
 
 from feti_homog.case.interface_section import Arc, InterfaceSection
+from feti_homog.case.load_section import LoadPath
 from feti_homog.case.sections import Angle
 from feti_homog.homogenization import cost_model
 from feti_homog.homogenization.phase_laws import problems
+from feti_homog.results.field_layout import SpatialStatePart, StatePart, rows_of, tables
 
 
 def estimate(dofs=(100_000,), subdomains=(9,), bodies=9, applications=36, columns=0):
@@ -56,3 +59,23 @@ def test_suggested_ranks_grow_with_the_size_up_to_the_bodies(dofs, bodies, ranks
 def test_words_tell_time_memory_and_better_ranks():
     first, second = cost_model.estimate_lines(cost_model.Estimate(400.0, 3e9, 8), 2)
     assert "on 2 ranks about 7 min, 2.8 GiB" in first and "recommended: 8 (" in second
+
+
+@pytest.mark.parametrize("plane", ["strain", "generalized"])
+def test_the_size_of_result_h5_is_that_of_its_tables(plane):
+    kind = SpatialStatePart if plane == "generalized" else StatePart
+    per_row = dict.fromkeys("nmk", 0)
+    for table in tables(kind).values():
+        columns = int(table.shape.strip("()").split(",")[1] or 1)
+        per_row[rows_of(table)] += columns * np.dtype(table.dtype).itemsize
+    own = cost_model.STATE_BYTES + (plane == "generalized") * cost_model.AXIAL_BYTES
+    assert own.tolist() == list(per_row.values())
+
+
+def test_kept_states_are_told():
+    case = make_case(plane="generalized")
+    assert "6 states of 5.7 MiB, 39 MiB in" in cost_model.fields_line(case, 50_000, 100_000, 0, 1)
+    path = replace(case, analysis=replace(case.analysis, type="path"), path=LoadPath(to={"E11": 1.0}))
+    assert "at most 20 states of 6.1 MiB, 128 MiB in" in cost_model.fields_line(path, 50_000, 100_000, 3000, 1)
+    every = replace(path, output=replace(path.output, states="all"))
+    assert "for each state" in cost_model.fields_line(every, 50_000, 100_000, 3000, 1)
