@@ -4,7 +4,11 @@ import os
 import signal
 import sys
 
+from feti_homog.errors import FetiHomogError
+from feti_homog.runtime import limits
 from feti_homog.runtime.environment import prepare
+from feti_homog.runtime.interrupts import launched_rank
+from feti_homog.runtime.standard_streams import complain
 
 
 def main() -> int:
@@ -12,6 +16,12 @@ def main() -> int:
     prepare(os.environ)
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # until the program listens, Ctrl-C ends it without a traceback
+    try:
+        limits.require()
+    except FetiHomogError as error:
+        rank = launched_rank()  # others may have other limits
+        complain(*(f"error: {f'rank {rank}: ' if rank else ''}{fault}" for fault in error.faults))
+        return error.exit_code
     from feti_homog.cli import main as command  # NumPy reads the environment when it is imported
 
     return command()

@@ -17,7 +17,7 @@ from feti_homog.petsc.command_words import named_values, petsc_words, split_argv
 from feti_homog.petsc.option_table import unknown_to_petsc
 from feti_homog.petsc.option_values import faulty_values
 from feti_homog.runtime import standard_streams
-from feti_homog.runtime.environment import prefer_own_toolkits
+from feti_homog.runtime.environment import ignore_settings_of_the_folder, prefer_own_toolkits
 from feti_homog.runtime.interrupts import end_on_signals, launched_rank
 
 if TYPE_CHECKING:
@@ -158,6 +158,7 @@ def start(command: Callable[[Sequence[str], Intracomm], int], argv: Sequence[str
     standard_streams.prepare()
     end_on_signals()
     prefer_own_toolkits()
+    ignore_settings_of_the_folder()
     try:
         libraries.require()
     except LibraryError as error:

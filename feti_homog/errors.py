@@ -2,20 +2,40 @@
 
 from __future__ import annotations
 
+import re
+
 EXIT_DONE, EXIT_DEFECT, EXIT_INPUT, EXIT_UNCONVERGED = 0, 1, 2, 3
+# Characters of a fault and number of faults: a file may have any number of them, with words of any length.
+LONGEST_LINE, MOST_FAULTS = 1000, 30
+
+
+def escaped(text: str, kept: str = "") -> str:
+    """Escape the characters that are not printable, but for those `kept`: a terminal would obey those of a file."""
+    return re.sub(r"[^ -~]", lambda c: c[0] if c[0].isprintable() or c[0] in kept else ascii(c[0])[1:-1], text)
 
 
 class FetiHomogError(Exception):
-    """An error told to the user in words, one line per fault, without a traceback."""
+    """An error told to the user in words, one line per fault, without a traceback.
+
+    Lines are cut after LONGEST_LINE characters; beyond MOST_FAULTS the others are counted.
+    """
 
     exit_code = EXIT_DEFECT
 
     def __init__(self, *faults: str) -> None:
-        super().__init__("\n".join(faults))
-        self.faults = faults
+        more = len(faults) - MOST_FAULTS
+        if more > 1:  # one more is as short as the count, or is the count
+            faults = (*faults[:MOST_FAULTS], f"{more} more faults")
+        self.faults = tuple(map(_line, faults))
+        super().__init__("\n".join(self.faults))
 
     def __reduce__(self) -> tuple[type[FetiHomogError], tuple[str, ...]]:
         return type(self), self.faults
+
+
+def _line(fault: str) -> str:
+    line = escaped(fault)
+    return line if len(line) <= LONGEST_LINE else f"{line[: LONGEST_LINE - 3]}..."
 
 
 class CaseError(FetiHomogError):

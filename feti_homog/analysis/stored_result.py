@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -31,7 +32,7 @@ def check_to_draw(directory: Path) -> None:
     Raises:
         CaseError: result.h5 is missing, or one of both is damaged, or of another program or run.
     """
-    if (directory / result_json.NAME).exists():
+    if os.path.lexists(directory / result_json.NAME):  # a link in a circle is there, too
         read(directory)
     elif not (directory / field_file.NAME).is_file():
         raise CaseError(f"cannot read {directory / field_file.NAME}: No such file or directory")

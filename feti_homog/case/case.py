@@ -46,6 +46,7 @@ from feti_homog.errors import CaseError
 from feti_homog.materials.forms import Isotropic, Material
 from feti_homog.materials.laws import contrast_faults, contrast_warnings
 from feti_homog.materials.plane_state import PLANE_STATES
+from feti_homog.runtime import input_files
 from feti_homog.schema.keys import Selected, TableReader, selected_value, to_table
 from feti_homog.schema.values import text
 from feti_homog.schema.wording import limit_in_words, suggestion, toml_key, toml_value
@@ -168,7 +169,7 @@ class Case:
         document.get("path", {}).pop("max_events", None)
         for key in ("file", "match"):
             document["cell"].pop(key, None)
-        content = b"".join(path.read_bytes() for path in (self.cell.file, self.cell.match) if path is not None)
+        content = b"".join(input_files.read(path) for path in (self.cell.file, self.cell.match) if path is not None)
         return hashlib.sha256(json.dumps(document, sort_keys=True).encode() + content).hexdigest()[:16]
 
 

@@ -14,6 +14,8 @@ from feti_homog.case.section_values import CELL_FILE, FIBRE_LIST, FRACTIONS, RAD
 from feti_homog.schema.keys import Selector, key
 from feti_homog.schema.values import choice, integer, real
 
+MOST_FIBRES = 100_000  # of a cell, and as many voids
+
 if TYPE_CHECKING:
     from feti_homog.microstructure.fibre_pattern import FibrePattern
 
@@ -74,7 +76,8 @@ class Cell:
     )
     mesh_size: float = key(
         real(least=1e-4, most=0.5),
-        "Size of the elements, before refine, / width of the cell.",
+        "Size of the elements, before refine, / width of the cell. At most 1000000 are made, 20000000 in cells of 400 "
+        "or more round fibres and voids, counting the small ones in narrow gaps and thin coatings.",
         default=0.05,
         only=MESHED,
     )
@@ -129,7 +132,7 @@ class Cell:
         default="torus",
     )
     fibres: int | None = key(
-        integer(least=1, most=100_000), "Number of fibres.", only=RANDOM, unless=("match", "radii"),
+        integer(least=1, most=MOST_FIBRES), "Number of fibres.", only=RANDOM, unless=("match", "radii"),
         default_words="required, or given by match, or by width and radii",
     )  # fmt: skip
     mix: Mapping[str, float] | None = key(

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.errors import CaseError
+from feti_homog.runtime import input_files
 from feti_homog.schema.wording import dotted_key
 
 MAX_BYTES = 1 << 24
@@ -25,7 +26,7 @@ def read_document(path: str | Path) -> dict[str, Any]:
     if "\0" in str(path):
         raise CaseError(f"{str(path)!r}: no file has a name with a null character")
     try:
-        content = _bytes_of(path).decode("utf-8-sig")
+        content = input_files.read(path, MAX_BYTES, pipes=True).decode("utf-8-sig")
         document = tomllib.loads(content)
     except UnicodeDecodeError as error:
         line = error.object.count(b"\n", 0, error.start) + 1
@@ -45,15 +46,6 @@ def read_document(path: str | Path) -> dict[str, Any]:
 
 def _too_deep(path: Path) -> CaseError:
     return CaseError(f"{path}: tables and arrays are nested more than {MAX_DEPTH} deep")
-
-
-def _bytes_of(path: Path) -> bytes:
-    """Return the content of a file that may be a pipe; of one that does not end too much is refused."""
-    with path.open("rb") as stream:
-        content = stream.read(MAX_BYTES + 1)
-    if len(content) > MAX_BYTES:
-        raise CaseError(f"{path}: not a case file: it has more than {MAX_BYTES >> 20} MiB")
-    return content
 
 
 def _is_deeper(document: dict[str, Any], depth: int) -> bool:

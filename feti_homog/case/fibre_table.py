@@ -17,6 +17,7 @@ from feti_homog.case.section_values import FIBRE_CELLS, NUMBERS
 from feti_homog.errors import CaseError
 from feti_homog.fibres.outlines.outlines import Columns, Outlines
 from feti_homog.fibres.outlines.shapes import REPLACING, outlines_of
+from feti_homog.runtime import input_files
 from feti_homog.schema.values import is_number
 from feti_homog.schema.wording import suggestion, toml_value
 from feti_homog.typing import Bool, Float, Int
@@ -25,10 +26,9 @@ COLUMNS = (*list(NUMBERS)[:3], "phase", *list(NUMBERS)[3:])
 SIZES = ("width", "height", "left", "bottom")
 """What comment lines may say of the cell: its size, and the coordinates of its lower left corner."""
 OF_FIBRES = ("coating", "inner_radius")
+MAX_BYTES = 1 << 26
 PHASE_NAME = re.compile(r"[A-Za-z0-9_:-]+")
 SIZE = re.compile(r"\b(width|height|left|bottom)\s*[=:]\s*([^\s;=]+?)(?=,?\s|,?$|;|,[a-z])")
-# Faults that are told one by one.
-MAX_FAULTS = 30
 
 
 @dataclass(frozen=True)
@@ -155,16 +155,14 @@ class _Faults:
         self.lines.append(f"{self._name}: row {row}: {words}")
 
     def throw(self) -> None:
-        """Raise those that there are, the first ones in full."""
-        more = len(self.lines) - MAX_FAULTS
-        rest = [f"{self._name}: {more} more faults like these"] if more > 0 else []
+        """Raise those that there are."""
         if self.lines:
-            raise CaseError(*self.lines[:MAX_FAULTS], *rest)
+            raise CaseError(*self.lines)
 
 
 def _text(path: Path) -> str:
     try:
-        return path.read_bytes().decode("utf-8-sig")
+        return input_files.read(path, MAX_BYTES).decode("utf-8-sig")
     except OSError as error:
         raise CaseError(f"{path.name}: cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:

@@ -6,7 +6,7 @@ from math import fsum, pi, sqrt
 
 import numpy as np
 
-from feti_homog.case.cell_section import Cell
+from feti_homog.case.cell_section import MOST_FIBRES, Cell
 from feti_homog.schema.wording import toml_value
 
 FEWEST = 0.5  # fibres of a phase, below which one would be another phase's worth
@@ -73,8 +73,11 @@ def mix_faults(cell: Cell) -> list[str]:
         faults.append(f"[cell] radii = {toml_value(dict(cell.radii))}: expected a radius of each of mix: {expected}")
     if faults:
         return faults
+    expected_counts = _expected_counts(cell)
+    if (count := fsum(expected_counts.values())) > MOST_FIBRES:
+        return [f"{given}: makes {count:.2g} fibres; expected at most {MOST_FIBRES}, of larger radii or a smaller cell"]
     return [
         f"{given}: makes {expected:.2g} fibres of {phase}; expected at least {FEWEST}, of more fibres or a wider cell"
-        for phase, expected in _expected_counts(cell).items()
+        for phase, expected in expected_counts.items()
         if expected < FEWEST
     ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from feti_homog.case.fibre_window import read_window
@@ -12,7 +13,7 @@ from feti_homog.fibres.hard_core import hard_core
 from feti_homog.microstructure.fibre_pattern import FibrePattern
 from feti_homog.microstructure.statistics import measure, poisson
 from feti_homog.report.text import statistics_text
-from feti_homog.results import output_folder
+from feti_homog.results import atomic, output_folder
 
 MODELS = {"hard-core": hard_core, "poisson": poisson}
 
@@ -37,6 +38,7 @@ def run(
         from feti_homog.report.plots import statistics_picture
 
         out.mkdir(parents=True, exist_ok=True)
+        atomic.remove_abandoned(out, re.compile(r"[a-z_]+\.(csv|png)"))
         paths = statistics_text.write(out, found)
         paths.append(statistics_picture.write(out, found, source.stem, model))
         lines += map(str, paths)

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from feti_homog.api import folder
-from feti_homog.errors import EXIT_DONE, EXIT_UNCONVERGED, FetiHomogError
+from feti_homog.errors import EXIT_DEFECT, EXIT_DONE, EXIT_UNCONVERGED, FetiHomogError
 from feti_homog.runtime.interrupts import end_on_signals, launched_rank
 from feti_homog.runtime.standard_streams import complain, prepare, print_product
 
@@ -41,6 +41,10 @@ def run(parser: argparse.ArgumentParser, words: Sequence[str]) -> int:
         certificate = verify(arguments.directory)
         if prints:
             print_product(json.dumps(certificate.document, indent=1) if arguments.json else certificate.text)
+    except PermissionError as error:
+        if prints:
+            complain(f"error: {error.filename}: {error.strerror}")
+        return EXIT_DEFECT
     except FetiHomogError as error:
         if prints:
             complain(*(f"error: {fault}" for fault in error.faults))

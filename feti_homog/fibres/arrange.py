@@ -7,7 +7,7 @@ from math import fsum, pi, sqrt
 
 import numpy as np
 
-from feti_homog.case.cell_section import Cell
+from feti_homog.case.cell_section import MOST_FIBRES, Cell
 from feti_homog.case.mixed_cell import fibre_counts, fractions_in_words, void_count
 from feti_homog.case.phase_names import FIBRE, VOID
 from feti_homog.errors import MeshError
@@ -115,6 +115,11 @@ def _with_voids(cell: Cell, radii: Float, coating: Float) -> tuple[Float, Float]
     count = void_count(cell, float(radii.mean()))
     if not count:
         return radii, coating
+    if count > MOST_FIBRES:
+        raise MeshError(
+            f"[cell] {fractions_in_words(cell)}: makes {count:.2g} voids; expected at most {MOST_FIBRES}; make "
+            "void_radius larger"
+        )
     own = np.full(count, sqrt((cell.voids or 0.0) / (pi * count)))
     return np.append(radii, own), np.append(coating, np.zeros(count))
 

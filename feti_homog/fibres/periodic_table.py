@@ -32,7 +32,6 @@ LEAST_CLEARANCE = 1e-3
 # Decimals of coordinates / width of the cell of tables that may have any origin and unit, and of height / width: gmsh
 # may put other elements beside ellipses and polygons where the last digit of a length is another.
 TABLE_DECIMALS, HEIGHT_DECIMALS = 10, 12
-MAX_FAULTS = 30  # that are told one by one
 MOST_LISTED = 30  # moved fibres that are listed one by one
 
 
@@ -147,9 +146,7 @@ def _corner(table: FibreTable) -> Float:
 
 def _raise_faults(table: FibreTable, faults: list[str]) -> None:
     if faults:
-        more = len(faults) - MAX_FAULTS
-        rest = [f"[cell] {table.name}: {more} more faults like these"] if more > 0 else []
-        raise MeshError(*(f"[cell] {table.name}: {fault}" for fault in faults[:MAX_FAULTS]), *rest)
+        raise MeshError(*(f"[cell] {table.name}: {fault}" for fault in faults))
 
 
 def _outside(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> list[str]:

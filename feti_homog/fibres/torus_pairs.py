@@ -7,13 +7,20 @@ from itertools import product
 import numpy as np
 from scipy.spatial import cKDTree
 
+from feti_homog.errors import MeshError
 from feti_homog.typing import Bool, Float, Int
+
+# Fibres beside each other have three pairs each; those on top of each other would fill the memory.
+MOST_PAIRS = 20_000_000
 
 
 def neighbours(centres: Float, size: Float, reach: float) -> tuple[Int, Int, Float]:
     """All pairs i <= j nearer than `reach`, and the vectors (k, 2) from i to that image of j.
 
     Images of one disc are pairs i = j; each pair of images comes once or, where i = j, from both ends.
+
+    Raises:
+        MeshError: there are more than MOST_PAIRS.
     """
     inside = centres % size
     points, owner = [inside], [np.arange(len(centres))]
@@ -24,12 +31,24 @@ def neighbours(centres: Float, size: Float, reach: float) -> tuple[Int, Int, Flo
             owner.append(near)
     place, who = np.concatenate(points), np.concatenate(owner)
     # A tree that is used once is not worth being balanced.
-    pairs = cKDTree(place, balanced_tree=False, compact_nodes=False).query_pairs(reach, output_type="ndarray")
+    tree = cKDTree(place, balanced_tree=False, compact_nodes=False)
+    if len(place) ** 2 > 2 * MOST_PAIRS:
+        _refuse_many(tree, reach)
+    pairs = tree.query_pairs(reach, output_type="ndarray")
     first, second = pairs.T
     keep = np.flatnonzero((first < len(centres)) & (who[first] <= who[second]))
     keep = keep[np.argsort(first[keep] * len(place) + second[keep])]
     first, second = first[keep], second[keep]
     return who[first], who[second], place[second] - place[first]
+
+
+def _refuse_many(tree: cKDTree, reach: float) -> None:
+    count = (int(tree.count_neighbors(tree, reach)) - tree.n) // 2
+    if count > MOST_PAIRS:
+        raise MeshError(
+            f"[cell] about {count:.2g} pairs of fibres are nearer to each other than {reach:.2g}; expected at most "
+            f"{MOST_PAIRS}: they lie on top of each other, or one is much larger than the others"
+        )
 
 
 def _is_near(inside: Float, step: Int, size: Float, reach: float) -> Bool:

@@ -148,6 +148,10 @@ def _told(error: FetiHomogError) -> str:
 def _attempt(function: Callable[..., T], *args: Any, **kwargs: Any) -> tuple[T | None, Exception | None]:
     try:
         return function(*args, **kwargs), None
+    except OSError as error:
+        if error.filename is None:
+            return None, error
+        return None, FetiHomogError(f"{error.filename}: {error.strerror}")  # a file's fault, not the program's
     except Exception as error:
         return None, error
 

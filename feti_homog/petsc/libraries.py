@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from feti_homog.errors import EXIT_DEFECT, LibraryError
+from feti_homog.runtime import limits
 from feti_homog.runtime.standard_streams import complain
 
 if TYPE_CHECKING:
@@ -36,6 +37,8 @@ def require() -> None:
 def start_petsc(words: Sequence[str], comm: Intracomm) -> None:
     """Start PETSc with the words of a command line, the program's name first.  Collective over `comm`.
 
+    Files .petscrc and petscrc, which lie in the current folder without being asked for, are not read.
+
     PETSc ends when Python does; a rank on which it cannot, for its logs cannot be written, ends the job: the others
     would wait for it.  At its end PETSc does not list options that nobody read, unless -options_left asks for it: the
     program refuses misspelt ones, and one set of options serves all runs.
@@ -46,15 +49,31 @@ def start_petsc(words: Sequence[str], comm: Intracomm) -> None:
     import petsc4py
 
     try:
-        petsc4py.init(list(words), comm=comm)
+        petsc4py.init([*words, "-skip_petscrc"], comm=comm)
     except (ImportError, ValueError) as error:
         raise LibraryError(_unfit("petsc4py", error, petsc4py_advice())) from error
     from petsc4py import PETSc
 
     atexit.register(_end_petsc, comm)
+    if limits.limits_addresses():
+        _reserve_buffers()
     options = PETSc.Options()
     if not options.hasName("options_left"):
         options.setValue("options_left", "no")
+
+
+def _reserve_buffers() -> None:
+    """Let each BLAS have its buffers while there are addresses: OpenBLAS, which finds none later, tries for ever."""
+    import numpy as np
+    from petsc4py import PETSc
+    from scipy.linalg import blas
+
+    square = np.eye(200)
+    blas.dgemm(1.0, square @ square, square)
+    matrix = PETSc.Mat().createDense(square.shape, array=square.copy(), comm=PETSc.COMM_SELF)
+    matrix.assemble()
+    for each in (matrix.matMult(matrix), matrix):
+        each.destroy()
 
 
 def _end_petsc(comm: Intracomm) -> None:

@@ -8,8 +8,10 @@ import re
 import stat
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 from feti_homog.petsc.option_table import DIRECT_PREFIXES, OPTIONS
+from feti_homog.runtime import input_files
 
 
 def can_be_written(file: str) -> bool:
@@ -29,11 +31,6 @@ def can_be_written(file: str) -> bool:
     if stat.S_ISFIFO(kind):
         return _has_reader(file)
     return not stat.S_ISDIR(kind) and os.access(file, os.W_OK)
-
-
-def can_be_read(file: str) -> bool:
-    """Return whether it is a regular file that can be opened for reading."""
-    return "\0" not in file and os.path.isfile(file) and os.access(file, os.R_OK)
 
 
 def _has_reader(pipe: str) -> bool:
@@ -138,10 +135,11 @@ def _never(text: str) -> bool:
 
 def _has_options(file: str) -> bool:
     """Return whether a file can be read, and its lines are options, comments or aliases."""
-    if not can_be_read(file):
+    try:
+        content = input_files.read(Path(file), 1 << 20)
+    except (OSError, ValueError):  # ValueError: of a null character
         return False
-    with open(file, encoding="utf-8", errors="replace") as stream:
-        lines = [line.strip() for line in stream]
+    lines = [line.strip() for line in content.decode("utf-8", "replace").splitlines()]
     return all(not line or line.startswith(("-", "#", "!", "%", "alias ")) for line in lines)
 
 

@@ -8,11 +8,11 @@ from __future__ import annotations
 import contextlib
 import os
 import re
-import socket
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from feti_homog.errors import FetiHomogError
+from feti_homog.runtime import owners
 
 
 def replace(path: Path, write: Callable[[Path], object]) -> Path:
@@ -24,12 +24,15 @@ def replace(path: Path, write: Callable[[Path], object]) -> Path:
     part = part_of(path)
     with write_errors(path):
         try:
+            owners.files.add(part)
             write(part)
             commit(part, path)
         except BaseException:
             with contextlib.suppress(OSError):
                 part.unlink(missing_ok=True)
             raise
+        finally:
+            owners.files.discard(part)
     return path
 
 
@@ -40,7 +43,7 @@ def replace_text(path: Path, text: str) -> Path:
 
 def part_of(path: Path) -> Path:
     """Return the name, beside `path`, of a file that is being written: no other process writes one of that name."""
-    return path.with_name(f"{path.name}.{socket.gethostname()}.{os.getpid()}.part")
+    return path.with_name(f"{path.name}.{owners.tag()}.part")
 
 
 def commit(part: Path, path: Path) -> None:
@@ -61,6 +64,15 @@ def remove_unfinished(folder: Path, names: re.Pattern[str]) -> None:
     unfinished = re.compile(rf"({names.pattern})\..+\.\d+\.part")
     for path in folder.glob("*.part"):
         if unfinished.fullmatch(path.name):
+            with contextlib.suppress(OSError):
+                path.unlink()
+
+
+def remove_abandoned(folder: Path, names: re.Pattern[str]) -> None:
+    """Remove what writers on this machine that were killed have left; for whoever writes there beside others."""
+    part = re.compile(rf"({names.pattern})\.(?P<tag>.+)\.part")
+    for path in folder.glob("*.part"):
+        if (match := part.fullmatch(path.name)) and owners.has_ended(match["tag"]):
             with contextlib.suppress(OSError):
                 path.unlink()
 

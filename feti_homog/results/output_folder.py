@@ -20,6 +20,7 @@ from feti_homog.materials.voigt import SPATIAL_STRAINS
 from feti_homog.parallel.mpi_errors import on_root
 from feti_homog.results import atomic, checkpoint, event_log, field_file, result_json
 from feti_homog.results.field_layout import PROGRAM
+from feti_homog.runtime import input_files
 from feti_homog.runtime.file_locks import Lock, LockHeld, LocksUnsupported, holder
 
 if TYPE_CHECKING:
@@ -100,11 +101,11 @@ def _is_own(path: Path) -> bool:
     """Return whether a run wrote this result.json, of whatever version, result.h5 or events.log."""
     if path.name == result_json.NAME:
         try:
-            document = json.loads(path.read_text(encoding="utf-8"))
+            document = json.loads(input_files.read(path))
         except ValueError:
             return False
         return isinstance(document, dict) and {"version", "case", "solver"} <= document.keys()
-    with path.open("rb") as stream:
+    with input_files.opened(path) as stream:
         head = stream.read(HEAD)
     if path.name == field_file.NAME:
         return head.startswith(HDF5_SIGNATURE) and PROGRAM.encode() in head
@@ -156,6 +157,7 @@ def write_product(path: Path, text: str) -> Path:
         raise CaseError(f"--out {path}: expected a file in a folder that there is")
     if RESULT_FILE.fullmatch(path.name):
         raise CaseError(f"--out {path}: expected another name; results have files of that name")
+    atomic.remove_abandoned(path.parent, re.compile(re.escape(path.name)))
     return atomic.replace_text(path, f"{text}\n")
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.results import atomic, seals
+from feti_homog.runtime import input_files
 
 NAME = "result.json"
 SCHEMA = 1  # version of the layout: to be raised when a key is renamed, removed or changes its meaning
@@ -49,11 +50,9 @@ def read(directory: Path) -> dict[str, Any]:
     """
     path = Path(directory) / NAME
     try:
-        if path.is_fifo():
-            raise CaseError(f"cannot read {path}: it is a pipe")
-        document = seals.loads(path.read_text(encoding="utf-8"))
+        document = seals.loads(input_files.read(path).decode("utf-8"))
     except OSError as error:
-        raise CaseError(f"cannot read {path}: {error.strerror or error}") from error
+        raise input_files.unreadable(path, error) from error
     except ValueError as error:
         raise CaseError(f"cannot read {path}: {error}") from error
     found = document.get("schema", "none")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import importlib
+import os
+import sys
 from collections.abc import MutableMapping
 from importlib.util import find_spec
 from pathlib import Path
@@ -24,6 +26,23 @@ def prefer_own_toolkits() -> None:
     if own.is_dir():
         toolkits = importlib.import_module("mpl_toolkits")
         toolkits.__path__ = [str(own), *(path for path in toolkits.__path__ if path != str(own))]
+
+
+def ignore_settings_of_the_folder() -> None:
+    """Let a program draw files as it does elsewhere: without `matplotlibrc` of the current folder, and without windows.
+
+    Matplotlib looks for that file first, when it is imported, and ends with a traceback where it is damaged.
+    """
+    os.environ["MPLBACKEND"] = "agg"
+    if not os.path.exists("matplotlibrc") or "matplotlib" in sys.modules:
+        return
+    here = os.open(".", os.O_RDONLY)
+    try:
+        os.chdir("/")
+        importlib.import_module("matplotlib")
+    finally:
+        os.fchdir(here)
+        os.close(here)
 
 
 SETTINGS = {

@@ -15,14 +15,13 @@ from pathlib import Path
 from types import TracebackType
 
 from feti_homog.errors import FetiHomogError
+from feti_homog.runtime import owners
 
 # Seconds that a lock is tried for: one who only looks whether it is held, holds it for a moment.
 LOCK_TIMEOUT_S = 0.2
 # What the system says of a lock that somebody else has, and of a file system that has no locks.
 HELD = (errno.EAGAIN, errno.EACCES)
 UNSUPPORTED = (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP)
-# Files of locks that this process holds.
-_held_files: set[Path] = set()
 
 
 class LockHeld(Exception):
@@ -56,14 +55,14 @@ class Lock:
             self._close()
             self._take()
         if not self.shared:
-            _held_files.add(self.path)
+            owners.files.add(self.path)
 
     def release(self) -> None:
         """Give the lock back, if it is held, and remove its file unless others share it."""
         if self._file >= 0 and self._is_alone():
             with contextlib.suppress(OSError):
                 self.path.unlink()
-        _held_files.discard(self.path)
+        owners.files.discard(self.path)
         self._close()
 
     def __enter__(self) -> Lock:
@@ -121,13 +120,6 @@ class Lock:
             return os.path.samestat(os.fstat(self._file), self.path.stat())
         except FileNotFoundError:
             return False
-
-
-def remove_files_of_held_locks() -> None:
-    """Remove the files of locks that this process holds, for it is about to end without giving them back."""
-    for path in tuple(_held_files):
-        with contextlib.suppress(OSError):
-            path.unlink()
 
 
 def holder(path: Path) -> str | None:

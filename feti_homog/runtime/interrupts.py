@@ -12,10 +12,10 @@ import signal
 import threading
 import time
 
-from feti_homog.runtime import file_locks
+from feti_homog.runtime import owners
 from feti_homog.runtime.standard_streams import complain
 
-ENDING = (signal.SIGINT, signal.SIGTERM)
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGXCPU)  # the last: the limit of CPU time
 # Where launchers say the rank of a process before MPI has started.
 RANK_VARIABLES = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID")
 # How long the others wait: after a rank has ended, Open MPI drops what rank 0 prints, and a call of a library may keep
@@ -24,11 +24,10 @@ SILENT_SECONDS = 5.0
 
 
 def end_on_signals() -> None:
-    """From now on SIGINT and SIGTERM end the process with exit code 128 + signal: 130 and 143.
+    """From now on SIGINT, SIGTERM and SIGXCPU end the process with exit code 128 + signal: 130, 143 and 152.
 
-    Files of locks are removed before; whatever else a run leaves unfinished, the next one removes.  Rank 0 tells of it
-    on standard error.  Signals that are ignored, as in a background job of a shell, stay so.  Call it before any other
-    thread starts.
+    Files of locks and unfinished ones are removed before.  Rank 0 tells of it on standard error.  Signals that are
+    ignored, as in a background job of a shell, stay so.  Call it before any other thread starts.
     """
     awaited = {number for number in ENDING if signal.getsignal(number) is not signal.SIG_IGN}
     # Of a pipe that its reader has closed, writing tells.
@@ -51,5 +50,5 @@ def _wait_and_end(awaited: set[signal.Signals]) -> None:
         complain(f"interrupted by {signal.Signals(number).name}")
     else:
         time.sleep(SILENT_SECONDS)
-    file_locks.remove_files_of_held_locks()
+    owners.remove_files()
     os._exit(128 + number)

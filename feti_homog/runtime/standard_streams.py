@@ -7,7 +7,9 @@ import io
 import os
 import sys
 
-from feti_homog.errors import CaseError
+from feti_homog.errors import FetiHomogError, escaped
+
+KEPT = "\n\t"  # of the characters that are not printable; others may come from files
 
 
 def prepare() -> None:
@@ -27,7 +29,7 @@ def prepare() -> None:
 def say(text: str) -> None:
     """Print a line beside the results.  If it cannot be written, nothing more is, and standard error says so once."""
     try:
-        print(text, flush=True)
+        print(escaped(text, KEPT), flush=True)
     except OSError as error:
         _give_up()
         if not isinstance(error, BrokenPipeError):  # a reader that left, as `head` does, wants no more
@@ -38,20 +40,20 @@ def print_product(text: str) -> None:
     """Print what a command is for.
 
     Raises:
-        CaseError: it cannot be written, and not because the reader left.
+        FetiHomogError: it cannot be written, and not because the reader left.
     """
     try:
-        print(text, flush=True)
+        print(escaped(text, KEPT), flush=True)
     except OSError as error:
         _give_up()
         if not isinstance(error, BrokenPipeError):
-            raise CaseError(f"standard output cannot be written: {error.strerror}") from error
+            raise FetiHomogError(f"standard output cannot be written: {error.strerror}") from error
 
 
 def complain(*lines: str) -> None:
     """Print lines on standard error, if that can be written."""
     with contextlib.suppress(OSError):
-        print(*lines, sep="\n", file=sys.stderr, flush=True)
+        print(*(escaped(line, KEPT) for line in lines), sep="\n", file=sys.stderr, flush=True)
 
 
 def _give_up() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -9,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from feti_homog.results import atomic
 from feti_homog.sweep import store
 from feti_homog.sweep.plan import SweepCase
 from feti_homog.sweep.report import figures, tables
@@ -36,6 +38,7 @@ def collect(directory: Path, pictures: bool) -> list[str]:
     """
     index, states = _index_and_states(directory)
     table = _table(index, states)
+    atomic.remove_abandoned(directory, re.compile(r"sweep\.(csv|h5)|(moduli|cell_size|curves|match)\.png"))
     paths = tables.write(directory, table)
     if pictures:
         paths += figures.plot(directory, table)

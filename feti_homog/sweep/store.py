@@ -22,6 +22,7 @@ import tomli_w
 from feti_homog.case.case import Case
 from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.results import atomic, checkpoint, output_folder, result_json, seals
+from feti_homog.runtime import input_files
 from feti_homog.runtime.file_locks import Lock, LockHeld, is_locked
 from feti_homog.sweep.plan import Sweep, SweepCase, identity_of
 from feti_homog.version import __version__
@@ -111,7 +112,7 @@ def read_index(directory: Path) -> SweepIndex:
     """Return the cases of a sweep's folder. Raises CaseError if it is none."""
     path = directory / INDEX_FILE
     try:
-        document = seals.loads(path.read_text(encoding="utf-8"))
+        document = seals.loads(input_files.read(path).decode("utf-8"))
         entries = tuple(SweepCase(**entry) for entry in document["cases"])
         return SweepIndex(document["name"], document["stress_unit"], entries)
     except OSError as error:
@@ -138,7 +139,7 @@ def stored_state(directory: Path, entry: SweepCase) -> CaseState:
         return CaseState(Status.DAMAGED, f"{folder / result_json.NAME} is no readable result: {error}")
     if (folder / ERROR_FILE).is_file():
         try:
-            lines = (folder / ERROR_FILE).read_text("utf-8", "replace").splitlines()
+            lines = input_files.read(folder / ERROR_FILE).decode("utf-8", "replace").splitlines()
         except OSError as error:
             lines = [f"{ERROR_FILE} cannot be read: {error.strerror}"]
         return CaseState(Status.FAILED, "; ".join(lines))

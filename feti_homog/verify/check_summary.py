@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.special import gammaln
 
+from feti_homog.runtime import input_files
 from feti_homog.typing import Float
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.findings import Findings, relative
@@ -148,8 +150,8 @@ def check_tables(findings: Findings, directory: Path, document: Mapping[str, Any
 
 
 def _check_table(findings: Findings, path: Path, points: Sequence[Mapping[str, str]]) -> None:
-    with path.open(encoding="utf-8", errors="replace", newline="") as stream:
-        rows = list(csv.DictReader(stream))
+    stream = io.StringIO(input_files.read(path).decode("utf-8", "replace"), newline="")
+    rows = list(csv.DictReader(stream))
     columns = list(dict.fromkeys(name for point in points for name in point))
     told = [*rows[0]] if rows else columns
     findings.record("CSV", 0.0 if len(rows) == len(points) else np.inf, f"{path.name}, the number of its rows")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import zlib
 from collections.abc import Mapping
 from functools import partial
@@ -10,6 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from feti_homog.runtime import input_files
 
 BLOCK = 1 << 26  # bytes
 
@@ -21,9 +24,16 @@ def is_as_written(document: Mapping[str, Any]) -> bool:
     return bool(document.get("checksum") == f"{zlib.crc32(text.encode('utf-8', 'surrogatepass')):08x}")
 
 
-def seal_of(path: Path) -> dict[str, Any]:
-    """Size of a file, and the CRC-32 of the CRC-32s of its blocks, as `result_h5` in result.json says them."""
-    with path.open("rb") as stream:
+def has_seal(path: Path, seal: object) -> bool:
+    """Return whether a file has its size and the CRC-32 of the CRC-32s of its blocks, `result_h5` of result.json.
+
+    Raises:
+        OSError: it cannot be read.
+    """
+    with input_files.opened(path) as stream:
+        size = os.fstat(stream.fileno()).st_size
+        if not isinstance(seal, dict) or seal.get("bytes") != size:
+            return False
         checksums = [zlib.crc32(block) for block in iter(partial(stream.read, BLOCK), b"")]
     whole = zlib.crc32(np.array(checksums, "<u4").tobytes())
-    return {"bytes": path.stat().st_size, "checksum": f"{whole:08x}"}
+    return seal == {"bytes": size, "checksum": f"{whole:08x}"}

@@ -13,9 +13,10 @@ import h5py
 import numpy as np
 
 from feti_homog.errors import CaseError
+from feti_homog.runtime import input_files
 from feti_homog.typing import AnyInt, Float, Int
 from feti_homog.verify.cell_tables import Fibres, InterfaceRows, Mesh
-from feti_homog.verify.checksums import is_as_written, seal_of
+from feti_homog.verify.checksums import has_seal, is_as_written
 
 JSON, FIELDS = "result.json", "result.h5"
 SCHEMA = 1
@@ -179,7 +180,7 @@ def altered(directory: Path) -> tuple[str, ...]:
         reason = "it is missing; run the case again" if asked else MISSING_FIELDS
         raise CaseError(f"{path}: {reason}")
     with _reading(path):
-        holds = {JSON: is_as_written(document), FIELDS: seal_of(path) == document.get("result_h5")}
+        holds = {JSON: is_as_written(document), FIELDS: has_seal(path, document.get("result_h5"))}
     return tuple(name for name, as_written in holds.items() if not as_written)
 
 
@@ -201,12 +202,10 @@ def opened(directory: Path) -> Iterator[ResultFiles]:
 
 def _document(path: Path) -> Mapping[str, Any]:
     try:
-        if path.is_fifo():
-            raise CaseError(f"cannot read {path}: it is a pipe")
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = json.loads(input_files.read(path).decode("utf-8"))
     except OSError as error:
-        raise CaseError(f"cannot read {path}: {error.strerror or error}") from error
-    except ValueError as error:
+        raise input_files.unreadable(path, error) from error
+    except (ValueError, RecursionError) as error:
         raise CaseError(f"cannot read {path}: it is damaged: {error}") from error
     if not isinstance(document, dict) or document.get("schema") != SCHEMA or not isinstance(document.get("case"), dict):
         raise CaseError(f"{path}: is no result of this version: expected schema {SCHEMA} and a case")
@@ -282,6 +281,8 @@ def _reading(path: Path) -> Iterator[None]:
     """Convert errors of reading a damaged or foreign file into one line."""
     try:
         yield
-    except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:
+    except OSError as error:
+        raise input_files.unreadable(path, error) from error
+    except (RuntimeError, KeyError, ValueError, TypeError) as error:
         words = error.args[0] if error.args else error
         raise CaseError(f"cannot read {path}: {' '.join(str(words).split())}") from error

@@ -96,7 +96,7 @@ CASES: dict[str, tuple[str, str]] = {
         changed(('geometry = "hexagonal"', 'geometry = "random"\nfibres = 100000\ninterface_size = 1e-4')),
         "fibres = 100000: about 9.8e+07 elements before refine; expected at most 20000000",
     ),
-    "fibres that nearly touch": (fraction("0.90689968"), "the lines of the cell need about "),
+    "fibres that nearly touch": (fraction("0.90689968"), "narrow gaps, thin coatings or small fibres need about "),
     "fibres of no size": (fraction("1e-99"), "a fibre has a radius of 1.7e-50; expected at least 1e-06 of the width"),
     "tables without end": ("a." * 2000 + "b = 1\n", "nested more than 50 deep"),
     "arc of no node": (

@@ -15,12 +15,16 @@ from feti_homog.mesh.coarse_mesh import CoarseMesh
 from feti_homog.mesh.fill.shape_mesher import mesh_outlines
 from feti_homog.mesh.fill.unmeshed_cell import NO_MARKS, NodedCell, UnmeshedCell
 from feti_homog.mesh.outline import elliptic_outline
-from feti_homog.mesh.sizes.element_estimate import ElementEstimate, triangles_of_a_tip
+from feti_homog.mesh.sizes.element_estimate import (
+    MAX_TRIANGLES,
+    MAX_TRIANGLES_OF_TILES,
+    ElementEstimate,
+    refuse_many,
+    triangles_of_a_tip,
+)
 from feti_homog.mesh.sizes.graded_size import MeshSizes
 from feti_homog.mesh.tiles.tiles import DEFAULT_TILES, TilePolicy, is_tiled
 
-# Elements that are meshed in some minutes on one rank, and by all ranks together.
-MAX_TRIANGLES, MAX_TRIANGLES_OF_TILES = 1_000_000, 20_000_000
 # Radius / width of the cell above which positions on a circle differ by more than rounding.
 SMALLEST_RADIUS = 1e-6
 
@@ -71,7 +75,9 @@ def begin(
         )
     scale = arrangement_scale(cell, arrangement)
     if isinstance(arrangement.outlines, Discs):
-        return UnmeshedCell.of(arrangement, sizes, marks, scale, policy)
+        cell_of_discs = UnmeshedCell.of(arrangement, sizes, marks, scale, policy)
+        refuse_many(cell_of_discs.bare.field.at, arrangement.size, most)
+        return cell_of_discs
     if isinstance(arrangement.outlines, Ellipses):
         lines = elliptic_outline.outline(arrangement, arrangement.outlines, sizes, marks)
         return NodedCell.of(arrangement, lines, sizes, None, scale)

@@ -22,6 +22,7 @@ from feti_homog.fibres.outlines.outlines import Outlines
 from feti_homog.mesh.coarse_mesh import CoarseMesh
 from feti_homog.mesh.readers.gmsh_file import triangles_of_model
 from feti_homog.mesh.readers.msh_reader import made
+from feti_homog.mesh.sizes.element_estimate import refuse_many
 from feti_homog.mesh.sizes.from_sources import MAX_GROWTH, wrap
 from feti_homog.mesh.sizes.graded_size import MIN_EDGES_AROUND, PASSAGE_EDGE, MeshSizes
 from feti_homog.mesh.tiles.filling import gmsh_session
@@ -46,14 +47,20 @@ SizeAt = Callable[[Float], Float]
 
 
 def mesh_outlines(arrangement: Arrangement, sizes: MeshSizes, scale: float) -> CoarseMesh:
-    """Return the mesh that `gmsh_mesher.begin` begins, of fibres with outlines of any convex shape."""
+    """Return the mesh that `gmsh_mesher.begin` begins, of fibres with outlines of any convex shape.
+
+    Raises:
+        MeshError: it would have too many elements.
+    """
+    least, size_at = _sizes_at(arrangement, sizes)
+    refuse_many(size_at, arrangement.size)
     with gmsh_session() as gmsh:
         number = _add_surfaces(gmsh, arrangement)
         _match_sides(gmsh, arrangement)
         for option in ("MeshSizeFromPoints", "MeshSizeExtendFromBoundary"):
             gmsh.option.setNumber(f"Mesh.{option}", 0)
         with TemporaryDirectory() as folder:
-            _set_sizes(gmsh, Path(folder) / "sizes", arrangement, *_sizes_at(arrangement, sizes))
+            _set_sizes(gmsh, Path(folder) / "sizes", arrangement, least, size_at)
             gmsh.model.mesh.generate(2)
         gmsh.model.mesh.setOrder(2)
         own = np.array([number[tag] for _, tag in gmsh.model.getEntities(2)], np.int32)

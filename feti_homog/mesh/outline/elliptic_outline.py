@@ -18,6 +18,7 @@ from feti_homog.mesh.outline.circle_arcs import MERGED, SAME_PLACE, arcs_within,
 from feti_homog.mesh.outline.curves import MATRIX, Curves, Numbering
 from feti_homog.mesh.outline.edge_samples import WHOLE, EdgeSamples
 from feti_homog.mesh.outline.outline import Outline, on_side, side_curves
+from feti_homog.mesh.sizes.element_estimate import refuse_many
 from feti_homog.mesh.sizes.elliptic_size import size_field
 from feti_homog.mesh.sizes.graded_size import MeshSizes
 from feti_homog.typing import Float, Int
@@ -47,6 +48,7 @@ def outline(
     outer = np.concatenate([border, ends[away & ~sparse[which]]])
     tips = _tips(arrangement, inner, marks, numbering.vertices)
     field = size_field(arrangement, inner, sizes, outer, sharp, tips)
+    refuse_many(field.at, size)
     find = partial(_ellipse_at, ellipses)
     curves = [side_curves(axis, places[axis], find, around, size, field, numbering, WHOLE) for axis in (0, 1)]
     arcs = _EllipticArcs.of(ellipses[which], start, stop, sizes.interface)

@@ -12,6 +12,7 @@ import numpy as np
 from feti_homog.errors import MeshError
 from feti_homog.mesh.readers.element_blocks import Block, assembled
 from feti_homog.mesh.readers.mesh_checks import RawMesh
+from feti_homog.runtime import input_files
 from feti_homog.schema.wording import toml_value
 from feti_homog.typing import Int
 
@@ -73,7 +74,7 @@ def load(path: Path) -> RawMesh:
         OSError: the file cannot be read.
         MeshError: it is damaged, or has other elements.
     """
-    text = path.read_text(encoding="utf-8", errors="replace")
+    text = input_files.read(path).decode("utf-8", "replace")
     content = _Content(left=max(MOST_MEMBERS, len(text)))
     for number, words, rows in _blocks(text):
         try:

@@ -14,6 +14,7 @@ from feti_homog.mesh.readers.element_blocks import Block, assembled
 from feti_homog.mesh.readers.mesh_checks import RawMesh
 from feti_homog.mesh.readers.msh_content import KINDS, MshContent
 from feti_homog.mesh.tiles.filling import LINE, TRIANGLE
+from feti_homog.runtime import input_files
 from feti_homog.typing import Float, Int
 
 # What to do about other elements, by order and dimension.
@@ -40,7 +41,7 @@ def load(path: Path) -> RawMesh:
         OSError: it cannot be read.
         MeshError: it is damaged, or it has other elements.
     """
-    content = msh_content.read(path.read_bytes())
+    content = msh_content.read(input_files.read(path))
     nodes, points = np.zeros(0, np.int64), np.zeros((0, 3))
     if content.nodes:
         nodes, points = (np.concatenate(parts) for parts in zip(*content.nodes, strict=True))

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from feti_homog.case.cell_section import Cell
-from feti_homog.errors import MeshError
+from feti_homog.errors import MeshError, escaped
 from feti_homog.fibres.outlines.ellipses import Ellipses
 from feti_homog.mesh.coarse_mesh import CoarseMesh, areas, paired_sides, representatives
 from feti_homog.mesh.interface_edges import can_debond
@@ -22,8 +22,6 @@ from feti_homog.mesh.readers.mesh_checks import RawMesh
 from feti_homog.mesh.readers.snapping import snapped
 from feti_homog.typing import Float
 
-# Characters of a message and number of messages: a file may have any number of faults with words of any length.
-LONGEST_LINE, MOST_FAULTS = 1000, 50
 LOADERS = {".msh": gmsh_file.load, ".inp": abaqus_file.load, ".vtu": vtk_file.load, ".vtk": vtk_file.load}
 
 
@@ -51,7 +49,7 @@ def read(path: Path, snap: float | None = None) -> CoarseMesh:
     _refuse(path.name, mesh_checks.not_finite(raw))
     if snap is not None:
         raw, moved = snapped(raw, snap)
-    unused = tuple(_line(path.name, remark) for remark in mesh_checks.unused_curves(raw))
+    unused = tuple(escaped(f"{path.name}: {remark}") for remark in mesh_checks.unused_curves(raw))
     return replace(made(raw, path.name), snapped=moved, remarks=unused)
 
 
@@ -80,34 +78,18 @@ def made(raw: RawMesh, path: str) -> CoarseMesh:
 def _loaded(path: Path) -> RawMesh:
     """Return the triangles of a file, as it has them."""
     try:
-        if path.exists() and not path.is_file():
-            raise MeshError("not a file that can be read")
         return LOADERS[path.suffix](path)
     except OSError as error:
-        raise MeshError(_line(str(path), f"cannot be read: {error.strerror}")) from None
+        raise MeshError(f"{path}: cannot be read: {error.strerror}") from None
     except MeshError as error:
-        raise _error(path.name, error.faults) from None
+        raise MeshError(*(f"{path.name}: {fault}" for fault in error.faults)) from None
 
 
 def _refuse(path: str, *faults: Sequence[str]) -> None:
     """Raise MeshError if there are faults."""
     found = [fault for kind in faults for fault in kind]
     if found:
-        raise _error(path, found)
-
-
-def _error(path: str, faults: Sequence[str]) -> MeshError:
-    """The faults of a file, at most MOST_FAULTS of them."""
-    more = len(faults) - MOST_FAULTS
-    lines = [*faults[:MOST_FAULTS], *([f"{more} more faults"] if more > 0 else [])]
-    return MeshError(*(_line(path, line) for line in lines))
-
-
-def _line(path: str, fault: str) -> str:
-    """Return the fault of a file in one line; characters that are not printable, which its words may have, are
-    escaped."""
-    line = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in f"{path}: {fault}"[: LONGEST_LINE + 1])
-    return line if len(line) <= LONGEST_LINE else f"{line[:LONGEST_LINE]}..."
+        raise MeshError(*(f"{path}: {fault}" for fault in found))
 
 
 def _turned(raw: RawMesh) -> RawMesh:

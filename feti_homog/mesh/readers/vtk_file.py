@@ -12,6 +12,7 @@ from feti_homog.errors import MeshError
 from feti_homog.mesh.readers import vtk_limits
 from feti_homog.mesh.readers.element_blocks import Block, assembled
 from feti_homog.mesh.readers.mesh_checks import DEBONDED, RawMesh
+from feti_homog.runtime import input_files
 from feti_homog.typing import Int
 
 # Readers of meshio, and how many nodes its triangles have.
@@ -38,7 +39,7 @@ def load(path: Path) -> RawMesh:
     except ImportError:
         wanted = f"{path.suffix} files are read by meshio, which is not installed"
         raise MeshError(f"{wanted}: pip install 'feti_homog[meshes]'") from None
-    content = path.read_bytes()
+    content = input_files.read(path)
     vtk_limits.check(content, path.suffix)
     try:
         with vtk_limits.bounded(reader, len(content)):

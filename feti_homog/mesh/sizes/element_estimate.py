@@ -1,26 +1,33 @@
-"""About how many triangles a mesh of round and elliptic fibres will have, before it is made."""
+"""About how many triangles a mesh will have, before it is made."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from feti_homog.case.cell_section import FIBRES_OF, Cell
 from feti_homog.case.mixed_cell import fibre_counts
+from feti_homog.errors import MeshError
 from feti_homog.fibres.arrangement import Arrangement
 from feti_homog.fibres.outlines.ellipses import Ellipses
 from feti_homog.fibres.outlines.shapes import elliptic
 from feti_homog.mesh.sizes.from_sources import MAX_GROWTH
 from feti_homog.mesh.sizes.graded_size import MIN_EDGES_AROUND
+from feti_homog.typing import Float
 
+# Elements that are meshed in some minutes on one rank, and by all ranks together.
+MAX_TRIANGLES, MAX_TRIANGLES_OF_TILES = 1_000_000, 20_000_000
 # Area of an equilateral triangle / its side squared.
 TRIANGLE_AREA = math.sqrt(3.0) / 4.0
 # Triangles about a fibre of a random cell, whose gaps are narrow.
 TRIANGLES_OF_A_FIBRE = 160
 # Ratios of sizes beyond those that a case can ask for.
 RATIOS = np.geomspace(1.0, 1e7, 400)
+# Positions along each axis at which sizes are summed over a cell.
+POSITIONS = 200
 
 
 @dataclass(frozen=True)
@@ -75,6 +82,24 @@ class ElementEstimate:
         if cell.interface_size is None:
             return count
         return count + 2 * self.interfaces / (TRIANGLE_AREA * MAX_GROWTH * cell.interface_size)
+
+
+def refuse_many(size_at: Callable[[Float], Float], period: Float, most: int = MAX_TRIANGLES) -> None:
+    """Refuse a cell of the periods (2,) with elements of the sizes h at positions (n, 2), int dA / (A h^2) of them.
+
+    The sizes contain narrow gaps and thin coatings, where `ElementEstimate` has the numbers of the case alone.
+
+    Raises:
+        MeshError: they are more than `most`.
+    """
+    share = (np.arange(POSITIONS) + 0.5) / POSITIONS
+    places = np.stack(np.meshgrid(share, share), axis=-1).reshape(-1, 2) * period
+    count = float((1 / size_at(places) ** 2).mean() * period.prod() / TRIANGLE_AREA)
+    if count > most:
+        raise MeshError(
+            f"[cell] narrow gaps, thin coatings or small fibres need about {count:.2g} elements before refine; "
+            f"expected at most {most}"
+        )
 
 
 def triangles_of_a_tip(ratio: np.float64 | float) -> float:

@@ -18,7 +18,7 @@ from feti_homog.errors import CaseError
 from feti_homog.materials.voigt import SPATIAL_STRAINS, STRAINS
 from feti_homog.report.html import curves, states, tables
 from feti_homog.report.text.summary import checks, title_of
-from feti_homog.results import atomic, field_file, result_json
+from feti_homog.results import atomic, field_file, output_folder, result_json
 from feti_homog.version import __version__
 
 NAME, SWEEP = "report.html", "sweep.json"
@@ -49,6 +49,7 @@ def write(directory: Path) -> Path:
     """
     directory = Path(directory)
     document = _document(directory)
+    atomic.remove_abandoned(directory, output_folder.RESULT_FILE)
     try:
         html = page(document, directory)
     except (OSError, KeyError) as error:  # KeyError: what h5py does not find in result.h5

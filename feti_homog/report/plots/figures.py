@@ -45,7 +45,7 @@ from feti_homog.report.plots.plot_helpers import (
     unit_label,
 )
 from feti_homog.report.text.analyses import reported
-from feti_homog.results import field_file, result_json
+from feti_homog.results import atomic, field_file, output_folder, result_json
 from feti_homog.typing import Array
 
 LEVEL_INK, LEVEL_WIDTH = "0.15", 0.6  # of lines of equal displacement along the fibres
@@ -70,6 +70,7 @@ def plot(directory: Path) -> list[Path]:
         FetiHomogError: result.h5 cannot be read, or a picture cannot be written.
     """
     directory = Path(directory)
+    atomic.remove_abandoned(directory, output_folder.RESULT_FILE)
     document = result_json.read(directory) if (directory / result_json.NAME).exists() else {}
     with mpl.rc_context(STYLE):
         try:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from mpi4py import MPI
 
 from feti_homog.results import atomic, output_folder
+from feti_homog.runtime import owners
 
 
 def test_unfinished_files_are_removed(tmp_path):
@@ -15,6 +16,17 @@ def test_unfinished_files_are_removed(tmp_path):
     with output_folder.held(tmp_path, MPI.COMM_SELF, print):
         assert {path.name for path in tmp_path.iterdir()} == {path.name for path in kept} | {output_folder.LOCK}
     assert sorted(tmp_path.iterdir()) == sorted(kept)
+
+
+def test_only_what_dead_writers_left_is_removed_beside_others(tmp_path):
+    host, process, began = owners.tag().rsplit(".", 2)
+    dead = f"{host}.{process}.{int(began) + 1}"
+    names = ("cell.png.%s.part", "mine.png.%s.part", "cell.png.%s.txt")
+    for name in (*(words % dead for words in names), names[0] % owners.tag(), names[0] % f"else.{dead}"):
+        (tmp_path / name).write_text("")
+    before = set(tmp_path.iterdir())
+    atomic.remove_abandoned(tmp_path, output_folder.RESULT_FILE)
+    assert before - set(tmp_path.iterdir()) == {tmp_path / (names[0] % dead)}
 
 
 def test_a_committed_file_has_its_name_only(tmp_path):

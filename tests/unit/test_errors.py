@@ -1,0 +1,26 @@
+"""Errors are lines of printable characters, not too long and not too many."""
+
+from __future__ import annotations
+
+import pickle
+
+from feti_homog.errors import LONGEST_LINE, MOST_FAULTS, CaseError, escaped
+
+
+def test_characters_that_a_terminal_obeys_are_escaped():
+    words = "red\x1b[31m bell\x07 line\nend \u202eturned \udcff \x9b"
+    assert CaseError(words).faults == (r"red\x1b[31m bell\x07 line\nend \u202eturned \udcff \x9b",)
+    assert escaped("größe\n\tα", "\n\t") == "größe\n\tα"
+
+
+def test_long_lines_are_cut():
+    (line,) = CaseError("x" * 10**6).faults
+    assert len(line) == LONGEST_LINE and line.endswith("x...")
+
+
+def test_many_faults_are_counted_once():
+    error = CaseError(*map(str, range(1000)))
+    assert error.faults == (*map(str, range(MOST_FAULTS)), f"{1000 - MOST_FAULTS} more faults")
+    again = pickle.loads(pickle.dumps(error))
+    assert again.faults == error.faults == CaseError(*error.faults).faults and str(again) == "\n".join(error.faults)
+    assert len(CaseError(*map(str, range(MOST_FAULTS + 1))).faults) == MOST_FAULTS + 1
