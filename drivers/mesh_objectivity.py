@@ -83,7 +83,7 @@ def numbers(result: Result) -> list[float]:
     points, rising = result.path or (), result.rising_strain()
     total = points[0].bonded + points[0].open + points[0].closed
     # Where the stress falls at constant strain, what is left.
-    strain, stress = rising[:, 3], rising[:, 0]
+    strain, stress = rising["E11"], rising["S11"]
     last = [np.flatnonzero(strain <= t * ONSET)[-1] for t in AT[:-1]]
     after = [
         stress[k] + (t * ONSET - strain[k]) * (stress[k + 1] - stress[k]) / (strain[k + 1] - strain[k])
@@ -108,7 +108,7 @@ def write(folder: Path, found: dict[tuple[str, int], Result]) -> list[Path]:
         rows.append([bonds, size, *own])
         rising = result.rising_strain()
         ink = INK[(refine - REFINEMENTS[0]) % len(INK)]
-        grid[bonds].plot(rising[:, 3] / ONSET, rising[:, 0], color=ink, linewidth=1.2, label=f"{size:.2f} um")
+        grid[bonds].plot(rising["E11"] / ONSET, rising["S11"], color=ink, linewidth=1.2, label=f"{size:.2f} um")
     for bonds, axes in grid.items():
         axes.set(xlabel="$E_{11}$ / strain of onset", title=TITLES[bonds])
         axes.grid(color="0.92", linewidth=0.6)

@@ -74,8 +74,8 @@ def solved(given: argparse.Namespace, comm: Intracomm, test: str, temperature: f
 def curve(result: Result, component: int) -> np.ndarray:
     """(n, 2) strain since the load began, from zero, and stress, as a test with rising strain sees them."""
     if len(result.case["path"]["waypoints"]) == 1:
-        rising = result.rising_strain()
-        return rising[:, [-1, component]]
+        strain, *stresses = result.rising_strain().values()
+        return np.column_stack([strain, stresses[component]])
     points = result.points
     found = np.column_stack([points["strain"][:, component], points["stress"][:, component]])
     cooled = int(np.flatnonzero(points["load_factor"] <= 0.5)[-1])

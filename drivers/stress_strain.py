@@ -70,7 +70,7 @@ def write(folder: Path, curves: dict[tuple[float, float], Result]) -> list[Path]
         for k, axes in enumerate(grid):
             strain, stress = np.append(0.0, points["strain"][:, 0]), np.append(0.0, points["stress"][:, k])
             axes.plot(strain, stress, color=ink, linewidth=0.6, alpha=0.8)
-            axes.plot(rising[:, 3], rising[:, k], color=ink, linewidth=width, label=label)
+            axes.plot(rising["E11"], rising[("S11", "S22")[k]], color=ink, linewidth=width, label=label)
     for axes, component, where in zip(grid, ("11", "22"), ("along", "across"), strict=True):
         axes.set(xlabel="$E_{11}$", ylabel=f"$\\Sigma_{{{component}}}$ (GPa)", title=f"{where} the strain")
         axes.axhline(0.0, color="0.6", linewidth=0.6, zorder=0)

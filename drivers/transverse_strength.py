@@ -65,9 +65,10 @@ def solved(given: argparse.Namespace, comm: Intracomm, seed: int) -> Result:
 
 def row(result: Result) -> list[float]:
     """Modulus, stress of the first break, the peak under rising strain, its strain, and points of the path."""
-    points, rising = result.path or (), result.rising_strain()
-    first, peak = points[0], int(np.argmax(rising[:, 0]))
-    return [first.stress[0] / first.strain[0], first.stress[0], rising[peak, 0], rising[peak, 3], len(points)]
+    points, peak = result.path or (), result.peak
+    assert peak is not None
+    first = points[0]
+    return [first.stress[0] / first.strain[0], first.stress[0], peak.stress, peak.strain, len(points)]
 
 
 def write(folder: Path, found: dict[int, Result]) -> list[Path]:
@@ -86,7 +87,7 @@ def write(folder: Path, found: dict[int, Result]) -> list[Path]:
     for k, result in enumerate(found.values()):
         rising = result.rising_strain()
         axes.plot(
-            100 * rising[:, 3], rising[:, 0], color=INK[0], alpha=0.55, linewidth=0.9, label=None if k else "a cell"
+            100 * rising["E11"], rising["S11"], color=INK[0], alpha=0.55, linewidth=0.9, label=None if k else "a cell"
         )
     axes.axhline(mean, color=INK[1], linewidth=1.2, label=f"mean peak {mean:.1f} MPa")
     axes.axhspan(mean - scatter, mean + scatter, color=INK[1], alpha=0.15, linewidth=0, label="one standard deviation")

@@ -11,7 +11,7 @@ from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.criteria import criterion_of
 from feti_homog.analysis.path_events import Work, restored, stored
 from feti_homog.analysis.registry import Analysis
-from feti_homog.analysis.result_records import PathPoint
+from feti_homog.analysis.result_records import PathPoint, Peak
 from feti_homog.analysis.tip_records import TipRecorder
 from feti_homog.case.load_section import LoadPath
 from feti_homog.errors import NotCarriedError
@@ -21,6 +21,7 @@ from feti_homog.interface.path.path_following import events, increments
 from feti_homog.interface.path.path_points import Energies, Point, unloaded
 from feti_homog.results import event_log
 from feti_homog.results.kept_points import kept
+from feti_homog.results.path_peak import marks, peak_of
 from feti_homog.runtime.progress import Progress
 
 SECONDS_A_LINE = 1.0
@@ -61,7 +62,18 @@ def follow(context: AnalysisContext, path: LoadPath, law: BondLaw) -> dict[str, 
             if not _goes_on(context, path, point, number + 1):
                 break
     states = _kept(context, path, law, entries, last)
-    return {"path": tuple(PathPoint(**entry) for entry in entries), "resumed": known} | states
+    if not entries:
+        return {"path": (), "resumed": known} | states
+    document = _document(context, entries)
+    for number, words in marks(document).items():
+        entries[number]["mark"] = words
+    points = tuple(PathPoint(**entry) for entry in entries)
+    return {"path": points, "peak": Peak(**peak_of(document)), "resumed": known} | states
+
+
+def _document(context: AnalysisContext, entries: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Return what result.json will have of the path."""
+    return {"case": context.case.resolved(), "path": entries}
 
 
 def _known(context: AnalysisContext) -> int:
@@ -178,7 +190,8 @@ def _kept(
     """
     if last is None or not (law.has_toughness or context.states.has_place):
         return {}
-    numbers = kept(entries, context.case.output.states, len(context.case.targets) if path.method == "events" else 0)
+    legs = len(context.case.targets) if path.method == "events" else 0
+    numbers = kept(entries, context.case.output.states, legs, marks(_document(context, entries)))
     tips = TipRecorder(context.cell, context.loads.interfaces, law) if law.has_toughness else None
     with context.progress.stage("states") as words:
         for number in context.progress.bar(numbers, "states"):

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from feti_homog.analysis import path_scaling
 from feti_homog.analysis.cell_records import CellInfo, Checks, FibreInfo, SolverInfo, StiffnessBounds
 from feti_homog.analysis.result_records import (
     EITHER_STIFFNESS,
@@ -16,11 +17,13 @@ from feti_homog.analysis.result_records import (
     EnvelopePoint,
     LoadPoint,
     PathPoint,
+    Peak,
     TipRates,
 )
 from feti_homog.materials.bounds import Moduli
 from feti_homog.materials.estimates.constituents import Estimates, FibreBounds
 from feti_homog.materials.spatial_constants import EngineeringConstants, TransverselyIsotropic, TransverseModuli
+from feti_homog.materials.voigt import voigt_names
 from feti_homog.results import path_curves
 from feti_homog.results.field_layout import FibrePart, Header, InterfacePart, MeshPart, StatePart, tables
 from feti_homog.results.result_json import SCHEMA
@@ -150,6 +153,7 @@ class Result:
     tips: TipRates | None = described("energy release rates at the tips of debonded arcs, of a stiffness", default=None)
     angle: tuple[AnglePoint, ...] | None = described("points of analysis `angle`, as in angle.csv", default=None)
     path: tuple[PathPoint, ...] | None = described("points of analysis `path`, as in path.csv", default=None)
+    peak: Peak | None = described("peak of the path, with its first break", default=None)
     load: LoadPoint | None = described("state of analysis `load`, as in load.csv", default=None)
     envelope: tuple[EnvelopePoint, ...] | None = described(
         "directions of analysis `envelope`, as in envelope.csv",
@@ -193,17 +197,41 @@ class Result:
         names = dict.fromkeys(name for point in documents for name in point if name != "tips")
         return {name: np.array([point.get(name, np.nan) for point in documents]) for name in names}
 
-    def rising_strain(self) -> Float:
-        """(v, 4) corners S11, S22, S12 and size of the leading strain along a path of one leg, as a test with rising
-        load follows it: where bonds break the stress drops, or under a given stress the strain jumps, to the next
-        branch that holds.  Of generalized plane strain (v, 7), all six stresses before the strain.
+    def rising_strain(self) -> dict[str, Float]:
+        """Corners (v,) of the leading strain and of all stresses, by their names, along a path of one leg, as a test
+        with rising load follows it: where bonds break the stress drops, or under a given stress the strain jumps, to
+        the next branch that holds.  The strain comes first; a table of pandas takes them all.
 
         Raises ValueError for any other result, and where that strain does not rise with the load.
         """
         curve = path_curves.rising_strain(self.document)
-        if curve is None:
+        if curve is None or self.peak is None:
             raise ValueError("only a path of one leg whose leading strain rises has a response to a rising strain")
-        return curve
+        sign = np.sign((self.path or ())[-1].strain[path_curves.leading_component(self.document)])
+        names = (*voigt_names(curve.shape[1] - 1)[1], self.peak.strain_name)
+        columns = dict(zip(names, (curve * [*[1.0] * (len(names) - 1), sign]).T, strict=True))
+        return {self.peak.strain_name: columns.pop(self.peak.strain_name)} | columns
+
+    def path_scaled(self, *, toughness: float) -> Result:
+        """Return the result of the same path with another toughness, of several interfaces that of the first and the
+        others alike, and with its loads multiplied by s = sqrt(toughness / that of the case).
+
+        Strains and stresses are s times, energies s^2 times as large, at the same events and load factors: bonds break
+        by energy on springs of given stiffness.  Fields, states and digest are those of no run, and left out.
+
+        Raises ValueError for any other result, and for a toughness that is not positive.
+        """
+        s = path_scaling.ratio(self.document, toughness)
+        return replace(
+            self,
+            case=path_scaling.case(self.case, s),
+            digest="",
+            path=tuple(path_scaling.point(point, s) for point in self.path or ()),
+            peak=None if self.peak is None else path_scaling.peak(self.peak, s),
+            states=None,
+            result_h5=None,
+            fields=None,
+        )
 
     def first_drop(self) -> tuple[Float, int]:
         """(3,) or (6,) stress left after the first break of a path of one leg, the load being held there, and the

@@ -119,6 +119,10 @@ class PathPoint:
         spatial_components=SPATIAL_STRESSES,
     )
     temperature: float | None = described(TEMPERATURE, default=None)
+    mark: str | None = described(
+        "`first break`, `peak`, `after the peak` (the branch of the valley after it) or `end`, several joined by `and`",
+        default=None,
+    )
     broke: int = described("bonds that break at this event, or broke in the step to this increment")
     free_motions: int = described("rigid motions of fibres that no interface force resists")
     stored: float = described("elastic energy stored per area of the cell", STRESS)
@@ -149,6 +153,28 @@ class PathPoint:
     open: int = described("debonded interface nodes without contact")
     closed: int = described("debonded interface nodes in contact")
     iterations: int = described("Krylov iterations")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Peak:
+    """The largest stress of a path, of the component whose strain leads: of those that the loads change the largest."""
+
+    stress_name: str = described("name of the component")
+    strain_name: str = described("name of its strain")
+    stress: float = described("the largest in magnitude, with its sign", STRESS)
+    strain: float = described("macroscopic strain there")
+    event: int = described("number of its point in `path`, from 0")
+    first_break_stress: float | None = described("stress where the first bonds break", STRESS, default=None)
+    first_break_strain: float | None = described("strain there", default=None)
+    first_break_event: int | None = described("number of that point", default=None)
+    stress_left: float | None = described(
+        "stress in the valley after the peak, the load only rising on a path of one leg; absent where it falls by less "
+        "than 1 %",
+        STRESS,
+        default=None,
+    )
+    event_left: int | None = described("number of the point on whose branch the valley is", default=None)
+    dissipated: float = described("energy lost to breaks before the peak, per area of the cell", STRESS)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,7 +6,7 @@ at its end.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from heapq import heapify, heapreplace
 from itertools import pairwise
 
@@ -15,31 +15,30 @@ import numpy as np
 from feti_homog.materials.voigt import STRAINS
 from feti_homog.results import path_curves
 from feti_homog.results.path_curves import SAME_LOAD, Document, Point
+from feti_homog.results.path_peak import LEAST_DROP, marks, turning_points
 from feti_homog.typing import Float
-
-# A drop is a fall of the stress, or a jump of the strain, by more than this share of the largest: saw teeth of single
-# nodes are none.
-LEAST_DROP = 0.01
 
 Drop = tuple[float, int, int]
 """How far the stress falls, of a jump of the strain as much of the largest, and the points before and after."""
 
 
-def kept(points: Sequence[Point], states: int | str, legs: int) -> list[int]:
+def kept(points: Sequence[Point], states: int | str, legs: int, marked: Collection[int] = ()) -> list[int]:
     """Numbers of the points to keep, rising.
 
-    `states` is "all", "peaks": the ends and the points around every drop, or how many at most: the ends, of the other
-    places half for the points around drops, the deepest first, and the rest as evenly between as they can be.
+    `states` is "all", "peaks": the ends, the points that are `marked` and those around every drop, or how many at most:
+    the ends, those marked if they are not too many, of the other places half for the points around drops, the deepest
+    first, and the rest as evenly between as they can be.
     Of `legs` legs the first goes through all equilibria; 0 of increments.
     """
     if states == "all" or not points:
         return list(range(len(points)))
     ends, around = {0, len(points) - 1}, drops(points, legs)
     if isinstance(states, str):
-        return sorted(ends.union(*(drop[1:] for drop in around)))
+        return sorted(ends.union(marked, *(drop[1:] for drop in around)))
     if len(points) <= states:
         return list(range(len(points)))
-    chosen, room = ends, 2 + (states - 2) // 2
+    chosen = ends.union(marked) if len(ends.union(marked)) <= states else ends
+    room = len(chosen) + (states - len(chosen)) // 2
     for _, *pair in sorted(around, key=lambda drop: -drop[0]):
         if len(chosen.union(pair)) <= room:
             chosen = chosen.union(pair)
@@ -67,24 +66,6 @@ def _norm(values: Float, shear: float) -> Float:
     tensions = 2 if values.shape[1] == len(STRAINS) else 3
     square = np.square(values)
     return np.asarray(np.sqrt(square[:, :tensions].sum(axis=1) + shear * square[:, tensions:].sum(axis=1)))
-
-
-def turning_points(values: Float, least: float) -> list[int]:
-    """Numbers of the peaks and valleys of a curve (n,), in turn, that are more than `least` apart.
-
-    The ends count if the curve falls or rises by so much from them, or to them.
-    """
-    found, low, high, rises, falls = list[int](), 0, 0, True, True
-    for number, value in enumerate(values):
-        low = number if value < values[low] else low
-        high = number if value > values[high] else high
-        if rises and value < values[high] - least:
-            found.append(high)
-            low, rises, falls = number, False, True
-        elif falls and value > values[low] + least:
-            found.append(low)
-            high, rises, falls = number, True, False
-    return [*found, high if rises else low] if found else []
 
 
 def _of_rising_load(load: Float, size: Float, strain: Float, least: float) -> list[Drop]:
@@ -119,20 +100,28 @@ def _filled(numbers: list[int], count: int) -> list[int]:
 
 
 def chosen(document: Document, rows: int, among: Sequence[int] | None = None) -> list[int]:
-    """Numbers of at most `rows` points of a path: the first, the last, the ends of its legs if they are not too many,
-    and between them as evenly as bonds broke; with `among`, rising, of these points."""
+    """Numbers of at most `rows` points of a path: the first, the last, the first break, the peak and the valley after
+    it, the deepest drop, the ends of its legs, each if they are not too many, and between them as evenly as bonds
+    broke; with `among`, rising, of these points."""
     points = document["path"]
     numbers = np.arange(len(points)) if among is None else np.asarray(among, int)
     if len(numbers) <= rows:
         return [int(number) for number in numbers]
     fixed = {0, len(numbers) - 1}
-    ends = np.flatnonzero(np.isin(numbers, path_curves.ends_of_legs(document))).tolist()
-    if len(fixed.union(ends)) <= rows:
-        fixed = fixed.union(ends)
+    for wanted in (marks(document), _deepest(document), path_curves.ends_of_legs(document)):
+        places = np.flatnonzero(np.isin(numbers, list(wanted))).tolist()
+        fixed = fixed.union(places) if len(fixed.union(places)) <= rows else fixed
     broken = np.cumsum([point["broke"] for point in points])[numbers]
-    wanted = np.linspace(broken[0], broken[-1], rows - len(fixed) + 2)[1:-1]
-    places = {int(np.abs(broken - w).argmin()) for w in wanted} | fixed
-    return [int(numbers[place]) for place in sorted(places)]
+    counts = np.linspace(broken[0], broken[-1], rows - len(fixed) + 2)[1:-1]
+    evenly = {int(np.abs(broken - count).argmin()) for count in counts}
+    return [int(numbers[place]) for place in sorted(evenly | fixed)]
+
+
+def _deepest(document: Document) -> tuple[int, ...]:
+    """Return the points before and after the deepest drop of a path, none without drops."""
+    of_events = document["case"]["path"]["method"] == "events"
+    around = drops(document["path"], path_curves.legs(document) if of_events else 0)
+    return max(around)[1:] if around else ()
 
 
 def kept_points(document: Document) -> list[int]:

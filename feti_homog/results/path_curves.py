@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from feti_homog.case.bond_laws import DEFAULT, LAWS
 from feti_homog.case.mixed_load import TEMPERATURE, MixedLoad, Strain, completed, first_named
 from feti_homog.materials.plane_state import plane_state_of
 from feti_homog.typing import Float
@@ -109,6 +110,20 @@ def is_proportional(document: Document) -> bool:
     """Return whether every point is on a ray of its own from zero: events along one leg, where the response is
     homogeneous."""
     return document["case"]["path"]["method"] == "events" and legs(document) == 1
+
+
+def interface_sections(document: Document) -> Sequence[Mapping[str, Any]]:
+    """Return the sections of interfaces of a case, none of perfect bonding."""
+    sections = document["case"].get("interface", [])
+    return sections if isinstance(sections, list) else [sections]
+
+
+def scales_with_toughness(document: Document) -> bool:
+    """Return whether strains and stresses of a path are as the root of the toughness, its loads growing alike: bonds
+    break by energy on springs that the toughness does not change."""
+    laws = [LAWS.get(section.get("criterion", DEFAULT)) for section in interface_sections(document)]
+    by_energy = [law is not None and "toughness" in law.keys and not law.softens for law in laws]
+    return bool(document.get("path")) and bool(laws) and all(by_energy)
 
 
 def load_controlled(points: Sequence[Point]) -> Float:

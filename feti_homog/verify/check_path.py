@@ -17,9 +17,9 @@ from feti_homog.verify.check_interfaces import BONDED
 from feti_homog.verify.check_loads import StateNumbers
 from feti_homog.verify.check_points import tip_shares
 from feti_homog.verify.discrete_cell import DiscreteCell
-from feti_homog.verify.findings import Findings, same_state_limit
+from feti_homog.verify.findings import Findings, relative, same_state_limit
 from feti_homog.verify.path_energies import check_path_energies
-from feti_homog.verify.prescribed import SAME_SHARE, TEMPERATURE
+from feti_homog.verify.prescribed import NAMES, SAME_SHARE, TEMPERATURE
 
 Point = Mapping[str, Any]
 
@@ -31,6 +31,7 @@ def check_path(findings: Findings, cell: DiscreteCell, states: Sequence[StateNum
         return
     by_events = cell.files.case["path"]["method"] == "events"
     _check_counts(findings, points, by_events)
+    _check_peak(findings, cell.files.document.get("peak"), points)
     _check_breaks(findings, states, points, by_events)
     near = same_state_limit(float(cell.files.document["solver"]["rtol"]))
     in_full = [_with_tips(cell, state, points[state.point]) for state in states]
@@ -55,6 +56,24 @@ def _check_counts(findings: Findings, points: Sequence[Point], by_events: bool) 
         findings.record("breaks", abs(point["bonded"] - after["bonded"] - broke), f"path[{number + 1}].bonded")
     if by_events and points[-1]["load_factor"] == 1.0:
         findings.record("breaks", points[-1]["broke"], f"path[{len(points) - 1}], bonds that broke at the end")
+
+
+def _check_peak(findings: Findings, peak: Point | None, points: Sequence[Point]) -> None:
+    """Check that the peak is the largest stress of its component, and the first break the first; older results have
+    none."""
+    if peak is None:
+        return
+    strain, stress = (
+        np.array([point[kind] for point in points])[:, names.index(peak[f"{kind}_name"])]
+        for names, kind in zip(NAMES[len(points[0]["stress"])], ("strain", "stress"), strict=True)
+    )
+    size, event = float(np.abs(stress).max()), peak["event"]
+    findings.record("tables", relative(np.array(peak["stress"] - stress[event]), size), "peak.stress")
+    findings.record("tables", relative(np.array(np.abs(stress[event]) - size), size), "peak.event")
+    findings.record("tables", relative(np.array(peak["strain"] - strain[event]), np.abs(strain).max()), "peak.strain")
+    broken = [number for number, point in enumerate(points) if point["broke"]]
+    told = peak.get("first_break_event")
+    findings.record("tables", 0.0 if told == next(iter(broken), None) else np.inf, "peak.first_break_event")
 
 
 def _check_breaks(findings: Findings, states: Sequence[StateNumbers], points: Sequence[Point], by_events: bool) -> None:

@@ -13,6 +13,7 @@ from support.ranks import parallel_assert
 
 from feti_homog import Case, CaseError, ConvergenceError, collect_sweep, run, run_sweep
 from feti_homog.results.field_layout import tables
+from feti_homog.runtime.records import plain
 
 pytestmark = pytest.mark.parallel
 
@@ -93,9 +94,39 @@ def test_with_files(comm, shared_path):
     assert np.array_equal(again.points["stress"], result.points["stress"]) and again.checks == result.checks
     assert again.timings == result.timings and again.solver == result.solver and again.case == result.case
     rising, (left, number) = result.rising_strain(), result.first_drop()
-    assert rising[2, :3] == pytest.approx(left) and rising[1, :3] == pytest.approx(result.path[0].stress) and number
+    names = list(rising)
+    assert names == ["E11", "S11", "S22", "S12"]
+    assert [rising[name][2] for name in names[1:]] == pytest.approx(left) and number
+    assert [rising[name][1] for name in names[1:]] == pytest.approx(result.path[0].stress)
     with pytest.raises(ValueError, match="path of one leg"):
         run(with_fraction(0.4), comm).rising_strain()
+
+
+@pytest.mark.parametrize("growth", ["released", "springs"])
+def test_a_path_scales_with_the_root_of_its_toughness(comm, growth):
+    """Two legs with contact, against a run with that toughness and loads that are as many times larger."""
+    bonds = {"criterion": "energy", "growth": growth, "normal_stiffness": 100.0, "tangential_stiffness": 40.0}
+    document = with_fraction(0.4, geometry="square").resolved()
+    document |= {"analysis": {"type": "path", "plane": "stress"}, "petsc": {"feti_ksp_rtol": 1e-12}}
+    s, G_c, loads = 1.7, 0.001, [{"E11": 0.02, "S22": 0.0}, {"E11": -0.01, "S22": 0.3}]
+    result, expected = (
+        run(Case.parse(document | {"interface": bonds | {"toughness": G}, "path": {"waypoints": waypoints}}), comm)
+        for G, waypoints in ((G_c, loads), (G_c * s**2, [{k: s * v for k, v in load.items()} for load in loads]))
+    )
+    found = result.path_scaled(toughness=G_c * s**2)
+    assert len(result.path) > 5 and result.peak.event_left is not None
+    names = ("load_factor", "strain", "stress", "stored", "work", "dissipated", "fracture_energy", "broke", "open")
+    for name in names:
+        known = expected.points[name]
+        assert found.points[name] == pytest.approx(known, rel=1e-9, abs=1e-9 * np.abs(known).max())
+    peak, known = ({k: v for k, v in plain(r.peak).items() if "name" not in k} for r in (found, expected))
+    assert peak == pytest.approx(known, rel=1e-9)
+    tips, known = (path[expected.peak.event].tips for path in (found.path, expected.path))
+    assert (tips is None) == (known is None)
+    assert found.case["path"]["waypoints"][1] == pytest.approx(expected.case["path"]["waypoints"][1])
+    for wrong, words in ((-1.0, "above 0"), (None, "energy on springs")):
+        with pytest.raises(ValueError, match=words):
+            (result if wrong else run(with_fraction(0.4), comm)).path_scaled(toughness=wrong or 1.0)
 
 
 def test_a_path_that_ends_at_max_events_goes_on_with_more(comm, shared_path):

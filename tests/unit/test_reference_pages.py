@@ -116,7 +116,7 @@ CASES = {
     },
     "path": {
         "analysis": {"type": "path", "plane": "strain"},
-        "interface": HALF_OPEN | {"normal_strength": 1.0, "scatter": {"shape": 8.0}},
+        "interface": {"normal_strength": 4.0, "scatter": {"shape": 1000.0}},
         "path": {"strain": STRAIN},
     },
     "path by energy": {

@@ -13,6 +13,7 @@ import numpy as np
 
 from feti_homog.materials.plane_state import plane_state_of
 from feti_homog.report.text import point_tables, stiffness_tables
+from feti_homog.report.text.path_table import path_table
 from feti_homog.report.text.table import Table
 from feti_homog.results.kept_points import chosen, chosen_states
 
@@ -42,7 +43,7 @@ def _angle_lines(document: Document, label: str, toughness: str) -> list[list[st
 
 
 def _path_lines(document: Document, label: str, toughness: str) -> list[list[str]]:
-    return [point_tables.path_table(document, label).lines]
+    return [path_table(document, label).lines]
 
 
 def _load_lines(document: Document, label: str, toughness: str) -> list[list[str]]:

@@ -10,15 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.case.mixed_load import TEMPERATURE
 from feti_homog.materials.voigt import STRAINS, STRESSES, voigt_names
 from feti_homog.report.text.table import Column, Table, without_noise
 from feti_homog.results import path_curves
-from feti_homog.results.kept_points import chosen
 
 WIDTH = 79
-PATH_ROWS, ENVELOPE_ROWS = 15, 12  # of their tables
-PATH_COLUMNS = 5  # of its strains, stresses and the temperature
+ENVELOPE_ROWS = 12  # of its table
 ENTRIES = {"C11": (0, 0), "C22": (1, 1), "C12": (0, 1), "C33": (2, 2)}
 SPATIAL_ENTRIES = {f"C{i}{i}": (i - 1, i - 1) for i in range(1, 7)} | {"C12": (0, 1)}
 STATES = ("bonded", "open", "closed")
@@ -40,10 +37,15 @@ def shown_entries(points: Sequence[Point]) -> dict[str, tuple[int, int]]:
 
 
 def all_numbers(key: str, document: Document, label: str, numbers: Sequence[int]) -> Table:
-    """Return the numbers and stresses, or entries of the stiffness, of these points of an angle or a path."""
+    """Return the numbers and stresses, or entries of the stiffness, of these points of an angle or a path.
+
+    Of a path its marks, the leading strain and the stresses come first.
+    """
     points = document[key]
     some = "" if len(numbers) == len(points) else f", {len(numbers)} of {len(points)}"
     names = [name for name, value in points[0].items() if isinstance(value, int | float)]
+    if key == "path":
+        return _path_numbers(document, f"Points of the path{some}; stress{label}", names, numbers)
     stiff = points[0].get("stiffness") is not None
     entries = shown_entries(points) if stiff else {}
     rows = []
@@ -53,6 +55,18 @@ def all_numbers(key: str, document: Document, label: str, numbers: Sequence[int]
         rows.append([number, *(point[name] for name in names), *values])
     head = ["point", *names, *(entries or voigt_names(len(points[0]["stress"]))[1])]
     return Table(f"Points of the {key}{some}; stress{label}", [*map(Column, head)], rows)
+
+
+def _path_numbers(document: Document, title: str, names: Sequence[str], numbers: Sequence[int]) -> Table:
+    leading, points = path_curves.leading_component(document), document["path"]
+    strains, stresses = voigt_names(len(points[0]["stress"]))
+    head = ["point", "mark", strains[leading], *stresses, *names]
+    shown = [points[number] for number in numbers]
+    rows = [
+        [number, point.get("mark", ""), point["strain"][leading], *point["stress"], *(point[name] for name in names)]
+        for number, point in zip(numbers, shown, strict=True)
+    ]
+    return Table(title, [*map(Column, head)], rows)
 
 
 def angle_table(points: Sequence[Point], label: str) -> Table:
@@ -73,43 +87,8 @@ def angle_table(points: Sequence[Point], label: str) -> Table:
     return Table(f"{'Stiffness' if stiff else 'Stress'}{label} against the debonding angle (degrees)", columns, rows)
 
 
-def path_table(document: Document, label: str) -> Table:
-    """Totals of the path, and rows of some of its points."""
-    points, numbers, found = document["path"], chosen(document, PATH_ROWS), _path_columns(document)
-    shown = dict(list(found.items())[:PATH_COLUMNS])
-    rest = [name for name in found if name not in shown]
-    broke = sum(point["broke"] for point in points)
-    some = "" if len(numbers) == len(points) else f", {len(numbers)} shown"
-    rows = [
-        [k, points[k]["load_factor"], *(without_noise(column[k]) for column in shown.values()), *_counts(points[k])]
-        for k in numbers
-    ]
-    columns = [Column("point", 5, "d"), Column("load", 9, ".6f")]
-    columns += [*(Column(name, max(11, len(name) + 1)) for name in shown), *COUNTS]
-    totals = [*_path_energies(document, label), *([f"Also in path.csv: {', '.join(rest)}"] if rest else [])]
-    return Table(f"Path{label}: {len(points)} points{some}; {broke} bonds broke", columns, rows, totals)
-
-
-def _path_columns(document: Document) -> dict[str, Any]:
-    """Return the columns that vary along a path.
-
-    They are the leading strain, stresses that are named or present, the temperature, and other strains under stresses.
-    """
-    points = document["path"]
-    strain, stress = (_without_noise([point[name] for point in points]) for name in ("strain", "stress"))
-    strains, stresses = voigt_names(strain.shape[1])
-    leading = path_curves.leading_component(document)
-    there = {*path_curves.named_components(document), *path_curves.components_above(path_curves.FAINT, stress)}
-    found = {strains[leading]: strain[:, leading]} | {stresses[k]: stress[:, k] for k in sorted(there)}
-    if any(point.get("temperature") for point in points):
-        found[TEMPERATURE] = np.array([point["temperature"] for point in points])
-    given = {name for target in path_curves.targets(document) for name in target}
-    others = path_curves.components_above(path_curves.FAINT, strain)
-    return found | {strains[k]: strain[:, k] for k in others if stresses[k] in given}
-
-
-def _without_noise(values: Sequence[Sequence[float]]) -> Any:
-    """(n, c) with zeros in the columns that have no more than the solver leaves of zero."""
+def columns_without_noise(values: Sequence[Sequence[float]]) -> Any:
+    """Return values (n, c) with zeros in the columns that have no more than the solver leaves of zero."""
     columns = np.array(values, float)
     is_there = np.isin(np.arange(columns.shape[1]), path_curves.components_above(path_curves.ZERO, columns))
     return np.where(is_there, columns, 0.0)
@@ -118,7 +97,7 @@ def _without_noise(values: Sequence[Sequence[float]]) -> Any:
 def load_lines(document: Document, label: str) -> list[str]:
     """Return the equilibrium under one load: strains, stresses, energies, and the states of the interface nodes."""
     point = document["load"]
-    strain, sigma = (map(without_noise, _without_noise([point[name]])[0]) for name in ("strain", "stress"))
+    strain, sigma = (map(without_noise, columns_without_noise([point[name]])[0]) for name in ("strain", "stress"))
     strains, stresses = voigt_names(len(point["strain"]))
     target = path_curves.targets(document)[0]
     given = ", ".join(f"{name} = {value:g}" for name, value in target.items() if value or name in strains)
@@ -127,8 +106,8 @@ def load_lines(document: Document, label: str) -> list[str]:
     return [
         *wrap(f"Equilibrium under {given}", WIDTH),
         *Table("", columns, [["strain", *strain], [f"stress{label}", *sigma]]).lines[1:],
-        *_energies(point, label),
-        *_debonded(document, point),
+        *energies(point, label),
+        *debonded(document, point),
         ", ".join(f"{point[state]} {state}" for state in STATES) + " interface nodes",
         *([f"Free motions of fibres: {motions}"] if motions else []),
     ]
@@ -149,32 +128,12 @@ def load_table(document: Document, label: str) -> Table:
     return Table(title, [Column(""), Column("computed")], [*rows, *numbers])
 
 
-def _path_energies(document: Document, label: str) -> list[str]:
-    """Return the lines about energies along a path.
-
-    They give the work of the loads, the energy stored at the end, the energy lost by breaks, along all equilibria and
-    under a rising load, and the debonded share.
-    """
-    last = document["path"][-1]
-    where = " on the first leg" if path_curves.legs(document) > 1 else ""
-    rising = f"{last['dissipated_strain_controlled']:.6g} if the {path_curves.what_rises(document)} only rises{where}"
-    lines = [
-        f"Work per area{label}: {last['work']:.6g}",
-        *_energies(last, label),
-        f"Dissipated per area{label}: {last['dissipated']:.6g} along all equilibria, {rising}",
-    ]
-    if "dissipation_ratio" in last:
-        ratio = f"{last['dissipation_ratio']:.4f} times it was dissipated"
-        lines.append(f"Toughness of broken bonds per area{label}: {last['fracture_energy']:.6g}; {ratio}")
-    return [*lines, *_debonded(document, last)]
-
-
-def _energies(point: Point, label: str) -> list[str]:
+def energies(point: Point, label: str) -> list[str]:
     springs = f", {point['stored_in_springs']:.6g} of it in springs" if point["stored_in_springs"] else ""
     return [f"Stored per area{label}: {point['stored']:.6g}{springs}"]
 
 
-def _debonded(document: Document, point: Point) -> list[str]:
+def debonded(document: Document, point: Point) -> list[str]:
     """Return the share of the interfaces that has debonded, and those of the pairs of phases if there are several."""
     text = f"Debonded: {100 * point['debonded_share']:.1f} % of the interfaces"
     if "debonded_shares" in point:
@@ -184,7 +143,7 @@ def _debonded(document: Document, point: Point) -> list[str]:
     return wrap(text, WIDTH)
 
 
-def _counts(point: Point) -> list[int]:
+def counts(point: Point) -> list[int]:
     return [point[state] for state in STATES]
 
 

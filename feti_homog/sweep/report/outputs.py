@@ -10,6 +10,7 @@ import numpy as np
 from feti_homog.materials.plane_state import GENERALIZED, PLANE_STRAIN
 from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, STRESSES, voigt_names
 from feti_homog.report.text import point_tables
+from feti_homog.results.path_peak import peak_of
 
 Document = Mapping[str, Any]
 
@@ -39,7 +40,7 @@ def outputs(document: Document, numbers: Sequence[int] = PLANE_STRAIN.numbers) -
     for section in ("moduli", "constants", "transversely_isotropic"):
         found |= {name: value for name, value in document.get(section, {}).items() if value is not None}
     found |= _bounds(document.get("bounds", {}), numbers)
-    found |= _angles(document.get("angle", ()), numbers) | _path(document.get("path", ()))
+    found |= _angles(document.get("angle", ()), numbers) | _path(document)
     found |= _load(document.get("load"))
     found |= _envelope(document)
     found |= {f"check_{name}": error for name, error in document["checks"].items()}
@@ -118,8 +119,9 @@ def _angles(points: Sequence[Document], numbers: Sequence[int]) -> dict[str, flo
     return found
 
 
-def _path(points: Sequence[Document]) -> dict[str, float]:
-    """Return the first break, the largest stresses and the end."""
+def _path(document: Document) -> dict[str, float]:
+    """Return the first break, the largest stresses with the leading strain at the peak, and the end."""
+    points = document.get("path")
     if not points:
         return {}
     stress = np.array([point["stress"] for point in points])
@@ -131,6 +133,8 @@ def _path(points: Sequence[Document]) -> dict[str, float]:
         found |= {f"{place}_{name}": value for name, value in zip(stresses, values.tolist(), strict=True)}
     for place, point in (("onset", points[0]), ("end", points[-1])):
         found |= {f"{place}_{name}": value for name, value in zip(strains, point["strain"], strict=True)}
+    summit = peak_of(document)
+    found |= {f"peak_{summit['strain_name']}": summit["strain"]}
     return found | {f"end_{state}": points[-1][state] for state in point_tables.STATES}
 
 

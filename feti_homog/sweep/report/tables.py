@@ -67,6 +67,7 @@ OUTPUT_COLUMNS = (
     Column("onset_Sij", STRESS, "macroscopic stress at the first point of a path"),
     Column("onset_STRAIN", "", "macroscopic strain at the first point of a path"),
     Column("peak_Sij", STRESS, "largest in magnitude of a path, with its sign"),
+    Column("peak_STRAIN", "", "strain at the peak of the stress of the component whose strain leads"),
     Column("end_Sij", STRESS, "macroscopic stress at the end of a path"),
     Column("end_STRAIN", "", "macroscopic strain at the end of a path"),
     Column("end_STATUS", "", "interface nodes that are bonded, open or closed at the end of a path"),

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from feti_homog.results.kept_points import drops, kept, turning_points
+from feti_homog.results.kept_points import drops, kept
+from feti_homog.results.path_peak import turning_points
 
 
 def path(stresses: Any, loads: Any = None) -> list[dict[str, Any]]:

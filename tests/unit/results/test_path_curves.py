@@ -21,12 +21,13 @@ from feti_homog.results.path_curves import (
     targets,
     what_rises,
 )
+from feti_homog.results.path_peak import marks, peak_of
 
 
 def point(load: float, stiffness: float, broke: int = 1) -> dict[str, Any]:
     strain = 0.1 * load
     stress = [stiffness * strain, 0.0, 0.0]
-    return {"load_factor": load, "strain": [strain, 0.0, 0.0], "stress": stress, "broke": broke}
+    return {"load_factor": load, "strain": [strain, 0.0, 0.0], "stress": stress, "broke": broke, "dissipated": 0.0}
 
 
 def test_snap_back_becomes_a_drop() -> None:
@@ -47,6 +48,33 @@ def test_the_first_drop_ends_on_the_next_branch_that_holds() -> None:
     points = [point(0.5, 10.0), point(0.3, 8.0), point(0.4, 6.0), point(0.8, 4.0), point(1.0, 2.0, 0)]
     stress, number = first_drop(points)
     assert number == 3 and stress.tolist() == pytest.approx([0.05 * 4.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_peak_is_the_largest_stress_with_the_first_break_and_what_is_left(sign: float) -> None:
+    """Snap-back: at the load of the peak the next branch that holds is that of the last point."""
+    points = [point(0.2, 9.0), point(0.5, 10.0), point(0.3, 8.0), point(0.4, 6.0), point(0.8, 4.0), point(1.0, 2.0, 0)]
+    for number, each in enumerate(points):
+        each |= {"dissipated": 0.1 * number, "broke": int(number not in (0, 5))}
+        each |= {name: [sign * value for value in each[name]] for name in ("strain", "stress")}
+    path = document("events", 1, points)
+    expected = {"stress": 0.5 * sign, "strain": 0.05 * sign, "event": 1, "first_break_stress": 0.5 * sign}
+    expected |= {"first_break_event": 1, "stress_left": 0.2 * sign, "event_left": 4, "dissipated": 0.1}
+    expected |= {"first_break_strain": 0.05 * sign}
+    assert peak_of(path) == {"strain_name": "E11", "stress_name": "S11"} | {
+        name: pytest.approx(value) for name, value in expected.items()
+    }
+    assert marks(path) == {1: "first break and peak", 4: "after the peak", 5: "end"}
+    assert {1, 4, 5} <= set(chosen(path, 5))
+
+
+def test_the_valley_after_a_peak_of_increments_is_a_point_and_saw_teeth_are_none() -> None:
+    stresses = [0.4, 1.0, 0.995, 0.998, 0.5, 0.7]
+    points = [point(n / 6, 60 * s / n, int(n > 1)) for n, s in enumerate(stresses, 1)]
+    found = peak_of(document("increments", 1, points))
+    assert (found["event"], found["first_break_event"], found["event_left"]) == (1, 1, 4)
+    assert found["stress_left"] == pytest.approx(0.5)
+    assert "event_left" not in peak_of(document("increments", 1, points[:4]))
 
 
 def test_first_legs() -> None:

@@ -156,7 +156,7 @@ def test_a_path_is_a_table_of_chosen_points() -> None:
     document = changed(path=points, kkt_tolerance=1e-6)
     del document["effective_stiffness"], document["moduli"], document["bounds"]
     document["case"]["analysis"]["type"] = "path"
-    document["case"] |= {"path": {"strain": [0.0, -0.2, 1e-3]}, "interface": {"contact": True}}
+    document["case"] |= {"path": {"strain": [0.0, -0.2, 1e-3], "method": "events"}, "interface": {"contact": True}}
     document["checks"] |= {"kkt_tension": 9e-7, "kkt_penetration": 2e-6}
     document["solver"] |= {"iterations": [*range(5, 30)], "factorizations": 3, "coarse_factorizations": 30}
     text = summary(document)
@@ -167,10 +167,11 @@ def test_a_path_is_a_table_of_chosen_points() -> None:
     assert line(text, "Stored").endswith("per area (GPa): 70, 10 of it in springs")
     assert line(text, "Toughness").endswith("per area (GPa): 40; 1.2500 times it was dissipated")
     assert line(text, "Debonded") == "Debonded: 50.0 % of the interfaces"
+    assert line(text, "Peak") == "Peak S22 (GPa): -350 at E22 = -0.2 (point 100); first break 0 at 0 (point 0)"
     rows = [words.split() for words in text.splitlines() if words[:5].strip().isdigit()]
     assert len(rows) == 15
-    assert rows[0] == ["0", "0.000000", "0", "0", "0", "-2", "100", "9", "1"]
-    assert rows[-1] == ["100", "1.000000", "-0.2", "0", "-350", "-2", "0", "9", "1"]
+    assert rows[0] == ["0", "0", "0", "0", "-2", "0.000000", "100", "9", "1"]
+    assert rows[-1] == ["100", "-0.2", "0", "-350", "-2", "1.000000", "0", "9", "1"]
     assert line(text, "Iterations").endswith("5 to 29 a state, 425 for 25 states")
     assert line(text, "Factorized").split(maxsplit=1)[1] == "3 subdomains, coarse problem 30 times"
     assert line(text, "kkt_tension").endswith("pass") and line(text, "kkt_penetration").endswith("FAIL")
@@ -195,12 +196,12 @@ def test_a_path_in_space_tells_what_is_named_or_there_in_100_columns() -> None:
     ]  # fmt: skip
     document = changed(path=points)
     document["case"]["analysis"] = {"type": "path", "plane": "generalized"}
-    document["case"]["path"] = {"waypoints": [{"temperature": -100.0}, {"S22": 120.0, "S13": 50.0}]}
+    document["case"]["path"] = {"waypoints": [{"temperature": -100.0}, {"S22": 120.0, "S13": 50.0}], "method": "events"}
     text = summary(document)
     assert max(map(len, text.splitlines())) <= 100
-    head = ["point", "load", "E22", "S22", "S13", "temperature", "E11", "bonded", "open", "closed"]
+    head = ["point", "E22", "S22", "S13", "temperature", "E11", "load", "bonded", "open", "closed"]
     assert line(text, "point").split() == head
-    assert line(text, "1 ").split()[2:7] == ["0.1", "120", "50", "-100", "-0.02"]
+    assert line(text, "1 ").split()[1:6] == ["0.1", "120", "50", "-100", "-0.02"]
     assert "Also in path.csv: E33, gamma13" in text and "if the load only rises" in text
 
 

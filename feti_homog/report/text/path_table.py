@@ -1,0 +1,96 @@
+"""The points of a path as a table of the summary: its peak, its energies, and rows of some points."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from textwrap import wrap
+from typing import Any
+
+import numpy as np
+
+from feti_homog.case.mixed_load import TEMPERATURE
+from feti_homog.materials.voigt import voigt_names
+from feti_homog.report.text.point_tables import COUNTS, WIDTH, columns_without_noise, counts, debonded, energies
+from feti_homog.report.text.table import Column, Table, without_noise
+from feti_homog.results import path_curves
+from feti_homog.results.kept_points import chosen
+from feti_homog.results.path_peak import peak_of
+
+ROWS = 15  # of the table
+SHOWN = 5  # of its strains, stresses and the temperature
+
+Document = Mapping[str, Any]
+
+
+def path_table(document: Document, label: str) -> Table:
+    """Totals of the path, and rows of some of its points."""
+    points, numbers, found = document["path"], chosen(document, ROWS), _path_columns(document)
+    shown = dict(list(found.items())[:SHOWN])
+    rest = [name for name in found if name not in shown]
+    broke = sum(point["broke"] for point in points)
+    some = "" if len(numbers) == len(points) else f", {len(numbers)} shown"
+    rows = [
+        [k, *(without_noise(column[k]) for column in shown.values()), points[k]["load_factor"], *counts(points[k])]
+        for k in numbers
+    ]
+    columns = [Column("point", 5, "d"), *(Column(name, max(11, len(name) + 1)) for name in shown)]
+    columns += [Column("load", 9, ".6f"), *COUNTS]
+    totals = [*_peak_lines(document, peak_of(document), label), *_path_energies(document, label)]
+    totals += [f"Also in path.csv: {', '.join(rest)}"] if rest else []
+    return Table(f"Path{label}: {len(points)} points{some}; {broke} bonds broke", columns, rows, totals)
+
+
+def _path_columns(document: Document) -> dict[str, Any]:
+    """Return the columns that vary along a path.
+
+    They are the leading strain, stresses that are named or present, the temperature, and other strains under stresses.
+    """
+    points = document["path"]
+    strain, stress = (columns_without_noise([point[name] for point in points]) for name in ("strain", "stress"))
+    strains, stresses = voigt_names(strain.shape[1])
+    leading = path_curves.leading_component(document)
+    there = {*path_curves.named_components(document), *path_curves.components_above(path_curves.FAINT, stress)}
+    found = {strains[leading]: strain[:, leading]} | {stresses[k]: stress[:, k] for k in sorted(there)}
+    if any(point.get("temperature") for point in points):
+        found[TEMPERATURE] = np.array([point["temperature"] for point in points])
+    given = {name for target in path_curves.targets(document) for name in target}
+    others = path_curves.components_above(path_curves.FAINT, strain)
+    return found | {strains[k]: strain[:, k] for k in others if stresses[k] in given}
+
+
+def _peak_lines(document: Document, peak: Mapping[str, Any], label: str) -> list[str]:
+    """Return the peak with the first break and what is left after it, and whether it grows with the toughness."""
+    strain, stress = (without_noise(peak[name]) for name in ("strain", "stress"))
+    text = f"Peak {peak['stress_name']}{label}: {stress:.6g} at {peak['strain_name']} = {strain:.6g}"
+    text += f" (point {peak['event']})"
+    if "first_break_event" in peak:
+        first, at = peak["first_break_stress"], peak["first_break_strain"]
+        text += f"; first break {first:.6g} at {at:.6g} (point {peak['first_break_event']})"
+    if "event_left" in peak:
+        lost = 1.0 - peak["stress_left"] / peak["stress"]
+        rises = f" as the {path_curves.what_rises(document)} rises" if path_curves.is_proportional(document) else ""
+        text += f"; {peak['stress_left']:.6g} after it{rises}, {lost:.1%} less (point {peak['event_left']})"
+    lines = wrap(text, WIDTH, subsequent_indent="  ")
+    if path_curves.scales_with_toughness(document):
+        lines.append("Scaling: strains and stresses of the path are as the root of the toughness")
+    return lines
+
+
+def _path_energies(document: Document, label: str) -> list[str]:
+    """Return the lines about energies along a path.
+
+    They give the work of the loads, the energy stored at the end, the energy lost by breaks, along all equilibria and
+    under a rising load, and the debonded share.
+    """
+    last = document["path"][-1]
+    where = " on the first leg" if path_curves.legs(document) > 1 else ""
+    rising = f"{last['dissipated_strain_controlled']:.6g} if the {path_curves.what_rises(document)} only rises{where}"
+    lines = [
+        f"Work per area{label}: {last['work']:.6g}",
+        *energies(last, label),
+        f"Dissipated per area{label}: {last['dissipated']:.6g} along all equilibria, {rising}",
+    ]
+    if "dissipation_ratio" in last:
+        ratio = f"{last['dissipation_ratio']:.4f} times it was dissipated"
+        lines.append(f"Toughness of broken bonds per area{label}: {last['fracture_energy']:.6g}; {ratio}")
+    return [*lines, *debonded(document, last)]
