@@ -84,7 +84,8 @@ def assert_kept_of(folder: Path, whole: Path) -> None:
         assert point.keys() - {"tips"} == expected.keys() - {"tips"}
         assert ("tips" in point) == ("tips" in expected and number in numbers)
         tips = [(point["tips"][name], values) for name, values in expected["tips"].items()] if "tips" in point else []
-        numbers_of = point.keys() - {"tips", "iterations"}
+        assert point.get("mark") == expected.get("mark")
+        numbers_of = point.keys() - {"tips", "iterations", "mark"}
         for value, wanted in [*tips, *((point[name], expected[name]) for name in numbers_of)]:
             # After an interruption influence columns are found in another order, which changes rounding.
             assert value == pytest.approx(wanted, rel=1e-9, abs=EXACT)
