@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from feti_homog.case.fibre_table import FibreTable
 from feti_homog.case.phase_names import FIBRE
-from feti_homog.case.section_values import CELL_FILE, FIBRE_LIST, FRACTIONS, RADII, SEED, TABLE_FILE
+from feti_homog.case.section_values import CELL_FILE, FIBRE_LIST, FRACTIONS, PHASES, RADII, SEED, TABLE_FILE
 from feti_homog.schema.keys import Selector, key
 from feti_homog.schema.values import choice, integer, real
 
@@ -207,6 +207,15 @@ class Cell:
         default=None,
         only=FROM_A_FILE,
         default_words="required, or fibre_list of a table",
+    )
+    phases: Mapping[str, tuple[str | int, ...]] | None = key(
+        PHASES,
+        "Names and numbers in the file, by the phase that they are of, where they are not the phases' names: physical "
+        "surfaces of gmsh; element sets and materials of sections of Abaqus; numbers of VTK's cell data and Medit's "
+        "references. Capitals do not matter. debonded has those of lines that are debonded from the start.",
+        default=None,
+        only=MESH,
+        default_words="none",
     )
     repair: str = key(
         choice("none", "snap"),

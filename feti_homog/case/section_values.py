@@ -8,7 +8,7 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
-from feti_homog.case.phase_names import FIBRE_PHASE
+from feti_homog.case.phase_names import FIBRE_PHASE, PHASE
 from feti_homog.fibres.outlines.outlines import Column
 from feti_homog.fibres.outlines.shapes import SHAPES
 from feti_homog.schema.values import (
@@ -27,8 +27,8 @@ STRAIN_COMPONENTS = "[E11, E22, gamma12]"
 PAIR_EXAMPLE = '["coating", "matrix"]'
 SEED = integer(least=0, most=10**15)
 
-MESH_SUFFIXES = (".msh", ".inp", ".vtu", ".vtk")
-MESH_FILE = ".msh, .inp, .vtu or .vtk file"
+MESH_SUFFIXES = (".msh", ".inp", ".vtu", ".vtk", ".mesh")
+MESH_FILE = ".msh, .inp, .vtu, .vtk or .mesh file"
 
 
 def _by_phase(words: str, example: str, number: ValueType) -> ValueType:
@@ -94,6 +94,20 @@ FIBRE_LIST = ValueType(
     },
 )
 FRACTIONS = _by_phase("numbers above 0 and below 1", "{glass = 0.3, carbon = 0.25}", real(above=0.0, below=1.0))
+_SELECTOR = either("", text, integer(least=0, most=10**9))
+_SELECTORS = either("", _SELECTOR, list_of(_SELECTOR, "", least=1))
+PHASES = ValueType(
+    "a table by phase of names or numbers in the file, or lists of them, such as "
+    '{matrix = "Epoxy", fibre = [2, "Glass"]}',
+    lambda v: isinstance(v, dict) and v != {} and all(PHASE.fullmatch(k) and _SELECTORS.accepts(v[k]) for k in v),
+    lambda v: {phase: tuple(own if isinstance(own, list) else [own]) for phase, own in v.items()},
+    {
+        "type": "object",
+        "minProperties": 1,
+        "patternProperties": {f"^({PHASE.pattern})$": _SELECTORS.json_schema},
+        "additionalProperties": False,
+    },
+)
 RADII = _by_phase("numbers from 1e-9 to 1e9", "{glass = 6.0, carbon = 3.5}", real(least=1e-9, most=1e9))
 FIBRE = integer(least=1)
 FIBRES = either("", choice("all"), FIBRE, list_of(FIBRE, "", least=1)).named(

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from feti_homog.errors import MeshError
+from feti_homog.mesh.readers.abaqus_words import blocks, integer, name_of, real
 from feti_homog.mesh.readers.element_blocks import Block, assembled
 from feti_homog.mesh.readers.mesh_checks import RawMesh
 from feti_homog.runtime import input_files
 from feti_homog.schema.wording import toml_value
 from feti_homog.typing import Int
 
-TRIANGLE = re.compile(r"(CPE|CPS|CPEG|DC2D|M3D|S|STRI)(3|6|65)[A-Z]*")
+TRIANGLE = re.compile(r"(CPE|CPS|CPEG|DC2D|M3D|S|STRI|R3D)(3|6|65)[A-Z]*")
+# Quadrilaterals are cut in two, and rigid triangles have the shape of others.
+QUAD = re.compile(r"(CPE|CPS|CPEG|DC2D|M3D|S)4[A-Z]*|R3D4")
 LINE = re.compile(r"(T2D|T3D|B2|B3|DC1D)\w*")
 LINE_NODES = (2, 3)
 # Keywords that make or move nodes and elements, and the parameters that are read of others that have them.
@@ -50,6 +53,7 @@ class _Content:
     lines: dict[int, list[int]] = field(default_factory=dict)
     sets: dict[tuple[int, str], set[int]] = field(default_factory=dict)
     sections: list[str] = field(default_factory=list)
+    materials: dict[str, str] = field(default_factory=dict)
     parts: int = 0
     instances: int = 0
     is_assembly: bool = False
@@ -76,7 +80,7 @@ def load(path: Path) -> RawMesh:
     """
     text = input_files.read(path).decode("utf-8", "replace")
     content = _Content(left=max(MOST_MEMBERS, len(text)))
-    for number, words, rows in _blocks(text):
+    for number, words, rows in blocks(text):
         try:
             _take(content, words, rows)
         except KeyError as error:
@@ -89,54 +93,6 @@ def load(path: Path) -> RawMesh:
     if faults:
         raise MeshError(*faults)
     return _raw(content)
-
-
-def _blocks(text: str) -> Iterator[tuple[int, dict[str, str], list[list[str]]]]:
-    """The keyword lines with their number, their words (the keyword under ""), and the data lines that follow."""
-    number, words, rows = 0, dict[str, str](), list[list[str]]()
-    open_line = ""
-    for place, line in enumerate(text.splitlines(), start=1):
-        line = line.strip()
-        if not line or line.startswith("**"):
-            continue
-        if line.startswith("*") or open_line.startswith("*"):
-            open_line += line
-            if open_line.endswith(","):
-                continue
-            if words:
-                yield number, words, rows
-            number, words, rows, open_line = place, _words(open_line), [], ""
-        elif words:
-            rows.append([word.strip() for word in line.rstrip(", \t").split(",")])
-    if words:
-        yield number, words, rows
-
-
-def _words(line: str) -> dict[str, str]:
-    """Keyword and parameters of a line: *ELEMENT, TYPE=CPE3 has {"": "ELEMENT", "TYPE": "CPE3"}."""
-    keyword, *parameters = (word.strip() for word in line[1:].split(","))
-    pairs = (word.partition("=") for word in parameters)
-    return {"": re.sub(r"\s+", " ", keyword.upper()), **{k.strip().upper(): _name(v) for k, _, v in pairs}}
-
-
-def _integer(word: str) -> int:
-    if not re.fullmatch(r"[+-]?[0-9]{1,15}", word):
-        raise ValueError(f"{toml_value(word)}: expected a whole number of at most 15 digits")
-    return int(word)
-
-
-def _real(word: str) -> float:
-    try:
-        if "_" not in word and word.isascii():
-            return float(word)
-    except ValueError:
-        pass
-    raise ValueError(f"{toml_value(word)}: expected a number")
-
-
-def _name(word: str) -> str:
-    word = word.strip()
-    return word[1:-1] if word[:1] == '"' else word.lower()
 
 
 def _take(content: _Content, words: dict[str, str], rows: list[list[str]]) -> None:
@@ -160,6 +116,7 @@ def _take(content: _Content, words: dict[str, str], rows: list[list[str]]) -> No
             _take_set(content, words, rows)
         case "SOLID SECTION" | "SHELL SECTION":
             content.sections.append(words["ELSET"])
+            content.materials[words["ELSET"]] = words.get("MATERIAL", words["ELSET"])
 
 
 def _enter(content: _Content, keyword: str, rows: list[list[str]]) -> None:
@@ -175,12 +132,12 @@ def _take_nodes(content: _Content, words: dict[str, str], rows: list[list[str]])
     if words.get("SYSTEM", "r") != "r":
         raise ValueError("its parameter SYSTEM is not read: expected Cartesian coordinates")
     for tag, *place in rows:
-        number = _integer(tag)
+        number = integer(tag)
         if not place:
             raise ValueError(f"node {number} has no coordinates")
         if number in content.nodes:
             raise ValueError(f"node {number} is there twice")
-        content.nodes[number] = [*map(_real, place[:3]), 0.0, 0.0][:3]
+        content.nodes[number] = [*map(real, place[:3]), 0.0, 0.0][:3]
 
 
 def _take_elements(content: _Content, words: dict[str, str], rows: list[list[str]]) -> None:
@@ -188,7 +145,7 @@ def _take_elements(content: _Content, words: dict[str, str], rows: list[list[str
     counts = _node_counts(kind)
     found = content.lines if counts == LINE_NODES else content.triangles
     for row in rows:
-        tag, *nodes = map(_integer, row)
+        tag, *nodes = map(integer, row)
         if len(nodes) not in counts:
             raise ValueError(f"element {tag} has {len(nodes)} nodes: expected {' or '.join(map(str, counts))}")
         if tag in content.triangles or tag in content.lines:
@@ -202,9 +159,12 @@ def _node_counts(kind: str) -> tuple[int, ...]:
     """Return the numbers of nodes that an element of this type may have."""
     if LINE.fullmatch(kind):
         return LINE_NODES
+    if QUAD.fullmatch(kind):
+        return (4,)
     triangle = TRIANGLE.fullmatch(kind)
     if triangle is None:
-        raise ValueError(f"elements are {kind or 'of no TYPE'}: only triangles of three or six nodes can be used")
+        expected = "only triangles of three or six nodes and quadrilaterals of four can be used"
+        raise ValueError(f"elements are {kind or 'of no TYPE'}: {expected}")
     return (3,) if triangle[2] == "3" else (6,)
 
 
@@ -217,14 +177,14 @@ def _take_set(content: _Content, words: dict[str, str], rows: list[list[str]]) -
             members.update(numbers)
             continue
         for word in filter(None, row):
-            own = {_integer(word)} if word.isdecimal() else _members(content, _name(word))
+            own = {integer(word)} if word.isdecimal() else _members(content, name_of(word))
             content.spend(len(own))
             members.update(own)
 
 
 def _range(row: list[str]) -> range:
     """Numbers from the first to the last, in steps of the third or of one."""
-    first, last, step = [*map(_integer, row), 1][:3] if len(row) in (2, 3) else (0, 0, 0)
+    first, last, step = [*map(integer, row), 1][:3] if len(row) in (2, 3) else (0, 0, 0)
     if step < 1 or last < first:
         raise ValueError(f"{', '.join(row)}: expected the first element, the last and a step of at least 1")
     return range(first, last + 1, step)
@@ -261,15 +221,28 @@ def _raw(content: _Content) -> RawMesh:
     labels: dict[int, tuple[str, ...]] = {}
     for level in (BY_ELEMENTS, BY_SET, BY_SECTION):
         labels |= _labels(content, level)
-    groups = list(dict.fromkeys(labels.get(tag, ()) for tag in content.triangles))
-    place = {names: k for k, names in enumerate(groups)}
-    blocks = []
+    others = _aliases(content)
+    names_of = {tag: (labels.get(tag, ()), others.get(tag, ())) for tag in content.triangles}
+    place = {names: k for k, names in enumerate(dict.fromkeys(names_of.values()))}
+    groups, aliases = zip(*place, strict=True)
+    parts = []
     for count in sorted({len(nodes) for nodes in content.triangles.values()}):
         own = {tag: nodes for tag, nodes in content.triangles.items() if len(nodes) == count}
-        group = np.array([place[labels.get(tag, ())] for tag in own])
-        blocks.append(Block(np.fromiter(own, np.int64), np.array(list(own.values()), np.int64), group))
+        group = np.array([place[names_of[tag]] for tag in own])
+        parts.append(Block(np.fromiter(own, np.int64), np.array(list(own.values()), np.int64), group))
     numbers, points = np.fromiter(content.nodes, np.int64), np.array(list(content.nodes.values()))
-    return assembled(numbers, points, blocks, groups, _curves(content, labels), ("element set", "element set"))
+    curves = _curves(content, labels)
+    return assembled(numbers, points, parts, groups, curves, ("element set", "element set"), aliases)
+
+
+def _aliases(content: _Content) -> dict[int, tuple[str, ...]]:
+    """Return the materials of the sections of each element, and all sets that it is in."""
+    found: dict[int, dict[str, None]] = {}
+    made_of = [(content.materials[name], _members(content, name)) for name in dict.fromkeys(content.sections)]
+    for name, members in [*made_of, *((name, own) for (_, name), own in content.sets.items())]:
+        for tag in members:
+            found.setdefault(tag, {})[name] = None
+    return {tag: tuple(names) for tag, names in found.items()}
 
 
 def _curves(content: _Content, labels: Mapping[int, tuple[str, ...]]) -> dict[str, Int]:

@@ -49,19 +49,22 @@ def load(path: Path) -> RawMesh:
     faults = _repeated(nodes, elements) or _lost(nodes, elements) or _other_kinds(nodes, points, elements)
     if faults:
         raise MeshError(*faults)
-    return assembled(nodes, points, *_triangles(content, elements), _curves_of_content(content, elements))
+    blocks, physical = _triangles(content, elements)
+    groups = [tuple(_name(content, 2, number) for number in own) for own in physical]
+    aliases = [tuple(f"number {number}" for number in own) for own in physical]
+    curves = _curves_of_content(content, elements)
+    return assembled(nodes, points, blocks, groups, curves, aliases=aliases)
 
 
-def _triangles(content: MshContent, elements: Mapping[int, Elements]) -> tuple[list[Block], list[tuple[str, ...]]]:
-    """Return the triangles, and the names of the physical surfaces of their entities."""
-    blocks, groups = list[Block](), list[tuple[str, ...]]()
+def _triangles(content: MshContent, elements: Mapping[int, Elements]) -> tuple[list[Block], list[tuple[int, ...]]]:
+    """Return the triangles, and the numbers of the physical surfaces of their entities."""
+    blocks, groups = list[Block](), list[tuple[int, ...]]()
     for kind in NODES_OF_TRIANGLES:
         if kind in elements:
             numbers, nodes, entity = elements[kind]
             entities = np.unique(entity)
             blocks.append(Block(numbers, nodes, len(groups) + np.searchsorted(entities, entity)))
-            physical = (content.groups.get((2, number), ()) for number in entities.tolist())
-            groups += [tuple(_name(content, 2, group) for group in own_groups) for own_groups in physical]
+            groups += [tuple(content.groups.get((2, number), ())) for number in entities.tolist()]
     return blocks, groups
 
 

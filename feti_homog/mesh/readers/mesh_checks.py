@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from feti_homog.case.phase_names import PHASE
 from feti_homog.mesh.coarse_mesh import areas, edge_keys, edges
 from feti_homog.mesh.middle_nodes import MiddleNodes
 from feti_homog.typing import Bool, Float, Int, Int32
@@ -42,6 +41,7 @@ class RawMesh:
         group: (m,) index into `groups`, the names of the physical surfaces or sets that the elements belong to.
         curves: (d, 2) node tags of the ends of the lines in each physical curve or set of lines, by its name.
         middles: the middle nodes of second-order triangles.
+        aliases: other names of each group, by which a case may select it; may be empty.
         container, curve_container: what the file calls a group, and an entry of `curves`.
     """
 
@@ -55,6 +55,7 @@ class RawMesh:
     middles: MiddleNodes
     container: str
     curve_container: str
+    aliases: tuple[tuple[str, ...], ...] = ()
 
     @property
     def debonded(self) -> Int:
@@ -96,18 +97,8 @@ def unlabelled(mesh: RawMesh) -> list[str]:
     for names, number in zip([mesh.groups[group] for group in used], first, strict=True):
         if len(names) > 1:
             element = mesh.element(int(number))
-            faults.append(f"{element} is in {len(names)} {mesh.container}s: {', '.join(names)}")
-    return faults
-
-
-def unknown_phases(mesh: RawMesh) -> list[str]:
-    """Physical surfaces whose name is not a phase, and a missing matrix."""
-    names = [name for group in mesh.groups for name in group]
-    known = 'expected "matrix", "fibre", "glass", ... of letters, digits, _ and -, "fibre:2", not "void"'
-    strange = [name for name in names if not PHASE.fullmatch(name)]
-    faults = [f'{mesh.container} "{name}" is not a phase: {known}' for name in dict.fromkeys(strange)]
-    if "matrix" not in names:
-        faults.append(f'no {mesh.container} is named "matrix"')
+            counts = f"is in {len(names)} {mesh.container}s: {', '.join(names)}"
+            faults.append(f"{element} {counts}; [cell.phases] says which of them are phases")
     return faults
 
 

@@ -267,6 +267,8 @@ def _row_starts(section: Section, words: Int, count: int) -> Int:
 def _add_rows(result: MshContent, words: Int, row: Int, kind: Int, tag: Int, tags: Int) -> None:
     """Add the elements with their numbers at `row`, the first of their tags at `tag` and the nodes behind the tags."""
     group, entity = (np.where(tags > k, words[np.minimum(tag + k, len(words) - 1)], 0) for k in (0, 1))
+    # Other programs write physical groups alone: each stands for an entity.
+    entity = np.where(entity == 0, -np.abs(group), entity)
     found = defaultdict[tuple[int, int], set[int]](set)
     for each in np.unique(kind).tolist():
         _, dimension, _, corners = KINDS[each]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
@@ -19,33 +20,35 @@ from feti_homog.mesh.readers.bent_edges import with_bent_edges
 from feti_homog.mesh.readers.circle_detection import with_circles
 from feti_homog.mesh.readers.ellipse_detection import with_ellipses
 from feti_homog.mesh.readers.mesh_checks import RawMesh
+from feti_homog.mesh.readers.named_phases import Selectors, unknown_phases, with_phases
 from feti_homog.mesh.readers.snapping import snapped
 from feti_homog.typing import Float
 
-LOADERS = {".msh": gmsh_file.load, ".inp": abaqus_file.load, ".vtu": vtk_file.load, ".vtk": vtk_file.load}
+LOADERS = {".msh": gmsh_file.load, ".inp": abaqus_file.load} | dict.fromkeys(vtk_file.READERS, vtk_file.load)
 
 
 def read_cell(cell: Cell) -> CoarseMesh:
     """Return the user's mesh of a cell, repaired as the case asks for. Raises as `read`."""
     assert cell.file is not None
-    return read(cell.file, cell.snap_tolerance if cell.repair == "snap" else None)
+    return read(cell.file, cell.snap_tolerance if cell.repair == "snap" else None, cell.phases or {})
 
 
-def read(path: Path, snap: float | None = None) -> CoarseMesh:
+def read(path: Path, snap: float | None = None, phases: Selectors = MappingProxyType({})) -> CoarseMesh:
     """Return the coarse mesh in a file of one of the LOADERS, moved to [0, width] x [0, height].
 
     It consists of triangles of three or six nodes, in either sense, in physical surfaces "matrix", "fibre", "glass",
     ..., fills a rectangle but for voids, and has matching nodes on opposite sides. Lines in the curve
     "debonded" are edges between a fibre and the matrix that are debonded. Round interfaces become circles
     (`with_circles`), elliptic ones ellipses (`with_ellipses`); others follow their middle nodes (`with_bent_edges`).
+    `phases` are names and numbers in the file of the phases, if these are not their names (`with_phases`).
     With `snap`, nodes on sides are first moved by up to that / width to where they should be (`snapped`).
 
     Raises:
         MeshError: with all faults of the first stage that has any: file, labels, shapes, middle nodes, connections,
             sides, debonded lines.
     """
-    raw, moved = _loaded(path), 0.0
-    _refuse(path.name, mesh_checks.unlabelled(raw), mesh_checks.unknown_phases(raw), mesh_checks.stray_lines(raw))
+    raw, moved = _loaded(path, phases), 0.0
+    _refuse(path.name, mesh_checks.unlabelled(raw), unknown_phases(raw), mesh_checks.stray_lines(raw))
     _refuse(path.name, mesh_checks.not_finite(raw))
     if snap is not None:
         raw, moved = snapped(raw, snap)
@@ -75,10 +78,10 @@ def made(raw: RawMesh, path: str) -> CoarseMesh:
     return replace(mesh, precedence=numbers)
 
 
-def _loaded(path: Path) -> RawMesh:
-    """Return the triangles of a file, as it has them."""
+def _loaded(path: Path, phases: Selectors) -> RawMesh:
+    """Return the triangles of a file, as it has them, in the phases of the case."""
     try:
-        return LOADERS[path.suffix](path)
+        return with_phases(LOADERS[path.suffix](path), phases)
     except OSError as error:
         raise MeshError(f"{path}: cannot be read: {error.strerror}") from None
     except MeshError as error:

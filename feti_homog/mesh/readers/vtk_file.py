@@ -1,4 +1,4 @@
-"""Read the triangles and the lines of a file of VTK by meshio."""
+"""Read the triangles and the lines of a file of VTK or Medit by meshio."""
 
 from __future__ import annotations
 
@@ -16,19 +16,32 @@ from feti_homog.runtime import input_files
 from feti_homog.typing import Int
 
 # Readers of meshio, and how many nodes its triangles have.
-READERS = {".vtu": "meshio.vtu", ".vtk": "meshio.vtk"}
-NODES = {"triangle": 3, "triangle6": 6}
+READERS = {".vtu": "meshio.vtu", ".vtk": "meshio.vtk", ".mesh": "meshio.medit"}
+NODES = {"triangle": 3, "triangle6": 6, "quad": 4}
 LINES = ("line", "line3")
 VERTEX = "vertex"
 PHASE = "phase"
+# Cell data by which other programs number materials, in the order of precedence.
+NUMBERS = (
+    "medit:ref",
+    "gmsh:physical",
+    "CellEntityIds",
+    "mat_id",
+    "MaterialIds",
+    "material",
+    "cell_tags",
+    "region",
+    "gmsh:geometrical",
+)
 MOST_PHASES = 10**9
 
 
 def load(path: Path) -> RawMesh:
-    """Read the triangles and the lines of a .vtu or .vtk file.
+    """Read the triangles and the lines of a .vtu, .vtk or .mesh file.
 
-    Its cell data `phase` are 0 in the matrix, 1 in phase fibre, k in fibre:k; its cell data `debonded`, if it has them,
-    are 1 on lines that are debonded from the start.  Nodes and elements have the numbers of the file, from 0.
+    Its cell data `phase` are 0 in the matrix, 1 in phase fibre, k in fibre:k; in their place the groups are those of
+    one of NUMBERS, or of the only cell data of whole numbers. Its cell data `debonded`, if it has them, are 1 on lines
+    that are debonded from the start.  Nodes and elements have the numbers of the file, from 0.
 
     Raises:
         OSError: the file cannot be read.
@@ -56,18 +69,34 @@ def _faults(mesh: Any) -> list[str]:
     """Elements that are not triangles, the lack of these, and of their phases."""
     kinds = [block.type for block in mesh.cells]
     others = [f"{len(block.data)} {block.type}" for block in mesh.cells if block.type not in (*NODES, *LINES, VERTEX)]
-    faults = [f"elements are {kind}: only triangles of three or six nodes can be used" for kind in others]
+    faults = [
+        f"elements are {kind}: only triangles of three or six nodes and quadrilaterals of four can be used"
+        for kind in others
+    ]
     if not others and not set(kinds) & set(NODES):
         faults.append("no triangles in it")
-    if PHASE not in mesh.cell_data:
+    name = _numbers_name(mesh)
+    if not name:
         expected = "expected 0 in the matrix, 1 in phase fibre, 2 in fibre:2, ..."
         faults.append(f"no cell data named {PHASE}, but {', '.join(mesh.cell_data) or 'none'}: {expected}")
     elif not faults:
-        values = np.concatenate([np.ravel(data) for data in mesh.cell_data[PHASE]])
+        values = np.concatenate([np.ravel(data) for data in mesh.cell_data[name]])
         bad = values[~((values == np.round(values)) & (values >= 0) & (values < MOST_PHASES))]
         if len(bad):
-            faults.append(f"cell data {PHASE} = {bad[0]:g}: expected 0, 1, 2, ... below {MOST_PHASES}")
+            faults.append(f"cell data {name} = {bad[0]:g}: expected 0, 1, 2, ... below {MOST_PHASES}")
     return faults
+
+
+def _numbers_name(mesh: Any) -> str:
+    """Return the name of the cell data that say which phase an element is of; empty if there are none."""
+    if known := [name for name in (PHASE, *NUMBERS) if name in mesh.cell_data]:
+        return known[0]
+    whole = [
+        name
+        for name, data in mesh.cell_data.items()
+        if name != DEBONDED and all(np.size(d) == len(d) and np.asarray(d).dtype.kind in "iu" for d in data)
+    ]
+    return whole[0] if len(whole) == 1 else ""
 
 
 def _misfits(mesh: Any) -> list[str]:
@@ -80,7 +109,7 @@ def _misfits(mesh: Any) -> list[str]:
         bad = nodes[(nodes < 0) | (nodes >= count)]
         if len(bad):
             faults.append(f"a {cells.type} has the node {bad[0]}: expected 0 to {count - 1}")
-        for name in {PHASE, DEBONDED} & set(mesh.cell_data):
+        for name in {_numbers_name(mesh), DEBONDED} & set(mesh.cell_data):
             own = mesh.cell_data[name][number : number + 1]
             if [np.size(values) for values in own] != [len(nodes)]:
                 faults.append(f"cell data {name}: expected one value for each of {len(nodes)} {cells.type}")
@@ -88,33 +117,43 @@ def _misfits(mesh: Any) -> list[str]:
 
 
 def _raw(mesh: Any) -> RawMesh:
-    first, blocks = 0, []
-    for cells, data in zip(mesh.cells, mesh.cell_data[PHASE], strict=True):
+    first, blocks, name = 0, [], _numbers_name(mesh)
+    for cells, data in zip(mesh.cells, mesh.cell_data[name], strict=True):
         tags = first + np.arange(len(cells.data))
         first += len(tags)
         if cells.type in NODES:
             blocks.append(Block(tags, np.asarray(cells.data, np.int64), np.ravel(data).astype(np.int64)))
     points = np.zeros((len(mesh.points), 3))
     points[:, : mesh.points.shape[1]] = mesh.points
-    containers = (f"value of {PHASE}", "cells")
-    return assembled(np.arange(len(points)), points, *_used(blocks), _curves(mesh), containers)
+    blocks, values = _used(blocks)
+    aliases = [(f"number {k}",) for k in values]
+    groups = [(("matrix", "fibre")[k] if k < 2 else f"fibre:{k}",) for k in values] if name == PHASE else aliases
+    containers = (f"value of {name}", "cells")
+    return assembled(np.arange(len(points)), points, blocks, groups, _curves(mesh, name), containers, aliases)
 
 
-def _curves(mesh: Any) -> dict[str, Int]:
-    """Nodes (d, 2) at the ends of the lines that cell data `debonded` mark, and of the others, by the cells' type."""
+def _curves(mesh: Any, name: str) -> dict[str, Int]:
+    """Nodes (d, 2) at the ends of the lines that cell data `debonded` mark, and of the others, by their number in the
+    cell data of that name or, if these are phases, by the cells' type."""
     curves: dict[str, list[Int]] = {}
     marks = mesh.cell_data.get(DEBONDED, [np.zeros(len(cells.data)) for cells in mesh.cells])
-    for cells, mark in zip(mesh.cells, marks, strict=True):
+    for cells, mark, numbers in zip(mesh.cells, marks, mesh.cell_data[name], strict=True):
         if cells.type in LINES:
             ends, is_debonded = np.asarray(cells.data, np.int64)[:, :2], np.ravel(mark) != 0
-            for name, own in ((DEBONDED, ends[is_debonded]), (cells.type, ends[~is_debonded])):
-                if len(own):
-                    curves.setdefault(name, []).append(own)
-    return {name: np.concatenate(ends) for name, ends in curves.items()}
+            own = [(DEBONDED, is_debonded)]
+            if name == PHASE:
+                own.append((cells.type, ~is_debonded))
+            else:
+                values = np.ravel(numbers).astype(np.int64)
+                own += [(f"number {k}", ~is_debonded & (values == k)) for k in np.unique(values).tolist()]
+            for curve, members in own:
+                if members.any():
+                    curves.setdefault(curve, []).append(ends[members])
+    return {curve: np.concatenate(ends) for curve, ends in curves.items()}
 
 
-def _used(blocks: list[Block]) -> tuple[list[Block], list[tuple[str, ...]]]:
-    """The blocks with groups numbered without gaps, and the names of these groups."""
+def _used(blocks: list[Block]) -> tuple[list[Block], list[int]]:
+    """The blocks with groups numbered without gaps, and the values of these groups."""
     used: Int = np.unique(np.concatenate([block.group for block in blocks]))
     renumbered = [Block(block.tags, block.nodes, np.searchsorted(used, block.group)) for block in blocks]
-    return renumbered, [(("matrix", "fibre")[k] if k < 2 else f"fibre:{k}",) for k in used.tolist()]
+    return renumbered, used.tolist()

@@ -26,12 +26,19 @@ DECLARED = re.compile(
 )
 ARRAY = re.compile(rb"(?im)^\S{1,200} (\d+) (\d+) [a-z][a-z_0-9]{0,20}\s*$")
 DATASET = re.compile(rb"(?im)^DATASET\s+(\S{1,60})")
+COUNTED = re.compile(rb"([A-Z][A-Za-z0-9]{0,40})\s+([0-9]{1,40})")
 RAW = re.compile(rb"(<AppendedData[^>]*>).*(</AppendedData>)", re.DOTALL)
 
 
 def check(content: bytes, suffix: str) -> None:
     """Raise MeshError where a file of this kind is damaged, or declares what meshio should not read."""
-    (_check_xml if suffix == ".vtu" else _check_legacy)(content)
+    {".vtu": _check_xml, ".vtk": _check_legacy, ".mesh": _check_medit}[suffix](content)
+
+
+def _check_medit(content: bytes) -> None:
+    for name, count in COUNTED.findall(content):
+        if int(count) > len(content):
+            raise MeshError(f"it declares {int(count)} {name.decode()}: there are {len(content)} bytes in all")
 
 
 def _check_xml(content: bytes) -> None:

@@ -157,7 +157,7 @@ FAULTY_CASES: dict[str, tuple[str, tuple[str, ...]]] = {
     ),
     "mesh_without_file": (
         cell('"hexagonal"\nfibre_fraction = 0.4\nmesh_size = 0.05', '"mesh"'),
-        ("[cell] file: missing; expected the name of a .msh, .inp, .vtu or .vtk file",),
+        ("[cell] file: missing; expected the name of a .msh, .inp, .vtu, .vtk or .mesh file",),
     ),
     "mesh_not_there": (
         cell('"hexagonal"\nfibre_fraction = 0.4\nmesh_size = 0.05', '"mesh"\nfile = "none.msh"'),
@@ -165,7 +165,7 @@ FAULTY_CASES: dict[str, tuple[str, tuple[str, ...]]] = {
     ),
     "mesh_is_no_msh": (
         cell('"hexagonal"\nfibre_fraction = 0.4\nmesh_size = 0.05', '"mesh"\nfile = "cell.geo"'),
-        ('[cell] file = "cell.geo": expected the name of a .msh, .inp, .vtu or .vtk file',),
+        ('[cell] file = "cell.geo": expected the name of a .msh, .inp, .vtu, .vtk or .mesh file',),
     ),
     "mesh_with_fraction": (
         cell('"hexagonal"', '"mesh"'),

@@ -198,7 +198,7 @@ FAULTS = {
     ),
     "much by lzma": ("a.vtu", _packed(2**27, "vtkLZMADataCompressor"), "its compressed data are too large for a file"),
     "broken phase": ("a.vtu", _vtk(HALVES, phase=[0.0, 0.5]), "cell data phase = 0.5: expected 0, 1, 2, ..."),
-    "quadrilateral": ("a.vtk", _vtk({"quad": [[0, 1, 2, 3]]}, phase=[0]), "elements are 1 quad: only triangles"),
+    "tetrahedron": ("a.vtk", _vtk({"tetra": [[0, 1, 2, 3]]}, phase=[0]), "elements are 1 tetra: only triangles"),
     "lines only": ("a.vtu", _vtk({"line": [[0, 1]]}, phase=[0]), "no triangles in it"),
     "no matrix": ("a.vtu", _vtk(HALVES, phase=[1, 3]), 'no value of phase is named "matrix"'),
     "coarse": ("a.vtu", _vtk(HALVES, phase=[0, 0]), "no node between the corners of the left, right, lower"),

@@ -67,8 +67,8 @@ FAULTS = {
     "missing": (lambda path: path, "cannot be read"),
     "no triangles": (_text("*HEADING\nempty\n"), "no triangles in it"),
     "quadrilaterals": (
-        _text(SQUARE.replace("CPS3", "CPE4")),
-        "line 6, *ELEMENT: elements are CPE4: only triangles of three or six nodes",
+        _text(SQUARE.replace("CPS3", "CPE8R")),
+        "line 6, *ELEMENT: elements are CPE8R: only triangles of three or six nodes and quadrilaterals of four",
     ),
     "no type": (_text(SQUARE.replace("TYPE=CPS3, ", "")), "elements are of no TYPE"),
     "short element": (_text(SQUARE.replace("1, 1, 2, 3", "1, 1, 2")), "element 1 has 2 nodes: expected 3"),

@@ -1,0 +1,89 @@
+"""Phases of a user's mesh by the names and numbers that its file has, as [cell.phases] maps them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from functools import partial
+
+from feti_homog.case.phase_names import PHASE
+from feti_homog.errors import MeshError
+from feti_homog.mesh.readers.mesh_checks import DEBONDED, RawMesh, first_of
+from feti_homog.schema.wording import toml_key, toml_value
+
+Selectors = Mapping[str, tuple[str | int, ...]]
+
+
+def with_phases(mesh: RawMesh, phases: Selectors) -> RawMesh:
+    """Return the mesh whose groups have the phases that select one of their names, or else of their aliases; other
+    groups keep their names.  `debonded` selects curves.
+
+    Raises:
+        MeshError: a name or number that no element has; one line for each.
+    """
+    pairs = [(phase, own) for phase, selected in phases.items() for own in selected]
+    faults = list(filter(None, (_fault(mesh, *pair) for pair in pairs)))
+    if faults:
+        raise MeshError(*faults)
+    wanted = {_key(own): phase for phase, own in pairs if phase != DEBONDED}
+    lines = set(map(_key, phases.get(DEBONDED, ())))
+    curves = {DEBONDED if _key(name) in lines else name: ends for name, ends in mesh.curves.items()}
+    groups = map(partial(_named, wanted), mesh.groups, mesh.aliases or ((),) * len(mesh.groups))
+    return replace(mesh, groups=tuple(groups), curves=curves)
+
+
+def _named(wanted: Mapping[str, str], names: tuple[str, ...], aliases: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the phases that select one of the names of a group, else of its aliases; else its names."""
+    return _phases(names, wanted) or _phases(aliases, wanted) or names
+
+
+def _fault(mesh: RawMesh, phase: str, own: str | int) -> str:
+    """Return that nothing has the name or number `own`, if it is so."""
+    if _key(own) in map(_key, _names(mesh, phase == DEBONDED)):
+        return ""
+    what = "lines" if phase == DEBONDED else "elements"
+    given = f"[cell.phases] {toml_key(phase)} = {toml_value(own)}"
+    return f"{given}: no {what} of that name; {known_names(mesh, phase == DEBONDED)}"
+
+
+def _phases(names: Iterable[str], wanted: Mapping[str, str]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(wanted[_key(name)] for name in names if _key(name) in wanted))
+
+
+def _key(name: str | int) -> str:
+    """Return a name, or the number of a group without one, such that capitals do not matter."""
+    return (f"number {name}" if isinstance(name, int) else name).casefold()
+
+
+def unknown_phases(mesh: RawMesh) -> list[str]:
+    """Physical surfaces whose name is not a phase, and a missing matrix."""
+    names = [name for group in mesh.groups for name in group]
+    known = 'expected "matrix", "fibre", "glass", ... of letters, digits, _ and -, "fibre:2", not "void"'
+    strange = [name for name in names if not PHASE.fullmatch(name)]
+    faults = [f'{mesh.container} "{name}" is not a phase: {known}' for name in dict.fromkeys(strange)]
+    if "matrix" not in names:
+        faults.append(f'no {mesh.container} is named "matrix"')
+    if faults:
+        faults[-1] += f"; {known_names(mesh)}, of which [cell.phases] says the phases, as by matrix = {_first(mesh)}"
+    return faults
+
+
+def known_names(mesh: RawMesh, of_curves: bool = False) -> str:
+    """Return the names of the groups, or of the curves, in words; numbers stand for those without a name."""
+    names = _names(mesh, of_curves)
+    return f"the file has {first_of(map(_as_selected, names), len(names), 20) or 'none'}"
+
+
+def _names(mesh: RawMesh, of_curves: bool) -> list[str]:
+    named = list(mesh.curves) if of_curves else [name for own in (*mesh.groups, *mesh.aliases) for name in own]
+    return list(dict.fromkeys(named))
+
+
+def _first(mesh: RawMesh) -> str:
+    return next((_as_selected(name) for own in mesh.groups for name in own), '"NAME"')
+
+
+def _as_selected(name: str) -> str:
+    """Return the name or number of a group as a case file has it."""
+    return name.removeprefix("number ") if re.fullmatch("number [0-9]+", name) else toml_value(name)

@@ -1,0 +1,205 @@
+"""Meshes as other programs write them, with names that are no phases: [cell.phases] is all that a case needs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from support.cases import FIBRE, MATRIX
+from unit.mesh.faulty_meshes import RIGHT_SIDE, MshFile, N, grid, node
+
+from feti_homog import Case, run
+from feti_homog.errors import MeshError
+from feti_homog.mesh.coarse_mesh import areas
+from feti_homog.mesh.readers.msh_reader import read
+
+meshio = pytest.importorskip("meshio")
+
+NAMES = {1: "Epoxy resin", 2: "E-Glass"}
+CODES = {"matrix": 1, "fibre": 2}  # as the files number them
+WORDS = {"matrix": "Epoxy resin", "fibre": "e-glass"}
+
+
+def named() -> MshFile:
+    return replace(grid(), names=NAMES)
+
+
+def by_gmsh(path: Path, mesh: MshFile, **options: float) -> None:
+    """Write by gmsh itself, in the format of the suffix."""
+    import gmsh
+
+    mesh.write(path.with_name("source.msh"))
+    gmsh.initialize()
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.open(str(path.with_name("source.msh")))
+        for name, value in options.items():
+            gmsh.option.setNumber(name.replace("_", "."), value)
+        gmsh.write(str(path))
+    finally:
+        gmsh.finalize()
+
+
+def by_meshio(path: Path, data: str | None, kind: str | None = None, sets: bool = False) -> None:
+    """Write by meshio: cell data of this name, or sets of cells."""
+    elements = list(grid().elements.values())
+    numbers = np.array([e[1] for e in elements])
+    points = np.array(list(grid().nodes.values()))
+    cells = [("triangle", np.array([e[3] for e in elements]) - 1)]
+    more: dict[str, Any] = {"cell_data": {data: [numbers]}} if data else {}
+    if sets:
+        more |= {"cell_sets": {name: [np.flatnonzero(numbers == k)] for k, name in ((1, "Resin"), (2, "Glass"))}}
+    meshio.Mesh(points, cells, **more).write(path, **({"file_format": kind} if kind else {}))
+
+
+def by_vtk(path: Path) -> None:
+    """Write by VTK: compressed, appended, with normals that nobody needs."""
+    from vtkmodules.util.numpy_support import numpy_to_vtk
+    from vtkmodules.vtkCommonCore import vtkPoints
+    from vtkmodules.vtkCommonDataModel import vtkUnstructuredGrid
+    from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
+
+    data, points = vtkUnstructuredGrid(), vtkPoints()
+    for place in grid().nodes.values():
+        points.InsertNextPoint(place)
+    data.SetPoints(points)
+    elements = list(grid().elements.values())
+    for element in elements:
+        data.InsertNextCell(5, 3, [n - 1 for n in element[3]])
+    for name, values in (("quality", np.linspace(0, 1, 32)), ("RegionId", np.array([e[1] for e in elements]))):
+        array = numpy_to_vtk(values, deep=True)
+        array.SetName(name)
+        data.GetCellData().AddArray(array)
+    writer = vtkXMLUnstructuredGridWriter()
+    writer.SetFileName(str(path))
+    writer.SetInputData(data)
+    writer.Write()
+
+
+def abaqus_cae(path: Path) -> None:
+    """Abaqus/CAE's words: picked sets, sections with materials, an assembly, steps."""
+    elements = grid().elements
+    lines = ["*Heading", "** Job name: Job-1 Model name: Model-1", "*Preprint, echo=NO, model=NO", "*Part, name=Part-1"]
+    lines += ["*Node"] + [f"{tag:7d}, {x:12.9g}, {y:12.9g}" for tag, (x, y, _) in grid().nodes.items()]
+    lines += ["*Element, type=CPE3"] + [f"{tag}, {', '.join(map(str, e[3]))}" for tag, e in elements.items()]
+    for number, name in ((1, "Set-1"), (2, "_PickedSet5")):
+        tags = [str(tag) for tag, e in elements.items() if e[1] == number]
+        lines += [f"*Elset, elset={name}, internal", *(", ".join(tags[k : k + 16]) for k in range(0, len(tags), 16))]
+    lines += ["*Elset, elset=ALL, generate", "1, 32, 1"]
+    for name, material in (("Set-1", '"Epoxy resin"'), ("_PickedSet5", "E-Glass")):
+        lines += ["** Section: S", f"*Solid Section, elset={name}, material={material}", ","]
+    lines += ["*End Part", "*Assembly, name=Assembly", "*Instance, name=Part-1-1, part=Part-1", "*End Instance"]
+    lines += [
+        "*End Assembly",
+        '*Material, name="Epoxy resin"',
+        "*Elastic",
+        "3.4, 0.35",
+        "*Step, name=Step-1",
+        "*End Step",
+    ]
+    path.write_text("\n".join([*lines, ""]))
+
+
+def calculix(path: Path, kind: str = "CPE4") -> None:
+    """Quadrilaterals in sets that overlap, as CalculiX's preprocessors write them."""
+    lines = ["*NODE, NSET=Nall", *(f"{tag},{x:e},{y:e},{z:e}" for tag, (x, y, z) in grid().nodes.items())]
+    lines.append(f"*ELEMENT, TYPE={kind}, ELSET=Eall")
+    members: dict[int, list[str]] = {1: [], 2: []}
+    for j in range(N):
+        for i in range(N):
+            tag = 1 + i + N * j
+            corners = (node(i, j), node(i + 1, j), node(i + 1, j + 1), node(i, j + 1))
+            lines.append(", ".join(map(str, (tag, *corners))))
+            members[grid().elements[2 * tag][1]].append(str(tag))
+    for number, name in ((1, "E_RESIN"), (2, "E_GLASS")):
+        lines += [f"*ELSET, ELSET={name}", *members[number]]
+    path.write_text("\n".join([*lines, "*ELSET, ELSET=Ewhole", "Eall", ""]))
+
+
+SETS = {"matrix": "Resin", "fibre": ["Glass"]}
+FILES = {
+    "gmsh, names": ("a.msh", lambda path: by_gmsh(path, named()), WORDS),
+    "gmsh, numbers": ("a.msh", lambda path: by_gmsh(path, replace(grid(), names={}), Mesh_MshFileVersion=2.2), CODES),
+    "gmsh, numbers of names, binary": ("a.msh", lambda path: by_gmsh(path, named(), Mesh_Binary=1), CODES),
+    "gmsh's Abaqus": (
+        "a.inp", lambda path: by_gmsh(path, named(), Mesh_SaveGroupsOfElements=1),
+        {"matrix": "EPOXY_resin", "fibre": "E-Glass"},
+    ),
+    "gmsh's Medit": ("a.mesh", lambda path: by_gmsh(path, named()), CODES),
+    "gmsh's VTK": ("a.vtk", lambda path: by_gmsh(path, named()), CODES),
+    "meshio's gmsh": ("a.msh", lambda path: by_meshio(path, "gmsh:physical", "gmsh22"), CODES),
+    "meshio's Abaqus": ("a.inp", lambda path: by_meshio(path, None, "abaqus", sets=True), SETS),
+    "meshio's VTU": ("a.vtu", lambda path: by_meshio(path, "mat_id"), {"matrix": [1], "fibre": 2}),
+    "meshio's Medit": ("a.mesh", lambda path: by_meshio(path, "medit:ref", "medit"), CODES),
+    "VTK": ("a.vtu", by_vtk, CODES),
+    "Abaqus/CAE": ("a.inp", abaqus_cae, WORDS),
+    "CalculiX": ("a.inp", calculix, {"matrix": "e_resin", "fibre": "e_glass"}),
+    "CalculiX, shells": ("a.inp", lambda path: calculix(path, "S4R"), {"matrix": "e_resin", "fibre": "e_glass"}),
+}  # fmt: skip
+
+
+def stiffness(path: Path, **cell: Any) -> Any:
+    document = {
+        "cell": {"geometry": "mesh", "file": str(path)} | cell,
+        "material": {"matrix": MATRIX, "fibre": FIBRE},
+        "analysis": {"type": "stiffness", "plane": "strain"},
+    }
+    return run(Case.parse(document), MPI.COMM_SELF).effective_stiffness
+
+
+@pytest.fixture(scope="module")
+def expected(tmp_path_factory):
+    """Provide the stiffness of the same mesh with the names of phases."""
+    path = tmp_path_factory.mktemp("own") / "own.msh"
+    grid().write(path)
+    return stiffness(path)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_strangers_mesh_is_run_as_it_is(tmp_path, expected, name):
+    file, write, phases = FILES[name]
+    write(tmp_path / file)
+    np.testing.assert_allclose(stiffness(tmp_path / file, phases=phases), expected, rtol=1e-6, atol=1e-6)
+
+
+def test_refused_names_are_listed_with_the_way_out(tmp_path):
+    named().write(tmp_path / "a.msh")
+    with pytest.raises(MeshError) as error:
+        read(tmp_path / "a.msh")
+    assert error.value.faults[-1].endswith(
+        'no physical surface is named "matrix"; the file has "Epoxy resin", "E-Glass", 1, 2, of which [cell.phases] '
+        'says the phases, as by matrix = "Epoxy resin"'
+    )
+    with pytest.raises(
+        MeshError, match=r'\[cell.phases\] fibre = "Glas": no elements of that name; the file has "Epox'
+    ):
+        read(tmp_path / "a.msh", phases={"matrix": (1,), "fibre": ("Glas",)})
+
+
+def test_an_element_of_two_phases_is_refused(tmp_path):
+    calculix(tmp_path / "a.inp")
+    with pytest.raises(MeshError, match="is in 2 element sets: fibre, matrix"):
+        read(tmp_path / "a.inp", phases={"matrix": ("Ewhole",), "fibre": ("E_GLASS",)})
+
+
+def test_debonded_lines_have_any_name(tmp_path):
+    mesh = grid().with_curve(RIGHT_SIDE, "Crack")
+    mesh.write(tmp_path / "a.msh")
+    assert len(read(tmp_path / "a.msh", phases={"debonded": ("crack",)}).debonded_edges) == len(RIGHT_SIDE)
+    with pytest.raises(MeshError, match=r'debonded = "crak": no lines of that name; the file has "Crack"'):
+        read(tmp_path / "a.msh", phases={"debonded": ("crak",)})
+
+
+def test_concave_quadrilaterals_are_cut_where_both_halves_have_area(tmp_path):
+    calculix(tmp_path / "a.inp")
+    places = ("5.000000e-01,5.000000e-01", "3.000000e-01,7.000000e-01")
+    old, new = (f"\n{node(2, 2)},{place}" for place in places)
+    text = (tmp_path / "a.inp").read_text()
+    assert old in text
+    (tmp_path / "a.inp").write_text(text.replace(old, new))
+    mesh = read(tmp_path / "a.inp", phases={"matrix": ("e_resin",), "fibre": ("e_glass",)})
+    assert len(mesh.triangles) == 32 and areas(mesh.points, mesh.triangles).sum() == pytest.approx(1.0)
