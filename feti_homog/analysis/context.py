@@ -24,7 +24,7 @@ from feti_homog.runtime.progress import Progress
 from feti_homog.typing import Float
 
 if TYPE_CHECKING:
-    from feti_homog.analysis.tip_rates import TipRateRecorder
+    from feti_homog.analysis.tip_records import TipRateRecorder
 
 
 @dataclass
@@ -105,7 +105,7 @@ class AnalysisContext:
     @cached_property
     def tips(self) -> TipRateRecorder:
         """Records of the tips of debonded arcs."""
-        from feti_homog.analysis.tip_rates import TipRateRecorder  # perfectly bonded cells have no tips
+        from feti_homog.analysis.tip_records import TipRateRecorder  # perfectly bonded cells have no tips
 
         return TipRateRecorder(self.plane)
 

@@ -7,7 +7,7 @@ from typing import Any
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.registry import Analysis
 from feti_homog.analysis.result_records import LoadPoint
-from feti_homog.analysis.tip_rates import IN_PLANE_LOADS
+from feti_homog.analysis.tip_records import IN_PLANE_LOADS
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:

@@ -11,8 +11,7 @@ from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BondState, Equilibrium
-from feti_homog.interface.loads.load import Load
-from feti_homog.interface.loads.macroscopic import Macroscopic
+from feti_homog.interface.loads.load import Load, Macroscopic
 from feti_homog.interface.path.path_points import NO_ENERGIES, Energies, PathState, Point
 from feti_homog.results.checkpoint import Arrays
 

@@ -12,7 +12,6 @@ import numpy as np
 from feti_homog.analysis import stored_result
 from feti_homog.case import case as cases
 from feti_homog.case.cell_section import Cell
-from feti_homog.commands import listed_fibres
 from feti_homog.errors import CaseError
 from feti_homog.fibres.arrange import arrange
 from feti_homog.fibres.outlines.ellipses import Ellipses
@@ -35,7 +34,7 @@ def table(source: Path) -> str:
     Raises:
         CaseError, MeshError: the source is faulty, or a fibre is neither round nor an ellipse, or voids are not known.
     """
-    fibres = listed_fibres.read(source)
+    fibres = read(source)
     if fibres.lacks_voids:
         raise CaseError(f"{source}: has voids, which only a case of a table or of a random cell lists")
     ellipses, is_round = fibres.ellipses, fibres.ellipses.are_round

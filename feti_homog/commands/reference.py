@@ -7,8 +7,8 @@ import json
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from feti_homog.commands.output import print_product
 from feti_homog.petsc.option_table import help_text
+from feti_homog.runtime.standard_streams import print_product
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
@@ -31,14 +31,17 @@ def _keys(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
     section = arguments.section
     tables = on_root_only(comm, reference.tables if section is None else partial(reference.tables_of, section))
-    print_product(comm, reference.as_text(tables or []))
+    on_root_only(comm, print_product, reference.as_text(tables or []))
 
 
 def _schema(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.case.json_schema import json_schema
+    from feti_homog.parallel.mpi_errors import on_root_only
 
-    print_product(comm, json.dumps(json_schema(), indent=2))
+    on_root_only(comm, print_product, json.dumps(json_schema(), indent=2))
 
 
 def _options(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    print_product(comm, help_text())
+    from feti_homog.parallel.mpi_errors import on_root_only
+
+    on_root_only(comm, print_product, help_text())

@@ -1,4 +1,4 @@
-"""`feti-homog run CASE.toml --out DIR`: run a case and write its results."""
+"""`feti-homog run` and `check`: run a case file and write its results; validate it and print what would run."""
 
 from __future__ import annotations
 
@@ -8,13 +8,19 @@ from typing import TYPE_CHECKING, Any
 
 from feti_homog.api import folder
 from feti_homog.errors import CaseError
+from feti_homog.runtime.standard_streams import print_product
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
 
 
 def add(actions: argparse._SubParsersAction[Any]) -> None:
-    """Add the command to those of a parser."""
+    """Add the commands to those of a parser."""
+    _add_run(actions)
+    _add_check(actions)
+
+
+def _add_run(actions: argparse._SubParsersAction[Any]) -> None:
     parser = actions.add_parser("run", help="run a case file and write its results to a folder")
     parser.add_argument("case", type=Path, metavar="CASE.toml")
     parser.add_argument("--out", type=folder, required=True, metavar="DIR", help="folder of the results")
@@ -34,3 +40,16 @@ def _run(arguments: argparse.Namespace, comm: Intracomm) -> None:
         raise CaseError(f'--resume: only for [analysis] type = "path"; this case has "{case.analysis.type}"')
     on_root(comm, output_folder.usable, arguments.out)
     run(case, arguments.out, comm, arguments.quiet, arguments.resume)
+
+
+def _add_check(actions: argparse._SubParsersAction[Any]) -> None:
+    parser = actions.add_parser("check", help="validate a case file, mesh its cell and describe the run")
+    parser.add_argument("case", type=Path, metavar="CASE.toml")
+    parser.set_defaults(action=_check)
+
+
+def _check(arguments: argparse.Namespace, comm: Intracomm) -> None:
+    from feti_homog.parallel.mpi_errors import on_root_only
+    from feti_homog.sweep import description
+
+    on_root_only(comm, print_product, description.of_file(arguments.case, comm))

@@ -1,4 +1,4 @@
-"""`feti-homog sweep CASE.toml --out DIR`: run the cases of a file with [sweep]."""
+"""`feti-homog sweep` and `collect`: run the cases of a file with [sweep]; make their table and pictures."""
 
 from __future__ import annotations
 
@@ -7,21 +7,30 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from feti_homog.api import folder
-from feti_homog.commands.output import print_product
 from feti_homog.errors import CaseError
+from feti_homog.runtime.standard_streams import print_product, say
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
 
-HELP = (
+SWEEP_HELP = (
     "Expand the file into numbered cases, check all of them, and run them one after the other. Finished cases are "
     "skipped: the same command resumes. Failed cases are kept and reported at the end, with exit code 3."
+)
+COLLECT_HELP = (
+    "Write sweep.h5 and sweep.csv, with the inputs and outputs of all cases and their statistics over realisations, "
+    "and pictures of the varied outputs. The sweep may still be running: finished cases are collected."
 )
 
 
 def add(actions: argparse._SubParsersAction[Any]) -> None:
-    """Add the command to those of a parser."""
-    parser = actions.add_parser("sweep", help="run the cases of a file with [sweep]", description=HELP)
+    """Add the commands to those of a parser."""
+    _add_sweep(actions)
+    _add_collect(actions)
+
+
+def _add_sweep(actions: argparse._SubParsersAction[Any]) -> None:
+    parser = actions.add_parser("sweep", help="run the cases of a file with [sweep]", description=SWEEP_HELP)
     parser.add_argument("case", type=Path, metavar="CASE.toml", help="a case file with a section [sweep]")
     parser.add_argument("--out", type=folder, metavar="DIR", help="folder of the sweep, in which each case has its own")
     one = parser.add_mutually_exclusive_group()
@@ -48,10 +57,27 @@ def _sweep(arguments: argparse.Namespace, comm: Intracomm) -> None:
     sweep = on_root(comm, plan.load, arguments.case)
     if arguments.list:
         lines = on_root_only(comm, execute.list_cases, sweep, arguments.out) or []
-        return print_product(comm, "\n".join(lines))
+        on_root_only(comm, print_product, "\n".join(lines))
+        return
     on_root(comm, output_folder.usable, arguments.out)
     if arguments.index is None:
         group = comm.size if arguments.ranks_per_case is None else arguments.ranks_per_case
         execute.run_all(sweep, arguments.out, comm, group, arguments.retry, arguments.quiet)
     else:
         execute.run_one(sweep, arguments.index, arguments.out, comm, arguments.retry, arguments.quiet)
+
+
+def _add_collect(actions: argparse._SubParsersAction[Any]) -> None:
+    words = "make one table and pictures of the cases of a sweep's folder"
+    parser = actions.add_parser("collect", help=words, description=COLLECT_HELP)
+    parser.add_argument("directory", type=folder, metavar="DIR", help="--out of the sweep")
+    parser.add_argument("--no-pictures", action="store_true", help="make the tables alone")
+    parser.set_defaults(action=_collect)
+
+
+def _collect(arguments: argparse.Namespace, comm: Intracomm) -> None:
+    from feti_homog.parallel.mpi_errors import on_root_only
+    from feti_homog.sweep import collect
+
+    for line in on_root_only(comm, collect.collect, arguments.directory, not arguments.no_pictures) or []:
+        say(line)

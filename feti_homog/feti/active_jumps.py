@@ -7,7 +7,7 @@ from mpi4py import MPI
 
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace
 from feti_homog.feti.krylov import ActiveRows
-from feti_homog.feti.operators.dual_operator import DualOperator
+from feti_homog.feti.operators.interface_operators import DualOperator
 from feti_homog.feti.thresholds import CANCELLED, ROUNDING_MARGIN, SMALL_JUMP, ZERO_JUMP
 from feti_homog.parallel.distributed_arrays import allreduce_sum
 from feti_homog.typing import Float

@@ -13,7 +13,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace
-from feti_homog.feti.operators.dual_operator import DualOperator
+from feti_homog.feti.operators.interface_operators import DualOperator
 from feti_homog.feti.preconditioners.scaled import Preconditioner
 from feti_homog.feti.thresholds import FORCE_STALL_ITERATIONS, MAX_ITERATIONS, RTOL, STALL_ITERATIONS
 from feti_homog.parallel.distributed_arrays import allreduce_sum, scale_rows

@@ -21,14 +21,13 @@ from petsc4py import PETSc
 from feti_homog.fem.problem import PLANE, Problem
 from feti_homog.feti import factory
 from feti_homog.feti.active_jumps import ActiveJumps
-from feti_homog.feti.decomposition.interface_springs import GLUE, InterfaceSprings
-from feti_homog.feti.decomposition.jump_operator import JumpOperator
+from feti_homog.feti.decomposition.jump_operator import GLUE, InterfaceSprings, JumpOperator
 from feti_homog.feti.decomposition.shared_entities import SharedEntities
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.feti.krylov import ActiveRows, Krylov
-from feti_homog.feti.operators.dual_operator import DualOperator
 from feti_homog.feti.operators.implicit import CondensedLoads
+from feti_homog.feti.operators.interface_operators import DualOperator
 from feti_homog.feti.thresholds import DEFAULTS, MAX_RESTARTS, Thresholds
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.runtime import process_memory

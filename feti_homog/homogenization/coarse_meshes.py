@@ -13,7 +13,7 @@ from mpi4py import MPI
 from feti_homog.case import case as cases
 from feti_homog.case.case import Case
 from feti_homog.fibres.arrange import listed_arrangement
-from feti_homog.homogenization import tips
+from feti_homog.homogenization import arc_selection
 from feti_homog.mesh.coarse_mesh import CoarseMesh
 from feti_homog.mesh.fill.gmsh_mesher import begin
 from feti_homog.mesh.fill.unmeshed_cell import NodedCell, UnmeshedCell
@@ -67,8 +67,8 @@ def begin_mesh(case: Case, policy: TilePolicy) -> UnmeshedCell | NodedCell | Coa
     else:
         listed = listed_arrangement(case.cell)
         estimate = ElementEstimate.of(case.cell, listed)
-        cell = replace(case.cell, tip_size=tips.size(case, estimate))
-        found = begin(cell, listed, tips.marks(case, estimate.fibres), policy)
+        cell = replace(case.cell, tip_size=arc_selection.size(case, estimate))
+        found = begin(cell, listed, arc_selection.marks(case, estimate.fibres), policy)
     cases.check_phases(case, found.phases)
     return found
 

@@ -11,7 +11,7 @@ from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.partition import decompose, pieces_for_count, pieces_for_size
 from feti_homog.fibres.matched_arrangement import distance_of
 from feti_homog.fibres.outlines.ellipses import Ellipses
-from feti_homog.homogenization import arc_selection, interface_pairs, process_zone
+from feti_homog.homogenization import arc_selection, cell_remarks, process_zone
 from feti_homog.homogenization.arc_selection import InterfaceNodes
 from feti_homog.homogenization.cell_remarks import mesh_remarks, subdomain_remarks, table_remarks
 from feti_homog.interface.tips import debonded_arcs
@@ -142,7 +142,7 @@ class RankShare:
 
     Attributes:
         summary, table: of the whole cell.
-        pairs: (phases, phases) as in `interface_pairs.pairs_of`.
+        pairs: (phases, phases) as in `cell_remarks.pairs_of`.
         submeshes: those of the rank.
     """
 
@@ -162,11 +162,11 @@ def distribute(
     """
     torus = Torus.of(mesh)
     numbers, is_fibre = fibre_numbers(torus)
-    pairs = interface_pairs.pairs_of(case, mesh.phases)
+    pairs = cell_remarks.pairs_of(case, mesh.phases)
     circles = fibre_circles(torus)
     centres = in_cell(circles[:, :2], mesh.period)
     touching = (mesh.phase[each] for each in torus.sides[:2])
-    faults = interface_pairs.faults(case, mesh.phases, *touching) + arc_selection.fibre_faults(case, centres[is_fibre])
+    faults = cell_remarks.faults(case, mesh.phases, *touching) + arc_selection.fibre_faults(case, centres[is_fibre])
     moved = (debonded_arcs.NOT_MOVED,) * len(case.interfaces)
     if case.arcs and not faults:
         nodes = InterfaceNodes.of(torus, lattice, pairs, numbers, centres)

@@ -15,7 +15,7 @@ from mpi4py import MPI
 from feti_homog.case.case import Case
 from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.partition import assign_ranks, cut_into_pieces
-from feti_homog.homogenization import interface_pairs
+from feti_homog.homogenization import cell_remarks
 from feti_homog.homogenization.cell_remarks import subdomain_remarks, table_remarks
 from feti_homog.homogenization.coarse_meshes import deal_tiles, fill_own
 from feti_homog.homogenization.domain_partition import (
@@ -148,7 +148,7 @@ class TiledCell:
     """Facts for all ranks.
 
     Attributes:
-        pairs: (phases, phases) as in `interface_pairs.pairs_of`.
+        pairs: (phases, phases) as in `cell_remarks.pairs_of`.
         nesting: (constituents,) as in `Torus.nesting`.
         edges: (constituents,) coarse edges that each shares with others.
     """
@@ -168,7 +168,7 @@ def tiled_cell(case: Case, noded: NodedCell) -> TiledCell:
     # The last of `constituent` is the matrix, which is around where `around` is MATRIX, -1.
     inside, outside = regions.constituent[:-1], regions.constituent[around]
     solid = (inside >= 0) & (outside >= 0)
-    faults = interface_pairs.faults(case, regions.phases, regions.phase[inside[solid]], regions.phase[outside[solid]])
+    faults = cell_remarks.faults(case, regions.phases, regions.phase[inside[solid]], regions.phase[outside[solid]])
     if faults:
         raise CaseError(*faults)
     n = len(regions.phase)
@@ -180,7 +180,7 @@ def tiled_cell(case: Case, noded: NodedCell) -> TiledCell:
     shared = (beside >= 0).all(axis=0)
     count = np.diff(curves.first)[arcs] - 1
     edges = np.bincount(beside[:, shared].ravel(), np.tile(count[shared], 2), n).astype(np.int64)
-    return TiledCell(interface_pairs.pairs_of(case, regions.phases), nesting, edges)
+    return TiledCell(cell_remarks.pairs_of(case, regions.phases), nesting, edges)
 
 
 def tiles_to_fill(noded: NodedCell) -> list[NumberedTile]:

@@ -1,26 +1,124 @@
-"""What `feti-homog check` says of a file: that of a case, or of a sweep."""
+"""Text of `feti-homog check`: what a run of a case, or of the cases of a sweep, would do."""
 
 from __future__ import annotations
 
+import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from mpi4py import MPI
+
 from feti_homog.case import case as cases
+from feti_homog.case import element_sizes
+from feti_homog.case.case import Case
 from feti_homog.case.document import read_document
+from feti_homog.case.phase_names import COATING
 from feti_homog.case.sweep_section import SWEEP
-from feti_homog.homogenization.cell_description import describe
-from feti_homog.parallel.mpi_errors import on_root
+from feti_homog.errors import CaseError
+from feti_homog.feti import solver_plan
+from feti_homog.feti.decomposition.shared_entities import share_entities
+from feti_homog.feti.factory import database_options
+from feti_homog.feti.solver_plan import ProblemSizes, SolverOptions, SolverPlan
+from feti_homog.homogenization import cost_model, phase_laws, process_zone
+from feti_homog.homogenization.domain_partition import DEFAULT_POLICY, CellSummary
+from feti_homog.homogenization.unit_cell import cut
+from feti_homog.mesh.refinement import ReferenceLattice
+from feti_homog.parallel.mpi_errors import on_root, on_root_only
 from feti_homog.petsc.options import case_options
 from feti_homog.sweep import plan
+from feti_homog.sweep.plan import Sweep, case_names
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
 
 
-import json
+def describe(case: Case, comm: MPI.Intracomm) -> str:
+    """Describe a run of the case on these ranks; empty except on rank 0.  Collective.
 
-from feti_homog.errors import CaseError
-from feti_homog.sweep.plan import Sweep, case_names
+    Raises as `tear`.
+    """
+    lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
+    own = cut(case, lattice, comm, DEFAULT_POLICY)
+    constraints = share_entities(comm, own.submeshes, own.table, own.pairs, lattice).constraints
+    options = database_options()
+    loads = comm.gather((len(own.submeshes.index), len(own.submeshes.member)))
+    return on_root_only(comm, _described, case, own.summary, lattice, 2 * constraints, loads, options) or ""
+
+
+def _described(
+    case: Case,
+    summary: CellSummary,
+    lattice: ReferenceLattice,
+    multipliers: int,
+    loads: Sequence[tuple[int, int]],
+    options: SolverOptions,
+) -> str:
+    """Return the text of `describe`; `loads` are the subdomains and the coarse triangles of each rank."""
+    own = [subdomains for subdomains, _ in loads]
+    nodes = [triangles * lattice.intervals**2 // 2 for _, triangles in loads]
+    elements = summary.coarse_triangles * len(lattice.triangles)
+    problems = {problem.components: cost_model.applications(case, problem) for problem in phase_laws.problems(case)}
+    plan = _plan(case, summary, multipliers, max(problems.values()), options)
+    columns = multipliers if plan.preconditioner == "influence" else 0
+    taken = cost_model.estimate(nodes, own, summary.coarse_triangles, summary.bodies, problems, columns)
+    unresolved = process_zone.warnings(case, summary.width, summary.interface_edge)
+    lines = [
+        f"case       {case.name}: {case.analysis.type}, plane {case.analysis.plane}",
+        f"cell       {summary.width:g} x {summary.height:g}, phases {', '.join(summary.phases)}",
+        *([f"voids      {summary.voids}"] if summary.voids else []),
+        f"mesh       {summary.coarse_triangles} coarse triangles, {elements} "
+        f"elements of order {case.cell.order}, about {2 * sum(nodes)} degrees of freedom",
+        *(
+            [f"sizes      mesh_size = {case.cell.mesh_size:g}, refine = {case.cell.refine}, as asked for by {asked}"]
+            if (asked := element_sizes.asked(case.cell))
+            else []
+        ),
+        *([f"fibres     {summary.fibres}, numbered from 1"] if case.interface else []),
+        *_mix_lines(case, summary),
+        *_match_lines(case, summary),
+        f"tearing    {summary.bodies} bodies, {summary.subdomains} subdomains, {multipliers} multipliers",
+        f"solver     {plan.in_words}",
+        *(
+            f"rank {rank:<5} {count} subdomains, about {2 * n} degrees of freedom"
+            for rank, (count, n) in enumerate(zip(own, nodes, strict=True))
+        ),
+        *cost_model.estimate_lines(taken, len(loads)),
+        *(
+            [cost_model.fields_line(case, sum(nodes), elements, multipliers // 2, len(loads))]
+            if case.output.fields
+            else []
+        ),
+        *(f"warning    {warning}" for warning in (*case.warnings(), *summary.warnings(), *unresolved)),
+        *(f"remark     {remark}" for remark in (*case.remarks(), *summary.remarks)),
+        "the case is valid",
+    ]
+    return "\n".join(lines)
+
+
+def _plan(case: Case, summary: CellSummary, multipliers: int, applications: int, options: SolverOptions) -> SolverPlan:
+    """How the plane problem will be solved, if its operators are of the kind asked for; pieces are dense by default."""
+    dense = options.operator != "implicit"
+    sizes = ProblemSizes(
+        applications, summary.subdomains > summary.bodies, dense, dense, multipliers, COATING in case.materials
+    )
+    return solver_plan.choose(sizes, options)
+
+
+def _match_lines(case: Case, summary: CellSummary) -> list[str]:
+    if case.cell.match is None:
+        return []
+    words = "mean diameters, the distance of the distributions of nearest and second neighbours"
+    return [f"match      {case.cell.match.name}, to {summary.match_distance:.4f} {words}"]
+
+
+def _mix_lines(case: Case, summary: CellSummary) -> list[str]:
+    """How many fibres each phase of a mix has got, and how large they are."""
+    if case.cell.mix is None:
+        return []
+    phase, radii = summary.constituent_phase[summary.is_fibre], summary.radii[summary.is_fibre]
+    own = [(name, radii[phase == k]) for k, name in enumerate(summary.phases) if name in case.cell.mix]
+    return [f"mix        {', '.join(f'{len(r)} of {name}, mean radius {r.mean():.6g}' for name, r in own)}"]
 
 
 def of_file(path: Path, comm: Intracomm) -> str:

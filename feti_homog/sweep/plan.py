@@ -15,7 +15,7 @@ from feti_homog.case.case import Case
 from feti_homog.case.document import read_document, to_document
 from feti_homog.case.sweep_section import SWEEP
 from feti_homog.errors import CaseError
-from feti_homog.report.text.units import unit
+from feti_homog.report.text.table import unit
 from feti_homog.schema.wording import dotted_key, toml_value
 from feti_homog.sweep.points import Assignment, read_points
 

@@ -1,11 +1,14 @@
-"""All laws on all states of a folder of results, and how what was found is told."""
+"""All laws on all states of a folder of results, in a process of its own, and the text of the outcome."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import multiprocessing
+import signal
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -22,8 +25,48 @@ from feti_homog.verify.check_spatial import check_spatial
 from feti_homog.verify.check_summary import check_summary, check_tables
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.findings import Finding, Findings, checks
-from feti_homog.verify.own_process import in_own_process
 from feti_homog.verify.reading import ResultFiles, altered, opened
+
+T = TypeVar("T")
+PATIENCE = 300.0  # seconds
+
+
+def in_own_process(directory: Path, function: Callable[[Path], T], patience: float = PATIENCE) -> T:
+    """function(directory).
+
+    Raises:
+        CaseError: of the function, or its process crashed or took longer than `patience`.
+    """
+    context = multiprocessing.get_context("fork")
+    ours, theirs = context.Pipe(duplex=False)
+    process = context.Process(target=_send, args=(theirs, function, directory), daemon=True)
+    process.start()
+    theirs.close()
+    try:
+        if not ours.poll(patience):
+            raise CaseError(f"{directory}: its files are damaged: reading them does not come to an end")
+        answer = ours.recv()
+    except EOFError:
+        raise CaseError(f"{directory}: its files are damaged: HDF5 crashes on them") from None
+    finally:
+        process.kill()
+        process.join()
+    if isinstance(answer, CaseError):
+        raise answer
+    found: T = answer
+    return found
+
+
+def _send(end: Connection, function: Callable[[Path], T], directory: Path) -> None:
+    # The thread that listens for signals stays with the parent; Ctrl-C ends both.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_SETMASK, ())
+    try:
+        end.send(function(directory))
+    except CaseError as error:
+        end.send(error)
+    except MemoryError as error:
+        end.send(CaseError(f"{directory}: its files are damaged: {error}"))
 
 
 @dataclass(frozen=True)

@@ -136,7 +136,7 @@ def test_loose_tolerance(tmp_path):
     assert job.returncode == 3 and document["status"] == "not converged"
 
 
-DUAL_OPERATOR = "feti_homog.feti.operators.dual_operator:DualOperator.apply"
+DUAL_OPERATOR = "feti_homog.feti.operators.interface_operators:DualOperator.apply"
 
 
 @pytest.mark.parametrize(("ranks", "call"), [(1, 1), (3, 1), (3, 3)], ids=["alone", "outside PETSc", "in its callback"])

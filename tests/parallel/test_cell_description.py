@@ -8,10 +8,10 @@ import pytest
 from support.base_case import changed
 
 from feti_homog.case.case import Case
-from feti_homog.homogenization.cell_description import describe
 from feti_homog.homogenization.unit_cell import tear
 from feti_homog.petsc.options import case_options
 from feti_homog.runtime.progress import Progress
+from feti_homog.sweep.description import describe
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 

@@ -1,4 +1,4 @@
-"""The gluing constraints B of one rank, and their place in the distributed vector of multipliers.
+"""Gluing constraints B of one rank, their place in the vector of multipliers, and springs in place of glue.
 
 Of the k copies of a fine node, those within one body are glued in x and y by orthonormal contrasts and can never
 part.  A body, such as a fibre, and the one around it are glued by one pair of rows (n, t) between the means of their
@@ -9,6 +9,7 @@ force that the faces exert on each other: tension is positive.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
@@ -21,6 +22,30 @@ from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.thresholds import KEPT_EXCHANGES
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.typing import Float, Int
+
+
+@dataclass(frozen=True)
+class InterfaceSprings:
+    """Traction = stiffness x jump at every node that holds, in tension and compression.
+
+    Attributes:
+        stiffness: of each interface of the case stress per opening and per slip, or per slip along the fibre;
+            infinite ones are glue.
+        soften: their compliance may grow while the cell is loaded.
+    """
+
+    stiffness: tuple[tuple[float, ...], ...]
+    soften: bool = False
+
+    def compliance(self, jump_operator: JumpOperator) -> Float:
+        """(owned rows,) C = 1 / (k l) of the rows of interface nodes with the tributary lengths l, 0 of all others."""
+        nodes, C = jump_operator.nodes, np.zeros(jump_operator.owned[1] - jump_operator.owned[0])
+        for component, stiffness in enumerate(zip(*self.stiffness, strict=True)):
+            C[nodes.row + component] = 1.0 / (np.array(stiffness)[nodes.pair] * nodes.length)
+        return C
+
+
+GLUE = InterfaceSprings(())
 
 
 class JumpOperator:

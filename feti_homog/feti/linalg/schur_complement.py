@@ -6,7 +6,7 @@ import numpy as np
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
-from feti_homog.feti.linalg.factor_status import check_factor, mumps_error, power_of_two
+from feti_homog.feti.linalg.sparse_direct import check_factor, mumps_error, power_of_two
 from feti_homog.petsc import c_functions
 from feti_homog.typing import Float, Int
 

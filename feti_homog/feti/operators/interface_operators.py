@@ -1,4 +1,4 @@
-"""All subdomains of this rank as the dual problem sees them: through their boundary dofs."""
+"""All subdomains of this rank as the dual problem sees them, by their boundary dofs; the dual operator, Eq. (36)."""
 
 from __future__ import annotations
 
@@ -15,13 +15,37 @@ from feti_homog.errors import MeshError
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.shared_entities import SharedEntities
 from feti_homog.feti.decomposition.subdomain import Subdomain, label
-from feti_homog.feti.operators.boundary_operator import BoundaryOperator
 from feti_homog.feti.operators.choice import SubdomainSize, choose
 from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
 from feti_homog.feti.operators.implicit import ImplicitInterfaceOperator, Interior
-from feti_homog.feti.operators.with_springs import WithSprings, compliance_root
+from feti_homog.feti.operators.with_springs import BoundaryOperator, WithSprings, compliance_root
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
+from feti_homog.parallel.distributed_arrays import scale_rows
 from feti_homog.typing import Bool, Float, Int
+
+
+class DualOperator:
+    """y = (F + C) x.  Symmetric positive definite, since B has full row rank and K+ is definite.
+
+    Attributes:
+        compliance: (owned rows,) the diagonal C.
+    """
+
+    def __init__(self, jump_operator: JumpOperator, boundary: InterfaceOperators, compliance: Float) -> None:
+        self.jump_operator, self.boundary, self.compliance = jump_operator, boundary, compliance
+
+    def apply(self, x: Float) -> Float:
+        """Return sum_s B K+ B^T x + C x for x (owned rows,) or (owned rows, k)."""
+        return self.jump(self.displacement(x)) + scale_rows(self.compliance, x)
+
+    def displacement(self, lam: Float) -> Float:
+        """K+ B^T lam on the boundary dofs: minus the torn cell's answer to multipliers in Eq. (34)."""
+        return self.boundary.apply_flexibility(self.boundary.BT @ self.jump_operator.gather(lam))
+
+    def jump(self, u: Float) -> Float:
+        """B u, Eq. (33), for displacements u (boundary dofs,) or (boundary dofs, k)."""
+        return self.jump_operator.sum(self.boundary.B @ u)
+
 
 InterfaceOperator = ExplicitInterfaceOperator | ImplicitInterfaceOperator
 

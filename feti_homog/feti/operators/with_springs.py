@@ -1,4 +1,4 @@
-"""Boundary operators of a body with springs on its boundary, as the body around it sees them.
+"""Boundary operators of a subdomain: their protocol, and those of a body with springs on its boundary.
 
 At the far ends of the springs the flexibility is S+ + C, with C = T T^T, and the stiffness is
 
@@ -15,12 +15,45 @@ takes the place of the difference.
 
 from __future__ import annotations
 
+from typing import Protocol, TypeGuard
+
 import numpy as np
 from scipy.linalg import cho_solve, cholesky, solve_triangular
 from scipy.sparse import csr_matrix, diags
 
-from feti_homog.feti.operators.boundary_operator import BoundaryOperator, is_dense
 from feti_homog.typing import Bool, Float, Int
+
+
+class BoundaryOperator(Protocol):
+    """S and a generalized inverse S+ of one subdomain on its n boundary dofs.
+
+    Attributes:
+        is_dense: whether it is a `DenseOperator`.
+    """
+
+    is_dense: bool
+
+    def apply_schur(self, x: Float, out: Float | None = None) -> Float:
+        """S x for x (n,) or (n, k), into `out` if it is given."""
+
+    def apply_flexibility(self, x: Float, out: Float | None = None) -> Float:
+        """S+ x for x (n,) or (n, k), into `out` if it is given."""
+
+
+class DenseOperator(BoundaryOperator, Protocol):
+    """A boundary operator that has its matrix."""
+
+    @property
+    def S(self) -> Float:
+        """(n, n) S."""
+
+    def regularisation(self, P: csr_matrix) -> Float:
+        """(m, m) P^T A P for P (n, m), with an A that makes S + A definite."""
+
+
+def is_dense(operator: BoundaryOperator) -> TypeGuard[DenseOperator]:
+    """Return whether the operator is a `DenseOperator`."""
+    return operator.is_dense
 
 
 class _Softening:

@@ -10,8 +10,8 @@ from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.linalg.distributed_matrix import allreduce_sparse
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
 from feti_homog.feti.linalg.sparse_matrices import DenseBlockSum
-from feti_homog.feti.operators.boundary_operator import is_dense
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
+from feti_homog.feti.operators.with_springs import is_dense
 from feti_homog.parallel.distributed_arrays import share_columns
 from feti_homog.typing import Float
 

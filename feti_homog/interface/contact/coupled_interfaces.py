@@ -14,9 +14,7 @@ from mpi4py import MPI
 from feti_homog.feti.decomposition.constraint_layout import InterfaceNodes
 from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.states import BondState, Equilibrium
-from feti_homog.interface.loads.coupled_solution import CoupledSolution, Multipliers
-from feti_homog.interface.loads.load import Load
-from feti_homog.interface.loads.macroscopic import Macroscopic
+from feti_homog.interface.loads.load import CoupledSolution, Load, Macroscopic, Multipliers
 from feti_homog.typing import Float
 
 

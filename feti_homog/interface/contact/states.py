@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feti_homog.feti.dual_solution import DualSolution
-from feti_homog.interface.loads.coupled_solution import CoupledSolution, Multipliers
-from feti_homog.interface.loads.load import Load
+from feti_homog.interface.loads.load import CoupledSolution, Load, Multipliers
 from feti_homog.typing import Bool, Float
 
 Status = NDArray[np.int8]

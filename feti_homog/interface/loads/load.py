@@ -1,4 +1,4 @@
-"""Loads on a cell: strains, or the stresses that work on them."""
+"""Loads on a cell, strains or the stresses that work on them; macroscopic states, and solutions of all problems."""
 
 from __future__ import annotations
 
@@ -7,7 +7,82 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.typing import Bool, Float
+
+
+class Multipliers(tuple[Float, ...]):
+    """(owned rows,) multipliers of each problem, that of the plane first."""
+
+    __slots__ = ()
+
+    @property
+    def plane(self) -> Float:
+        """Multipliers in the plane."""
+        return self[0]
+
+    def towards(self, others: Multipliers, share: float) -> Multipliers:
+        """Multipliers after a share of the way to others."""
+        return Multipliers((1.0 - share) * a + share * b for a, b in zip(self, others, strict=True))
+
+
+@dataclass(frozen=True)
+class CoupledSolution:
+    """Solutions with the same bonds, `parts` of each problem, that of the plane first."""
+
+    parts: tuple[DualSolution, ...]
+
+    @property
+    def plane(self) -> DualSolution:
+        """The solution in the plane."""
+        return self.parts[0]
+
+    @property
+    def lam(self) -> Multipliers:
+        """Their multipliers."""
+        return Multipliers(each.lam for each in self.parts)
+
+    @property
+    def converged(self) -> bool:
+        """Return True if the Krylov method found all."""
+        return all(each.reason > 0 for each in self.parts)
+
+
+@dataclass(frozen=True)
+class Macroscopic:
+    """Strains E and the stresses Sigma that work on them, energy per area of the cell.
+
+    A change of temperature is a strain.
+
+    With the bonds as they are the cell stores E.Sigma / 2, and E'.Sigma = E.Sigma' of two states (Betti).
+
+    Attributes:
+        strain, stress: (n,).
+    """
+
+    strain: Float
+    stress: Float
+
+    @property
+    def stored(self) -> float:
+        """E.Sigma / 2."""
+        return 0.5 * float(self.strain @ self.stress)
+
+    def scaled(self, factor: float) -> Macroscopic:
+        """Return the state under `factor` times the load."""
+        return Macroscopic(factor * self.strain, factor * self.stress)
+
+    def load(self, by_stress: Bool) -> Load:
+        """Return the load that holds the state, with these (n,) components given by their stress."""
+        return Load(np.where(by_stress, self.stress, self.strain), by_stress)
+
+    def released_to(self, after: Macroscopic) -> float:
+        """Return the energy lost by a break at constant load: 1/2 (E'.Sigma - E.Sigma'), with ' after the break.
+
+        It is the work less the change of stored energy; at constant strain 1/2 E.(Sigma - Sigma').
+        """
+        return 0.5 * float(after.strain @ self.stress - self.strain @ after.stress)
+
 
 # What is smaller than this, relative to its values at the ends of its leg, is what rounding leaves of zero.
 LOAD_ROUNDING = 1e-13

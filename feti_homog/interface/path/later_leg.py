@@ -15,9 +15,7 @@ from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.floating_bodies import admissible_share, shares_to_zero
 from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, Equilibrium
 from feti_homog.interface.laws.bond_law import BISECTIONS, BondLaw
-from feti_homog.interface.loads.coupled_solution import CoupledSolution
-from feti_homog.interface.loads.load import Load
-from feti_homog.interface.loads.macroscopic import Macroscopic
+from feti_homog.interface.loads.load import CoupledSolution, Load, Macroscopic
 from feti_homog.interface.path.path_points import (
     NO_ENERGIES,
     UTILISATION_TIE,

@@ -11,8 +11,7 @@ from mpi4py import MPI
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BONDED, BondState, Equilibrium
 from feti_homog.interface.laws.bond_law import BondLaw
-from feti_homog.interface.loads.coupled_solution import Multipliers
-from feti_homog.interface.loads.macroscopic import Macroscopic
+from feti_homog.interface.loads.load import Macroscopic, Multipliers
 from feti_homog.typing import Bool, Float
 
 # Bonds whose utilisation differs by no more than this, relatively, break together: those of a symmetric cell do, but

@@ -8,8 +8,7 @@ from typing import Any
 
 from feti_homog.report.text.analyses import reported
 from feti_homog.report.text.summary import checks, title_of
-from feti_homog.report.text.table import Column, Table
-from feti_homog.report.text.units import in_brackets
+from feti_homog.report.text.table import Column, Table, in_brackets
 
 MOST_ROWS, NOTEBOOK_ROWS = 60, 20  # of a table of points
 

@@ -12,8 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
 
-from feti_homog.microstructure.pair_functions import SECTORS
-from feti_homog.microstructure.statistics import FibreStatistics
+from feti_homog.microstructure.statistics import SECTORS, FibreStatistics
 from feti_homog.report.plots.plot_helpers import STYLE, plain, save
 from feti_homog.typing import Float
 

@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.microstructure.pair_functions import SECTORS
-from feti_homog.microstructure.statistics import FibreStatistics
+from feti_homog.microstructure.statistics import SECTORS, FibreStatistics
 from feti_homog.microstructure.voronoi_cells import VoronoiCells
 from feti_homog.results import atomic
 from feti_homog.typing import Array, Float

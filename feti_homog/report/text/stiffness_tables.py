@@ -9,8 +9,7 @@ from typing import Any
 
 from feti_homog.case.phase_names import COATING
 from feti_homog.materials.voigt import SPATIAL_STRESSES, STRAINS, voigt_names
-from feti_homog.report.text.table import Column, Table, number
-from feti_homog.report.text.units import with_unit
+from feti_homog.report.text.table import Column, Table, number, with_unit
 
 NAMES = Column("", -28)
 STIFF = ("C11", "C22", "C33")

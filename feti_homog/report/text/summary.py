@@ -11,7 +11,7 @@ from typing import Any
 from feti_homog.case.element_sizes import ASKED
 from feti_homog.report.text.analyses import reported
 from feti_homog.report.text.point_tables import WIDTH
-from feti_homog.report.text.units import in_brackets
+from feti_homog.report.text.table import in_brackets
 
 LABEL = 12  # columns of the labels at the left
 NAME = 28  # columns of the names of checks

@@ -16,7 +16,7 @@ import numpy as np
 from feti_homog.materials.bounds import Moduli
 from feti_homog.materials.spatial_constants import EngineeringConstants, TransverselyIsotropic
 from feti_homog.materials.voigt import voigt_names
-from feti_homog.report.text.units import unit, with_unit
+from feti_homog.report.text.table import unit, with_unit
 from feti_homog.results import atomic
 from feti_homog.results.csv_tables import Column, columns
 from feti_homog.runtime.records import STRESS

@@ -10,7 +10,7 @@ from support import coated_cells
 from unit.case.test_interface_pairs import Case, document
 from unit.mesh.faulty_meshes import grid
 
-from feti_homog.homogenization import interface_pairs
+from feti_homog.homogenization import cell_remarks
 from feti_homog.mesh.mesh_fibres import fibre_numbers
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.readers.msh_reader import read
@@ -56,5 +56,5 @@ def test_a_coating_without_a_fibre_is_a_fibre(tmp_path):
 )
 def test_pairs_that_the_cell_does_not_have_are_told(coated, pair, words):
     case = Case.parse(document({"normal_strength": 1.0, "between": pair}))
-    (fault,) = interface_pairs.faults(case, coated.phases, *(coated.phase[each] for each in Torus.of(coated).sides[:2]))
+    (fault,) = cell_remarks.faults(case, coated.phases, *(coated.phase[each] for each in Torus.of(coated).sides[:2]))
     assert fault.startswith("[interface] between = [") and words in fault

@@ -7,7 +7,7 @@ import pytest
 from support.fibre_patterns import hexagonal_lattice, square_lattice
 
 from feti_homog.microstructure.neighbour_match import nearest_neighbours
-from feti_homog.microstructure.pair_functions import SECTORS, distances, pair_directions, pair_functions
+from feti_homog.microstructure.statistics import SECTORS, distances, pair_directions, pair_functions
 from feti_homog.microstructure.voronoi_cells import voronoi_cells
 
 SQUARE = [(1.0, 4), (np.sqrt(2), 4), (2.0, 4), (np.sqrt(5), 8), (np.sqrt(8), 4), (3.0, 4), (np.sqrt(10), 8)]

@@ -11,7 +11,7 @@ import pytest
 from matplotlib.image import imread
 from scipy import stats
 
-from feti_homog.report.text.units import unit, with_unit
+from feti_homog.report.text.table import unit, with_unit
 from feti_homog.sweep.report import figures, moduli, tables
 from feti_homog.sweep.report.outputs import numbers, outputs
 from feti_homog.sweep.report.sweep_table import Statistics, SweepTable, series_over

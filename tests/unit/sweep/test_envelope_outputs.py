@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from feti_homog.report.text.units import unit
+from feti_homog.report.text.table import unit
 from feti_homog.sweep.report.outputs import outputs
 
 

@@ -7,12 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mpi4py import MPI
-from scipy.sparse import diags, kronsum
+from scipy.sparse import csr_matrix, diags, kronsum
 
+from feti_homog.feti.linalg.dense_cholesky import check_lapack, cholesky, invert_upper
 from feti_homog.feti.linalg.distributed_matrix import assemble_owned_rows
 from feti_homog.feti.linalg.distributed_solver import DistributedSolver
-from feti_homog.feti.linalg.sparse_direct import DirectSolver
+from feti_homog.feti.linalg.schur_complement import schur_complement
+from feti_homog.feti.linalg.sparse_direct import DirectSolver, power_of_two
 from feti_homog.feti.linalg.sparse_matrices import DenseBlockSum
+from feti_homog.petsc.options import case_options
 from feti_homog.runtime import process_memory
 
 PAGE, MEGABYTE = 4096, 2**20
@@ -84,3 +87,135 @@ def test_sum_of_blocks_does_not_depend_on_the_buffer():
             blocks.add(rows, columns, values)
             expected[np.ix_(rows, columns)] += values
         np.testing.assert_allclose(blocks.matrix().toarray(), expected, atol=1e-12)
+
+
+SMALL, LARGE = 3, 40  # rows of grids of which CHOLMOD makes simplicial and supernodal factors
+LIBRARIES = ["cholmod", "mumps", "petsc"]
+# The first is a power of four, of which also the root has the same digits.
+SCALES = [2.0**-300, 2.0**-301, 2.0**301]
+
+
+def grid(n):
+    """(n^2, n^2) a definite matrix."""
+    line = diags([-1.0, 2.1, -1.0], [-1, 0, 1], (n, n))
+    return csr_matrix(kronsum(line, line))
+
+
+def spoilt(n, value):
+    """Return a matrix with another diagonal entry in the middle."""
+    A = grid(n).tolil()
+    A[n * n // 2, n * n // 2] = value
+    return csr_matrix(A)
+
+
+def with_zero_row(value):
+    """Return a grid with an entry of its own."""
+    A = grid(SMALL).tolil()
+    A[4], A[:, 4] = 0.0, 0.0
+    A[4, 4] = value
+    return csr_matrix(A)
+
+
+WRONG = {
+    "indefinite": csr_matrix([[1.0, 2.0], [2.0, 1.0]]),
+    "negative": csr_matrix(-np.eye(3)),
+    "small grid": spoilt(SMALL, -1.0),
+    "large grid": spoilt(LARGE, -1.0),
+    "singular": csr_matrix(np.ones((2, 2))),
+    "no number": spoilt(SMALL, np.nan),
+    "infinite": spoilt(SMALL, np.inf),
+}
+
+
+def options(library, prefix="feti_sub_"):
+    return case_options({f"{prefix}pc_factor_mat_solver_type": library})
+
+
+def of_all_ranks(matrix, right):
+    """Solved by the solver of all ranks, on one."""
+    solver = DistributedSolver(MPI.COMM_SELF, len(right), "feti_natural_")
+    solver.factor(np.arange(len(right)), matrix)
+    return solver.solve(right)
+
+
+@pytest.mark.parametrize("library", LIBRARIES)
+@pytest.mark.parametrize("name", WRONG)
+def test_every_library_refuses_a_matrix_that_is_not_definite(library, name):
+    with options(library), pytest.raises(np.linalg.LinAlgError):
+        DirectSolver(WRONG[name].copy(), "feti_sub_")
+
+
+@pytest.mark.parametrize("library", ["mumps", "petsc"])
+def test_triangular_factors_of_other_kinds_may_exchange_pivots(library):
+    """LU needs no definite matrix."""
+    A = np.random.default_rng(1).standard_normal((200, 200))
+    A, x = csr_matrix(A + A.T), np.cos(np.arange(200.0))
+    with options(library), case_options({"feti_sub_pc_type": "lu"}):
+        np.testing.assert_allclose(DirectSolver(A, "feti_sub_").solve(A @ x), x, atol=1e-9)
+
+
+@pytest.mark.parametrize("library", LIBRARIES)
+@pytest.mark.parametrize("name", WRONG)
+def test_the_solver_of_all_ranks_refuses_it(library, name):
+    A = WRONG[name]
+    with options(library, "feti_natural_"), pytest.raises(np.linalg.LinAlgError):
+        DistributedSolver(MPI.COMM_SELF, A.shape[0], "feti_natural_").factor(np.arange(A.shape[0]), A)
+
+
+def test_pivots_that_mumps_would_replace_are_refused():
+    """Where it condenses it replaces pivots below about 1e-16, and only counts them."""
+    rows = np.array([0, 8])
+    with pytest.raises(np.linalg.LinAlgError, match=r"nearly singular \(MUMPS: INFOG\(25\) = 1 "):
+        schur_complement(with_zero_row(1e-18), rows)
+    schur_complement(with_zero_row(1e-12), rows)
+
+
+@pytest.mark.parametrize(("value", "words"), [(-1.0, "not positive definite"), (np.nan, "not finite")])
+def test_no_schur_complement_of_an_interior_that_is_not_definite(value, words):
+    A = spoilt(SMALL, value)
+    before = A.data.copy()
+    with pytest.raises(np.linalg.LinAlgError, match=words):
+        schur_complement(A, np.array([0, 8]))
+    assert np.array_equal(A.data, before, equal_nan=True)
+
+
+@pytest.mark.parametrize("scale", SCALES)
+@pytest.mark.parametrize("n", [SMALL, LARGE])
+def test_a_power_of_two_changes_no_digit(scale, n):
+    A, b = grid(n), np.cos(np.arange(n * n))
+    rows, B = np.arange(0, n * n, n), np.stack([b, b[::-1], b**2], axis=1)
+    assert (schur_complement(scale * A, rows) == scale * schur_complement(A, rows)).all()
+    for right in (b, B):
+        assert (
+            DirectSolver(scale * A, "feti_sub_").solve(right) == DirectSolver(A, "feti_sub_").solve(right) / scale
+        ).all()
+        for library in LIBRARIES:
+            with options(library, "feti_natural_"):
+                assert (of_all_ranks(scale * A, right) == of_all_ranks(A, right) / scale).all()
+
+
+def test_scales_are_powers_of_two():
+    for size in (1.0, 1.5, 3.0, 1e-200, 1e200, 5e-324):
+        scale = power_of_two(np.array([-9.0, 0.0, size]))
+        assert np.frexp(scale)[0] == 0.5 and (1.0 <= size * scale < 2.0 or size < 1e-300)
+    assert power_of_two(np.zeros(2)) == power_of_two(np.zeros(0)) == 1.0
+
+
+@pytest.mark.parametrize("place", [(0, 0), (4, 4), (4, 0)])
+def test_lapack_refuses_what_is_no_number(place):
+    """Its own info is 0."""
+    A = np.asfortranarray(np.eye(5))
+    A[place] = A[place[::-1]] = np.nan
+    for refused in (lambda: cholesky(A.copy("F")), lambda: invert_upper(A.copy("F"))):
+        with pytest.raises(np.linalg.LinAlgError):
+            refused()
+
+
+def test_info_of_lapack_is_read():
+    check_lapack("dpotrf", 0)
+    with pytest.raises(np.linalg.LinAlgError, match="dpotrf: LAPACK info 3"):
+        check_lapack("dpotrf", 3)
+    with pytest.raises(ValueError, match="argument 2 is illegal"):
+        check_lapack("dtrtri", -2)
+    with pytest.raises(np.linalg.LinAlgError, match="LAPACK info 2"):
+        cholesky(np.array([[1.0, 2.0], [2.0, 1.0]], order="F"))

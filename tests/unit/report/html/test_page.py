@@ -16,7 +16,8 @@ import pytest
 from support.sample_output import in_space, sample
 
 from feti_homog.errors import CaseError
-from feti_homog.report.html import page, states, tables
+from feti_homog.report.html import page, tables
+from feti_homog.report.html.page import TRIANGLES, viewer_data
 from feti_homog.report.plots.decimation import drawn_mesh, nodal_values, triangle_means
 from feti_homog.report.text.summary import checks
 from feti_homog.results import result_json
@@ -178,7 +179,7 @@ def test_the_viewer_draws_the_fields(tmp_path: Path) -> None:
     """Displacements to 1 / 32767 of the largest, stresses to 1 / 255 of their range."""
     with h5py.File(written(tmp_path, path()) / "result.h5", "a") as file:
         file["state/1/status"][0] = 2  # then no two kinds of nodes are as many
-        shown, drawn = states.viewer_data(file, path()), drawn_mesh(file, states.TRIANGLES)
+        shown, drawn = viewer_data(file, path()), drawn_mesh(file, TRIANGLES)
         for number, state in enumerate(shown["states"]):
             steps = np.frombuffer(base64.b64decode(state["displacement"]), "<i2").reshape(-1, 2)
             exact = nodal_values(file[f"state/{number}/displacement"], drawn)

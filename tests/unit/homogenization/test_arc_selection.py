@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from feti_homog.case import case as cases
-from feti_homog.homogenization import tips
+from feti_homog.homogenization import arc_selection
 from feti_homog.mesh.sizes.element_estimate import ElementEstimate, triangles_of_a_tip
 
 CELL = {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.05}
@@ -28,7 +28,7 @@ def case_of(kind="stiffness", values=None, arcs=({"fibre": "all", "angle": 120.0
 
 
 def size_of(case):
-    return tips.size(case, ElementEstimate.of(case.cell, None))
+    return arc_selection.size(case, ElementEstimate.of(case.cell, None))
 
 
 @pytest.mark.parametrize("order", [1, 2])

@@ -8,7 +8,7 @@ import signal
 import pytest
 
 from feti_homog.errors import CaseError
-from feti_homog.verify.own_process import in_own_process
+from feti_homog.verify.certificate import in_own_process
 
 
 def crash(_):
