@@ -14,10 +14,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from figures import EQUATION_38, add_output_options, written
+from figures import EQUATION_38, add_output_options, computed, written
 from mpi4py.MPI import Intracomm
 
-from feti_homog import Case, launch, run
+from feti_homog import Case, launch
 
 # C11, C12, C33 of Fourier solutions whose truncations agree to 2e-9.
 REFERENCE = {
@@ -59,7 +59,7 @@ def stiffness(arguments: argparse.Namespace, comm: Intracomm, geometry: str, pla
         "analysis": {"type": "stiffness", "plane": plane},
         "output": written(arguments),
     }  # fmt: skip
-    return run(Case.parse(document), comm, out=arguments.out / name).effective_stiffness
+    return computed(comm, Case.parse(document), arguments.out / name).effective_stiffness
 
 
 def draw(fractions: Sequence[float], sweep: Sequence[Any], path: Path) -> Path:

@@ -21,7 +21,7 @@ import numpy as np
 from figures import INK
 from mpi4py.MPI import Intracomm
 
-from feti_homog import Case, Result, launch, run
+from feti_homog import Case, Result, launch
 
 MATERIAL = {"matrix": {"young": 2790.0, "poisson": 0.33}, "fibre": {"young": 70800.0, "poisson": 0.22}}  # MPa
 NORMAL, TANGENTIAL, TOUGHNESS, SENSITIVITY = 2025.0, 506.25, 2.0, 0.25  # MPa/um, MPa/um, J/m2, 1
@@ -90,7 +90,7 @@ def solved(given: argparse.Namespace, comm: Intracomm, radius: float, **sections
         "interface": springs | sections.get("interface", {}),
     }
     kind = sections["analysis"]["type"]
-    return run(Case.parse(document), comm, out=given.out / f"{kind}_{radius:g}_um")
+    return figures.computed(comm, Case.parse(document), given.out / f"{kind}_{radius:g}_um")
 
 
 def exact_onset(radius: float) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import csv
+import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -67,7 +68,17 @@ def solved(
     }
     output = written(options) | rest.pop("output", {})
     case = Case.parse({"name": name, "cell": cell, "material": dict(material), "output": output, **rest})
-    return run(case, comm, out=options.out / name.replace(" ", "_"), fields=keep_fields)
+    return computed(comm, case, options.out / name.replace(" ", "_"), keep_fields)
+
+
+def computed(comm: Intracomm, case: Case, folder: Path, keep_fields: bool = False) -> Result:
+    """Return the result of a case, on every rank, and print on rank 0 how long it took."""
+    start = time.perf_counter()
+    result = run(case, comm, out=folder, fields=keep_fields)
+    if comm.rank == 0:
+        points = f", {len(result.path)} points" if result.path else ""
+        print(f"  {folder.name}: {time.perf_counter() - start:.1f} s{points}", flush=True)
+    return result
 
 
 def tabulate(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> Path:

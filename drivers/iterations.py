@@ -10,10 +10,10 @@ import sys
 import time
 from pathlib import Path
 
-from figures import EQUATION_38
+from figures import EQUATION_38, computed
 from mpi4py.MPI import Intracomm
 
-from feti_homog import Case, launch, run
+from feti_homog import Case, launch
 
 
 def main(arguments: argparse.Namespace, comm: Intracomm) -> None:
@@ -33,7 +33,7 @@ def main(arguments: argparse.Namespace, comm: Intracomm) -> None:
             "petsc": {"feti_ksp_rtol": 1e-10},
         }  # fmt: skip
         start = time.perf_counter()
-        solver = run(Case.parse(document), comm, out=arguments.out / f"refine_{refine}").solver
+        solver = computed(comm, Case.parse(document), arguments.out / f"refine_{refine}").solver
         seconds = time.perf_counter() - start
         if comm.rank == 0:
             counts = ", ".join(map(str, solver.iterations))

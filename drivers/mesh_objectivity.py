@@ -21,7 +21,7 @@ import numpy as np
 from figures import INK
 from mpi4py.MPI import Intracomm
 
-from feti_homog import Case, Result, launch, run
+from feti_homog import Case, Result, launch
 
 MATERIAL = {"matrix": {"young": 2790.0, "poisson": 0.33}, "fibre": {"young": 70800.0, "poisson": 0.22}}  # MPa
 RADIUS, FRACTION = 7.5, 0.4  # um
@@ -69,7 +69,7 @@ def solved(given: argparse.Namespace, comm: Intracomm, bonds: str, refine: int) 
         "path": {"strain": [AT[-1] * ONSET, 0.0, 0.0]},
         "output": figures.written(given) | {"stress_unit": "MPa", "length_unit": "um"},
     }
-    return run(Case.parse(document), comm, out=given.out / f"{bonds}_{refine}")
+    return figures.computed(comm, Case.parse(document), given.out / f"{bonds}_{refine}")
 
 
 def element(result: Result) -> float:

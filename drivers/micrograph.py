@@ -19,7 +19,7 @@ import numpy as np
 from figures import INK
 from mpi4py.MPI import Intracomm
 
-from feti_homog import Case, Result, launch, run
+from feti_homog import Case, Result, launch
 from feti_homog.microstructure.fibre_pattern import FibrePattern
 from feti_homog.microstructure.voronoi_cells import voronoi_cells
 
@@ -61,7 +61,7 @@ def solved(
         "output": figures.written(given) | {"stress_unit": "MPa", "length_unit": "um"},
         **sections,
     }
-    return run(Case.parse(document), comm, out=given.out / analysis, fields=keep_fields)
+    return figures.computed(comm, Case.parse(document), given.out / analysis, keep_fields)
 
 
 def local_fractions(result: Result) -> np.ndarray:

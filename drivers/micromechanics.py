@@ -21,7 +21,7 @@ from figures import INK
 from mpi4py.MPI import Intracomm
 from numpy.typing import NDArray
 
-from feti_homog import Case, Result, launch, run
+from feti_homog import Case, Result, launch
 
 EPOXY = {"young": 3.45, "poisson": 0.35, "expansion": 54e-6}
 GLASS = {"poisson": 0.22, "expansion": 5e-6}
@@ -71,7 +71,7 @@ def solved(
         "analysis": {"type": "stiffness", "plane": "generalized"},
         "output": figures.written(given),
     }
-    return run(Case.parse(document), comm, out=given.out / name.replace(" ", "_"))
+    return figures.computed(comm, Case.parse(document), given.out / name.replace(" ", "_"))
 
 
 def row(constants: Any) -> NDArray[np.float64]:

@@ -17,7 +17,7 @@ import numpy as np
 from figures import INK
 from mpi4py.MPI import Intracomm
 
-from feti_homog import Case, Result, launch, run
+from feti_homog import Case, Result, launch
 
 MATERIAL = {  # MPa, 1/K
     "matrix": {"young": 2790.0, "poisson": 0.33, "expansion": 60e-6},
@@ -68,7 +68,7 @@ def solved(given: argparse.Namespace, comm: Intracomm, test: str, temperature: f
         "path": {"waypoints": [*cooling, {strain: end}]},
         "output": figures.written(given) | {"stress_unit": "MPa", "length_unit": "um"},
     }
-    return run(Case.parse(document), comm, out=given.out / f"{test}_{abs(temperature):g}K")
+    return figures.computed(comm, Case.parse(document), given.out / f"{test}_{abs(temperature):g}K")
 
 
 def curve(result: Result, component: int) -> np.ndarray:

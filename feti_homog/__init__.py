@@ -52,6 +52,10 @@ __all__ = [
 HOMES = {"Result": "analysis.result", "Case": "case.case"}
 
 
+def __dir__() -> list[str]:
+    return [*__all__]
+
+
 def __getattr__(name: str) -> Any:
     """Import a public name on first access, so that `feti-homog` starts at once and `verify` loads no analysis."""
     if name not in __all__:

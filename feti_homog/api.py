@@ -48,7 +48,7 @@ def run(
         out: a folder for the files that `feti-homog run` writes; without it none is written.
         fields: whether `result.fields` has mesh, interface and states in memory, each rank its part.
         resume: with `out`, go on from where a path to the same folder was ended.
-        quiet: print nothing; else, with `out`, what the command line prints.
+        quiet: print nothing; else what the command line prints.
 
     Raises:
         TypeError: `case` is not a Case.
@@ -63,7 +63,7 @@ def run(
     from feti_homog.analysis import runner
 
     if out is None:
-        return runner.compute(case, comm, fields)
+        return runner.compute(case, comm, fields, quiet)
     return runner.run(case, folder(out), comm, quiet, resume, fields)
 
 

@@ -36,7 +36,7 @@ class AnalysisContext:
         checks: those of all responses so far.
         states: where the states that are kept go.
         checkpoint: where the events of a path go; `resume` goes on from it.
-        log: called with a line about each event of a path.
+        log: called with a line about each event of a path; `events` is where all of them are.
         undetermined: of every point under one load, the strains that nothing determines.
     """
 
@@ -47,6 +47,7 @@ class AnalysisContext:
     checkpoint: Checkpoint
     resume: bool = False
     log: Callable[[str], object] = lambda line: None
+    events: str = "result.path"
     undetermined: list[list[str]] = field(default_factory=list)
 
     @classmethod

@@ -19,7 +19,6 @@ from feti_homog.homogenization.averaging import Response
 from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.path.path_following import events, increments
 from feti_homog.interface.path.path_points import Energies, Point, unloaded
-from feti_homog.results import event_log
 from feti_homog.results.kept_points import kept
 from feti_homog.results.path_peak import marks, peak_of
 from feti_homog.runtime.progress import Progress
@@ -45,7 +44,7 @@ def follow(context: AnalysisContext, path: LoadPath, law: BondLaw) -> dict[str, 
     """
     known = _known(context)
     work, entries, last = Work(), list[dict[str, Any]](), None
-    with EventProgress(context.progress, BARS[path.method], event_log.NAME) as shown:
+    with EventProgress(context.progress, BARS[path.method], context.events) as shown:
         for number, (point, energies) in enumerate(_points(context, path, law, known)):
             responses = context.loads.responses(point.state, point.scale)
             source = "" if energies is None else ", from the checkpoint"

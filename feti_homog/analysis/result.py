@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 Part = TypeVar("Part", MeshPart, FibrePart, InterfacePart, StatePart)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Fields:
     """This rank's part of the fields; `gathered` has all of them.
 
@@ -58,6 +58,9 @@ class Fields:
     fibres: FibrePart
     interface: InterfacePart
     states: tuple[StatePart, ...]
+
+    def __repr__(self) -> str:
+        return f"Fields({len(self.mesh.points)} nodes, {len(self.mesh.triangles)} elements, {len(self.states)} states)"
 
     def gathered(self) -> Fields | None:
         """Return the fields of all ranks as one part, on rank 0; None on the others. Collective."""
@@ -81,7 +84,7 @@ def _gathered(comm: Intracomm, part: Part) -> Part | None:
     return replace(part, **whole)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)  # arrays have no single answer to "equal"
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)  # arrays have no single answer to "equal"
 class Result:
     """The result of a case, the same on every rank but for `fields`.
 
@@ -240,6 +243,9 @@ class Result:
         if not self.path or not path_curves.is_proportional(document):
             raise ValueError("only a path of one leg, followed by events, has a first drop")
         return path_curves.first_drop(document["path"])
+
+    def __repr__(self) -> str:
+        return f"Result({self.case.get('name', '')!r}, {self.case['analysis']['type']}, {self.status})"
 
     # Most runs print neither: the tables are imported by those that do.
     def __str__(self) -> str:

@@ -51,10 +51,7 @@ def run(
             that another run writes to.
         ConvergenceError: after what was computed has been written, marked as such.
     """
-    progress = Progress(comm, quiet)
-    for label, lines in (("warning", case.warnings()), ("remark", case.remarks())):
-        for line in lines:
-            progress.say(f"{label}: {line}")
+    progress = _begun(case, comm, quiet)
     if resume and on_root(comm, stored_result.finished, directory, case):
         progress.say(f"{directory} holds the finished result of this case: nothing to do")
         return Result.of(on_root(comm, result_json.read, directory))
@@ -69,23 +66,39 @@ def run(
     return result
 
 
-def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False) -> Result:
-    """Return the case's result on every rank, without a file or a word. Collective.
+def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False, quiet: bool = True) -> Result:
+    """Return the case's result on every rank, without a file. Collective.
 
     Raises:
         CaseError, MeshError: the case cannot be run.
         ConvergenceError: a solve did not converge or a check failed.
     """
-    progress = Progress(comm, quiet=True)
+    progress = _begun(case, comm, quiet)
     with _torn(case, comm, progress) as cell:
         states = StateRecorder(cell, None, keep_fields, progress.say)
         context = AnalysisContext.of(cell, progress, states)
         if keep_fields or context.plane.law.has_toughness:
             context = replace(context, checkpoint=EventsInMemory(comm))
+        _warn(context)
         result = result_builder.result(context, _analyse(context), states.kept())
+    _print_summary(result, progress)
     if result.faults:
         raise ConvergenceError(*result.faults)
     return result
+
+
+def _begun(case: Case, comm: MPI.Intracomm, quiet: bool) -> Progress:
+    """Return the progress of a run, after the warnings and remarks about its case."""
+    progress = Progress(comm, quiet)
+    for label, lines in (("warning", case.warnings()), ("remark", case.remarks())):
+        for line in lines:
+            progress.say(f"{label}: {line}")
+    return progress
+
+
+def _warn(context: AnalysisContext) -> None:
+    for warning in context.warnings():
+        context.progress.say(f"warning: {warning}")
 
 
 @contextmanager
@@ -112,9 +125,9 @@ def _run_and_write(cell: TornCell, directory: Path, progress: Progress, resume: 
     with file or nullcontext(), closing(EventLog(directory, cell.comm, cell.case.name, progress.say)) as log:
         states = StateRecorder(cell, file, keep_fields, progress.say)
         context = AnalysisContext.of(cell, progress, states)
-        context = replace(context, checkpoint=_checkpoint(cell, directory), resume=resume, log=log.write)
-        for warning in context.warnings():
-            progress.say(f"warning: {warning}")
+        context = replace(context, checkpoint=_checkpoint(cell, directory), resume=resume)
+        context = replace(context, log=log.write, events=event_log.NAME)
+        _warn(context)
         analysis = _analyse(context)
         seal = states.seal()
         if states.error is not None and not keep_fields:

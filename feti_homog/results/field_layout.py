@@ -92,7 +92,7 @@ class InterfacePart:
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class StatePart:
     """One load case or state of the cell and this rank's part of its fields."""
 
@@ -121,6 +121,10 @@ class StatePart:
         "(k, 3)",
     )
     status: AnyInt = described("0 bonded, 1 closed (debonded, in contact), 2 open", shape="(k,)", dtype="int8")
+
+    def __repr__(self) -> str:
+        sizes = f"{len(self.displacement)} nodes, {len(self.stress)} elements, {len(self.status)} interface nodes"
+        return f"{type(self).__name__}({self.label!r}, {sizes})"
 
 
 GROUPS = {"mesh": MeshPart, "fibre": FibrePart, "interface": InterfacePart, GROUP_OF_STATES: StatePart}
@@ -177,7 +181,7 @@ def items_of(part: type, group: str, views: Iterable[View]) -> Iterator[Item]:
         yield Item(f"/{view.path(group)}", "dataset", shape, d.dtype, d.unit, view.words)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class SpatialStatePart(StatePart):
     """A load case of generalized plane strain and this rank's part of its fields, which do not vary along x3 but for
     the displacement E33 x3."""

@@ -21,7 +21,7 @@ from feti_homog.typing import Array, Float
 from feti_homog.verify.constitutive_law import out_of_plane
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ViewedState:
     """One state on its mesh: the cell, or the interface as points.
 
@@ -37,6 +37,9 @@ class ViewedState:
     nodes: Mapping[str, Array]
     elements: Mapping[str, Array]
     label: str
+
+    def __repr__(self) -> str:
+        return f"ViewedState({self.label!r}, {len(self.points)} nodes, {len(self.cells)} cells)"
 
 
 def read_state(directory: str | Path, state: int = 0) -> ViewedState:

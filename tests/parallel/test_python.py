@@ -64,6 +64,7 @@ def test_fields(comm, shared_path):
     fields = result.fields
     assert [state.label for state in fields.states] == ["E11", "E22", "gamma12"]
     assert len(fields.mesh.points) == len(fields.states[0].displacement)
+    assert all(len(repr(each)) < 100 for each in (result, fields, fields.states[0]))
     parallel_assert(comm, comm.allreduce(len(fields.mesh.triangles)) == result.cell.elements)
     whole = fields.gathered()
     assert (whole is None) == (comm.rank > 0)
@@ -100,6 +101,17 @@ def test_with_files(comm, shared_path):
     assert [rising[name][1] for name in names[1:]] == pytest.approx(result.path[0].stress)
     with pytest.raises(ValueError, match="path of one leg"):
         run(with_fraction(0.4), comm).rising_strain()
+
+
+def test_not_quiet_prints_what_the_command_line_prints(comm, capsys):
+    case = with_fraction(0.4, geometry="square")
+    run(case, comm)
+    silent = capsys.readouterr().out
+    result = run(case, comm, quiet=False)
+    said = capsys.readouterr().out
+    stages = all(f"\n{stage} " in f"\n{said}" for stage in ("mesh", "factor", "solve"))
+    whole = stages and said.strip().endswith("done") and f"{result.effective_stiffness[0, 0]:.4f}"[:5] in said
+    parallel_assert(comm, not silent and (whole if comm.rank == 0 else not said), said)
 
 
 @pytest.mark.parametrize("growth", ["released", "springs"])
