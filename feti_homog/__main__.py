@@ -7,8 +7,7 @@ import sys
 from feti_homog.errors import FetiHomogError
 from feti_homog.runtime import limits
 from feti_homog.runtime.environment import prepare
-from feti_homog.runtime.interrupts import launched_rank
-from feti_homog.runtime.standard_streams import complain
+from feti_homog.runtime.standard_streams import complain, launched_rank
 
 
 def main() -> int:

@@ -18,7 +18,7 @@ from feti_homog.petsc.option_table import unknown_to_petsc
 from feti_homog.petsc.option_values import faulty_values
 from feti_homog.runtime import standard_streams
 from feti_homog.runtime.environment import ignore_settings_of_the_folder, prefer_own_toolkits
-from feti_homog.runtime.interrupts import end_on_signals, launched_rank
+from feti_homog.runtime.standard_streams import end_on_signals, launched_rank
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

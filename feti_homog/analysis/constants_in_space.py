@@ -11,8 +11,7 @@ from feti_homog.case.phase_names import COATING
 from feti_homog.homogenization import bonds
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.materials.estimates.constituents import Fibres, Springs
-from feti_homog.materials.estimates.fibre_bounds import fibre_bounds
-from feti_homog.materials.estimates.methods import estimates
+from feti_homog.materials.estimates.methods import estimates, fibre_bounds
 from feti_homog.materials.laws import expansion, spatial_stiffness
 from feti_homog.materials.spatial_constants import (
     TransverselyIsotropic,

@@ -23,6 +23,8 @@ from feti_homog.typing import Float, Int
 EMPTY = np.zeros(0)
 # Loads under which energy release rates are known; "strain" is a given one.
 IN_PLANE_LOADS = (*STRAINS, "strain")
+# Directions of nodes differ by rounding from rank to rank, and so would their order.
+DIRECTION_DIGITS = 9
 
 
 class TipRateRecorder:
@@ -62,10 +64,6 @@ class TipRateRecorder:
             length=length,
             interface=tuple((pair + 1).astype(int).tolist()) if several else None,
         )
-
-
-# Directions of nodes differ by rounding from rank to rank, and so would their order.
-DIRECTION_DIGITS = 9
 
 
 def bond_directions(cell: TornCell) -> Float:

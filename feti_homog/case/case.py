@@ -15,9 +15,8 @@ from feti_homog.case.asked import AnalysisSection, Stiffness
 from feti_homog.case.cell_files import with_files, with_match
 from feti_homog.case.cell_section import GEOMETRY, TOUCHING, Cell, size_faults
 from feti_homog.case.document import read_document, to_document
-from feti_homog.case.envelope_section import Envelope
 from feti_homog.case.interface_section import Arc, InterfaceSection, interface_tables, read_interfaces
-from feti_homog.case.load_section import LoadPath, SingleLoad, expansion_faults, load_faults, stress_free
+from feti_homog.case.load_section import Envelope, LoadPath, SingleLoad, expansion_faults, load_faults, stress_free
 from feti_homog.case.material_sections import (
     coating_faults,
     missing_expansions,
@@ -34,6 +33,7 @@ from feti_homog.case.sections import (
     REQUIRED,
     SECTIONS,
     SECTIONS_OF_AN_ANALYSIS,
+    SWEEP,
     TOP_LEVEL,
     Analysis,
     Angle,
@@ -41,7 +41,6 @@ from feti_homog.case.sections import (
     Output,
 )
 from feti_homog.case.selectors import ANALYSIS_TYPE, CRITERION, METHOD, PLANE
-from feti_homog.case.sweep_section import SWEEP
 from feti_homog.errors import CaseError
 from feti_homog.materials.forms import Isotropic, Material
 from feti_homog.materials.laws import contrast_faults, contrast_warnings

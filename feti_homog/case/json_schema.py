@@ -17,9 +17,8 @@ from feti_homog.case.mixed_load import TEMPERATURE, MixedLoad
 from feti_homog.case.petsc_section import PREFIXED
 from feti_homog.case.phase_names import COATING, FIBRE, MATRIX, PHASE
 from feti_homog.case.rules import PLACES_OF_LOADS, PLACES_OF_TABLES, RULES
-from feti_homog.case.sections import REQUIRED, SECTIONS, TOP_LEVEL
+from feti_homog.case.sections import AXIS_MEANING, RANGE_KEYS, REQUIRED, SECTIONS, SWEEP, TOP_LEVEL, SweepSection
 from feti_homog.case.selectors import GENERALIZED, PLANE
-from feti_homog.case.sweep_section import AXIS_MEANING, RANGE_KEYS, SWEEP, SweepSection
 from feti_homog.materials.forms import EXPANSION_PAIR, MATERIAL_FORMS
 from feti_homog.materials.laws import NEEDED
 from feti_homog.schema.keys import Condition, Key, defaults_of, keys_of

@@ -9,8 +9,16 @@ from dataclasses import dataclass
 from typing import Any
 
 from feti_homog.case.petsc_section import OPTION_EXPECTED
-from feti_homog.case.sections import SECTIONS_OF_AN_ANALYSIS, TABLES, Table
-from feti_homog.case.sweep_section import AXIS_EXPECTED, AXIS_MEANING, RANGE_KEYS, SWEEP, SweepSection
+from feti_homog.case.sections import (
+    AXIS_EXPECTED,
+    AXIS_MEANING,
+    RANGE_KEYS,
+    SECTIONS_OF_AN_ANALYSIS,
+    SWEEP,
+    TABLES,
+    SweepSection,
+    Table,
+)
 from feti_homog.errors import CaseError
 from feti_homog.materials.forms import Isotropic
 from feti_homog.schema.keys import Key, keys_of

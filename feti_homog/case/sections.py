@@ -1,4 +1,4 @@
-"""The sections of a case file: which keys they have, what each accepts, and what it means."""
+"""Sections of a case file, [sweep] among them: their keys, accepted values and meanings."""
 
 from __future__ import annotations
 
@@ -7,15 +7,64 @@ from typing import Any
 
 from feti_homog.case.asked import AnalysisSection
 from feti_homog.case.cell_section import Cell
-from feti_homog.case.envelope_section import Envelope
 from feti_homog.case.interface_section import Arc, InterfaceSection, Scatter
-from feti_homog.case.load_section import LoadPath, SingleLoad
+from feti_homog.case.load_section import Envelope, LoadPath, SingleLoad
 from feti_homog.case.mixed_load import MixedLoad, Strain
-from feti_homog.case.section_values import OPENINGS, STATES, STRAIN
+from feti_homog.case.section_values import OPENINGS, SEED, STATES, STRAIN
 from feti_homog.case.selectors import ANGLE_ANALYSIS, ENVELOPE_ANALYSIS, IN_THE_PLANE, LOAD_ANALYSIS, PATH_ANALYSIS
 from feti_homog.materials.forms import MATERIAL_FORMS
-from feti_homog.schema.keys import key, keys_of
+from feti_homog.schema.keys import Key, key, keys_of
 from feti_homog.schema.values import boolean, choice, integer, real, text
+
+SWEEP = "sweep"
+MAX_CASES = 20_000
+
+AXIS_EXPECTED = "a list of values, or a range {from, to} with step, with count, or with samples in [sweep]"
+AXIS_MEANING = (
+    "Values of any key of the file, instead of or beside the one in its section. A list of tables for a section is "
+    'merged into it: cell = [{geometry = "square"}, {geometry = "random", fibres = 30}]; further keys of that section '
+    'are then quoted: "cell.refine" = [0, 1].'
+)
+
+
+RANGE_KEYS = {
+    "from": Key(real(), "First value, below the last.", required=True),
+    "to": Key(real(), "Last value.", required=True),
+    "step": Key(real(above=0.0), "Distance of the values, at most to - from; of linear ranges."),
+    "count": Key(
+        integer(least=2, most=MAX_CASES),
+        "Number of values, both ends included. Without step and count, samples in [sweep] gives the number.",
+    ),
+    "scale": Key(choice("linear", "log"), '"log": values of even ratios, from a number above 0.', default='"linear"'),
+}
+"""A range is no dataclass: `from` is a word of Python's."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SweepSection:
+    """Many cases in one file: keys that vary, each with its values, and how these are combined."""
+
+    mode: str = key(
+        choice("grid", "zip"),
+        '"grid": all combinations, the last key in the file fastest; "zip": first values with first, second with '
+        "second.",
+        default="grid",
+    )
+    samples: int | None = key(
+        integer(least=1, most=MAX_CASES),
+        "Number of points in the box of the ranges that have neither step nor count.",
+        default=None,
+    )
+    sampling: str = key(
+        choice("latin", "random"), '"latin": a Latin hypercube; "random": independent points.', default="latin"
+    )
+    seed: int = key(SEED, "Seed of the samples.", default=0)
+    realisations: int | None = key(
+        integer(least=1, most=MAX_CASES),
+        "Arrangements of each point with a random cell; the k-th has the seed [cell] seed + k - 1 at all points.",
+        default=None,
+    )
+
 
 OUT_OF_PLANE_STRESSES = ("S33", "S23", "S13")
 

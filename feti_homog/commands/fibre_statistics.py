@@ -1,9 +1,14 @@
-"""`feti-homog statistics`: how the fibres of a table, a result or a case are placed."""
+"""Text of `feti-homog statistics`, the placement of the fibres of a table, a result or a case, and its tables."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from feti_homog.case.fibre_window import read_window
 from feti_homog.case.phase_names import VOID
@@ -11,11 +16,125 @@ from feti_homog.commands import listed_fibres
 from feti_homog.errors import CaseError
 from feti_homog.fibres.hard_core import hard_core
 from feti_homog.microstructure.fibre_pattern import FibrePattern
-from feti_homog.microstructure.statistics import measure, poisson
-from feti_homog.report.text import statistics_text
+from feti_homog.microstructure.statistics import SECTORS, FibreStatistics, measure, poisson
+from feti_homog.microstructure.voronoi_cells import VoronoiCells
 from feti_homog.results import atomic, output_folder
+from feti_homog.typing import Array, Float
 
+ORDINALS = ("nearest", "second", "third")
+LEVEL = 0.05  # of the test of randomness
 MODELS = {"hard-core": hard_core, "poisson": poisson}
+
+
+def text(found: FibreStatistics, model: str, simulations: int) -> str:
+    """Return a line for each quantity; lengths in the unit of the fibres' table, and in mean diameters."""
+    pattern, cells = found.pattern, found.cells
+    kind = "periodic cell" if pattern.periodic else "window, corrected for its edges,"
+    size = 2 * pattern.mean_radius
+    lines = [
+        ("fibres", f"{pattern.count} in a {kind} of {pattern.width:.6g} x {pattern.height:.6g}"),
+        ("fibre fraction", f"{pattern.fibre_fraction:.4f}"),
+        ("radii", _spread(pattern.radii)),
+        ("smallest gap", f"{pattern.smallest_gap:.4g}, {pattern.smallest_gap / size:.3f} mean diameters"),
+        *_neighbours(found, size),
+        ("local fractions", _local_fractions(cells)),
+        ("directions", _directions(found.directions)),
+        ("randomness", _randomness(found, model, simulations)),
+    ]
+    return "\n".join(f"{name:<16}{words}" for name, words in lines)
+
+
+def _spread(values: Float) -> str:
+    return f"{values.mean():.4g} +- {values.std():.2g}, from {values.min():.4g} to {values.max():.4g}"
+
+
+def _local_fractions(cells: VoronoiCells) -> str:
+    known = cells.fractions[cells.whole]
+    if not len(known):
+        return "undetermined: the window is too small"
+    limits = f"from {known.min():.4g} to {known.max():.4g}"
+    return f"{cells.mean_fraction:.4g} +- {cells.fraction_deviation:.2g}, {limits}, in {len(known)} Voronoi cells"
+
+
+def _neighbours(found: FibreStatistics, size: float) -> list[tuple[str, str]]:
+    near = found.neighbours
+    return [
+        (f"{name} centre", f"{mean:.4g} +- {deviation:.2g}, {mean / size:.3f} +- {deviation / size:.3f} mean diameters")
+        if np.isfinite(mean)
+        else (f"{name} centre", "undetermined: the window is too small")
+        for name, mean, deviation in zip(ORDINALS, near.means, near.deviations, strict=True)
+    ]
+
+
+def _directions(shares: Float) -> str:
+    angle = int(shares.argmax()) * 180 / SECTORS
+    return f"{shares.min():.2f} to {shares.max():.2f} times as many near pairs as evenly, most about {angle:g} degrees"
+
+
+def _randomness(found: FibreStatistics, model: str, simulations: int) -> str:
+    value = found.random.p_value
+    verdict = "indistinguishable from it" if value > LEVEL else f"not one of its patterns at {100 * LEVEL:g} %"
+    if 1 / (simulations + 1) > LEVEL:
+        verdict = f"too few simulations for a level of {100 * LEVEL:g} %"
+    return f"L(r) beside {simulations} simulations of the model {model}: p = {value:.3g}, {verdict}"
+
+
+def write(directory: Path, found: FibreStatistics) -> list[Path]:
+    """Write the three tables; returns their paths.  On one rank.  Raises FetiHomogError if they cannot be written."""
+    tables = {
+        "fibre_statistics.csv": fibre_columns(found),
+        "pair_functions.csv": pair_columns(found),
+        "pair_directions.csv": {"angle": np.arange(SECTORS) * 180 / SECTORS, "relative_share": found.directions},
+    }
+    return [atomic.replace(directory / name, partial(_write, columns)) for name, columns in tables.items()]
+
+
+def fibre_columns(found: FibreStatistics) -> dict[str, Array]:
+    """Return a row for each fibre: its three nearest neighbours with the weights of their distances, and its
+    Voronoi cell."""
+    pattern, near, cells = found.pattern, found.neighbours, found.cells
+    columns: dict[str, Array] = {
+        "number": np.arange(1, pattern.count + 1),
+        "x": pattern.centres[:, 0],
+        "y": pattern.centres[:, 1],
+        "radius": pattern.radii,
+    }
+    for k in range(near.distances.shape[1]):
+        columns |= {
+            f"distance_{k + 1}": near.distances[:, k],
+            f"direction_{k + 1}": near.directions[:, k],
+            f"weight_{k + 1}": near.weights[:, k],
+        }
+    return columns | {
+        "voronoi_area": cells.areas,
+        "local_fraction": cells.fractions,
+        "cell_weight": cells.weights,
+    }
+
+
+def pair_columns(found: FibreStatistics) -> dict[str, Array]:
+    """Return a row for each distance r between centres: g, K and L, and L of the simulations."""
+    pairs, random = found.pairs, found.random
+    return {
+        "r": pairs.r,
+        "g": pairs.radial,
+        "K": pairs.ripley_k,
+        "L": pairs.ripley_l,
+        "L_random_mean": random.mean,
+        "L_random_low": random.low,
+        "L_random_high": random.high,
+    }
+
+
+def _write(columns: Mapping[str, Array], path: Path) -> None:
+    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+    lines = [",".join(columns), *(",".join(map(_cell, row)) for row in rows)]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _cell(value: Any) -> str:
+    """Return a number as Python reads it back; nothing for one that is not there."""
+    return repr(value) if np.isfinite(value) else ""
 
 
 def run(
@@ -33,13 +152,13 @@ def run(
     if out is not None:
         output_folder.usable(out)
     found = measure(fibres, MODELS[model], simulations)
-    lines = [statistics_text.text(found, model, simulations)]
+    lines = [text(found, model, simulations)]
     if out is not None:
         from feti_homog.report.plots import statistics_picture
 
         out.mkdir(parents=True, exist_ok=True)
         atomic.remove_abandoned(out, re.compile(r"[a-z_]+\.(csv|png)"))
-        paths = statistics_text.write(out, found)
+        paths = write(out, found)
         paths.append(statistics_picture.write(out, found, source.stem, model))
         lines += map(str, paths)
     return lines

@@ -10,8 +10,7 @@ from typing import Any
 
 from feti_homog.api import folder
 from feti_homog.errors import EXIT_DEFECT, EXIT_DONE, EXIT_UNCONVERGED, FetiHomogError
-from feti_homog.runtime.interrupts import end_on_signals, launched_rank
-from feti_homog.runtime.standard_streams import complain, prepare, print_product
+from feti_homog.runtime.standard_streams import complain, end_on_signals, launched_rank, prepare, print_product
 
 HELP = (
     "Recompute stresses, equilibrium, periodicity, averages, contact, strengths and energies from result.json and "

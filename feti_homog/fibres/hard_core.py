@@ -15,6 +15,9 @@ from feti_homog.typing import Float, Int
 RADIUS_EXCESS = 1e-3
 # Steps of the descent after which an arrangement counts as jammed; found ones take less than 200.
 MAX_STEPS = 2000
+ATTEMPTS = 3
+# Area fraction of discs grown by half the gap above which there are no random patterns.
+DENSEST = 0.9
 
 
 def relax(centres: Float, radii: Float, max_steps: int, size: tuple[float, float] = (1.0, 1.0)) -> tuple[Float, float]:
@@ -41,11 +44,6 @@ def relax(centres: Float, radii: Float, max_steps: int, size: tuple[float, float
 def _sum_at(rows: Int, vectors: Float, count: int) -> Float:
     """Return sums (count, 2) of the vectors (k, 2) of each row, added one after the other."""
     return np.stack([np.bincount(rows, vectors[:, axis], count) for axis in (0, 1)], axis=1)
-
-
-ATTEMPTS = 3
-# Area fraction of discs grown by half the gap above which there are no random patterns.
-DENSEST = 0.9
 
 
 def hard_core(pattern: FibrePattern, generator: np.random.Generator, max_steps: int = MAX_STEPS) -> FibrePattern:

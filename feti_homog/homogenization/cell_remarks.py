@@ -12,6 +12,8 @@ from feti_homog.mesh.submesh import pinned_class
 from feti_homog.schema.wording import toml_value
 from feti_homog.typing import AnyInt, Int
 
+SAME_FRACTION = 0.01  # of a matched table and its cell, relative
+
 
 def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:
     """(phases, phases) symmetric: the place among the case's interfaces of that between two phases, -1 where there is
@@ -46,9 +48,6 @@ def faults(case: Case, phases: tuple[str, ...], left: AnyInt, right: AnyInt) -> 
         elif not touching[tuple(map(phases.index, interface.between))]:
             found.append(f"{line}expected phases that touch; in this cell they do nowhere")
     return found
-
-
-SAME_FRACTION = 0.01  # of a matched table and its cell, relative
 
 
 def mesh_remarks(case: Case, torus: Torus, pairs: Int) -> tuple[str, ...]:

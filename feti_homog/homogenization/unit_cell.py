@@ -32,8 +32,8 @@ from feti_homog.mesh.coarse_mesh import CoarseMesh
 from feti_homog.mesh.fill.unmeshed_cell import NodedCell
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.mesh.submesh import SubmeshesOfRank
+from feti_homog.parallel.distributed_arrays import scatter
 from feti_homog.parallel.mpi_errors import agree, on_root_only
-from feti_homog.parallel.objects import scatter
 from feti_homog.runtime.progress import Progress
 from feti_homog.typing import Bool, Float, Int
 

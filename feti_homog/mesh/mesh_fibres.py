@@ -15,6 +15,13 @@ from feti_homog.mesh.periodic_topology import Torus, components, edge_pairs
 from feti_homog.mesh.submesh import Submesh, cut_bodies
 from feti_homog.typing import Bool, Float, Int
 
+# Relative to the radius: circles nearer than this are images of one.
+SAME_CIRCLE = 1e-9
+# Relative to the longer semi-axis: ellipses with centres nearer than this are images of one, or one within another.
+SAME_CENTRE = 1e-9
+# Relative to the longer semi-axis: coatings whose thicknesses along both differ by less are of one.
+SAME_LENGTH = 1e-6
+
 
 def unwrap(submesh: Submesh) -> tuple[Float, bool]:
     """Shift of each coarse triangle to its unwrapped position, and whether the walk closes.
@@ -61,10 +68,6 @@ def _part_shifts(submesh: Submesh, part: Int) -> Float:
                 shifts[q] = np.round((shifts[p] + jump) / submesh.period) * submesh.period
                 queue.append(q)
     return shifts
-
-
-# Relative to the radius: circles nearer than this are images of one.
-SAME_CIRCLE = 1e-9
 
 
 def fibre_circles(torus: Torus) -> Float:
@@ -120,10 +123,6 @@ def _centre_of_area(submesh: Submesh) -> Float:
     return np.asarray(np.r_[np.average(middles, axis=0, weights=weights), np.nan])
 
 
-# Relative to the longer semi-axis: ellipses with centres nearer than this are images of one, or one within another.
-SAME_CENTRE = 1e-9
-
-
 def fibre_frames(torus: Torus) -> Float:
     """(constituents, 2, 2) frame F of the ellipse c + F p, |p| = 1, around each fibre, of a coating the outer one.
 
@@ -149,10 +148,6 @@ def fibre_frames(torus: Torus) -> Float:
     known = ~is_other & (torus.constituent_phase[bodies] > 0)
     frames[bodies[known]] = outer.frames[known]
     return frames
-
-
-# Relative to the longer semi-axis: coatings whose thicknesses along both differ by less are of one.
-SAME_LENGTH = 1e-6
 
 
 def fibre_numbers(torus: Torus) -> tuple[Int, Bool]:

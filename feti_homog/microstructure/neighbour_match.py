@@ -12,6 +12,13 @@ from scipy.spatial import cKDTree
 from feti_homog.microstructure.fibre_pattern import FibrePattern
 from feti_homog.typing import Float, Int
 
+# Nearest and second nearest.
+SHELLS = 2
+# Moves that are tried: for each fibre, and in all.
+MOVES_OF_A_FIBRE, MOST_MOVES = 100, 40_000
+# A distance of distributions, in mean diameters, at which no more moves are tried.
+CLOSE = 0.002
+
 
 @dataclass(frozen=True)
 class NearestNeighbours:
@@ -87,14 +94,6 @@ def _weights(pattern: FibrePattern, distances: Float) -> Float:
     raw = np.where(counts & (inner > 0), 1 / np.where(inner > 0, inner, 1.0), 0.0)
     total = raw.sum(axis=0)
     return np.asarray(raw / np.where(total > 0, total, 1.0))
-
-
-# Nearest and second nearest.
-SHELLS = 2
-# Moves that are tried: for each fibre, and in all.
-MOVES_OF_A_FIBRE, MOST_MOVES = 100, 40_000
-# A distance of distributions, in mean diameters, at which no more moves are tried.
-CLOSE = 0.002
 
 
 def knows_neighbours(measured: FibrePattern) -> bool:

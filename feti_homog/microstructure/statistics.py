@@ -18,6 +18,8 @@ FAR = 10.0
 # Steps of the distance, in mean radii.
 STEP = 0.2
 SECTORS = 12
+# Pairs whose directions are measured are at most so many mean nearest distances apart.
+NEAR = 1.5
 
 
 @dataclass(frozen=True)
@@ -123,10 +125,6 @@ def envelope(
     deviation = np.abs(every - every.mean(axis=0)).max(axis=1)
     p_value = np.count_nonzero(deviation >= deviation[0] * (1 - 1e-12)) / (count + 1)
     return Envelope(simulated.min(axis=0), simulated.max(axis=0), simulated.mean(axis=0), float(p_value))
-
-
-# Pairs whose directions are measured are at most so many mean nearest distances apart.
-NEAR = 1.5
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,23 @@ from pathlib import Path
 from feti_homog.petsc.option_table import DIRECT_PREFIXES, OPTIONS
 from feti_homog.runtime import input_files
 
+Value = str | int | float | bool
+TRUE, FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
+LARGEST_INTEGER = 2**31 - 1  # of a PETSc with 32-bit integers
+VIEWER = re.compile(r"(ascii)?(:(?P<file>[^:]*)(:(default|ascii_\w+)?(:(write|append))?)?)?")
+FLAGS = (
+    *("feti_view", "malloc_debug", "malloc_test", "log_view_memory", "log_view_gpu_time"),
+    *("options_left", "skip_petscrc", "on_error_abort", "on_error_mpiabort", "no_signal_handler"),
+)
+VIEWERS = (
+    *(option.name for option in OPTIONS if not option.value and option.name != "feti_view"),
+    *(f"feti_ksp_{name}" for name in ("monitor_true_residual", "monitor_singular_value", "view_final_residual")),
+    *(f"feti_ksp_{name}" for name in ("converged_rate", "view_eigenvalues", "view_rhs", "view_solution")),
+    "log_view",
+    "options_view",
+)
+"""Flags that print, whose value may say where."""
+
 
 def can_be_written(file: str) -> bool:
     """Return whether a file of this name can be opened for writing: there is one that can, or a folder for it.
@@ -39,13 +56,6 @@ def _has_reader(pipe: str) -> bool:
     except OSError:
         return False
     return True
-
-
-Value = str | int | float | bool
-
-TRUE, FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
-LARGEST_INTEGER = 2**31 - 1  # of a PETSc with 32-bit integers
-VIEWER = re.compile(r"(ascii)?(:(?P<file>[^:]*)(:(default|ascii_\w+)?(:(write|append))?)?)?")
 
 
 @dataclass(frozen=True)
@@ -151,18 +161,6 @@ PRINTS = Rule(
 SHARE = _real("a number above 0 and below 1", lambda number: 0.0 < number < 1.0)
 NOT_NEGATIVE = _real("a number of at least 0", lambda number: 0.0 <= number < math.inf)
 
-FLAGS = (
-    *("feti_view", "malloc_debug", "malloc_test", "log_view_memory", "log_view_gpu_time"),
-    *("options_left", "skip_petscrc", "on_error_abort", "on_error_mpiabort", "no_signal_handler"),
-)
-VIEWERS = (
-    *(option.name for option in OPTIONS if not option.value and option.name != "feti_view"),
-    *(f"feti_ksp_{name}" for name in ("monitor_true_residual", "monitor_singular_value", "view_final_residual")),
-    *(f"feti_ksp_{name}" for name in ("converged_rate", "view_eigenvalues", "view_rhs", "view_solution")),
-    "log_view",
-    "options_view",
-)
-"""Flags that print, whose value may say where."""
 
 # With a relative tolerance of 1 or more nothing is solved.
 RULES: dict[str, Rule] = {

@@ -11,6 +11,13 @@ from pathlib import Path
 
 from feti_homog.errors import LibraryError
 
+SETTINGS = {
+    "OMP_NUM_THREADS": "1",  # one core per rank: threads of BLAS would compete with the ranks
+    "H5PY_ALWAYS_USE_MPI": "1",  # Debian has a serial h5py beside the parallel one
+    "OMPI_MCA_btl_vader_single_copy_mechanism": "none",  # containers forbid the default of Open MPI 4
+    "OMPI_MCA_smsc": "^cma",  # and of Open MPI 5
+}
+
 
 def prefer_own_toolkits() -> None:
     """Let `mpl_toolkits` be found beside the `matplotlib` that will be imported; Matplotlib itself is not imported.
@@ -43,14 +50,6 @@ def ignore_settings_of_the_folder() -> None:
     finally:
         os.fchdir(here)
         os.close(here)
-
-
-SETTINGS = {
-    "OMP_NUM_THREADS": "1",  # one core per rank: threads of BLAS would compete with the ranks
-    "H5PY_ALWAYS_USE_MPI": "1",  # Debian has a serial h5py beside the parallel one
-    "OMPI_MCA_btl_vader_single_copy_mechanism": "none",  # containers forbid the default of Open MPI 4
-    "OMPI_MCA_smsc": "^cma",  # and of Open MPI 5
-}
 
 
 def prepare(environment: MutableMapping[str, str]) -> None:

@@ -14,7 +14,7 @@ from feti_homog.case import element_sizes
 from feti_homog.case.case import Case
 from feti_homog.case.document import read_document
 from feti_homog.case.phase_names import COATING
-from feti_homog.case.sweep_section import SWEEP
+from feti_homog.case.sections import SWEEP
 from feti_homog.errors import CaseError
 from feti_homog.feti import solver_plan
 from feti_homog.feti.decomposition.shared_entities import share_entities

@@ -13,7 +13,7 @@ from typing import Any
 from feti_homog.case import case as cases
 from feti_homog.case.case import Case
 from feti_homog.case.document import read_document, to_document
-from feti_homog.case.sweep_section import SWEEP
+from feti_homog.case.sections import SWEEP
 from feti_homog.errors import CaseError
 from feti_homog.report.text.table import unit
 from feti_homog.schema.wording import dotted_key, toml_value

@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike
 from scipy.stats import qmc
 
 from feti_homog.case.document import TomlPath
-from feti_homog.case.sections import SECTIONS, TOP_LEVEL
-from feti_homog.case.sweep_section import AXIS_EXPECTED, MAX_CASES, RANGE_KEYS, SWEEP, SweepSection
+from feti_homog.case.sections import AXIS_EXPECTED, MAX_CASES, RANGE_KEYS, SECTIONS, SWEEP, TOP_LEVEL, SweepSection
 from feti_homog.schema.keys import TableReader, keys_of
 from feti_homog.schema.values import is_number, magnitudes_in_words
 from feti_homog.schema.wording import dotted_key, suggestion, toml_value

@@ -14,12 +14,10 @@ import numpy as np
 
 from feti_homog.errors import CaseError
 from feti_homog.verify.bonds import COATING
-from feti_homog.verify.check_envelope import check_envelope
-from feti_homog.verify.check_fields import check_derived, check_fields
-from feti_homog.verify.check_interfaces import check_interface_state
+from feti_homog.verify.check_fields import check_derived, check_fields, check_interface_state
 from feti_homog.verify.check_loads import StateNumbers, check_load
 from feti_homog.verify.check_mesh import check_arcs, check_interface, check_mesh
-from feti_homog.verify.check_path import check_path
+from feti_homog.verify.check_path import check_envelope, check_path
 from feti_homog.verify.check_points import check_points
 from feti_homog.verify.check_spatial import check_spatial
 from feti_homog.verify.check_summary import check_summary, check_tables

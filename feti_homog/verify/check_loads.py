@@ -12,7 +12,7 @@ import numpy as np
 
 from feti_homog.typing import AnyInt, Bool, Float
 from feti_homog.verify.bonds import law_at
-from feti_homog.verify.check_interfaces import BONDED, CLOSED, OPEN
+from feti_homog.verify.check_fields import BONDED, CLOSED, OPEN
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.elements import ElementFields
 from feti_homog.verify.findings import Findings, relative

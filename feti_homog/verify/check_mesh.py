@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from feti_homog.typing import AnyInt, Bool, Float, Int
-from feti_homog.verify.check_interfaces import BONDED
+from feti_homog.verify.check_fields import BONDED
 from feti_homog.verify.check_loads import StateNumbers
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.findings import Findings, relative

@@ -10,7 +10,7 @@ import numpy as np
 
 from feti_homog.typing import Float, Int
 from feti_homog.verify.bonds import law_at
-from feti_homog.verify.check_interfaces import BONDED
+from feti_homog.verify.check_fields import BONDED
 from feti_homog.verify.check_loads import StateNumbers, tips
 from feti_homog.verify.check_mesh import directions
 from feti_homog.verify.discrete_cell import DiscreteCell

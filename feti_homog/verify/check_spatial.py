@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.typing import Float
-from feti_homog.verify.check_interfaces import BONDED
+from feti_homog.verify.check_fields import BONDED
 from feti_homog.verify.check_loads import StateNumbers
 from feti_homog.verify.constitutive_law import VOIGT
 from feti_homog.verify.discrete_cell import DiscreteCell

@@ -10,8 +10,7 @@ from support import torn_cells
 from support.ranks import PIECES, parallel_assert
 
 from feti_homog.analysis import stiffness
-from feti_homog.analysis.context import AnalysisContext
-from feti_homog.analysis.loads import CellLoads
+from feti_homog.analysis.context import AnalysisContext, CellLoads
 from feti_homog.case.interface_section import Arc
 from feti_homog.homogenization.averaging import Homogenization
 from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN

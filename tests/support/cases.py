@@ -10,8 +10,7 @@ from petsc4py import PETSc
 from reference import monolithic
 
 from feti_homog.analysis import stiffness
-from feti_homog.analysis.context import AnalysisContext
-from feti_homog.analysis.loads import CellLoads
+from feti_homog.analysis.context import AnalysisContext, CellLoads
 from feti_homog.case import case as cases
 from feti_homog.feti.thresholds import DEFAULTS
 from feti_homog.homogenization.domain_partition import DEFAULT_POLICY

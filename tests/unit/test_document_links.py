@@ -14,7 +14,7 @@ import pytest
 
 from feti_homog import cli
 from feti_homog.case.case import parse
-from feti_homog.case.sweep_section import SWEEP
+from feti_homog.case.sections import SWEEP
 from feti_homog.mesh.readers import msh_reader
 from feti_homog.mesh.tiles.filling import gmsh_session
 from feti_homog.sweep import plan

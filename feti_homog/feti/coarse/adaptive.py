@@ -1,6 +1,6 @@
 """The adaptive coarse space: rigid-body motions and soft modes of the subdomains, averaged over copies of each node.
 
-With the coarse displacements Z_0 of `averaged_modes`, the stiffness S of the boundaries becomes
+With the coarse displacements Z_0 of `geneo.AveragedModes`, the stiffness S of the boundaries becomes
 
     S_0 = S - S Z_0 (Z_0^T S Z_0)^+ Z_0^T S,
 
@@ -19,8 +19,13 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix, diags
 
-from feti_homog.feti.coarse.averaged_modes import AveragedModes
-from feti_homog.feti.coarse.geneo import kernels_and_soft_modes, local_columns, scaled_constraints, subdomain_blocks
+from feti_homog.feti.coarse.geneo import (
+    AveragedModes,
+    kernels_and_soft_modes,
+    local_columns,
+    scaled_constraints,
+    subdomain_blocks,
+)
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.neighbours import Neighbours
 from feti_homog.feti.linalg.distributed_solver import DistributedSolver

@@ -3,11 +3,16 @@
 With the averaged soft modes in equilibrium, the largest eigenvalue of the preconditioned dual operator is at most
 1 + N / tau whatever the geometry and the materials, N being the largest number of subdomains that share nodes with one,
 itself included (GenEO: Spillane & Rixen, IJNME 95, 2013).  Measured, it is about 1 / tau.
+
+Modes of subdomains are averaged over the copies of each node: Z_0 = (I - B_D^T B) V, the coarse displacements.
+B Z_0 = 0, for B B_D^T = I, so they are displacements of the cell whose active rows are glued.  A mode of a subdomain
+reaches those that share nodes with it, and no further.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from mpi4py import MPI
@@ -25,8 +30,99 @@ from feti_homog.feti.linalg.distributed_matrix import add_shared_rows
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.scaled import StiffnessScaled
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
+from feti_homog.parallel.distributed_arrays import allreduce_sum
 from feti_homog.parallel.mpi_errors import agree
 from feti_homog.typing import Float, Float32, Int
+
+
+class _Jumps(NamedTuple):
+    """What the modes of one subdomain, itself or a neighbour, open on the rows of a subdomain: B V there.
+
+    `rows` (r,) are positions among the subdomain's rows, `columns` (c,) numbers of coarse modes, `values` (r, c).
+    """
+
+    rows: Int
+    columns: Int
+    values: Float
+
+
+class AveragedModes:
+    """Z_0 on this rank's subdomains, for any active rows: what it is made of is kept for changes of them.
+
+    Attributes:
+        total: coarse modes of all subdomains, n.
+        columns: of each subdomain the numbers (m,) of the modes that reach it, ascending.
+        reaching: (u,) the numbers of all that reach this rank's subdomains, ascending.
+        is_own: (u,) whether each of these is of a subdomain of this rank.
+    """
+
+    def __init__(
+        self, comm: MPI.Intracomm, blocks: Sequence[SubdomainBlocks], neighbours: Neighbours, V: Sequence[Float]
+    ) -> None:
+        """`V` are of each subdomain its kernel, then its soft modes, on its boundary dofs.  Collective."""
+        self._blocks, self._V, self._sizes = blocks, V, [len(rows) for rows in neighbours.rows]
+        self._jumps, ends = _exchange_jumps(comm, blocks, neighbours, V)
+        self.total = int(ends[-1]) if len(ends) else 0
+        self._first = [int(ends[s]) - v.shape[1] for s, v in zip(neighbours.index, V, strict=True)]
+        none = np.zeros(0, np.int64)
+        self.columns = [np.unique(np.concatenate([none, *(jumps.columns for jumps in of)])) for of in self._jumps]
+        self.reaching = np.unique(np.concatenate([none, *self.columns]))
+        own = [first + np.arange(v.shape[1]) for first, v in zip(self._first, V, strict=True)]
+        self.is_own = np.isin(self.reaching, np.concatenate([none, *own]))
+
+    def of_subdomain(self, i: int, BW: csr_matrix) -> Float:
+        """(boundary dofs, m) Z_0 on subdomain i, less its own kernel, which has no energy there.
+
+        Without the kernel, what is left of a rigid-body motion in a stiff subdomain has all its digits.
+
+        Args:
+            BW: (rows, boundary dofs) its scaled constraints W^-1 B D^-1 of the active rows.
+        """
+        columns, kernel = self.columns[i], self._blocks[i].R.shape[1]
+        jump = np.zeros((self._sizes[i], len(columns)))
+        for rows, numbers, values in self._jumps[i]:
+            jump[np.ix_(rows, np.searchsorted(columns, numbers))] = values
+        Z = np.asfortranarray(-(BW.T @ jump))
+        soft = self._V[i][:, kernel:]
+        at = np.searchsorted(columns, self._first[i] + kernel + np.arange(soft.shape[1]))
+        Z[:, at] += soft
+        return Z
+
+    def translations(self, comm: MPI.Intracomm) -> Float:
+        """(u, c) amplitudes of the translations of the whole cell, which have little energy.  Collective."""
+        subdomains = [block.subdomain for block in self._blocks]
+        c = subdomains[0].problem.components if subdomains else 0
+        amplitudes = np.zeros((self.total, comm.allreduce(c, MPI.MAX)))
+        for first, s in zip(self._first, subdomains, strict=True):
+            amplitudes[first : first + s.R.shape[1]] = np.stack([s.R[i::c].sum(axis=0) for i in range(c)], axis=1)
+        return np.asarray(allreduce_sum(comm, amplitudes)[self.reaching])
+
+
+def _exchange_jumps(
+    comm: MPI.Intracomm, blocks: Sequence[SubdomainBlocks], neighbours: Neighbours, V: Sequence[Float]
+) -> tuple[list[list[_Jumps]], Int]:
+    """For each subdomain of this rank the jumps on its rows, and where the coarse modes of each subdomain of the cell
+    end.  Collective."""
+    counts = np.zeros(len(neighbours.rank), np.int64)
+    counts[neighbours.index] = [v.shape[1] for v in V]
+    comm.Allreduce(MPI.IN_PLACE, counts)
+    ends = np.cumsum(counts)
+
+    def messages() -> Iterator[tuple[int, int, tuple[Int, Float]]]:
+        for i, (block, v) in enumerate(zip(blocks, V, strict=True)):
+            Z, s = block.B @ v, neighbours.index[i]
+            first = ends[s] - v.shape[1]
+            for t, common in neighbours.common[i].items():
+                # All of its own, though a mode may open nothing.
+                some = np.arange(v.shape[1]) if t == s else np.flatnonzero(Z[common].any(axis=0))
+                yield i, t, (first + some, Z[np.ix_(common, some)])
+
+    received: list[list[_Jumps]] = [[] for _ in blocks]
+    neighbours.exchange(
+        messages(),
+        lambda i, sender, message: received[i].append(_Jumps(neighbours.common[i][sender], *message)),
+    )
+    return received, ends
 
 
 def subdomain_blocks(

@@ -9,8 +9,7 @@ import numpy as np
 from scipy.linalg import block_diag, helmert
 from scipy.sparse import coo_matrix, csr_matrix
 
-from feti_homog.feti.decomposition.interface_geometry import along, mean_speed
-from feti_homog.feti.decomposition.shared_entities import SharedEntities
+from feti_homog.feti.decomposition.shared_entities import SharedEntities, along, mean_speed
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.mesh.refinement import ReferenceLattice, edge_node
 from feti_homog.typing import Bool, Float, Int

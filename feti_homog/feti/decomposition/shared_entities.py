@@ -1,4 +1,4 @@
-"""Which subdomains share which coarse vertices and edges, with the numbers of their constraints.
+"""Coarse vertices and edges shared by subdomains: constraints, and the normals and lengths of interfaces.
 
 An entity is a vertex class or a torus edge that belongs to several subdomains.  Each fine node on an entity of k
 subdomains needs k - 1 vector constraints.  It belongs to the rank of its last sharer, which numbers these and tells the
@@ -11,13 +11,164 @@ from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
+from scipy.special import roots_legendre
 
-from feti_homog.feti.decomposition.interface_geometry import breakable_pairs, interface_geometry
-from feti_homog.feti.decomposition.sharers import Sharers, find_sharers
+from feti_homog.errors import MeshError
+from feti_homog.feti.decomposition.sharers import Sharers, entity_code, find_sharers
 from feti_homog.mesh.refinement import ReferenceLattice
-from feti_homog.mesh.submesh import SubdomainTable, SubmeshesOfRank
+from feti_homog.mesh.submesh import SubdomainTable, Submesh, SubmeshesOfRank
 from feti_homog.parallel.distributed_arrays import exchange
+from feti_homog.parallel.mpi_errors import agree
 from feti_homog.typing import Array, Bool, Float, Int
+
+# Gauss points of one side of an element, on arcs that the mesh follows well.
+POINTS, WEIGHTS = roots_legendre(4)
+# Two sides at a node are folded onto each other if their normals add up to no more than this share of their lengths.
+FOLDED = 1e-9
+
+
+def along(ends: Float, turn: Float, place: Float) -> Float:
+    """(k, 2) at the places s (k,) in [0, 1] of edges what is dx / ds, turned or not, at their ends (k, 2, 2).
+
+    On the arc of an ellipse along which the parameter turns by `turn` (k,), it obeys y'' = -turn^2 y; where the edge is
+    straight, it is linear, for `turn` is 0.
+    """
+    sine = np.where(turn > 0, np.sin(turn), 1.0)
+    of_start = np.where(turn > 0, np.sin((1 - place) * turn), 1 - place) / sine
+    of_stop = np.where(turn > 0, np.sin(place * turn), place) / sine
+    return np.asarray(of_start[:, None] * ends[:, 0] + of_stop[:, None] * ends[:, 1])
+
+
+def mean_speed(ends: Float, turn: Float, low: Float, high: Float) -> Float:
+    """(k,) the means of |dx / ds| from the places `low` to `high` (k,), by Gauss's rule; arguments as of `along`."""
+    places = (low[:, None] * (1 - POINTS) + high[:, None] * (1 + POINTS)) / 2
+    speeds = [np.hypot(*along(ends, turn, place).T) for place in places.T]
+    return np.asarray(np.stack(speeds, axis=1) @ WEIGHTS / 2)
+
+
+@dataclass(frozen=True)
+class InterfaceGeometry:
+    """Geometry of the n shared entities that this rank owns.
+
+    The attributes are those of `SharedEntities`, 0 of other entities and where no bond may break.
+    """
+
+    normal: Float
+    turn: Float
+    precracked: Bool
+
+    def chosen(self, which: Int) -> InterfaceGeometry:
+        """Of the entities of these numbers (k,)."""
+        return InterfaceGeometry(self.normal[which], self.turn[which], self.precracked[which])
+
+
+def breakable_pairs(own: SubmeshesOfRank, table: SubdomainTable, pairs: Int, found: Sharers) -> Int:
+    """(n,) the interface of the two bodies that meet there.
+
+    -1 where it never parts, where a third body meets them, and where they do not meet along one line.
+    """
+    body, copies = table.body[found.sharer], found.copies
+    outer, inner = body[found.pointer[:-1]], body[found.pointer[1:] - 1]
+    third = (body != np.repeat(outer, copies)) & (body != np.repeat(inner, copies))
+    thirds = np.bincount(np.repeat(np.arange(len(copies)), copies), third, len(copies))
+    on_line, vertices = np.ones(len(copies), bool), np.flatnonzero(~found.is_edge)
+    on_line[vertices] = ~own.whole.touching[np.searchsorted(own.whole.class_keys, found.key[vertices])]
+    phase = table.phase
+    return np.where((thirds == 0) & (outer != inner) & on_line, pairs[phase[outer], phase[inner]], -1)
+
+
+def interface_geometry(
+    comm: MPI.Intracomm, own: SubmeshesOfRank, table: SubdomainTable, pairs: Int, found: Sharers, side: float
+) -> InterfaceGeometry:
+    """Return normals, turns and precracks of shared entities.  Collective.
+
+    `pairs` as in `share_entities`; the side of an element is the share `side` of a coarse edge.
+    """
+    n, owner = len(found.key), table.rank[found.innermost]
+    can_part = (owner == comm.rank) & (breakable_pairs(own, table, pairs, found) >= 0)
+    # The last sharer of an edge between two bodies is on the side of the fibre.
+    edges = np.flatnonzero(found.is_edge & can_part)
+    triangle, k = _triangles_beside(own, found.key[edges], found.innermost[edges])
+    whole = own.whole
+    plane = whole.triangle_edges[triangle, k]
+    normals, turns, precracked = np.zeros((n, 2, 2)), np.zeros(n), np.zeros(n, bool)
+    normals[edges], turns[edges] = normal, turn = _edge_normals(whole, triangle, k)
+    precracked[edges] = whole.debonded[whole.edge_class[plane]]
+    ends = whole.class_keys[whole.vertex_class[whole.edges[plane]]]
+    parts = []
+    for end, (low, high) in enumerate(((0.0, side), (1.0 - side, 1.0))):
+        length = mean_speed(normal, turn, np.full(len(edges), low), np.full(len(edges), high))
+        unit = normal[:, end] / np.maximum(np.hypot(*normal[:, end].T), 1e-300)[:, None]
+        parts.append(np.column_stack([unit * length[:, None], length, ~precracked[edges]]))
+    sums = _sums_at_vertices(comm, found, owner, ends, found.key[edges], np.stack(parts, axis=1))
+    vertices = ~found.is_edge
+    scaled = sums[:, :2] * (sums[:, 2] / np.maximum(np.hypot(*sums[:, :2].T), 1e-300))[:, None]
+    normals[vertices], precracked[vertices] = scaled[vertices, None], sums[vertices, 3] == 0
+    agree(comm, _check, own, found.chosen(np.flatnonzero(can_part)), normals[can_part], sums[can_part])
+    return InterfaceGeometry(normals, turns, precracked)
+
+
+def _check(own: SubmeshesOfRank, found: Sharers, normals: Float, sums: Float) -> None:
+    """Raise MeshError where a normal is not finite, is zero, or is that of sides folded onto each other, whose
+    directions cancel; `normals` (n, 2, 2) and `sums` (n, 4) as in `InterfaceGeometry`."""
+    length = np.linalg.norm(normals, axis=2)
+    folded = ~found.is_edge & ~(np.hypot(*sums[:, :2].T) > FOLDED * sums[:, 2])
+    bad = np.flatnonzero(~(np.isfinite(length) & (length > 0)).all(axis=1) | folded)
+    if len(bad):
+        whole, first = own.whole, bad[0]
+        keys = whole.edge_keys[whole.edge_class] if found.is_edge[first] else whole.class_keys[whole.vertex_class]
+        plane = int(np.flatnonzero(keys == found.key[first])[0])
+        x, y = whole.points[whole.edges[plane] if found.is_edge[first] else [plane]].mean(axis=0)
+        raise MeshError(f"the interface has no normal at ({x:.9g}, {y:.9g}): its sides are folded or of no length")
+
+
+def _sums_at_vertices(comm: MPI.Intracomm, found: Sharers, owner: Int, ends: Int, edge: Int, parts: Float) -> Float:
+    """(n, k) for each entity that this rank owns, what all ranks have for it: `parts` (p, 2, k) of these edges (p,) for
+    the classes at their `ends` (p, 2), each of which is an entity or the pinned class.  Collective."""
+    order, code = np.argsort(found.code), entity_code(ends, False)
+    ordered = found.code[order]
+    is_entity = np.isin(code, ordered)
+    at = np.stack(np.broadcast_arrays(edge[:, None], np.arange(2)), axis=-1)
+    to = owner[order[np.searchsorted(ordered, code[is_entity])]]
+    code, at, parts = exchange(comm, to, code[is_entity], at[is_entity], parts[is_entity])
+    sums = np.zeros((len(order), parts.shape[1]))
+    # Rounding depends on the order, which is that of the edges on any number of ranks.
+    sequence = np.lexsort(at.T)
+    np.add.at(sums, order[np.searchsorted(ordered, code[sequence])], parts[sequence])
+    return sums
+
+
+def _triangles_beside(own: SubmeshesOfRank, key: Int, subdomain: Int) -> tuple[Int, Int]:
+    """Return the triangle (n,) of this rank's subdomain (n,), and which of its edges (n,) is the torus edge `key`
+    (n,)."""
+    whole = own.whole
+    edge = np.searchsorted(whole.edge_keys, key)
+    wanted = np.full(len(whole.edge_keys), -1)
+    wanted[edge] = subdomain
+    beside = whole.edge_class[whole.triangle_edges]
+    triangle, k = np.nonzero(wanted[beside] == own.index[own.member][:, None])
+    order = np.argsort(beside[triangle, k])
+    place = order[np.searchsorted(beside[triangle, k][order], edge)]
+    return triangle[place], k[place]
+
+
+def _edge_normals(mesh: Submesh, triangle: Int, k: Int) -> tuple[Float, Float]:
+    """Return normals (n, 2, 2) out of triangles (n,) at the start and end of their edges k (n,), as in
+    `SharedEntities`, and the turns (n,) of these."""
+    a, b = (mesh.points[mesh.triangles[triangle, (k + step) % 3]] for step in (0, 1))
+    plane = mesh.triangle_edges[triangle, k]
+    turn = mesh.turns[plane]
+    tangents = np.repeat((b - a)[:, None], 2, axis=1)
+    curved = turn > 0
+    # On an arc about c the place y obeys y'' = -turn^2 y.
+    angle, centre = turn[curved, None], mesh.circles[plane[curved], :2]
+    start, stop = a[curved] - centre, b[curved] - centre
+    ahead = np.stack([stop - np.cos(angle) * start, np.cos(angle) * stop - start], axis=1)
+    tangents[curved] = (angle / np.sin(angle))[:, None] * ahead
+    normal = np.stack([tangents[..., 1], -tangents[..., 0]], axis=-1)
+    backwards = mesh.backwards[triangle, k]
+    normal[backwards] = normal[backwards, ::-1]
+    return normal, turn
 
 
 @dataclass(frozen=True)

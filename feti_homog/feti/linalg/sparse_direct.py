@@ -24,6 +24,11 @@ from feti_homog.typing import Float
 # INFOG(1) of MUMPS where a pivot is zero.
 SINGULAR = -10
 LEAST_EXPONENT = -1000
+# PETSc's error code for a factorization that the chosen library does not have (PETSC_ERR_MISSING_FACTOR).
+MISSING_FACTOR = 92
+# With these CHOLMOD makes L L^T of small matrices too, which those that are indefinite do not have: D of its own
+# L D L^T may have any sign.
+DEFINITE = {"mat_cholmod_final_asis": False, "mat_cholmod_final_ll": True}
 
 
 def power_of_two(diagonal: Float, comm: MPI.Intracomm | None = None) -> float:
@@ -79,13 +84,6 @@ def _read_mumps(factor: PETSc.Mat, is_cholesky: bool) -> int:
         raise np.linalg.LinAlgError(f"nearly singular (MUMPS: INFOG(25) = {replaced} tiny pivots were replaced)")
     # Without symmetry INFOG(12) counts exchanged pivots.
     return int(factor.getMumpsInfog(12)) if is_cholesky else 0
-
-
-# PETSc's error code for a factorization that the chosen library does not have (PETSC_ERR_MISSING_FACTOR).
-MISSING_FACTOR = 92
-# With these CHOLMOD makes L L^T of small matrices too, which those that are indefinite do not have: D of its own
-# L D L^T may have any sign.
-DEFINITE = {"mat_cholmod_final_asis": False, "mat_cholmod_final_ll": True}
 
 
 class DirectSolver:

@@ -23,6 +23,8 @@ from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.parallel.distributed_arrays import scale_rows
 from feti_homog.typing import Bool, Float, Int
 
+InterfaceOperator = ExplicitInterfaceOperator | ImplicitInterfaceOperator
+
 
 class DualOperator:
     """y = (F + C) x.  Symmetric positive definite, since B has full row rank and K+ is definite.
@@ -45,9 +47,6 @@ class DualOperator:
     def jump(self, u: Float) -> Float:
         """B u, Eq. (33), for displacements u (boundary dofs,) or (boundary dofs, k)."""
         return self.jump_operator.sum(self.boundary.B @ u)
-
-
-InterfaceOperator = ExplicitInterfaceOperator | ImplicitInterfaceOperator
 
 
 class InterfaceOperators:

@@ -10,6 +10,9 @@ import numpy as np
 from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.typing import Bool, Float
 
+# What is smaller than this, relative to its values at the ends of its leg, is what rounding leaves of zero.
+LOAD_ROUNDING = 1e-13
+
 
 class Multipliers(tuple[Float, ...]):
     """(owned rows,) multipliers of each problem, that of the plane first."""
@@ -82,10 +85,6 @@ class Macroscopic:
         It is the work less the change of stored energy; at constant strain 1/2 E.(Sigma - Sigma').
         """
         return 0.5 * float(after.strain @ self.stress - self.strain @ after.stress)
-
-
-# What is smaller than this, relative to its values at the ends of its leg, is what rounding leaves of zero.
-LOAD_ROUNDING = 1e-13
 
 
 @dataclass(frozen=True)

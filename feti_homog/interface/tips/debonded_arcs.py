@@ -17,6 +17,12 @@ from feti_homog.interface.contact.states import BONDED, Status
 from feti_homog.schema.wording import toml_value
 from feti_homog.typing import Bool, Float, Int
 
+# A node this near to a tip, in degrees, is the tip: coordinates in files and of circles are rounded.
+TIP_TOLERANCE_DEGREES = 1e-6
+# Number of a fibre and direction of a tip, as `tips` has it -> where the mesh has it.
+MovedTips = Mapping[tuple[int, float], float]
+NOT_MOVED: MovedTips = MappingProxyType({})
+
 
 class InterfaceChains:
     """Interface nodes with their neighbours along the interface.
@@ -82,14 +88,6 @@ def closing_work(length: float, ahead: Float, force: Float, behind: Float, jump:
     near = ahead < length
     w = np.stack([np.interp(length - ahead[near], behind, jump[:, mode]) for mode in (0, 1)], axis=1)
     return np.asarray(np.maximum((force[near] * w).sum(axis=0), 0.0) / (2 * length))
-
-
-# A node this near to a tip, in degrees, is the tip: coordinates in files and of circles are rounded.
-TIP_TOLERANCE_DEGREES = 1e-6
-
-# Number of a fibre and direction of a tip, as `tips` has it -> where the mesh has it.
-MovedTips = Mapping[tuple[int, float], float]
-NOT_MOVED: MovedTips = MappingProxyType({})
 
 
 def tips(arcs: Sequence[Arc], values: Sequence[float], fibres: int) -> dict[int, list[float]]:

@@ -1,4 +1,4 @@
-"""All estimates by name: rules of engineers for bonded fibres, and generalized self-consistent estimates.
+"""Estimates by name: rules of engineers, generalized self-consistent shear; bounds for any arrangement.
 
 E_A, E_T, nu_A, nu_T: Young's moduli and contractions along and across the fibres; G_A, G_T, k: shear moduli along and
 across them and the bulk modulus across them; alpha: expansions; c: fractions; f, m: fibre and matrix.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from feti_homog.materials.estimates.constituents import (
     NOTHING,
     Estimate,
     Estimates,
+    FibreBounds,
     Fibres,
     bonded,
     equivalent_fibre,
@@ -24,12 +25,45 @@ from feti_homog.materials.estimates.constituents import (
     matrix_fraction,
     spring_compliances,
 )
-from feti_homog.materials.estimates.cylinders import composite_cylinders, cylinders_in_matrix, mori_tanaka
+from feti_homog.materials.estimates.cylinders import (
+    Surroundings,
+    aligned_cylinders,
+    composite_cylinders,
+    cylinders_in_matrix,
+    mori_tanaka,
+)
 from feti_homog.materials.spatial_constants import (
     TransverselyIsotropic,
     is_transversely_isotropic,
     transverse_constants,
 )
+
+
+def fibre_bounds(fractions: Sequence[float], phases: Sequence[TransverselyIsotropic]) -> FibreBounds:
+    """Bounds of bonded, transversely isotropic phases that are cylinders along x3 of any section.
+
+    `aligned_cylinders` with the least moduli of the phases around, and with the greatest.  Those of nu_A are the values
+    of Hill's relation at the bounds of k, so of two phases only.  All but those of G_T hold for square symmetry too.
+    Hill 1964, Hashin 1965, Walpole 1969.
+    """
+    lower, upper = (aligned_cylinders(fractions, phases, _extreme(phases, pick)) for pick in (min, max))
+    nu = min(lower.nu_axial, upper.nu_axial), max(lower.nu_axial, upper.nu_axial)
+    return FibreBounds(
+        E_axial=(lower.E_axial, upper.E_axial),
+        nu_axial=nu if len(phases) == 2 else None,
+        G_axial=(lower.G_axial, upper.G_axial),
+        G_transverse=(lower.G_transverse, upper.G_transverse),
+        K_transverse=(lower.K_transverse, upper.K_transverse),
+    )
+
+
+def _extreme(phases: Sequence[TransverselyIsotropic], pick: Callable[[Iterable[float]], float]) -> Surroundings:
+    """Return the least or the greatest of each modulus."""
+    return Surroundings(
+        pick(phase.K_transverse for phase in phases),
+        pick(phase.G_transverse for phase in phases),
+        pick(phase.G_axial for phase in phases),
+    )
 
 
 def rule_of_mixtures(matrix: TransverselyIsotropic, fibres: Sequence[Fibres]) -> Estimate:

@@ -13,6 +13,7 @@ STRESSES = ("young", "E1", "E2", "E3", "E_axial", "E_transverse", "G12", "G13", 
            "dissipated", "dissipated_strain_controlled", "work", "load_stored")  # fmt: skip
 MODULI = re.compile(r"(C\d\d|S\d\d|bulk|shear)(_\w+)?|anisotropy_\w+|\w+_(C|S)\d\d")
 FIXED = {"angle": "degrees", "centre": "degrees", "values": "degrees", "memory": "bytes"}
+NOISE = 1e-12  # what the solver leaves of a zero
 
 
 def unit(name: str, stress_unit: str) -> str:
@@ -33,9 +34,6 @@ def with_unit(name: str, stress_unit: str) -> str:
 def in_brackets(unit: str) -> str:
     """Return the unit for a title: in brackets after a space; empty if there is none."""
     return f" ({unit})" if unit else ""
-
-
-NOISE = 1e-12  # what the solver leaves of a zero
 
 
 @dataclass(frozen=True)

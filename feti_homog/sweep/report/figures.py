@@ -28,6 +28,9 @@ from feti_homog.typing import Float
 
 MOST_TABLES, MOST_CELLS = 4, 60  # that are drawn
 TABLE_STYLE: dict[str, Any] = {"color": "black", "linewidth": 1.8, "zorder": 3}
+X_FACTOR, MARGIN = 0.94, 1.3  # factors on a logarithmic axis
+CHOICES = (("C11", "bulk", "shear"), ("C11", "C33", "C44", "C66"))
+FIBRES = "cell.fibres"
 
 
 def tables(table: SweepTable) -> list[Path]:
@@ -104,11 +107,6 @@ def _local_fractions(pattern: FibrePattern) -> tuple[Float, Float]:
     order = np.argsort(cells.fractions)
     order = order[cells.whole[order]]
     return cells.fractions[order], np.cumsum(cells.weights[order])
-
-
-X_FACTOR, MARGIN = 0.94, 1.3  # factors on a logarithmic axis
-CHOICES = (("C11", "bulk", "shear"), ("C11", "C33", "C44", "C66"))
-FIBRES = "cell.fibres"
 
 
 def plot(directory: Path, table: SweepTable) -> list[Path]:

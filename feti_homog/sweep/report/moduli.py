@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from feti_homog.case.cell_section import GEOMETRY
 from feti_homog.case.material_sections import read_materials
 from feti_homog.materials import bounds as mechanics
-from feti_homog.materials.estimates.fibre_bounds import fibre_bounds
+from feti_homog.materials.estimates.methods import fibre_bounds
 from feti_homog.materials.laws import stiffness_of
 from feti_homog.materials.plane_state import PLANE_STATES, plane_state_of
 from feti_homog.materials.spatial_constants import is_transversely_isotropic, transversely_isotropic_part

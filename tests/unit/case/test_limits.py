@@ -9,8 +9,7 @@ import pytest
 
 from feti_homog.case.mixed_load import WAYPOINTS
 from feti_homog.case.section_values import OPENINGS, STRAIN, STRENGTH
-from feti_homog.case.sections import TABLES
-from feti_homog.case.sweep_section import RANGE_KEYS, SweepSection
+from feti_homog.case.sections import RANGE_KEYS, TABLES, SweepSection
 from feti_homog.schema.keys import keys_of
 from feti_homog.schema.values import LARGEST, MAGNITUDES, SMALLEST, real
 from feti_homog.schema.wording import limit_in_words

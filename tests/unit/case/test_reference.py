@@ -5,8 +5,7 @@ from __future__ import annotations
 import pytest
 
 from feti_homog.case import reference
-from feti_homog.case.sections import TABLES, TOP_LEVEL
-from feti_homog.case.sweep_section import RANGE_KEYS, SweepSection
+from feti_homog.case.sections import RANGE_KEYS, TABLES, TOP_LEVEL, SweepSection
 from feti_homog.errors import CaseError
 from feti_homog.schema.keys import keys_of
 

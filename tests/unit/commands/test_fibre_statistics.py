@@ -14,11 +14,11 @@ from support.fibre_patterns import hexagonal_lattice, poisson_points, square_lat
 from feti_homog.analysis.runner import run
 from feti_homog.case import case as cases
 from feti_homog.commands import fibre_statistics
+from feti_homog.commands.fibre_statistics import text
 from feti_homog.errors import CaseError, MeshError
 from feti_homog.fibres.hard_core import hard_core
 from feti_homog.microstructure.neighbour_match import nearest_neighbours
 from feti_homog.microstructure.statistics import measure, poisson
-from feti_homog.report.text import statistics_text
 
 MESHES = Path(__file__).parents[3] / "meshes"
 SMALL = BASE.replace('geometry = "hexagonal"\n', f"{RANDOM}width = 40.0\n").replace("0.05", "0.1")
@@ -133,7 +133,7 @@ def test_tables_and_picture_hold_what_was_measured(tmp_path):
 )
 def test_randomness_is_judged_by_enough_simulations(fibres, simulations, words):
     found = measure(fibres, poisson, simulations)
-    assert statistics_text.text(found, "poisson", simulations).endswith(words)
+    assert text(found, "poisson", simulations).endswith(words)
 
 
 def test_without_out_nothing_is_written(tmp_path):

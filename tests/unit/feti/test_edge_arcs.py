@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.special import ellipeinc
 
-from feti_homog.feti.decomposition.interface_geometry import along, mean_speed
+from feti_homog.feti.decomposition.shared_entities import along, mean_speed
 from feti_homog.fibres.outlines.ellipses import Ellipses
 
 A, B = 0.5, 0.2

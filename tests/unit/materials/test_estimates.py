@@ -23,8 +23,7 @@ from reference.fibre_composites import (
 
 from feti_homog.materials.bounds import hashin_shtrikman
 from feti_homog.materials.estimates.constituents import CONSTANTS, NOTHING, Fibres, Springs
-from feti_homog.materials.estimates.fibre_bounds import fibre_bounds
-from feti_homog.materials.estimates.methods import METHODS, estimates
+from feti_homog.materials.estimates.methods import METHODS, estimates, fibre_bounds
 from feti_homog.materials.laws import Isotropic, plane_stiffness
 from feti_homog.materials.spatial_constants import transversely_isotropic_part
 
