@@ -5,7 +5,7 @@
 Random cells of 50 % fibres with E = 200, nu = 0.222 in a matrix with E = 88, nu = 0.299 (GPa), plane strain, several
 arrangements of each number of fibres.  A cell is representative where the mean no longer moves by more than its
 confidence interval, and one arrangement scatters by less than what is asked for.  It is a sweep: started again it
-goes on; sweep.csv and cell_size.png are its table and its picture.
+goes on; statistics.csv and cell_size.png are its table and its picture.
 """
 
 from __future__ import annotations

@@ -18,8 +18,8 @@ SWEEP_HELP = (
     "skipped: the same command resumes. Failed cases are kept and reported at the end, with exit code 3."
 )
 COLLECT_HELP = (
-    "Write sweep.h5 and sweep.csv, with the inputs and outputs of all cases and their statistics over realisations, "
-    "and pictures of the varied outputs. The sweep may still be running: finished cases are collected."
+    "Write cases.csv, the inputs and outputs of all cases, statistics.csv, those over realisations, sweep.h5 with "
+    "both, and pictures of the varied outputs. The sweep may still be running: finished cases are collected."
 )
 
 

@@ -30,7 +30,7 @@ def read(directory: Path) -> SweepTable:
 
 
 def collect(directory: Path, pictures: bool) -> list[str]:
-    """Write sweep.csv, sweep.h5 and the pictures to the folder; returns the lines to print.  On one rank.
+    """Write cases.csv, statistics.csv, sweep.h5 and the pictures to the folder; returns the lines to print.  On one rank.
 
     Raises:
         CaseError: as `read`.
@@ -38,7 +38,9 @@ def collect(directory: Path, pictures: bool) -> list[str]:
     """
     index, states = _index_and_states(directory)
     table = _table(index, states)
-    atomic.remove_abandoned(directory, re.compile(r"sweep\.(csv|h5)|(moduli|cell_size|curves|match)\.png"))
+    atomic.remove_abandoned(
+        directory, re.compile(r"(cases|statistics)\.csv|sweep\.h5|(moduli|cell_size|curves|match)\.png")
+    )
     paths = tables.write(directory, table)
     if pictures:
         paths += figures.plot(directory, table)

@@ -1,6 +1,6 @@
 """The folder of a sweep: its list of cases, a folder for each, and how far each has come.
 
-DIR/sweep.json, cases.csv     what the cases are
+DIR/sweep.json, cases.csv     what the cases are; collected, cases.csv has their results too
 DIR/case-0001/case.toml       the case with its defaults, which `feti-homog run` runs too
 DIR/case-0001/result.json     as of any run
 DIR/case-0001/error.txt       why it failed, if it did
@@ -32,7 +32,7 @@ INDEX_FILE, TABLE_FILE, ERROR_FILE, CASE_FILE, LOCK_FILE = (
 )  # fmt: skip
 # What a sweep, its collection and its report write beside sweep.json.
 SWEEP_ENTRY = re.compile(
-    r"cases\.csv|lock|sweep\.(csv|h5)|(moduli|cell_size|curves|match)\.png|report\.html|case-\d{4,}"
+    r"(cases|statistics)\.csv|lock|sweep\.h5|(moduli|cell_size|curves|match)\.png|report\.html|case-\d{4,}"
 )
 INDEX_LOCK_FILE, INDEX_LOCK_TIMEOUT_S = "index.lock", 30.0
 

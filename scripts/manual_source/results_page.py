@@ -10,7 +10,7 @@ from feti_homog.analysis.result import schema_keys
 from feti_homog.analysis.result_records import AnglePoint, EnvelopePoint, LoadPoint, PathPoint
 from feti_homog.results.csv_tables import Column, columns
 from feti_homog.results.field_layout import Item, items, spatial_items
-from feti_homog.sweep.report.tables import COLUMNS, DATASETS
+from feti_homog.sweep.report.tables import COLUMNS, DATASETS, STATISTICS_COLUMNS
 
 INTRODUCTION = """\
 Any consistent units: the unit of stresses is that of the moduli in the case file, that of lengths the unit of the cell.
@@ -34,9 +34,11 @@ Mises and principal stresses as `cell.vtkhdf` and `interface.vtkhdf` (ParaView f
 `--format vtu` as a `.vtu` for each state (meshio, too). In Python `feti_homog.read_state(DIR, K)` returns them as
 arrays."""
 
-SWEEP_CSV = """\
-A row for each case, then four for each point: the statistics of its realisations. Names have their units in brackets; i
-and j stand for 1, 2 or 3, in stiffnesses of generalized plane strain for 1 to 6."""
+CASES_CSV = """\
+Of a sweep, a row for each case; results are there once `collect` has written them. i and j stand for 1, 2 or 3, in
+stiffnesses of generalized plane strain for 1 to 6."""
+
+STATISTICS_CSV = "A row for each point of a sweep and each output: the statistics of its realisations."
 
 SPATIAL = """\
 Of generalized plane strain, result.h5 has all of the above but for what stands here again or is new. Fields do not vary
@@ -52,7 +54,8 @@ def results() -> str:
     parts += ["## angle.csv", _columns(columns(AnglePoint)), "## path.csv", _columns(columns(PathPoint))]
     parts += ["## load.csv", _columns(columns(LoadPoint))]
     parts += ["## envelope.csv", _columns(columns(EnvelopePoint))]
-    parts += ["## sweep.csv", SWEEP_CSV, _columns(COLUMNS), "## sweep.h5", _columns(DATASETS, "dataset")]
+    parts += ["## cases.csv", CASES_CSV, _columns(COLUMNS), "## statistics.csv", STATISTICS_CSV]
+    parts += [_columns(STATISTICS_COLUMNS), "## sweep.h5", _columns(DATASETS, "dataset")]
     return page(*parts)
 
 

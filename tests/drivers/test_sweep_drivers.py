@@ -10,7 +10,7 @@ from matplotlib.image import imread
 from reference.references import BONDED
 from support.command_line import assert_verified
 from support.jobs import ROOT, mpirun
-from support.sweep_files import rows
+from support.sweep_files import means
 
 
 def driven(name, folder, *options):
@@ -30,7 +30,7 @@ def test_fibre_fraction_sweep_reaches_the_references(tmp_path):
     assert found["hexagonal", 0.4][:3] == pytest.approx(BONDED["hexagonal", "strain"].value, rel=1e-3)
     assert found["square", 0.4][:3] == pytest.approx(BONDED["square", "strain"].value, rel=1e-3)
     assert found["hexagonal", 0.2][3] < 1e-3 < 1e-2 < found["square", 0.2][3]
-    assert all(output.count(str(tmp_path / name)) == 1 for name in ("sweep.csv", "moduli.png"))
+    assert all(output.count(str(tmp_path / name)) == 1 for name in ("statistics.csv", "moduli.png"))
     assert imread(tmp_path / "moduli.png")[..., :3].std() > 0.05
     results = [path.parent for path in tmp_path.rglob("result.h5")]
     assert len(results) == 10
@@ -49,5 +49,4 @@ def test_representative_cell_prints_what_scatters(tmp_path):
     assert output.count("C11 - C22 = ") == output.count("bulk between ") == 2
     assert imread(tmp_path / "cell_size.png")[..., :3].std() > 0.02
     assert_verified(*(path.parent for path in tmp_path.rglob("result.h5")))
-    means = [row for row in rows(tmp_path) if row["row"] == "mean"]
-    assert [float(row["bulk (GPa)"]) for row in means] == pytest.approx(table[:, 4], rel=1e-4)
+    assert means(tmp_path, "bulk") == pytest.approx(table[:, 4], rel=1e-4)

@@ -84,11 +84,11 @@ def test_a_full_disk_while_collecting_leaves_the_old_table(tmp_path):
     out, script = tmp_path / "out", tmp_path / "limited.py"
     swept(out, sweep_file(tmp_path, TWO))
     collected(out)
-    before = (out / "sweep.csv").read_bytes()
+    before = (out / "cases.csv").read_bytes()
     script.write_text(LIMITED.format(limit=300))
     job = mpirun(0, script, "collect", out)
     assert job.returncode == 1 and "cannot write" in job.stderr and "Traceback" not in job.stderr
-    assert (out / "sweep.csv").read_bytes() == before
+    assert (out / "cases.csv").read_bytes() == before
 
 
 def test_an_unwritable_folder_is_told(tmp_path):

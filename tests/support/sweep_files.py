@@ -24,8 +24,14 @@ def sweep_file(folder: Path, table: str, case: str = CASE, name: str = "sweep") 
     return path
 
 
-def rows(folder: Path, measured: bool = False) -> list[dict[str, str]]:
-    """sweep.csv, without times and memory unless they are asked for."""
-    with (folder / "sweep.csv").open(encoding="utf-8") as stream:
+def rows(folder: Path) -> list[dict[str, str]]:
+    """cases.csv, without times and memory."""
+    with (folder / "cases.csv").open(encoding="utf-8") as stream:
         found = list(csv.DictReader(stream))
-    return [{k: v for k, v in row.items() if measured or not k.startswith(("seconds", "memory"))} for row in found]
+    return [{k: v for k, v in row.items() if not k.startswith(("seconds", "memory"))} for row in found]
+
+
+def means(folder: Path, output: str) -> list[float]:
+    """Means of an output over the realisations of each point, by statistics.csv."""
+    with (folder / "statistics.csv").open(encoding="utf-8") as stream:
+        return [float(row["mean"]) for row in csv.DictReader(stream) if row["output"] == output]

@@ -22,7 +22,7 @@ from feti_homog.results.csv_tables import columns
 from feti_homog.results.field_layout import items, spatial_items
 from feti_homog.sweep import collect, execute, plan
 from feti_homog.sweep.report.outputs import outputs
-from feti_homog.sweep.report.tables import COLUMNS, DATASETS, OUTPUT_COLUMNS
+from feti_homog.sweep.report.tables import COLUMNS, DATASETS, OUTPUT_COLUMNS, STATISTICS_COLUMNS
 
 pytestmark = pytest.mark.slow
 
@@ -260,9 +260,10 @@ def test_columns_of_the_tables_of_points(folders, name, kind):
 def test_columns_of_sweeps(documents, sweep_folder):
     found = {name for document in documents for name in outputs(document)}
     assert unmatched(found, {column.name for column in OUTPUT_COLUMNS}) == (set(), set())
-    with (sweep_folder / "sweep.csv").open() as stream:
-        header = {name.partition(" (")[0] for name in next(csv.reader(stream))}
-    assert not unmatched(header, {column.name for column in COLUMNS})[0]
+    for name, described in (("cases.csv", COLUMNS), ("statistics.csv", STATISTICS_COLUMNS)):
+        with (sweep_folder / name).open() as stream:
+            header = next(csv.reader(stream))
+        assert not unmatched(header, {column.name for column in described})[0]
 
 
 def test_datasets_of_sweep_h5(sweep_folder):

@@ -1,4 +1,4 @@
-"""sweep.csv and sweep.h5: the table of a sweep and its statistics."""
+"""cases.csv, statistics.csv and sweep.h5: the table of a sweep and its statistics."""
 
 from __future__ import annotations
 
@@ -16,14 +16,15 @@ import numpy as np
 from feti_homog.materials.bounds import Moduli
 from feti_homog.materials.spatial_constants import EngineeringConstants, TransverselyIsotropic
 from feti_homog.materials.voigt import voigt_names
-from feti_homog.report.text.table import unit, with_unit
+from feti_homog.report.text.point_tables import STATES
+from feti_homog.report.text.table import unit
 from feti_homog.results import atomic
 from feti_homog.results.csv_tables import Column, columns
 from feti_homog.runtime.records import STRESS
 from feti_homog.sweep.report.sweep_table import Statistics, SweepTable
 
 CASE_COLUMNS = (
-    Column("row", "", "`case`, or of a point the `count`, `mean`, `std` and `ci95` of its realisations"),
+    Column("case", "", "number of the case, from 1"),
     Column("folder", "", "folder of the case, below the folder of the sweep"),
     Column("point", "", "number of the point, from 1"),
     Column("realisation", "", "number of the realisation of the point, from 1"),
@@ -83,6 +84,16 @@ OUTPUT_COLUMNS = (
     Column("memory", "bytes", "peak resident memory, the largest over ranks"),
 )
 COLUMNS = (*CASE_COLUMNS, *INPUT_COLUMNS, *OUTPUT_COLUMNS)
+STATISTICS_COLUMNS = (
+    Column("point", "", "number of the point, from 1"),
+    *INPUT_COLUMNS,
+    Column("output", "", "name of a column of cases.csv"),
+    Column("unit", "", "its unit"),
+    Column("count", "", "finished realisations of the point that have it"),
+    Column("mean", "that of the output", "mean over them"),
+    Column("std", "that of the output", "standard deviation, from two on"),
+    Column("ci95", "that of the output", "half the width of the 95 % confidence interval of the mean"),
+)
 
 DATASETS = (
     Column("/cases/COLUMN", "", "`folder`, `point`, `realisation`, `status`, `reason` of each case"),
@@ -96,42 +107,53 @@ DATASETS = (
     Column("/curves/point-K/Sij_PART", STRESS, "`mean`, `std`, `ci95` of these"),
 )
 PARTS = ("count", "mean", "std", "ci95")
+COUNTS = ("elements", "nodes", "ranks", "subdomains", "dofs", "multipliers", "iterations", "memory")
 CASE = ("folder", "point", "realisation", "status", "reason")
 
 
 def write(directory: Path, table: SweepTable) -> list[Path]:
-    """Write both, each in one step; returns their paths.  On one rank.  Raises FetiHomogError if it cannot."""
-    writers: tuple[tuple[str, Callable[[SweepTable, Path], None]], ...] = (("sweep.csv", _csv), ("sweep.h5", _hdf5))
-    return [atomic.replace(directory / name, partial(writer, table)) for name, writer in writers]
+    """Write all, each in one step; returns their paths.  On one rank.  Raises FetiHomogError if it cannot."""
+    writers: dict[str, Callable[[SweepTable, Path], None]] = {
+        "cases.csv": partial(_csv, _case_rows), "statistics.csv": partial(_csv, _statistics_rows), "sweep.h5": _hdf5,
+    }  # fmt: skip
+    return [atomic.replace(directory / name, partial(writer, table)) for name, writer in writers.items()]
 
 
-def _csv(table: SweepTable, path: Path) -> None:
-    """Write a row for each case; then, for each point, the count, mean, std and ci95 of its realisations.
-
-    The column `row` says which; names have their units in brackets.
-    """
-    names = [with_unit(name, table.stress_unit) for name in (*table.inputs, *table.outputs)]
+def _csv(rows: Callable[[SweepTable], Iterator[list[Any]]], table: SweepTable, path: Path) -> None:
+    """Write rows of cells, the first of which are the names of the columns."""
     with path.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(["row", *CASE, *names])
-        writer.writerows(_case_rows(table))
-        writer.writerows(_statistics_rows(table))
+        csv.writer(stream, lineterminator="\n").writerows(map(_cell, row) for row in rows(table))
 
 
 def _case_rows(table: SweepTable) -> Iterator[list[Any]]:
+    """Yield a row for each case."""
+    yield ["case", *CASE, *table.inputs, *table.outputs]
+    outputs = [
+        [int(value) if np.isfinite(value) else value for value in values.tolist()]
+        if is_count(name)
+        else values.tolist()
+        for name, values in table.outputs.items()
+    ]
     for row, _ in enumerate(table.folder):
-        inputs = [_cell(values[row]) for values in table.inputs.values()]
-        outputs = [_cell(values[row]) for values in table.outputs.values()]
-        yield ["case", *(getattr(table, name)[row] for name in CASE), *inputs, *outputs]
+        own = [values[row] for values in (*table.inputs.values(), *outputs)]
+        yield [row + 1, *(getattr(table, name)[row] for name in CASE), *own]
 
 
 def _statistics_rows(table: SweepTable) -> Iterator[list[Any]]:
+    """Yield a row for each point and output, of those with a result."""
+    inputs = [name for name in table.inputs if name != "cell.seed"]
+    yield ["point", *inputs, "output", "unit", *PARTS]
     for number, point in enumerate(table.points):
-        first = table.rows(point)[0]
-        inputs = ["" if key == "cell.seed" else _cell(values[first]) for key, values in table.inputs.items()]
-        for part in PARTS:
-            values = [getattr(statistics, part)[number] for statistics in table.statistics.values()]
-            yield [part, "", point, "", "", "", *inputs, *map(_cell, values)]
+        own = [point, *(table.input_of(point, name) for name in inputs)]
+        for name, statistics in table.statistics.items():
+            count, *others = (float(getattr(statistics, part)[number]) for part in PARTS)
+            if count:
+                yield [*own, name, unit(name, table.stress_unit), int(count), *others]
+
+
+def is_count(name: str) -> bool:
+    """Return whether an output is an integer."""
+    return name in COUNTS or name.endswith(tuple(f"_{state}" for state in STATES))
 
 
 def _cell(value: Any) -> Any:

@@ -51,7 +51,7 @@ def test_files_of_an_earlier_result_are_removed_and_nothing_else(tmp_path):
         "case_E11.png",
         "angle_states.png",
     ]
-    others = ["case.toml", "my.png", "case_mine.png", "cell.svg", "checkpoint", "result.h5.old", "sweep.csv"]
+    others = ["case.toml", "my.png", "case_mine.png", "cell.svg", "checkpoint", "result.h5.old", "statistics.csv"]
     for name in [*earlier, *others, "result.json"]:
         (tmp_path / name).touch()
     output_folder.remove_other_results(tmp_path, {"result.json", "path.csv"})

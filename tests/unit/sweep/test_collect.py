@@ -145,13 +145,18 @@ def fractions():
 
 def test_tables_hold_cases_and_statistics_of_points(tmp_path):
     table = fractions()
-    assert [path.name for path in tables.write(tmp_path, table)] == ["sweep.csv", "sweep.h5"]
-    with (tmp_path / "sweep.csv").open() as stream:
-        rows = list(csv.DictReader(stream))
-    assert [row["row"] for row in rows] == ["case"] * 6 + ["count", "mean", "std", "ci95"] * 2
-    assert rows[5]["status"] == "waiting" and rows[5]["bulk (GPa)"] == "" and rows[5]["cell.fibre_fraction"] == "0.4"
-    assert [float(row["bulk (GPa)"]) for row in rows if row["row"] == "mean"] == pytest.approx([97.5, 109.25])
-    assert [row["bulk (GPa)"] for row in rows if row["row"] == "count"] == ["3.0", "2.0"]
+    assert [path.name for path in tables.write(tmp_path, table)] == ["cases.csv", "statistics.csv", "sweep.h5"]
+    rows, statistics = (
+        list(csv.DictReader((tmp_path / name).read_text().splitlines())) for name in ("cases.csv", "statistics.csv")
+    )
+    assert [row["case"] for row in rows] == list("123456") and rows[0]["elements"].isdigit()
+    assert rows[5]["status"] == "waiting" and rows[5]["bulk"] == "" and rows[5]["cell.fibre_fraction"] == "0.4"
+    bulk = [row for row in statistics if row["output"] == "bulk"]
+    assert [float(row["mean"]) for row in bulk] == pytest.approx([97.5, 109.25])
+    assert [(row["point"], row["cell.fibre_fraction"], row["unit"], row["count"]) for row in bulk] == [
+        ("1", "0.2", "GPa", "3"),
+        ("2", "0.4", "GPa", "2"),
+    ]
     with h5py.File(tmp_path / "sweep.h5") as file:
         assert file["statistics/mean/C11"][()].tolist() == pytest.approx([136.5, 152.25])
         halves = [stats.t.ppf(0.975, 2) * 0.5 / 3**0.5, stats.t.ppf(0.975, 1) * 0.25]
@@ -159,7 +164,7 @@ def test_tables_hold_cases_and_statistics_of_points(tmp_path):
         assert file["cases/status"].asstr()[5] == "waiting" and np.isnan(file["outputs/C11"][5])
         assert file["points/cell.fibre_fraction"][()].tolist() == [0.2, 0.4]
         assert file["outputs/seconds_solve"].attrs["unit"] == "s"
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["sweep.csv", "sweep.h5"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["cases.csv", "statistics.csv", "sweep.h5"]
 
 
 def test_entries_beside_cases_in_space_have_the_names_of_space(tmp_path):

@@ -79,7 +79,10 @@ def test_a_full_device_is_told():
         atomic.replace(Path("/dev/shm/feti_homog_none"), lambda part: Path("/dev/full").write_text("x"))
 
 
-@pytest.mark.parametrize("name", ["cases.csv", "lock", "sweep.csv", "sweep.h5", "match.png", "case-0001/notes.txt"])
+OWN = ["cases.csv", "lock", "statistics.csv", "sweep.h5", "match.png", "case-0001/notes.txt"]
+
+
+@pytest.mark.parametrize("name", OWN)
 def test_files_that_no_sweep_wrote_are_not_replaced(tmp_path, name):
     sweep, out = plan.load(sweep_file(tmp_path, '"cell.order" = [1, 2]\n')), tmp_path / "out"
     (out / name).parent.mkdir(parents=True)
@@ -102,11 +105,11 @@ def test_the_folder_of_a_sweep_is_made_whole_again(tmp_path):
     ]  # fmt: skip
     assert list(csv.DictReader(table.splitlines())) == expected
     (out / "cases.csv").unlink()
-    (out / "sweep.csv").write_text("collected")
+    (out / "statistics.csv").write_text("collected")
     atomic.part_of(out / "cases.csv").write_text("half")
     store.prepare_folder(out, sweep)
     assert {path.name: path.read_text() for path in out.glob("*.csv*")} == {
         "cases.csv": table,
-        "sweep.csv": "collected",
+        "statistics.csv": "collected",
     }
     assert store.read_index(out).entries == sweep.entries
