@@ -30,7 +30,7 @@ def read(directory: Path) -> SweepTable:
 
 
 def collect(directory: Path, pictures: bool) -> list[str]:
-    """Write cases.csv, statistics.csv, sweep.h5 and the pictures to the folder; returns the lines to print.  On one rank.
+    """Write cases.csv, statistics.csv, sweep.h5 and the pictures; returns the lines to print.  On one rank.
 
     Raises:
         CaseError: as `read`.
