@@ -141,7 +141,8 @@ class Case:
 
     def remarks(self) -> tuple[str, ...]:
         """List the assumptions about settings that are not given, a line each."""
-        return stress_free(self.analysis.type, self.section.placed, self.analysis.plane)
+        of_table = () if self.cell.table is None else self.cell.table.remarks
+        return (*of_table, *stress_free(self.analysis.type, self.section.placed, self.analysis.plane))
 
     def resolved(self) -> dict[str, Any]:
         """Return the case with its defaults as a plain document, of which `parse` makes an equal case."""

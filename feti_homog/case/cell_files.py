@@ -10,14 +10,17 @@ import numpy as np
 
 from feti_homog.case.cell_section import Cell
 from feti_homog.case.fibre_table import FibreTable, read_table, table_of
-from feti_homog.case.section_values import MESH_SUFFIXES
+from feti_homog.case.section_values import MESH_SUFFIXES, TABLE_SUFFIXES
 from feti_homog.case.table_shapes import check_shapes
 from feti_homog.errors import CaseError
 from feti_homog.fibres.outlines.shapes import given_shapes
 from feti_homog.schema.wording import toml_value
 
-SUFFIXES = {"mesh": MESH_SUFFIXES, "table": (".csv",)}
+SUFFIXES = {"mesh": MESH_SUFFIXES, "table": TABLE_SUFFIXES}
 LIST = "fibre_list"
+# Of a radius, up to which centres outside of a cut window are taken as on its border.
+LEFT_OUT = 0.01
+MOST_LISTED = 20
 FEWEST_MATCHED = 10  # fibres: of fewer, distances have no distribution
 
 
@@ -73,7 +76,7 @@ def with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
 def _with_table(cell: Cell, faults: list[str]) -> Cell:
     """Return the cell with its table, which has the size of the cell."""
     try:
-        table = read_table(cell.file) if cell.file is not None else table_of(cell.fibre_list or (), LIST)
+        table = read_table(cell.file, cell.columns) if cell.file is not None else table_of(cell.fibre_list or (), LIST)
     except CaseError as error:
         faults += [f"[cell] {fault}" for fault in error.faults]
         return cell
@@ -87,7 +90,24 @@ def _with_table(cell: Cell, faults: list[str]) -> Cell:
         words = f"{table.name} has {shape.name}, and with them no nodes at tips"
         faults.append(f"[cell] tip_size = {cell.tip_size:g}: {words}")
     width, height = (_size(name, getattr(cell, name), table, faults) for name in ("width", "height"))
-    return replace(cell, table=replace(table, width=width, height=height))
+    table = replace(table, width=width, height=height)
+    return replace(cell, table=_within(table) if cell.window == "cut" else table)
+
+
+def _within(table: FibreTable) -> FibreTable:
+    """Return the table without the rows whose centres are outside of the cell by more than LEFT_OUT of their radii."""
+    if table.width is None or table.height is None:
+        return table
+    corner = np.array([table.left, table.bottom], float)
+    places = table.centres - np.where(np.isnan(corner), table.centres.min(axis=0), corner)
+    over = np.maximum(-places, places - [table.width, table.height]).max(axis=1)
+    outside = over > LEFT_OUT * table.radius
+    if not outside.any() or outside.all():
+        return table
+    kept, rows = table.rows(np.flatnonzero(~outside)), table.row[outside]
+    listed = ", ".join(map(str, rows[:MOST_LISTED])) + (", ..." if len(rows) > MOST_LISTED else "")
+    line = f'[cell] window = "cut": {len(rows)} rows with centres outside are left out: {listed}'
+    return replace(kept, remarks=(*table.remarks, line))
 
 
 def _size(name: str, asked: float | None, table: FibreTable, faults: list[str]) -> float | None:

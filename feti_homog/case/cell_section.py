@@ -10,7 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 from feti_homog.case.fibre_table import FibreTable
 from feti_homog.case.phase_names import FIBRE
-from feti_homog.case.section_values import CELL_FILE, FIBRE_LIST, FRACTIONS, PHASES, RADII, SEED, TABLE_FILE
+from feti_homog.case.section_values import (
+    CELL_FILE,
+    FIBRE_LIST,
+    FRACTIONS,
+    NAMES_OF_COLUMNS,
+    PHASES,
+    RADII,
+    SEED,
+    TABLE_FILE,
+)
 from feti_homog.schema.keys import Selector, key
 from feti_homog.schema.values import choice, integer, real
 
@@ -218,16 +227,25 @@ class Cell:
         default_words="none",
     )
     repair: str = key(
-        choice("none", "snap"),
-        '"snap": nodes on sides that nearly match are moved to match; the result says how far.',
+        choice("none", "snap", "overlaps"),
+        '"snap", of a mesh: nodes on sides that nearly match are moved to match; the result says how far. "overlaps", '
+        "of a table: fibres that touch, or overlap by less than 1 % of a radius, are made smaller until they do not; "
+        "the result names the rows.",
         default="none",
-        only=MESH,
+        only=FROM_A_FILE,
     )
     snap_tolerance: float = key(
         real(least=0.0, most=0.1),
         'How far nodes may be moved by repair = "snap" / width of the cell.',
         default=1e-3,
         only=MESH,
+    )
+    columns: tuple[str, ...] | None = key(
+        NAMES_OF_COLUMNS,
+        "Names of the columns of a table without a line of names; others than those of file are not read.",
+        default=None,
+        only=TABLE,
+        default_words="the first line of the table",
     )
     fibre_list: tuple[Mapping[str, Any], ...] | None = key(
         FIBRE_LIST, "The fibres, in place of file.", default=None, only=TABLE, default_words="given by file"
@@ -236,7 +254,7 @@ class Cell:
         choice("periodic", "cut"),
         'What a table is. "periodic": a cell, whose fibres return on the other side; they must not overlap. "cut": a '
         "piece of something larger, whose fibres may overlap across the border: they are moved apart as little as can "
-        "be.",
+        "be. Those with centres outside are left out.",
         default="periodic",
         only=TABLE,
     )

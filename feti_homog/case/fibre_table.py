@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -14,6 +13,7 @@ import numpy as np
 
 from feti_homog.case.phase_names import VOID
 from feti_homog.case.section_values import FIBRE_CELLS, NUMBERS
+from feti_homog.case.table_columns import Column, misspelt, number_of, understood
 from feti_homog.errors import CaseError
 from feti_homog.fibres.outlines.outlines import Columns, Outlines
 from feti_homog.fibres.outlines.shapes import REPLACING, outlines_of
@@ -42,6 +42,7 @@ class FibreTable:
         phase: N names, "fibre" where the table gives none, "void" of voids.
         width, height: of the cell; None if the table does not say.
         left, bottom: coordinates of its lower left corner; None if the table does not say.
+        remarks: what of the table is not used, a line each.
     """
 
     name: str
@@ -53,6 +54,7 @@ class FibreTable:
     height: float | None
     left: float | None
     bottom: float | None
+    remarks: tuple[str, ...] = ()
 
     @cached_property
     def outlines(self) -> Outlines:
@@ -92,23 +94,26 @@ class FibreTable:
     @property
     def solid(self) -> FibreTable:
         """The table without its voids."""
-        kept = np.flatnonzero(~self.is_void)
+        return self.rows(np.flatnonzero(~self.is_void))
+
+    def rows(self, kept: Int) -> FibreTable:
+        """Return the table of the rows `kept` (k,)."""
         columns = {name: values[kept] for name, values in self.columns.items()}
         return replace(self, row=self.row[kept], columns=columns, phase=tuple(self.phase[k] for k in kept.tolist()))
 
     @property
     def outer_radius(self) -> Float:
         """(N,) with the coating."""
-        return np.asarray(self.radius * (1 + self.coating))
+        return self.radius * (1 + self.coating)
 
 
-def read_table(path: Path) -> FibreTable:
+def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
     """Return the table in a text file, which is not judged as a whole: fibres may overlap.
 
-    A line of names comes first: x, y, radius (or a, b), and phase, coating, angle if there are any, in any order
-    and case; then a line for each fibre. Columns are parted by commas, semicolons or tabs; without commas between
-    columns, decimals may have them. What follows "#" is a comment; one such as "# width = 120, height = 80" tells
-    the size of the cell, and with "left" and "bottom" where it begins.
+    A line of names comes first, unless `columns` has them: x, y, radius (or a, b), and phase, coating, angle if
+    there are any, or names that `understood` knows; then a line for each fibre. Columns are parted by commas,
+    semicolons, tabs or else by spaces; without commas between columns, decimals may have them. What follows "#" is
+    a comment; "# width = 120, height = 80" tells the size of the cell, and "left" and "bottom" where it begins.
 
     Raises:
         CaseError: the table is faulty; a line for each fault, with the line of the file.
@@ -123,12 +128,14 @@ def read_table(path: Path) -> FibreTable:
             lines.append((number, contents))
     if not lines:
         raise CaseError(*faults.lines, f"{name}: no rows; expected a line of names such as x, y, radius, then fibres")
-    delimiter = next((mark for mark in ";\t" if mark in lines[0][1]), ",")
-    names = [_bare(word).lower() for word in lines[0][1].split(delimiter)]
-    _check_names(names, lines[0][0], faults)
+    delimiter = next((mark for mark in ";\t," if mark in lines[0][1]), None)
+    words = [_bare(word) for word in lines[0][1].split(delimiter)] if columns is None else list(columns)
+    read, others = understood(words, COLUMNS)
+    _check_names(words, read, others, lines[0][0], faults)
     faults.throw()
-    rows = dict(_split(lines[1:], names, delimiter, faults))
-    return _table(name, rows, set(names), sizes, faults)
+    rows = dict(_split(lines[1:] if columns is None else lines, read, len(words), delimiter, faults))
+    remarks = (f"[cell] {name}: not read: {', '.join(map(toml_value, others))}",) if others else ()
+    return replace(_table(name, rows, {column.name for column in read}, sizes, faults), remarks=remarks)
 
 
 def table_of(entries: Sequence[Mapping[str, Any]], name: str) -> FibreTable:
@@ -176,7 +183,7 @@ def _bare(word: str) -> str:
 def _read_sizes(comment: str, row: int, sizes: dict[str, float], faults: _Faults) -> None:
     """Add what a comment says of the cell to `sizes`."""
     for key, word in SIZE.findall(comment):
-        value = _number(word, ";")
+        value = number_of(word, ";")
         if value is None or not is_number(value) or (value <= 0 and key in SIZES[:2]):
             expected = "a number above 0" if key in SIZES[:2] else "a number"
             faults.add(row, f"{key} = {word}: expected {expected}")
@@ -184,27 +191,24 @@ def _read_sizes(comment: str, row: int, sizes: dict[str, float], faults: _Faults
             faults.add(row, f"{key} = {word}: an earlier line has {sizes[key]:g}")
 
 
-def _number(word: str, delimiter: str) -> float | None:
-    """Return the number that a word is; None if it is none."""
-    try:
-        value = float(word if delimiter == "," else word.replace(",", "."))
-    except ValueError:
-        return None
-    return value if math.isfinite(value) and "_" not in word else None
-
-
-def _check_names(names: list[str], row: int, faults: _Faults) -> None:
-    if not any(name in COLUMNS for name in names):
-        words = toml_value(", ".join(names))
-        faults.add(row, f"{words}: expected names of columns, as x, y, radius")
+def _check_names(
+    words: Sequence[str], read: Sequence[Column], others: Sequence[str], row: int, faults: _Faults
+) -> None:
+    """Add the faults of a line of names: none that is known, some twice, misspelt or missing."""
+    names = [column.name for column in read]
+    if not names:
+        given = toml_value(", ".join(words))
+        ways = 'in [cell] columns = ["x", "y", "radius"]'
+        faults.add(row, f"{given}: expected names of columns, as x, y, radius, here or {ways}")
         faults.throw()
-    for place, name in enumerate(names, 1):
-        if name in names[: place - 1]:
-            faults.add(row, f"column {name}: there are two of it")
-        elif name not in COLUMNS:
-            faults.add(row, f"column {toml_value(name)}: unknown; {suggestion(name, COLUMNS, {})}")
+    for name in dict.fromkeys(name for name in names if names.count(name) > 1):
+        faults.add(row, f"column {name}: there are two of it")
+    for word in others:
+        if meant := misspelt(word, [name for name in COLUMNS if name not in names]):
+            faults.add(row, f"column {toml_value(word)}: unknown; did you mean {meant}?")
     for name in _missing(set(names)):
-        faults.add(row, f"column {name}: missing")
+        ignored = f"; not read: {', '.join(map(toml_value, others))}" if others else ""
+        faults.add(row, f"column {name}: missing{ignored}")
 
 
 def _missing(names: set[str]) -> list[str]:
@@ -215,7 +219,7 @@ def _missing(names: set[str]) -> list[str]:
 
 
 def _split(
-    lines: list[tuple[int, str]], names: list[str], delimiter: str, faults: _Faults
+    lines: list[tuple[int, str]], columns: Sequence[Column], count: int, delimiter: str | None, faults: _Faults
 ) -> Iterator[tuple[int, dict[str, Any]]]:
     """Each row's number, and its cells by column: numbers, texts, and nothing for cells that are empty."""
     for row, line in lines:
@@ -223,12 +227,10 @@ def _split(
             faults.add(row, "a quotation mark is not closed")
             continue
         words = [_bare(word) for word in line.split(delimiter)]
-        if len(words) != len(names):
-            faults.add(row, f"has {len(words)} columns; expected {len(names)}, as there are names")
+        if len(words) != count:
+            faults.add(row, f"has {len(words)} columns; expected {count}, as there are names")
             continue
-        cells = dict(zip(names, words, strict=True))
-        read = {name: word if name == "phase" else _number(word, delimiter) for name, word in cells.items() if word}
-        yield row, {name: cells[name] if value is None else value for name, value in read.items()}
+        yield row, {c.name: c.read(words[c.place], delimiter) for c in columns if words[c.place]}
 
 
 def _table(

@@ -14,7 +14,7 @@ from feti_homog.case.cell_section import MESH, MESHED, TABLE, Cell
 from feti_homog.case.element_sizes import ASKED, CHOSEN
 from feti_homog.case.interface_section import ARCS, Arc, Scatter
 from feti_homog.case.mixed_load import MixedLoad
-from feti_homog.case.section_values import MESH_FILE, MESH_SUFFIXES
+from feti_homog.case.section_values import MESH_FILE, MESH_SUFFIXES, TABLE_SUFFIXES
 from feti_homog.case.sections import OUT_OF_PLANE_STRESSES, SECTIONS, SECTIONS_OF_AN_ANALYSIS
 from feti_homog.case.selectors import (
     ANALYSIS_TYPE,
@@ -125,9 +125,13 @@ def _files() -> Iterator[Rule]:
     line = "missing; expected the name of a .csv file, or fibre_list"
     yield needed(CELL, "file", line, TABLE, unless=("fibre_list",))
     meshes = "|".join(suffix[1:] for suffix in MESH_SUFFIXES)
-    for pattern, expected, geometry in ((r"\.csv$", MESH_FILE, MESH), (rf"\.({meshes})$", ".csv file", TABLE)):
+    tables = "|".join(suffix[1:] for suffix in TABLE_SUFFIXES)
+    for pattern, expected, geometry in ((rf"\.({tables})$", MESH_FILE, MESH), (rf"\.({meshes})$", ".csv file", TABLE)):
         line = f"expected the name of a {expected} for {geometry.in_words('cell')}"
         yield refused((*CELL, "file"), {"type": "string", "pattern": pattern}, line, geometry)
+    for wrong, right, geometry in (("overlaps", "snap", MESH), ("snap", "overlaps", TABLE)):
+        line = f'expected "none" or "{right}" for {geometry.in_words("cell")}'
+        yield refused((*CELL, "repair"), {"enum": [wrong]}, line, geometry)
     for name in ("width", "height"):
         line = "missing; fibre_list has no line such as # width = 120, height = 80"
         yield needed(CELL, name, line, TABLE, beside="fibre_list")

@@ -76,8 +76,10 @@ FIBRE_CELLS: Mapping[str, ValueType] = {
 }
 """The numbers of a fibre in a table."""
 
-TABLE_FILE = file_name("the name of a .csv file", ".csv")
-CELL_FILE = file_name(f"the name of a {MESH_FILE}, or of a .csv file of a table", *MESH_SUFFIXES, ".csv")
+TABLE_SUFFIXES = (".csv", ".txt", ".dat")
+TABLE_FILE = file_name("the name of a .csv file", *TABLE_SUFFIXES)
+NAMES_OF_COLUMNS = list_of(text, 'a list of names such as ["x", "y", "radius"]', least=3)
+CELL_FILE = file_name(f"the name of a {MESH_FILE}, or of a .csv file of a table", *MESH_SUFFIXES, *TABLE_SUFFIXES)
 FIBRE_LIST = ValueType(
     "a list of fibres such as {x = 0.5, y = 0.5, radius = 0.3}",
     lambda value: isinstance(value, list) and value != [] and all(isinstance(fibre, dict) for fibre in value),

@@ -32,6 +32,8 @@ LEAST_CLEARANCE = 1e-3
 # Decimals of coordinates / width of the cell of tables that may have any origin and unit, and of height / width: gmsh
 # may put other elements beside ellipses and polygons where the last digit of a length is another.
 TABLE_DECIMALS, HEIGHT_DECIMALS = 10, 12
+# Overlap / radius of the smaller fibre, up to which fibres are repaired.
+REPAIRED = 0.01
 MOST_LISTED = 30  # moved fibres that are listed one by one
 
 
@@ -51,12 +53,13 @@ def table_arrangement(cell: Cell) -> Arrangement:
     """
     table = cell.table
     assert table is not None and table.width is not None
+    table, repaired = _repaired(table, cell.window) if cell.repair == "overlaps" else (table, ())
     kept, centres, moves, size = on_torus(table, cell.window)
     order = np.argsort(table.is_void[kept], kind="stable")
     rows, places = kept[order], (centres + moves)[order]
     fibres = replace(
         _nested(table, rows, places % size / size[0], float(size[1] / size[0])),
-        remarks=_moved_fibres(table, kept, moves) if cell.window == "cut" else (),
+        remarks=repaired + (_moved_fibres(table, kept, moves) if cell.window == "cut" else ()),
     )
     shifted = clear_shift(fibres)
     is_placed = table.left is not None and table.bottom is not None
@@ -64,6 +67,30 @@ def table_arrangement(cell: Cell) -> Arrangement:
     if not is_placed or clearance(fibres) < clear:
         return _in_mesh_order(_rounded(shifted))
     return fibres if isinstance(fibres.outlines, Discs) else _rounded(fibres)
+
+
+def _repaired(table: FibreTable, window: str) -> tuple[FibreTable, tuple[str, ...]]:
+    """Return the table whose fibres that touch or overlap by up to REPAIRED of a radius are smaller by what parts them,
+    and the rows, in one line."""
+    assert table.width is not None and table.height is not None
+    size, centres = np.array([table.width, table.height]), table.centres - _corner(table)
+    kept = np.flatnonzero(_without_images(table, centres, size, window == "cut")[0])
+    outer = table.outlines[kept].at(centres[kept]).grown((table.coating * table.radius)[kept])
+    first, second, gap, _, across = _gaps(table, kept, outer, size)
+    least = LEAST_GAP * (table.outer_radius[kept][first] + table.outer_radius[kept][second]) / 2
+    smaller = np.minimum(table.radius[kept][first], table.radius[kept][second])
+    near = (gap < least) & (gap > -REPAIRED * smaller) & ~(across & (window == "cut"))
+    share = np.zeros(len(table.row))
+    for own in (first[near], second[near]):
+        sizes = np.stack([table.columns[name][kept[own]] for name in ("radius", "a", "b")])
+        np.maximum.at(share, kept[own], (least - gap)[near] / np.nanmin(sizes, axis=0))
+    names = {"radius", *(name for shape in SHAPES for name in shape.sizes if name != "sides")}
+    # A little more than enough, for the gap is compared with the radii that are left.
+    columns = {name: own * (1 - 0.51 * share) if name in names else own for name, own in table.columns.items()}
+    rows = table.row[share > 0]
+    listed = f"rows {', '.join(map(str, rows[:MOST_LISTED]))}{', ...' if len(rows) > MOST_LISTED else ''}"
+    words = f"{listed} are smaller by up to {100 * 0.51 * share.max():.2g} %" if len(rows) else "nothing to repair"
+    return replace(table, columns=columns), (f'[cell] repair = "overlaps": {words}',)
 
 
 def _nested(table: FibreTable, rows: Int, centres: Float, height: float) -> Arrangement:
@@ -211,19 +238,27 @@ def _contacts(table: FibreTable, kept: Int, outer: Outlines, size: Float, is_cut
 
     Of a cut window only of those that do within.
     """
-    centres, radius = outer.centres, table.outer_radius[kept]
-    first, second, vector = neighbours(centres, size, 2 * outer.longest.max() * (1 + LEAST_GAP))
-    together = radius[first] + radius[second]
-    normal, reach = outer.parting(first, second, vector)
-    gap = (normal * vector).sum(axis=1) - reach
-    across = np.linalg.norm(centres[second] - centres[first] - vector, axis=1) > SAME_FIBRE * radius[first]
+    first, second, gap, together, across = _gaps(table, kept, outer, size)
     bad = np.flatnonzero((gap < LEAST_GAP * together / 2) & ~(across & is_cut))
     faults = []
     for k in bad[np.unique(np.stack([first[bad], second[bad]]), axis=1, return_index=True)[1]].tolist():
         i, j = table.row[kept[first[k]]], table.row[kept[second[k]]]
         who = f"rows {i} and {j}" if i != j else f"row {i} and its image"
         what = f"overlap by {-gap[k]:.3g}" if gap[k] < -LEAST_GAP * together[k] / 2 else "touch"
-        faults.append(f"{who}: {what}{' across the border' if across[k] else ''}")
+        least = REPAIRED * min(table.radius[kept[[first[k], second[k]]]])
+        hint = '; repair = "overlaps" makes them smaller' if -gap[k] < least else ""
+        faults.append(f"{who}: {what}{' across the border' if across[k] else ''}{hint}")
     if (across[bad]).any():
         faults.append('fibres meet across the border: give the right width and height, or window = "cut"')
     return faults
+
+
+def _gaps(table: FibreTable, kept: Int, outer: Outlines, size: Float) -> tuple[Int, Int, Float, Float, Bool]:
+    """Return the pairs of near fibres among the rows `kept` (k,): places in these, gaps, sums of radii, and whether
+    they are across the border."""
+    centres, radius = outer.centres, table.outer_radius[kept]
+    first, second, vector = neighbours(centres, size, 2 * outer.longest.max() * (1 + LEAST_GAP))
+    normal, reach = outer.parting(first, second, vector)
+    gap = (normal * vector).sum(axis=1) - reach
+    across = np.linalg.norm(centres[second] - centres[first] - vector, axis=1) > SAME_FIBRE * radius[first]
+    return first, second, gap, radius[first] + radius[second], across

@@ -133,6 +133,8 @@ def estimate_lines(found: Estimate, n_ranks: int) -> list[str]:
 
 def _size(size: float) -> str:
     """Return bytes in words."""
+    if size < 2**17:
+        return f"{size / 1024:.0f} KiB"
     size /= 2**20
     digits = 1 if size < 10 else 0
     return f"{size:.{digits}f} MiB" if size < 1000 else f"{size / 1024:.1f} GiB"

@@ -42,7 +42,7 @@ def test_keys_that_are_left_out_have_their_defaults(tmp_path):
         "accuracy": None, "element_size": None,
         "refine": 0, "order": 1, "bodies": "torus", "fibres": None, "width": None, "fibre_radius": None,
         "coating": None, "min_gap": 0.05, "seed": 0, "radius_spread": 0.0, "file": None,
-        "phases": None, "repair": "none", "snap_tolerance": 1e-3,
+        "phases": None, "columns": None, "repair": "none", "snap_tolerance": 1e-3,
         "height": None, "fibre_list": None, "window": "periodic", "table": None, "match": None, "matched": None,
         "voids": None, "void_radius": None,
         "mix": None, "radii": None,

@@ -1,0 +1,93 @@
+"""Columns of tables of fibres as programs name them: units in brackets, diameters, areas and axes of ellipses."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+UNIT = re.compile(r"\s*(\[[^]]*\]|\([^)]*\)|/\s*[^/]+)\s*$")
+
+
+def _radius_of_area(area: float) -> float:
+    return math.copysign(math.sqrt(abs(area) / math.pi), area)
+
+
+def _same(value: float) -> float:
+    return value
+
+
+def _half(value: float) -> float:
+    return value / 2
+
+
+def _turned(value: float) -> float:
+    """Return an angle that is measured as a picture is seen, for coordinates whose y points down."""
+    return -value
+
+
+# Other names of columns, those before first, and what makes the column of their values. Major and Minor are ImageJ's
+# axes of ellipses, whose areas are of no more use.
+OTHERS: tuple[tuple[tuple[str, ...], str, Callable[[float], float]], ...] = (
+    (("xm", "xc", "x_c", "cx", "center_x", "centre_x", "centroid_x", "x_center", "x_centre"), "x", _same),
+    (("ym", "yc", "y_c", "cy", "center_y", "centre_y", "centroid_y", "y_center", "y_centre"), "y", _same),
+    (("major",), "a", _half),
+    (("minor",), "b", _half),
+    (("r", "rad"), "radius", _same),
+    (("diameter", "diam", "d"), "radius", _half),
+    (("area",), "radius", _radius_of_area),
+    (("material", "type"), "phase", _same),
+)
+
+
+INSTEAD = {"radius": "a"}
+"""Columns that are not made where another is given."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column that is read: its place in the rows, its name, and what makes its value of a number."""
+
+    place: int
+    name: str
+    value: Callable[[float], float]
+
+    def read(self, word: str, delimiter: str | None) -> float | str:
+        """Return the value of a cell: a number, or its text if it is none."""
+        number = None if self.name == "phase" else number_of(word, delimiter)
+        return word if number is None else self.value(number)
+
+
+def _bare(word: str) -> str:
+    """Return a name without its unit, in lower case."""
+    return UNIT.sub("", word).strip().lower()
+
+
+def understood(words: Sequence[str], known: Sequence[str]) -> tuple[list[Column], list[str]]:
+    """Return the columns of a line of names that are among those `known`, in any case, and the other words."""
+    bare = list(map(_bare, words))
+    values = {"angle": _turned} if "major" in bare else {}
+    columns = [Column(place, name, values.get(name, _same)) for place, name in enumerate(bare) if name in known]
+    for others, name, value in OTHERS:
+        given = {column.name for column in columns}
+        if {name, INSTEAD.get(name, name)}.isdisjoint(given):
+            columns += [Column(bare.index(other), name, value) for other in others if other in bare][:1]
+    read = {column.place for column in columns}
+    return columns, [word for place, word in enumerate(words) if place not in read]
+
+
+def misspelt(word: str, missing: Sequence[str]) -> str:
+    """Return the column among those that are `missing` that a word is nearly the name of; empty if there is none."""
+    near = difflib.get_close_matches(_bare(word), missing, n=1, cutoff=0.75)
+    return near[0] if near else ""
+
+
+def number_of(word: str, delimiter: str | None) -> float | None:
+    """Return the number that a word is, with a decimal comma where commas do not part columns; None if it is none."""
+    try:
+        value = float(word if delimiter == "," else word.replace(",", "."))
+    except ValueError:
+        return None
+    return value if math.isfinite(value) and "_" not in word else None

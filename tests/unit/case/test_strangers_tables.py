@@ -1,0 +1,105 @@
+"""Tables of fibres as other programs write them, and what is made of those that nearly fit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from feti_homog import Case
+from feti_homog.case.fibre_table import read_table
+from feti_homog.errors import CaseError, MeshError
+from feti_homog.fibres.periodic_table import table_arrangement
+
+SIZE = "# width = 8, height = 6\n"
+TABLES = {
+    "ImageJ": " ,Area,X,Y,Major,Minor,Angle\n1,3.141593,2,2,2,2,0\n2,4.523893,5,4,2.4,2.4,90\n",
+    "ImageJ, areas": " \tLabel\tArea\tXM\tYM\tCirc.\n1\ta.tif\t3.14159265\t2\t2\t1\n2\ta.tif\t4.52389342\t5\t4\t1\n",
+    "pandas": ",id,x,y,diameter\n0,17,2.0,2.0,2.0\n1,18,5.0,4.0,2.4\n",
+    "R": '"","x","y","r"\n"1",2,2,1\n"2",5,4,1.2\n',
+    "German Excel": "Nr;X [µm];Y [µm];Durchmesser;D (µm)\n1;2,0;2,0;-;2,0\n2;5,0;4,0;-;2,4\n",
+    "units after a stroke": "x / um\ty / um\td / um\n2\t2\t2\n5\t4\t2.4\n",
+    "NumPy": "# x y radius\n x y radius \n2.0e+00 2.0e+00 1.0e+00\n5.0e+00 4.0e+00 1.2e+00\n",
+    "MATLAB": "  x_c    y_c   diam\n   2      2      2\n   5      4    2.4\n",
+    "regionprops": "label,centroid_x,centroid_y,area,eccentricity\n1,2,2,3.14159265,0\n2,5,4,4.52389342,0\n",
+    "microscope": "Type,Center_X (um),Center_Y (um),Radius (um),Time\nfibre,2,2,1,12:00\nfibre,5,4,1.2,12:01\n",
+    "capitals": "X,Y,R,ID\n2,2,1,F1\n5,4,1.2,F2\n",
+    "own": "x,y,radius,phase\n2,2,1,fibre\n5,4,1.2,\n",
+}
+
+
+def case(path, text, **cell):
+    path.write_text(text)
+    return Case.parse(
+        {
+            "cell": {"geometry": "table", "file": str(path)} | cell,
+            "material": {"matrix": {"young": 3.0, "poisson": 0.3}, "fibre": {"young": 70.0, "poisson": 0.2}},
+            "analysis": {"type": "stiffness", "plane": "strain"},
+        }
+    )
+
+
+def is_expected(table):
+    np.testing.assert_allclose(table.centres, [[2, 2], [5, 4]])
+    np.testing.assert_allclose(table.radius, [1.0, 1.2], rtol=1e-6)
+    assert table.phase == ("fibre", "fibre")
+
+
+@pytest.mark.parametrize("writer", TABLES)
+def test_a_strangers_table_is_read_as_it_is(tmp_path, writer):
+    read = case(tmp_path / "t.csv", SIZE + TABLES[writer])
+    is_expected(read.cell.table)
+    assert len(table_arrangement(read.cell).radii) == 2
+    assert bool(read.remarks()) == (writer not in ("own", "NumPy", "MATLAB", "units after a stroke"))
+
+
+@pytest.mark.parametrize("name", ["t.txt", "t.dat", "t.csv"])
+@pytest.mark.parametrize("mark", [" ", ",", ";\t"])
+def test_a_table_without_names_is_read_by_those_of_the_case(tmp_path, name, mark):
+    text = SIZE + "\n".join(mark[:1].join(row) for row in (["7", "2", "2", "2"], ["8", "5", "4", "2.4"]))
+    is_expected(case(tmp_path / name, text, columns=["number", "x", "y", "d"]).cell.table)
+    with pytest.raises(CaseError, match=r"expected names of columns, as x, y, radius, here or in \[cell\] columns = "):
+        case(tmp_path / name, text)
+
+
+def test_angles_of_imagej_are_those_of_pictures_whose_y_points_down(tmp_path):
+    (tmp_path / "t.csv").write_text("X,Y,Major,Minor,Angle\n2,2,2,1,30\n")
+    columns = read_table(tmp_path / "t.csv").columns
+    assert [columns[name][0] for name in ("a", "b", "angle")] == [1.0, 0.5, -30.0]
+
+
+def test_what_is_not_read_is_remarked(tmp_path):
+    read = case(tmp_path / "t.csv", SIZE + TABLES["pandas"])
+    assert read.remarks() == ('[cell] t.csv: not read: "", "id"',)
+    with pytest.raises(CaseError, match='column radius: missing; not read: "size"'):
+        case(tmp_path / "t.csv", SIZE + "x,y,size\n2,2,1\n")
+
+
+def test_a_cut_window_leaves_out_centres_outside(tmp_path):
+    text = "# width = 8, height = 6, left = 0, bottom = 0\nx,y,r\n2,2,1\n-0.5,3,1\n5,4,1.2\n4,7,1\n"
+    read = case(tmp_path / "t.csv", text, window="cut")
+    is_expected(read.cell.table)
+    assert read.remarks() == ('[cell] window = "cut": 2 rows with centres outside are left out: 4, 6',)
+
+
+TOUCHING = "x,y,r\n2,2,1\n3.995,2,1\n6,4,0.5\n"
+
+
+def test_small_overlaps_are_repaired_where_that_is_asked_for(tmp_path):
+    """By 0.005, of radii of 1."""
+    with pytest.raises(MeshError, match=r'rows 3 and 4: overlap by 0\.005; repair = "overlaps" makes them smaller'):
+        table_arrangement(case(tmp_path / "t.csv", SIZE + TOUCHING).cell)
+    found = table_arrangement(case(tmp_path / "t.csv", SIZE + TOUCHING, repair="overlaps").cell)
+    radii = found.radii * 8
+    assert radii[2] == pytest.approx(0.5) and (radii[:2] > 0.997).all() and radii[:2].sum() < 1.995
+    assert found.remarks == ('[cell] repair = "overlaps": rows 3, 4 are smaller by up to 0.26 %',)
+
+
+def test_larger_overlaps_are_not_repaired(tmp_path):
+    text = SIZE + TOUCHING.replace("3.995", "3.95")
+    with pytest.raises(MeshError, match=r"rows 3 and 4: overlap by 0\.05$"):
+        table_arrangement(case(tmp_path / "t.csv", text, repair="overlaps").cell)
+
+
+def test_each_geometry_has_its_repair(tmp_path):
+    with pytest.raises(CaseError, match='expected "none" or "overlaps" for geometry = "table"'):
+        case(tmp_path / "t.csv", SIZE + TOUCHING, repair="snap")
