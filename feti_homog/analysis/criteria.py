@@ -15,7 +15,8 @@ def criterion_of(cell: TornCell, grows: bool = False) -> BondLaw:
     Raises:
         CaseError: tips of debonding ask for what the solver does not have.
     """
-    law, bonds = cell.bond_law, cell.case.interfaces
+    bonds = cell.case.interfaces
+    law = cell.bond_law if grows else cell.bond_law.onset()
     if not (isinstance(law, SpringEnergy) and bonds[0].growth == "released"):
         return law
     has_tips = grows or cell.sum_over_ranks(int(cell.debonded(None).sum())) > 0

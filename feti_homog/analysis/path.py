@@ -144,6 +144,7 @@ def _entry(
     return {
         "load_factor": point.load_factor,
         "broke": point.broke,
+        **({} if law.damage(point.state.bonds) is None else {"softened": point.softened}),
         "free_motions": point.state.free_motions,
         "work": work.all_equilibria.work,
         "dissipated": work.all_equilibria.released,
@@ -187,11 +188,11 @@ def _kept(
 
     `states`, the numbers of those whose fields are recorded.
     """
-    if last is None or not (law.has_toughness or context.states.has_place):
+    if last is None or not (law.has_tips or context.states.has_place):
         return {}
     legs = len(context.case.targets) if path.method == "events" else 0
     numbers = kept(entries, context.case.output.states, legs, marks(_document(context, entries)))
-    tips = TipRecorder(context.cell, context.loads.interfaces, law) if law.has_toughness else None
+    tips = TipRecorder(context.cell, context.loads.interfaces, law) if law.has_tips else None
     with context.progress.stage("states") as words:
         for number in context.progress.bar(numbers, "states"):
             point = (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -58,12 +58,12 @@ def stored(point: Point, work: Work) -> tuple[dict[str, Any], Arrays]:
     """
     after = point.after
     whole: dict[str, Any] = {
-        "path": [point.load_factor, point.scale, float(after.leg), after.position, float(point.broke)],
+        "path": [point.load_factor, point.scale, float(after.leg), after.position, point.broke, point.softened],
         "energies": [*point.energies, *work.all_equilibria, work.load_controlled],
         "macroscopic": np.stack([after.origin.strain, after.origin.stress, after.last.strain, after.last.stress]),
         "broken": np.nan if after.broken is None else after.broken,
     }
-    distributed: Arrays = {"used": point.used, "status_after": after.bonds.status, "history_after": after.bonds.history}
+    distributed: Arrays = {"used": point.used} | _bonds_apart(after.bonds, "_after")
     for suffix, state in zip(SUFFIXES, point.state.problems, strict=False):
         numbers, arrays = _taken_apart(state)
         whole |= {f"{name}{suffix}": value for name, value in numbers.items()}
@@ -73,7 +73,7 @@ def stored(point: Point, work: Work) -> tuple[dict[str, Any], Arrays]:
 
 def restored(event: Arrays, cell: CoupledInterfaces) -> tuple[Point, tuple[Energies, float]]:
     """Put together what `stored` took apart of an event of a cell: the point, and the energies up to it."""
-    load_factor, scale, leg, position, broke = event["path"].tolist()
+    load_factor, scale, leg, position, *counts = event["path"].tolist()
     energies = event["energies"].tolist()
     pairs = zip(cell.problems, SUFFIXES, strict=False)
     state, *others = (_put_together(event, each, suffix) for each, suffix in pairs)
@@ -83,13 +83,14 @@ def restored(event: Arrays, cell: CoupledInterfaces) -> tuple[Point, tuple[Energ
     after = PathState(
         int(leg),
         position,
-        BondState(event["status_after"], event["history_after"]),
+        _bonds_together(event, "_after"),
         state.multipliers,
         Macroscopic(origin_strain, origin_stress),
         Macroscopic(strain, stress),
         None if np.isnan(broken) else broken,
     )
-    point = Point(load_factor, scale, state, int(broke), Energies(*energies[:3]), event["used"], after)
+    broke, softened = map(int, counts)
+    point = Point(load_factor, scale, state, broke, softened, Energies(*energies[:3]), event["used"], after)
     return point, (Energies(*energies[3:6]), energies[6])
 
 
@@ -104,7 +105,7 @@ def _taken_apart(state: Equilibrium) -> tuple[dict[str, Any], Arrays]:
         "residual": solution.residual,
         "certificate": [state.certificate[law] for law in KKT_LAWS],
     }
-    return whole, {"status": state.status, "history": state.bonds.history, "lam": solution.lam, "jump": solution.jump}
+    return whole, {"lam": solution.lam, "jump": solution.jump} | _bonds_apart(state.bonds, "")
 
 
 def _put_together(event: Arrays, interface: ContactProblem, suffix: str) -> Equilibrium:
@@ -114,7 +115,17 @@ def _put_together(event: Arrays, interface: ContactProblem, suffix: str) -> Equi
     certificate = dict(zip(KKT_LAWS, event[f"certificate{suffix}"].tolist(), strict=True))
     values, by_stress = event[f"load{suffix}"]
     load = Load(values, by_stress.astype(bool))
-    bonds = BondState(event[f"status{suffix}"], event[f"history{suffix}"])
+    bonds = _bonds_together(event, suffix)
     residual, C = float(event[f"residual{suffix}"]), interface.compliance(bonds)
     solution = DualSolution(strain, lam, jump, alpha, last, reason, residual, C)
     return Equilibrium(load, bonds, solution, iterations, solves, free_motions, certificate)
+
+
+def _bonds_apart(bonds: BondState, suffix: str) -> Arrays:
+    """Return the state of bonds as distributed arrays with this suffix."""
+    return {f"{name}{suffix}": values for name, values in vars(bonds).items()}
+
+
+def _bonds_together(event: Arrays, suffix: str) -> BondState:
+    """Rebuild the state of bonds from the arrays of `_bonds_apart`."""
+    return BondState(*(event[f"{field.name}{suffix}"] for field in fields(BondState)))

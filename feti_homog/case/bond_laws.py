@@ -14,12 +14,12 @@ class BondLawEntry:
     """Law of bonds as a case names it.
 
     Attributes:
-        name: value of [interface] criterion.
+        name: value of [interface] law, or criterion.
         implementation: "module.Class".
         keys: keys of [interface] that belong to this law and others that list them.
         needs: keys of all laws that must be given with this one.
         limits: keys of which one must be finite for any bond to break; none if the law always has a limit.
-        description: of what reaches 1 when a bond breaks, for the key `criterion`.
+        description: of what reaches 1 when a bond breaks, or of how it softens, for the key `law`.
         symbols: that label the law in pictures: symbol, key, and whether its unit is that of stress.
         softens: the compliance of springs grows before a bond parts.
         has_process_zone: elements must resolve the length along which bonds break.
@@ -38,6 +38,10 @@ class BondLawEntry:
 
 STIFFNESSES = ("normal_stiffness", "tangential_stiffness")
 STRENGTHS = ("normal_strength", "tangential_strength", "axial_strength")
+OF_SOFTENING = ("mixing_exponent", "teeth", "softening_tolerance")
+COHESIVE = (*STRENGTHS[:2], "normal_toughness", "tangential_toughness")
+BRANCH = ("openings", "tractions")
+"""Of one cohesive law, the numbers that all of these have, and the softening branch of a table."""
 OF_STRENGTHS = ((r"R^\mathrm{n}", "normal_strength", True), (r"R^\mathrm{t}", "tangential_strength", True))
 
 REGISTRY = (
@@ -65,6 +69,23 @@ REGISTRY = (
         ((r"G_\mathrm{Ic}", "toughness", False),),
         needs=STIFFNESSES,
         has_process_zone=True,
+    ),
+    *(
+        BondLawEntry(
+            name,
+            f"softening.{name.capitalize()}",
+            (*COHESIVE, *OF_SOFTENING, *(BRANCH if name == "table" else ())),
+            description,
+            ((r"N", "normal_strength", True), (r"S", "tangential_strength", True)),
+            needs=needs,
+            softens=True,
+            has_process_zone=True,
+        )
+        for name, description, needs in (
+            ("bilinear", "a cohesive law, softening in a straight line", (*STIFFNESSES, *COHESIVE)),
+            ("exponential", "softening exponentially", (*STIFFNESSES, *COHESIVE)),
+            ("table", "softening as openings and tractions say", (*STIFFNESSES[1:], *COHESIVE[1::2], *BRANCH)),
+        )
     ),
 )
 LAWS = {entry.name: entry for entry in REGISTRY}

@@ -15,7 +15,8 @@ from feti_homog.case.asked import AnalysisSection, Stiffness
 from feti_homog.case.cell_files import with_files, with_match
 from feti_homog.case.cell_section import GEOMETRY, TOUCHING, Cell, size_faults
 from feti_homog.case.document import read_document, to_document
-from feti_homog.case.interface_section import Arc, InterfaceSection, interface_tables, read_interfaces
+from feti_homog.case.interface_faults import read_interfaces
+from feti_homog.case.interface_section import Arc, InterfaceSection, interface_tables
 from feti_homog.case.load_section import Envelope, LoadPath, SingleLoad, expansion_faults, load_faults, stress_free
 from feti_homog.case.material_sections import (
     coating_faults,
@@ -231,7 +232,10 @@ def _relations(sections: Mapping[str, Any], document: Mapping[str, Any], selecte
 def _selected(document: Mapping[str, Any]) -> Selected:
     """Return the values that decide which keys belong to the case."""
     selectors = (GEOMETRY, ANALYSIS_TYPE, PLANE, METHOD, CRITERION)
-    tables = dict(document) | {"interface": next(iter(interface_tables(document)), None)}
+    first = next(iter(interface_tables(document)), None)
+    if isinstance(first, dict) and "law" in first:
+        first = first | {"criterion": first["law"]}
+    tables = dict(document) | {"interface": first}
     return {s: selected_value(SECTIONS[s.section], tables.get(s.section), s.key) for s in selectors}
 
 

@@ -7,14 +7,19 @@ from dataclasses import dataclass
 from typing import Any
 
 from feti_homog.case.bond_laws import DEFAULT, LAWS, REGISTRY
-from feti_homog.case.section_values import FIBRES, PAIR, SEED, STIFFNESS, STRENGTH, TOUGHNESS
-from feti_homog.case.selectors import ANALYSIS_TYPE, BREAKING, BY_ENERGY, BY_STRENGTH, GENERALIZED
-from feti_homog.schema.keys import TableReader, key, to_table
-from feti_homog.schema.values import POSITIVE_OR_INF, boolean, choice, list_of, real, table_of
-from feti_homog.schema.wording import toml_value
-
-COMMON = ("contact", "criterion", "growth", "scatter")
-"""The keys in which all sections [[interface]] agree."""
+from feti_homog.case.section_values import FIBRES, NUMBERS_ABOVE, PAIR, SEED, STIFFNESS, STRENGTH, TOUGHNESS
+from feti_homog.case.selectors import (
+    ANALYSIS_TYPE,
+    BREAKING,
+    BY_AXIAL_STRENGTH,
+    BY_ENERGY,
+    BY_STRENGTH,
+    BY_TABLE,
+    GENERALIZED,
+    SOFTENING,
+)
+from feti_homog.schema.keys import key
+from feti_homog.schema.values import POSITIVE_OR_INF, boolean, choice, integer, list_of, real, table_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,7 +112,8 @@ class InterfaceSection:
     )
     normal_strength: float | None = key(
         STRENGTH,
-        "R^n: the normal traction at which a bond breaks. A force per area: it does not depend on the mesh.",
+        "R^n: the normal traction at which a bond breaks, or N: at which its damage begins. A force per area: it does "
+        "not depend on the mesh.",
         unit="stress",
         default=None,
         default_words="inf",
@@ -115,7 +121,8 @@ class InterfaceSection:
     )
     tangential_strength: float | None = key(
         STRENGTH,
-        "R^t: the tangential traction at which a bond breaks.",
+        "R^t: the tangential traction at which a bond breaks, or S: at which its damage begins; of cohesive laws along "
+        "the fibre, too.",
         unit="stress",
         default=None,
         default_words="inf",
@@ -127,15 +134,71 @@ class InterfaceSection:
         unit="stress",
         default=None,
         default_words="tangential_strength",
-        only=(BREAKING, GENERALIZED, BY_STRENGTH),
+        only=(BREAKING, GENERALIZED, BY_AXIAL_STRENGTH),
+    )
+    law: str | None = key(
+        choice(*LAWS),
+        "The law of the bonds. A bond breaks when this reaches 1: "
+        + "; ".join(f'"{law.name}": {law.description}' for law in REGISTRY if not law.softens)
+        + ". Or it softens under damage, until nothing is left: "
+        + "; ".join(f'"{law.name}": {law.description}' for law in REGISTRY if law.softens)
+        + '. Compression neither breaks nor damages a bond. With teeth = 1 a cohesive law is "energy" with growth = '
+        '"springs" in pure modes.',
+        default=None,
+        default_words="criterion",
+        only=BREAKING,
     )
     criterion: str = key(
         choice(*LAWS),
-        "A bond breaks when this reaches 1: "
-        + "; ".join(f'"{law.name}": {law.description}' for law in REGISTRY)
-        + ". Compression never breaks a bond.",
+        'The older word for law, with the same values: criterion = "energy" is law = "energy".',
         default=DEFAULT,
         only=BREAKING,
+    )
+    normal_toughness: float | None = key(
+        TOUGHNESS,
+        "G_n, the energy per area that a bond takes in pure opening: no less than N^2 / (2 normal_stiffness).",
+        unit="stress * length",
+        default=None,
+        only=(BREAKING, SOFTENING),
+    )
+    tangential_toughness: float | None = key(
+        TOUGHNESS,
+        "G_t, the energy per area in pure shear. At the share B of shear in the energy of undamaged springs damage "
+        "begins at (t_n / N)^2 + (t_t / S)^2 = 1 and takes G_n + (G_t - G_n) B^mixing_exponent.",
+        unit="stress * length",
+        default=None,
+        only=(BREAKING, SOFTENING),
+    )
+    mixing_exponent: float = key(
+        real(above=0.0), "Exponent of Benzeggagh and Kenane's toughness.", default=2.0, only=(BREAKING, SOFTENING)
+    )
+    teeth: int | None = key(
+        integer(least=1, most=10_000),
+        "Steps of damage; each is an event. Any number takes the energy of the law.",
+        default=None,
+        default_words="as few as softening_tolerance allows",
+        only=(BREAKING, SOFTENING),
+    )
+    softening_tolerance: float = key(
+        real(above=0.0, most=1.0),
+        "By how much of the peak traction the first tooth may exceed it.",
+        default=0.02,
+        only=(BREAKING, SOFTENING),
+    )
+    openings: tuple[float, ...] | None = key(
+        NUMBERS_ABOVE,
+        "The softening branch in pure opening: rising openings, the first at the peak, which the line of the "
+        "normal_stiffness reaches (by default its traction / its opening), the last with no traction.",
+        unit="length",
+        default=None,
+        only=(BREAKING, BY_TABLE),
+    )
+    tractions: tuple[float, ...] | None = key(
+        NUMBERS_ABOVE,
+        "Tractions at the openings, falling to 0. In other modes the branch is stretched to their toughness.",
+        unit="stress",
+        default=None,
+        only=(BREAKING, BY_TABLE),
     )
     toughness: float | None = key(
         TOUGHNESS,
@@ -151,6 +214,7 @@ class InterfaceSection:
         'length, which hardly depends on the mesh; "springs": by the energy of its spring, as any other.',
         default="released",
         only=BY_ENERGY,
+        instead="no growth: a law that softens takes the energy of its teeth, at tips too",
     )
     mode_sensitivity: float = key(
         real(least=0.0, most=1.0),
@@ -186,43 +250,3 @@ def interface_tables(document: Mapping[str, Any]) -> list[Any]:
 def interface_label(number: int, count: int) -> str:
     """Return the label of an interface in messages; numbers begin at 0, labels at 1."""
     return "interface" if count == 1 else f"interface {number + 1}"
-
-
-def read_interfaces(document: Mapping[str, Any], reader: TableReader) -> tuple[InterfaceSection, ...] | None:
-    """Return the sections of interfaces with their arcs, in the order of the file; None if one is faulty."""
-    tables = interface_tables(document)
-    if document.get("interface") == []:
-        reader.faults.append("interface = []: expected a section [interface]")
-    read = [reader.read(InterfaceSection, table, interface_label(n, len(tables))) for n, table in enumerate(tables)]
-    interfaces = tuple(interface for interface in read if interface is not None)
-    if len(interfaces) < len(tables):
-        return None
-    reader.faults += _faults_between(interfaces)
-    return interfaces
-
-
-def _faults_between(interfaces: tuple[InterfaceSection, ...]) -> list[str]:
-    """Faults of several sections: pairs that are missing or named twice, and keys that must agree."""
-    faults: list[str] = []
-    first: dict[frozenset[str], int] = {}
-    for number, interface in enumerate(interfaces[: None if len(interfaces) > 1 else 0]):
-        label = interface_label(number, len(interfaces))
-        if interface.between is None:
-            faults.append(f"[{label}] between: missing; of several [[interface]] each needs {PAIR.expected}")
-            continue
-        other = first.setdefault(frozenset(interface.between), number)
-        if other != number:
-            pair = toml_value(list(interface.between))
-            faults.append(f"[{label}] between = {pair}: expected another pair than [interface {other + 1}] has")
-        for name in COMMON:
-            value, common = getattr(interface, name), getattr(interfaces[0], name)
-            if value != common:
-                expected = f"expected {_written(common)}, as of [interface 1]"
-                faults.append(f"[{label}] {name} = {_written(value)}: {expected}: all interfaces agree in it")
-    return faults
-
-
-def _written(value: Any) -> str:
-    """Return the value of a key that interfaces agree in, as TOML has it."""
-    table = to_table(value, {}) if isinstance(value, Scatter) else value
-    return "none" if table is None else toml_value(table)

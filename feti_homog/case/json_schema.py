@@ -18,7 +18,7 @@ from feti_homog.case.petsc_section import PREFIXED
 from feti_homog.case.phase_names import COATING, FIBRE, MATRIX, PHASE
 from feti_homog.case.rules import PLACES_OF_LOADS, PLACES_OF_TABLES, RULES
 from feti_homog.case.sections import AXIS_MEANING, RANGE_KEYS, REQUIRED, SECTIONS, SWEEP, TOP_LEVEL, SweepSection
-from feti_homog.case.selectors import GENERALIZED, PLANE
+from feti_homog.case.selectors import CRITERION, GENERALIZED, PLANE
 from feti_homog.materials.forms import EXPANSION_PAIR, MATERIAL_FORMS
 from feti_homog.materials.laws import NEEDED
 from feti_homog.schema.keys import Condition, Key, defaults_of, keys_of
@@ -157,6 +157,9 @@ def _if(condition: Condition) -> Schema:
     has_value: Schema = {"properties": {selector.key: {"enum": list(condition.values)}}}
     if default not in condition.values:
         has_value["required"] = [selector.key]
+    if selector == CRITERION:  # which may have its other name
+        by_law: Schema = {"properties": {"law": {"enum": list(condition.values)}}}
+        has_value = {"if": {"required": ["law"]}, "then": by_law, "else": has_value}
     if selector.section == "interface":  # the first of several, for all agree
         has_value = {"if": {"type": "array"}, "then": {"prefixItems": [has_value]}, "else": has_value}
     return {"properties": {selector.section: has_value}, "required": [selector.section]}

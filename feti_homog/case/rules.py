@@ -159,8 +159,9 @@ def _bonds() -> Iterator[Rule]:
     line = f"[interface] debonded: missing; expected {ARCS.expected}, or []: nothing else can open"
     unbroken = ANALYSIS_TYPE.among("stiffness", "load")
     yield _document({"properties": {"interface": _any_section(ways)}}, line, unbroken, MESHED)
+    yield exclusive(INTERFACE, "law", "criterion", words="exclude each other; criterion is the older word for law")
     for law in REGISTRY:
-        missing = f"missing; criterion = {toml_value(law.name)} needs it"
+        missing = f"missing; {'law' if law.softens else 'criterion'} = {toml_value(law.name)} needs it"
         for name in law.needs:
             yield needed(INTERFACE, name, missing, BREAKING, CRITERION.among(law.name))
     type_, unlimited = ENVELOPE_ANALYSIS.in_words(""), [law.name for law in REGISTRY if not law.limits]
@@ -168,7 +169,7 @@ def _bonds() -> Iterator[Rule]:
     for plane, names in ((IN_THE_PLANE, STRENGTHS[:2]), (GENERALIZED, STRENGTHS)):
         finite: Schema = {"maximum": sys.float_info.max, "not": {"enum": [INF]}}
         strong: list[Schema] = [{"required": [name], "properties": {name: finite}} for name in names]
-        strong.append({"required": ["criterion"], "properties": {"criterion": {"enum": unlimited}}})
+        strong += [{"required": [key], "properties": {key: {"enum": unlimited}}} for key in ("criterion", "law")]
         line = f"[interface] {', '.join(names)}: missing; {type_} needs one"
         bonds = {"properties": {"interface": _any_section({"anyOf": strong})}}
         yield _document(bonds, line, ENVELOPE_ANALYSIS, plane)

@@ -121,6 +121,7 @@ STATES = either(f'"all", "peaks" or {KEPT.expected}', choice("all", "peaks"), KE
 PAIR = list_of(text, f"the names of two phases, such as {PAIR_EXAMPLE}", count=2, unique=True)
 STRENGTH, STIFFNESS = _positive_or_inf("a traction"), _positive_or_inf("a stiffness")
 TOUGHNESS = real(above=0.0).named("an energy per area above 0")
+NUMBERS_ABOVE = list_of(real(least=0.0), "a list of two numbers or more, none below 0", least=2)
 _ANGLES = list_of(real(least=0.0, most=360.0), "a rising list of numbers from 0 to 360", least=1, unique=True)
 OPENINGS = replace(_ANGLES, accepts=lambda v: _ANGLES.accepts(v) and all(a < b for a, b in pairwise(v)))
 STRAIN = list_of(real(), f"a list of three numbers {STRAIN_COMPONENTS}", count=3)

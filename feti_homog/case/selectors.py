@@ -13,7 +13,10 @@ CRITERION = Selector("interface", "criterion")
 ANGLE_ANALYSIS, PATH_ANALYSIS = ANALYSIS_TYPE.among("angle"), ANALYSIS_TYPE.among("path")
 LOAD_ANALYSIS = ANALYSIS_TYPE.among("load")
 ENVELOPE_ANALYSIS, BREAKING = ANALYSIS_TYPE.among("envelope"), ANALYSIS_TYPE.among("path", "envelope")
-BY_ENERGY, BY_STRENGTH = (CRITERION.among(*laws_with(key)) for key in ("toughness", "normal_strength"))
+BY_ENERGY, BY_STRENGTH, BY_AXIAL_STRENGTH, SOFTENING, BY_TABLE = (
+    CRITERION.among(*laws_with(key))
+    for key in ("toughness", "normal_strength", "axial_strength", "mixing_exponent", "openings")
+)
 
 DRAWN_STRESS = Selector("output", "stress")
 

@@ -133,7 +133,8 @@ def build(
             )
         preconditioner = Balanced(preconditioner, adaptive)
     left_out = operators.compliance if plan.preconditioner == "dirichlet" else np.zeros(len(compliance))
-    if soften or comm.allreduce(bool(left_out.any()), MPI.LOR):
+    followed = isinstance(preconditioner, ExactInverse) or not soften
+    if not followed or comm.allreduce(bool(left_out.any()), MPI.LOR):
         preconditioner = SpringUpdated(comm, preconditioner, jump_operator.owned[0], left_out)
     return SolverParts(operators, preconditioner, natural, adaptive)
 

@@ -166,9 +166,10 @@ class FetiSolver:
         if change >= 2:
             self.preconditioner.soften(compliance - self.intact_compliance)
             self.operator.compliance = compliance
-        if change:
+        if change % 2:
             self.active.mask = active
             self.natural.activate(active)
+        if change:
             self.preconditioner.activate(active)
 
     def solve(self, strain: Float, start: Float) -> DualSolution:

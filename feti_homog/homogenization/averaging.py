@@ -43,6 +43,7 @@ class Response:
             largest error of one relative to the largest stress or, if that is less, to what the strains would make in a
             bonded cell at least.
         counts: numbers of `bonded`, `open` and `closed` interface nodes.
+        damage: (k,) of the bonds, 0 intact to 1 broken.
     """
 
     strain: Float
@@ -54,6 +55,7 @@ class Response:
     u: Float
     checks: dict[str, float]
     counts: dict[str, int]
+    damage: Float
 
     @property
     def debonded(self) -> int:
@@ -78,7 +80,7 @@ class Homogenization:
     def intact(self) -> BondState:
         """State of the interfaces with all bonds."""
         nodes = len(self.interface.nodes.row)
-        return BondState(np.zeros(nodes, np.int8), self.law.begin(nodes))
+        return BondState(np.zeros(nodes, np.int8), self.law.begin(nodes), np.zeros(nodes, bool))
 
     @property
     def loads(self) -> tuple[str, ...]:
@@ -130,7 +132,9 @@ class Homogenization:
             checks["stress"] = self._unmet_stress(state, stress)
         counts = self.counts(state.status)
         means, energies = (scale * strain, scale * stress), (scale**2 * energy / 2, scale**2 * stretched / 2)
-        return Response(*means, scale, *energies, state, scale * u, checks | state.certificate, counts)
+        damage = self.law.damage(state.bonds)
+        damage = (state.status != BONDED).astype(float) if damage is None else damage
+        return Response(*means, scale, *energies, state, scale * u, checks | state.certificate, counts, damage)
 
     def _unmet_stress(self, state: Equilibrium, stress: Float) -> float:
         """Return the error of the prescribed stresses. Collective."""

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -19,15 +21,15 @@ from feti_homog.typing import Float, Int
 
 def springs(case: Case) -> InterfaceSprings:
     """Those of the problem in the plane: normal and tangential."""
-    return InterfaceSprings(tuple(map(plane_stiffnesses, case.interfaces)), _soften(case))
+    return InterfaceSprings(tuple(map(plane_stiffnesses, case.interfaces)), has_softening(case))
 
 
 def axial_springs(case: Case) -> InterfaceSprings:
     """Those of the problem along the fibres."""
-    return InterfaceSprings(tuple((axial_stiffness(bond),) for bond in case.interfaces), _soften(case))
+    return InterfaceSprings(tuple((axial_stiffness(bond),) for bond in case.interfaces), has_softening(case))
 
 
-def _soften(case: Case) -> bool:
+def has_softening(case: Case) -> bool:
     """Return True if the law of the bonds changes their compliance."""
     return case.interface is not None and bond_laws.LAWS[case.interface.criterion].softens
 
@@ -68,20 +70,43 @@ def strength_factors(case: Case, fibres: int) -> Float:
     return factors if table is None else factors * table.strength[fibre_rows(table, case.cell.window)]
 
 
-def bond_law(bonds: Sequence[InterfaceSection], pair: Int, factor: float | Float = 1.0) -> BondLaw:
-    """Law of the bonds at the nodes (k,) of the interfaces `pair` (k,); without sections of interfaces none breaks.
+@dataclass(frozen=True)
+class SectionValues:
+    """Values of the keys of sections [interface] at nodes (k,), which belong to the sections `pair` (k,).
 
     `factor` (k,) is that of the fibre of each node, which multiplies its strengths, and squared its toughness.
     """
 
-    def value(key: str, *others: str) -> float | Float:
-        given = [next((v for name in (key, *others) if (v := getattr(bond, name)) is not None), None) for bond in bonds]
-        finite = [math.inf if own is None else own for own in given] or [math.inf]
-        values = finite[0] if len(finite) == 1 else np.array(finite)[pair]
-        power = POWERS.get(key.rpartition("_")[2], 0)
-        return values * factor**power if power else values
+    bonds: Sequence[InterfaceSection]
+    pair: Int
+    factor: float | Float
 
-    return law_class(bonds[0].criterion if bonds else bond_laws.DEFAULT).of_keys(value)
+    def __call__(self, key: str, *others: str) -> float | Float:
+        """Return the value of a key, or of the next of the others, at all nodes or (k,) at each; inf without any."""
+        own = self.everywhere(key, *others)
+        values = float(own[0]) if len(own) == 1 else own[self.pair]
+        power = POWERS.get(key.rpartition("_")[2], 0)
+        return values * self.factor**power if power else values
+
+    def everywhere(self, key: str, *others: str) -> Float:
+        """(s,) values of all sections, for the factor 1."""
+        given = [
+            next((v for name in (key, *others) if (v := getattr(bond, name)) is not None), None) for bond in self.bonds
+        ]
+        return np.array([math.inf if own is None else own for own in given] or [math.inf], float)
+
+    def common(self, key: str) -> Any:
+        """Return the value of the first section, with which the others agree."""
+        return getattr(self.bonds[0], key)
+
+
+def bond_law(bonds: Sequence[InterfaceSection], pair: Int, factor: float | Float = 1.0) -> BondLaw:
+    """Law of the bonds at the nodes (k,) of the interfaces `pair` (k,); without sections of interfaces none breaks.
+
+    `factor` is as of `SectionValues`.
+    """
+    name = bonds[0].criterion if bonds else bond_laws.DEFAULT
+    return law_class(name).of_keys(SectionValues(bonds, pair, factor))
 
 
 def has_process_zone(case: Case) -> bool:

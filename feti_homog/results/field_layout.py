@@ -121,6 +121,7 @@ class StatePart:
         "(k, 3)",
     )
     status: AnyInt = described("0 bonded, 1 closed (debonded, in contact), 2 open", shape="(k,)", dtype="int8")
+    damage: Float = described("damage of bonds: 0 intact, 1 broken; between only by laws that soften", shape="(k,)")
 
     def __repr__(self) -> str:
         sizes = f"{len(self.displacement)} nodes, {len(self.stress)} elements, {len(self.status)} interface nodes"

@@ -104,6 +104,7 @@ def state_part(cell: TornCell, response: Response, load_factor: float, label: st
         displacement_fibre=_vectors(fibre),
         displacement_matrix=_vectors(fibre + opening),
         status=response.state.status,
+        damage=response.damage,
     )
 
 
@@ -145,6 +146,7 @@ def spatial_state_part(
         displacement_fibre=fibre,
         displacement_matrix=fibre + opening,
         status=response.state.status,
+        damage=response.damage,
     )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from feti_homog.typing import AnyInt, Bool, Int
+from feti_homog.typing import AnyInt, Bool, Float, Int
 from feti_homog.verify.bond_laws.law import BondLaw, law_of
 from feti_homog.verify.cell_tables import Mesh
 from feti_homog.verify.reading import ResultFiles
@@ -17,7 +17,8 @@ from feti_homog.verify.torus import TornSides
 
 COATING = "coating"
 NUMBERS = ("normal_stiffness", "tangential_stiffness", "axial_stiffness", "normal_strength", "tangential_strength",
-           "axial_strength", "toughness", "mode_sensitivity")  # fmt: skip
+           "axial_strength", "toughness", "mode_sensitivity", "normal_toughness", "tangential_toughness",
+           "mixing_exponent")  # fmt: skip
 DEFAULTS = {"axial_stiffness": "tangential_stiffness", "axial_strength": "tangential_strength"}
 
 
@@ -30,12 +31,14 @@ def _section_at(files: ResultFiles, nodes: AnyInt | Bool | slice) -> Mapping[str
     pair, factor = files.interface.pair[nodes], strength[files.interface.fibre[nodes] - 1]
     numbers = {name: np.array([_number(section, name) for section in sections])[pair] for name in NUMBERS}
     scaled = {name: numbers[name] * factor for name in NUMBERS if name.endswith("strength")}
-    return {**sections[0], **numbers, **scaled, "toughness": numbers["toughness"] * factor**2}
+    scaled |= {name: numbers[name] * factor**2 for name in NUMBERS if name.endswith("toughness")}
+    return {**sections[0], **numbers, **scaled}
 
 
-def law_at(files: ResultFiles, nodes: AnyInt | Bool | slice = slice(None)) -> BondLaw:
-    """Law of the bonds at some interface nodes."""
-    return law_of(_section_at(files, nodes))
+def law_at(files: ResultFiles, nodes: AnyInt | Bool | slice = slice(None), damage: Float | None = None) -> BondLaw:
+    """Law of the bonds at some interface nodes; those of a state with the damage (k,) of all nodes."""
+    section = _section_at(files, nodes)
+    return law_of(section if damage is None else {**section, "damage": damage[nodes]})
 
 
 def _number(section: Mapping[str, Any], name: str) -> float:

@@ -22,7 +22,10 @@ def check_interface_state(findings: Findings, cell: DiscreteCell, state: State) 
     parted = cell.faces.means(values, of_fibre=False) - cell.faces.means(values, of_fibre=True)
     largest = largest_displacement(cell, state)
     findings.record("jump", relative(np.abs(in_axes(cell, state.jump) - parted).max(axis=1, initial=0.0), largest), at)
-    slack = state.jump - law_at(cell.files).jumps(state.traction)
+    most = np.where(state.status == BONDED, np.nextafter(1.0, 0.0), 1.0)
+    off = np.abs(state.damage.clip(np.where(state.status == BONDED, 0.0, 1.0), most) - state.damage)
+    findings.record("bond", off, f"{state.name}, damage of node {{}}".format)
+    slack = state.jump - law_at(cell.files, damage=state.damage).jumps(state.traction)
     findings.record("bond", relative(np.where(state.status != OPEN, np.abs(slack[:, 0]), 0.0), largest), at)
     findings.record(
         "bond", relative(np.where(state.status == BONDED, np.abs(slack[:, 1:]).max(axis=1), 0.0), largest), at
@@ -35,7 +38,7 @@ def _check_contact(findings: Findings, cell: DiscreteCell, state: State) -> None
     """gap >= 0, traction <= 0, gap traction = 0, and no other force on debonded faces."""
     at = f"{state.name}, interface node {{}}".format
     debonded, closed = state.status != BONDED, state.status == CLOSED
-    gap = (state.jump - law_at(cell.files).jumps(state.traction))[:, 0]
+    gap = (state.jump - law_at(cell.files, damage=state.damage).jumps(state.traction))[:, 0]
     normal, shear = state.traction[:, 0], np.abs(state.traction[:, 1:]).max(axis=1)
     length, imposed, least = cell.files.interface.length, cell.imposed(state), cell.least_stress(state)
     pull, force = max(float(np.abs(state.traction).max()), least), np.abs(normal) * length

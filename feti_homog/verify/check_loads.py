@@ -66,6 +66,7 @@ class StateNumbers:
     in_springs: float
     traction: Float
     status: AnyInt
+    damage: Float
     released: Bool
     used: Float
     temperature: float
@@ -75,7 +76,7 @@ class StateNumbers:
     @classmethod
     def of(cls, cell: DiscreteCell, state: State, fields: ElementFields) -> StateNumbers:
         """Those of a state of a cell."""
-        law = law_at(cell.files)
+        law = law_at(cell.files, damage=state.damage)
         released = tips(cell, state.status) & law.grows_by_release
         used = np.where(state.status == BONDED, law.utilisation(state.traction), 0.0)
         used[released] = np.nan
@@ -85,7 +86,8 @@ class StateNumbers:
         energies = fields.energy / (2 * cell.area) + state.temperature * heat / 2 + in_springs, in_springs
         means = state.strain, state.mean_stress
         return cls(
-            state.name, state.load_factor, state.point, *means, *energies, state.traction, state.status, released,
+            state.name, state.load_factor, state.point, *means, *energies, state.traction, state.status,
+            state.damage, released,
             used, state.temperature, heat, _expanding(cell, fields),
         )  # fmt: skip
 

@@ -21,7 +21,7 @@ from feti_homog.verify.check_points import tip_shares
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.findings import Findings, relative, same_state_limit
 from feti_homog.verify.path_energies import check_path_energies
-from feti_homog.verify.prescribed import NAMES, SAME_SHARE, TEMPERATURE
+from feti_homog.verify.prescribed import NAMES, SAME_SHARE, TEMPERATURE, damaged_at
 
 # Utilisations by tractions below 10 rtol of the stress are none to the program; twice as many are here.
 NOISE_PER_RTOL = 20.0
@@ -49,7 +49,7 @@ class _Bonds:
 
     def used(self, traction: Float) -> Float:
         """(k,) 0 of debonded nodes, and of tips whose breaks release what is not in the files."""
-        return np.where(self._bonded & ~self.released, self.law.utilisation(traction), 0.0)
+        return np.where(self._bonded & ~self.released, self.law.onset(traction), 0.0)
 
 
 def check_envelope(findings: Findings, cell: DiscreteCell, states: Sequence[StateNumbers]) -> None:
@@ -71,7 +71,7 @@ def check_envelope(findings: Findings, cell: DiscreteCell, states: Sequence[Stat
             strain = unit if of_strains else np.linalg.solve(stiffness, unit)
             least = NOISE_PER_RTOL * float(document["solver"]["rtol"]) * np.abs(stiffness @ strain).max()
             traction = bonds.traction(strain, 0.0)
-            over = bonds.used(traction) > bonds.law.utilisation(np.full_like(traction, least))
+            over = bonds.used(traction) > bonds.law.onset(np.full_like(traction, least))
             findings.record("onset", np.inf if over.any() else 0.0, f"{at}, where some load breaks a bond")
 
 
@@ -179,7 +179,13 @@ def _check_breaks(findings: Findings, states: Sequence[StateNumbers], points: Se
     shift = 0 if by_events else 1
     for state, after in pairwise(states):
         bonded, still = state.status == BONDED, after.status == BONDED
-        broke = sum(point["broke"] for point in points[state.point + shift : after.point + shift])
+        between = points[state.point + shift : after.point + shift]
+        broke = sum(point["broke"] for point in between)
+        softened = np.count_nonzero(still & (after.damage > state.damage))
+        most = sum(point.get("softened", 0) for point in between)
+        off = abs(softened - most) if len(between) == 1 else max(softened - most, 0)
+        findings.record("breaks", off, f"{state.name}, bonds that softened")
+        findings.record("breaks", np.count_nonzero(after.damage < state.damage), f"{after.name}, damage that healed")
         findings.record("breaks", np.count_nonzero(still & ~bonded), f"{after.name}, bonds that healed")
         findings.record("breaks", abs(np.count_nonzero(bonded & ~still) - broke), f"{state.name}, bonds that broke")
 
@@ -196,7 +202,7 @@ def _check_strength(
         used = np.nan_to_num(state.used)
         held = ~_overloaded_by_jump(state, points, near) if by_events else np.ones(len(used), bool)
         findings.record("strength", np.where(held, np.maximum(used - 1.0, 0.0), 0.0), where)
-        if by_events and (broke := points[state.point]["broke"]):
+        if by_events and (broke := damaged_at(points[state.point])):
             # Which break, the next point tells; that so many are as near to their strength as the worst, this one does.
             due = max(float(used.max(initial=0.0)), 1.0)
             worst = np.sort(np.where(np.isnan(state.used), np.inf, state.used))[-broke:]
@@ -213,7 +219,7 @@ def _overloaded_by_jump(state: StateNumbers, points: Sequence[Point], near: floa
 
     Tips where only the contact changed, with which the energy jumps that their break releases.
     """
-    if points[state.point]["broke"] == 0:
+    if damaged_at(points[state.point]) == 0:
         return np.zeros(len(state.used), bool)
     if _in_cascade(points, state.point):
         return np.ones(len(state.used), bool)
@@ -223,7 +229,7 @@ def _overloaded_by_jump(state: StateNumbers, points: Sequence[Point], near: floa
 def _in_cascade(points: Sequence[Point], number: int) -> bool:
     """Return whether bonds broke at the same load just before."""
     before = points[number - 1] if number else None
-    return before is not None and before["broke"] > 0 and _same_load(before, points[number])
+    return before is not None and damaged_at(before) > 0 and _same_load(before, points[number])
 
 
 def _same_load(one: Point, other: Point) -> bool:
@@ -235,7 +241,7 @@ def _only_contact_changed(points: Sequence[Point], number: int, near: float) -> 
     if number == 0:
         return False
     before, now = points[number - 1], points[number]
-    turned = before["broke"] == 0 and before["closed"] != now["closed"]
+    turned = damaged_at(before) == 0 and before["closed"] != now["closed"]
     return turned and all(_is_near(before.get(name), now.get(name), near) for name in ("strain", "stress", TEMPERATURE))
 
 
@@ -245,4 +251,4 @@ def _is_near(one: Any, other: Any, near: float) -> bool:
 
 
 def _broken(state: StateNumbers, after: StateNumbers) -> Bool:
-    return np.asarray((state.status == BONDED) & (after.status != BONDED))
+    return np.asarray(after.damage > state.damage)

@@ -46,10 +46,11 @@ def _check_path(
         if not point.get("temperature"):
             off = point["stored"] - float(np.dot(point["strain"], point["stress"])) / 2
             findings.record("energy", relative(np.array(off), scale), f"path[{number}].stored")
-    if law_at(cell.files).has_toughness:
+    law = law_at(cell.files)
+    if law.has_toughness:
         _check_ratios(findings, points)
         _check_toughness(findings, cell, known, points, cell.files.case["path"]["method"] == "events")
-        for state in known:
+        for state in known if law.has_tips else ():
             _check_tips(findings, cell, state, points[state.point]["tips"])
 
 
@@ -130,13 +131,13 @@ def _check_toughness(
     findings.record("energy", points[0]["fracture_energy"] * by_events / scale, "path[0].fracture_energy")
     for state, after in pairwise(states):
         grown = points[after.point]["fracture_energy"] - points[state.point]["fracture_energy"]
-        broken = (state.status == BONDED) & (after.status != BONDED)
-        law = law_at(cell.files, broken)
+        broken = after.damage > state.damage
+        law, damages = law_at(cell.files, broken), (state.damage[broken], after.damage[broken])
         if by_events and after.point == state.point + 1:
-            low = high = float(law.lost(law.mode(state.traction[broken])) @ length[broken])
+            bounds = (law.taken(law.mode(state.traction[broken]), *damages),) * 2
         else:
-            modes = np.zeros(int(broken.sum())), np.full(int(broken.sum()), np.pi / 2)
-            low, high = (float(law.lost(psi) @ length[broken]) for psi in modes)
+            bounds = law.taken_between(*damages)
+        low, high = (float(energies @ length[broken]) for energies in bounds)
         off = max(low - grown, grown - high, 0.0)
         findings.record("energy", off / scale, f"{after.name}, fracture_energy")
 

@@ -30,7 +30,7 @@ from feti_homog.typing import Float
 from feti_homog.verify.check_loads import StateNumbers
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.findings import Findings
-from feti_homog.verify.prescribed import SAME_SHARE, TEMPERATURE, Prescribed, at_points, targets
+from feti_homog.verify.prescribed import SAME_SHARE, TEMPERATURE, Prescribed, at_points, damaged_at, targets
 
 # Loads whose components differ by so much, relatively, are in proportion.
 SAME_RATIO = 1e-9
@@ -132,10 +132,10 @@ def _check_events(
     largest = 0.0
     for (state, before), (after, now) in pairwise(zip(numbers, points, strict=True)):
         largest = max(largest, before["load_factor"])
-        low, high = (0.0, 0.0) if before["broke"] == 0 else _losses(state, after)
+        low, high = (0.0, 0.0) if damaged_at(before) == 0 else _losses(state, after)
         lost = now["dissipated"] - before["dissipated"]
         findings.record("energy", max(low - lost, lost - high, 0.0) / scale, f"{after.name}, dissipated")
-        if before["broke"] == 0:
+        if damaged_at(before) == 0:
             straight = _work(after.strain - state.strain, state.stress + after.stress) / 2
             off = np.nan_to_num(now["work"] - before["work"] - straight)
             findings.record("energy", abs(off) / scale, f"{after.name}, work")
@@ -187,7 +187,7 @@ def _check_increments(
     total = 0.0
     for number, (point, now) in enumerate(zip(points, numbers, strict=True)):
         lost, low, high = point["dissipated"] - total, 0.0, 0.0
-        if point["broke"]:
+        if damaged_at(point):
             n = len(now.strain)
             high = float(now.strain @ stiffest[:n, :n] @ now.strain) / 2 - now.stored
             least, most = potentials(now.load, numbers[number - 1]) if number else (-np.inf, np.inf)

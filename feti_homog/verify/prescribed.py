@@ -84,7 +84,12 @@ def at_points(case: Document, points: Sequence[Document]) -> Iterator[Prescribed
         share = along - leg
         yield Prescribed((1 - share) * start + share * ends[leg].values, ends[leg].by_stress)
         # After the last break at a waypoint comes its own point, at which nothing breaks.
-        ended, last = abs(share - 1) <= SAME_SHARE and not (by_events and point["broke"]), point
+        ended, last = abs(share - 1) <= SAME_SHARE and not (by_events and damaged_at(point)), point
+
+
+def damaged_at(point: Document) -> int:
+    """Count the bonds that break or soften at a point, or did in the step to it."""
+    return int(point["broke"]) + int(point.get("softened") or 0)
 
 
 def _values(point: Document, by_stress: Bool) -> Float:

@@ -46,6 +46,7 @@ class State:
         stress: (m, v) means over the elements.
         traction, jump: (k, c) normal, tangential and along the fibres.
         status: (k,) 0 bonded, 1 closed, 2 open.
+        damage: (k,) 0 intact to 1 broken, also of bonds that break at once.
         derived: the tables of `DERIVED` or `SPATIAL_DERIVED`, which follow from those above.
         temperature: its change.
     """
@@ -61,6 +62,7 @@ class State:
     traction: Float
     jump: Float
     status: AnyInt
+    damage: Float
     derived: Mapping[str, Float]
     temperature: float = 0.0
 
@@ -130,6 +132,9 @@ class ResultFiles:
         )
         if self.is_spatial:
             arrays |= self._spatial(number, arrays)
+        # Results of before there were laws that soften have no damage.
+        known = "damage" in group
+        arrays["damage"] = self._table(number, "damage", (k,)) if known else (arrays["status"] != 0).astype(float)
         strain, mean = (np.array(group.attrs[name], float) for name in ("strain", "stress"))
         v = 6 if self.is_spatial else 3
         _expect(

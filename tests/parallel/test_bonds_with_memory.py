@@ -41,12 +41,12 @@ class TwoSteps(MaxStrength):
 @pytest.fixture
 def path(comm, monkeypatch, request):
     """Return the interfaces, the law and the points of the path."""
-    monkeypatch.setattr("feti_homog.homogenization.bonds._soften", lambda case: True)
+    monkeypatch.setattr("feti_homog.homogenization.bonds.has_softening", lambda case: True)
     case = {"geometry": "square", "mesh_size": 0.25, "petsc": {"feti_pc_type": request.param}}
     solver = torn_cells.tear(comm, springs=STIFFNESS, **case).solver
     law, k = TwoSteps(30.0, 15.0), len(solver.jump_operator.nodes.row)
     loaded = CoupledInterfaces(ContactProblem(solver, True, np.ones(2), law.softening))
-    begin = unloaded(loaded, BondState(np.full(k, BONDED, np.int8), law.begin(k)))
+    begin = unloaded(loaded, BondState(np.full(k, BONDED, np.int8), law.begin(k), np.zeros(k, bool)))
     return loaded, law, begin, list(islice(events(loaded, law, LEGS, begin), MOST))
 
 

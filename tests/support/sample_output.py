@@ -174,6 +174,7 @@ def _state(mesh: MeshPart, gradient: np.ndarray, number: int) -> StatePart:
         jump=jump,
         **{name: np.stack([n * k, k, 0 * k], axis=1) for n, name in enumerate(VECTORS)},
         status=status,
+        damage=np.where(status == 0, 0.1 * np.arange(10) % 1.0, 1.0),
     )
 
 

@@ -43,6 +43,16 @@ COATED = {
 }
 OUTER, INNER = {"between": ["coating", "matrix"]}, {"between": ["fibre", "coating"]}
 WARM = {name: phase | {"expansion": 1e-5} for name, phase in BASE["material"].items()}
+SOFTENING = {
+    "law": "bilinear",
+    "normal_stiffness": 100.0,
+    "tangential_stiffness": 100.0,
+    "normal_strength": 1.0,
+    "tangential_strength": 1.0,
+    "normal_toughness": 0.02,
+    "tangential_toughness": 0.02,
+    "teeth": 2,
+}
 CASES = {
     "bonded": {"analysis": {"type": "stiffness", "plane": "strain"}},
     "debonded": {"analysis": {"type": "stiffness", "plane": "strain"}, "interface": HALF_OPEN},
@@ -122,6 +132,11 @@ CASES = {
     "path by energy": {
         "analysis": {"type": "path", "plane": "strain"},
         "interface": HALF_OPEN | ENERGY,
+        "path": {"strain": STRAIN},
+    },
+    "path that softens": {
+        "analysis": {"type": "path", "plane": "strain"},
+        "interface": HALF_OPEN | SOFTENING,
         "path": {"strain": STRAIN},
     },
     "path in space": {

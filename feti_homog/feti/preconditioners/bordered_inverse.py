@@ -1,4 +1,4 @@
-"""The inverse of a block of a symmetric matrix, for rows that come and go: O(k^2) a row."""
+"""The inverse of a block of a symmetric matrix, for rows that come, go or stiffen: O(k^2) a row."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ class BorderedInverse:
         members: (k,) C, in the order of the rows of N.
         N: (k, k).
         M: (k, k) M[C, C].
+        added: (k,) the part of the diagonal of M that changes.
     """
 
     def __init__(self, comm: MPI.Intracomm) -> None:
@@ -26,10 +27,12 @@ class BorderedInverse:
         self._comm = comm
         self.members: Int = np.zeros(0, np.int64)
         self.N = self.M = np.zeros((0, 0))
-        self._root = np.zeros(0)
+        self._root = self.added = np.zeros(0)
 
-    def append(self, M: Float, size: Float, new: Int, sign: int) -> None:
+    def append(self, M: Float, size: Float, new: Int, sign: int, added: Float | None = None) -> None:
         """Border with the members `new`, on which `sign` M, Schur's complement of the others, is semi-definite.
+
+        M is the matrix `M` (n, n), of which only blocks are read, plus the diagonal `added` (n,), if any.
 
         `size` (n,) is what the diagonal of `sign` M may be; less than a share SINGULAR_PIVOT of it is rounding.  Those
         that depend on others, as rank 0 finds, are left out.  With s the pivots, b = M[C, new], w = N b,
@@ -41,10 +44,12 @@ class BorderedInverse:
         """
         if not len(new):
             return
+        added = np.zeros(len(M)) if added is None else added
         border = M[self.members[:, None], new]
         w = self.N @ border
-        own = np.sqrt(np.maximum(size[new], sign * M[new, new]))
-        pivots = sign * (M[new[:, None], new] - border.T @ w) / np.outer(own, own)
+        block = M[new[:, None], new] + np.diag(added[new])
+        own = np.sqrt(np.maximum(size[new], sign * block.diagonal()))
+        pivots = sign * (block - border.T @ w) / np.outer(own, own)
         factor, order, rank, _ = dpstrf(pivots, tol=SINGULAR_PIVOT, lower=1)
         # The first pivot is taken whatever it is.
         rank = min(rank, int((factor.diagonal() ** 2 > SINGULAR_PIVOT).sum()))
@@ -58,7 +63,19 @@ class BorderedInverse:
         N[:k, :k] += self.N
         N[:k, k:], N[k:, :k], N[k:, k:] = -scaled, -scaled.T, inverse
         self.N, self.members = N, np.concatenate([self.members, new[kept]])
-        self.M, self._root = M[self.members[:, None], self.members], np.concatenate([self._root, own[kept]])
+        self.added, self._root = added[self.members], np.concatenate([self._root, own[kept]])
+        self.M = M[self.members[:, None], self.members] + np.diag(self.added)
+
+    def change(self, at: Int, added: Float) -> None:
+        """Let the diagonal of M have `added` (p,) at the places `at` (p,) among the members: with its change d there,
+
+        N <- N - N_:p (d^-1 + N_pp)^-1 N_p:.
+        """
+        change = added - self.added[at]
+        columns = self.N[:, at]
+        self.N -= columns @ np.linalg.solve(np.diag(1.0 / change) + columns[at], columns.T)
+        self.added[at] = added
+        self.M[at, at] += change
 
     def remove(self, gone: Int) -> None:
         """Take members out: N <- N_cc - N_cg N_gg^-1 N_gc."""
@@ -70,6 +87,7 @@ class BorderedInverse:
         block = self.N[g[:, None], g] * np.outer(self._root[g], self._root[g])
         self.N = self.N[c[:, None], c] - coupling @ np.linalg.solve(block, coupling.T)
         self.members, self.M, self._root = self.members[c], self.M[c[:, None], c], self._root[c]
+        self.added = self.added[c]
 
     def solve(self, b: Float) -> Float:
         """M[C, C]^-1 b for b (k,) or (k, n), with one step of iterative refinement: borders add up rounding."""

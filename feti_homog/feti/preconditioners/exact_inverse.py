@@ -5,8 +5,13 @@ here or there: D of A have left, R beside A have come.  The multipliers that clo
 
     y = Gamma_:A g_A,  c = N (y_C + g_R),  lam_A = y_A - Gamma_AC c,  lam_R = -c_R,  N = Gamma_CC^-1.
 
-A bond that breaks costs two columns and two borders of N, a face that closes or opens one border; no factor is made
-anew.  After as many changes as an option says, the cell as it stands becomes the reference.
+A spring whose compliance grew by dC is one of C, whose jump dC lam is prescribed by its own multiplier:
+
+    N = (Gamma_CC + D)^-1,  lam_C = D c on such rows,  D = dC^-1 there, and 0 where bonds left.
+
+A bond that breaks costs two columns and two borders of N, a face that closes or opens one border, a bond that softens
+an update of rank two; no factor is made anew.  After as many changes as an option says, the cell as it stands becomes
+the reference, but for what softened.
 """
 
 from __future__ import annotations
@@ -22,7 +27,7 @@ from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.bordered_inverse import BorderedInverse
 from feti_homog.feti.preconditioners.reference_cell import BodyTies, ReferenceCell, ResponseColumns, one_sided_jumps
-from feti_homog.feti.preconditioners.scaled import Preconditioner, never_softens
+from feti_homog.feti.preconditioners.scaled import Preconditioner
 from feti_homog.feti.thresholds import INFLUENCE_BATCH, INFLUENCE_COLUMNS, NORM_ITERATIONS, NORM_MARGIN
 from feti_homog.parallel.distributed_arrays import allreduce_sum, gather_rows, scale_rows
 from feti_homog.typing import Float, Int
@@ -43,7 +48,7 @@ class ExactInverse(Preconditioner):
     """
 
     norm: float = np.inf
-    soften, is_exact = never_softens, True
+    is_exact = True
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> None:
         """Factor the cell with all bonds intact; all boundary operators must be dense.  Collective.
@@ -68,10 +73,14 @@ class ExactInverse(Preconditioner):
         # Columns without which the reference cell is not the one at hand.
         self.factorizations = self._tied = 0
         self._answer: Float | None = None
-        self._active = np.ones(self._rows)
+        self._active, self._more = np.ones(self._rows), np.zeros(self._rows)
         self._rebase(self._active)
         # Rows that leave make H smaller.
         self.norm = NORM_MARGIN * self._largest_eigenvalue()
+
+    def soften(self, more: Float) -> None:
+        """Let springs have `more` compliance (owned rows,) than at first, from the next `activate` on."""
+        self._more = more
 
     def activate(self, active: Float) -> None:
         """Restrict to the rows where `active` is 1.  Collective."""
@@ -120,9 +129,17 @@ class ExactInverse(Preconditioner):
         return np.asarray(own - np.matmul((U @ self._inverse.N).reshape(paired.shape), paired.transpose(0, 2, 1)))
 
     def _changed(self) -> Int:
-        """Return the global rows that are active here or in the reference cell, not both. Collective."""
-        own = self._first + np.flatnonzero(self._active != self.reference.active)
+        """Return the global rows that are active here or in the reference cell, not both, and those that softened.
+
+        Collective."""
+        own = self._first + np.flatnonzero((self._active != self.reference.active) | (self._softened > 0.0))
         return np.concatenate(self.comm.allgather(own))
+
+    @property
+    def _softened(self) -> Float:
+        """(owned rows,) D: 1 / dC of the springs that softened, of bonds that hold; 0 of all others."""
+        soft = (self._active * self.reference.active > 0.0) & (self._more > 0.0)
+        return np.divide(1.0, self._more, out=np.zeros(self._rows), where=soft)
 
     def _rebase(self, active: Float) -> None:
         """Take a cell with these active rows, and what it takes to hold its bodies, for the reference.  Collective."""
@@ -164,16 +181,24 @@ class ExactInverse(Preconditioner):
     def _exchange_members(self, changed: Int) -> None:
         """Take the columns that are not `changed` out of N, and the others in.  Collective."""
         inverse, M = self._inverse, self._columns.block
-        returned = gather_rows(self.comm, self.reference.active, self._first, self._columns.rows[changed]) == 0
-        size = self.stiffness[self._columns.rows]
-        gone = np.setdiff1d(inverse.members, changed)
+        ours = np.stack([self.reference.active, self._softened], axis=1)
+        active, softened = gather_rows(self.comm, ours, self._first, self._columns.rows[changed]).T
+        returned, size = active == 0, self.stiffness[self._columns.rows]
+        D = np.zeros(len(size))
+        D[changed] = softened
+        # What no longer holds at all is taken out and in again, for N may be singular with it.
+        left = (D[inverse.members] == 0.0) & (inverse.added > 0.0)
+        gone = np.union1d(np.setdiff1d(inverse.members, changed), inverse.members[left])
         inverse.remove(gone)
+        at = np.flatnonzero(D[inverse.members] != inverse.added)
+        if len(at):
+            inverse.change(at, D[inverse.members[at]])
         taken_in = np.setdiff1d(changed[returned], inverse.members)
-        inverse.append(M, 1.0 / size, taken_in, -1)
+        inverse.append(M, 1.0 / size, taken_in, -1, D)
         if len(gone) or len(taken_in):
             self._dependent = np.zeros(0, np.int64)
         left_out = np.setdiff1d(changed[~returned], np.concatenate([inverse.members, self._dependent]))
-        inverse.append(M, size, left_out, 1)
+        inverse.append(M, size, left_out, 1, D)
         self._dependent = np.setdiff1d(changed, inverse.members)
 
     def _force_of_rigid_motions(self) -> float:
@@ -211,8 +236,11 @@ class ExactInverse(Preconditioner):
             whole[members] = c
             z = z - scale_rows(self.reference.active, self._columns.owned @ whole)
             mine = np.flatnonzero((rows >= self._first) & (rows < self._first + self._rows))
-            taken_in = mine[outside[rows[mine] - self._first] > 0]
-            z[rows[taken_in] - self._first] = -c[taken_in]
+            own = rows[mine] - self._first
+            taken_in, stretched = outside[own] > 0, self._inverse.added[mine] > 0
+            z[own[taken_in]] = -c[mine[taken_in]]
+            # Nothing cancels in D c, however soft the spring.
+            z[own[stretched]] = scale_rows(self._inverse.added[mine[stretched]], c[mine[stretched]])
         return scale_rows(self._active, z)
 
 

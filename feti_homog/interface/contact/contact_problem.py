@@ -2,6 +2,10 @@
 
 A debonded node is open (gap >= 0, no force) or closed (gap = 0, force <= 0, compression).  Which, is found by
 block principal pivoting on the dual problem, which is strictly convex.
+
+A damaged bond that holds is pulled (compliance C, force >= 0) or pressed (compliance C_0 as without damage,
+force <= 0).  With s = jump - C_0 force >= 0 and w = s / (C - C_0) - force >= 0, s w = 0: the conditions of a debonded
+node, for which C is infinite.  So the same search finds both.
 """
 
 from __future__ import annotations
@@ -79,8 +83,8 @@ class ContactProblem:
         self.solver.set_state(self.active(bonds.status), self.compliance(bonds))
 
     def compliance(self, bonds: BondState) -> Float:
-        """(owned rows,) C of the springs in a state of the bonds; all are pulled."""
-        C, factor = self.solver.intact_compliance, self.softening(bonds, np.ones(len(bonds.status), bool))
+        """(owned rows,) C of the springs in a state of the bonds."""
+        C, factor = self.solver.intact_compliance, self.softening(bonds, ~bonds.pressed)
         if factor is None:
             return C
         # Normal and tangential springs belong to the problem of the plane, axial ones to the other.
@@ -88,6 +92,19 @@ class ContactProblem:
         C = C.copy()
         C[self._pairs] *= factor[:, own]
         return C
+
+    def _gained(self, bonds: BondState) -> Float:
+        """(k,) normal compliance that damaged bonds have more if pulled than if pressed; 0 of others."""
+        pulled = np.ones(len(bonds.status), bool)
+        soft, stiff = self.softening(bonds, pulled), self.softening(bonds, ~pulled)
+        if soft is None or stiff is None or not self.contact:
+            return np.zeros(len(pulled))
+        C = self.solver.intact_compliance[self.nodes.row]
+        return np.where(bonds.status == BONDED, C * (soft - stiff)[:, 0], 0.0)
+
+    def damaged(self, bonds: BondState) -> Bool:
+        """(k,) bonds that hold, with another normal stiffness if pulled than if pressed."""
+        return self._gained(bonds) > 0.0
 
     def debond(self, status: Status, which: Bool, lam: Float) -> Status:
         """Return the status after the bonds of `which` have broken; under tension they start open."""
@@ -160,12 +177,11 @@ class ContactProblem:
         while True:
             solution = self.linear(load, bonds, start)
             iterations, solves = iterations + solution.iterations, solves + 1
-            solution, wrong = self._placed(bonds.status, solution)
+            solution, wrong = self._placed(bonds, solution)
             count = self.solver.comm.allreduce(int(wrong.sum()))
             if count == 0 or solves == MAX_CONTACT_SOLVES or solution.reason < 0:
                 return self._equilibrium(load, bonds, solution, iterations, solves)
-            flip = pivoting.choose(wrong, count)
-            bonds = bonds.with_status(np.where(flip, CLOSED + OPEN - bonds.status, bonds.status).astype(np.int8))
+            bonds = bonds.flipped(pivoting.choose(wrong, count))
             start = solution.lam
 
     def undetermined(self, state: Equilibrium) -> Bool:
@@ -183,8 +199,9 @@ class ContactProblem:
         """Return True if a node of any rank is one of `which`; collective."""
         return bool(self.solver.comm.allreduce(bool(which.any()), MPI.LOR))
 
-    def _placed(self, status: Status, solution: DualSolution) -> tuple[DualSolution, Bool]:
+    def _placed(self, bonds: BondState, solution: DualSolution) -> tuple[DualSolution, Bool]:
         """Return the solution with free fibres where they have room, and which nodes (k,) break the KKT conditions."""
+        status = bonds.status
         if not self.contact:
             return solution, np.zeros(len(status), bool)
         pressed = np.zeros(len(status), bool)
@@ -194,22 +211,26 @@ class ContactProblem:
             alpha, jump = solution.alpha + placement.alpha, solution.jump + placement.jump(coarse)
             solution, pressed = replace(solution, alpha=alpha, jump=jump), placement.pressed
         force, gap = solution.lam[self.nodes.row], solution.jump[self.nodes.row]
-        pulled = (status == CLOSED) & (force > self.scales.force_noise(solution))
-        overlaps = (status == OPEN) & (gap < -noise)
+        force_noise, damaged = self.scales.force_noise(solution), self.damaged(bonds)
+        pulled = ((status == CLOSED) | (damaged & bonds.pressed)) & (force > force_noise)
+        overlaps = ((status == OPEN) & (gap < -noise)) | (damaged & ~bonds.pressed & (force < -force_noise))
         return solution, pulled | overlaps | pressed
 
     def _equilibrium(
         self, load: Load, bonds: BondState, solution: DualSolution, iterations: int, solves: int
     ) -> Equilibrium:
         """Return the state that a search ended with, its free motions and its certificate."""
-        status = bonds.status
+        status, gained = bonds.status, self._gained(bonds)
+        damaged = gained > 0.0
+        # A pulled bond opens by its damage; one that is found pulled under pressure overlaps.
+        overlap = np.minimum(gained * solution.lam[self.nodes.row], 0.0)
         certificate = kkt_errors(
             self.solver.comm,
             self.traction(solution),
             self.nodes.length,
-            solution.jump[self.nodes.row],
-            (status != BONDED) & self.contact,
-            status == CLOSED,
+            np.where(damaged & ~bonds.pressed, overlap, solution.jump[self.nodes.row]),
+            ((status != BONDED) & self.contact) | damaged,
+            (status == CLOSED) | (damaged & bonds.pressed),
             self.scales.imposed(solution.strain),
             self.scales.bond_stress(solution.strain),
             self.scales.over_interface,

@@ -24,19 +24,32 @@ class BondState:
     Attributes:
         status: (k,) BONDED, CLOSED or OPEN.
         history: (k, h) internal variables of the law of the bonds, from its `begin`; h = 0 of laws without memory.
+        pressed: (k,) which of the bonds that hold have the normal stiffness of compression, where damage makes that
+            another one than in tension.
     """
 
     status: Status
     history: Float
+    pressed: Bool
 
     @classmethod
     def without_memory(cls, status: Status) -> BondState:
         """State of bonds whose law has no internal variables."""
-        return cls(status, np.zeros((len(status), 0)))
+        return cls(status, np.zeros((len(status), 0)), np.zeros(len(status), bool))
 
     def with_status(self, status: Status) -> BondState:
         """Replace the status; contact changes no internal variable."""
         return replace(self, status=status)
+
+    def flipped(self, which: Bool) -> BondState:
+        """Turn the nodes `which` (k,) over: from open to closed or back, and from pulled to pressed or back."""
+        holds = self.status == BONDED
+        turned = np.where(which & ~holds, CLOSED + OPEN - self.status, self.status).astype(np.int8)
+        return replace(self, status=turned, pressed=self.pressed ^ (which & holds))
+
+    def differs(self, other: BondState) -> Bool:
+        """(k,) nodes whose contact is another one."""
+        return np.asarray((self.status != other.status) | (self.pressed != other.pressed))
 
 
 Softening = Callable[[BondState, Bool], Float | None]

@@ -8,7 +8,7 @@ from __future__ import annotations
 import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import ClassVar, Protocol, Self
+from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
 
@@ -26,16 +26,26 @@ class KeyValues(Protocol):
     def __call__(self, key: str, *others: str) -> float | Float:
         """Return one value of all nodes, or (k,) of each."""
 
+    def everywhere(self, key: str, *others: str) -> Float:
+        """(s,) values of all sections, the same on every rank."""
+
+    def common(self, key: str) -> Any:
+        """Return the value in which all sections agree, as the case has it."""
+
 
 class BondLaw(ABC):
     """Law of all bonds of a cell.  The defaults are those of a law without memory.
 
     Attributes:
         has_toughness: bonds have a fracture energy, which `fracture` gives.
+        has_tips: the energies that drive the tips of debonding on are compared with it.
+        is_convex: `share` is, and so passes 1 once on a straight way.
         break_names: what `breaks` gives of tractions with two or three components.
     """
 
     has_toughness: ClassVar[bool] = False
+    has_tips: ClassVar[bool] = False
+    is_convex: ClassVar[bool] = True
     break_names: ClassVar[Sequence[str]] = ("normal", "tangential", "axial")
 
     @abstractmethod
@@ -43,7 +53,7 @@ class BondLaw(ABC):
         """(p,) share of the strength that tractions (p, c) use at the nodes of the law; 1 breaks.
 
         c = 2 are normal, tension positive, and tangential, 3 also along the fibre.  Homogeneous of degree one in the
-        traction, and convex; 0 of none.
+        traction; 0 of none.
         """
 
     @abstractmethod
@@ -79,6 +89,19 @@ class BondLaw(ABC):
         """(p,) energies per area that the p bonds `which` (k,) take to break under tractions (k, c) of any size."""
         return np.zeros(int(which.sum()))
 
+    def damage(self, bonds: BondState) -> Float | None:
+        """(k,) 0 of intact bonds to 1 of broken ones; None of a law that does not soften."""
+        return None
+
+    @property
+    def overshoot(self) -> float:
+        """Excess of the traction of the first step of damage over the peak of the law, relative to that."""
+        return 0.0
+
+    def onset(self) -> BondLaw:
+        """Return the criterion by which an intact bond is first damaged."""
+        return self
+
     def mode_angle(self, traction: Float) -> Float:
         """(p,) psi of tractions (p, c), in radians: 0 opens, pi/2 shears, under pressure too."""
         shear = np.linalg.norm(traction[:, 1:], axis=1)
@@ -112,7 +135,7 @@ class Utilisation:
 
     def is_convex(self, p: int) -> Bool:
         """(p,) True where the utilisation is sure to be a convex function of the traction, for p nodes."""
-        return np.ones(p, bool)
+        return np.full(p, self.law.is_convex)
 
     def first_factor(self, before: Float, ahead: Float) -> Float | None:
         """(p,) factors of `BondLaw.first_factor`; None where `crossing` has to find them."""

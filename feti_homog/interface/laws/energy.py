@@ -41,6 +41,7 @@ class SpringEnergy(BondLaw):
     axial_stiffness: float | Float = math.inf
 
     has_toughness: ClassVar[bool] = True
+    has_tips: ClassVar[bool] = True
     break_names: ClassVar[tuple[str, ...]] = ("psi",)
 
     @classmethod

@@ -81,6 +81,7 @@ class ReleasedEnergy(BondLaw):
     axial: ExactInverse | None = None
 
     has_toughness: ClassVar[bool] = True
+    has_tips: ClassVar[bool] = True
     break_names: ClassVar[tuple[str, ...]] = SpringEnergy.break_names
 
     def at(self, node: Int) -> ReleasedEnergy:

@@ -9,13 +9,11 @@ import numpy as np
 from mpi4py import MPI
 
 from feti_homog.errors import NotCarriedError
-from feti_homog.feti.dual_solution import DualSolution
-from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.contact.floating_bodies import admissible_share, shares_to_zero
-from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, Equilibrium
-from feti_homog.interface.laws.bond_law import BISECTIONS, BondLaw
+from feti_homog.interface.contact.states import Equilibrium
+from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.loads.load import CoupledSolution, Load, Macroscopic
+from feti_homog.interface.path.next_change import first_break, first_change
 from feti_homog.interface.path.path_points import (
     NO_ENERGIES,
     UTILISATION_TIE,
@@ -77,7 +75,7 @@ class LaterLeg:
         while self._share < 1.0 and self._state.converged:
             ahead = self._ahead()
             yield from self._touch() if ahead is None else self._advance(ahead)
-        yield self._point(0, self._path_state(self.leg + 1, 0.0))
+        yield self._point(0, 0, self._path_state(self.leg + 1, 0.0))
 
     def _ahead(self) -> CoupledSolution | None:
         """Return the end of the leg with the contact states as they are; None if they do not carry its stresses."""
@@ -113,8 +111,8 @@ class LaterLeg:
         What does not happen on the leg is at infinity.
         """
         rest = 1.0 - self._share
-        breaks = _first_break(self.cell, self.law, self._state, ahead)
-        begins, certain = (1.0, 1.0) if self._false_alarm else _first_change(self.cell.plane, self._state, ahead.plane)
+        breaks = first_break(self.cell, self.law, self._state, ahead)
+        begins, certain = (1.0, 1.0) if self._false_alarm else first_change(self.cell.plane, self._state, ahead.plane)
         if begins == 1.0:
             begins = certain = np.inf
         return self._share + rest * breaks, self._share + rest * begins, self._share + rest * certain
@@ -191,7 +189,7 @@ class LaterLeg:
 
     def _turn(self, position: float) -> Point:
         """Return the state here as a point at which nothing breaks and from which the path goes on at `position`."""
-        return self._point(0, self._path_state(self.leg, position))
+        return self._point(0, 0, self._path_state(self.leg, position))
 
     def _break_overloaded(self) -> Iterator[Point]:
         while self._is_overloaded():
@@ -204,15 +202,17 @@ class LaterLeg:
     def _break(self) -> Iterator[Point]:
         """Break the worst bonds here, and find the state after it."""
         cell, state, worst = self.cell, self._state, self._worst
-        bonds, count, fracture = break_bonds(cell, self.law, worst, state)
+        bonds, broke, softened, fracture = break_bonds(cell, self.law, worst, state)
         broken = replace(self._path_state(self.leg, self._share), bonds=bonds, broken=fracture)
-        yield self._point(count, broken)
+        yield self._point(broke, softened, broken)
         self._bends_before, self._false_alarm, self._from = np.inf, False, broken
         self._stand(self._share, cell.equilibrium(self._load_at(self._share), bonds, state.multipliers))
 
-    def _point(self, broke: int, after: PathState) -> Point:
+    def _point(self, broke: int, softened: int, after: PathState) -> Point:
+        """Return the point here, at which so many bonds part and so many soften."""
         energies, self._energies, self._reported = self._energies, NO_ENERGIES, self._share
-        return Point((self.leg + self._share) / self.legs, 1.0, self._state, broke, energies, self._used, after)
+        load_factor = (self.leg + self._share) / self.legs
+        return Point(load_factor, 1.0, self._state, broke, softened, energies, self._used, after)
 
     def _path_state(self, leg: int, position: float) -> PathState:
         """From the state here on, at a position of a leg."""
@@ -230,44 +230,4 @@ class LaterLeg:
 
     def _differs(self, before: Equilibrium) -> bool:
         """Return whether contact states are other than before; collective."""
-        return bool(self.cell.comm.allreduce(bool((self._state.status != before.status).any()), MPI.LOR))
-
-
-def _first_break(cell: CoupledInterfaces, law: BondLaw, state: Equilibrium, ahead: CoupledSolution) -> float:
-    """Share of the way to `ahead` at which the first bond reaches its strength, or inf.  Collective.
-
-    Utilisation is convex along a straight way, so below 1 here and above 1 there it passes 1 once: bisection.
-    """
-    here, there = cell.traction(state.solutions), cell.traction(ahead)
-    utilisation = law.utilisation(cell, state.bonds)
-    over = (state.status == BONDED) & (utilisation(there) > 1.0)
-    step, low, high = there - here, np.zeros(len(here)), np.ones(len(here))
-    for _ in range(BISECTIONS if over.any() else 0):
-        middle = (low + high) / 2
-        broken = utilisation(here + middle[:, None] * step) > 1.0
-        low, high = np.where(broken, low, middle), np.where(broken, middle, high)
-    return float(cell.comm.allreduce(high[over].min(initial=np.inf), MPI.MIN))
-
-
-def _first_change(interface: ContactProblem, state: Equilibrium, ahead: DualSolution) -> tuple[float, float]:
-    """Shares of the way to `ahead` at which the contact begins to change, and at which that is beyond doubt; or 1, 1.
-
-    Beyond doubt means that a tension or an overlap is twice what counts as the solver's error.  A closed node opens
-    when its force is none; open nodes of a fibre that is held close when their gap is none, those of a free
-    fibre when it has no more room (its gaps are not unique).  Collective.
-    """
-    if not interface.contact:
-        return 1.0, 1.0
-    solver, nodes = interface.solver, interface.nodes
-    tension = np.maximum(interface.scales.force_noise(state.solution), interface.scales.force_noise(ahead))
-    closed = state.status == CLOSED
-    shares = [shares_to_zero(-state.solution.lam[nodes.row][closed], -ahead.lam[nodes.row][closed], tension[closed])]
-    is_open, here, there = state.status == OPEN, state.solution.jump[nodes.row], ahead.jump[nodes.row]
-    noise = max(interface.scales.gap_noise(state.solution.strain), interface.scales.gap_noise(ahead.strain))
-    if solver.natural.unconstrained_modes.shape[1]:
-        shares.append(admissible_share(solver.comm, solver.natural, nodes, is_open, here, there, noise))
-    else:
-        shares.append(shares_to_zero(here[is_open], there[is_open], noise))
-    least = np.min(shares, axis=0)
-    solver.comm.Allreduce(MPI.IN_PLACE, least, MPI.MIN)
-    return float(least[0]), float(least[1])
+        return bool(self.cell.comm.allreduce(bool(self._state.bonds.differs(before.bonds).any()), MPI.LOR))

@@ -12,6 +12,7 @@ breaks nothing is lost.  A point's `energies` are those of the way from the last
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.laws.bond_law import BondLaw
@@ -65,14 +66,14 @@ def increments(
         point = _increment(cell, law, load, worst_only, begin)
         after = PathState(step, 0.0, point.state.bonds, point.state.multipliers, origin, point.after.last)
         begin = after
-        yield Point(step / steps, 1.0, point.state, point.broke, point.energies, point.used, after)
+        yield replace(point, load_factor=step / steps, after=after)
         if not point.state.converged:
             return
 
 
 def _increment(cell: CoupledInterfaces, law: BondLaw, load: Load, worst_only: bool, begin: PathState) -> Point:
     """Return the state under a load after all overloaded bonds have broken."""
-    bonds, lam, here, broke = begin.bonds, begin.lam, begin, 0
+    bonds, lam, here, broke, softened = begin.bonds, begin.lam, begin, 0, 0
     energies = NO_ENERGIES
     while True:
         state = cell.equilibrium(load, bonds, lam)
@@ -81,11 +82,11 @@ def _increment(cell: CoupledInterfaces, law: BondLaw, load: Load, worst_only: bo
         used, largest, which = most_utilised(cell, law, state)
         here = PathState(begin.leg, 0.0, state.bonds, lam, begin.origin, reached)
         if largest <= 1.0 + UTILISATION_TIE or not state.converged:
-            return Point(0.0, 1.0, state, broke, energies, used, here)
+            return Point(0.0, 1.0, state, broke, softened, energies, used, here)
         if not worst_only:
             which = used > 1.0
-        bonds, parted, fracture = break_bonds(cell, law, which, state)
-        broke += parted
+        bonds, parted, damaged, fracture = break_bonds(cell, law, which, state)
+        broke, softened = broke + parted, softened + damaged
         here = PathState(begin.leg, 0.0, bonds, lam, begin.origin, reached, fracture)
 
 
@@ -118,8 +119,8 @@ def _first_leg(cell: CoupledInterfaces, law: BondLaw, load: Load, legs: int, beg
         energies = energies.plus(Energies(reached.stored - here.stored, 0.0, 0.0))
         if largest <= 1.0:
             after = PathState(1, 0.0, state.bonds, lam, reached, reached)
-            yield Point(1.0 / legs, 1.0, state, 0, energies, used, after)
+            yield Point(1.0 / legs, 1.0, state, 0, 0, energies, used, after)
             return
-        bonds, broke, fracture = break_bonds(cell, law, worst, state)
+        bonds, broke, softened, fracture = break_bonds(cell, law, worst, state)
         begin = PathState(0, factor, bonds, lam, begin.origin, reached, fracture)
-        yield Point(factor / legs, factor, state, broke, energies, used / largest, begin)
+        yield Point(factor / legs, factor, state, broke, softened, energies, used / largest, begin)

@@ -74,7 +74,8 @@ class Point:
         load_factor: position on the whole path, 0 to 1, every leg taking the same share.
         scale: the state is `scale` times the equilibrium `state`.
         state: that equilibrium.
-        broke: number of bonds that break at this state, after it; of increments, that broke in the step, before it.
+        broke: number of bonds that part at this state, after it; of increments, that did in the step, before it.
+        softened: number of bonds that are damaged there, but hold.
         energies: between the last point's state and this one.
         used: (k,) share of their strength that bonds use in the state, 0 where there are none.
         after: from where the path goes on.
@@ -84,17 +85,19 @@ class Point:
     scale: float
     state: Equilibrium
     broke: int
+    softened: int
     energies: Energies
     used: Float
     after: PathState
 
 
 class Break(NamedTuple):
-    """Break of some bonds: the state of the interface after it, how many part on all ranks, and the fracture energy per
-    area of the cell."""
+    """Break of some bonds: the state of the interface after it, how many part on all ranks and how many soften, and
+    the fracture energy per area of the cell."""
 
     bonds: BondState
     parted: int
+    softened: int
     fracture: float
 
 
@@ -110,7 +113,10 @@ def break_bonds(cell: CoupledInterfaces, law: BondLaw, which: Bool, state: Equil
     history, parts = law.after(state.bonds, which, traction)
     status = cell.plane.debond(state.status, parts, state.multipliers.plane)
     energy = _fracture_energy(cell, law, which, state.bonds, traction)
-    return Break(BondState(status, history), _count_on_all_ranks(cell, parts), energy)
+    # A first guess, which the search for contact checks.
+    pressed = np.where(which, traction[:, 0] < 0.0, state.bonds.pressed)
+    parted, softened = (_count_on_all_ranks(cell, nodes) for nodes in (parts, which & ~parts))
+    return Break(BondState(status, history, pressed), parted, softened, energy)
 
 
 def _fracture_energy(cell: CoupledInterfaces, law: BondLaw, which: Bool, bonds: BondState, traction: Float) -> float:

@@ -209,7 +209,8 @@ def _limits(bond: Mapping[str, Any], unit: str) -> str:
     symbols = [each for each in LAWS[criterion].symbols if bond.get(each[1])]
     given = [(symbol, key, unit if of_stress else "") for symbol, key, of_stress in symbols]
     words = [f"${symbol} = {bond[key]:g}$ {plain(label)}".rstrip() for symbol, key, label in given]
-    return ", ".join([f"criterion {criterion}", *words]) if words else "no debonding by load"
+    law = f"{criterion} law" if LAWS[criterion].softens else f"criterion {criterion}"
+    return ", ".join([law, *words]) if words else "no debonding by load"
 
 
 def plain(text: str) -> str:

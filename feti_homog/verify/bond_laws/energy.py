@@ -14,6 +14,7 @@ class SpringEnergy(BondLaw):
     """G_I + G_II = G_c = G_Ic [1 + tan^2((1 - lambda) psi)] breaks the bond, tan^2 psi = G_II / G_I."""
 
     has_toughness: ClassVar[bool] = True
+    has_tips: ClassVar[bool] = True
 
     def utilisation(self, traction: Float) -> Float:
         """(k,) sqrt(G / G_c) of the springs' energies G = G_I + G_II."""

@@ -19,9 +19,11 @@ class BondLaw(ABC):
     Attributes:
         section: [interface], with one number of all bonds or one of each (k,).
         has_toughness: breaking bonds take the energy `lost`.
+        has_tips: result.json has the energies at the tips of debonding.
     """
 
     has_toughness: ClassVar[bool] = False
+    has_tips: ClassVar[bool] = False
 
     def __init__(self, section: Mapping[str, Any]) -> None:
         self.section = section
@@ -54,6 +56,19 @@ class BondLaw(ABC):
     def lost(self, psi: Float) -> Float:
         """(k,) energies per area that breaks in the modes psi (k,) take."""
         return np.zeros(len(psi))
+
+    def taken(self, psi: Float, before: Float, after: Float) -> Float:
+        """(k,) energies per area that bonds take in the modes psi (k,) from the damage `before` to `after`."""
+        return self.lost(psi)
+
+    def taken_between(self, before: Float, after: Float) -> tuple[Float, Float]:
+        """(k,) the least and the most, whatever the modes."""
+        least, most = (self.lost(np.full(len(after), psi)) for psi in (0.0, np.pi / 2))
+        return least, most
+
+    def onset(self, traction: Float) -> Float:
+        """(k,) utilisation of intact bonds by tractions (k, c), 1 where they break or are first damaged."""
+        return self.utilisation(traction)
 
     def energies(self, traction: Float) -> Float:
         """(k, 2) energies per area of opening and of shear that tractions (k, c) store in the springs."""

@@ -72,7 +72,7 @@ FAULTY_BONDINGS: dict[str, tuple[str, tuple[str, ...]]] = {
         of_type(
             "path", PATH, "[interface]", SPRINGS, 'criterion = "energy"', "toughness = 1.0", "normal_strength = 1.0"
         ),
-        ('[interface] normal_strength = 1.0: belongs to criterion = "max" or "quadratic", not "energy"',),
+        ('[interface] normal_strength = 1.0: belongs to criterion = "max" or "quadratic" or "bilinear" or ',),
     ),
     "energy_without_toughness": (
         of_type("path", PATH, "[interface]", SPRINGS, 'criterion = "energy"'),

@@ -11,6 +11,7 @@ import pytest
 from support.base_case import BASE, FIBRE, changed, fibre
 from unit.case.faulty_bonding import BARE_ARC, FAULTY_BONDINGS, PATH, debonded, of_type
 from unit.case.faulty_cases import FAULTY_CASES
+from unit.case.faulty_cohesive_laws import FAULTY_COHESIVE_LAWS
 from unit.case.faulty_envelopes import FAULTY_ENVELOPES
 from unit.case.faulty_loads import FAULTY_LOADS
 from unit.case.faulty_sizes import FAULTY_SIZES
@@ -24,7 +25,15 @@ from feti_homog.case.sections import Angle
 from feti_homog.errors import CaseError
 from feti_homog.materials.forms import General, Isotropic, Orthotropic
 
-FAULTY = FAULTY_CASES | FAULTY_BONDINGS | FAULTY_ENVELOPES | FAULTY_LOADS | FAULTY_SIZES | FAULTY_TABLE_CELLS
+FAULTY = (
+    FAULTY_CASES
+    | FAULTY_BONDINGS
+    | FAULTY_COHESIVE_LAWS
+    | FAULTY_ENVELOPES
+    | FAULTY_LOADS
+    | FAULTY_SIZES
+    | FAULTY_TABLE_CELLS
+)
 
 
 def case_of(tmp_path: Path, content: str, name: str = "cell.toml"):
@@ -81,8 +90,16 @@ def test_one_fault_is_one_line(tmp_path, name):
 
 
 def test_there_are_enough_faulty_cases():
-    parts = (FAULTY_CASES, FAULTY_BONDINGS, FAULTY_ENVELOPES, FAULTY_LOADS, FAULTY_SIZES, FAULTY_TABLE_CELLS)
-    assert len(FAULTY) == sum(map(len, parts)) >= 100
+    parts = (
+        FAULTY_CASES,
+        FAULTY_BONDINGS,
+        FAULTY_COHESIVE_LAWS,
+        FAULTY_ENVELOPES,
+        FAULTY_LOADS,
+        FAULTY_SIZES,
+        FAULTY_TABLE_CELLS,
+    )
+    assert len(FAULTY) == sum(map(len, (*parts, FAULTY_COHESIVE_LAWS))) >= 100
 
 
 def test_a_missing_file_is_told(tmp_path):

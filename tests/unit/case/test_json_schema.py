@@ -17,6 +17,7 @@ from support.jobs import ROOT
 from unit.case.documents import changed_documents, documents
 from unit.case.faulty_bonding import FAULTY_BONDINGS
 from unit.case.faulty_cases import FAULTY_CASES
+from unit.case.faulty_cohesive_laws import FAULTY_COHESIVE_LAWS
 from unit.case.faulty_envelopes import FAULTY_ENVELOPES
 from unit.case.faulty_loads import FAULTY_LOADS
 from unit.case.faulty_sizes import FAULTY_SIZES
@@ -29,10 +30,20 @@ from feti_homog.errors import CaseError
 
 VALIDATOR = Draft202012Validator(json_schema())
 FILES = [path for folder in ("drivers", "scripts/cases") for path in sorted((ROOT / folder).glob("*.toml"))]
-FAULTY = FAULTY_CASES | FAULTY_BONDINGS | FAULTY_ENVELOPES | FAULTY_LOADS | FAULTY_SIZES | FAULTY_TABLE_CELLS
+FAULTY = (
+    FAULTY_CASES
+    | FAULTY_BONDINGS
+    | FAULTY_COHESIVE_LAWS
+    | FAULTY_ENVELOPES
+    | FAULTY_LOADS
+    | FAULTY_SIZES
+    | FAULTY_TABLE_CELLS
+)
 
 NO_TOML = {"syntax", "syntax_unclosed", "key_twice", "section_twice", "number_too_long"}
 BETWEEN_NUMBERS = {
+    "toughness_below_the_triangle", "infinite_strength_of_a_softening_law", "table_that_hardens",
+    "table_of_falling_openings", "table_of_unlike_lengths", "table_of_another_stiffness",
     "fibres_touch", "fibres_touch_in_square", "random_too_dense", "poisson_half",
     "orthotropic_unstable", "orthotropic_unstable_third", "stiffness_not_symmetric", "stiffness_indefinite",
     "angle_strain_zero", "path_to_zero", "waypoints_begin_at_zero", "waypoints_repeated", "increments_too_few",

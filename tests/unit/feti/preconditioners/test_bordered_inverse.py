@@ -37,6 +37,22 @@ def test_rows_come_and_go():
     assert sorted(found.members) == [2, 3, 7, 11]
 
 
+def test_rows_stiffen_and_soften():
+    M, found, D = quasi_definite(12, 4, 8), BorderedInverse(MPI.COMM_SELF), np.zeros(12)
+    D[[0, 3, 7]] = 2.0, 0.5, 30.0
+    found.append(M, SMALL * np.ones(12), np.array([0, 1, 3, 7]), 1, D)
+    found.append(M, SMALL * np.ones(12), np.array([9]), -1, D)
+    for at, added in (([0], [0.1]), ([2, 3], [0.4, 4.0])):
+        found.change(np.array(at), np.array(added))
+        D[found.members[at]] = added
+        expected = np.linalg.inv((M + np.diag(D))[np.ix_(found.members, found.members)])
+        np.testing.assert_allclose(found.N, expected, rtol=1e-9, atol=1e-12 * np.abs(expected).max())
+    found.remove(np.array([3]))
+    expected = np.linalg.inv((M + np.diag(D))[np.ix_(found.members, found.members)])
+    np.testing.assert_allclose(found.N, expected, rtol=1e-9, atol=1e-12 * np.abs(expected).max())
+    assert found.holds()
+
+
 @pytest.mark.parametrize("at_once", [1, 2, 6], ids=["one by one", "in pairs", "all together"])
 def test_rows_that_depend_on_others_are_left_out(at_once):
     M, found = quasi_definite(6, 0, 4), BorderedInverse(MPI.COMM_SELF)

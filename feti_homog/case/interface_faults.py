@@ -1,0 +1,138 @@
+"""Reading of the sections [interface], and relations between their keys."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+from feti_homog.case.bond_laws import BRANCH, COHESIVE, LAWS, STIFFNESSES
+from feti_homog.case.interface_section import InterfaceSection, Scatter, interface_label, interface_tables
+from feti_homog.case.section_values import PAIR
+from feti_homog.schema.keys import TableReader, to_table
+from feti_homog.schema.wording import toml_value
+
+# Relative difference of numbers that a table and other keys give alike.
+SAME = 1e-6
+COMMON = ("contact", "criterion", "growth", "scatter", "teeth", "softening_tolerance", *BRANCH)
+"""The keys in which all sections [[interface]] agree."""
+
+
+def read_interfaces(document: Mapping[str, Any], reader: TableReader) -> tuple[InterfaceSection, ...] | None:
+    """Return the sections of interfaces with their arcs, in the order of the file; None if one is faulty."""
+    tables = interface_tables(document)
+    if document.get("interface") == []:
+        reader.faults.append("interface = []: expected a section [interface]")
+    labels = [interface_label(n, len(tables)) for n in range(len(tables))]
+    pairs = zip(tables, labels, strict=True)
+    read = [reader.read(InterfaceSection, table, label) for table, label in pairs]
+    if any(interface is None for interface in read):
+        return None
+    interfaces = tuple(map(_completed, filter(None, read)))
+    reader.faults += _faults_between(interfaces)
+    for label, interface in zip(labels, interfaces, strict=True):
+        reader.faults += _cohesive_faults(interface, label)
+    return interfaces
+
+
+def _completed(interface: InterfaceSection) -> InterfaceSection:
+    """Return a section with its law as `criterion`, and with the numbers that follow from a table."""
+    named = replace(interface, criterion=interface.law or interface.criterion, law=None)
+    return replace(named, **_of_table(named))
+
+
+def _faults_between(interfaces: tuple[InterfaceSection, ...]) -> list[str]:
+    """Faults of several sections: pairs that are missing or named twice, and keys that must agree."""
+    faults: list[str] = []
+    first: dict[frozenset[str], int] = {}
+    for number, interface in enumerate(interfaces[: None if len(interfaces) > 1 else 0]):
+        label = interface_label(number, len(interfaces))
+        if interface.between is None:
+            faults.append(f"[{label}] between: missing; of several [[interface]] each needs {PAIR.expected}")
+            continue
+        other = first.setdefault(frozenset(interface.between), number)
+        if other != number:
+            pair = toml_value(list(interface.between))
+            faults.append(f"[{label}] between = {pair}: expected another pair than [interface {other + 1}] has")
+        for name in COMMON:
+            value, common = getattr(interface, name), getattr(interfaces[0], name)
+            if value != common:
+                expected = f"expected {_written(common)}, as of [interface 1]"
+                faults.append(f"[{label}] {name} = {_written(value)}: {expected}: all interfaces agree in it")
+    return faults
+
+
+def _written(value: Any) -> str:
+    """Return the value of a key that interfaces agree in, as TOML has it."""
+    table = to_table(value, {}) if isinstance(value, Scatter) else list(value) if isinstance(value, tuple) else value
+    return "none" if table is None else toml_value(table)
+
+
+def _of_table(interface: InterfaceSection) -> dict[str, Any]:
+    """Return normal stiffness, strength and toughness of a table that begins at its peak, where they are not given."""
+    openings, tractions = interface.openings, interface.tractions
+    if not openings or not tractions or len(openings) != len(tractions) or openings[0] == 0.0:
+        return {}
+    points = list(zip(openings, tractions, strict=True))
+    area = sum((there[0] - here[0]) * (there[1] + here[1]) / 2 for here, there in pairwise(points))
+    numbers = tractions[0] / openings[0], tractions[0], area + openings[0] * tractions[0] / 2
+    names = STIFFNESSES[0], COHESIVE[0], COHESIVE[2]
+    return {name: own for name, own in zip(names, numbers, strict=True) if getattr(interface, name) is None}
+
+
+def _cohesive_faults(interface: InterfaceSection, label: str) -> list[str]:
+    """List what is wrong with the numbers of a law that softens, a line each; keys that are missing are not."""
+    law = LAWS[interface.criterion]
+    if not law.softens:
+        return []
+    words = f"law = {toml_value(law.name)}"
+    unlimited = [name for name in (*STIFFNESSES, *COHESIVE[:2]) if getattr(interface, name) is None]
+    needed = [name for name in unlimited if name in law.needs]
+    found = [f"[{label}] {name}: {words} needs a finite one" for name in needed]
+    found += [f"[{label}] {line}" for line in _branch_faults(interface)]
+    return found or [f"[{label}] {line}" for line in _short_of_energy(interface)]
+
+
+def _branch_faults(interface: InterfaceSection) -> Iterator[str]:
+    """Yield the faults of the table of a softening branch."""
+    openings, tractions = interface.openings, interface.tractions
+    if openings is None or tractions is None:
+        return
+    if len(openings) != len(tractions):
+        yield f"openings, tractions: {len(openings)} and {len(tractions)} numbers; expected as many of both"
+    elif openings[0] <= 0.0 or any(a >= b for a, b in pairwise(openings)):
+        yield f"openings = {toml_value(list(openings))}: expected a rising list of numbers above 0"
+    elif not _softens(tractions):
+        yield f"tractions = {toml_value(list(tractions))}: expected a softening branch, which falls from its peak to 0"
+    else:
+        yield from _unlike_branch(interface)
+
+
+def _softens(tractions: Sequence[float]) -> bool:
+    """Return whether tractions never rise, and end with none."""
+    return tractions[0] > 0.0 and tractions[-1] == 0.0 and all(a >= b for a, b in pairwise(tractions))
+
+
+def _unlike_branch(interface: InterfaceSection) -> Iterator[str]:
+    """Yield the numbers that are others than those of the softening branch."""
+    of_branch = _of_table(replace(interface, normal_stiffness=None, normal_strength=None, normal_toughness=None))
+    given = {name: getattr(interface, name) for name in of_branch}
+    for name, own in of_branch.items():
+        if not math.isclose(given[name], own, rel_tol=SAME):
+            yield f"{name} = {given[name]:g}: expected {own:g}, that of openings and tractions, or none"
+
+
+def _short_of_energy(interface: InterfaceSection) -> Iterator[str]:
+    """Yield the toughnesses below the triangle under the elastic line."""
+    for kind in ("normal", "tangential"):
+        stiffness, strength, toughness = (
+            getattr(interface, f"{kind}_{what}") for what in ("stiffness", "strength", "toughness")
+        )
+        if None in (stiffness, strength, toughness):
+            continue
+        least = strength**2 / (2 * stiffness)
+        if toughness < least * (1.0 - SAME):
+            line = f"expected at least {kind}_strength^2 / (2 {kind}_stiffness) = {least:.6g}, stored at the peak"
+            yield f"{kind}_toughness = {toughness:g}: {line}"
