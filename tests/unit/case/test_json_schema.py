@@ -103,7 +103,9 @@ BEYOND = re.compile(
     "expected less than|expected at most (mesh_size|interface_size|1e.14)|expected a (load|strain) other than|"
     "no such file|would need elements|at least one for each waypoint|positive definite|symmetric matrix|"
     r"no material is stable|x3 must be normal|as of \[interface 1\]|another pair than|magnitudes from|"
-    r"\[cell\] has coatings|no fibre has a coating|fibre_list: row"
+    r"\[cell\] has coatings|no fibre has a coating|fibre_list: row|"
+    r"expected at least (normal|tangential)_strength|a softening branch|a rising list of numbers above 0|"
+    r"expected as many of both|that of openings and tractions|needs a finite one"
 )
 """Faults between numbers, and of files."""
 OF_A_MIX = re.compile(
