@@ -8,6 +8,24 @@ import re
 from collections.abc import Iterable, Mapping
 
 LONGEST_VALUE = 60  # characters of a value in a message
+# Keys that other programs and textbooks name otherwise, in lower case; known ones count.
+SYNONYMS: Mapping[str, tuple[str, ...]] = {
+    **dict.fromkeys(("e", "youngs_modulus", "young_modulus", "modulus"), ("young", "E1")),
+    **dict.fromkeys(("nu", "v", "poisson_ratio", "poissons_ratio"), ("poisson", "nu12")),
+    **dict.fromkeys(("g", "shear_modulus"), ("G12", "G_axial")),
+    **dict.fromkeys(("alpha", "cte", "thermal_expansion"), ("expansion",)),
+    **dict.fromkeys(("strength", "bond_strength", "tensile_strength"), ("normal_strength", "tangential_strength")),
+    "shear_strength": ("tangential_strength",),
+    **dict.fromkeys(("k", "kn", "k_n", "stiffness"), ("normal_stiffness", "tangential_stiffness")),
+    **dict.fromkeys(("gc", "g_c", "gic", "fracture_energy"), ("toughness",)),
+    **dict.fromkeys(("vf", "fraction", "volume_fraction", "fibre_volume_fraction"), ("fibre_fraction",)),
+}
+# What there is none of, and what there is in its place.
+ABSENT = {
+    "friction": "there is no friction: debonded faces touch without it, see contact in [interface]",
+    "strength": "phases do not break; bonds do, see normal_strength and tangential_strength in [interface]",
+    "g": "it follows from young and poisson",
+}
 
 
 def toml_value(value: object) -> str:
@@ -44,6 +62,11 @@ def suggestion(name: str, known: Iterable[str], owners: Mapping[str, str]) -> st
     """
     known = list(known)
     nearest = difflib.get_close_matches(name, known, n=1)
+    meant = [key for key in SYNONYMS.get(name.lower(), ()) if key in known]
+    if meant:
+        return f"did you mean {' or '.join(meant)}?"
+    if name.lower() in ABSENT:
+        return ABSENT[name.lower()]
     if name in owners:
         return f"it belongs to {owners[name]}"
     if nearest:

@@ -65,6 +65,17 @@ FAULTY_MATERIALS: dict[str, tuple[str, tuple[str, ...]]] = {
         cell("young = 200.0", "yuong = 200.0"),
         ("[material.fibre] yuong = 200.0: unknown key; did you mean young?",),
     ),
+    "words_of_textbooks": (
+        cell("young = 200.0", "E = 200.0\nG = 82.0"),
+        (
+            "[material.fibre] E = 200.0: unknown key; did you mean young?",
+            "G = 82.0: unknown key; it follows from young",
+        ),
+    ),
+    "strength_of_a_phase": (
+        cell("young = 200.0", "young = 200.0\nstrength = 3.0"),
+        ("[material.fibre] strength = 3.0: unknown key; phases do not break; bonds do, see normal_strength",),
+    ),
     "poisson_half": (
         cell("0.299", "0.5"),
         ("[material.matrix] poisson = 0.5: expected less than 0.5 in plane strain",),
