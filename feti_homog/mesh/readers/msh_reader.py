@@ -15,7 +15,7 @@ from feti_homog.fibres.outlines.ellipses import Ellipses
 from feti_homog.mesh.coarse_mesh import CoarseMesh, areas, paired_sides, representatives
 from feti_homog.mesh.interface_edges import can_debond
 from feti_homog.mesh.periodic_topology import Torus
-from feti_homog.mesh.readers import abaqus_file, bent_edges, gmsh_file, mesh_checks, void_checks, vtk_file
+from feti_homog.mesh.readers import abaqus_file, bent_edges, gmsh_file, mesh_checks, other_cells, void_checks, vtk_file
 from feti_homog.mesh.readers.bent_edges import with_bent_edges
 from feti_homog.mesh.readers.circle_detection import with_circles
 from feti_homog.mesh.readers.ellipse_detection import with_ellipses
@@ -61,8 +61,11 @@ def made(raw: RawMesh, path: str) -> CoarseMesh:
     _refuse(path, mesh_checks.not_planar(raw), mesh_checks.flat(raw), mesh_checks.duplicate_nodes(raw))
     raw = _turned(raw)
     _refuse(path, bent_edges.faults(raw))
+    _refuse(path, other_cells.lattice(raw.points[:, :2], raw.triangles))
     origin, size, plane = _on_rectangle(raw.points[:, :2])
     corners = mesh_checks.missing_corners(plane, origin, size)
+    if corners and (advice := other_cells.shift(plane, raw.triangles, size)):
+        corners = [f"{corners[0]}; {advice}"]
     _refuse(path, mesh_checks.overlapping(raw), mesh_checks.hanging_nodes(raw, plane, size), corners)
     _refuse(path, mesh_checks.too_large(plane, raw.triangles, size))
     _refuse(path, mesh_checks.not_periodic(raw, plane, size), mesh_checks.unrefined_sides(plane, size))

@@ -112,10 +112,6 @@ FAULTY_BONDINGS: dict[str, tuple[str, tuple[str, ...]]] = {
         of_type("path", PATH, "[interface]", "normal_strenght = 1.0"),
         ("[interface] normal_strenght = 1.0: unknown key; did you mean normal_strength?",),
     ),
-    "strength_of_no_direction": (
-        of_type("path", PATH, "[interface]", "strength = 1.0\nfriction = 0.3"),
-        ("strength = 1.0: unknown key; did you mean normal_strength or tangential_strength?", "there is no friction: "),
-    ),
     "debonded_is_a_table": (
         ended(f"[interface]\ndebonded = {ARC}\n"),
         ("[interface] debonded = ", "expected a list of arcs {fibre, centre, angle}"),

@@ -72,6 +72,10 @@ FAULTY_MATERIALS: dict[str, tuple[str, tuple[str, ...]]] = {
             "G = 82.0: unknown key; it follows from young",
         ),
     ),
+    "words_of_bonds": (
+        cell("young = 200.0", "young = 200.0\n[interface]\nfriction = 0.3\nstrength = 1.0\n[material.other]"),
+        ("there is no friction: ", "unknown key; did you mean normal_strength or tangential_strength?"),
+    ),
     "strength_of_a_phase": (
         cell("young = 200.0", "young = 200.0\nstrength = 3.0"),
         ("[material.fibre] strength = 3.0: unknown key; phases do not break; bonds do, see normal_strength",),

@@ -272,7 +272,7 @@ FAULTY_MESHES: dict[str, tuple[Callable[[Path], None], str]] = {
         "hanging nodes: node 99 (0.375, 0.375) on the edge between node 7 (0.25, 0.25)",
     ),
     "nearly hanging": (_mesh(lambda: _hanging(1e-4)), "hanging nodes: node 99"),
-    "sheared": (_mesh(_sheared), "no node at the corner"),
+    "sheared": (_mesh(_sheared), "the cell is a parallelogram, expected a rectangle"),
     "dent": (_mesh(lambda: grid().moved(n11=(0.1, 0.5))), "node 15 (1, 0.5), expected at (0, 0.5)"),
     "lost corner": (_mesh(lambda: grid().without(31, 32)), "no node at the corner (1, 1) of the cell"),
     "cut corner": (_mesh(_cut_corner), "no node at the corner"),
