@@ -6,6 +6,7 @@ plane strain [E11, E22, E33, gamma23, gamma13, gamma12] and [S11, S22, S33, S23,
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from feti_homog.materials.voigt import (
@@ -29,6 +30,30 @@ DEBONDED_ANGLE = (
 
 OWN_SECTION = "number, from 1, of its section [[interface]]; absent where there is one"
 DEBONDED_SHARES = "the same of the interfaces of each section [[interface]], in their order; absent where there is one"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)  # arrays have no single answer to "equal"
+class MeshError:
+    """Estimates of how far the mesh is from the exact answer: recovered stresses against those of the elements."""
+
+    effective_stiffness: Float = described("error of each entry", STRESS, EITHER_STIFFNESS)
+    effective_stiffness_compression: Float | None = described(
+        "the same under minus the unit strains, with contact", STRESS, EITHER_STIFFNESS, default=None
+    )
+    thermal_stress: Float | None = described(
+        "error of each entry", f"{STRESS} per unit of temperature", "(6,)", default=None
+    )
+    thermal_stress_compression: Float | None = described(
+        "the same under minus a unit of temperature, with contact",
+        f"{STRESS} per unit of temperature",
+        "(6,)",
+        default=None,
+    )
+    thermal_expansion: Float | None = described("error of each entry", "1 / temperature", "(6,)", default=None)
+    constants: Mapping[str, float] = described(
+        "errors of moduli and constants, each in its unit", entries={"NAME": "that of one, as of `E1`"}
+    )
+    energy: float = described("relative error of the strain energy, the largest under any strain")
 
 
 @dataclass(frozen=True, eq=False)  # arrays have no single answer to "equal"

@@ -6,15 +6,17 @@ from typing import Any
 
 from feti_homog.analysis.constants import constants
 from feti_homog.analysis.context import AnalysisContext
+from feti_homog.analysis.mesh_errors import mesh_error, unit_errors
 from feti_homog.analysis.registry import Analysis
 from feti_homog.homogenization.averaging import asymmetry
+from feti_homog.homogenization.mesh_error import EnergyErrors
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
     """`effective_stiffness`, whose columns are the stresses under the unit strains.
 
     With contact between debonded faces also `effective_stiffness_compression`, its columns -Sigma(-E); `tips` of
-    debonded arcs under each of them.
+    debonded arcs under each of them; `mesh_error` of the estimated errors.
 
     If a temperature is a load, `thermal_stress` under a unit of it, and `thermal_stress_compression`.
     """
@@ -22,11 +24,13 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     starts = context.loads.zero_multipliers()
     one_sided = context.plane.interface.contact and context.plane.counts(bonds.status)["open"] > 0
     columns, responses = context.unit_responses("", bonds, starts, 1.0)
+    errors, errors_of_minus = unit_errors(context, responses), list[EnergyErrors]()
     context.record_unit_states(responses, 1.0, "", 0)
     document: dict[str, Any] = {"effective_stiffness": columns.pop("stiffness")} | columns
     under, loads = list(responses), list(context.loads.names)
     if one_sided:
         minus, responses = context.unit_responses("", bonds, starts, -1.0)
+        errors_of_minus = unit_errors(context, responses)
         context.record_unit_states(responses, -1.0, "-", 0)
         document["effective_stiffness_compression"] = minus.pop("stiffness")
         document |= {f"{name}_compression": column for name, column in minus.items()}
@@ -35,7 +39,8 @@ def run(context: AnalysisContext) -> dict[str, Any]:
         context.checks.require("L^ef", {"symmetry": asymmetry(document["effective_stiffness"])})
     if context.case.interface is not None:
         document["tips"] = context.tips.of(under, loads)
-    return document | constants(context.cell, document)
+    document |= constants(context.cell, document)
+    return document | mesh_error(document, errors, errors_of_minus)
 
 
 ANALYSIS = Analysis(run)

@@ -140,6 +140,12 @@ class Output:
         default=20,
         only=PATH_ANALYSIS,
     )
+    mesh_error: bool = key(
+        boolean,
+        "Estimate the error that the mesh makes of every constant: some percent of a run that writes fields, up to a "
+        "half more of one that writes none.",
+        default=True,
+    )
     pictures: bool = key(boolean, "Draw the PNG files; without fields, the curves alone.", default=True)
     report: bool = key(boolean, "Write report.html: numbers, pictures, curves and states on one page.", default=False)
     stress: str = key(

@@ -1,4 +1,4 @@
-"""Gradients of the shape functions of linear and quadratic triangles, at the points of a quadrature."""
+"""Shape functions of linear and quadratic triangles, and their gradients at the points of a quadrature."""
 
 from __future__ import annotations
 
@@ -48,3 +48,17 @@ def gradients(corners: Float) -> tuple[Float, Float]:
     by_x = ys[..., None] * by_r - yr[..., None] * by_s
     by_y = xr[..., None] * by_s - xs[..., None] * by_r
     return np.stack([by_x, by_y], axis=3) / determinant[..., None, None], determinant * rule.weights
+
+
+def barycentric(nodes: int) -> Float:
+    """(q, 3) barycentric coordinates of the quadrature points of the 3- or 6-node triangle."""
+    if nodes == 3:
+        return np.full((1, 3), 1 / 3)
+    return np.column_stack([1 - _P2_POINTS.sum(axis=1), _P2_POINTS])
+
+
+def shape_functions(nodes: int, lam: Float) -> Float:
+    """(q, nodes) values of the 3 or 6 shape functions at the barycentric coordinates lam (q, 3)."""
+    if nodes == 3:
+        return lam
+    return np.hstack([lam * (2 * lam - 1), 4 * lam * np.roll(lam, -1, axis=1)])

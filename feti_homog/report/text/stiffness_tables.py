@@ -21,7 +21,11 @@ THERMAL = {
     "thermal_expansion": "strain at no stress",
 }
 THERMAL_DIGITS = 7  # below the last of the largest there is zero
-THIS_CELL, LOWER, UPPER, UNKNOWN = "this cell", "lower bound", "upper bound", "-"
+THIS_CELL, ITS_ERROR, LOWER, UPPER, UNKNOWN = "this cell", "error of its mesh", "lower bound", "upper bound", "-"
+MESH_ERROR = "Mesh error, estimated"
+# Of a value by which an error is below the digits that are printed without it.
+NO_ERROR = 1e-7
+LEAST_DECIMAL, MOST_DECIMAL = 1e-4, 1e8  # numbers between these are printed to the digits of their errors
 ABREAST = 5  # constants beside each other in text
 SHORT = {
     "E_axial": "E axial",
@@ -43,15 +47,45 @@ def stiffnesses(document: Document, label: str, under_minus: str = "Under minus 
     `label` is the unit of stresses in brackets, or empty.
     """
     titles = {"effective_stiffness": "Effective stiffness", "effective_stiffness_compression": under_minus}
-    return [_matrix(f"{title}{label}", document[key]) for key, title in titles.items() if document.get(key) is not None]
+    found, errors = list[Table](), _errors(document)
+    for key, title in titles.items():
+        if document.get(key) is not None:
+            found.append(_matrix(f"{title}{label}", document[key]))
+        if errors.get(key) is not None:
+            found.append(_matrix(f"{MESH_ERROR}{label}", errors[key], ".1e"))
+    return found
 
 
-def _matrix(title: str, rows: Sequence[Sequence[float]]) -> Table:
+def _errors(document: Document) -> Document:
+    """Return the estimated errors of the mesh, empty of a result without."""
+    found: Document = document.get("mesh_error") or {}
+    return found
+
+
+def _with_error(document: Document, name: str, form: str) -> tuple[str, str]:
+    """Return a constant and its error, which has two digits that say how many the constant has; in this format and
+    empty without an error."""
+    value = next(values[name] for key in ("moduli", "constants") if name in (values := document.get(key) or {}))
+    error = _errors(document).get("constants", {}).get(name)
+    if error is None:
+        return number(value, form), ""
+    if not error > NO_ERROR * abs(value) or not LEAST_DECIMAL < abs(value) < MOST_DECIMAL:
+        return number(value, form), f"{error:.1e}"
+    decimals = max(0, 1 - floor(log10(error)))
+    return f"{value:.{decimals}f}", f"{error:.{decimals}f}"
+
+
+def _beside(error: str) -> str:
+    return f" +- {error:<9}" if error else ""
+
+
+def _matrix(title: str, rows: Sequence[Sequence[float]], given: str = "") -> Table:
     strains, stresses = voigt_names(len(rows))
     in_plane = len(rows) == len(STRAINS)
     names, width, digits, most, short = (NAMES, 16, 8, 1e8, ".7e") if in_plane else (Column("", -6), 12, 7, 1e6, ".4e")
     largest = max(abs(entry) for row in rows for entry in row)
     form = f".{digits - 1 - floor(log10(largest))}f" if 10.0 ** (4 - digits) < largest < most else short
+    form = given or form
     named = [[name, *row] for name, row in zip(stresses, rows, strict=True)]
     return Table(title, [names, *(Column(name, width, form) for name in strains)], named, title_in_head=in_plane)
 
@@ -60,8 +94,10 @@ def thermal(document: Document, label: str) -> list[Table]:
     """Return the table of thermal constants: a row per component, a column per known quantity."""
     known = {key: title for key, title in THERMAL.items() if document.get(key) is not None}
     names = [stress[1:] for stress in SPATIAL_STRESSES]
-    rows = list(zip(names, *(_rounded(document[key]) for key in known), strict=True))
+    errors = {key: _errors(document)[key] for key in known if _errors(document).get(key) is not None}
+    rows = list(zip(names, *(_rounded(document[key]) for key in known), *errors.values(), strict=True))
     columns = [Column("", -6), *(Column(title, 22, ".7g") for title in known.values())]
+    columns += [Column(f"{key.rpartition('_')[2]}: error", 18, ".1e") for key in errors]
     return [Table(f"Per unit of temperature{label}", columns, rows)] if known else []
 
 
@@ -72,18 +108,31 @@ def _rounded(numbers: Sequence[float]) -> list[float]:
 
 def moduli(document: Document, unit: str) -> list[Table]:
     """Engineering moduli of the plane state, each with its unit."""
-    rows = [[with_unit(name, unit), value] for name, value in (document.get("moduli") or {}).items()]
-    return [Table("Engineering moduli", [NAMES, Column("computed")], rows)] if rows else []
+    values, errors = document.get("moduli") or {}, _errors(document).get("constants", {})
+    rows = [[with_unit(name, unit), value, *_listed(errors, name)] for name, value in values.items()]
+    return [Table("Engineering moduli", [NAMES, Column("computed"), *_column(errors)], rows)] if rows else []
+
+
+def _listed(errors: Document, name: str) -> list[float]:
+    return [errors[name]] if name in errors else []
+
+
+def _column(errors: Document) -> list[Column]:
+    return [Column("mesh error", 12, ".1e")] if errors else []
 
 
 def moduli_lines(document: Document, label: str) -> list[str]:
     """Return the same as text: moduli on the left, ratios on the right."""
     values = document["moduli"]
-    left = [f"{name:<6}{values[name]:>13.7g}" for name in STRESS_MODULI if name in values]
-    right = [f"{name:<11}{number(v, '.6f'):>13}" for name, v in values.items() if name not in STRESS_MODULI]
+    left, right = list[str](), list[str]()
+    for name in values:
+        is_stress = name in STRESS_MODULI
+        value, error = _with_error(document, name, ".7g" if is_stress else ".6f")
+        width, column = (6, left) if is_stress else (11, right)
+        column.append(f"{name:<{width}}{value:>13}{_beside(error)}")
     count = max(len(left), len(right))
     pairs = zip(left + [""] * (count - len(left)), right + [""] * (count - len(right)), strict=True)
-    return [f"Engineering moduli{label}", *(f"  {modulus:<30}{ratio}".rstrip() for modulus, ratio in pairs)]
+    return [f"Engineering moduli{label}", *(f"  {modulus:<34}{ratio}".rstrip() for modulus, ratio in pairs)]
 
 
 def bounds(document: Document, label: str) -> list[Table]:
@@ -106,9 +155,11 @@ def bounds(document: Document, label: str) -> list[Table]:
 def constants(document: Document, label: str) -> list[Table]:
     """Engineering constants in space, their range over all directions across the fibres, and what closed estimates and
     bounds are beside them."""
-    found, computed = [], [NAMES, Column("computed")]
+    found, errors = list[Table](), _errors(document).get("constants", {})
     if (values := document.get("constants")) is not None:
-        found.append(Table(f"Engineering constants in the axes of the cell{label}", computed, list(values.items())))
+        columns = [NAMES, Column("computed"), *_column(errors)]
+        rows = [[name, value, *_listed(errors, name)] for name, value in values.items()]
+        found.append(Table(f"Engineering constants in the axes of the cell{label}", columns, rows))
     if (across := document.get("transverse_moduli")) is not None:
         ends = ("least", "largest")
         rows = [[name, *(across[f"{name}_{end}"] for end in ends)] for name in ("E", "G")]
@@ -121,7 +172,9 @@ def constants_lines(document: Document, label: str) -> list[list[str]]:
     """Return the same as blocks of text; empty blocks where nothing is known."""
     values, block = document.get("constants"), list[str]()
     if values is not None:
-        rows = ("    ".join(f"{name:<5}{values[name]:>13.7g}" for name in names) for names in ENGINEERING)
+        parts = {name: _with_error(document, name, ".7g") for names in ENGINEERING for name in names}
+        words = {name: f"{name:<5}{value:>13}{_beside(error)}" for name, (value, error) in parts.items()}
+        rows = ("    ".join(words[name] for name in names).rstrip() for names in ENGINEERING)
         block = [f"Engineering constants in the axes of the cell{label}", *(f"  {row}" for row in rows)]
     return [block, *(_estimates_lines(document, table) for table in estimates(document, label))]
 
@@ -133,7 +186,12 @@ def estimates(document: Document, label: str) -> list[Table]:
         return []
     rows = {title: _known(row) for title, row in _sources(document).items()}
     names = [name for name in SHORT if any(name in row for row in rows.values())]
-    cells = [[title, *(_five(row.get(name)) for name in names)] for title, row in rows.items() if row]
+    forms = {ITS_ERROR: ".1e"}
+    cells = [
+        [title, *(_short(row.get(name), forms.get(title, ".5g")) for name in names)]
+        for title, row in rows.items()
+        if row
+    ]
     columns = [Column("", -22), *(Column(SHORT[name], 13) for name in names)]
     return [Table(f"Along the fibres and across them{label}", columns, cells)]
 
@@ -141,7 +199,8 @@ def estimates(document: Document, label: str) -> list[Table]:
 def _sources(document: Document) -> dict[str, Document]:
     """Return the constants of this cell, by each method, and the bounds."""
     limits = _known(document.get("fibre_bounds") or {})
-    sources = {THIS_CELL: document["transversely_isotropic"]}
+    errors, sources = _errors(document).get("constants", {}), {THIS_CELL: document["transversely_isotropic"]}
+    sources |= {ITS_ERROR: {name: errors[name] for name in SHORT if name in errors}} if errors else {}
     sources |= {name.replace("_", " "): row for name, row in (document.get("estimates") or {}).items()}
     return sources | {name: {key: limits[key][k] for key in limits} for k, name in enumerate((LOWER, UPPER))}
 
@@ -151,7 +210,7 @@ def _estimates_lines(document: Document, table: Table) -> list[str]:
     cell, across = document["transversely_isotropic"], document.get("transverse_moduli")
     lines = [f"{table.title}; {100 * cell['deviation']:.2g} % from transversely isotropic"]
     if across is not None:
-        ranges = (f"{n} from {_five(across[f'{n}_least'])} to {_five(across[f'{n}_largest'])}" for n in ("E", "G"))
+        ranges = (f"{n} from {_short(across[f'{n}_least'])} to {_short(across[f'{n}_largest'])}" for n in ("E", "G"))
         lines.append(f"  over all directions across: {', '.join(ranges)}")
     for first in range(1, len(table.columns), ABREAST):
         part = [0, *range(first, min(first + ABREAST, len(table.columns)))]
@@ -182,5 +241,5 @@ def _known(row: Document) -> dict[str, Any]:
     return {name: value for name, value in row.items() if value is not None}
 
 
-def _five(value: float | None) -> str:
-    return UNKNOWN if value is None else f"{value:.5g}"
+def _short(value: float | None, form: str = ".5g") -> str:
+    return UNKNOWN if value is None else f"{value:{form}}"

@@ -1,0 +1,142 @@
+"""What elements make of arcs costs energy: their sides take area from a body or add to it, and their displacements and
+those of a bond on springs follow polynomials between nodes.
+
+Of each body alone, so that nothing is communicated; what two bodies that are glued have of it in common cancels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from feti_homog.fem.stress_recovery import RecoveredStress
+from feti_homog.mesh.refinement import ReferenceLattice
+from feti_homog.mesh.submesh import Submesh
+from feti_homog.typing import Float, Int
+
+
+@dataclass(frozen=True)
+class ArcSides:
+    """The f sides of elements of order p on arcs; the body is on their left.
+
+    Attributes:
+        element, side: (f,) the side from corner `side` of the element to the next.
+        nodes: (f, p + 1) plane nodes along it.
+        points: (f, p + 1, 2) these.
+        normals: (f, p + 1, 2) unit normals of the arc at these, out of the body.
+        area: (f,) between side and arc that the body lacks.
+    """
+
+    element: Int
+    side: Int
+    nodes: Int
+    points: Float
+    normals: Float
+    area: Float
+
+    @classmethod
+    def of(cls, body: RecoveredStress, submeshes: Sequence[Submesh], lattice: ReferenceLattice) -> ArcSides:
+        """Find those of subdomains that are refined by the lattice."""
+        corners = lattice.nodes[lattice.triangles[:, :3]]
+        is_zero = np.stack([corners, np.roll(corners, -1, axis=1)]) == 0
+        # Side k of the lattice, from its vertex k to the next, is where the coordinate of the third vanishes.
+        place, side = np.nonzero(np.roll(is_zero.all(axis=0), 1, axis=2).transpose(2, 0, 1))[1:]
+        place, side = place.reshape(3, -1), side.reshape(3, -1)
+        n = place.shape[1]
+        edges = np.cumsum([0, *(len(submesh.turns) for submesh in submeshes)])
+        numbers = [submesh.triangle_edges + first for submesh, first in zip(submeshes, edges, strict=False)]
+        triangle_edges, turns = np.concatenate(numbers), np.concatenate([submesh.turns for submesh in submeshes])
+        centres = np.concatenate([submesh.circles[:, :2] for submesh in submeshes])
+        coarse, k = np.nonzero(turns[triangle_edges] > 0)
+        element = (coarse[:, None] * len(corners) + place[k]).ravel()
+        side, edge = side[k].ravel(), np.repeat(triangle_edges[coarse, k], n)
+        own = body.triangles[element]
+        middle = [3 + side] if lattice.order == 2 else []
+        nodes = np.stack([own[np.arange(len(own)), j] for j in (side, *middle, (side + 1) % 3)], axis=1)
+        points, turn = body.points[nodes], turns[edge] / n
+        spokes = points - centres[edge, None]
+        doubled = _cross(spokes[:, 0], spokes[:, -1])
+        area = doubled / 2 * (turn / np.sin(turn) - 1)
+        if lattice.order == 2:  # the parabola has two thirds of the parallelogram around it
+            area -= 2 / 3 * _cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
+        # On an arc about c the place y obeys y'' = -turn^2 y.
+        cosine = np.cos(turn)[:, None]
+        first, last = spokes[:, -1] - cosine * spokes[:, 0], cosine * spokes[:, -1] - spokes[:, 0]
+        tangents = [first, *([last + first] if lattice.order == 2 else []), last]
+        units = [t / np.hypot(*t.T)[:, None] for t in tangents]
+        normals = np.stack([np.column_stack([t[:, 1], -t[:, 0]]) for t in units], axis=1)
+        return cls(element, side, nodes, points, normals, area)
+
+
+def arc_energy(body: RecoveredStress, sides: ArcSides) -> Float:
+    """(k, k) how much larger int sigma_i : eps_j is with the sides in place of the arcs, twice the energy for i = j.
+
+        -int V (sigma_i : eps_j - t_i . du_j/dn - t_j . du_i/dn) ds - c sum_sides h (D t_i . D u_j + D t_j . D u_i)
+
+    with V the distance from the side to the arc, outwards, and t = sigma n: the energy changes at the rate of a
+    boundary that moves.  D are differences of order p between the nodes of a side of length h, c = 1/12 or of order 2
+    1/60: t does work on how far interpolation is from u, -h^2 / 12 int t' . u' ds or -h^4 / 960 int t'' . u'' ds.
+    """
+    if not len(sides.element):
+        return np.zeros((body.loads.shape[1],) * 2)
+    rate = np.einsum("f,fkl->kl", sides.area, _rate(body, sides))
+    chord = sides.points[:, -1] - sides.points[:, 0]
+    order, last = body.order, len(sides.nodes[0]) - 1
+    stress = np.stack([_at(body, sides, place) for place in np.arange(last + 1) / last], axis=1)
+    tractions = np.diff(_tractions(body, stress, sides.normals), n=order, axis=1)[:, 0]
+    imposed = np.einsum("cdk,fpd->fpck", _macroscopic(body), sides.points)
+    u = np.diff(body.u[body.node_class[sides.nodes]] + imposed, n=order, axis=1)[:, 0]
+    share = np.hypot(*chord.T) / {1: 12, 2: 60}[order]
+    between = np.einsum("f,fik,fil->kl", share, tractions, u)
+    return -np.asarray(rate + between + between.T)
+
+
+def _rate(body: RecoveredStress, sides: ArcSides) -> Float:
+    """(f, k, k) sigma_i : eps_j - t_i . du_j/dn - t_j . du_i/dn in the middle of each side."""
+    m, stress = body.problem.strains, _at(body, sides, 0.5)
+    loads = np.tile(body.loads, (len(stress), 1, 1))
+    loads[:, :m] = body.flexibility @ (stress - body.L[:m, m:] @ body.loads[m:])
+    chord = sides.points[:, -1] - sides.points[:, 0]
+    h = np.hypot(*chord.T)[:, None]
+    tangent = chord / h
+    normal = np.column_stack([tangent[:, 1], -tangent[:, 0]])
+    traction = _tractions(body, stress[:, None], normal[:, None])[:, 0]
+    gradient = loads[:, body.problem.voigt]
+    if body.problem.components == 2:  # of which the strains know the symmetric part, and the nodes du/ds along the side
+        gradient[:, [0, 1], [1, 0]] /= 2
+        u = body.u[body.node_class[sides.nodes]]
+        along = (u[:, -1] - u[:, 0]) / h[..., None] + np.einsum("cdk,fd->fck", _macroscopic(body), tangent)
+        turn = np.einsum("fc,fck->fk", normal, along - np.einsum("fcdk,fd->fck", gradient, tangent))
+        gradient[:, 0, 1] += turn * (normal[:, 0] * tangent[:, 1] - normal[:, 1] * tangent[:, 0])[:, None]
+        gradient[:, 1, 0] -= turn * (normal[:, 0] * tangent[:, 1] - normal[:, 1] * tangent[:, 0])[:, None]
+    across = np.einsum("fcdk,fd->fck", gradient, normal)
+    work = np.einsum("fck,fcl->fkl", traction, across)
+    return np.asarray(np.einsum("fvk,vw,fwl->fkl", loads, body.L, loads) - work - work.transpose(0, 2, 1))
+
+
+def _at(body: RecoveredStress, sides: ArcSides, place: float) -> Float:
+    """(f, m, k) recovered stresses at the place, from 0 to 1, of each side."""
+    found = np.empty((len(sides.element), body.problem.strains, body.loads.shape[1]))
+    for k in range(3):
+        own = np.flatnonzero(sides.side == k)
+        lam = np.roll([[1 - place, place, 0.0]], k, axis=1)
+        found[own] = body.recovered(sides.element[own], lam)[:, 0]
+    return found
+
+
+def _tractions(body: RecoveredStress, stress: Float, normal: Float) -> Float:
+    """(f, p, c, k) tractions of stresses (f, p, m, k) on normals (f, p, 2)."""
+    return np.asarray(np.einsum("fpcdk,fpd->fpck", stress[:, :, body.problem.voigt], normal))
+
+
+def _macroscopic(body: RecoveredStress) -> Float:
+    """(c, 2, k) gradients that the loads impose."""
+    m = body.problem.strains
+    return np.stack([body.problem.gradient(load[:m]) for load in body.loads.T], axis=-1)
+
+
+def _cross(a: Float, b: Float) -> Float:
+    """(f,) a x b of vectors (f, 2)."""
+    return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])

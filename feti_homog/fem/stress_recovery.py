@@ -1,0 +1,214 @@
+"""Stresses recovered in each subdomain from those of its elements, and the energy of their difference.
+
+Zienkiewicz and Zhu (IJNME 33 (1992) 1331): about each vertex a polynomial of the elements' order is fitted to the
+stresses at the points of integration of the elements around it; within an element the fits of its three vertices are
+blended by its barycentric coordinates, of order 1 their values there.  A subdomain is of one phase, so that no fit
+reaches across an interface, where stresses jump.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from feti_homog.fem.assembly import ELEMENTS_AT_ONCE
+from feti_homog.fem.problem import Problem
+from feti_homog.fem.shape_functions import barycentric, gradients, shape_functions
+from feti_homog.mesh.refinement import FineMesh
+from feti_homog.typing import Bool, Float, Int
+
+# Weight of the elements around the neighbours of a vertex on the boundary, whose own are few, by the order of elements:
+# of `scripts/measure_mesh_error.py` over all its cells.
+NEIGHBOURS = {1: 0.1, 2: 0.001}
+# Of the moments of a fit, whose diagonal is 1: where all points lie on a line, a fit does not vary across it.
+RIDGE = 1e-9
+# Where linear stresses are compared with those of linear elements, which are uniform: the middles of the sides.
+MIDDLES = np.array([[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]])
+
+
+@dataclass(frozen=True)
+class ElementStresses:
+    """Stresses of the elements `part` under k loads at q points: `points` (e, q, 2), `weights` (e, q), `stress`
+    (e, q, m, k)."""
+
+    part: slice
+    points: Float
+    weights: Float
+    stress: Float
+
+
+@dataclass(frozen=True)
+class RecoveredStress:
+    """Stresses of some subdomains of one phase under k loads, those of their elements and the recovered ones.
+
+    Attributes:
+        points: (n, 2) plane nodes of all of them.
+        triangles: (e, 3 or 6) plane nodes of the elements.
+        node_class: (n,) class of each plane node.
+        L, problem: as of `Subdomain`; m strains of displacements, v loads.
+        u: (classes, c, k) fluctuating displacements.
+        loads: (v, k) the strains and other loads.
+    """
+
+    points: Float
+    triangles: Int
+    node_class: Int
+    L: Float
+    problem: Problem
+    u: Float
+    loads: Float
+
+    @classmethod
+    def on(cls, meshes: Sequence[FineMesh], L: Float, problem: Problem, u: Float, loads: Float) -> RecoveredStress:
+        """On some meshes, one after the other; arguments as the attributes."""
+        nodes = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
+        classes = np.cumsum([0, *(mesh.n_classes for mesh in meshes)])
+        triangles = [mesh.triangles + first for mesh, first in zip(meshes, nodes, strict=False)]
+        node_class = [mesh.node_class + first for mesh, first in zip(meshes, classes, strict=False)]
+        points = np.concatenate([mesh.points for mesh in meshes])
+        return cls(points, np.concatenate(triangles), np.concatenate(node_class), L, problem, u, loads)
+
+    @property
+    def order(self) -> int:
+        """Of the elements and of the fits."""
+        return 1 if self.triangles.shape[1] == 3 else 2
+
+    @cached_property
+    def vertices(self) -> Int:
+        """(e, 3) vertices of the elements, numbered from 0; periodic images are one."""
+        corners = self.node_class[self.triangles[:, :3]]
+        is_vertex = np.zeros(len(self.u), bool)
+        is_vertex[corners] = True
+        return np.asarray((np.cumsum(is_vertex) - 1)[corners])
+
+    @cached_property
+    def flexibility(self) -> Float:
+        """(m, m) inverse of the stiffness that strains of displacements meet."""
+        m = self.problem.strains
+        return np.asarray(np.linalg.inv(self.L[:m, :m]))
+
+    def gradient(self, part: Int | slice, g: Float) -> Float:
+        """(e, q, c, 2, k) gradients of u in the elements `part` from those of the shape functions g (e, q, a, 2)."""
+        u = self.u[self.node_class[self.triangles[part]]]
+        (e, a, c, k), q = u.shape, g.shape[1]
+        flat = g.transpose(0, 1, 3, 2).reshape(e, 2 * q, a) @ u.reshape(e, a, c * k)
+        return np.asarray(flat.reshape(e, q, 2, c, k).transpose(0, 1, 3, 2, 4))
+
+    @cached_property
+    def elements(self) -> list[ElementStresses]:
+        """The stresses of the elements at their points of integration, in chunks."""
+        return list(self._elements())
+
+    def _elements(self) -> Iterator[ElementStresses]:
+        problem, m = self.problem, self.problem.strains
+        lam = barycentric(self.triangles.shape[1])
+        for first in range(0, len(self.triangles), ELEMENTS_AT_ONCE):
+            part = slice(first, min(first + ELEMENTS_AT_ONCE, len(self.triangles)))
+            corners = self.points[self.triangles[part]]
+            g, w = gradients(corners)
+            gradient = self.gradient(part, g)
+            strain = np.zeros((*w.shape, m, self.loads.shape[1]))
+            for number, (i, d) in enumerate(np.nonzero(problem.voigt == n) for n in range(m)):
+                strain[:, :, number] = gradient[:, :, i, d].sum(axis=2)
+            stress = self.L[:m, :m] @ strain + self.L[:m] @ self.loads
+            yield ElementStresses(part, shape_functions(corners.shape[1], lam) @ corners, w, stress)
+
+    @cached_property
+    def fits(self) -> Float:
+        """(vertices, p, m k) coefficients of the polynomials about each vertex, see `polynomials`."""
+        size = int(self.vertices.max()) + 1
+        moments, sums = np.zeros(()), np.zeros(())
+        for own in self.elements:
+            corners, stress = self.points[self.triangles[own.part, :3]], own.stress
+            stress = stress.reshape(*stress.shape[:2], -1)
+            for k in range(3):
+                basis = polynomials(own.points - corners[:, None, k], self.order)
+                weighted = (basis * own.weights[..., None]).transpose(0, 2, 1)
+                moments = moments + _gathered(self.vertices[own.part, k], weighted @ basis, size)
+                sums = sums + _gathered(self.vertices[own.part, k], weighted @ stress, size)
+        return _solved(*self._with_neighbours(moments, sums))
+
+    def recovered(self, part: Int | slice, lam: Float) -> Float:
+        """(e, q, m, k) recovered stresses in the elements `part` at the barycentric coordinates lam (q, 3)."""
+        vertices, shape = self.vertices[part], (self.problem.strains, self.loads.shape[1])
+        if self.order == 1:
+            return np.asarray((lam @ self.fits[:, 0][vertices]).reshape(len(vertices), len(lam), *shape))
+        corners = self.points[self.triangles[part]]
+        points, found = shape_functions(6, lam) @ corners, np.zeros(())
+        for k in range(3):
+            basis = polynomials(points - corners[:, None, k], self.order)
+            found = found + (lam[:, k, None] * basis) @ self.fits[vertices[:, k]]
+        return found.reshape(*points.shape[:2], *shape)
+
+    def difference(self) -> tuple[Float, Float]:
+        """(k, k) int ds_i : S : ds_j, ds recovered less own stress; (e, k) what the elements have of its diagonal."""
+        root = np.linalg.cholesky(self.flexibility).T
+        total, shares = np.zeros((self.loads.shape[1],) * 2), np.empty((len(self.triangles), self.loads.shape[1]))
+        lam = MIDDLES if self.order == 1 else barycentric(6)
+        for own in self.elements:
+            weights = np.repeat(own.weights / 3, 3, axis=1) if self.order == 1 else own.weights
+            off = root @ (self.recovered(own.part, lam) - own.stress) * np.sqrt(weights)[..., None, None]
+            flat = off.reshape(-1, off.shape[-1])
+            total += flat.T @ flat
+            shares[own.part] = np.square(off).sum(axis=(1, 2))
+        return total, shares
+
+    def _with_neighbours(self, moments: Float, sums: Float) -> tuple[Float, Float]:
+        """Moments and sums of the vertices, at the boundary with a share of those of their neighbours."""
+        ends, vector, at_boundary = self._edges
+        wanted = np.concatenate([at_boundary[ends[:, 0]], at_boundary[ends[:, 1]]])
+        own, other = (np.concatenate([ends[:, k], ends[:, 1 - k]])[wanted] for k in (0, 1))
+        moved = _translations(np.concatenate([vector, -vector])[wanted], self.order)
+        share = NEIGHBOURS[self.order]
+        added = _gathered(own, moved @ moments[other] @ moved.transpose(0, 2, 1), len(moments))
+        return moments + share * added, sums + share * _gathered(own, moved @ sums[other], len(sums))
+
+    @cached_property
+    def _edges(self) -> tuple[Int, Float, Bool]:
+        """Vertices (n, 2) of the sides of elements, each side once, vectors (n, 2) from the first to the second, and
+        which vertices are on the boundary, where sides have one element."""
+        size, corners = int(self.vertices.max()) + 1, self.points[self.triangles[:, :3]]
+        ends = np.stack([self.vertices, np.roll(self.vertices, -1, axis=1)], axis=2).reshape(-1, 2)
+        vector = (np.roll(corners, -1, axis=1) - corners).reshape(-1, 2)
+        low, high = np.sort(ends, axis=1).T
+        _, first, count = np.unique(low * size + high, return_index=True, return_counts=True)
+        at_boundary = np.zeros(size, bool)
+        at_boundary[ends[first[count == 1]]] = True
+        return ends[first], vector[first], at_boundary
+
+
+def polynomials(x: Float, order: int) -> Float:
+    """(.., p) 1, x, y and of order 2 also x^2, x y, y^2 at the places x (.., 2)."""
+    one, first, second = np.ones(x.shape[:-1]), x[..., 0], x[..., 1]
+    quadratic = (first * first, first * second, second * second) if order == 2 else ()
+    return np.stack([one, first, second, *quadratic], axis=-1)
+
+
+def _translations(d: Float, order: int) -> Float:
+    """(n, p, p) T with polynomials(x + d) = T polynomials(x) for d (n, 2)."""
+    x, y = d.T
+    T = np.tile(np.eye(3 * order), (len(d), 1, 1))
+    T[:, 1, 0], T[:, 2, 0] = x, y
+    if order == 2:
+        T[:, 3, :2] = np.stack([x * x, 2 * x], axis=1)
+        T[:, 4, :3] = np.stack([x * y, y, x], axis=1)
+        T[:, 5, 0], T[:, 5, 2] = y * y, 2 * y
+    return T
+
+
+def _gathered(place: Int, values: Float, size: int) -> Float:
+    """(size, ..) sums of the values (n, ..) at the places (n,)."""
+    n = len(place)
+    sums = csr_matrix((np.ones(n), (place, np.arange(n))), (size, n)) @ values.reshape(n, -1)
+    return np.asarray(sums.reshape(size, *values.shape[1:]))
+
+
+def _solved(moments: Float, sums: Float) -> Float:
+    """Solve for the coefficients, with the moments scaled to a diagonal of 1."""
+    scale = 1 / np.sqrt(np.einsum("nii->ni", moments))[..., None]
+    scaled = moments * scale * scale.transpose(0, 2, 1) + RIDGE * np.eye(moments.shape[1])
+    return np.asarray(scale * np.linalg.solve(scaled, scale * sums))

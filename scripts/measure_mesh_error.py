@@ -1,0 +1,150 @@
+"""Measures how good the estimated errors of the mesh are: true error / estimate, on one rank.
+
+    .venv/bin/python scripts/measure_mesh_error.py [--only WORDS] [--nested]
+
+For each cell, each order of elements and each of three refinements the least and the largest ratio over the entries of
+the stiffness that are above 1e-3 of its largest; then over all cells how many lie between 0.5 and 2.  Exact values are
+spectral (tests/reference/references.py) or of quadratic elements refined twice more.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
+
+from reference.references import ARC_OF_120_DEGREES_FINE, AXIAL_SHEAR, BONDED, ELASTIC, VOID
+
+from feti_homog import Case, run
+from feti_homog.typing import Float
+
+SIZES = {1: (0.1, 0.05, 0.025), 2: (0.2, 0.1, 0.05)}
+EXACT = {"mesh_size": 0.05, "order": 2, "refine": 2}
+PAPER = {"matrix": {"young": 88.0, "poisson": 0.299}, "fibre": {"young": 200.0, "poisson": 0.222}}
+GLASS = {"matrix": {"young": 3.45, "poisson": 0.35}, "fibre": {"young": 73.0, "poisson": 0.22}}
+BORON = {"matrix": {"young": 68.3, "poisson": 0.3}, "fibre": {"young": 379.3, "poisson": 0.1}}
+INCOMPRESSIBLE = {0.35: (3.304196, 1.312082, 0.671171), 0.49: (29.16768, 26.55517, 0.624632)}
+Known = tuple[str, dict[str, Any], Float | None]
+
+
+def lattice(geometry: str, fraction: float = 0.4, **more: Any) -> dict[str, Any]:
+    """Return the section of a cell."""
+    return {"geometry": geometry, "fibre_fraction": fraction, **more}
+
+
+def arc(angle: float, centre: float = 0.0, contact: bool = False) -> dict[str, Any]:
+    """Return an interface with an arc debonded on every fibre."""
+    return {"contact": contact, "debonded": [{"fibre": "all", "centre": centre, "angle": angle}]}
+
+
+def case(cell: dict[str, Any], phases: Any = PAPER, interface: Any = None, plane: str = "strain") -> dict[str, Any]:
+    """Return a case of the stiffness of a cell."""
+    found = {"cell": cell, "material": phases, "analysis": {"type": "stiffness", "plane": plane}}
+    return found | ({"interface": interface} if interface else {})
+
+
+def springs(normal: float, tangential: float) -> dict[str, Any]:
+    """Return an interface on springs."""
+    return {"contact": False, "normal_stiffness": float(normal), "tangential_stiffness": float(tangential)}
+
+
+def orthotropic(C11: float, C12: float, C33: float, C22: float | None = None) -> Float:
+    """(3, 3) stiffness."""
+    return np.array([[C11, C12, 0.0], [C12, C11 if C22 is None else C22, 0.0], [0.0, 0.0, C33]])
+
+
+def spectral() -> list[Known]:
+    """Cells whose stiffness is known."""
+    found: list[Known] = []
+    for (cell, plane), known in BONDED.items():
+        found.append((f"bonded {cell} {plane}", case(lattice(cell), plane=plane), orthotropic(*known.value)))
+    for cell, known in VOID.items():
+        found.append((f"debonded {cell}", case(lattice(cell), interface=arc(360.0)), orthotropic(*known.value)))
+    for (cell, normal, tangential), known in ELASTIC.items():
+        document = case(lattice(cell), interface=springs(normal, tangential))
+        found.append((f"springs {cell} {normal} {tangential}", document, orthotropic(*known.value)))
+    C11, C22, C12, C33 = ARC_OF_120_DEGREES_FINE.value[:4]
+    found.append(("arc of 120 degrees", case(lattice("square"), interface=arc(120.0)), orthotropic(C11, C12, C33, C22)))
+    for poisson, values in INCOMPRESSIBLE.items():
+        phases = {"matrix": {"young": 1.0, "poisson": poisson}, "fibre": {"young": 1000.0, "poisson": 0.3}}
+        found.append((f"nu = {poisson}", case(lattice("square"), phases), orthotropic(*values)))
+    phases = {name: {"young": young, "poisson": 0.25} for name, young in (("matrix", 2.5), ("fibre", 25.0))}
+    for (cell, fraction), known in AXIAL_SHEAR.items():
+        axial = np.diag([0, 0, 0, known.value[1], known.value[1], 0])
+        document = case(lattice(cell, fraction), phases, plane="generalized")
+        found.append((f"axial shear {cell} {fraction}", document, axial))
+    return found
+
+
+def twins() -> list[Known]:
+    """Cells whose stiffness a finer mesh gives."""
+    cell = {"fibres": 5, "seed": 1, "min_gap": 0.05}
+    axes = ((0.3, 0.3, 0.28, 0.15, 20.0), (0.7, 0.75, 0.25, 0.18, 70.0))
+    ellipses = [dict(zip(("x", "y", "a", "b", "angle"), own, strict=True)) for own in axes]
+    cases = {
+        "random glass 0.5": case(lattice("random", 0.5, **cell), GLASS),
+        "random glass 0.6": case(lattice("random", 0.6, **cell | {"min_gap": 0.02}), GLASS),
+        "random boron 0.5": case(lattice("random", 0.5, **cell), BORON),
+        "hexagonal 0.7": case(lattice("hexagonal", 0.7), GLASS),
+        "square 0.2": case(lattice("square", 0.2), GLASS),
+        "square 0.6": case(lattice("square", 0.6), GLASS),
+        "generalized": case(lattice("hexagonal", 0.5), GLASS, plane="generalized"),
+        "soft fibres": case(lattice("hexagonal", 0.5), {"matrix": GLASS["fibre"], "fibre": GLASS["matrix"]}),
+        "soft coatings": case(lattice("square", coating=0.1), GLASS | {"coating": {"young": 1.0, "poisson": 0.4}}),
+        "stiff coatings": case(
+            lattice("hexagonal", coating=0.05), GLASS | {"coating": {"young": 100.0, "poisson": 0.2}}
+        ),
+        "voids": case(lattice("random", 0.4, **cell, voids=0.05), GLASS),
+        "ellipses": case({"geometry": "table", "width": 1.0, "height": 1.0, "fibre_list": ellipses}, GLASS),
+        "springs of glass": case(lattice("hexagonal", 0.5), GLASS, springs(20, 5)),
+        "arc of 60 degrees": case(lattice("hexagonal"), interface=arc(60.0)),
+        "arc of 180 degrees": case(lattice("square"), GLASS, arc(180.0, centre=45.0)),
+        "arc with contact": case(lattice("square"), interface=arc(120.0, contact=True)),
+        "nu = 0.45": case(lattice("hexagonal", 0.6), GLASS | {"matrix": {"young": 3.0, "poisson": 0.45}}),
+    }
+    return [(name, document, None) for name, document in cases.items()]
+
+
+def solved(document: dict[str, Any], **mesh: Any) -> tuple[Float, Float]:
+    """Return the stiffness on a mesh and its estimated errors."""
+    result = run(Case.parse(document | {"cell": document["cell"] | mesh}), MPI.COMM_SELF)
+    assert result.effective_stiffness is not None and result.mesh_error is not None
+    return result.effective_stiffness, result.mesh_error.effective_stiffness
+
+
+def ratios(document: dict[str, Any], exact: Float, order: int, size: float, nested: bool) -> Float:
+    """Ratios of true errors to their estimates, of the entries that matter."""
+    found, estimate = solved(document, mesh_size=size, order=order, refine=int(nested))
+    if nested:
+        estimate = np.abs(solved(document, mesh_size=size, order=order)[0] - found) / (4**order - 1)
+    matters = np.abs(exact) > 1e-3 * np.abs(exact).max()
+    return np.asarray(np.abs(found - exact)[matters] / estimate[matters])
+
+
+def main() -> None:
+    """One line a cell and order."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--only", default="", metavar="WORDS", help="cells whose names begin so")
+    parser.add_argument("--nested", action="store_true", help="the nested coarser level in place of recovered stresses")
+    arguments = parser.parse_args()
+    of_all: dict[int, list[float]] = {order: [] for order in SIZES}
+    for name, document, known in (each for each in spectral() + twins() if each[0].startswith(arguments.only)):
+        exact = solved(document, **EXACT)[0] if known is None else known
+        for order, sizes in SIZES.items():
+            found = [ratios(document, exact, order, size, arguments.nested) for size in sizes]
+            of_all[order] += np.concatenate(found).tolist()
+            words = ", ".join(f"{own.min():.2f} to {own.max():.2f}" for own in found)
+            print(f"{name:26} order {order}: {words}", flush=True)
+    for order, own in ((order, np.array(each)) for order, each in of_all.items()):
+        shares = ", ".join(f"{np.mean(own > x):.1%} above {x:g}" for x in (5.0, 2.0, 0.5, 0.2))
+        print(f"order {order}: {len(own)} entries, {shares}")
+
+
+if __name__ == "__main__":
+    main()

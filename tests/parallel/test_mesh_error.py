@@ -1,0 +1,136 @@
+"""Estimated errors of the mesh against true ones, at any number of ranks."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from reference.closed_forms import cubic
+from reference.references import AXIAL_SHEAR, BONDED, ELASTIC, ENGINEERING_CONSTANTS, VOID
+from support.cases import FIBRE, MATRIX, make_case, solve
+
+from feti_homog import Case, run
+from feti_homog.fem.arc_error import ArcSides
+from feti_homog.fem.stress_recovery import RecoveredStress
+
+pytestmark = pytest.mark.parallel
+
+ALL_ROUND = {"contact": False, "debonded": [{"fibre": "all", "centre": 0.0, "angle": 360.0}]}
+GLASS = {"young": 73.0, "poisson": 0.22, "expansion": 5.0e-6}
+EPOXY = {"young": 3.45, "poisson": 0.35, "expansion": 54.0e-6}
+SIZES = {1: 0.05, 2: 0.1}
+
+
+def springs(normal, tangential):
+    """Return an interface on springs."""
+    return {"normal_stiffness": float(normal), "tangential_stiffness": float(tangential), "contact": False}
+
+
+def result(comm, geometry="hexagonal", phases=(MATRIX, FIBRE), plane="strain", **more):
+    """Return the result of a stiffness; `more` are sections, of the cell keys beside its geometry.  Collective."""
+    cell = {"geometry": geometry, "fibre_fraction": 0.4} | more.pop("cell", {})
+    materials = dict(zip(("matrix", "fibre"), phases, strict=True))
+    document = {"cell": cell, "material": materials, "analysis": {"type": "stiffness", "plane": plane}}
+    return run(Case.parse(document | more), comm)
+
+
+@pytest.mark.parametrize("order", SIZES)
+@pytest.mark.parametrize(
+    ("known", "interface"),
+    [
+        (BONDED["hexagonal", "strain"], None),
+        (VOID["square"], ALL_ROUND),
+        (ELASTIC["hexagonal", 1000, 250], springs(1000, 250)),
+        (ELASTIC["square", 500, 500], springs(500, 500)),
+    ],
+    ids=["bonded", "debonded", "springs", "springs alike"],
+)
+def test_true_errors_are_near_their_estimates(comm, order, known, interface):
+    geometry = "square" if known in (VOID["square"], ELASTIC["square", 500, 500]) else "hexagonal"
+    sections = {} if interface is None else {"interface": interface}
+    found = result(comm, geometry, cell={"order": order, "mesh_size": SIZES[order]}, **sections)
+    true = np.abs(found.effective_stiffness - cubic(*known.value))
+    ratio = true[[0, 0, 1, 2], [0, 1, 1, 2]] / found.mesh_error.effective_stiffness[[0, 0, 1, 2], [0, 1, 1, 2]]
+    assert (ratio > 0.5).all() and (ratio < 2.0).all()
+    assert found.mesh_error.energy > 0.5 * true[0, 0] / known.value[0]
+
+
+def test_along_the_fibres_too(comm):
+    modulus = AXIAL_SHEAR["hexagonal", 0.5].value[1]
+    phases = ({"young": 2.5, "poisson": 0.25}, {"young": 25.0, "poisson": 0.25})
+    cell = {"fibre_fraction": 0.5, "mesh_size": 0.05}
+    found = result(comm, phases=phases, plane="generalized", cell=cell)
+    for k in (3, 4):
+        assert 0.5 < abs(found.effective_stiffness[k, k] - modulus) / found.mesh_error.effective_stiffness[k, k] < 2.0
+
+
+def test_constants_that_follow(comm):
+    E1, E2, G12, G23, nu12, _, alpha1, alpha2 = ENGINEERING_CONSTANTS["glass/epoxy", "hexagonal", 0.55].value
+    cell = {"fibre_fraction": 0.55, "mesh_size": 0.05}
+    found = result(comm, phases=(EPOXY, GLASS), plane="generalized", cell=cell)
+    values, errors = found.transversely_isotropic, found.mesh_error.constants
+    exact = {"E_axial": E1, "E_transverse": E2, "G_axial": G12, "G_transverse": G23, "nu_axial": nu12}
+    exact |= {"expansion_axial": 1e-6 * alpha1, "expansion_transverse": 1e-6 * alpha2}
+    for name, value in exact.items():
+        assert 0.5 < abs(getattr(values, name) - value) / errors[name] < 2.0, name
+    off = np.abs(found.thermal_expansion - 1e-6 * np.array([alpha2, alpha2, alpha1, 0, 0, 0]))
+    assert (off < 3 * found.mesh_error.thermal_expansion + 1e-12).all()
+
+
+def test_uniform_fields_have_no_error(comm):
+    found = result(comm, phases=(MATRIX, MATRIX), cell={"mesh_size": 0.2})
+    assert found.mesh_error.effective_stiffness.max() < 1e-6
+    assert found.mesh_error.energy < 1e-8
+
+
+def test_cuts_hardly_matter(comm):
+    cell = {"mesh_size": 0.05, "refine": 1}
+    whole, cut = (result(comm, cell=cell, decomposition={"subdomains": n}).mesh_error for n in (3, 12))
+    np.testing.assert_allclose(cut.effective_stiffness[:2, :2], whole.effective_stiffness[:2, :2], rtol=0.1)
+
+
+def test_contact_has_errors_of_both_signs_of_the_load_and_of_no_constants(comm):
+    interface = {"contact": True, "debonded": [{"fibre": "all", "centre": 0.0, "angle": 120.0}]}
+    error = result(comm, "square", interface=interface, cell={"mesh_size": 0.1}).mesh_error
+    assert not error.constants
+    for entries in (error.effective_stiffness, error.effective_stiffness_compression):
+        assert entries.shape == (3, 3) and (entries > 0).all()
+
+
+def test_no_errors_of_constants_that_are_not_there(comm):
+    assert not result(comm, interface=springs(1000, 250), cell={"mesh_size": 0.2}).mesh_error.constants
+
+
+def test_a_case_can_forgo_them(comm):
+    assert result(comm, cell={"mesh_size": 0.2}, output={"mesh_error": False}).mesh_error is None
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_sides_lack_what_the_mesh_does(comm, order):
+    cell, *_ = solve(make_case(order=order, refine=1), comm)
+    lacking = {"matrix": 0.0, "fibre": 0.0}
+    for s in cell.subdomains:
+        body = RecoveredStress.on([s.mesh], s.L, s.problem, np.zeros((s.mesh.n_classes, 2, 1)), np.zeros((3, 1)))
+        lacking[s.submesh.phase] += ArcSides.of(body, [s.submesh], cell.lattice).area.sum()
+    lacking, meshed = ({phase: comm.allreduce(area) for phase, area in lacking.items()}, cell.areas())
+    assert lacking["fibre"] == pytest.approx(0.4 * cell.summary.area - meshed["fibre"], rel=1e-6)
+    assert lacking["matrix"] == pytest.approx(-lacking["fibre"], rel=1e-9)
+    cell.destroy()
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_displacements_of_the_order_of_elements_are_recovered(comm, order):
+    cell, *_ = solve(make_case(order=order, mesh_size=0.06), comm)
+    inner = 0
+    for s in (s for s in cell.subdomains if s.submesh.phase == "fibre"):
+        x, y = s.positions.T
+        u = np.stack([x + 2 * y, x - y] if order == 1 else [x * x + 2 * x * y, x * y - y * y], axis=1)
+        body = RecoveredStress.on([s.mesh], s.L, s.problem, u[..., None], np.zeros((3, 1)))
+        energy, shares = body.difference()
+        assert energy[0, 0] == pytest.approx(shares.sum())
+        # Curved elements on the arc have no quadratic displacements.
+        middles = s.positions[s.mesh.node_class[s.mesh.triangles]].mean(axis=1)
+        away = np.hypot(*(middles - s.positions.mean(axis=0)).T) < 0.5 * np.ptp(x) / 2
+        inner += int(away.sum())
+        assert shares[away].max(initial=0.0) < 1e-16 * s.L[0, 0]
+    assert comm.allreduce(inner) > 50
+    cell.destroy()
