@@ -183,19 +183,22 @@ class PathPoint:
 
 @dataclass(frozen=True, kw_only=True)
 class Peak:
-    """The largest stress of a path, of the component whose strain leads: of those that the loads change the largest."""
+    """The largest stress of a path up to its deepest fall, of the component whose strain leads: of those that the loads
+    change the largest."""
 
     stress_name: str = described("name of the component")
     strain_name: str = described("name of its strain")
-    stress: float = described("the largest in magnitude, with its sign", STRESS)
+    stress: float = described(
+        "the largest in magnitude up to that fall, or of all points without one, with its sign", STRESS
+    )
     strain: float = described("macroscopic strain there")
     event: int = described("number of its point in `path`, from 0")
     first_break_stress: float | None = described("stress where the first bonds break", STRESS, default=None)
     first_break_strain: float | None = described("strain there", default=None)
     first_break_event: int | None = described("number of that point", default=None)
     stress_left: float | None = described(
-        "stress in the valley after the peak, the load only rising on a path of one leg; absent where it falls by less "
-        "than 1 %",
+        "stress in the valley of that fall, the load only rising on a path of one leg; absent where it never falls by "
+        "1 % as bonds break",
         STRESS,
         default=None,
     )

@@ -1,10 +1,11 @@
-"""The peak of a path: its largest stress, the first break before it, and what is left after it.
+"""The peak of a path: its largest stress before it falls, the first break before it, and what is left after it.
 
 The stress is that of the component whose strain leads; points are those of `path` in result.json.
 """
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -38,11 +39,15 @@ def turning_points(values: Float, least: float) -> list[int]:
 
 
 def peak_of(document: Document) -> dict[str, Any]:
-    """Return the fields of `result_records.Peak` of a path that has points."""
+    """Return the fields of `result_records.Peak` of a path that has points.
+
+    The peak is the largest stress up to the deepest fall in which bonds break, or of the whole path if there is none:
+    once all fibres have come off, the matrix alone may carry more than the composite did.
+    """
     points, component = document["path"], path_curves.leading_component(document)
     # 0.0 is added, for a zero may have a sign.
     stress, strain = (np.array([p[name] for p in points], float)[:, component] + 0.0 for name in ("stress", "strain"))
-    event = int(np.abs(stress).argmax())
+    event, left, valley = _deepest_fall(document, stress)
     names = [names[component] for names in voigt_names(len(points[0]["stress"]))]
     found = {"stress": float(stress[event]), "strain": float(strain[event]), "event": event}
     first = next((number for number, point in enumerate(points) if point["broke"]), None)
@@ -52,30 +57,32 @@ def peak_of(document: Document) -> dict[str, Any]:
             "first_break_strain": float(strain[first]),
             "first_break_event": first,
         }
-    left, number = _left(document, stress, event)
-    if number is not None:
-        found |= {"stress_left": left, "event_left": number}
+    if valley is not None:
+        found |= {"stress_left": left, "event_left": valley}
     found["dissipated"] = points[event].get("dissipated", 0.0)
     return {"strain_name": names[0], "stress_name": names[1], **found}
 
 
-def _left(document: Document, stress: Float, event: int) -> tuple[float, int | None]:
-    """Return the stress in the valley after the peak and the point on whose branch it is, None without a drop.
+def _deepest_fall(document: Document, stress: Float) -> tuple[int, float, int | None]:
+    """Return the point of the largest stress (n,) up to the deepest fall in which bonds break, the stress in the valley
+    and the point on whose branch it is; the largest of all points, and None, without a fall.
 
     On a path of one leg the load only rises: at the load of a point it comes to the branch of the next that holds.
     """
-    number = np.arange(len(stress))
+    number, broke = np.arange(len(stress)), np.array([point["broke"] for point in document["path"]])
     if path_curves.is_proportional(document):
         load = np.array([point["load_factor"] for point in document["path"]])
         records = np.flatnonzero(load >= np.maximum.accumulate(load))
         fallen = stress[records[1:]] * load[records[:-1]] / load[records[1:]]
         stress = np.r_[stress[records[0]], np.column_stack([fallen, stress[records[1:]]]).ravel()]
         number = np.r_[records[0], np.repeat(records[1:], 2)]
-    begin = int(np.flatnonzero(number == event)[-1])
-    tail = np.abs(stress[begin:])
-    turns = turning_points(tail, LEAST_DROP * float(tail[0]))
-    valley = begin + turns[1] if len(turns) > 1 else begin
-    return float(stress[valley]), int(number[valley]) if valley > begin else None
+    size = np.abs(stress)
+    turns = pairwise(turning_points(size, LEAST_DROP * float(size.max())))
+    falls = [(size[a] - size[b], a, b) for a, b in turns if size[a] > size[b] and broke[number[a] : number[b]].any()]
+    if not falls:
+        return int(number[size.argmax()]), 0.0, None
+    _, top, valley = max(falls)
+    return int(number[size[: top + 1].argmax()]), float(stress[valley]), int(number[valley])
 
 
 def marks(document: Document) -> dict[int, str]:

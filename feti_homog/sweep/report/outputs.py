@@ -134,7 +134,7 @@ def _path(document: Document) -> dict[str, float]:
     for place, point in (("onset", points[0]), ("end", points[-1])):
         found |= {f"{place}_{name}": value for name, value in zip(strains, point["strain"], strict=True)}
     summit = peak_of(document)
-    found |= {f"peak_{summit['strain_name']}": summit["strain"]}
+    found |= {f"peak_{summit[f'{kind}_name']}": summit[kind] for kind in ("stress", "strain")}
     return found | {f"end_{state}": points[-1][state] for state in point_tables.STATES}
 
 

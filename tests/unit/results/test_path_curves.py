@@ -77,6 +77,14 @@ def test_the_valley_after_a_peak_of_increments_is_a_point_and_saw_teeth_are_none
     assert "event_left" not in peak_of(document("increments", 1, points[:4]))
 
 
+def test_the_peak_is_before_the_deepest_fall_in_which_bonds_break() -> None:
+    """The matrix alone stiffens the cell again, and unloading breaks nothing."""
+    stresses, broke = [2.0, 1.9, 1.95, 0.7, 4.0, 0.5], [1, 1, 1, 1, 0, 0]
+    points = [point(n / 6, 60 * s / n, b) for n, (s, b) in enumerate(zip(stresses, broke, strict=True), 1)]
+    found = peak_of(document("increments", 1, points))
+    assert (found["event"], found["event_left"], found["stress"]) == (0, 3, pytest.approx(2.0))
+
+
 def test_first_legs() -> None:
     points = [point(load, 1.0) for load in (0.2, 0.5, 0.6, 1.0)]
     assert [first_leg(document("events", n, points)) for n in (1, 2, 3)] == [4, 2, 1]

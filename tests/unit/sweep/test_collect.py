@@ -122,7 +122,8 @@ def test_columns_of_a_path_are_its_first_point_its_peaks_and_its_end():
     path = path_document(2, 0.0)
     path["path"][-1] |= {"stress": [-7.0, 1.0, 0.5], "bonded": 5, "open": 3, "closed": 2}
     found = outputs(path)
-    assert [found[f"{place}_S11"] for place in ("onset", "peak", "end")] == [4.0, -7.0, -7.0]
+    assert [found[f"{place}_S11"] for place in ("onset", "peak", "end")] == [4.0, 4.0, -7.0]
+    assert found["peak_E11"] == pytest.approx(0.02)  # whose stress falls behind it
     assert [found[f"peak_{name}"] for name in ("S22", "S12")] == pytest.approx([5.0 / 3, 0.5])
     assert (found["onset_E11"], found["end_E11"]) == pytest.approx((0.02, 0.2))
     assert [found[f"end_{state}"] for state in ("bonded", "open", "closed")] == [5.0, 3.0, 2.0]
@@ -190,7 +191,8 @@ def test_mean_curves_keep_the_bonded_branch(tmp_path):
     table = collected({"cell.fibres": [2, 4, 2, 4], "cell.seed": [0, 0, 1, 1]}, documents, [1, 2, 1, 2], [1, 1, 2, 2])
     tables.write(tmp_path, table)
     assert table.outputs["onset_S11"].tolist() == [4.0, 4.0, 5.0, 5.0]
-    assert table.outputs["peak_S11"].tolist() == [8.0, 8.0, 9.0, 9.0]
+    assert table.outputs["peak_S11"].tolist() == [4.0, 4.0, 5.0, 5.0]  # before the fall
+    assert table.outputs["end_S11"].tolist() == [8.0, 8.0, 9.0, 9.0]
     with h5py.File(tmp_path / "sweep.h5") as file:
         group = file["curves/point-1"]
         strain, mean = group["strain"][()], group["S11_mean"][()]
