@@ -18,6 +18,8 @@ from feti_homog.results.path_curves import SAME_LOAD, Document, Point
 from feti_homog.results.path_peak import LEAST_DROP, marks, turning_points
 from feti_homog.typing import Float
 
+FEWEST_MARKED = 3  # points of a path whose marks show how it went
+
 Drop = tuple[float, int, int]
 """How far the stress falls, of a jump of the strain as much of the largest, and the points before and after."""
 
@@ -127,6 +129,14 @@ def _deepest(document: Document) -> tuple[int, ...]:
 def kept_points(document: Document) -> list[int]:
     """Numbers of the points of a path whose fields are kept, in the order of the states; of all if none are."""
     return list(document.get("states") or range(len(document["path"])))
+
+
+def landmark_states(document: Document, rows: int, count: int) -> list[int]:
+    """Numbers of those of the first `count` states of a path that are at its first break, its peak, the valley after it
+    and its end; with fewer than three of them at most `rows` states, chosen as `chosen_states` chooses."""
+    among, marked = kept_points(document)[:count], marks(document)
+    found = [state for state, point in enumerate(among) if point in marked]
+    return found if len(found) >= FEWEST_MARKED else chosen_states(document, rows, count)
 
 
 def chosen_states(document: Document, rows: int, count: int) -> list[int]:

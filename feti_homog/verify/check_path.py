@@ -168,7 +168,7 @@ def _check_peak(findings: Findings, peak: Point | None, points: Sequence[Point])
     size, event = float(np.abs(stress).max()), peak["event"]
     before = float(np.abs(stress[:event]).max(initial=0.0))
     findings.record("tables", relative(np.array(peak["stress"] - stress[event]), size), "peak.stress")
-    findings.record("tables", max(before - abs(stress[event]), 0.0) / (size or 1.0), "peak.event")
+    findings.record("tables", max(before - float(abs(stress[event])), 0.0) / (size or 1.0), "peak.event")
     findings.record("tables", relative(np.array(peak["strain"] - strain[event]), np.abs(strain).max()), "peak.strain")
     broken = [number for number, point in enumerate(points) if point["broke"]]
     told = peak.get("first_break_event")

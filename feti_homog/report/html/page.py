@@ -97,14 +97,14 @@ def _state(file: Any, number: int, drawn: DrawnMesh, edges: InterfaceEdges, docu
         "nodes": [int((status == kind).sum()) for kind in range(3)],
         "unit": unit,
         "displacement": _base64(np.round(displacement / unit), "<i2"),
-        "fields": [_field(drawn_stress(state, name, drawn)) for name in stresses],
+        "fields": [_field(drawn_stress(state, name, drawn), drawn.areas) for name in stresses],
         "status": _base64(edges.state(status), "u1"),
     }
 
 
-def _field(values: NDArray[Any]) -> dict[str, Any]:
-    """Bytes of values, and the range they are in."""
-    norm, _ = value_range(values)
+def _field(values: NDArray[Any], areas: NDArray[Any]) -> dict[str, Any]:
+    """Bytes of values on triangles of these areas, and the range they are in."""
+    norm, _ = value_range(values, areas)
     low, high = float(norm.vmin or 0.0), float(norm.vmax or 0.0)
     scaled = np.clip((values - low) / (high - low), 0.0, 1.0)
     return {"low": low, "high": high, "values": _base64(np.round(scaled * LARGEST_BYTE), "u1")}

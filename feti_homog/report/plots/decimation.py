@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from feti_homog.typing import Array
 LEAST_AREA = 0.5  # area of a triangle in a picture / its own: at zero it would be turned over
 TRIANGLE_LIMIT = 100_000  # triangles in a picture
 BLOCK_ROWS = 1 << 18
+SAME_PLACE = 1e-6  # of the size of the cell
 QUARTERS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])  # of a six-node triangle
 
 
@@ -32,6 +34,27 @@ class DrawnMesh:
     body: Array  # (q,)
     subdomain: Array  # (q,)
     phase: Array  # (q,)
+
+    @cached_property
+    def areas(self) -> Array:
+        """(q,) areas of the triangles."""
+        found: Array = np.abs(_determinant(_sides(self.points, self))) / 2
+        return found
+
+    @cached_property
+    def node_areas(self) -> Array:
+        """(p,) a third of the areas of the triangles at each node."""
+        return np.bincount(self.triangles.ravel(), np.repeat(self.areas / 3, 3), len(self.points))
+
+    @cached_property
+    def places(self) -> Array:
+        """(p,) number of the place of each node in its body: nodes are torn between the subdomains of a body."""
+        near = SAME_PLACE * np.ptp(self.points, axis=0).max()
+        body = np.zeros(len(self.points), np.int64)
+        body[self.triangles] = self.body[:, None]
+        keys = np.column_stack([body, np.round(self.points / near).astype(np.int64)])
+        numbers: Array = np.unique(keys, axis=0, return_inverse=True)[1].ravel()
+        return numbers
 
 
 def drawn_mesh(file: Any, limit: int = TRIANGLE_LIMIT, block: int = BLOCK_ROWS) -> DrawnMesh:
@@ -64,6 +87,14 @@ def triangle_means(table: Any, column: int | None, drawn: DrawnMesh) -> Array:
     own = ... if column is None else (..., column)
     means = _blocks(table, drawn.group, drawn.block, lambda rows: rows[own].mean(axis=1))
     return np.repeat(means, drawn.pieces)
+
+
+def node_means(values: Array, drawn: DrawnMesh) -> Array:
+    """Return the means (p,) of values (q,) on triangles at the nodes drawn, weighted by area, within each body."""
+    place, weights = drawn.places[drawn.triangles].ravel(), np.repeat(drawn.areas, 3)
+    sums = np.bincount(place, np.repeat(values * drawn.areas, 3)) / np.bincount(place, weights)
+    means: Array = sums[drawn.places]
+    return means
 
 
 def outline_edges(drawn: DrawnMesh, label: Array) -> Array:

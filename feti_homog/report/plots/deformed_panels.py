@@ -1,4 +1,4 @@
-"""The deformed cell at several states of an angle or path, side by side and as an animation."""
+"""The deformed cell at several states of an angle or path, side by side and as an animation, in one range of colour."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import Any
 import h5py
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from PIL import Image
@@ -21,20 +22,21 @@ from feti_homog.report.plots.interface_marks import STATE_NAMES, InterfaceEdges,
 from feti_homog.report.plots.load_labels import LoadLabels
 from feti_homog.report.plots.plot_helpers import (
     STRESS_SYMBOLS,
+    colour_range,
     draw_segments,
-    drawn_stress,
-    fill_triangles,
     largest_length,
     magnification,
+    nodal_stress,
     pixels_of,
     plain,
     save,
+    shade_triangles,
     stress_component,
     unit_label,
-    value_range,
 )
 from feti_homog.report.text.analyses import reported
 from feti_homog.results import atomic, field_file, kept_points
+from feti_homog.results.path_peak import marks
 from feti_homog.typing import Array
 
 Document = Mapping[str, Any]
@@ -55,41 +57,57 @@ class DeformedCell:
     borders: Array
     interface_edges: InterfaceEdges
     component: str
+    colours: tuple[Normalize, str, str]
     scale: float
     labels: LoadLabels
+    marks: Mapping[int, str]
 
     @classmethod
     def of(cls, file: Any, numbers: Sequence[int], document: Document, scale: float, limit: int) -> DeformedCell:
-        """Return the stress that the case chooses, or that suits all these states."""
+        """Return the stress that the case chooses, or that suits all these states, and one range of colours of all."""
         drawn = drawn_mesh(file, limit)
         borders = outline_edges(drawn, drawn.body)
         chosen = document["case"]["output"].get("stress", "auto")
-        component = stress_component(chosen, [file[f"state/{n}"] for n in numbers])
+        states = [file[f"state/{n}"] for n in numbers]
+        component = stress_component(chosen, states)
+        words = marks(document) if reported(document).is_followed else {}
+        # At the end, once all fibres have come off, stresses may be many times those of the peak.
+        marked = [state for state in states if words.get(int(state.attrs["point"]), "end") != "end"] or states
+        stress = np.concatenate([nodal_stress(state, component, drawn) for state in marked])
+        colours = colour_range(stress, np.tile(drawn.node_areas, len(marked)))
         edges = InterfaceEdges.of(file, drawn, borders)
-        return cls(file, drawn, borders, edges, component, scale, LoadLabels.of(document))
+        return cls(file, drawn, borders, edges, component, colours, scale, LoadLabels.of(document), words)
 
     def moved(self, number: int) -> Array:
         """(p, 2) places of the drawn nodes."""
         places: Array = self.drawn.points + self.scale * drawn_displacement(self.file[f"state/{number}"], self.drawn)
         return places
 
-    def draw(self, axes: Axes, number: int, moved: Array) -> None:
-        """Draw the cell of a state, drawn nodes at `moved`, in its own range of colours: stresses grow along a path."""
+    def draw(self, axes: Axes, number: int, moved: Array) -> Any:
+        """Draw the cell of a state, drawn nodes at `moved`; returns what a colour bar is of."""
         state = self.file[f"state/{number}"]
-        stress = drawn_stress(state, self.component, self.drawn)
-        norm, extend = value_range(stress)
-        shapes = fill_triangles(axes, self.drawn, moved, stress, edges=False, norm=norm, cmap="viridis")
+        norm, colours, _ = self.colours
+        shapes = shade_triangles(
+            axes, self.drawn, moved, nodal_stress(state, self.component, self.drawn), norm, colours
+        )
         draw_segments(axes, moved[self.borders], "black", 0.5)
         self.interface_edges.mark(axes, moved, state["status"][:], magnified=0.8)
         axes.set_aspect("equal")
         axes.set(xticks=(), yticks=())
         axes.set_axis_off()
         attributes = state.attrs
-        axes.set_title(f"{attributes['label']}\n{self.labels.label(attributes, LOADS_IN_PANEL)}", fontsize=9, y=1.0)
+        mark = self.marks.get(int(attributes["point"]))
+        title = f"{mark}: {attributes['label']}" if mark else attributes["label"]
+        axes.set_title(f"{title}\n{self.labels.label(attributes, LOADS_IN_PANEL)}", fontsize=9, y=1.0)
+        return shapes
+
+    def bar(self, axes: Axes, shapes: Any, place: Axes | None = None) -> None:
+        """Draw the colour bar of all states beside axes, or in a `place`."""
         figure: Any = axes.figure
-        bar = figure.colorbar(shapes, cax=axes.inset_axes((1.02, 0.1, 0.035, 0.8)), extend=extend)
-        bar.ax.tick_params(labelsize=7, pad=1, length=2)
-        bar.locator = MaxNLocator(5)
+        at = axes.inset_axes((1.03, 0.0, 0.04, 1.0)) if place is None else place
+        bar = figure.colorbar(shapes, cax=at, extend=self.colours[2])
+        bar.ax.tick_params(labelsize=8)
+        bar.locator = MaxNLocator(6)
 
     def lines(self, number: int) -> int:
         """Lines of the words for the load of a state."""
@@ -115,7 +133,7 @@ def draw_state(axes: Axes, directory: Path, number: int, stress: str = "auto", s
     try:
         with h5py.File(path, "r") as file:
             cell = DeformedCell.of(file, [number], {"case": {"output": {"stress": stress}}}, scale, STATE_LIMIT)
-            cell.draw(axes, number, cell.moved(number))
+            cell.bar(axes, cell.draw(axes, number, cell.moved(number)))
             caption = cell.caption
     except (OSError, KeyError) as error:
         raise FetiHomogError(f"cannot draw state {number} of {path}: {error}") from error
@@ -143,7 +161,7 @@ def _angle(directory: Path, file: Any, document: Document, count: int) -> list[P
 
 def _path(directory: Path, file: Any, document: Document, count: int) -> list[Path]:
     scale = shown_scale(file, document)
-    panels = _side_by_side(file, kept_points.chosen_states(document, MAX_PANELS, count), document, scale)
+    panels = _side_by_side(file, kept_points.landmark_states(document, MAX_PANELS, count), document, scale)
     paths = [save(panels, directory / "path_states.png")]
     frames = kept_points.chosen_states(document, MAX_FRAMES, count)
     return [*paths, _animation(file, frames, document, scale, directory / "path.gif")]
@@ -178,12 +196,13 @@ def _side_by_side(file: Any, numbers: Sequence[int], document: Document, scale: 
     size = np.subtract(*_corners(places)[::-1])
     rows = max(1, round(math.sqrt(0.7 * len(numbers) * size[0] / size[1])))
     columns = -(-len(numbers) // rows)
-    panel = (INCHES - BAR * columns) / columns
+    panel = (INCHES - BAR) / columns
     title = 0.2 + LINE * (1 + max(cell.lines(number) for number in numbers))
     figure = Figure(figsize=(INCHES, rows * (panel * size[1] / size[0] + title) + 0.7), layout="constrained")
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
-    for axes, number, moved in zip(grid, numbers, places, strict=False):
-        cell.draw(axes, number, moved)
+    shapes = [cell.draw(axes, number, moved) for axes, number, moved in zip(grid, numbers, places, strict=False)]
+    bar: Any = figure.colorbar(shapes[0], ax=grid.tolist(), extend=cell.colours[2], shrink=0.7, aspect=30, pad=0.01)
+    bar.locator = MaxNLocator(6)
     for axes in grid[len(numbers) :]:
         axes.set_axis_off()
     grid[0].autoscale_view()
@@ -210,7 +229,7 @@ def _animation(file: Any, numbers: Sequence[int], document: Document, scale: flo
     for number, moved in zip(reversed(numbers), reversed(places), strict=True):
         for artist in [*axes.collections, *axes.patches, *axes.child_axes]:
             artist.remove()
-        cell.draw(axes, number, moved)
+        cell.bar(axes, cell.draw(axes, number, moved))
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         picture = Image.fromarray(pixels_of(figure))
         figure.set_layout_engine("none")

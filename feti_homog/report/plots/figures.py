@@ -33,14 +33,14 @@ from feti_homog.report.plots.plot_helpers import (
     STYLE,
     colour_range,
     draw_segments,
-    drawn_stress,
     figure_of,
-    fill_triangles,
     label_cell_axes,
     largest_length,
     magnification,
+    nodal_stress,
     plain,
     save,
+    shade_triangles,
     stress_component,
     unit_label,
 )
@@ -52,6 +52,7 @@ LEVEL_INK, LEVEL_WIDTH = "0.15", 0.6  # of lines of equal displacement along the
 LEVELS = 12  # about so many lines
 OUTLINED_BODIES = 8  # up to which the deformed cell is drawn over all that it has left
 UNDEFORMED, BAR_INCHES = "0.5", 1.1
+IN_LEGEND = 2  # entries of a legend in a line: four are wider than a narrow cell
 
 
 def plot(directory: Path) -> list[Path]:
@@ -165,9 +166,9 @@ def _coloured(file: Any, state: Any, drawn: DrawnMesh, moved: Array, output: Map
     attributes = file.attrs
     figure, (axes,) = figure_of(attributes, panels=1, beside=BAR_INCHES)
     component = stress_component(output.get("stress", "auto"), [state])
-    stress = drawn_stress(state, component, drawn)
-    norm, colours, extend = colour_range(stress)
-    picture = fill_triangles(axes, drawn, moved, stress, edges=False, norm=norm, cmap=colours)
+    stress = nodal_stress(state, component, drawn)
+    norm, colours, extend = colour_range(stress, drawn.node_areas)
+    picture = shade_triangles(axes, drawn, moved, stress, norm, colours)
     bar = figure.colorbar(picture, cax=axes.inset_axes((1.03, 0.0, 0.04, 1.0)), extend=extend)
     bar.set_label(f"${STRESS_SYMBOLS[component]}$ " + (unit_label(attributes["stress_unit"]) or "(unit of the moduli)"))
     return figure, axes
@@ -187,7 +188,7 @@ def _outlined(
     marks = interface_edges.mark(axes, moved, state["status"][:])
     label_cell_axes(axes, state.file.attrs)
     handles = [*(marks if len(marks) > 1 else ()), *lines]
-    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), frameon=False)
+    figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), IN_LEGEND), frameon=False)
 
 
 def _left(attributes: Any, drawn: DrawnMesh, borders: Array) -> Array:

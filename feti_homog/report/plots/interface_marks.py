@@ -16,8 +16,9 @@ from feti_homog.typing import Array
 
 BONDED, CLOSED, OPEN = 0, 1, 2
 STATE_NAMES = {BONDED: "bonded", CLOSED: "in contact", OPEN: "open"}
-STATE_COLOURS = {BONDED: "black", CLOSED: "#ff7f0e", OPEN: "#d6006c"}
+STATE_COLOURS = {BONDED: "black", CLOSED: "#ff7f0e", OPEN: "#00a14b"}
 STATE_WIDTHS = {BONDED: 0.8, CLOSED: 2.6, OPEN: 2.0}
+HALO = 1.6  # points
 SAME_PLACE = 1e-6  # of the width of the cell
 
 
@@ -53,6 +54,9 @@ class InterfaceEdges:
         for kind in found:
             segments = points[self.edges[states == kind]]
             cap: Literal["butt", "round"] = "butt" if kind == BONDED else "round"
+            if kind != BONDED:
+                # Seen on every colour: magenta and orange are not, on red.
+                draw_segments(axes, segments, "white", magnified * (STATE_WIDTHS[kind] + HALO), cap)
             draw_segments(axes, segments, STATE_COLOURS[kind], magnified * STATE_WIDTHS[kind], cap)
         return state_legend(found)
 

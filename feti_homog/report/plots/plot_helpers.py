@@ -16,11 +16,12 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Path2D
+from matplotlib.tri import Triangulation
 from PIL import Image
 
 from feti_homog.case.bond_laws import DEFAULT, LAWS
 from feti_homog.materials.voigt import AXIAL_STRESSES, SPATIAL_STRESSES, STRESSES, voigt_names
-from feti_homog.report.plots.decimation import DrawnMesh, triangle_means
+from feti_homog.report.plots.decimation import DrawnMesh, node_means, triangle_means
 from feti_homog.results import atomic
 from feti_homog.results.path_curves import FAINT, components_above
 from feti_homog.typing import Array
@@ -34,7 +35,9 @@ STRESS_TABLES: dict[str, tuple[str, int | None]] = {
     "S33": ("stress_33", None),
     **{name: ("axial_stress", column) for column, name in enumerate(AXIAL_STRESSES)},
 }
-SAME_VALUE = 1e-6  # values that differ by less, relatively, are one
+# Fields that vary by less, relatively, have one colour; share of one sign below which zero is not in the middle; share
+# of the area that may lie outside of a colour range, at either end.
+UNIFORM, ONE_SIGN, OUTLIERS = 0.01, 0.1, 0.005
 CELL_INCHES = 4.8  # inches, the longer side of a drawn cell
 STYLE = {"font.size": 10, "axes.titlesize": 11, "axes.linewidth": 0.8}
 DPI, PADDING = 200, 0.08  # dots per inch; inches
@@ -98,15 +101,20 @@ def label_cell_axes(axes: Axes, attributes: Any) -> None:
     axes.spines[["top", "right"]].set_visible(False)
 
 
-def fill_triangles(axes: Axes, drawn: DrawnMesh, points: Array, colours: Array, edges: bool, **mapping: Any) -> Any:
-    """Return fills the triangles with values, or with colours (q, 4); antialiasing would leave seams."""
-    fill = {"array": colours} if colours.ndim == 1 else {"facecolors": colours}
-    border = {"edgecolors": "0.55", "linewidths": 0.15} if edges else {"edgecolors": "none", "antialiased": False}
-    style: dict[str, Any] = fill | border | mapping
+def fill_triangles(axes: Axes, drawn: DrawnMesh, points: Array, colours: Array, edges: bool) -> None:
+    """Fill the triangles with colours (q, 4); antialiasing would leave seams."""
+    style: dict[str, Any] = {"edgecolors": "none", "antialiased": False}
+    if edges:
+        style = {"edgecolors": "0.55", "linewidths": 0.15}
     corners: Any = points[drawn.triangles]
-    shapes = PolyCollection(corners, **style)
-    axes.add_collection(shapes)
-    return shapes
+    axes.add_collection(PolyCollection(corners, facecolors=colours, **style))
+
+
+def shade_triangles(axes: Axes, drawn: DrawnMesh, points: Array, values: Array, norm: Normalize, colours: str) -> Any:
+    """Return the triangles in smooth colours of values (p,) at their nodes, which are at `points` (p, 2)."""
+    x, y = points.T
+    mesh = Triangulation(x, y, drawn.triangles)
+    return axes.tripcolor(mesh, values, shading="gouraud", norm=norm, cmap=colours)
 
 
 def draw_segments(
@@ -120,27 +128,46 @@ def draw_segments(
     axes.update_datalim(path.vertices)  # as `add_patch` does, one segment after the other
 
 
-def colour_range(values: Array) -> tuple[Normalize, str, str]:
-    """Colour range, map and the ends at which values lie outside; zero is white if both signs matter."""
-    norm, extend = value_range(values)
+def colour_range(values: Array, areas: Array | None = None) -> tuple[Normalize, str, str]:
+    """Colour range, map and the ends at which values lie outside; zero is white if both signs matter.
+
+    Values (n,) count by their `areas` (n,), all alike by default: meshes are fine at tips, where stresses are singular.
+    """
+    norm, extend = value_range(values, areas)
     least, most = float(norm.vmin or 0.0), float(norm.vmax or 0.0)
-    if min(-least, most) <= 0.05 * max(-least, most) or np.ptp(values) <= SAME_VALUE * np.abs(values).max():
+    if min(-least, most) <= ONE_SIGN * max(-least, most) or _is_uniform(values):
         return norm, "viridis", extend
     most = max(-least, most)
     return Normalize(-most, most), "RdBu_r", _outside(values, -most, most)
 
 
-def value_range(values: Array) -> tuple[Normalize, str]:
-    """Colour range and the ends at which values lie outside; the extreme 0.5 % may, at either end."""
+def value_range(values: Array, areas: Array | None = None) -> tuple[Normalize, str]:
+    """Colour range and the ends at which values lie outside; those on the extreme 0.5 % of the area may, at either end.
+
+    Of a field that is uniform to 1 % it is so wide that it has one colour.
+    """
     low, high = float(values.min()), float(values.max())
-    if high - low <= SAME_VALUE * max(abs(low), abs(high), 1e-300):
+    if _is_uniform(values):
         middle = 0.5 * (low + high)
         half = 0.5 * (abs(middle) or 1.0)
         return Normalize(middle - half, middle + half), "neither"
-    least, most = (float(value) for value in np.percentile(values, (0.5, 99.5)))
+    least, most = _quantiles(values, np.ones_like(values) if areas is None else areas)
     slack = 0.05 * (most - least)
     least, most = (low if least - low < slack else least), (high if high - most < slack else most)
     return Normalize(least, most), _outside(values, least, most)
+
+
+def _is_uniform(values: Array) -> bool:
+    return bool(np.ptp(values) <= UNIFORM * max(np.abs(values).max(), 1e-300))
+
+
+def _quantiles(values: Array, weights: Array) -> tuple[float, float]:
+    """Return the values below and above which OUTLIERS of the weight is, interpolated as by `numpy.percentile`."""
+    order = np.argsort(values)
+    below = np.cumsum(weights[order]) - weights[order]
+    share = below / max(float(below[-1]), 1e-300)
+    least, most = np.interp([OUTLIERS, 1.0 - OUTLIERS], share, values[order])
+    return float(least), float(most)
 
 
 def _outside(values: Array, least: float, most: float) -> str:
@@ -190,6 +217,11 @@ def drawn_stress(state: Any, component: str, drawn: DrawnMesh) -> Array:
     return triangle_means(state[table], column, drawn)
 
 
+def nodal_stress(state: Any, component: str, drawn: DrawnMesh) -> Array:
+    """Return the stress (p,) of a state at the nodes drawn: means of the triangles of the same body."""
+    return node_means(drawn_stress(state, component, drawn), drawn)
+
+
 def interfaces_of(case: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
     """Return the section [interface] of a resolved case, or all sections [[interface]]; none of perfect bonding."""
     sections = case.get("interface", [])
@@ -198,16 +230,19 @@ def interfaces_of(case: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
 
 def bond_limits(case: Mapping[str, Any]) -> list[str]:
     """Describe the law of each interface of a case, a line each; of several with the phases that it is between."""
-    bonds, unit = interfaces_of(case) or [{}], case.get("output", {}).get("stress_unit", "")
+    bonds, output = interfaces_of(case) or [{}], case.get("output", {})
+    stress, length = output.get("stress_unit", ""), output.get("length_unit", "")
+    units = stress, f"{stress} {length}" if stress and length else ""
     if len(bonds) == 1:
-        return [_limits(bonds[0], unit)]
-    return [f"{plain('-'.join(bond['between']))}: {_limits(bond, unit)}" for bond in bonds]
+        return [_limits(bonds[0], units)]
+    return [f"{plain('-'.join(bond['between']))}: {_limits(bond, units)}" for bond in bonds]
 
 
-def _limits(bond: Mapping[str, Any], unit: str) -> str:
+def _limits(bond: Mapping[str, Any], units: tuple[str, str]) -> str:
+    """Describe a law with constants in these units, of stresses and of energies per area."""
     criterion = bond.get("criterion", DEFAULT)
     symbols = [each for each in LAWS[criterion].symbols if bond.get(each[1])]
-    given = [(symbol, key, unit if of_stress else "") for symbol, key, of_stress in symbols]
+    given = [(symbol, key, units[0 if of_stress else 1]) for symbol, key, of_stress in symbols]
     words = [f"${symbol} = {bond[key]:g}$ {plain(label)}".rstrip() for symbol, key, label in given]
     law = f"{criterion} law" if LAWS[criterion].softens else f"criterion {criterion}"
     return ", ".join([law, *words]) if words else "no debonding by load"

@@ -18,6 +18,7 @@ from feti_homog.report.plots.plot_helpers import bond_limits, interfaces_of, pla
 from feti_homog.report.text.analyses import reported
 from feti_homog.report.text.point_tables import shown_entries
 from feti_homog.results import kept_points, path_curves
+from feti_homog.results.path_peak import peak_of
 from feti_homog.typing import Array
 
 Document = Mapping[str, Any]
@@ -26,6 +27,7 @@ INK = ("#1f4e9c", "#c44e00", "#2a7f3f", "#7a3e9d", "#8a6d00", "#0f7c8c", "#8c1d4
 MARKS = ("o", "s", "^", "D", "v", "P", "X")
 NUMBERED_POINTS = 6  # of a path
 ARROWS, SHORTEST_ARROW = 6, 0.06  # that show its direction: how many, and on steps of which share of the picture
+NEAR = 0.05  # of all points: numbers of points that are nearer stand above each other
 MARKED_POINTS = 60  # points of a path up to which each has a mark
 STATES = {BONDED: "bonded", OPEN: "open", CLOSED: "closed"}
 
@@ -96,13 +98,23 @@ def _path(document: Document) -> Figure:
     middle.tick_params(labelbottom=False)
     _count_curves(lower, points, style)
     lower.set_xlabel("number of the point, in the order of the path")
-    for axes in (upper, middle, lower):
-        _finish(axes)
     # The panels of path_states.png show the same points.
-    numbers = kept_points.chosen(document, NUMBERED_POINTS, kept_points.kept_points(document))
+    kept = kept_points.kept_points(document)
+    numbers = [kept[state] for state in kept_points.landmark_states(document, NUMBERED_POINTS, len(kept))]
     curve = np.stack([strain, stress[:, component]], axis=1)
     _number_points(upper, (middle, lower), curve, numbers, INK[component])
+    _mark_peak(upper, document, INK[component])
+    for axes in (upper, middle, lower):
+        _finish(axes)
     return figure
+
+
+def _mark_peak(axes: Axes, document: Document, ink: str) -> None:
+    """Mark the peak, with its stress in words."""
+    peak, unit = peak_of(document), document["case"].get("output", {}).get("stress_unit", "")
+    words = f"peak {peak['stress']:.4g} {plain(unit)}".rstrip()
+    axes.plot(peak["strain"], peak["stress"], "*", color=ink, markersize=11, markeredgecolor="white", zorder=5,
+              linestyle="none", label=words)  # fmt: skip
 
 
 def _stress_curves(
@@ -154,15 +166,18 @@ def _count_curves(axes: Axes, points: Sequence[Mapping[str, Any]], style: Mappin
 
 
 def _number_points(upper: Axes, below: Sequence[Axes], curve: Array, numbers: Sequence[int], ink: str) -> None:
-    """Draw a curve (points, 2): points as ringed numbers, arrows in its ink, and lines at their numbers below."""
-    ring = {"boxstyle": "circle,pad=0.15", "facecolor": "white", "edgecolor": "0.3", "linewidth": 0.6}
-    for number in numbers:
-        style: dict[str, Any] = {"color": "0.3", "fontsize": 7, "ha": "center", "va": "center", "bbox": ring}
-        pointer = {"arrowstyle": "-", "color": "0.3", "linewidth": 0.5, "shrinkA": 0, "shrinkB": 0}
-        upper.annotate(str(number), curve[number], (-9, 11), textcoords="offset points", arrowprops=pointer, **style)
+    """Draw the numbers of some points of a curve (points, 2), arrows in its ink, and lines at their numbers below."""
+    style: dict[str, Any] = {"color": "0.3", "fontsize": 7, "ha": "center", "va": "center"}
+    pointer: dict[str, Any] = {"arrowstyle": "-", "color": "0.3", "linewidth": 0.5, "shrinkA": 0, "shrinkB": 2}
+    span, level = max(len(curve) - 1, 1), 0
+    for place, number in enumerate(numbers):
+        # Above the curve, where it hides none, and each row of numbers at another height.
+        upper.annotate(str(number), curve[number], (-6, 16 + 9 * (place % 2)), textcoords="offset points",
+                       arrowprops=pointer, **style)  # fmt: skip
         for axes in below:
             axes.axvline(number, color="0.7", linewidth=0.7, linestyle=":", zorder=0)
-        above = (number, 1.05)
+        level = level + 1 if place and number - numbers[place - 1] < NEAR * span else 0
+        above = (number, 1.05 + 0.1 * level)
         below[0].annotate(str(number), above, xycoords=below[0].get_xaxis_transform(), annotation_clip=False, **style)
     pointer = {"arrowstyle": "-|>", "color": ink, "linewidth": 0, "shrinkB": 0, "mutation_scale": 15}
     for (x0, y0), (x1, y1) in _direction_marks(curve):

@@ -28,6 +28,7 @@ from feti_homog.report.plots.interface_marks import (
 from feti_homog.report.plots.load_labels import LoadLabels
 from feti_homog.report.plots.plot_helpers import save, unit_label
 from feti_homog.report.text.analyses import reported
+from feti_homog.results.path_peak import peak_of
 from feti_homog.typing import Array
 
 DEGREES = (-180.0, 180.0)
@@ -36,12 +37,14 @@ MAX_FIBRES = 4
 LOADS_IN_LINE = 7
 # Nodes are all around a fibre if the distance of the first and the last is not so many times that of others.
 MOST_UNEVEN = 2.0
+SPIKES, SPIKE_ROOM = 2.0, 1.0  # per cent of the nodes, at either end; how far beyond the others they are drawn
 INK = ("#1f4e9c", "#2a7f3f", "#c44e00")
 NAMES = {"traction": (r"$t_\mathrm{n}$", r"$t_\mathrm{t}$", r"$t_\mathrm{a}$"), "jump": ("gap", "slip", "axial slip")}
 
 
 def plot(directory: Path, file: Any, edges: InterfaceEdges, document: Mapping[str, Any]) -> list[Path]:
-    """interface.png, if any state has debonded nodes: of a path's last state and first, else of one state."""
+    """interface.png, if any state has debonded nodes: of a path the state of its peak, dashed, and the valley after it
+    or the last that shows much, else one state."""
     names = sorted(file.get("state", ()), key=int)
     debonded = {name: int((file[f"state/{name}/status"][:] != BONDED).sum()) for name in names}
     if not any(debonded.values()):
@@ -51,11 +54,20 @@ def plot(directory: Path, file: Any, edges: InterfaceEdges, document: Mapping[st
     last = next((n for n in reversed(names) if 0 < debonded[n] < total or _touching(file, n)), names[-1])
     partly = [name for name in names if 0 < debonded[name] < total]
     shown = (
-        list(dict.fromkeys([names[0], last]))
+        _around_the_peak(file, names, last, document)
         if reported(document).is_followed
         else [(partly or [last])[len(partly) // 2]]
     )
     return [save(_figure(file, edges, shown, LoadLabels.of(document)), directory / "interface.png")]
+
+
+def _around_the_peak(file: Any, names: list[str], last: str, document: Mapping[str, Any]) -> list[str]:
+    """Return the states at the peak of a path, or the first, and in the valley after it, or the `last`."""
+    of_point = {int(file[f"state/{name}"].attrs["point"]): name for name in names}
+    peak = peak_of(document)
+    before, after = of_point.get(peak["event"], names[0]), of_point.get(peak.get("event_left", -1), last)
+    debonded = (file[f"state/{after}/status"][:] != BONDED).any()
+    return list(dict.fromkeys([before, after if debonded else last]))
 
 
 def _touching(file: Any, name: str) -> bool:
@@ -78,6 +90,8 @@ def _figure(file: Any, edges: InterfaceEdges, names: list[str], labels: LoadLabe
                 _curves(axes, quantity, place, values, name == names[-1])
             _finish(axes, place)
         row[0].set_title(_name(file, body, place), fontsize=10, loc="left")
+    for column in grid.T:
+        _clip_spikes(column[0], [line.get_ydata() for axes in column for line in axes.lines])
     _labels(file, figure, grid, status[np.isin(fibre, chosen)])
     which = (
         f"\nthe {len(chosen)} of {len(bodies)} debonded interfaces that are so most"
@@ -86,6 +100,15 @@ def _figure(file: Any, edges: InterfaceEdges, names: list[str], labels: LoadLabe
     )
     figure.suptitle(_title(file, names, labels) + which, fontsize=10)
     return figure
+
+
+def _clip_spikes(axes: Axes, curves: list[Any]) -> None:
+    """Limit the range, which axes share, where a few nodes at singular tips are beyond all others."""
+    values = np.concatenate([np.asarray(curve, float) for curve in curves])
+    low, high = np.percentile(values, (SPIKES, 100.0 - SPIKES))
+    room = SPIKE_ROOM * (high - low)
+    if values.min() < low - room or values.max() > high + room:
+        axes.set_ylim(max(values.min(), low - room), min(values.max(), high + room))
 
 
 def _name(file: Any, body: int, place: Coordinate) -> str:

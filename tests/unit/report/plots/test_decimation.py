@@ -12,7 +12,14 @@ import pytest
 from support.sample_output import Sample, in_space, sample
 
 from feti_homog.report.plots import deformed_panels, plot_helpers
-from feti_homog.report.plots.decimation import LEAST_AREA, DrawnMesh, drawn_displacement, drawn_mesh, largest_scale
+from feti_homog.report.plots.decimation import (
+    LEAST_AREA,
+    DrawnMesh,
+    drawn_displacement,
+    drawn_mesh,
+    largest_scale,
+    node_means,
+)
 from feti_homog.results.field_file import FieldFile
 
 
@@ -29,6 +36,19 @@ def square() -> DrawnMesh:
     points = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]])
     label = np.zeros(2, int)
     return DrawnMesh(8, 1, 1, np.arange(4), points, np.array([[0, 1, 2], [2, 0, 3]]), label, label, label)
+
+
+@pytest.mark.parametrize("bodies", [1, 2])
+def test_values_at_nodes_are_means_within_a_body_weighted_by_area(bodies: int) -> None:
+    """Two triangles of areas 1 and 3 with a side in common, each with nodes of its own: of one body or of two."""
+    points = np.array([[0, 0], [2, 0], [2, 1], [2, 1], [0, 0], [-2, 2]], float)
+    body = np.arange(2) % bodies
+    drawn = DrawnMesh(8, 1, 1, np.arange(6), points, np.arange(6).reshape(2, 3), body, np.arange(2), body)
+    means = node_means(np.array([4.0, 8.0]), drawn)
+    middle = (4.0 * drawn.areas[0] + 8.0 * drawn.areas[1]) / drawn.areas.sum()
+    assert means.tolist() == pytest.approx(
+        [middle, 4, middle, middle, middle, 8] if bodies == 1 else [4.0] * 3 + [8.0] * 3
+    )
 
 
 def area_ratio(displacement: Any, drawn: DrawnMesh, scale: float) -> float:

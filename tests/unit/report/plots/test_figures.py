@@ -206,6 +206,14 @@ def test_the_colour_range_leaves_out_outliers(values: Any, expected: tuple[float
     assert (colours, extend) == expected[2:]
 
 
+def test_values_count_by_their_area() -> None:
+    """Of a thousand values at a tip, which is no part of the cell, most are beyond the colours."""
+    values = np.append(np.linspace(1, 2, 1001), np.linspace(-90, 90, 1001))
+    areas = np.append(np.ones(1001), np.full(1001, 1e-9))
+    norm, colours, extend = plot_helpers.colour_range(values, areas)
+    assert (norm.vmin, norm.vmax) == pytest.approx((1, 2), abs=0.02) and (colours, extend) == ("viridis", "both")
+
+
 @pytest.mark.parametrize(("largest", "scale"), [(1.0, 0.1), (1.2, 0.1), (0.01, 10.0), (0.3e-4, 5e3), (0.0, 1.0)])
 def test_the_deformation_scale_shows_a_tenth_of_the_cell(largest: float, scale: float) -> None:
     assert plot_helpers.magnification(largest, 1.0) == pytest.approx(scale)
