@@ -122,8 +122,8 @@ class Cell:
     )
     element_size: float | None = key(
         real(least=1e-6, most=0.5),
-        "Largest size of the elements, after refine, / width of the cell: mesh_size and refine are chosen, as with "
-        "accuracy.",
+        "Size of the elements, after refine, / width of the cell: mesh_size and refine are chosen, as with accuracy. "
+        "Mean edges are 0.8 to 1 of it, unless circles of 16 edges or narrow gaps need smaller ones.",
         default=None,
         default_words="none",
         only=MESHED,

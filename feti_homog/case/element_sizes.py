@@ -29,6 +29,9 @@ SOFT_FACTOR = 6.0
 # gaps have smaller ones; still coarser meshes have hardly less elements.
 PITCH_SHARE, LARGEST = 0.5, 0.5
 MOST_REFINED = 8
+# Coarse edges around a circle at least, as in `mesh.sizes`, and size of elements / those edges, up to which the mean
+# edge of a mesh is 0.8 to 0.95 of its size.
+EDGES_AROUND, FREE_SHARE = 16, 0.7
 
 
 def with_sizes(
@@ -42,16 +45,18 @@ def with_sizes(
     """Return the cell with the mesh_size, the refine and the order that its accuracy or its element_size asks for.
 
     Of an accuracy eps, the coarsest mesh is refined r times, with r the least for which `coarse_error` / 4^(p r) <= eps
-    for elements of order p; of orders the one with the fewest nodes, about p^2 4^r. Of an element_size e, it is refined
-    r times with r the most for which e 2^r is at most its size, and the coarse elements have that size. It is a fault
-    if more than MOST_REFINED were needed.
+    for elements of order p; of orders the one with the fewest nodes, about p^2 4^r. It is a fault if more than
+    MOST_REFINED were needed. Of an element_size e, the coarse elements have the size e 2^r with r the most for which
+    it is that of all but the narrowest places: at most that of the coarsest mesh, and FREE_SHARE of the edges that
+    circles have at most. Were they larger, circles would say how fine the mesh is, whatever e.
 
     Args:
         free_faces: whether there are faces that no other phase holds firmly: of voids, of bonds that are soft or part.
         orders: among which an accuracy chooses.
     """
     if cell.element_size is not None:
-        refine = min(MOST_REFINED, max(0, math.floor(math.log2(coarsest(cell) / cell.element_size))))
+        largest = min(coarsest(cell), FREE_SHARE * 2 * math.pi * _mean_radius(cell) / EDGES_AROUND)
+        refine = min(MOST_REFINED, max(0, math.floor(math.log2(largest / cell.element_size))))
         return replace(cell, mesh_size=min(coarsest(cell), cell.element_size * 2**refine), refine=refine)
     if cell.accuracy is None:
         return cell
@@ -89,13 +94,25 @@ def without_chosen(cell: Cell, table: dict[str, Any]) -> dict[str, Any]:
 def coarsest(cell: Cell) -> float:
     """mesh_size of the coarsest mesh: half the distance of as many fibres on a square lattice / width of the
     cell, in two digits."""
+    fibres, height = _fibres(cell)
+    return min(LARGEST, float(f"{PITCH_SHARE * math.sqrt(height / fibres):.2g}"))
+
+
+def _fibres(cell: Cell) -> tuple[int, float]:
+    """Return the number of fibres, and height / width of the cell."""
     if cell.table is not None:
         assert cell.table.width is not None and cell.table.height is not None
-        fibres, height = len(cell.table.row), cell.table.height / cell.table.width
-    else:
-        fibres = FIBRES_OF.get(cell.geometry) or sum(fibre_counts(cell).values())
-        height = math.sqrt(3.0) if cell.geometry == "hexagonal" else 1.0
-    return min(LARGEST, float(f"{PITCH_SHARE * math.sqrt(height / fibres):.2g}"))
+        return len(cell.table.row), cell.table.height / cell.table.width
+    fibres = FIBRES_OF.get(cell.geometry) or sum(fibre_counts(cell).values())
+    return fibres, math.sqrt(3.0) if cell.geometry == "hexagonal" else 1.0
+
+
+def _mean_radius(cell: Cell) -> float:
+    """Return that of the fibres / width of the cell."""
+    if cell.table is not None:
+        return float(cell.table.radius.mean()) / (cell.table.width or 1.0)
+    fibres, height = _fibres(cell)
+    return math.sqrt(math.fsum(cell.fractions.values()) * height / (math.pi * fibres))
 
 
 def coarse_error(materials: Mapping[str, Material], plane: str, order: int, free_faces: bool) -> float:

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from feti_homog.case import case as cases
-from feti_homog.case.element_sizes import COARSE_ERROR, SOFT_FACTOR, coarse_error
+from feti_homog.case.element_sizes import COARSE_ERROR, EDGES_AROUND, SOFT_FACTOR, coarse_error
 from feti_homog.materials.forms import Isotropic, TransverselyIsotropic
+from feti_homog.mesh.fill.gmsh_mesher import generate
+from feti_homog.mesh.sizes.graded_size import MIN_EDGES_AROUND
 
 MATRIX = {"young": 3.5, "poisson": 0.35}
 GEOMETRIES = {
@@ -123,9 +126,22 @@ def test_a_size_of_elements_is_that_after_refinement(geometry, size):
     coarse = case_of(geometry=geometry, accuracy=1e-3).cell.mesh_size
     assert cell.mesh_size <= coarse
     assert cell.mesh_size / 2**cell.refine <= size * (1 + 1e-12)
-    if size <= coarse:  # neither finer than asked for, nor a finer coarse mesh than needed
+    if size <= coarse:  # not finer than asked for
         assert cell.mesh_size / 2**cell.refine == pytest.approx(size)
-        assert 2 * cell.mesh_size > coarse
+    radius = {"square": 0.357, "hexagonal": 0.332, "random": 0.0714, "mix": 0.0714, "table": 0.05}[geometry]
+    assert EDGES_AROUND == MIN_EDGES_AROUND
+    edge = 2 * np.pi * radius / EDGES_AROUND
+    assert cell.refine == 0 or 0.34 * edge < cell.mesh_size < 0.71 * edge
+
+
+@pytest.mark.parametrize("geometry", ["square", "random"])
+def test_a_size_of_elements_is_met_within_a_fifth(geometry):
+    """By the side of equilateral triangles of the mean area, which tells sizes of a mesh study apart."""
+    for size in (0.02, 0.012):
+        cell = case_of(geometry=geometry, element_size=size).cell
+        mesh = generate(cell)
+        found = np.sqrt(4 / np.sqrt(3) / (len(mesh.triangles) * 4**cell.refine))
+        assert 0.8 * size < found < size
 
 
 @pytest.mark.parametrize("asked", [{"accuracy": 1e-4}, {"element_size": 0.01}])
