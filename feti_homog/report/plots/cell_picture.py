@@ -1,4 +1,4 @@
-"""cell.png: phases and subdomains, and the numbers of the fibres, those that `fibre = N` of a case file means."""
+"""cell.png: materials and subdomains, and the numbers of the fibres, those that `fibre = N` of a case file means."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ from feti_homog.report.plots.plot_helpers import (
 )
 from feti_homog.typing import Array
 
+IN_LEGEND = 12  # phases of the legend, which would cover the cell
 MESH_LINES = 6000  # triangles up to which their edges are drawn
 MATRIX = "#ece8df"
 FIBRES = ("Blues", "Oranges", "Greens", "Purples", "Reds", "Greys")  # one colour map for each phase
@@ -32,42 +33,39 @@ LEAST_SIZE, LARGEST_SIZE = 3.0, 11.0  # of the letters, in points
 
 
 def figure(file: Any, drawn: DrawnMesh, borders: Array) -> Figure:
-    """Return the phases, each body in a shade of its own and with the fibre's number, beside the subdomains."""
-    attributes = file.attrs
+    """Return the materials, with the fibres' numbers and, where they differ, the factors of their strengths, beside the
+    subdomains."""
+    attributes, fibres = file.attrs, file["fibre"]
     picture, (left, right) = figure_of(attributes, panels=2)
     edges = len(drawn.triangles) <= MESH_LINES
     bodies, subdomains = drawn.body.max() + 1, drawn.subdomain.max() + 1
-    shades, legend = _shades(drawn, list(attributes["phases"]))
-    for axes, label, colours in ((left, drawn.body, shades), (right, drawn.subdomain, _distinct(subdomains))):
-        fill_triangles(axes, drawn, drawn.points, colours[label], edges)
+    phases = list(attributes["phases"])
+    inks = np.array([mpl.colors.to_rgba(MATRIX), *(_material(k) for k in range(len(phases) - 1))])
+    for axes, colours in ((left, inks[drawn.phase]), (right, _distinct(subdomains)[drawn.subdomain])):
+        fill_triangles(axes, drawn, drawn.points, colours, edges)
         draw_segments(axes, drawn.points[borders], "black", 0.9)
         label_cell_axes(axes, attributes)
     draw_segments(right, drawn.points[outline_edges(drawn, drawn.subdomain)], "black", 0.5)
-    write_fibre_numbers(left, file, drawn, borders, cell_scale(attributes))
-    left.set_title(_count(bodies, "body", "bodies"))
+    factors = fibres["strength"][:] if "strength" in fibres else np.ones(len(fibres["number"]))
+    varies = bool((factors != 1.0).any())
+    write_fibre_numbers(left, file, drawn, borders, cell_scale(attributes), factors if varies else None)
+    words = "; below the numbers: strength / that of [interface]" if varies else ""
+    left.set_title(_count(bodies, "body", "bodies") + words, fontsize=9 if varies else None)
     right.set_title(_count(subdomains, "subdomain", "subdomains"))
     right.set_ylabel("")
     picture.suptitle(plain(attributes["title"]), fontsize=12)
-    picture.legend(handles=legend, loc="outside lower center", ncols=4, frameon=False)
+    there = np.unique(drawn.phase)
+    entries = [Patch(facecolor=inks[k], edgecolor="black", linewidth=0.6, label=phases[k]) for k in there[:IN_LEGEND]]
+    if len(there) > IN_LEGEND:
+        entries.append(Patch(facecolor="none", edgecolor="none", label=f"and {len(there) - IN_LEGEND} others"))
+    picture.legend(handles=entries, loc="outside lower center", ncols=6, frameon=False)
     return picture
 
 
-def _shades(drawn: DrawnMesh, phases: list[str]) -> tuple[Array, list[Patch]]:
-    """Return a colour (bodies, 4) for each body, a shade of its phase's; and the legend of the phases."""
-    colours = np.zeros((drawn.body.max() + 1, 4))
-    legend = []
-    for index, phase in enumerate(phases):
-        bodies = np.unique(drawn.body[drawn.phase == index])
-        if not len(bodies):
-            continue
-        if index == 0:
-            shades = np.tile(mpl.colors.to_rgba(MATRIX), (len(bodies), 1))
-        else:
-            tones = 0.65 - 0.35 * (np.arange(len(bodies)) * 0.618 % 1.0)
-            shades = mpl.colormaps[FIBRES[(index - 1) % len(FIBRES)]](tones)
-        colours[bodies] = shades
-        legend.append(Patch(facecolor=shades[0], edgecolor="black", linewidth=0.6, label=phase))
-    return colours, legend
+def _material(number: int) -> Any:
+    """Return the colour of a phase other than the matrix: those of the first ones differ most."""
+    tone = 0.55 - 0.25 * (number // len(FIBRES) * 0.618 % 1.0)
+    return mpl.colormaps[FIBRES[number % len(FIBRES)]](tone)
 
 
 def _distinct(count: int) -> Array:
@@ -81,10 +79,13 @@ def _count(number: int, one: str, many: str) -> str:
     return f"{number} {one if number == 1 else many}"
 
 
-def write_fibre_numbers(axes: Axes, file: Any, drawn: DrawnMesh, borders: Array, inches: float) -> None:
+def write_fibre_numbers(
+    axes: Axes, file: Any, drawn: DrawnMesh, borders: Array, inches: float, factors: Array | None = None
+) -> None:
     """Write each fibre's number on it, on every part of a round one that the sides of the cell cut.
 
-    `borders` are the outlines (e, 2) of the bodies, `inches` a length unit in the picture.
+    `borders` are the outlines (e, 2) of the bodies, `inches` a length unit in the picture; below the numbers stand
+    `factors` (f,), if there are any.
     """
     fibres = file["fibre"]
     if len(fibres["number"]) > MOST_NUMBERS:
@@ -92,14 +93,17 @@ def write_fibre_numbers(axes: Axes, file: Any, drawn: DrawnMesh, borders: Array,
     period, low = np.array([file.attrs["width"], file.attrs["height"]]), drawn.points.min(axis=0)
     outline = cKDTree(drawn.points[np.unique(borders)])
     tables = (fibres[name][:] for name in ("number", "body", "centre", "radius"))
-    for number, body, centre, radius in zip(*tables, strict=True):
+    for k, (number, body, centre, radius) in enumerate(zip(*tables, strict=True)):
         if np.isfinite(radius):
             places, room = _on_images(centre, radius, low, period), radius
         else:
             places, room = _inside(drawn, body, outline)
         size = float(np.clip(room * inches * POINTS_PER_INCH / CHARACTERS, LEAST_SIZE, LARGEST_SIZE))
+        words = str(number)
+        if factors is not None:
+            words, size = f"{number}\n{factors[k]:.2f}", max(0.75 * size, LEAST_SIZE)
         for x, y in places:
-            axes.text(x, y, str(number), fontsize=size, ha="center", va="center", clip_on=True)
+            axes.text(x, y, words, fontsize=size, ha="center", va="center", clip_on=True)
 
 
 def _on_images(centre: Array, radius: float, low: Array, period: Array) -> Array:

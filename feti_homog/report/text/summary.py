@@ -92,6 +92,7 @@ def _cell(document: Document) -> list[str]:
         *_field("Cell", [str(shape["geometry"]), size]),
         *_field("Meshed", [f"fibre fraction {cell['fibre_fraction']:.6f}", *([f"({shares})"] if shares else [])]),
         *_match(shape, cell),
+        *_scatter(document.get("fibres", ())),
         *_field("Mesh", mesh),
     ]
 
@@ -109,6 +110,17 @@ def _match(shape: Document, cell: Document) -> list[str]:
     distance = cell.get("match_distance")
     words = f"distances of neighbours differ by {distance or 0:.4f} mean diameters"
     return [] if distance is None else _field("Match", [Path(shape["match"]).name, words])
+
+
+def _scatter(fibres: Sequence[Document]) -> list[str]:
+    """Return the range of the strengths of fibres, where they differ."""
+    factors = [fibre["strength"] for fibre in fibres if "strength" in fibre]
+    if not factors:
+        return []
+    low, high = min(factors), max(factors)
+    ends = [f"{end:.4f} (fibre {factors.index(end) + 1})" for end in (low, high)]
+    mean = f"{sum(factors) / len(factors):.4f} in the mean"
+    return _field("Strengths", [f"{ends[0]} to {ends[1]} times those of [interface]", mean])
 
 
 def _solver(solver: Document) -> list[str]:

@@ -31,6 +31,7 @@ TABLE_STYLE: dict[str, Any] = {"color": "black", "linewidth": 1.8, "zorder": 3}
 X_FACTOR, MARGIN = 0.94, 1.3  # factors on a logarithmic axis
 CHOICES = (("C11", "bulk", "shear"), ("C11", "C33", "C44", "C66"))
 FIBRES = "cell.fibres"
+FEWEST_OF_INTERVAL = 10  # realisations: of fewer saw-teeth an interval of the mean tells nothing
 
 
 def tables(table: SweepTable) -> list[Path]:
@@ -141,13 +142,15 @@ def curves_figure(table: SweepTable) -> Figure:
     picture = Figure(figsize=(0.4 + 4.6 * len(components), 4.6), layout="constrained")
     panels = picture.subplots(1, len(components), sharex=True, squeeze=False)[0]
     symbol = strain_symbols(len(strains))[along]
+    few = min(len(table.curves(point)[1]) for point in points) < FEWEST_OF_INTERVAL
     for axes, component in zip(panels, components, strict=True):
         for style, point in enumerate(points):
-            _bundle(axes, table, point, component, COLOURS[style])
+            _bundle(axes, table, point, component, COLOURS[style], few)
         axes.xaxis.set_major_locator(MaxNLocator(5))
         axes.axhline(0.0, color="0.6", linewidth=0.6, zorder=0)
         label_axes(axes, f"$\\Sigma_{{{stresses[component][1:]}}}$", table, f"${symbol}$")
-    picture.suptitle(f"{plain(table.name)}: realisations, means and their 95 % confidence intervals", fontsize=12)
+    band = "range of the realisations" if few else "95 % confidence interval of the mean"
+    picture.suptitle(f"{plain(table.name)}: realisations and their mean; band: {band}", fontsize=11)
     legend(picture, list(panels))
     return picture
 
@@ -165,14 +168,17 @@ def _others(table: SweepTable, points: Sequence[int], along: int) -> list[int]:
     return sorted(seen, key=lambda k: -largest[k])
 
 
-def _bundle(axes: Axes, table: SweepTable, point: int, component: int, colour: str) -> None:
+def _bundle(axes: Axes, table: SweepTable, point: int, component: int, colour: str, few: bool) -> None:
     strain, stress = table.curves(point)
     curves = stress[:, :, component]
     statistics = Statistics.of(curves)
     label = table.label(point) or "mean"
     if len(curves) > 1:
         axes.plot(strain, curves.T, color=colour, linewidth=0.5, alpha=0.3)
-        low, high = statistics.mean - statistics.ci95, statistics.mean + statistics.ci95
+        half = statistics.ci95
+        low, high = (
+            (curves.min(axis=0), curves.max(axis=0)) if few else (statistics.mean - half, statistics.mean + half)
+        )
         axes.fill_between(strain, low, high, color=colour, alpha=0.18, linewidth=0.0)
         label = f"{label} ({len(curves)} realisations)"
     axes.plot(strain, statistics.mean, color=colour, linewidth=1.6, label=label)

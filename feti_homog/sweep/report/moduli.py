@@ -18,18 +18,19 @@ from feti_homog.materials.spatial_constants import is_transversely_isotropic, tr
 from feti_homog.report.plots.plot_helpers import plain
 from feti_homog.schema.keys import TableReader
 from feti_homog.sweep.report.style import COLOURS, label_axes, legend, plot_series
-from feti_homog.sweep.report.sweep_table import Series, SweepTable, series_over
+from feti_homog.sweep.report.sweep_table import SweepTable, series_over
 from feti_homog.typing import Float
 
 FRACTION = "cell.fibre_fraction"
 PANELS = ("C11", "C33", "bulk", "shear")
 SPATIAL_PANELS = ("E_axial", "E_transverse", "G_axial", "G_transverse")  # of generalized plane strain
+RATIOS = ("nu_axial", "nu_transverse", "expansion_axial", "expansion_transverse")
 SECANTS = ("C11", "C33", "C44", "C66")  # of that where faces may touch: there are no constants
 COMMON_PANELS = ("C11", "C66")  # of that and of plane states
 FRACTIONS, MARGIN = 201, 1.05  # of the bounds: points, and how far they go beyond the largest fibre fraction
 # Where the fractions drawn begin: at none, or before the smallest by this share of their range if that is far away.
 BEFORE = 0.25
-X_FACTOR, HASHIN_SHTRIKMAN = 0.98, "Hashin-Shtrikman"
+HASHIN_SHTRIKMAN = "Hashin-Shtrikman"
 
 
 @dataclass(frozen=True)
@@ -51,33 +52,28 @@ def panels_of(table: SweepTable) -> tuple[str, ...]:
 
 
 def figure(table: SweepTable) -> Figure:
-    """Moduli above; below, where there are bounds, how far they are above that of Reuss, which tells them apart."""
+    """Moduli over the fibre fraction, between their bounds if there are any; in space also Poisson's ratios and thermal
+    expansions."""
     bounds, series = _bounds(table), series_over(table, FRACTION)[: len(COLOURS)]
-    names = panels_of(table)
-    picture = Figure(figsize=(14.4, 6.6 if bounds else 3.8), layout="constrained")
-    panels = picture.subplots(2 if bounds else 1, len(names), sharex=True, squeeze=False)
-    for k, name in enumerate(names):
-        if bounds is not None:
-            _draw_bounds(panels[0, k], bounds.fractions, bounds.rows[name], bounds.tight)
+    ratios = RATIOS if panels_of(table) == SPATIAL_PANELS else ()
+    names = [*panels_of(table), *(name for name in ratios if name in table.outputs)]
+    rows = -(-len(names) // len(PANELS))
+    picture = Figure(figsize=(14.4, 3.6 * rows + 0.6), layout="constrained")
+    panels = picture.subplots(rows, len(PANELS), sharex=True, squeeze=False).ravel()
+    for axes, name in zip(panels, names, strict=False):
+        if bounds is not None and name in bounds.rows:
+            _draw_bounds(axes, bounds.fractions, bounds.rows[name], bounds.tight)
         for style, each in enumerate(series):
-            plot_series(panels[0, k], table, each, name, style)
-        label_axes(panels[0, k], name, table, "" if bounds else "fibre fraction")
-        if bounds is not None:
-            _draw_above_reuss(panels[1, k], table, series, bounds, name)
+            plot_series(axes, table, each, name, style)
+        label_axes(axes, name, table, "fibre fraction")
+        axes.tick_params(labelbottom=True)
+    for axes in panels[len(names) :]:
+        axes.set_axis_off()
     planes = sorted({document["case"]["analysis"]["plane"] for document in table.finished})
     without = "" if bounds else f"; no bounds, for {_why_no_bounds(table)}"
     picture.suptitle(f"{plain(table.name)}: plane {' and '.join(planes)}{without}", fontsize=12)
-    legend(picture, list(panels.flat)[::-1])
+    legend(picture, list(panels)[::-1])
     return picture
-
-
-def _draw_above_reuss(axes: Axes, table: SweepTable, series: list[Series], bounds: PanelBounds, name: str) -> None:
-    c, rows = bounds.fractions, bounds.rows[name]
-    _draw_bounds(axes, c, 100.0 * (rows / rows[0] - 1.0), bounds.tight)
-    for style, each in enumerate(series):
-        plot_series(axes, table, each, name, style, baseline=lambda x: np.interp(x, c, rows[0]), x_factor=X_FACTOR)
-    label_axes(axes, name, table, "fibre fraction")
-    axes.set_ylabel("above Reuss (%)")
 
 
 def _why_no_bounds(table: SweepTable) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,17 +11,19 @@ from matplotlib.axes import Axes
 from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES
 from feti_homog.report.plots.plot_helpers import strain_symbols, unit_label
 from feti_homog.sweep.report.sweep_table import Series, SweepTable
-from feti_homog.typing import Float
 
 COLOURS = ("#1f4e9c", "#c44e00", "#2a7f3f", "#7a3e9d", "#8c6d1f", "#c2185b")
 MARKERS = ("o", "s", "^", "D", "v", "P")
 REALISATION_STYLE: dict[str, Any] = {"markersize": 3.5, "alpha": 0.4, "markeredgewidth": 0}
+LEGEND_HANDLE, LEGEND_CHARACTER = 0.7, 0.085  # inches of an entry: its line with the space around, a letter
 WAYS = {"axial": "along", "transverse": "across"}
 NAMES = {
     "C11": "$C_{11}$",
     **{name: f"$C_{{{name[1:]}}}$" for name in ("C33", "C44", "C66")},
     **{f"E_{way}": f"$E$ {words} the fibres" for way, words in WAYS.items()},
     **{f"G_{way}": f"$G$ {words} the fibres" for way, words in WAYS.items()},
+    **{f"nu_{way}": f"$\\nu$ {words} the fibres" for way, words in WAYS.items()},
+    **{f"expansion_{way}": f"$\\alpha$ {words} the fibres (1 / temperature)" for way, words in WAYS.items()},
     "bulk": "plane bulk modulus $k$",
     "shear": "shear modulus $\\mu$",
     **{f"onset_{name}": f"$\\Sigma_{{{name[1:]}}}$ at the first break" for name in SPATIAL_STRESSES},
@@ -31,42 +33,30 @@ NAMES = {
     },
 }
 
-Baseline = Callable[[Float], Float]
 
-
-def plot_series(
-    axes: Axes,
-    table: SweepTable,
-    series: Series,
-    name: str,
-    style: int,
-    baseline: Baseline | None = None,
-    x_factor: float = 1.0,
-) -> None:
-    """Every realisation as a faint mark, at x times `x_factor`, and the means with their confidence intervals.
-
-    With `baseline`, a value for each x, in percent above that.
-    """
+def plot_series(axes: Axes, table: SweepTable, series: Series, name: str, style: int, x_factor: float = 1.0) -> None:
+    """Every realisation as a faint mark, at x times `x_factor`, and the means with their confidence intervals."""
     colour, marker = COLOURS[style], MARKERS[style]
     statistics, values = table.statistics[name], table.outputs[name]
     numbers = [table.points.index(point) for point in series.points]
-    base = np.zeros(len(series.x)) if baseline is None else baseline(series.x)
-    factor = np.ones(len(series.x)) if baseline is None else 100.0 / base
-    for x, point, zero, scale in zip(series.x, series.points, base, factor, strict=True):
+    for x, point in zip(series.x, series.points, strict=True):
         rows = table.rows(point)
         if len(rows) > 1:
-            y = scale * (values[rows] - zero)
-            axes.plot([x * x_factor] * len(rows), y, marker, **REALISATION_STYLE, color=colour)
-    mean, spread = statistics.mean[numbers] - base, np.nan_to_num(statistics.ci95[numbers])
+            axes.plot([x * x_factor] * len(rows), values[rows], marker, **REALISATION_STYLE, color=colour)
+    mean, spread = statistics.mean[numbers], np.nan_to_num(statistics.ci95[numbers])
     axes.errorbar(
-        series.x, factor * mean, factor * spread, color=colour, marker=marker, markersize=4.5, linewidth=1.2,
+        series.x, mean, spread, color=colour, marker=marker, markersize=4.5, linewidth=1.2,
         capsize=2.5, label=series.label or None,
     )  # fmt: skip
 
 
 def label_axes(axes: Axes, name: str, table: SweepTable, xlabel: str) -> None:
     """Labels, a faint grid, no box."""
-    unit = "" if name.startswith("end_") else unit_label(table.stress_unit) or "(unit of the moduli)"
+    unit = (
+        ""
+        if name.startswith(("end_", "nu_", "expansion_"))
+        else unit_label(table.stress_unit) or "(unit of the moduli)"
+    )
     axes.set(xlabel=xlabel, ylabel=f"{NAMES.get(name, name)} {unit}".rstrip())
     axes.grid(color="0.92", linewidth=0.6)
     axes.set_axisbelow(True)
@@ -80,6 +70,6 @@ def legend(figure: Any, axes: Sequence[Axes]) -> None:
         handles, labels = one.get_legend_handles_labels()
         found |= dict(zip(labels, handles, strict=True))
     if found:
-        figure.legend(
-            list(found.values()), list(found), loc="outside lower center", ncols=min(len(found), 5), frameon=False
-        )
+        widest = LEGEND_HANDLE + LEGEND_CHARACTER * max(map(len, found))
+        columns = max(1, min(len(found), 5, int(figure.get_figwidth() / widest)))
+        figure.legend(list(found.values()), list(found), loc="outside lower center", ncols=columns, frameon=False)
