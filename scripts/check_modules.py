@@ -13,6 +13,7 @@ import platform
 import shutil
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 # module: what provides it
@@ -57,7 +58,19 @@ DEMANDS: dict[str, tuple[str, Callable[[Any], bool]]] = {
 
 def fault_found(module: str) -> str:
     """Empty if the module's package is on the path, else the reason (nothing is imported)."""
-    return "" if importlib.util.find_spec(module.split(".")[0]) else "not found"
+    if not importlib.util.find_spec(module.split(".")[0]):
+        return "not found"
+    constraints = Path(sys.prefix) / "constraints.txt"
+    if module != "numpy" or not constraints.is_file():
+        return ""
+    return numpy_fault(constraints.read_text(), importlib.metadata.version("numpy"))
+
+
+def numpy_fault(constraint: str, installed: str) -> str:
+    """Empty if the NumPy that is installed is of the major version of a constraint such as numpy==1.26.4."""
+    wanted = constraint.strip().partition("==")[2]
+    same = wanted.split(".")[0] == installed.split(".")[0]
+    return "" if same else f"version {installed}: petsc4py was built for {wanted}"
 
 
 def fault_imported(module: str) -> str:
@@ -67,7 +80,7 @@ def fault_imported(module: str) -> str:
     except Exception as error:  # a broken module may raise anything
         return f"{type(error).__name__}: {error}"
     words, fulfils = DEMANDS.get(module, ("", lambda _: True))
-    return "" if fulfils(imported) else f"must be {words}"
+    return fault_found(module) if fulfils(imported) else f"must be {words}"
 
 
 def versions() -> str:

@@ -92,7 +92,9 @@ def interface_state(file: Any, state: int) -> ViewedState:
 
 
 def _tables(file: Any, state: int, places: Mapping[str, str]) -> dict[str, Array]:
-    return {name: file[place.replace("/K/", f"/{state}/")][()] for name, place in places.items()}
+    """Return the tables of a state that the file has; those of earlier versions have fewer."""
+    found = {name: place.replace("/K/", f"/{state}/") for name, place in places.items()}
+    return {name: file[place][()] for name, place in found.items() if place in file}
 
 
 def _in_space(points: Float) -> Float:
