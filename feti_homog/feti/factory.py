@@ -4,47 +4,57 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace, Balanced
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.assembled_schur import shared_dofs
-from feti_homog.feti.preconditioners.exact_inverse import ExactInverse
 from feti_homog.feti.preconditioners.scaled import Dirichlet, Identity, Lumped, Preconditioner
-from feti_homog.feti.preconditioners.spring_update import SpringUpdated
 from feti_homog.feti.solver_plan import ProblemSizes, SolverOptions, choose
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.parallel.mpi_errors import agree
 from feti_homog.typing import Float
 
+if TYPE_CHECKING:
+    from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace
+    from feti_homog.feti.preconditioners.exact_inverse import ExactInverse
+
+
+def _influence(comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> Preconditioner:
+    from feti_homog.feti.preconditioners.exact_inverse import ExactInverse  # four modules that no other one needs
+
+    return ExactInverse(comm, jump_operator, operators)
+
+
 CLASSES: dict[str, Callable[[MPI.Intracomm, JumpOperator, InterfaceOperators], Preconditioner]] = {
     "none": lambda *_: Identity(),
     "lumped": Lumped,
     "dirichlet": Dirichlet,
-    "influence": ExactInverse,
+    "influence": _influence,
 }
 """What makes the preconditioner of each name of `PRECONDITIONERS` but auto."""
 
 
 @dataclass(frozen=True)
 class SolverParts:
-    """What the Krylov method works with; `adaptive` is the coarse space of the preconditioner, if it has one."""
+    """Parts that the Krylov method works with.
+
+    Attributes:
+        adaptive: the coarse space of the preconditioner, if it has one.
+        exact_inverse: the preconditioner, if it leaves nothing to iterate.
+    """
 
     operators: InterfaceOperators
     preconditioner: Preconditioner
     natural: NaturalCoarseSpace
     adaptive: AdaptiveCoarseSpace | None
-
-    @property
-    def exact_inverse(self) -> ExactInverse | None:
-        """The preconditioner, if it leaves nothing to iterate."""
-        return self.preconditioner if isinstance(self.preconditioner, ExactInverse) else None
+    exact_inverse: ExactInverse | None
 
     @property
     def coarse_dimension(self) -> int:
@@ -127,16 +137,21 @@ def build(
         natural = NaturalCoarseSpace(comm, jump_operator, operators)
     adaptive = None
     if plan.adaptive and isinstance(preconditioner, Dirichlet):
+        from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace, Balanced  # with its eigenproblems
+
         with PETSc.Log.Event("FETICoarseSetUp"):
             adaptive = AdaptiveCoarseSpace(
                 comm, jump_operator, operators, preconditioner, options.threshold, thresholds
             )
         preconditioner = Balanced(preconditioner, adaptive)
     left_out = operators.compliance if plan.preconditioner == "dirichlet" else np.zeros(len(compliance))
-    followed = isinstance(preconditioner, ExactInverse) or not soften
+    followed = plan.preconditioner == "influence" or not soften
     if not followed or comm.allreduce(bool(left_out.any()), MPI.LOR):
+        from feti_homog.feti.preconditioners.spring_update import SpringUpdated  # of softening springs alone
+
         preconditioner = SpringUpdated(comm, preconditioner, jump_operator.owned[0], left_out)
-    return SolverParts(operators, preconditioner, natural, adaptive)
+    inverse = cast("ExactInverse", preconditioner) if plan.preconditioner == "influence" else None
+    return SolverParts(operators, preconditioner, natural, adaptive, inverse)
 
 
 def _sizes(

@@ -13,7 +13,6 @@ from feti_homog.case import bond_laws
 from feti_homog.case.case import Case
 from feti_homog.case.interface_section import InterfaceSection
 from feti_homog.feti.decomposition.jump_operator import InterfaceSprings
-from feti_homog.fibres.periodic_table import fibre_rows
 from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.laws.registry import law_class
 from feti_homog.typing import Float, Int
@@ -67,7 +66,11 @@ def strength_factors(case: Case, fibres: int) -> Float:
         uniform = np.random.default_rng(np.random.SeedSequence(scatter.seed, spawn_key=(1,))).random(fibres)
         factors = (-np.log1p(-uniform)) ** (1.0 / scatter.shape) / math.gamma(1.0 + 1.0 / scatter.shape)
     table = case.cell.table
-    return factors if table is None else factors * table.strength[fibre_rows(table, case.cell.window)]
+    if table is None:
+        return factors
+    from feti_homog.fibres.periodic_table import fibre_rows  # with windows of tables
+
+    return factors * table.strength[fibre_rows(table, case.cell.window)]
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,6 @@ from feti_homog.mesh.coarse_mesh import CoarseMesh
 from feti_homog.mesh.fill.gmsh_mesher import begin
 from feti_homog.mesh.fill.unmeshed_cell import NodedCell, UnmeshedCell
 from feti_homog.mesh.outline.bare_outline import LineStations
-from feti_homog.mesh.readers.msh_reader import read_cell
 from feti_homog.mesh.sizes.element_estimate import ElementEstimate
 from feti_homog.mesh.sizes.graded_size import SizeField
 from feti_homog.mesh.tiles.filling import Filling, Tile, fill
@@ -63,6 +62,8 @@ def begin_mesh(case: Case, policy: TilePolicy) -> UnmeshedCell | NodedCell | Coa
     """
     found: UnmeshedCell | NodedCell | CoarseMesh
     if case.cell.has_own_mesh:
+        from feti_homog.mesh.readers.msh_reader import read_cell  # with the readers of all formats
+
         found = read_cell(case.cell)
     else:
         listed = listed_arrangement(case.cell)

@@ -9,7 +9,6 @@ import numpy as np
 from feti_homog.case.case import Case
 from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.partition import decompose, pieces_for_count, pieces_for_size
-from feti_homog.fibres.matched_arrangement import distance_of
 from feti_homog.fibres.outlines.ellipses import Ellipses
 from feti_homog.homogenization import arc_selection, cell_remarks, process_zone
 from feti_homog.homogenization.arc_selection import InterfaceNodes
@@ -211,7 +210,11 @@ def distribute(
 def match_distance(case: Case, width: float, height: float, centres: Float, radii: Float) -> float | None:
     """Return the match distance of fibres with these centres (n, 2) and radii (n,)."""
     window = case.cell.matched
-    return None if window is None else distance_of(window, width, height, centres, radii)
+    if window is None:
+        return None
+    from feti_homog.fibres.matched_arrangement import distance_of  # with statistics of neighbours
+
+    return distance_of(window, width, height, centres, radii)
 
 
 def wanted_pieces(

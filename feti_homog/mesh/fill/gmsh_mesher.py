@@ -12,9 +12,7 @@ from feti_homog.fibres.arrangement import Arrangement
 from feti_homog.fibres.outlines.discs import Discs
 from feti_homog.fibres.outlines.ellipses import Ellipses
 from feti_homog.mesh.coarse_mesh import CoarseMesh
-from feti_homog.mesh.fill.shape_mesher import mesh_outlines
 from feti_homog.mesh.fill.unmeshed_cell import NO_MARKS, NodedCell, UnmeshedCell
-from feti_homog.mesh.outline import elliptic_outline
 from feti_homog.mesh.sizes.element_estimate import (
     MAX_TRIANGLES,
     MAX_TRIANGLES_OF_TILES,
@@ -79,8 +77,12 @@ def begin(
         refuse_many(cell_of_discs.bare.field.at, arrangement.size, most)
         return cell_of_discs
     if isinstance(arrangement.outlines, Ellipses):
+        from feti_homog.mesh.outline import elliptic_outline  # discs, the common case, do without
+
         lines = elliptic_outline.outline(arrangement, arrangement.outlines, sizes, marks)
         return NodedCell.of(arrangement, lines, sizes, None, scale)
+    from feti_homog.mesh.fill.shape_mesher import mesh_outlines  # with a reader of meshes
+
     return mesh_outlines(arrangement, sizes, scale)
 
 
