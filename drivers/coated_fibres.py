@@ -36,8 +36,11 @@ def main(given: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def point(given: argparse.Namespace, comm: Intracomm, ratio: float) -> list[float]:
-    """Of one coating, `ratio` times as stiff as the matrix: the bulk modulus, that of composite cylinders, the shear
-    modulus, and S11 at the onset of debonding within and around the coating."""
+    """Constants of one coating, `ratio` times as stiff as the matrix.
+
+    They are the bulk modulus, that of composite cylinders, the shear modulus, and S11 at the onset of debonding within
+    and around the coating.
+    """
     coating = {"young": ratio * MATRIX["young"], "poisson": COATING_POISSON}
     bonded = solved(given, comm, coating, "stiffness", "bonded")
     assert bonded.moduli is not None

@@ -73,8 +73,9 @@ def _tools(text: str) -> str:
 
 
 def best(arguments: argparse.Namespace, planes: Sequence[str]) -> dict[tuple[str, str], Row]:
-    """Return the fastest run of each tool in each plane state, or one that did not end well, after which it gets no
-    other.
+    """Return the fastest run of each tool in each plane state, or one that did not end well.
+
+    After such a run the tool gets no other.
 
     The tools take turns, so that none has the quiet minutes of a machine to itself.
     """

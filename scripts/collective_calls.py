@@ -46,8 +46,11 @@ def collective_calls() -> Iterator[Counter[str]]:
 
 @contextmanager
 def no_communication() -> Iterator[None]:
-    """Provide a block in which mpi4py, PETSc's objects and HDF5's files of several ranks raise CommunicationError
-    before they communicate, or after PETSc has made such an object."""
+    """Provide a block in which communication raises CommunicationError.
+
+    mpi4py, PETSc's objects and HDF5's files of several ranks raise it before they communicate, or after PETSc has made
+    such an object.
+    """
 
     def refuse(frame: FrameType, event: str, function: Any) -> None:
         if event == "call":

@@ -62,8 +62,10 @@ class Nodes:
 
 
 def _keys(comm: MPI.Intracomm, subdomains: list[Subdomain], lattice: ReferenceLattice) -> tuple[list[Int], int]:
-    """Return a key for each class of each subdomain, the same wherever the node is, and from which on keys are not
-    shared."""
+    """Return a key for each class of each subdomain, and from which on keys are not shared.
+
+    A key is the same wherever the node is.
+    """
     inner = lattice.intervals - 1
     inside = [s.mesh.n_classes - len(s.submesh.class_keys) - len(s.submesh.edge_keys) * inner for s in subdomains]
     classes, edges = (

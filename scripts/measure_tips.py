@@ -1,5 +1,7 @@
-"""Measures what grading at the tips of debonded arcs buys: the largest relative error of C11, C22, C12 and C33 of the
-square cell with an arc of 120 degrees whose faces may overlap, against the degrees of freedom, on one rank.
+"""Measures the gain of grading at the tips of debonded arcs.
+
+It is the largest relative error of C11, C22, C12 and C33 of the square cell with an arc of 120 degrees whose faces may
+overlap, against the degrees of freedom, on one rank.
 
     .venv/bin/python scripts/measure_tips.py
 

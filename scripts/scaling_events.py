@@ -27,8 +27,10 @@ MESH_SIZE = 0.16
 
 @dataclass(frozen=True)
 class EventRow:
-    """A path: sizes, and of an event on average seconds, dual problems, Krylov iterations, collective calls, exchanges
-    of multipliers and kilobytes in these of the busiest rank, in and out.
+    """Sizes of a path, and means over its events.
+
+    Means are of seconds, dual problems, Krylov iterations, collective calls, exchanges of multipliers and kilobytes in
+    these of the busiest rank, in and out.
 
     `worst` are the seconds of the longest event, `setup` those of all before the first; `neighbours` the messages of an
     exchange of the rank with most; `latency` the seconds of one message.

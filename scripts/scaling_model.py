@@ -35,8 +35,10 @@ class Machine:
 
 @dataclass(frozen=True)
 class Factor:
-    """Seconds of the factor of n unknowns and of the solves of an iteration: shares of n to powers, which are those of
-    the runs on one rank."""
+    """Seconds of the factor of n unknowns and of the solves of an iteration.
+
+    They are shares of n to powers, which are those of the runs on one rank.
+    """
 
     factor: Shares
     factor_power: float

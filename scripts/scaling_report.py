@@ -129,8 +129,11 @@ def by_ranks(rows: Sequence[Row], cores: int) -> list[str]:
 
 
 def memory(rows: Sequence[Row]) -> list[str]:
-    """Aligned lines: peaks of the rank with most in each stage, of rank 0 and of all others when it meshes, and what
-    the coarse factorization takes of each."""
+    """Aligned lines of memory.
+
+    They give peaks of the rank with most in each stage, of rank 0 and of all others when it meshes, and what the coarse
+    factorization takes of each.
+    """
     lines = [
         "MB of the rank with most, interpreter and libraries included; of rank 0 and of the others (on average)",
         f"{'ranks':>5}{'dofs':>10}" + "".join(f"{s:>10}" for s in STAGES)

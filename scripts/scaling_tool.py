@@ -219,9 +219,12 @@ def ping(comm: MPI.Intracomm, size: int, times: int) -> float:
 def _coarse(
     coarse: AdaptiveCoarseSpace, natural: NaturalCoarseSpace, comm: MPI.Intracomm, asked: str | None
 ) -> dict[str, Any]:
-    """Seconds to set up the coarse space, to sum and factor the coarse matrix, of which each rank has made its part,
-    and that of the rigid-body motions, and to solve with them as often as an iteration does, and by how many
-    megabytes the factors let the memory of each rank grow."""
+    """Seconds and megabytes of the coarse space.
+
+    Seconds are those to set it up, to sum and factor the coarse matrix, of which each rank has made its part, and that
+    of the rigid-body motions, and to solve with them as often as an iteration does; megabytes by which the factors let
+    the memory of each rank grow.
+    """
     right, motions = (np.ones((n, LOADS)) for n in (coarse.part().shape[0], len(natural.unknowns)))
     right[1::2] = -1.0
     solve = fastest(lambda: coarse.solve(right))

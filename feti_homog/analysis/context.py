@@ -71,8 +71,11 @@ class CellLoads:
         return [name for name, found in zip(self.names, masks, strict=True) if found]
 
     def secants(self, responses: Sequence[Response], sign: float) -> dict[str, Float]:
-        """Return the secant stiffness (39) as `stiffness`, (3, 3) or (6, 6), and if a temperature is a load
-        `thermal_stress` (6,), from the responses to plus or minus each unit load."""
+        """Return the secant stiffness (39), and the thermal stress if a temperature is a load.
+
+        `stiffness`, (3, 3) or (6, 6), and `thermal_stress` (6,) follow from the responses to plus or minus each unit
+        load.
+        """
         matrices, first = list[Float](), 0
         for problem in self.problems:
             end = first + len(problem.loads)
@@ -142,7 +145,9 @@ class AnalysisContext:
         self, label: str, bonds: BondState, starts: Sequence[Float], sign: float
     ) -> tuple[dict[str, Float], list[Response]]:
         """Return the secants, see `CellLoads.secants`, and the responses to plus or minus each unit load.
-        Collective."""
+
+        Collective.
+        """
         responses = list[Response]()
         for problem in self.loads.problems:
             own = starts[len(responses) : len(responses) + len(problem.loads)]

@@ -55,8 +55,9 @@ class Rays:
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
-    """`envelope`, a list of directions with the load at which the first bond breaks, and `effective_stiffness` from
-    the unit loads; if a temperature is a load, `thermal_stress`.
+    """Return `envelope`, `effective_stiffness` and, if a temperature is a load, `thermal_stress`.
+
+    `envelope` is a list of directions with the load at which the first bond breaks; the others follow from unit loads.
 
     Raises:
         CaseError: faces of the mesh are debonded and may touch.
@@ -85,8 +86,11 @@ def run(context: AnalysisContext) -> dict[str, Any]:
 def rays_of(
     plane: Sequence[str], angles: Float, stiffness: Float, thermal_stress: Float | None, temperature: float
 ) -> Rays:
-    """Return the rays in directions (n,), degrees, of a plane whose axes have these names: of stresses at E = C^-1
-    S, with no other stresses, or of strains; after a change of temperature at zero stress, or strain."""
+    """Return the rays in directions (n,), degrees, of a plane whose axes have these names.
+
+    They are of stresses at E = C^-1 S, with no other stresses, or of strains; after a change of temperature at zero
+    stress, or strain.
+    """
     strains, stresses = voigt_names(len(stiffness))
     of_stresses = plane[0] in stresses
     names = stresses if of_stresses else strains
@@ -146,8 +150,10 @@ class _Finder:
         return np.stack([column[load] for load in self._loads], axis=1)
 
     def _least(self, strain: Float, names: Sequence[str], components: int) -> Float:
-        """(n, k) utilisations that the solver's error makes under strains (n, m) of these names: of tractions that each
-        problem has an error of at each bond.  Collective."""
+        """(n, k) utilisations that the solver's error makes under strains (n, m) of these names.
+
+        Of tractions that each problem has an error of at each bond. Collective.
+        """
         loads, first, total = self._unit_loads(strain, 0.0, names), 0, np.zeros((len(strain), len(self._fibre)))
         parts = ((0, 1), (2,))[: len(self._problems)]
         for problem, part in zip(self._problems, parts, strict=True):
@@ -194,8 +200,10 @@ class _Finder:
 
 
 def _tractions(context: AnalysisContext, responses: Sequence[Response]) -> Float:
-    """(l, k, c) tractions of this rank's nodes under each unit load: normal and tangential, and along the fibres if
-    there is such a problem."""
+    """(l, k, c) tractions of this rank's nodes under each unit load.
+
+    Normal and tangential, and along the fibres if there is such a problem.
+    """
     components = [problem.cell.solver.problem.components for problem in context.loads.problems]
     found, first, column = list[Float](), 0, 0
     for problem, own in zip(context.loads.problems, components, strict=True):

@@ -59,8 +59,10 @@ def mesh_error(secants: Mapping[str, Any], of_plus: list[EnergyErrors], of_minus
 
 
 def state_error(context: AnalysisContext, responses: Sequence[Response]) -> tuple[float | None, list[Float]]:
-    """Return the estimated relative error of the energy of one state, of all problems, and what the elements have of
-    it; None and nothing if the case asks for none.  Collective."""
+    """Return the estimated relative error of the energy of one state, of all problems, and the share of the elements.
+
+    None and nothing if the case asks for none. Collective.
+    """
     if not context.case.output.mesh_error:
         return None, []
     pairs = zip(context.loads.problems, responses, strict=False)
@@ -99,8 +101,10 @@ def _constants(stiffness: Float, heat: Float | None) -> dict[str, Float]:
 
 
 def _of_energy(stiffness: Float, parts: Mapping[str, Mapping[str, Float]]) -> float:
-    """Return the largest relative error of the strain energy under any strain; of a stiffness that is not positive
-    definite under unit strains."""
+    """Return the largest relative error of the strain energy under any strain.
+
+    Of a stiffness that is not positive definite under unit strains.
+    """
     symmetric = (stiffness + stiffness.T) / 2
     if np.linalg.eigvalsh(symmetric)[0] <= 0:
         return float((np.diag(parts["absolute"]["effective_stiffness"]) / np.abs(np.diag(stiffness))).max())

@@ -204,9 +204,10 @@ class Result:
         return {name: np.array([point.get(name, np.nan) for point in documents]) for name in names}
 
     def rising_strain(self) -> dict[str, Float]:
-        """Corners (v,) of the leading strain and of all stresses, by their names, along a path of one leg, as a test
-        with rising load follows it: where bonds break the stress drops, or under a given stress the strain jumps, to
-        the next branch that holds.  The strain comes first; a table of pandas takes them all.
+        """Corners (v,) of the leading strain and of all stresses, by their names, along a path of one leg.
+
+        They are those of a test with rising load: where bonds break the stress drops, or under a given stress the
+        strain jumps, to the next branch that holds. The strain comes first; a table of pandas takes them all.
 
         Raises ValueError for any other result, and where that strain does not rise with the load.
         """
@@ -219,8 +220,10 @@ class Result:
         return {self.peak.strain_name: columns.pop(self.peak.strain_name)} | columns
 
     def path_scaled(self, *, toughness: float) -> Result:
-        """Return the result of the same path with another toughness, of several interfaces that of the first and the
-        others alike, and with its loads multiplied by s = sqrt(toughness / that of the case).
+        """Return the result of the same path with another toughness, its loads multiplied by s.
+
+        s = sqrt(toughness / that of the case); of several interfaces the toughness is that of the first, and the others
+        alike.
 
         Strains and stresses are s times, energies s^2 times as large, at the same events and load factors: bonds break
         by energy on springs of given stiffness.  Fields, states and digest are those of no run, and left out.
@@ -240,8 +243,11 @@ class Result:
         )
 
     def first_drop(self) -> tuple[Float, int]:
-        """(3,) or (6,) stress left after the first break of a path of one leg, the load being held there, and the
-        number of the point whose branch it is on.  Raises ValueError for any other result."""
+        """(3,) or (6,) stress left after the first break of a path of one leg, and the number of a point.
+
+        The load is held there; the point is the one whose branch the stress is on. Raises ValueError for any other
+        result.
+        """
         document = self.document
         if not self.path or not path_curves.is_proportional(document):
             raise ValueError("only a path of one leg, followed by events, has a first drop")

@@ -183,8 +183,10 @@ class PathPoint:
 
 @dataclass(frozen=True, kw_only=True)
 class Peak:
-    """The largest stress of a path up to its deepest fall, of the component whose strain leads: of those that the loads
-    change the largest."""
+    """The largest stress of a path up to its deepest fall.
+
+    It is of the component whose strain leads: of those that the loads change the largest.
+    """
 
     stress_name: str = described("name of the component")
     strain_name: str = described("name of its strain")

@@ -96,8 +96,7 @@ class Case:
 
     @property
     def interface(self) -> InterfaceSection | None:
-        """The first of the interfaces, None if the bonding is perfect: contact, criterion and growth are those of
-        all."""
+        """The first interface, None of perfect bonding; contact, criterion and growth are those of all."""
         return self.interfaces[0] if self.interfaces else None
 
     @property

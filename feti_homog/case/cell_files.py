@@ -48,8 +48,11 @@ def missing(file: Path) -> str:
 
 
 def with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
-    """Return the cell with its table read, the path of that completed, and the number and the fraction of the
-    table's fibres where it has none of its own; faults are added to `faults`."""
+    """Return the cell with its table read and what follows from it.
+
+    The path of the table is completed; number and fraction are those of the table's fibres where the cell has none of
+    its own; faults are added to `faults`.
+    """
     if cell.match is None:
         return cell
     file, given = Path(os.path.realpath(folder / cell.match)), f"[cell] match = {toml_value(str(cell.match))}"

@@ -92,8 +92,10 @@ def without_chosen(cell: Cell, table: dict[str, Any]) -> dict[str, Any]:
 
 
 def coarsest(cell: Cell) -> float:
-    """mesh_size of the coarsest mesh: half the distance of as many fibres on a square lattice / width of the
-    cell, in two digits."""
+    """mesh_size of the coarsest mesh.
+
+    Half the distance of as many fibres on a square lattice / width of the cell, in two digits.
+    """
     fibres, height = _fibres(cell)
     return min(LARGEST, float(f"{PITCH_SHARE * math.sqrt(height / fibres):.2g}"))
 

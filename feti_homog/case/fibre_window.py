@@ -18,8 +18,9 @@ SAME_CENTRE = 1e-6
 
 
 def read_window(path: Path, size: tuple[float, float] | None = None) -> FibrePattern:
-    """Return the fibres of a table, at least two, in a window of this width and height, else of those that the
-    table gives; ellipses as discs of the same centres and areas.
+    """Return the fibres of a table, at least two, in a window of this width and height.
+
+    Without these, the window is that which the table gives; ellipses count as discs of the same centres and areas.
 
     Voids are left out. The window begins at the `left` and `bottom` of the table, else at 0.
 

@@ -38,8 +38,10 @@ def _radius(cell: Cell, phase: str) -> float:
 
 
 def void_count(cell: Cell, fibre_radius: float) -> int:
-    """How many voids a random cell of width 1 has, whose fibres have this mean radius: the whole number next to that of
-    their radius, at least one."""
+    """Return the number of voids of a random cell of width 1 whose fibres have this mean radius.
+
+    It is the whole number next to that of their radius, at least one.
+    """
     if not cell.voids:
         return 0
     radius = fibre_radius * (1.0 if cell.void_radius is None else cell.void_radius)
@@ -53,8 +55,10 @@ def fractions_in_words(cell: Cell) -> str:
 
 
 def mixed_width(cell: Cell) -> float | None:
-    """Width of the cell, or None where `fibre_radius` or the default make it: the one in which `fibres` fibres have
-    these radii and fractions, W^2 = sum n_p pi r_p^2 / sum c_p."""
+    """Width of the cell, or None where `fibre_radius` or the default make it.
+
+    In it `fibres` fibres have these radii and fractions, W^2 = sum n_p pi r_p^2 / sum c_p.
+    """
     if cell.radii is None or cell.fibres is None:
         return cell.width
     filled = fsum(count * pi * cell.radii[phase] ** 2 for phase, count in fibre_counts(cell).items())

@@ -68,8 +68,11 @@ WAYPOINTS = list_of(
 
 
 def completed(loads: Sequence[Strain | MixedLoad], plane: str) -> tuple[dict[str, float], ...]:
-    """Return the loads of a path in full: of each component one name and value, and the temperature in generalized
-    plane strain. What a load does not name is that of the load before, at first a stress of zero."""
+    """Return the loads of a path in full.
+
+    Of each component one name and value, and the temperature in generalized plane strain. What a load does not name is
+    that of the load before, at first a stress of zero.
+    """
     state = PLANE_STATES[plane]
     unloaded = dict.fromkeys((*state.stresses, *[TEMPERATURE] * state.is_spatial), 0.0)
 

@@ -90,8 +90,10 @@ def write(directory: Path, found: FibreStatistics) -> list[Path]:
 
 
 def fibre_columns(found: FibreStatistics) -> dict[str, Array]:
-    """Return a row for each fibre: its three nearest neighbours with the weights of their distances, and its
-    Voronoi cell."""
+    """Return a row for each fibre.
+
+    It has the three nearest neighbours with the weights of their distances, and its Voronoi cell.
+    """
     pattern, near, cells = found.pattern, found.neighbours, found.cells
     columns: dict[str, Array] = {
         "number": np.arange(1, pattern.count + 1),

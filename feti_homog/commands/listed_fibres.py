@@ -25,9 +25,10 @@ from feti_homog.typing import Float
 
 
 def table(source: Path) -> str:
-    """Return the table of a case file or a folder of results: a row for each fibre, in the order of their numbers,
-    and for each void; with columns `a`, `b` and `angle` if any is an ellipse, and a column `coating` if any has
-    one.
+    """Return the table of a case file or a folder of results, with a row for each fibre and for each void.
+
+    Fibres are in the order of their numbers; there are columns `a`, `b` and `angle` if any is an ellipse, and a column
+    `coating` if any has one.
 
     Its numbers are exact, so that it gives the same cell again.  On one rank.
 
@@ -133,8 +134,10 @@ def _of_records(fibres: Sequence[Mapping[str, Any]], cell: Mapping[str, Any]) ->
 
 
 def _is_complete(document: Mapping[str, Any]) -> bool:
-    """Return whether a result has all outlines: it lacks those of voids, and those that are neither round nor
-    elliptic."""
+    """Return whether a result has all outlines.
+
+    It lacks those of voids, and those that are neither round nor elliptic.
+    """
     are_known = all("radius" in fibre or "semi_axes" in fibre for fibre in document["fibres"])
     return are_known and not document["cell"].get("porosity")
 

@@ -1,5 +1,7 @@
-"""What elements make of arcs costs energy: their sides take area from a body or add to it, and their displacements and
-those of a bond on springs follow polynomials between nodes.
+"""Energy that the elements' error along arcs costs.
+
+Their sides take area from a body or add to it, and their displacements and those of a bond on springs follow
+polynomials between nodes.
 
 Of each body alone, so that nothing is communicated; what two bodies that are glued have of it in common cancels.
 """

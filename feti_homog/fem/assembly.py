@@ -41,8 +41,10 @@ class Assembly:
 
 
 def assemble(mesh: FineMesh, L: Float, problem: Problem = PLANE) -> Assembly:
-    """Assemble the subdomain `mesh` of the stiffness L (v, v): its first rows and columns are those of the strains that
-    displacements make, the others of uniform ones."""
+    """Assemble the subdomain `mesh` of the stiffness L (v, v).
+
+    Its first rows and columns are those of the strains that displacements make, the others of uniform ones.
+    """
     macro, tensor, c = MacroElement.of(mesh.lattice), _tensor(L, problem), problem.components
     couples, loads = np.empty((len(mesh.nodes), len(macro.rows), c * c)), np.empty((*mesh.nodes.shape, 2))
     area = 0.0

@@ -32,8 +32,10 @@ MIDDLES = np.array([[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]])
 
 @dataclass(frozen=True)
 class ElementStresses:
-    """Stresses of the elements `part` under k loads at q points: `points` (e, q, 2), `weights` (e, q), `stress`
-    (e, q, m, k)."""
+    """Stresses of the elements `part` under k loads at q points.
+
+    `points` (e, q, 2), `weights` (e, q), `stress` (e, q, m, k).
+    """
 
     part: slice
     points: Float
@@ -169,8 +171,10 @@ class RecoveredStress:
 
     @cached_property
     def _edges(self) -> tuple[Int, Float, Bool]:
-        """Vertices (n, 2) of the sides of elements, each side once, vectors (n, 2) from the first to the second, and
-        which vertices are on the boundary, where sides have one element."""
+        """Vertices (n, 2) and vectors (n, 2) of the sides of elements, each side once, and vertices on the boundary.
+
+        Vectors go from the first vertex to the second; on the boundary sides have one element.
+        """
         size, corners = int(self.vertices.max()) + 1, self.points[self.triangles[:, :3]]
         ends = np.stack([self.vertices, np.roll(self.vertices, -1, axis=1)], axis=2).reshape(-1, 2)
         vector = (np.roll(corners, -1, axis=1) - corners).reshape(-1, 2)

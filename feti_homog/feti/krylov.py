@@ -229,8 +229,10 @@ class Krylov:
         return found
 
     def describe(self, iterations: int) -> str:
-        """Return iterations and condition number of the last solve, as the method estimates it and -feti_view
-        prints."""
+        """Return iterations and condition number of the last solve.
+
+        As the method estimates it and -feti_view prints.
+        """
         ksp, load_cases = self.ksp, self._columns
         words = f"FETI: {load_cases} load case{'s' * (load_cases > 1)}, {iterations} iterations"
         if not iterations or ksp.getType() not in ESTIMATES_SINGULAR_VALUES:

@@ -159,8 +159,10 @@ class FetiSolver:
         return np.asarray(self.torn_stiffness @ solution.strain + forces)
 
     def set_state(self, active: Float, compliance: Float) -> None:
-        """Let only the owned rows where `active` is 1 carry multipliers, and springs have this C (owned rows,), no less
-        than at first; refactors the coarse problem alone.  Collective.  Raises as `Preconditioner.soften`."""
+        """Let rows where `active` is 1 alone carry multipliers, and springs have this C (owned rows,).  Collective.
+
+        C is no less than at first; refactors the coarse problem alone. Raises as `Preconditioner.soften`.
+        """
         changed = bool((active != self.active.mask).any()) + 2 * bool((compliance != self.operator.compliance).any())
         change = self.comm.allreduce(changed, MPI.BOR)
         if change >= 2:
@@ -272,8 +274,7 @@ class FetiSolver:
     def _solutions(
         self, strains: Float, lam: Float, jump: Float, iterations: int, reason: int, scale: Float
     ) -> list[DualSolution]:
-        """Amplitudes, jumps and residuals of the multipliers `lam` (owned rows, k), which leave `jump` = (d E - F lam)
-        but for rigid-body motions."""
+        """Amplitudes, jumps, residuals of `lam` (owned rows, k); `jump` = d E - F lam but for rigid motions."""
         alpha = np.zeros((self.natural.kernel_dimension, len(strains)))
         if self.natural.kernel_dimension:
             alpha -= self.natural.amplitudes(self.active.restrict(jump))

@@ -57,8 +57,10 @@ class SolverOptions:
         )
 
     def want_soft_modes(self, bodies_are_cut: bool) -> bool:
-        """Return whether soft modes are looked for: asked for, or bodies are cut, for the webs that METIS makes have
-        them."""
+        """Return whether soft modes are looked for.
+
+        Asked for, or bodies are cut, for the webs that METIS makes have them.
+        """
         return self.coarse_space == "adaptive" or (self.coarse_space == "auto" and bodies_are_cut)
 
 

@@ -142,8 +142,9 @@ def clearance(arrangement: Arrangement) -> float:
 
 
 def clear_shift(arrangement: Arrangement) -> Arrangement:
-    """Return the arrangement moved as a whole such that the cell's boundary stays clear of tangency with the
-    outlines.
+    """Return the arrangement moved as a whole.
+
+    The cell's boundary then stays clear of tangency with the outlines.
 
     Along each axis the candidates are the middles of the widest gaps between the positions where a boundary
     line touches an outline; among their combinations the one whose corner is farthest from an outline is taken. In

@@ -56,8 +56,9 @@ Parting = Callable[[Int, Int, Float], tuple[Float, Float]]
 
 
 def moves(outlines: Outlines, size: Float) -> Float:
-    """(N, 2) the moves d of outlines on the torus of periods `size` (2,) that part those which overlap across its
-    border.
+    """(N, 2) the moves d of outlines on the torus that part those which overlap across its border.
+
+    The periods of the torus are `size` (2,).
 
     They are a local minimum of sum |d|^2 such that no gap across the border is less than the smallest one within, and
     no gap within becomes less than that, all relative to the sum of the radii and that gap between LEAST_GAP and

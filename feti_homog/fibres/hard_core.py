@@ -113,9 +113,10 @@ def _sum_at(rows: Int, vectors: Float, count: int) -> Float:
 
 
 def hard_core(pattern: FibrePattern, generator: np.random.Generator, max_steps: int = MAX_STEPS) -> FibrePattern:
-    """Return the same fibres elsewhere, as those of random cells are placed (`random_arrangement`): no gap is
-    smaller than the smallest one of the pattern. Across the sides of a window they are placed as in a periodic
-    cell.
+    """Return the same fibres elsewhere, as those of random cells are placed (`random_arrangement`).
+
+    No gap is smaller than the smallest one of the pattern. Across the sides of a window they are placed as in a
+    periodic cell.
 
     Raises:
         MeshError: no such pattern is found.

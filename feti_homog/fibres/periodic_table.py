@@ -70,8 +70,10 @@ def table_arrangement(cell: Cell) -> Arrangement:
 
 
 def _repaired(table: FibreTable, window: str) -> tuple[FibreTable, tuple[str, ...]]:
-    """Return the table whose fibres that touch or overlap by up to REPAIRED of a radius are smaller by what parts them,
-    and the rows, in one line."""
+    """Return the table without slight overlaps, and its repaired rows in one line.
+
+    Fibres that touch or overlap by up to REPAIRED of a radius are smaller by what parts them.
+    """
     assert table.width is not None and table.height is not None
     size, centres = np.array([table.width, table.height]), table.centres - _corner(table)
     kept = np.flatnonzero(_without_images(table, centres, size, window == "cut")[0])
@@ -94,8 +96,10 @@ def _repaired(table: FibreTable, window: str) -> tuple[FibreTable, tuple[str, ..
 
 
 def _nested(table: FibreTable, rows: Int, centres: Float, height: float) -> Arrangement:
-    """Return the rows (k,) about these centres / width of the cell: a ring around each outline that has a coating
-    or that is a void in a hollow fibre."""
+    """Return the rows (k,) about these centres / width of the cell.
+
+    A ring around each outline that has a coating or that is a void in a hollow fibre.
+    """
     assert table.width is not None
     outlines, core = table.outlines[rows].per(table.width).at(centres), table.inner_radius[rows] / table.width
     radii, is_hollow = outlines.radii, core > 0
@@ -254,8 +258,10 @@ def _contacts(table: FibreTable, kept: Int, outer: Outlines, size: Float, is_cut
 
 
 def _gaps(table: FibreTable, kept: Int, outer: Outlines, size: Float) -> tuple[Int, Int, Float, Float, Bool]:
-    """Return the pairs of near fibres among the rows `kept` (k,): places in these, gaps, sums of radii, and whether
-    they are across the border."""
+    """Return the pairs of near fibres among the rows `kept` (k,).
+
+    Places in these, gaps, sums of radii, and whether they are across the border.
+    """
     centres, radius = outer.centres, table.outer_radius[kept]
     first, second, vector = neighbours(centres, size, 2 * outer.longest.max() * (1 + LEAST_GAP))
     normal, reach = outer.parting(first, second, vector)

@@ -30,8 +30,10 @@ LEAST_SIZE = 1e-5
 
 
 def on_interface(case: Case, interface: InterfaceSection, fibres: int) -> dict[int, list[float]]:
-    """Directions in [0, 360) of the tips of its arcs on so many fibres, at all their openings, by the fibre's number
-    from 0."""
+    """Directions in [0, 360) of the tips of its arcs on so many fibres, by the fibre's number from 0.
+
+    They are those at all openings.
+    """
     return debonded_arcs.tips(interface.debonded, case.section.openings, fibres)
 
 
@@ -68,8 +70,10 @@ def size(case: Case, estimate: ElementEstimate) -> float | None:
 
 @dataclass(frozen=True)
 class InterfaceNodes:
-    """Nodes of interfaces on rank 0, before the refinement: (k,) numbers of fibres from 1, interfaces of the case,
-    directions in degrees about their centres, and whether they are vertices of the coarse mesh.
+    """Nodes of interfaces on rank 0, before the refinement.
+
+    (k,) numbers of fibres from 1, interfaces of the case, directions in degrees about their centres, and whether they
+    are vertices of the coarse mesh.
     """
 
     fibre: Int
@@ -128,8 +132,10 @@ class InterfaceNodes:
 
 
 def fibre_faults(case: Case, centres: Float) -> list[str]:
-    """List the faults of the fibres of arcs in a cell whose fibres have these centres (fibres, 2), NaN where there is
-    none."""
+    """List the faults of the fibres of arcs in a cell.
+
+    Its fibres have these centres (fibres, 2), NaN where there is none.
+    """
     return [
         fault
         for pair, interface in enumerate(case.interfaces)

@@ -16,8 +16,9 @@ SAME_FRACTION = 0.01  # of a matched table and its cell, relative
 
 
 def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:
-    """(phases, phases) symmetric: the place among the case's interfaces of that between two phases, -1 where there is
-    none and they never part.
+    """(phases, phases) symmetric: the place of the interface between two phases among the case's.
+
+    It is -1 where there is none and they never part.
 
     An interface that does not say between what is that of the matrix, the first phase, with all others; so is perfect
     bonding, which is looked at there too.
@@ -33,8 +34,10 @@ def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:
 
 
 def faults(case: Case, phases: tuple[str, ...], left: AnyInt, right: AnyInt) -> list[str]:
-    """Faults of interfaces between phases that the cell does not have, or that touch nowhere in it: those numbered
-    `left` (n,) touch those numbered `right` (n,)."""
+    """Faults of interfaces between phases that the cell does not have, or that touch nowhere in it.
+
+    Those numbered `left` (n,) touch those numbered `right` (n,).
+    """
     found = []
     touching = np.zeros((len(phases), len(phases)), bool)
     touching[left, right] = touching[right, left] = True

@@ -115,8 +115,9 @@ def _of_all(comm: MPI.Comm, own: list[Array], none: Array) -> Array:
 
 
 def reach_of_tips(tips: Float, spokes: Float, bodies: Int, boundaries: tuple[Float, Int], period: Float) -> Float:
-    """(t,) radius around each tip in which its crack may be extended: no other tip and no boundary is there but the
-    circle between its bodies.
+    """(t,) radius around each tip in which its crack may be extended.
+
+    No other tip and no boundary is there but the circle between its bodies.
 
     Args:
         tips, spokes: (t, 2) their places, and those from the centres of their circles.

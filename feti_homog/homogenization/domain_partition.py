@@ -115,8 +115,10 @@ class CellSummary:
         return coating_thickness(self.numbers, self.is_fibre, Ellipses(self.centres, self.frames).semi_axes)
 
     def fibre_number(self, constituent: Int) -> Int:
-        """(k,) numbers from 1, as a case file has them, of the fibres that are these constituents (k,) or that these
-        coat; 0 of the matrix."""
+        """(k,) numbers from 1 of the fibres that are these constituents (k,) or that these coat.
+
+        They are those that a case file has; 0 of the matrix.
+        """
         return np.asarray(self.numbers[constituent])
 
     def warnings(self) -> list[str]:

@@ -170,8 +170,10 @@ class EnergyReleaseRates:
         return np.asarray(np.linalg.norm(away, axis=1))
 
     def _closing(self, tips: CrackTips, status: Status, force: Float, jump: Float) -> tuple[Float, Float]:
-        """(t, 2) `closing_work` in opening and in shear, and (t,) the length that is closed: MODE_LENGTH, or the
-        element behind the tip if that is longer."""
+        """(t, 2) `closing_work` in opening and in shear, and (t,) the length that is closed.
+
+        MODE_LENGTH, or the element behind the tip if that is longer.
+        """
         wanted = MODE_LENGTH * self._radius(tips)
         work, length = np.zeros((len(wanted), 2)), np.zeros(len(wanted))
         chains = [

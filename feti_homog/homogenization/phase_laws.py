@@ -57,8 +57,11 @@ def axial_law(case: Case, phase: str) -> Float:
 
 
 def secants(plane: Float, *axial: Float) -> dict[str, Float]:
-    """`stiffness` (3, 3) or, with an axial problem, (6, 6), and if a temperature is a load the `thermal_stress` (6,)
-    under a unit of it; from stresses under unit loads, (v, v) of the plane problem and (2, 2) of the axial one."""
+    """Return `stiffness`, (3, 3) or with an axial problem (6, 6), and if a temperature is a load `thermal_stress` (6,).
+
+    They follow from stresses under unit loads, (v, v) of the plane problem and (2, 2) of the axial one; the thermal
+    stress is that under a unit of it.
+    """
     if not axial:
         return {"stiffness": plane}
     C, place = np.zeros((6, 6)), np.ix_(IN_PLANE, IN_PLANE)

@@ -31,8 +31,10 @@ def longest_edge(mesh: CoarseMesh) -> float:
 
 
 def process_zone(case: Case) -> float | None:
-    """Return the length E' G_Ic / sigma_c^2 of bonds that break by energy, sigma_c = sqrt(2 k_n G_Ic) or of a cohesive
-    law the strength, in the shorter of its pure modes; of several interfaces the least; None of others.
+    """Return the length E' G_Ic / sigma_c^2 of bonds that break by energy.
+
+    sigma_c = sqrt(2 k_n G_Ic) or of a cohesive law the strength, in the shorter of its pure modes; of several
+    interfaces the least; None of others.
 
     E' is Young's modulus of the plane state, E / (1 - nu^2) in plane strain, of the most compliant phase, which the
     matrix is in general, and of its most compliant axis.
@@ -69,8 +71,10 @@ def warnings(case: Case, width: float, edge: float) -> list[str]:
 
 
 def _of_paths(case: Case) -> list[str]:
-    """Return a line if the energy that a cohesive law takes in changing modes depends on their order, and one if its
-    teeth overshoot."""
+    """Return the warnings on a cohesive law under changing modes.
+
+    One if the energy that it takes in changing modes depends on their order, and one if its teeth overshoot.
+    """
     if not has_softening(case):
         return []
     lines, law = [], bond_law(case.interfaces, np.zeros(0, np.int64))

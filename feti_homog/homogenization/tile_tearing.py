@@ -98,8 +98,10 @@ def _cut(torus: Torus, tile: Int, pieces_per_triangle: Float, longest: float) ->
 
 
 def _numbered(torus: Torus, tile: Int, local: Int, comm: MPI.Intracomm) -> tuple[Int, Int, Int]:
-    """Return the subdomain (m,) of each triangle, numbered body by body and tile by tile in the whole cell, from
-    those of this rank; the body (s,) and the triangles (s,) of each subdomain. Collective."""
+    """Return the subdomain (m,) of each triangle of this rank, and body (s,) and triangles (s,) of each. Collective.
+
+    Subdomains are numbered body by body and tile by tile in the whole cell, from those of this rank.
+    """
     first = np.unique(local, return_index=True)[1]
     parts = comm.allgather((torus.constituent[first], tile[first], np.bincount(local)))
     body, tiles, load = (np.concatenate(some) for some in zip(*parts, strict=True))

@@ -82,8 +82,9 @@ def transverse_moduli(stiffness: ArrayLike) -> TransverseModuli:
 
 
 def engineering_constants(stiffness: ArrayLike) -> EngineeringConstants:
-    """Return the constants of a stiffness C, with compliance S = C^-1: E_i = 1/S_ii, nu_ij = -S_ji/S_ii, G_ij =
-    1/S_kk.
+    """Return the constants of a stiffness C, with compliance S = C^-1.
+
+    E_i = 1/S_ii, nu_ij = -S_ji/S_ii, G_ij = 1/S_kk.
 
     Raises numpy.linalg.LinAlgError if C is singular.
     """

@@ -171,8 +171,9 @@ def fibre_numbers(torus: Torus) -> tuple[Int, Bool]:
 
 
 def coating_thickness(numbers: Int, is_fibre: Bool, semi_axes: Float) -> Float:
-    """(fibres,) by how much coatings make both semi-axes longer, 0 without one, for `fibre_numbers` and the semi-axes
-    (constituents, 2), of discs the radius twice.
+    """(fibres,) by how much coatings make both semi-axes longer, 0 without one.
+
+    Arguments are `fibre_numbers` and the semi-axes (constituents, 2), of discs the radius twice.
 
     NaN where fibre or coating is neither round nor an ellipse, and where their semi-axes differ by two lengths.
     """

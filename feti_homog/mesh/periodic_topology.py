@@ -177,8 +177,11 @@ class Torus:
 
     @cached_property
     def nesting(self) -> Int:
-        """(constituents,) places from the outermost to the innermost: by the number of others between a constituent and
-        the matrix, a coating before what it coats, and then by number."""
+        """(constituents,) places from the outermost to the innermost.
+
+        By the number of others between a constituent and the matrix, a coating before what it coats, and then by
+        number.
+        """
         left, right, _ = self.sides
         a, b = self.constituent[left], self.constituent[right]
         phase, n = self.constituent_phase, len(self.constituent_phase)
@@ -195,8 +198,10 @@ class Torus:
 
 
 def places_by_depth(depth: Float | Int, phase: Int, phases: tuple[str, ...]) -> Int:
-    """(n,) places from the outermost to the innermost of constituents of these depths (n,) in the matrix, a coating
-    before what it coats, and then by number; `phase` (n,) is the number of the phase of each."""
+    """(n,) places from the outermost to the innermost of constituents of these depths (n,) in the matrix.
+
+    A coating is before what it coats, and then they go by number; `phase` (n,) is the number of the phase of each.
+    """
     coats = np.array([name == COATING for name in phases])[phase]
     return np.argsort(np.lexsort((~coats, depth)))
 

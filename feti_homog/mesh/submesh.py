@@ -192,8 +192,11 @@ def pinned_class(torus: Torus) -> int:
 
 
 def pinning(torus: Torus, unfit: Int) -> list[tuple[int, float, int]]:
-    """Find the class that is best pinned, the least of several: how unfit it is, its distance from the cell's corner,
-    its key; `unfit` (classes,) is the larger, the less fit each is.  Nothing of no classes."""
+    """Find the class that is best pinned, the least of several.
+
+    They are compared by how unfit each is, its distance from the cell's corner, its key; `unfit` (classes,) is the
+    larger, the less fit each is. Nothing of no classes.
+    """
     mesh = torus.mesh
     away = mesh.points - np.round(mesh.points / mesh.period) * mesh.period
     distance = np.full(len(torus.class_keys), np.inf)

@@ -52,8 +52,10 @@ class FibrePattern:
 
     @property
     def fibre_fraction(self) -> float:
-        """sum_i pi R_i^2 / area over the centres in the rectangle: of a window unbiased, for what leaves it is met,
-        in the mean, by what comes in."""
+        """sum_i pi R_i^2 / area over the centres in the rectangle.
+
+        Of a window unbiased, for what leaves it is met, in the mean, by what comes in.
+        """
         return pi * fsum(self.radii * self.radii) / self.area
 
     @property

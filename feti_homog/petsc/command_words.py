@@ -48,8 +48,9 @@ def named_values(words: Sequence[str]) -> dict[str, str]:
 
 
 def petsc_words(options: Mapping[str, str]) -> list[str]:
-    """Return the words of options by name without dash, for PETSc's start: its own flags are there or not, true or
-    false.
+    """Return the words of options by name without dash, for PETSc's start.
+
+    Its own flags are there or not, true or false.
 
     False flags of the solver stay, for a case may have them true.
     """
@@ -63,8 +64,10 @@ def _is_petsc(word: str) -> bool:
 
 
 def _may_be_value(name: str, word: str) -> bool:
-    """Return whether a word is the value, right or wrong, of the option before it: no case file, and no path after a
-    flag."""
+    """Return whether a word is the value, right or wrong, of the option before it.
+
+    A value is no case file, and no path after a flag.
+    """
     if word.endswith(CASE_FILE) and name != "options_file":
         return False
     return not is_flag(name) or is_flag_value(word) or not _is_path(word)

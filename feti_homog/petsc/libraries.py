@@ -89,8 +89,10 @@ def _end_petsc(comm: Intracomm) -> None:
 
 
 def petsc4py_advice(debian: Path = DEBIAN_PETSC, path: Sequence[str] = sys.path) -> str:
-    """Return the advice where petsc4py is not on the `path`: Debian has it in a folder of `debian` that PETSC_DIR
-    names."""
+    """Return the advice where petsc4py is not on the `path`.
+
+    Debian has it in a folder of `debian` that PETSC_DIR names.
+    """
     found = [folder for folder in debian.glob("petsc*/*-real") if (folder / "lib/python3/dist-packages").is_dir()]
     if not found:
         return (

@@ -115,8 +115,9 @@ def unknown_options(names: Iterable[str]) -> list[str]:
 
 
 def unknown_to_petsc(names: Iterable[str]) -> list[str]:
-    """One fault for each name (without dash) that is neither one of PETSC_NAMES nor begins with feti_, as those of this
-    program's solvers do.
+    """One fault for each name (without dash) that no option has.
+
+    Options are those of PETSC_NAMES and those that begin with feti_, as those of this program's solvers do.
 
     A name that lacks the prefix of one of OPTIONS is left to `without_prefix`.
     """

@@ -184,8 +184,10 @@ def items_of(part: type, group: str, views: Iterable[View]) -> Iterator[Item]:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class SpatialStatePart(StatePart):
-    """A load case of generalized plane strain and this rank's part of its fields, which do not vary along x3 but for
-    the displacement E33 x3."""
+    """A load case of generalized plane strain and this rank's part of its fields.
+
+    They do not vary along x3 but for the displacement E33 x3.
+    """
 
     strain: Float = described(f"macroscopic strain {', '.join(SPATIAL_STRAINS)}", shape="(6,)")
     stress_mean: Float = described(f"macroscopic stress {', '.join(SPATIAL_STRESSES)}", STRESS, "(6,)", name="stress")

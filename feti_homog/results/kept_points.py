@@ -48,9 +48,11 @@ def kept(points: Sequence[Point], states: int | str, legs: int, marked: Collecti
 
 
 def drops(points: Sequence[Point], legs: int) -> list[Drop]:
-    """Return the drops of the stress: from each peak to the valley after it, and on a first leg of events also from
-    each load at which bonds break to the next point that a rising load comes to; and the jumps of the strain at a
-    load that is held, where a stress is given that cannot drop."""
+    """Return the drops of the stress, and the jumps of the strain at a load that is held.
+
+    Drops go from each peak to the valley after it, and on a first leg of events also from each load at which bonds
+    break to the next point that a rising load comes to; jumps are where a stress is given that cannot drop.
+    """
     stress, strain = (np.array([point[name] for point in points], float) for name in ("stress", "strain"))
     size, length = _norm(stress, 2.0), _norm(strain, 0.5)
     largest = float(size.max())
@@ -102,9 +104,12 @@ def _filled(numbers: list[int], count: int) -> list[int]:
 
 
 def chosen(document: Document, rows: int, among: Sequence[int] | None = None) -> list[int]:
-    """Numbers of at most `rows` points of a path: the first, the last, the first break, the peak and the valley after
-    it, the deepest drop, the ends of its legs, each if they are not too many, and between them as evenly as bonds
-    broke; with `among`, rising, of these points."""
+    """Numbers of at most `rows` points of a path.
+
+    These are the first, the last, the first break, the peak and the valley after it, the deepest drop, the ends of its
+    legs, each if they are not too many, and between them as evenly as bonds broke; with `among`, rising, of these
+    points.
+    """
     points = document["path"]
     numbers = np.arange(len(points)) if among is None else np.asarray(among, int)
     if len(numbers) <= rows:
@@ -132,8 +137,11 @@ def kept_points(document: Document) -> list[int]:
 
 
 def landmark_states(document: Document, rows: int, count: int) -> list[int]:
-    """Numbers of those of the first `count` states of a path that are at its first break, its peak, the valley after it
-    and its end; with fewer than three of them at most `rows` states, chosen as `chosen_states` chooses."""
+    """Numbers of those of the first `count` states of a path that are at its main points.
+
+    These are its first break, its peak, the valley after it and its end; with fewer than three of them at most `rows`
+    states, chosen as `chosen_states` chooses.
+    """
     among, marked = kept_points(document)[:count], marks(document)
     found = [state for state, point in enumerate(among) if point in marked]
     return found if len(found) >= FEWEST_MARKED else chosen_states(document, rows, count)

@@ -107,8 +107,10 @@ def ends_of_legs(document: Document) -> list[int]:
 
 
 def is_proportional(document: Document) -> bool:
-    """Return whether every point is on a ray of its own from zero: events along one leg, where the response is
-    homogeneous."""
+    """Return whether every point is on a ray of its own from zero.
+
+    It is so for events along one leg, where the response is homogeneous.
+    """
     return document["case"]["path"]["method"] == "events" and legs(document) == 1
 
 
@@ -119,8 +121,10 @@ def interface_sections(document: Document) -> Sequence[Mapping[str, Any]]:
 
 
 def scales_with_toughness(document: Document) -> bool:
-    """Return whether strains and stresses of a path are as the root of the toughness, its loads growing alike: bonds
-    break by energy on springs that the toughness does not change."""
+    """Return whether strains and stresses of a path are as the root of the toughness.
+
+    Its loads grow alike, and bonds break by energy on springs that the toughness does not change.
+    """
     laws = [LAWS.get(section.get("criterion", DEFAULT)) for section in interface_sections(document)]
     by_energy = [law is not None and "toughness" in law.keys and not law.softens for law in laws]
     return bool(document.get("path")) and bool(laws) and all(by_energy)
@@ -164,8 +168,10 @@ def rising_strain(document: Document) -> Float | None:
 
 
 def first_drop(points: Sequence[Point]) -> tuple[Float, int]:
-    """(c,) stress left when the bonds that break at the first point of a proportional path are gone, the load being
-    held there, and the number of the point whose branch it is on."""
+    """(c,) stress left when the bonds that break at the first point of a proportional path are gone, and a point.
+
+    The load is held there; the number is that of the point whose branch the stress is on.
+    """
     load = points[0]["load_factor"]
     number = next((n for n, point in enumerate(points) if n and point["load_factor"] >= load), len(points) - 1)
     return np.asarray(points[number]["stress"]) * load / points[number]["load_factor"], number

@@ -64,8 +64,10 @@ def peak_of(document: Document) -> dict[str, Any]:
 
 
 def _deepest_fall(document: Document, stress: Float) -> tuple[int, float, int | None]:
-    """Return the point of the largest stress (n,) up to the deepest fall in which bonds break, the stress in the valley
-    and the point on whose branch it is; the largest of all points, and None, without a fall.
+    """Return the point of the largest stress (n,) up to the deepest fall in which bonds break, and the valley.
+
+    With the stress in the valley and the point on whose branch it is; the largest of all points, and None, without a
+    fall.
 
     On a path of one leg the load only rises: at the load of a point it comes to the branch of the next that holds.
     """

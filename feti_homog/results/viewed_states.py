@@ -108,8 +108,10 @@ def _gradient(strain: Float) -> Float:
 
 
 def _strain_33(file: Any, strain: Float, in_plane: Float) -> Float:
-    """(m,) strains 33 under a macroscopic strain and stresses (m, 3): those of all elements or, in plane strain and
-    stress, as the materials make them."""
+    """(m,) strains 33 under a macroscopic strain and stresses (m, 3).
+
+    Those of all elements or, in plane strain and stress, as the materials make them.
+    """
     if len(strain) > len(voigt.STRAINS):
         return np.full(len(in_plane), strain[2])
     rules = out_of_plane(json.loads(file.attrs["case"]), tuple(map(str, file.attrs["phases"])))

@@ -192,8 +192,10 @@ def _with_values(base: Mapping[str, Any], point: Assignment, faults: list[str]) 
 
 
 def _entry(table: Any, name: str) -> Any:
-    """Return the table or the list of tables of this name, a new one if there is none, and of a list the table of
-    this number, from 1; None if there is something else."""
+    """Return the table or the list of tables of this name, or of a list the table of this number, from 1.
+
+    A new one is made if there is none; None if there is something else.
+    """
     if isinstance(table, list):
         is_one = name.isdecimal() and 0 < int(name) <= len(table)
         found = table[int(name) - 1] if is_one else None

@@ -23,8 +23,10 @@ DEFAULTS = {"axial_stiffness": "tangential_stiffness", "axial_strength": "tangen
 
 
 def _section_at(files: ResultFiles, nodes: AnyInt | Bool | slice) -> Mapping[str, Any]:
-    """Return the section [interface]; of several, or of fibres of different strengths, with the numbers (p,) of each of
-    the `nodes` in place of one."""
+    """Return the section [interface].
+
+    Of several, or of fibres of different strengths, it has the numbers (p,) of each of the `nodes` in place of one.
+    """
     sections, strength = files.interfaces, files.fibres.strength
     if not sections or (len(sections) == 1 and (strength == 1).all()):
         return sections[0] if sections else {}
@@ -61,8 +63,11 @@ def pairs_of(files: ResultFiles) -> Int:
 
 
 def inwardness(mesh: Mesh, phases: tuple[str, ...], sides: TornSides, part: Int) -> Int:
-    """(parts,) the larger, the farther inwards: by bodies between one and the matrix, then coatings before others, then
-    by their labels; `part` (subdomains,) is that of each."""
+    """(parts,) ranks of parts, the larger, the farther inwards.
+
+    They go by bodies between one and the matrix, then coatings before others, then by their labels; `part`
+    (subdomains,) is that of each.
+    """
     paired = np.flatnonzero(sides.partner >= 0)
     here, there = sides.element[paired], sides.element[sides.partner[paired]]
     ends = part[mesh.subdomain[here]], part[mesh.subdomain[there]]

@@ -47,8 +47,11 @@ class InterfaceRows:
 
 @dataclass(frozen=True)
 class Fibres:
-    """The f fibres by number: numbers, bodies and phases (f,), centres (f, 2), radii (f,), NaN where there is none; and
-    the strength of their bonds / that of the case (f,)."""
+    """The f fibres by number.
+
+    Numbers, bodies and phases (f,), centres (f, 2), radii (f,), NaN where there is none; and the strength of their
+    bonds / that of the case (f,).
+    """
 
     number: AnyInt
     body: AnyInt

@@ -80,8 +80,10 @@ def largest_displacement(cell: DiscreteCell, state: State) -> float:
 
 
 def _check_copies(findings: Findings, cell: DiscreteCell, state: State) -> None:
-    """Check that copies of a node have one fluctuation: in a subdomain by periodicity, elsewhere but across a bond by
-    gluing."""
+    """Check that copies of a node have one fluctuation.
+
+    In a subdomain they do by periodicity, elsewhere but across a bond by gluing.
+    """
     nodes, scale = cell.nodes, largest_displacement(cell, state)
     values = state.fluctuation[nodes.node]
     sides = _sides(cell)
@@ -155,8 +157,11 @@ def _check_averages(findings: Findings, cell: DiscreteCell, state: State, fields
 
 
 def _void_strain(cell: DiscreteCell, state: State) -> Float:
-    """(v,) mean over the cell of the strain of voids: their share of E, and int sym(u* (x) n) ds along them, which is
-    periodic and so closes around voids that the cell's boundary cuts."""
+    """(v,) mean over the cell of the strain of voids.
+
+    It is their share of E, and int sym(u* (x) n) ds along them, which is periodic and so closes around voids that the
+    cell's boundary cuts.
+    """
     v = len(state.strain)
     slope = np.einsum("ni,nd->id", state.fluctuation, cell.void_integrals)
     strain = np.bincount(PLACES[v].ravel(), slope.ravel(), v) / cell.area

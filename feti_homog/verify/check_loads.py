@@ -32,8 +32,10 @@ class UnitLoad:
     temperature: float
 
     def entries(self, told: Mapping[str, Any], stiffness: str, suffix: str, sign: float) -> dict[str, Float]:
-        """Return the stress under it, or under minus it, that is told in a column of a stiffness or in
-        `thermal_stress`."""
+        """Return the stress under a load, or under minus it.
+
+        It is told in a column of a stiffness or in `thermal_stress`.
+        """
         if self.temperature:
             return {"stress": sign * np.array(told[f"thermal_stress{suffix}"])}
         return {"stress": sign * np.array(told[f"{stiffness}{suffix}"]) @ self.strain}

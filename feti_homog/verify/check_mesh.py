@@ -72,8 +72,10 @@ def check_mesh(findings: Findings, cell: DiscreteCell) -> None:
 
 
 def check_interface(findings: Findings, cell: DiscreteCell) -> None:
-    """Each place where two bodies meet that may part has one interface node, of the inner one and of their section,
-    and there are no others."""
+    """Check that each place where two bodies meet that may part has one interface node.
+
+    The node is of the inner body and of their section, and there are no others.
+    """
     rows, faces = cell.files.interface, cell.faces
     at = "interface node {}".format
     findings.record("interface", faces.distance / cell.files.size.max(), at)
@@ -96,8 +98,7 @@ def check_interface(findings: Findings, cell: DiscreteCell) -> None:
 
 
 def _shape(cell: DiscreteCell) -> tuple[Float, Float, Bool]:
-    """Return normals (k, 2) and tributary lengths (k,) that follow from the mesh, and whether (k,) the fibre is
-    round.
+    """Return normals (k, 2) and tributary lengths (k,) that follow from the mesh, and whether (k,) fibres are round.
 
     A round fibre has radial normals and sides that are arcs, 2 R arcsin(chord / 2 R); of others sides are taken as
     straight, and a node has the mean normal of its sides.  Of its length a side gives each end one half or, of order 2,
@@ -139,8 +140,10 @@ def _is_fibre(cell: DiscreteCell) -> Bool:
 
 
 def _strangers(cell: DiscreteCell) -> Float:
-    """(k,) with how many nodes each shares its body on the mesh, or its label of the body and number of the fibre, but
-    not the other."""
+    """(k,) with how many nodes each shares its body in one of two ways, but not in the other.
+
+    One is on the mesh, the other by its label of the body and number of the fibre.
+    """
     nodes, faces, rows = cell.nodes, cell.faces, cell.files.interface
     fibre = rows.fibre + (int(rows.fibre.max(initial=0)) + 1) * rows.body.astype(np.int64)
     own = (faces.row >= 0) & faces.is_fibre

@@ -157,8 +157,10 @@ def _check_counts(findings: Findings, points: Sequence[Point], by_events: bool) 
 
 
 def _check_peak(findings: Findings, peak: Point | None, points: Sequence[Point]) -> None:
-    """Check that no stress before the peak is larger, and that the first break is the first; older results have
-    none."""
+    """Check that no stress before the peak is larger, and that the first break is the first.
+
+    Older results have none.
+    """
     if peak is None:
         return
     strain, stress = (

@@ -20,8 +20,10 @@ Section = Mapping[str, Any]
 
 
 def check_spatial(findings: Findings, cell: DiscreteCell, states: Sequence[StateNumbers]) -> None:
-    """Check the quantities that follow from the stiffness, and the thermal stress from the states under unit
-    strains."""
+    """Check the quantities that follow from the stiffness, and the thermal stress.
+
+    The thermal stress follows from the states under unit strains.
+    """
     document = cell.files.document
     if "effective_stiffness" in document:
         _check_stiffness(findings, document)

@@ -68,8 +68,10 @@ def _check_fibres(findings: Findings, cell: DiscreteCell, told: Sequence[Section
 
 
 def _unlike_scatter(cell: DiscreteCell) -> Float:
-    """(f,) errors of the strengths of fibres, but for those that a table may have given: quantiles of Weibull's
-    distribution with mean 1."""
+    """(f,) errors of the strengths of fibres, but for those that a table may have given.
+
+    Quantiles of Weibull's distribution with mean 1.
+    """
     strength, scatter = cell.files.fibres.strength, next(iter(cell.files.interfaces), {}).get("scatter")
     if cell.files.case["cell"]["geometry"] == "table":
         return np.zeros_like(strength)

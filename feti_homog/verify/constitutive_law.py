@@ -156,8 +156,10 @@ def _engineering_constants(constants: Mapping[str, Any]) -> tuple[list[float], l
 
 
 def _turned(stiffness: Float, degrees: float) -> Float:
-    """C_ijkl = R_ip R_jq R_kr R_ls C'_pqrs in axes x1, x2, (x3) of a material whose axis 1 is `degrees` from x1 to
-    x2."""
+    """C_ijkl = R_ip R_jq R_kr R_ls C'_pqrs in axes x1, x2, (x3) of a material.
+
+    Its axis 1 is `degrees` from x1 to x2.
+    """
     voigt = VOIGT[len(stiffness)]
     turn = _turn(degrees, len(voigt))
     tensor = stiffness[voigt[:, :, None, None], voigt[None, None]]

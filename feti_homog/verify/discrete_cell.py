@@ -131,8 +131,10 @@ class DiscreteCell:
 
     @cached_property
     def node_integrals(self) -> Float:
-        """(n, 2) int dN/dx over all elements of each node, and over the voids that it lies at: int N n ds there, n
-        outward from the void."""
+        """(n, 2) int dN/dx over all elements of each node, and over the voids that it lies at.
+
+        There it is int N n ds, n outward from the void.
+        """
         return np.asarray(self.elements.node_integrals + self.void_integrals)
 
     @cached_property
@@ -181,8 +183,10 @@ class DiscreteCell:
         return max(own, LEAST_SHARE * self.largest_strain * float(self.files.size.max()))
 
     def least_stress(self, state: Loaded) -> float:
-        """Return a stress that a state makes in the bonded cell at least, for scales that debonding does not make
-        zero."""
+        """Return a stress that a state makes in the bonded cell at least.
+
+        It is for scales that debonding does not make zero.
+        """
         own, most = np.abs(self.reuss @ self.loads(state)).max(), np.abs(self.reuss).max() * self.largest_strain
         return float(max(own, LEAST_SHARE * most))
 

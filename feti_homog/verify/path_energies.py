@@ -182,8 +182,11 @@ def _work(one: Float, other: Float) -> float:
 def _check_increments(
     findings: Findings, stiffest: Float, numbers: Sequence[PointNumbers], points: Sequence[Point], scale: float
 ) -> None:
-    """At the load of a step: what was lost is the potential of the old bonds, which (P) bounds by the step before, less
-    that of the new; the strain of the new ones in bonded phases stores no less than the old bonds would have."""
+    """Check the energy lost at the load of each step.
+
+    It is the potential of the old bonds, which (P) bounds by the step before, less that of the new; the strain of the
+    new ones in bonded phases stores no less than the old bonds would have.
+    """
     total = 0.0
     for number, (point, now) in enumerate(zip(points, numbers, strict=True)):
         lost, low, high = point["dissipated"] - total, 0.0, 0.0

@@ -40,8 +40,10 @@ class Prescribed:
 
 
 def targets(case: Document) -> list[Prescribed]:
-    """Return the loads that a case names, each in full: what one does not name stays, and is at first free of
-    stress."""
+    """Return the loads that a case names, each in full.
+
+    A component that one does not name stays, and is at first free of stress.
+    """
     v = 6 if case["analysis"]["plane"] == "generalized" else 3
     n = v + (v > 3)
     strains, stresses = NAMES[v]

@@ -64,8 +64,10 @@ class TornNodes:
 
 
 def torn(mesh: Mesh, size: Float) -> tuple[TornSides, TornNodes, float]:
-    """Return the torn sides and nodes of a mesh on the torus of the given size (2,), and how near the same places
-    are."""
+    """Return the torn sides and nodes of a mesh on the torus of the given size (2,), and a distance.
+
+    The distance is how near the same places are.
+    """
     element, nodes = _torn_sides(mesh)
     ends = mesh.points[nodes[:, :2]]
     chord = ends[:, 1] - ends[:, 0]

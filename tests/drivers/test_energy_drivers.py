@@ -33,8 +33,10 @@ def test_curves_by_energy_that_is_released_depend_little_on_the_mesh(tmp_path):
 
 
 def of_its_path(row, folder, component, name=""):
-    """Return the result in a folder, whose path has the first break and, where its load is the highest so far, the
-    peak."""
+    """Return the result in a folder.
+
+    Its path has the first break and, where its load is the highest so far, the peak.
+    """
     result = json.loads((folder / "result.json").read_text())
     load, stress = np.array([[point["load_factor"], point["stress"][component]] for point in result["path"]]).T
     first = next(k for k, point in enumerate(result["path"]) if point["broke"])

@@ -26,8 +26,10 @@ def done(*words: str | Path, **options) -> str:
 
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory) -> Path:
-    """Provide the folder of an environment with the wheel, which finds its requirements where those of the tests
-    are."""
+    """Provide the folder of an environment with the wheel.
+
+    It finds its requirements where those of the tests are.
+    """
     folder = tmp_path_factory.mktemp("installed")
     source = folder / "source"
     for name in SOURCES:

@@ -1,5 +1,7 @@
-"""Energy release rates at tips: against differences of the energy, published numbers and laws, on all numbers
-of ranks."""
+"""Energy release rates at tips, on all numbers of ranks.
+
+They are compared with differences of the energy, published numbers and laws.
+"""
 
 from __future__ import annotations
 

@@ -62,8 +62,10 @@ def test_voids_of_a_table_are_those_of_a_mesh_with_holes(comm, shared_path, deco
 
 @pytest.mark.parametrize(("a", "b"), [(0.04, 0.04), (0.06, 0.03), (0.02, 0.06)])
 def test_a_small_elliptic_void_softens_as_the_dilute_limit_says(comm, a, b):
-    """Compliances of plane stress grow by pi / (E A) times 2 b^2 + a b, 2 a^2 + a b, -a b and of shear 2 (a + b)^2, to
-    first order in the area [Kachanov 1993]."""
+    """Compliances of plane stress grow in proportion to the area of an ellipse [Kachanov 1993].
+
+    They grow by pi / (E A) times 2 b^2 + a b, 2 a^2 + a b, -a b and of shear 2 (a + b)^2, to first order in the area.
+    """
     row = {"x": 0.5, "y": 0.5, "a": a, "b": b, "phase": "void"}
     cell = table([row], mesh_size=0.2, interface_size=0.01, order=2)
     L = solved(comm, cell, plane="stress", fibre=False).effective_stiffness

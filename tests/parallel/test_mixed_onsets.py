@@ -75,8 +75,10 @@ def load(names, of_stresses, values, temperature):
 
 
 def first_break(cell, axes, values, temperature):
-    """Strain and stress (6,) of the first event of the path to these values (2,) of the axes, after a change of
-    temperature if there is one, and the share of its leg.  Collective."""
+    """Strain and stress (6,) of the first event of the path, and the share of its leg.  Collective.
+
+    The path goes to these values (2,) of the axes, after a change of temperature if there is one.
+    """
     size = np.array([cell.summary.width, cell.summary.height])
     contact = cell.case.interface.contact
     loaded = CoupledInterfaces(

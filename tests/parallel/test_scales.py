@@ -147,8 +147,10 @@ STRAIN, TOUGHNESS, SENSITIVITY, RATIO = np.array([1.0, 0.2, 0.3]), 1e-4, 0.25, 0
 
 @dataclass(frozen=True)
 class RigidFibre:
-    """One round fibre on springs, with faces that may overlap and part by `jump` (k, 2), normal and tangential, where
-    nothing holds them."""
+    """One round fibre on springs, with faces that may overlap.
+
+    They part by `jump` (k, 2), normal and tangential, where nothing holds them.
+    """
 
     jump: np.ndarray
     arm: np.ndarray

@@ -1,5 +1,7 @@
-"""Bodies that touch themselves or another twice at a node, which there never part: images of pixels against other
-solvers, with nodes moved a little, and turned."""
+"""Bodies that touch themselves or another twice at a node, where they never part.
+
+Images of pixels are compared with other solvers, with nodes moved a little, and turned.
+"""
 
 from __future__ import annotations
 

@@ -55,8 +55,10 @@ def plane_strain(young: float, poisson: float) -> np.ndarray:
 
 
 def eshelby(a: float, b: float, nu: float) -> np.ndarray:
-    """(3, 3) Eshelby's tensor of an elliptic cylinder in the plane: Mura, Micromechanics of defects in solids (1987),
-    Eq. (11.22)."""
+    """(3, 3) Eshelby's tensor of an elliptic cylinder in the plane.
+
+    Mura, Micromechanics of defects in solids (1987), Eq. (11.22).
+    """
     s, k = a + b, 1 - 2 * nu
     tensor = [
         [(b * b + 2 * a * b) / s**2 + k * b / s, b * b / s**2 - k * b / s, 0],

@@ -12,8 +12,10 @@ BONDED = (0.0, 0.0, 0.0)
 
 
 def michell(phase, r):
-    """(4, 4) rows sigma_rr, tau, u_r, u_t over cos 2t, sin 2t, cos 2t, sin 2t of the stress functions
-    (r^2, r^4, r^-2, 1) cos 2t in plane strain (Michell; Timoshenko and Goodier)."""
+    """(4, 4) rows sigma_rr, tau, u_r, u_t over cos 2t, sin 2t, cos 2t, sin 2t of stress functions.
+
+    The functions are (r^2, r^4, r^-2, 1) cos 2t in plane strain (Michell; Timoshenko and Goodier).
+    """
     m, kappa = phase.G_transverse, 1 + 2 * phase.G_transverse / phase.K_transverse
     return np.array([
         [-2, 0, -6 / r**4, -4 / r**2],
@@ -94,8 +96,10 @@ def hill(phase):
 
 
 def tractions_of_fibre(matrix, fibre, radius, springs):
-    """p0, N and T of a fibre alone in the matrix: t_n = s p0 + d N cos 2t and t_t = d T sin 2t under the far stresses
-    s11 = s + d and s22 = s - d."""
+    """p0, N and T of a fibre alone in the matrix.
+
+    t_n = s p0 + d N cos 2t and t_t = d T sin 2t under the far stresses s11 = s + d and s22 = s - d.
+    """
     (normal, tangential), stiff, soft = springs, 2 * fibre.K_transverse, 2 * matrix.K_transverse
     # u = p r / stiff in the fibre, r / soft + C / r in the matrix, where the radial stress is 1 - 2 m C / r^2.
     m = 2 * matrix.G_transverse / radius**2

@@ -41,8 +41,11 @@ class MixedLoad:
 
 @dataclass(frozen=True)
 class State:
-    """Loads (m,) and what works on them per area (m,), energy per area with that of the springs and theirs alone, jumps
-    and forces on the fibre (k, d), and which nodes (k,) are `closed`, debonded ones that touch."""
+    """Loads (m,), their works and energies, jumps and forces on the fibre (k, d), and closed nodes.
+
+    What works on the loads per area (m,), energy per area with that of the springs and theirs alone, and which nodes
+    (k,) are `closed`, debonded ones that touch.
+    """
 
     strain: np.ndarray
     stress: np.ndarray

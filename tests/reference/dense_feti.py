@@ -80,8 +80,10 @@ class DenseDual:
         return [inverse @ (B / d) for B, d in zip(self.B, self.D, strict=True)]
 
     def balanced(self, active, V):
-        """(total, total) B_D S_0 B_D^T with S_0 = S - S Z (Z^T S Z)^+ Z^T S and Z = (I - B_D^T B) V, V (n, m) of each
-        subdomain."""
+        """(total, total) B_D S_0 B_D^T with S_0 = S - S Z (Z^T S Z)^+ Z^T S and Z = (I - B_D^T B) V.
+
+        V (n, m) is of each subdomain.
+        """
         S, modes = block_diag(*self.S), block_diag(*V)
         BD = np.hstack(self.scaled(active))
         Z = modes - BD.T @ (np.hstack(self.B) @ modes)

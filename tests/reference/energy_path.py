@@ -1,5 +1,8 @@
-"""Load paths of bonds that break by energy, by brute force: every state anew by `quadratic_programme`, and what a break
-releases from the compliance of the cell in displacements."""
+"""Load paths of bonds that break by energy, by brute force.
+
+Every state is made anew by `quadratic_programme`, and what a break releases follows from the compliance of the cell in
+displacements.
+"""
 
 from __future__ import annotations
 
@@ -56,8 +59,11 @@ class SlowEnergyPath:
         return np.flatnonzero(found)
 
     def released(self, state, bonded, tips):
-        """(t,) energies that the single breaks release at fixed strain, with the faces that touch as they are: the
-        springs lam = k j go, and their ends part by (1 - A k)^-1 j, A being the compliance of the cell with them."""
+        """(t,) energies that the single breaks release at fixed strain, with the faces that touch as they are.
+
+        The springs have lam = k j go, and their ends part by (1 - A k)^-1 j, A being the compliance of the cell with
+        them.
+        """
         programme, lengths = self.programme, self.programme.lengths()
         stiff = np.stack([self.springs[0] * lengths, self.springs[1] * lengths], axis=1)
         rows = [programme._gaps(np.arange(len(bonded))), programme._slips()]

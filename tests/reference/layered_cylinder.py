@@ -37,15 +37,19 @@ def excess_energy(layers, medium):
 
 
 def self_consistent_shear(layers, medium_of):
-    """Return the shear modulus m* of the medium `medium_of(m*)` whose energy the layers, matrix outside, do not change
-    (Christensen and Lo 1979 of two layers; Herve and Zaoui 1995 of more)."""
+    """Return the shear modulus m* of the medium `medium_of(m*)` whose energy the layers do not change.
+
+    The matrix is outside (Christensen and Lo 1979 of two layers; Herve and Zaoui 1995 of more).
+    """
     scale = layers[-1][0].G_transverse
     return scale * brentq(lambda x: excess_energy(layers, medium_of(scale * x)), 1e-3, 1e3, xtol=1e-15, rtol=1e-14)
 
 
 def dilute_shear(matrix, layers):
-    """dG/dc of layers alone in the matrix, c their area over that of the cell: at the strain -e11 = e22 = 1/G of
-    `excess_energy` 4 dG / G^2 times the cell's area is -pi times that integral."""
+    """dG/dc of layers alone in the matrix, c their area over that of the cell.
+
+    At the strain -e11 = e22 = 1/G of `excess_energy` 4 dG / G^2 times the cell's area is -pi times that integral.
+    """
     return -(matrix.G_transverse**2) * excess_energy(layers, matrix) / (4 * layers[-1][1] ** 2)
 
 
@@ -62,8 +66,10 @@ def dilute_axial_shear(matrix, layers):
 
 
 def axisymmetric_stiffness(layers):
-    """(2, 2) pressure outside and mean sigma_33, of the change of area and of the axial strain (Hashin and Rosen 1964,
-    of any layers): u = B r + C/r with one B and C for each layer, and C = 0 in the first."""
+    """(2, 2) pressure outside and mean sigma_33, of the change of area and of the axial strain.
+
+    u = B r + C/r with one B and C for each layer, and C = 0 in the first (Hashin and Rosen 1964, of any layers).
+    """
     radii = np.array([radius for _, radius in layers])
     constants = [(*hill(phase)[:3], phase.G_transverse) for phase, _ in layers]
     count = 2 * len(layers)

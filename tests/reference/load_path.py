@@ -27,8 +27,10 @@ class Event:
 
 @dataclass(frozen=True)
 class SlowLoadPath:
-    """A cell whose bonds have the strengths `normal` and `tangential`, numbers or (k,), by the
-    `criterion` "max" or "quadratic"."""
+    """A cell whose bonds have strengths by the `criterion` "max" or "quadratic".
+
+    `normal` and `tangential` are numbers or (k,).
+    """
 
     programme: QuadraticProgramme
     contact: bool

@@ -115,8 +115,10 @@ class MixedPath:
         return self.events
 
     def increments(self, loads, steps, worst_only):
-        """(state, bonds that broke, what has been lost) after each of so many equal steps of the whole path, a multiple
-        of the legs: overloaded bonds break, or the worst alone, until none is."""
+        """(state, bonds that broke, what has been lost) after each of so many equal steps of the whole path.
+
+        Their number is a multiple of the legs: overloaded bonds break, or the worst alone, until none is.
+        """
         found, own, last = [], steps // len(loads), None
         for load in loads:
             start = MixedLoad(np.zeros(self.cell.m), load.by_stress)

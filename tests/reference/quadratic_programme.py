@@ -23,8 +23,10 @@ EXACT = 1e-9  # relative, of the KKT conditions of an answer
 
 @dataclass(frozen=True)
 class State:
-    """Energy, Sigma (3,), displacements (n, 2), and of the interface nodes: gap and slip, and the force on the
-    fibre, both (k, 2) in n and t; `closed` (k,) of the debonded nodes."""
+    """Energy, Sigma (3,), displacements (n, 2), and jumps and forces of the interface nodes.
+
+    Gap and slip, and the force on the fibre, both (k, 2) in n and t; `closed` (k,) of the debonded nodes.
+    """
 
     energy: float
     stress: np.ndarray
@@ -134,8 +136,11 @@ class QuadraticProgramme:
         return State(float(energy), stress, u, *turned, closed)
 
     def solve_elastic(self, strain, bonded, contact, springs):
-        """Return the same with springs of stiffnesses `springs` (normal, tangential), numbers or (k,), at bonded nodes,
-        and normal ones in compression between debonded faces. The energy is that of the bodies and of the springs."""
+        """Return the same with springs of stiffnesses `springs` (normal, tangential), numbers or (k,).
+
+        They are at bonded nodes, and normal ones in compression between debonded faces. The energy is that of the
+        bodies and of the springs.
+        """
         k, lengths = len(bonded), self.lengths()
         stiffness = [s * lengths for s in springs]
         free = np.flatnonzero(~bonded) if contact else np.zeros(0, int)
@@ -204,8 +209,11 @@ def nearest(points, centres, radii, size):
 
 
 def rigid_motions(rigid, T, held, C):
-    """(free dofs, z) motions of the fibres, of all `rigid` (n, c, fibres, m), that do not part what is held, as `held`
-    (h, c, fibres, m) says, and that no row of C resists; T (cn, free dofs) are the displacements of all nodes."""
+    """(free dofs, z) motions of the fibres that do not part what is held, and that no row of C resists.
+
+    They are of all `rigid` (n, c, fibres, m); `held` (h, c, fibres, m) says what is held; T (cn, free dofs) are the
+    displacements of all nodes.
+    """
     n, c, fibres, m = rigid.shape
     v = (T.T @ rigid.reshape(n * c, fibres * m)) / np.maximum(T.T @ np.ones(c * n), 1.0)[:, None]
     resisted = np.concatenate([held.reshape(len(held) * c, fibres * m), C @ v, np.zeros((fibres * m,) * 2)])

@@ -74,8 +74,10 @@ def rotated_strain(strain, angle):
 
 
 def laminate(phases, fractions, across, springs=(np.inf, np.inf)):
-    """Stiffness (6, 6) and thermal stress (6,) of layers normal to the axis `across`, with two interfaces in a period
-    of one of the stiffnesses `springs`, normal and tangential; `phases` are pairs of stiffness and expansion.
+    """Stiffness (6, 6) and thermal stress (6,) of layers normal to the axis `across`.
+
+    There are two interfaces in a period of one of the stiffnesses `springs`, normal and tangential; `phases` are pairs
+    of stiffness and expansion.
 
     The stresses s_a that act across the layers and the strains E_b along them are the same in all layers, and
     E_a = <e_a> + jumps:
@@ -149,8 +151,10 @@ def stiffness_of_constants(E1, E2, G12, G23, nu12, nu23):
 
 
 def layered_contrast(fibre, coating, share):
-    """Return the contrast of a homogeneous fibre that answers cos(n t) as one in a coating does, over the matrix:
-    function of n; `share` is the area of the fibre within that of both."""
+    """Return the contrast of a homogeneous fibre that answers cos(n t) as one in a coating does.
+
+    It is over the matrix, a function of n; `share` is the area of the fibre within that of both.
+    """
 
     def contrast(n):
         reflected = (coating - fibre) / (coating + fibre) * share**n
@@ -160,8 +164,9 @@ def layered_contrast(fibre, coating, share):
 
 
 def axial_shear_modulus(geometry, c, contrast, terms=40):
-    """Axial shear modulus of round fibres over that of the matrix, by Rayleigh's method (Perrins, McKenzie, McPhedran
-    1979): Re B_n z^-n about each fibre, n odd, a its radius,
+    """Axial shear modulus of round fibres over that of the matrix, by Rayleigh's method.
+
+    Perrins, McKenzie, McPhedran 1979: Re B_n z^-n about each fibre, n odd, a its radius,
 
     B_n / (g a^2n) + sum_m (m+n-1 over n) S_(m+n) B_m = delta_n1, g = (1 - contrast) / (1 + contrast),
 

@@ -14,8 +14,9 @@ from reference.quadratic_programme import QuadraticProgramme, torus_keys
 
 
 class TouchingBodies(QuadraticProgramme):
-    """The unit square of `points` (n, 2) and `triangles` (m, 3) in phases (m,), 0 the matrix, of stiffnesses L
-    (phases, 3, 3).
+    """The unit square of `points` (n, 2) and `triangles` (m, 3) in phases (m,), 0 the matrix.
+
+    Their stiffnesses are L (phases, 3, 3).
 
     `held` has the keys of the places where two bodies meet and never part, `ends` (k, 2 p) the keys of the edges' ends.
     """

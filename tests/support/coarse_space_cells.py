@@ -27,8 +27,10 @@ SINGLE = 2e-6
 
 
 class Narrow:
-    """The narrow cell at one threshold, its dense dual problem, and as dense matrices the preconditioner without coarse
-    space, M, that of dense modes, and what the program applies, H."""
+    """The narrow cell at one threshold, its dense dual problem, and preconditioners as dense matrices.
+
+    These are the preconditioner without coarse space, M, that of dense modes, and what the program applies, H.
+    """
 
     def __init__(self, threshold, dense=None):
         """Solve the dense dual problem, which does not depend on the threshold.  Collective."""

@@ -118,8 +118,11 @@ def _leaves(value: Any, path: str) -> Iterator[tuple[str, np.ndarray]]:
 
 
 def differences(one: Result, other: Result, units: Units) -> dict[str, float]:
-    """By the place of each number of `other` that is not that of `one` in its units the largest difference, relative
-    to the largest number of that kind in the result, of checks absolute; inf where one of the results has none."""
+    """Largest differences, by the place of each number of `other` that is not that of `one` in its units.
+
+    They are relative to the largest number of that kind in the result, of checks absolute; inf where one of the results
+    has none.
+    """
     ours, theirs = ({path: (powers, v) for path, powers, v in numbers(result)} for result in (one, other))
     off, sizes = dict.fromkeys(ours.keys() ^ theirs.keys(), np.inf), {}
     for path, (_, values) in ours.items():

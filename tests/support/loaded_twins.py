@@ -29,8 +29,10 @@ EPOXY_GLASS = (
 
 
 def document(cell, phases, plane, interface=None, petsc=None, **analysis):
-    """Return a case as a document: `phases` are tables of materials, `analysis` is one type and its section, or
-    None."""
+    """Return a case as a document.
+
+    `phases` are tables of materials, `analysis` is one type and its section, or None.
+    """
     (name,) = analysis
     circular = {} if cell.get("geometry") == "mesh" else {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.3}
     sections = {key: value for key, value in (analysis | {"interface": interface}).items() if value is not None}
@@ -157,8 +159,10 @@ def is_end(point, legs):
 
 
 def compare_paths(comm, tolerance=1e-8, steps=12, **case):
-    """Return the result of a path whose points are those of the oracle: events with their energies, and changes of
-    contact between them; and the events. Collective."""
+    """Return the result of a path whose points are those of the oracle, and the events. Collective.
+
+    The points are events with their energies, and changes of contact between them.
+    """
     twin, result = LoadedTwin(comm, **case), solved(comm, **case)
     events, legs = twin.path(steps), len(twin.loads)
     points = [p for p in result.path if p.broke or is_end(p, legs)]

@@ -36,8 +36,10 @@ def random_image(size: int, seed: int, share: float = 0.4, phases: int = 1, void
 
 
 def pixel_mesh(image: np.ndarray, jitter: float = 0.0, symmetry: np.ndarray = SYMMETRIES[0], seed: int = 0) -> MshFile:
-    """Return the unit square of these pixels, negative ones voids, its nodes moved by up to `jitter` pixels,
-    periodically, and then turned or mirrored about its centre."""
+    """Return the unit square of these pixels, negative ones voids.
+
+    Its nodes are moved by up to `jitter` pixels, periodically, and then turned or mirrored about its centre.
+    """
     n = len(image)
     i, j = np.meshgrid(np.arange(n + 1), np.arange(n + 1))
     moved = jitter * np.random.default_rng(seed).uniform(-1, 1, (2, n, n))
@@ -60,8 +62,10 @@ def pixel_mesh(image: np.ndarray, jitter: float = 0.0, symmetry: np.ndarray = SY
 
 
 def turned(symmetry: np.ndarray, of_strain: bool = False) -> np.ndarray:
-    """(3, 3) what makes of the stresses [11, 22, 12] of a body, or of its strains with engineering shear, those of the
-    body turned or mirrored."""
+    """(3, 3) matrix that turns or mirrors stresses [11, 22, 12] of a body, or its strains.
+
+    Strains have engineering shear.
+    """
     (a, b), (c, d) = symmetry
     two, half = (1, 2) if of_strain else (2, 1)
     return np.array(

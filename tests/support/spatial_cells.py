@@ -87,8 +87,11 @@ def _expansion(alpha):
 
 
 def error(found, expected):
-    """Largest difference of entries, of a stiffness relative to the root of the product of its diagonal entries, else
-    to the largest entry, or to 1e-12 where there is none."""
+    """Largest difference of entries.
+
+    It is, of a stiffness, relative to the root of the product of its diagonal entries, else to the largest entry, or to
+    1e-12 where there is none.
+    """
     difference, expected = np.abs(found - expected), np.asarray(expected)
     if expected.ndim == 2:
         size = np.sqrt(expected.diagonal())

@@ -34,7 +34,9 @@ class ReferencedCell:
 
     def status(self, bonded):
         """Return the status on this rank, debonded nodes open, of the reference's `bonded` (k,) on rank 0.
-        Collective."""
+
+        Collective.
+        """
         comm = self.cell.comm
         bonded = comm.bcast(bonded[self.order] if comm.rank == 0 else None)
         first = comm.exscan(self.here) or 0
@@ -59,8 +61,10 @@ class ReferencedCell:
 
 
 def tear(comm, arcs=(), thresholds=DEFAULTS, springs=(None, None), policy=DEFAULT_POLICY, **case):
-    """Return the torn cell of the case that `make_case` makes, the tips of arcs at its nodes, with elastic interfaces
-    of the stiffnesses `springs`. Collective."""
+    """Return the torn cell of the case that `make_case` makes. Collective.
+
+    The tips of arcs are at its nodes, and elastic interfaces have the stiffnesses `springs`.
+    """
     PETSc.garbage_cleanup(comm)
     normal, tangential = springs
     bonding = sections.InterfaceSection(debonded=tuple(arcs), normal_stiffness=normal, tangential_stiffness=tangential)

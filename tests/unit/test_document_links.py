@@ -72,8 +72,10 @@ def names_in(module):
 
 
 def module_of(dotted):
-    """Return the file of a dotted name below the package, and the names after it: a package, a module, or names in
-    one."""
+    """Return the file of a dotted name below the package, and the names after it.
+
+    A package, a module, or names in one.
+    """
     words = dotted.removeprefix("feti_homog.").split(".")
     place = ROOT / "feti_homog"
     while words and (place / words[0]).is_dir():

@@ -101,8 +101,11 @@ class AdaptiveCoarseSpace:
         self.factor(self.part())
 
     def activate(self, active: Float) -> None:
-        """Average over the copies that the owned rows hold together of which `active` is 1, those of the scaling, and
-        factor.  Collective.  Raises as `factor`."""
+        """Average over the copies, and factor.  Collective.
+
+        The copies are those that the owned rows hold together of which `active` is 1, as in the scaling. Raises as
+        `factor`.
+        """
         mask = self._jump_operator.gather(active).copy()
         changed = mask != self._mask
         touched = [i for i, rows in enumerate(self._neighbours.rows) if changed[rows].any()]
@@ -169,7 +172,9 @@ class AdaptiveCoarseSpace:
 
     def balanced(self, x: Float) -> Float:
         """Return the forces S_0 x (boundary dofs,) or (boundary dofs, k) of displacements x of that shape.
-        Collective."""
+
+        Collective.
+        """
         forces = self._operators.apply_with_springs(x)
         if not self.coarse_dimension:
             return forces

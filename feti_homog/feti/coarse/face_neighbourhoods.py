@@ -96,8 +96,9 @@ class FaceNeighbourhood:
 def face_neighbourhoods(
     body: Subdomain, dofs: Int, face: Int, thresholds: Thresholds = DEFAULTS
 ) -> list[FaceNeighbourhood]:
-    """Return the neighbourhoods of a face: one for each connected part of what is near it and has enough of its
-    nodes.
+    """Return the neighbourhoods of a face.
+
+    One for each connected part of what is near it and has enough of its nodes.
 
     Args:
         dofs: (n,) boundary dofs of the body, sorted.

@@ -101,8 +101,10 @@ class AveragedModes:
 def _exchange_jumps(
     comm: MPI.Intracomm, blocks: Sequence[SubdomainBlocks], neighbours: Neighbours, V: Sequence[Float]
 ) -> tuple[list[list[_Jumps]], Int]:
-    """For each subdomain of this rank the jumps on its rows, and where the coarse modes of each subdomain of the cell
-    end.  Collective."""
+    """Return the jumps on the rows of each subdomain of this rank, and where coarse modes end.  Collective.
+
+    The ends are those of the coarse modes of each subdomain of the cell.
+    """
     counts = np.zeros(len(neighbours.rank), np.int64)
     counts[neighbours.index] = [v.shape[1] for v in V]
     comm.Allreduce(MPI.IN_PLACE, counts)

@@ -154,8 +154,10 @@ class ConstraintLayout:
         return np.asarray(normal / np.hypot(*normal.T)[:, None])
 
     def _lengths(self, entity: Int, p: Int) -> Float:
-        """(i,) row sums of the interface mass matrix: halves of sides for linear elements, Simpson's rule for quadratic
-        ones."""
+        """(i,) row sums of the interface mass matrix.
+
+        Halves of sides for linear elements, Simpson's rule for quadratic ones.
+        """
         shared, lattice = self.shared, self.lattice
         is_edge = shared.is_edge[entity]
         in_middle = is_edge & (p % 2 == 0) & (lattice.order == 2)
@@ -194,8 +196,10 @@ class ConstraintLayout:
         )
 
     def facing(self) -> tuple[Int, Int]:
-        """(local rows, 2) how many copies the outer and the inner of two bodies have where a row is between them,
-        and (local rows,) the inner body; 0 and -1 of other rows."""
+        """(local rows, 2) numbers of copies of the outer and the inner body, and (local rows,) the inner body.
+
+        They are of rows between two bodies; 0 and -1 of other rows.
+        """
         shared = self.shared
         entity = np.repeat(np.arange(len(shared.key)), shared.copies)
         # Sharers are sorted inwards: the first is the outer body's.
@@ -213,8 +217,10 @@ class ConstraintLayout:
         return copies, inside
 
     def outer_copies(self) -> tuple[Int, Int]:
-        """Return the breakable nodes of which this rank has the outer body's first copy: the local row of the bond
-        of each, and that copy among the fine nodes of this rank."""
+        """Return the breakable nodes of which this rank has the outer body's first copy.
+
+        The local row of the bond of each, and that copy among the fine nodes of this rank.
+        """
         shared = self.shared
         first = self.base[shared.pointer[:-1]]
         here = np.flatnonzero((shared.fibre >= 0) & (first >= 0))

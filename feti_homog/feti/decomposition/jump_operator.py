@@ -105,8 +105,10 @@ class JumpOperator:
         return self._exchange(local).sum(local)
 
     def from_outer(self, numbers: Int) -> Int:
-        """(k,) the numbers that the ranks of the outer bodies give their fine nodes, at the interface nodes that this
-        rank owns; each has one for all of its own fine nodes.  Collective."""
+        """(k,) the numbers that ranks of the outer bodies give their fine nodes, at the interface nodes of this rank.
+
+        The interface nodes are those that it owns; each rank has one number for each of its own fine nodes. Collective.
+        """
         rows, copies = self.outer_copies
         local = np.zeros(len(self.rows))
         local[rows] = numbers[copies]  # exact, as integers below 2^53 are

@@ -26,8 +26,10 @@ class Decomposition:
 def decompose(
     torus: Torus, parts: Int, pieces: Int, n_ranks: int, length_classes: int = LENGTH_CLASSES
 ) -> Decomposition:
-    """Cut the bodies of a whole cell into pieces, see `cut_into_pieces`, and assign these to ranks, see
-    `assign_ranks`."""
+    """Cut the bodies of a whole cell into pieces, and assign these to ranks.
+
+    See `cut_into_pieces` and `assign_ranks`.
+    """
     left, right, edge = torus.sides
     subdomain = cut_into_pieces(torus, parts, pieces, torus.edge_lengths[edge].max(), length_classes)
     apart = subdomain[left] != subdomain[right]
@@ -114,8 +116,11 @@ def _metis(graph: csr_matrix, count: int, load: Int | None = None) -> Int:
 
 
 def assign_ranks(load: Int, left: Int, right: Int, n_ranks: int) -> Int:
-    """(s,) rank of each subdomain of so many triangles (s,): neighbours (left, right), in a row for each edge that they
-    share, on the same one as far as the loads stay even; some get none if there are more ranks than subdomains."""
+    """(s,) rank of each subdomain of so many triangles (s,).
+
+    Neighbours (left, right), in a row for each edge that they share, are on the same one as far as the loads stay even;
+    some ranks get none if there are more ranks than subdomains.
+    """
     even = balanced(load, n_ranks)
     if n_ranks == 1 or len(load) <= n_ranks:
         return even

@@ -109,8 +109,10 @@ def interface_geometry(
 
 
 def _check(own: SubmeshesOfRank, found: Sharers, normals: Float, sums: Float) -> None:
-    """Raise MeshError where a normal is not finite, is zero, or is that of sides folded onto each other, whose
-    directions cancel; `normals` (n, 2, 2) and `sums` (n, 4) as in `InterfaceGeometry`."""
+    """Raise MeshError where a normal is not finite or zero, or its sides are folded onto each other.
+
+    The directions of folded sides cancel; `normals` (n, 2, 2) and `sums` (n, 4) as in `InterfaceGeometry`.
+    """
     length = np.linalg.norm(normals, axis=2)
     folded = ~found.is_edge & ~(np.hypot(*sums[:, :2].T) > FOLDED * sums[:, 2])
     bad = np.flatnonzero(~(np.isfinite(length) & (length > 0)).all(axis=1) | folded)
@@ -123,8 +125,11 @@ def _check(own: SubmeshesOfRank, found: Sharers, normals: Float, sums: Float) ->
 
 
 def _sums_at_vertices(comm: MPI.Intracomm, found: Sharers, owner: Int, ends: Int, edge: Int, parts: Float) -> Float:
-    """(n, k) for each entity that this rank owns, what all ranks have for it: `parts` (p, 2, k) of these edges (p,) for
-    the classes at their `ends` (p, 2), each of which is an entity or the pinned class.  Collective."""
+    """(n, k) the sums over all ranks for each entity that this rank owns.  Collective.
+
+    They are of `parts` (p, 2, k) of these edges (p,) for the classes at their `ends` (p, 2), each of which is an entity
+    or the pinned class.
+    """
     order, code = np.argsort(found.code), entity_code(ends, False)
     ordered = found.code[order]
     is_entity = np.isin(code, ordered)
@@ -139,8 +144,7 @@ def _sums_at_vertices(comm: MPI.Intracomm, found: Sharers, owner: Int, ends: Int
 
 
 def _triangles_beside(own: SubmeshesOfRank, key: Int, subdomain: Int) -> tuple[Int, Int]:
-    """Return the triangle (n,) of this rank's subdomain (n,), and which of its edges (n,) is the torus edge `key`
-    (n,)."""
+    """Return the triangle (n,) of this rank's subdomain (n,), and its edge (n,) that is the torus edge `key` (n,)."""
     whole = own.whole
     edge = np.searchsorted(whole.edge_keys, key)
     wanted = np.full(len(whole.edge_keys), -1)
@@ -153,8 +157,10 @@ def _triangles_beside(own: SubmeshesOfRank, key: Int, subdomain: Int) -> tuple[I
 
 
 def _edge_normals(mesh: Submesh, triangle: Int, k: Int) -> tuple[Float, Float]:
-    """Return normals (n, 2, 2) out of triangles (n,) at the start and end of their edges k (n,), as in
-    `SharedEntities`, and the turns (n,) of these."""
+    """Return normals (n, 2, 2) out of triangles (n,) at the start and end of their edges k (n,).
+
+    As in `SharedEntities`, and the turns (n,) of these.
+    """
     a, b = (mesh.points[mesh.triangles[triangle, (k + step) % 3]] for step in (0, 1))
     plane = mesh.triangle_edges[triangle, k]
     turn = mesh.turns[plane]

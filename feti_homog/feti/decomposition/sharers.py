@@ -58,8 +58,10 @@ def entity_code(key: Int, is_edge: Bool | bool) -> Int:
 
 
 def find_sharers(comm: MPI.Intracomm, own: SubmeshesOfRank, table: SubdomainTable) -> Sharers:
-    """Return the vertex classes, but for the pinned one, and the torus edges that several subdomains share, one of
-    them of this rank. Collective."""
+    """Return the vertex classes, but for the pinned one, and the torus edges that subdomains share. Collective.
+
+    Several subdomains share each, one of them of this rank.
+    """
     code, subdomain = _told(own)
     code, subdomain = exchange(comm, code // 2 % comm.size, code, subdomain)
     order = np.lexsort((subdomain, table.nesting[table.body[subdomain]], code))
@@ -100,8 +102,10 @@ def _told(own: SubmeshesOfRank) -> tuple[Int, Int]:
 
 
 def _several(keys: Int, member: Int, at_border: Bool) -> tuple[Int, Int]:
-    """Return the keys of triangles (t, 3), negative ones left out, that several members (t,) have or that are at
-    the border of all, and these members."""
+    """Return the keys of triangles (t, 3), negative ones left out.
+
+    That several members (t,) have or that are at the border of all, and these members.
+    """
     n = int(member.max(initial=0)) + 1
     low, high = np.full(len(at_border) + 1, n), np.full(len(at_border) + 1, -1)
     for corner in keys.T:

@@ -80,8 +80,11 @@ class Subdomain:
         return cls(submesh, mesh, problem, L, Q, body.area, R, positions, K, **flags)
 
     def mean_strain(self, dofs: Int) -> Float:
-        """(k, m) whose transpose times the displacements u of `dofs` (k,) is their share in int eps* over the subdomain
-        and what lies of voids beside it, int_Omega eps* + int u (x) n ds, n outward from the voids; 0 at voids."""
+        """(k, m) whose transpose times the displacements u of `dofs` (k,) is their share in int eps*.
+
+        The integral is over the subdomain and what lies of voids beside it, int_Omega eps* + int u (x) n ds, n outward
+        from the voids; 0 at voids.
+        """
         m = self.problem.strains
         bodies = np.linalg.solve(self.L[:m, :m], self.Q[dofs, :m].T).T
         if not self.submesh.at_void.any():

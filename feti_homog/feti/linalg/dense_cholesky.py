@@ -14,8 +14,9 @@ from feti_homog.typing import Float
 
 
 def cholesky(A: Float, lower: bool = True, clean: bool = True) -> Float:
-    """Return the triangle L with L L^T = A (n, n), or the upper one L^T, in the memory of A if that is in Fortran
-    order.
+    """Return the triangle L with L L^T = A (n, n), or the upper one L^T.
+
+    In the memory of A if that is in Fortran order.
 
     Args:
         clean: set the other triangle to 0.

@@ -71,8 +71,10 @@ def add_shared_rows(comm: MPI.Intracomm, local: csr_matrix, rows: Int, is_shared
 
 
 def assemble_distributed(comm: MPI.Intracomm, part: csr_matrix, numbers: Int, total: int) -> PETSc.Mat:
-    """(n, n) the sum over ranks of parts (k, k), whose rows and columns have these numbers (k,), as a matrix whose rows
-    the ranks share evenly.  Collective."""
+    """(n, n) the sum over ranks of parts (k, k), as a matrix whose rows the ranks share evenly.  Collective.
+
+    Rows and columns of the parts have these numbers (k,).
+    """
     share = _even_share(comm, total)
     return _assemble(comm, part, numbers, numbers, (share, share))
 

@@ -79,8 +79,10 @@ class DistributedSolver:
         return np.linalg.qr(whole[:, whole.any(axis=0)])[0]
 
     def solve(self, B: Float) -> Float:
-        """A^-1 times the sum over ranks of right-hand sides, of which each rank has a part B (u,) or (u, k), on the
-        unknowns of this rank.  Collective."""
+        """A^-1 times the sum over ranks of right-hand sides, on the unknowns of this rank.  Collective.
+
+        Each rank has a part B (u,) or (u, k) of them.
+        """
         assert self._ksp is not None, "nothing is factored"
         right = self._sum(B if B.ndim == 2 else B[:, None])[slice(*self._b.getOwnershipRange())]
         X = solve_columns(self._ksp, self._x, self._b, right, self.max_columns_one_by_one)

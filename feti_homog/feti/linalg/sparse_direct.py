@@ -32,8 +32,9 @@ DEFINITE = {"mat_cholmod_final_asis": False, "mat_cholmod_final_ll": True}
 
 
 def power_of_two(diagonal: Float, comm: MPI.Intracomm | None = None) -> float:
-    """Return the factor that brings the largest entry of a diagonal, or of all ranks' parts of it, to between 1 and
-    2.
+    """Return the factor that brings the largest entry of a diagonal to between 1 and 2.
+
+    With a communicator the largest entry is that of all ranks' parts.
 
     It is 1 where none is positive.  Collective, if there are ranks.
 

@@ -129,8 +129,10 @@ class WithSprings:
         return y
 
     def regularisation(self, P: csr_matrix) -> Float:
-        """(m, m) P^T rho Rf Rf^T P for P (n, m), rho as soft as the springs: it makes S~ definite, whose kernel is that
-        of S.  Of dense operators alone."""
+        """(m, m) P^T rho Rf Rf^T P for P (n, m), rho as soft as the springs.
+
+        It makes S~ definite, whose kernel is that of S. Of dense operators alone.
+        """
         assert is_dense(self._body)
         return self._softer * self._body.regularisation(P)
 

@@ -54,7 +54,9 @@ class AssembledSchur:
 
     def relieving_displacement(self, forces: Float) -> Float:
         """-Z (Z^T S Z)^-1 Z^T f for boundary forces f (n,) or (n, k): it takes them off the shared nodes.
-        Collective."""
+
+        Collective.
+        """
         right = -self._ZT @ forces
         self.comm.Allreduce(MPI.IN_PLACE, right)
         return np.asarray(self._Z @ share_columns(self.comm, self._solver.solve, right))
@@ -89,8 +91,11 @@ def _released(
     together: csr_matrix,
     active: Float,
 ) -> csr_matrix:
-    """(n, columns) Z, for the one with all rows active: u_f = y - e (e . y) + e w along the direction e of each row
-    that is not active, and w is a column of its own.  Collective."""
+    """(n, columns) Z, for the one with all rows active.
+
+    u_f = y - e (e . y) + e w along the direction e of each row that is not active, and w is a column of its own.
+    Collective.
+    """
     released = active == 0
     counts = comm.allgather(int(released.sum()))
     number = np.where(released, sum(counts[: comm.rank]) + np.cumsum(released), 0)

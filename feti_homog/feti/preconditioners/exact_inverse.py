@@ -101,8 +101,9 @@ class ExactInverse(Preconditioner):
         return self._restricted(self.reference.respond(scale_rows(self.reference.active, r)), r)
 
     def multipliers(self, d: Float, E: Float) -> Float:
-        """H d E for d (owned rows, v), the same at every call, and E (v, k): the solution for the loads E, but for
-        rounding.  Collective.
+        """H d E for d (owned rows, v), the same at every call, and E (v, k).
+
+        The solution for the loads E, but for rounding. Collective.
 
         The reference cell answers to d once.
         """
@@ -245,7 +246,9 @@ class ExactInverse(Preconditioner):
 
 
 def _stiffness_of_rows(jump_operator: JumpOperator, operators: InterfaceOperators) -> Float:
-    """(owned rows,) 1 / (B D^-1 B^T + C) of each row, for the diagonal D of the bodies' stiffness and the compliance C
-    of the springs.  Collective."""
+    """(owned rows,) 1 / (B D^-1 B^T + C) of each row.  Collective.
+
+    D is the diagonal of the bodies' stiffness, C the compliance of the springs.
+    """
     flexibility = jump_operator.sum(operators.B.power(2) @ (1.0 / operators.body_diagonal))
     return np.asarray(1.0 / (flexibility + operators.springs))

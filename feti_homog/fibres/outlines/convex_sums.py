@@ -16,9 +16,11 @@ POINTS = 256
 
 @dataclass(frozen=True)
 class ConvexSums:
-    """The k sums c + V + F D of the convex hull V of `cores` (k, m, 2), about the origin, and the unit disc D under
-    `frames` (k, 2, 2), as `Outlines`; `centres` (k, 2). The core of circles and ellipses is the origin, one of fewer
-    corners than m repeats one of them."""
+    """The k sums c + V + F D of convex hulls V and the unit disc D, as `Outlines`.
+
+    V is that of `cores` (k, m, 2), about the origin; `frames` F (k, 2, 2); `centres` c (k, 2). The core of circles and
+    ellipses is the origin, one of fewer corners than m repeats one of them.
+    """
 
     centres: Float
     cores: Float

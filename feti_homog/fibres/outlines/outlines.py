@@ -124,8 +124,10 @@ def directions(angle: Float) -> Float:
 
 
 def widest(vector: Float, gap: Callable[[Float], Float]) -> tuple[Float, Float]:
-    """Return the largest gap (k,) of pairs at these vectors (k, 2) from the first to the second, and its direction
-    (k,) in radians; gap(a) are those across directions a (k, m)."""
+    """Return the largest gap (k,) of pairs and its direction (k,) in radians.
+
+    Vectors (k, 2) go from the first to the second; gap(a) are those across directions a (k, m).
+    """
     step = 2 * np.pi / DIRECTIONS
     around = np.arctan2(vector[:, 1], vector[:, 0])[:, None] + step * np.arange(DIRECTIONS)
     best = around[np.arange(len(vector)), gap(around).argmax(axis=1)]

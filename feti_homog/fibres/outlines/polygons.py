@@ -16,8 +16,11 @@ SIDES = 3, 12
 
 
 class PolygonalRows:
-    """Rows with `sides`, as `Shape`: regular polygons of that circumradius, the first corner at `angle`, rounded by
-    circles that touch both sides at a corner; `corner` is their radius / that of the circle within the sides."""
+    """Rows with `sides`, as `Shape`.
+
+    Regular polygons of that circumradius, the first corner at `angle`, rounded by circles that touch both sides at a
+    corner; `corner` is their radius / that of the circle within the sides.
+    """
 
     name, sizes, has_tips = "polygons", ("radius",), False
     columns = MappingProxyType({"sides": Column(0.0, least=0.0), "corner": Column(0.0, least=0.0)})

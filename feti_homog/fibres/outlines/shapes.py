@@ -56,8 +56,10 @@ def outlines_of(rows: Columns) -> Outlines:
 
 
 def with_parts(outlines: Outlines, parts: Sequence[tuple[Bool, Outlines]]) -> Outlines:
-    """Return the outlines, but those of the rows (N,) of each part in its place: discs, ellipses or sums, if need
-    be."""
+    """Return the outlines, but those of the rows (N,) of each part in its place.
+
+    Discs, ellipses or sums, if need be.
+    """
     parts = [(own, part) for own, part in parts if own.any()]
     if not parts:
         return outlines

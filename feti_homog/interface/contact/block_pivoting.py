@@ -31,7 +31,9 @@ class BlockPivoting:
 
     def choose(self, wrong: Bool, count: int) -> Bool:
         """Return the nodes (k,) of this rank that change, of those that are `wrong`, `count` on all ranks.
-        Collective."""
+
+        Collective.
+        """
         self._left -= 1
         if count < self._fewest:
             self._fewest, self._left = count, self.block_pivots

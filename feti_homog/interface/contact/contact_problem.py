@@ -239,8 +239,9 @@ class ContactProblem:
         return Equilibrium(load, bonds.with_status(status), solution, iterations, solves, motions, certificate)
 
     def _without_idle(self, status: Status, solution: DualSolution) -> tuple[Status, int]:
-        """Return the status and the number of rigid motions that neither a bond nor a face under compression
-        resists.
+        """Return the status and the number of rigid motions that nothing resists.
+
+        Neither a bond nor a face under compression does.
 
         A fibre may touch its hole without a force: such nodes count as open if it moves without them, lest they seem
         to hold it; those of other fibres stay closed.  Collective.

@@ -63,9 +63,11 @@ class _Fibres:
     fibre: Array
 
     def nodes_and_motions(self, of: Bool) -> Iterator[tuple[Array, Float, Array, Float]]:
-        """For each fibre with an open node in `of` (k,): its open nodes (n,), their motions M (n, m), the numbers of
-        the free motions (c,) that move them and the combinations (c, m) of these; m = 0 where nothing that is free
-        opens a gap."""
+        """For each fibre with an open node in `of` (k,): its open nodes (n,) and their motions M (n, m).
+
+        With the numbers of the free motions (c,) that move them and the combinations (c, m) of these; m = 0 where
+        nothing that is free opens a gap.
+        """
         nodes = np.flatnonzero(self.is_open & np.isin(self.fibre, self.fibre[self.is_open & of]))
         nodes = nodes[np.argsort(self.fibre[nodes], kind="stable")]
         opening, slip = self.opening[nodes], self.slip[nodes]
@@ -156,8 +158,10 @@ def _decided_on_root(
 
 
 def _moving_together(bodies: Array, fixed: int) -> Array:
-    """(k,) labels of the two bodies (k, 2) of each node, of which one may be the body that is `fixed`: those whose
-    gaps depend on each other's motions have the same."""
+    """(k,) labels of nodes, the same where gaps depend on each other's motions.
+
+    They are those of the two bodies (k, 2) of each node, of which one may be the body that is `fixed`.
+    """
     outer, inner = bodies.T
     between = (bodies != fixed).all(axis=1)
     labels = components(int(bodies.max(initial=0)) + 1, outer[between], inner[between])
@@ -188,8 +192,7 @@ def _shares_of_all(fibres: _Fibres, here: Float, ahead: Float, noise: float) -> 
 
 
 def _block(first: int, last: int, *matrices: csr_matrix) -> tuple[Array, list[Float]]:
-    """Return the columns (c,) in which rows of these matrices have entries, and the rows there, dense (rows, c)
-    each."""
+    """Return the columns (c,) in which rows of these matrices have entries, and the dense rows (rows, c) there."""
     spans = [slice(*matrix.indptr[[first, last]]) for matrix in matrices]
     parts = [(matrix.indices[span], matrix.data[span]) for matrix, span in zip(matrices, spans, strict=True)]
     columns, dense = np.unique(np.concatenate([indices for indices, _ in parts])), []

@@ -26,8 +26,10 @@ class LoadScales:
 
     @cached_property
     def least_bonded_stiffness(self) -> Float:
-        """(v, v) Reuss' bound <L^-1>^-1 of the strains, and <L> of the other loads, collective: a scale of stress and
-        energy that debonding does not make zero."""
+        """(v, v) Reuss' bound <L^-1>^-1 of the strains, and <L> of the other loads.  Collective.
+
+        It is a scale of stress and energy that debonding does not make zero.
+        """
         shares, stiffnesses = self._phases
         m, least = self._solver.problem.strains, self.mean_stiffness.copy()
         least[:m, m:] = least[m:, :m] = 0.0
@@ -48,8 +50,11 @@ class LoadScales:
 
     @cached_property
     def roots(self) -> Float:
-        """(v,) of the diagonal of `least_bonded_stiffness`: by these strains are multiplied and stresses divided that
-        are compared with each other; inf of what works on no stress.  Collective."""
+        """(v,) scales of the diagonal of `least_bonded_stiffness`.  Collective.
+
+        By these strains are multiplied and stresses divided that are compared with each other; inf of what works on no
+        stress.
+        """
         diagonal = np.full(len(self.least_bonded_stiffness), np.inf)
         stresses = slice(self._solver.problem.stresses)
         diagonal[stresses] = self.least_bonded_stiffness.diagonal()[stresses]
@@ -84,7 +89,9 @@ class LoadScales:
 
     def over_interface(self, values: Float) -> Float:
         """(k,) of each bond of this rank the largest of values (k,), 0 at least, on all of its inner body.
-        Collective."""
+
+        Collective.
+        """
         inner, largest = self._solver.jump_operator.nodes.bodies[:, 1], np.zeros(self._bodies)
         np.maximum.at(largest, inner, values)
         self._solver.comm.Allreduce(MPI.IN_PLACE, largest, MPI.MAX)
@@ -96,8 +103,10 @@ class LoadScales:
         return self.over_interface(self._solver.jump_operator.nodes.length)
 
     def bond_stress(self, loads: Float) -> Float:
-        """(k,) or (k, n) stress that the loads (v,) or (v, n) make at each bond of this rank, or would if nothing else
-        bore them.  Collective."""
+        """(k,) or (k, n) stress that the loads (v,) or (v, n) make at each bond of this rank.  Collective.
+
+        It is the stress that they make, or would if nothing else bore them.
+        """
         largest: Float = np.multiply.outer(self._bond_stiffness, self.imposed_strain(loads).max(axis=0))
         return largest
 

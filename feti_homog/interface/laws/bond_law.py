@@ -74,8 +74,10 @@ class BondLaw(ABC):
         return Utilisation(self)
 
     def after(self, bonds: BondState, which: Bool, traction: Float) -> tuple[Float, Bool]:
-        """(k, h) internal variables after the bonds `which` (k,) used all of their strength under tractions (k, c), and
-        which bonds (k,) part."""
+        """(k, h) internal variables after some bonds used all of their strength, and which bonds (k,) part.
+
+        These are the bonds `which` (k,) under tractions (k, c).
+        """
         return bonds.history, which
 
     def softening(self, bonds: BondState, pulled: Bool) -> Float | None:

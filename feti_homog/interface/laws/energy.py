@@ -61,8 +61,9 @@ class SpringEnergy(BondLaw):
         return np.asarray(np.cos((1.0 - self.mode_sensitivity) * self.mode_angle(traction)))
 
     def share(self, traction: Float) -> Float:
-        """(k,) sqrt((G_I + G_II) / G_c) of tractions (k, 2), normal and tangential, or (k, 3), also along the fibre: 1
-        breaks.
+        """(k,) sqrt((G_I + G_II) / G_c) of tractions (k, 2).
+
+        Normal and tangential, or (k, 3), also along the fibre: 1 breaks.
 
         Homogeneous of degree one in the traction, for psi does not depend on its size, and convex.
         """

@@ -153,8 +153,10 @@ class ReleasedUtilisation(Utilisation):
     """sqrt(released / (G_c l)) at tips, the utilisation of the springs at other nodes."""
 
     def __init__(self, law: SpringEnergy, tips: Tips, number: Int, contact: bool) -> None:
-        """Store the tips; `number` (p,) is the number of the tip at a node, or -1; with `contact` faces do not
-        overlap."""
+        """Store the tips.
+
+        `number` (p,) is the number of the tip at a node, or -1; with `contact` faces do not overlap.
+        """
         super().__init__(law)
         self._springs, self._tips, self._number, self._contact = law, tips, number, contact
 

@@ -40,8 +40,9 @@ class Noise:
 
 
 def solve(solver: FetiSolver, load: Load, start: Float, area: float, noise: Noise) -> DualSolution:
-    """Return the solution under a load on the cell of this area, beginning with the multipliers `start` (owned
-    rows,).
+    """Return the solution under a load on the cell of this area.
+
+    It begins with the multipliers `start` (owned rows,).
 
     Strains that meet no more than noise stay zero.  Collective.
 
@@ -82,8 +83,10 @@ def _strains(stiffness: Float, stress: Float, noise: Noise) -> Float | None:
 
 
 def unresisted(solver: FetiSolver, by_stress: Bool, voigt: Float) -> Bool:
-    """(v,) which of the strains with given stresses (v,) have a share in one that strains no body: it opens faces
-    without multipliers alone; `voigt` (v, v) is the stress integral of bodies that do not move.  Collective.
+    """(v,) which of the strains with given stresses (v,) have a share in one that strains no body.  Collective.
+
+    Such a strain opens faces without multipliers alone; `voigt` (v, v) is the stress integral of bodies that do not
+    move.
 
     Of such a strain rigid motions close all jumps of the torn cell, and the torn bodies bear no stress.
     """

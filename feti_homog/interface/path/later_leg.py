@@ -138,8 +138,7 @@ class LaterLeg:
         return reached
 
     def _continues(self, ahead: CoupledSolution, way: float, state: Equilibrium) -> bool:
-        """Return whether no bond is overloaded in a state, and its response on the line from here to `ahead`;
-        collective."""
+        """Return whether no bond is overloaded in a state, and its response on the line to `ahead`.  Collective."""
         cell = self.cell
         _, used, _ = most_utilised(cell, self.law, state)
         here, there = self._from.last, cell.macroscopic(ahead)

@@ -44,8 +44,9 @@ class Onset:
         return np.where(self.bonded[node], self.bonds.at(node)(traction), 0.0)
 
     def factors(self, ahead: Float, least: Float, before: Float | None = None) -> Float:
-        """(n, k) the f >= 0 at which each bond breaks under each of n rays of tractions `before` (k, c) + f `ahead`
-        (n, k, c); inf where none does, or where it is not the first by far.
+        """(n, k) the f >= 0 at which each bond breaks under each of n rays of tractions.
+
+        Tractions are `before` (k, c) + f `ahead` (n, k, c); inf where none breaks, or where it is not the first by far.
 
         Utilisations by `ahead` of at most `least`, (n,) or (n, k), are none.  `before` alone breaks nothing.
         """

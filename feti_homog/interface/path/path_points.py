@@ -51,8 +51,10 @@ class PathState:
 
 
 class Energies(NamedTuple):
-    """Energies per area of the cell of a part of a path: the work of the loads, what breaks lost of it, and the
-    fracture energy of these breaks."""
+    """Energies per area of the cell of a part of a path.
+
+    The work of the loads, what breaks lost of it, and the fracture energy of these breaks.
+    """
 
     work: float
     released: float
@@ -92,8 +94,11 @@ class Point:
 
 
 class Break(NamedTuple):
-    """Break of some bonds: the state of the interface after it, how many part on all ranks and how many soften, and
-    the fracture energy per area of the cell."""
+    """Break of some bonds.
+
+    The state of the interface after it, how many part on all ranks and how many soften, and the fracture energy per
+    area of the cell.
+    """
 
     bonds: BondState
     parted: int

@@ -115,8 +115,11 @@ def angles(points: Float, fibre: Int, centres: Float, period: Float) -> Float:
 
 
 def moved_tips(marks: Mapping[int, Sequence[float]], fibre: Int, direction: Float, most: float) -> MovedTips:
-    """Tips of `tips` that a mesh has elsewhere, by `most` degrees at most: at the nearest of its vertices, which lie on
-    the fibres `fibre` (k,), numbered from 1, in the directions (k,)."""
+    """Tips of `tips` that a mesh has elsewhere, by `most` degrees at most.
+
+    They are at the nearest of its vertices, which lie on the fibres `fibre` (k,), numbered from 1, in the directions
+    (k,).
+    """
     moved = {}
     for number, ends in marks.items():
         own = direction[fibre == number + 1]
@@ -163,8 +166,10 @@ def _ends(arc: Arc, half: float, fibre: Int, moved: MovedTips) -> Float:
 
 
 def faults(arcs: Sequence[Arc], centres: Float, label: str = "interface") -> list[str]:
-    """List the faults of the arcs of the interface of this label on a cell whose fibres have these centres (fibres, 2),
-    NaN where there is none."""
+    """List the faults of the arcs of the interface of this label on a cell.
+
+    Its fibres have these centres (fibres, 2), NaN where there is none.
+    """
     found = []
     for place, arc in enumerate(arcs):
         chosen = range(1, len(centres) + 1) if isinstance(arc.fibre, str) else arc.fibre

@@ -103,8 +103,9 @@ def expansions(phase: TransverselyIsotropic) -> tuple[float, float] | None:
 
 
 def equivalent_fibre(family: Fibres, matrix: TransverselyIsotropic) -> TransverselyIsotropic:
-    """Return the bonded fibre that does for the matrix what one on springs does, in a field that is uniform far
-    away.
+    """Return the bonded fibre that does for the matrix what one on springs does.
+
+    The field is uniform far away.
 
     E_axial, nu_axial and the expansions stay;
 

@@ -46,8 +46,9 @@ class Surroundings:
 def aligned_cylinders(
     fractions: Sequence[float], phases: Sequence[TransverselyIsotropic], around: Surroundings
 ) -> TransverselyIsotropic:
-    """Return the estimate in which every phase is a cylinder in the same surroundings k0, m0, p0, under the same
-    far field.
+    """Return the estimate in which every phase is a cylinder in the same surroundings k0, m0, p0.
+
+    All have the same far field.
 
     With x_i = k_i + m0 and h0 = k0 m0/(k0 + 2 m0),
 

@@ -196,8 +196,9 @@ def self_consistent(matrix: TransverselyIsotropic, fibres: Sequence[Fibres]) -> 
 
 
 def transverse_shear(matrix: TransverselyIsotropic, family: Fibres) -> float:
-    """Return the shear modulus m* of the medium in which a coated fibre under shear across it has the energy of the
-    medium.
+    """Return the shear modulus m* of the medium that a coated fibre does not change.
+
+    Under shear across it the coated fibre has the energy of the medium.
 
     On a circle, u_1 + i u_2 and the resultant F = phi + z conj(phi') + conj(psi) of Muskhelishvili's potentials have
     two harmonics, exp(-i t) and exp(3 i t).  In the medium phi has no term 1/z, as the energies are equal, and so

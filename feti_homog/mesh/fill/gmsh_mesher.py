@@ -42,8 +42,9 @@ def begin(
     marks: Mapping[int, Sequence[float]] = NO_MARKS,
     policy: TilePolicy = DEFAULT_TILES,
 ) -> UnmeshedCell | NodedCell | CoarseMesh:
-    """Return the periodic coarse mesh of a square, hexagonal or random cell, or of a table: of round fibres the
-    bare lines, of ellipses all but the triangles, of polygons all.
+    """Return the periodic coarse mesh of a square, hexagonal or random cell, or of a table.
+
+    It is, of round fibres, the bare lines, of ellipses all but the triangles, of polygons all.
 
     Elements have about the size mesh_size * width, on circles interface_size * width.
 

@@ -137,8 +137,10 @@ def _add_shape(gmsh: ModuleType, shapes: ConvexSums, number: int, shift: Float) 
 
 
 def _rounded_lines(occ: ModuleType, corners: Float, rounding: float) -> list[int]:
-    """Return the straight sides and the arcs of a polygon with a margin around, whose corners (n, 2) run
-    counter-clockwise."""
+    """Return the straight sides and the arcs of a polygon with a margin around.
+
+    Its corners (n, 2) run counter-clockwise.
+    """
     following = np.roll(corners, -1, axis=0)
     along = (following - corners) / np.linalg.norm(following - corners, axis=1, keepdims=True)
     outward = np.column_stack([along[:, 1], -along[:, 0]]) * rounding
@@ -192,8 +194,9 @@ def _set_sizes(gmsh: ModuleType, path: Path, arrangement: Arrangement, least: fl
 
 
 def _sizes_at(arrangement: Arrangement, sizes: MeshSizes) -> tuple[float, SizeAt]:
-    """Return the least size of elements, and the sizes at positions (n, 2): h = min_k h_k + g |x - x_k| over points
-    x_k of all outlines.
+    """Return the least size of elements, and the sizes at positions (n, 2).
+
+    h = min_k h_k + g |x - x_k| over points x_k of all outlines.
 
     h_k is at most that of interfaces, that of the curvature, and PASSAGE_EDGE times the distance of the next outline or
     of a side of the cell that the outline faces there.

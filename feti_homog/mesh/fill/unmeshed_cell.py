@@ -134,8 +134,10 @@ class NodedCell:
 
     @cached_property
     def _within(self) -> tuple[Int32, Int32]:
-        """(k + 1,) the phase next within each circle, a number behind all for a void, and the precedence, as in
-        `CoarseMesh`; last those of the matrix."""
+        """(k + 1,) the phase next within each circle, and the precedence, as in `CoarseMesh`.
+
+        The phase of a void is a number behind all; last are those of the matrix.
+        """
         arrangement, lines = self.arrangement, self.lines
         in_disc, in_ring = arrangement.within
         within = [(in_ring if ring else in_disc)[disc] for disc, ring in zip(lines.disc, lines.is_coating, strict=True)]
@@ -175,8 +177,10 @@ class NodedCell:
 
 
 def _without_voids(mesh: CoarseMesh, void: int) -> CoarseMesh:
-    """Return the mesh without the triangles of the phase number `void`, which has no name in it, and without nodes
-    that no other triangle has."""
+    """Return the mesh without the triangles of the phase number `void`.
+
+    The phase has no name in it; nodes that no other triangle has are left out.
+    """
     kept = mesh.phase != void
     used = np.zeros(len(mesh.points), bool)
     used[mesh.triangles[kept]] = True

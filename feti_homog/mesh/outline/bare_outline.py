@@ -168,8 +168,10 @@ class BareOutline:
 def _arcs(
     circles: Float, border: Float, vertices: OnCircles, size: Float, chosen: Bool
 ) -> tuple[tuple[Int, Float, Float], Float]:
-    """Return the arcs of `arcs_within`, and the points (v, 2) at which those of the `chosen` (k,) circles begin,
-    but for those on the border, near its points (b, 2)."""
+    """Return the arcs of `arcs_within`, and the points (v, 2) at which those of the `chosen` (k,) circles begin.
+
+    Points on the border, near its points (b, 2), are left out.
+    """
     arcs = arcs_within(len(circles), *vertices, partial(on_circles, circles), size)
     ends, same = on_circles(circles, *arcs[:2]), SAME_PLACE * size.max()
     away = np.all((ends > same) & (ends < size - same), axis=1)

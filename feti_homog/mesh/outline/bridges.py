@@ -106,8 +106,10 @@ def _clearance(centres: Float, radii: Float, ends: Int, most: float) -> Float:
 
 
 def bridges(lines: CentreLines, size: Float, margin: float, largest: float, vertices: OnCircles) -> Bridges:
-    """Bridges on these lines, clear of third discs and of the sides of the cell, and LEAST_ANGLE from each other and
-    from the `vertices` that circles have; of two that are too near the shorter one.
+    """Bridges on these lines, clear of third discs and of the sides of the cell.
+
+    They are LEAST_ANGLE from each other and from the `vertices` that circles have; of two that are too near the shorter
+    one.
 
     Their ends are `margin` away from the sides, and their middles one of the `largest` edges there, or as long as they
     are: beside a side there would be no room for good triangles.

@@ -59,8 +59,10 @@ def arcs_within(
 
 
 def marked(arrangement: Arrangement, marks: Mapping[int, Sequence[float]]) -> tuple[Int, Float]:
-    """Curve and angle in radians (t,) of the marks on curves that are there: k is the outer curve of fibre k, ~k that
-    within its coating."""
+    """Curve and angle in radians (t,) of the marks on curves that are there.
+
+    k is the outer curve of fibre k, ~k that within its coating.
+    """
     there = {*range(len(arrangement.radii)), *(~np.flatnonzero(arrangement.coated)).tolist()}
     known = {curve: own for curve, own in marks.items() if curve in there}
     curve = np.repeat(list(known), [len(own) for own in known.values()]).astype(int)

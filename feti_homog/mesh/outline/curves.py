@@ -99,8 +99,10 @@ class Numbering:
         self._count = len(vertices)
 
     def along(self, points: Float, first: Int) -> Int:
-        """Numbers (n,) of the nodes at `points` (n, 2) of curves, which begin at first[:-1] and whose ends are
-        vertices."""
+        """Numbers (n,) of the nodes at `points` (n, 2) of curves.
+
+        Which begin at first[:-1] and whose ends are vertices.
+        """
         is_end = np.zeros(len(points), bool)
         is_end[first[:-1]] = is_end[first[1:] - 1] = True
         number = np.empty(len(points), np.int64)

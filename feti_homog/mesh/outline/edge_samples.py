@@ -15,8 +15,11 @@ from feti_homog.typing import Float, Int
 
 @dataclass(frozen=True)
 class Sampling:
-    """How sizes are sampled: at so many positions along an arc, a piece of a side and a bridge, and for at most so many
-    nodes on all arcs, on the sides along one axis, and on all bridges."""
+    """Numbers of samples of sizes.
+
+    There are so many positions along an arc, a piece of a side and a bridge, and for at most so many nodes on all arcs,
+    on the sides along one axis, and on all bridges.
+    """
 
     arc: int
     side: int
@@ -70,8 +73,11 @@ def _refuse_many(edges: float, most: int) -> None:
 
 @dataclass(frozen=True)
 class EdgeSamples:
-    """The size of edges h sampled along c lines: at the shares `share` (n,) of their lengths there is ds / h `density`
-    (n,); those of line k are from first[k] up to first[k + 1].  Those of a line depend on it and on the sizes alone."""
+    """The size of edges h sampled along c lines.
+
+    At the shares `share` (n,) of their lengths there is ds / h `density` (n,); those of line k are from first[k] up to
+    first[k + 1]. Those of a line depend on it and on the sizes alone.
+    """
 
     share: Float
     density: Float

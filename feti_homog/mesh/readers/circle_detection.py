@@ -90,8 +90,10 @@ def closed_loops(mesh: CoarseMesh, pairs: Int32, size: Float, least: int) -> lis
 
 
 def _fit(places: Float, longest: float) -> Float | None:
-    """Centre and radius (3,) of the circle through a closed chain of places (k, 2); None if not round, or with edges
-    longer than `longest` radii."""
+    """Centre and radius (3,) of the circle through a closed chain of places (k, 2).
+
+    None if not round, or with edges longer than `longest` radii.
+    """
     middle = places.mean(axis=0)
     offset = places - middle
     scale = np.abs(offset).max()
@@ -144,8 +146,7 @@ def _images(mesh: CoarseMesh, loop: Loop, circle: Float, own: Int32) -> list[tup
 
 
 def loop_images(mesh: CoarseMesh, loop: Loop, own: Int32) -> list[tuple[Float, Int]]:
-    """How far (2,) the loop is from each of its images in the plane, and the edges of that among the loop's own
-    (a, 2)."""
+    """(2,) distance of the loop from each of its images in the plane, and the edges of that among its own (a, 2)."""
     order = np.argsort(loop.classes)
     place = order[np.searchsorted(loop.classes[order], mesh.representative[own[:, 0]])]
     steps = np.round((loop.places[place] - mesh.points[own[:, 0]]) / mesh.period)

@@ -14,8 +14,11 @@ from feti_homog.typing import Float, Int
 
 @dataclass(frozen=True)
 class Block:
-    """m triangles of a file: their numbers (m,), the numbers of their nodes (m, 3) or (m, 6), corners first and then
-    the middles of the edges 01, 12, 20, and the group (m,) of each; or quadrilaterals of four nodes (m, 4)."""
+    """m triangles of a file.
+
+    Their numbers (m,), the numbers of their nodes (m, 3) or (m, 6), corners first and then the middles of the edges 01,
+    12, 20, and the group (m,) of each; or quadrilaterals of four nodes (m, 4).
+    """
 
     tags: Int
     nodes: Int

@@ -69,8 +69,10 @@ def with_ellipses(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
 
 
 def _follow(ellipse: Ellipse, ends: Float, bends: Float) -> bool:
-    """Return whether edges with ends (k, 2, 2) and middle nodes (k, 2), NaN if there are none, may follow the
-    ellipse."""
+    """Return whether edges may follow the ellipse.
+
+    Their ends are (k, 2, 2) and their middle nodes (k, 2), NaN if there are none.
+    """
     chord = ends[:, 1] - ends[:, 0]
     bulge = ellipse.between(ends[:, 0], ends[:, 1]) - ends.mean(axis=1)
     off = np.abs(np.linalg.norm(np.linalg.solve(ellipse.frame, (bends - ellipse.centre).T), axis=0) - 1)
@@ -93,8 +95,9 @@ def _with_arcs(mesh: CoarseMesh, found: list[Ellipse], arcs: list[Int32]) -> Coa
 
 
 def fit(places: Float) -> Ellipse | None:
-    """Return the ellipse through a closed chain of places (k, 2) in order; None if they are on none or too far
-    apart.
+    """Return the ellipse through a closed chain of places (k, 2) in order.
+
+    None if they are on none or too far apart.
 
     The conic d.A.d + b.d = 1 that fits best, d from the mean of the places, is |F^-1 (d - c)| = 1.
     """

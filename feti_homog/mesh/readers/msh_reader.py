@@ -99,8 +99,10 @@ def _refuse(path: str, *faults: Sequence[str]) -> None:
 
 
 def _turned(raw: RawMesh) -> RawMesh:
-    """Return the mesh with all triangles counter-clockwise; middle nodes are those of edges, whichever way these
-    run."""
+    """Return the mesh with all triangles counter-clockwise.
+
+    Middle nodes are those of edges, whichever way these run.
+    """
     clockwise = areas(raw.points[:, :2], raw.triangles) < 0
     return replace(raw, triangles=np.where(clockwise[:, None], raw.triangles[:, ::-1], raw.triangles))
 

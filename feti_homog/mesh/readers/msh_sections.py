@@ -163,8 +163,10 @@ def end_of(name: str, content: bytes, start: int) -> int:
 
 
 def chain(following: Int) -> Int:
-    """Return indices that are met from 0 on, where following[i] comes after i, in order; the last one's is out of
-    range."""
+    """Return indices that are met from 0 on, in order.
+
+    following[i] comes after i; the last one's is out of range.
+    """
     size = len(following)
     onward = np.clip(following, 0, size)
     graph = csr_array((np.ones(size), onward, np.append(np.arange(size + 1), size)), shape=(size + 1, size + 1))

@@ -16,8 +16,9 @@ Selectors = Mapping[str, tuple[str | int, ...]]
 
 
 def with_phases(mesh: RawMesh, phases: Selectors) -> RawMesh:
-    """Return the mesh whose groups have the phases that select one of their names, or else of their aliases; other
-    groups keep their names.  `debonded` selects curves.
+    """Return the mesh whose groups have the phases that select one of their names, or else of their aliases.
+
+    Other groups keep their names. `debonded` selects curves.
 
     Raises:
         MeshError: a name or number that no element has; one line for each.

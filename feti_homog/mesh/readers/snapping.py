@@ -13,8 +13,9 @@ from feti_homog.typing import Float, Int
 
 
 def snapped(raw: RawMesh, tolerance: float) -> tuple[RawMesh, float]:
-    """Return the mesh with the nodes of its outer edges on the sides of a rectangle and opposite each other, and
-    how far the one that moved most has moved.
+    """Return the mesh with its outer edges on the sides of a rectangle, and how far the farthest node has moved.
+
+    Nodes of the outer edges are opposite each other.
 
     A side lies at the median of the nodes within `tolerance`, relative to the width, of the outermost. Partners, each
     other's nearest within the tolerance along the side, both move to the middle between them. Middle nodes of

@@ -133,8 +133,10 @@ def _raw(mesh: Any) -> RawMesh:
 
 
 def _curves(mesh: Any, name: str) -> dict[str, Int]:
-    """Nodes (d, 2) at the ends of the lines that cell data `debonded` mark, and of the others, by their number in the
-    cell data of that name or, if these are phases, by the cells' type."""
+    """Nodes (d, 2) at the ends of the lines that cell data `debonded` mark, and of the others by their number.
+
+    The number is in the cell data of that name or, if these are phases, the cells' type.
+    """
     curves: dict[str, list[Int]] = {}
     marks = mesh.cell_data.get(DEBONDED, [np.zeros(len(cells.data)) for cells in mesh.cells])
     for cells, mark, numbers in zip(mesh.cells, marks, mesh.cell_data[name], strict=True):

@@ -51,8 +51,10 @@ class SourcedSize:
         return np.asarray(np.minimum(self.largest, sizes.min(axis=1)))
 
     def on_lines(self, points: Float) -> Float:
-        """(c, m) at points (c, m, 2) of lines: as for each point, but sources are looked for once for all of a short
-        line."""
+        """(c, m) at points (c, m, 2) of lines, as for each point.
+
+        Sources are looked for once for all of a short line.
+        """
         middle = points[:, points.shape[1] // 2]
         half = np.sqrt(((points - middle[:, None]) ** 2).sum(axis=2).max(axis=1, initial=0.0))
         # Longer ones have too many sources near them.

@@ -164,8 +164,10 @@ class MeshSizes:
         return cls(largest, largest, largest)
 
     def are_graded(self, arrangement: Arrangement) -> bool:
-        """Return whether the mesh is finer on circles or at tips than elsewhere, as it is on thin coatings and tiny
-        discs."""
+        """Return whether the mesh is finer on circles or at tips than elsewhere.
+
+        It is on thin coatings and tiny discs.
+        """
         return bool(min(self.tip, self.on_circles(arrangement).min()) < self.largest)
 
     def on_circles(self, arrangement: Arrangement) -> Float:
@@ -201,8 +203,11 @@ class SizeField:
 
 
 def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips: Float) -> SizeField:
-    """`line_size`, but at most h_i + g d at the distance d from a disc, and h_t + g max(0, d - h_t) from one of the
-    `tips` (t, 2), so that the edges at a tip have the size h_t; the growth g is MAX_GROWTH."""
+    """`line_size`, but smaller near discs and tips.
+
+    It is at most h_i + g d at the distance d from a disc, and h_t + g max(0, d - h_t) from one of the `tips` (t, 2), so
+    that the edges at a tip have the size h_t; the growth g is MAX_GROWTH.
+    """
     base = line_size(arrangement, sizes.largest, vertices)
     if not sizes.are_graded(arrangement):
         return SizeField(base)

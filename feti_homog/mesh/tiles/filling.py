@@ -129,8 +129,11 @@ def _unfilled(tile: Tile, why: str) -> MeshError:
 
 
 def _bounded_area(tile: Tile) -> float:
-    """Area within the curves that bound a tile: 1/2 of the integral of x dy - y dx along those with the tile on their
-    left, less along those with it on their right."""
+    """Area within the curves that bound a tile.
+
+    It is 1/2 of the integral of x dy - y dx along those with the tile on their left, less along those with it on their
+    right.
+    """
     curves = tile.curves
     sign = (curves.inside != OUTSIDE).astype(float) - (curves.outside != OUTSIDE)
     within = np.ones(len(curves.node), bool)

@@ -39,8 +39,10 @@ class HalfLines:
 
     @classmethod
     def of(cls, nodes: Int, centres: Float, starts: Float) -> HalfLines:
-        """Return the halves of lines between `nodes` (l, 2), which have these centres (n, 2), from starts[:, 0] to
-        starts[:, 1] (l, 2, 2); those from the second node come last."""
+        """Return the halves of lines between `nodes` (l, 2), from starts[:, 0] to starts[:, 1] (l, 2, 2).
+
+        The nodes have these centres (n, 2); halves from the second node come last.
+        """
         node, start = nodes.T.ravel(), np.concatenate([starts[:, 0], starts[:, 1]])
         other = np.concatenate([starts[:, 1], starts[:, 0]])
         # A corner is its own place: what leaves it is seen from where it goes.
@@ -88,8 +90,10 @@ class MatrixTiles:
 
 
 def beside(lines: HalfLines, label: Int, alone: Int, disc: Int, angle: Float) -> Int:
-    """Return the label (k,) of the matrix beside discs (k,) at these angles: that of the half-line clockwise from
-    there, of labels (h,), or that of discs that are alone (n,)."""
+    """Return the label (k,) of the matrix beside discs (k,) at these angles.
+
+    It is that of the half-line clockwise from there, of labels (h,), or that of discs that are alone (n,).
+    """
     order = np.lexsort((lines.angle, lines.node))
     node, at = lines.node[order], lines.angle[order]
     # Twice a turn apart, so that those of one disc stay together.

@@ -72,8 +72,7 @@ class FilledTile:
 
 
 def tile_torus(regions: Regions, tiles: Sequence[FilledTile], all_nodes: int) -> tuple[Torus, Int]:
-    """Return the torus of the triangles of these tiles, without voids, and the number (m,) of the tile that each is
-    in.
+    """Return the torus of the triangles of these tiles, without voids, and the number (m,) of the tile of each.
 
     `all_nodes` is how many there are in the cell.
     """

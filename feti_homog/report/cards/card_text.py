@@ -38,8 +38,10 @@ def number(value: float, width: int = 24) -> str:
 
 
 def identifier(name: str) -> str:
-    """Return the name in letters, digits and single underscores, of at most 60 characters, the first of them a
-    letter."""
+    """Return the name in letters, digits and single underscores.
+
+    It has at most 60 characters, the first of them a letter.
+    """
     word = re.sub(r"[\W_]+", "_", name, flags=re.ASCII)[:60].strip("_")
     return word if word[:1].isalpha() else f"material_{word}".strip("_")
 

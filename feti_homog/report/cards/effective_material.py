@@ -62,8 +62,10 @@ class EffectiveMaterial:
 
     @property
     def constants(self) -> dict[str, float]:
-        """E_i = 1/S_ii, nu_ij = -S_ij/S_ii (-eps_j/eps_i under stress along i) and G_ij, in the order in which Abaqus
-        takes them."""
+        """E_i = 1/S_ii, nu_ij = -S_ij/S_ii (-eps_j/eps_i under stress along i) and G_ij.
+
+        In the order in which Abaqus takes them.
+        """
         S = self.compliance
         return {
             **{f"E{i + 1}": float(1.0 / S[i, i]) for i in range(3)},
@@ -73,8 +75,9 @@ class EffectiveMaterial:
 
 
 def in_axes_of_the_cell(document: Mapping[str, Any]) -> EffectiveMaterial:
-    """Return the material of the stiffness and expansion of a result: orthotropic if its other entries are
-    negligible.
+    """Return the material of the stiffness and expansion of a result.
+
+    It is orthotropic if its other entries are negligible.
 
     Raises:
         CaseError: the result has no linear spatial stiffness, or did not converge.

@@ -115,8 +115,9 @@ def _base64(values: Any, kind: str) -> str:
 
 
 def write(directory: Path) -> Path:
-    """Write `directory`/report.html from result.json, result.h5 if the case has fields, and the pictures that are
-    there; returns its path.  Call on one rank.
+    """Write `directory`/report.html; returns its path.  Call on one rank.
+
+    It is made of result.json, result.h5 if the case has fields, and the pictures that are there.
 
     Raises:
         CaseError: the folder is not that of a result, or a file of it is missing or damaged.

@@ -1,5 +1,8 @@
-"""The part of result.h5 that pictures show: about TRIANGLE_LIMIT triangles at most, read in blocks, their outlines, the
-values and displacements on them, and how far these may be magnified."""
+"""The part of result.h5 that pictures show.
+
+It has about TRIANGLE_LIMIT triangles at most, read in blocks, their outlines, the values and displacements on them, and
+how far these may be magnified.
+"""
 
 from __future__ import annotations
 
@@ -147,8 +150,11 @@ def _picks(table: Any, numbers: Array, block: int) -> Iterator[Array]:
 
 
 def drawn_displacement(state: Any, drawn: DrawnMesh) -> Array:
-    """(p, 2) u of a state of result.h5 at the nodes drawn, shifted so that the mean of u* = u - E x over the triangles
-    drawn is zero: the solution leaves the translation open, and without it the cell stays in place."""
+    """(p, 2) u of a state of result.h5 at the nodes drawn.
+
+    It is shifted so that the mean of u* = u - E x over the triangles drawn is zero: the solution leaves the translation
+    open, and without it the cell stays in place.
+    """
     displacement = nodal_values(state["displacement"], drawn)
     loads = dict(zip(voigt_names(len(state.attrs["strain"]))[0], state.attrs["strain"], strict=True))
     shear = 0.5 * loads["gamma12"]

@@ -171,9 +171,11 @@ PANELS = {"angle": _angle, "path": _path}
 
 
 def shown_scale(file: Any, document: Mapping[str, Any]) -> float:
-    """Return the factor of displacements in all pictures of an angle or a path and in the report: that of the case
-    or, by default, one at which the largest displacement and opening are seen and no triangle turns over, but at
-    least 1 under a given load."""
+    """Return the factor of displacements in all pictures of an angle or a path and in the report.
+
+    It is that of the case or, by default, one at which the largest displacement and opening are seen and no triangle
+    turns over, but at least 1 under a given load.
+    """
     chosen = document.get("case", {}).get("output", {}).get("deformation_scale")
     if chosen is not None:
         return float(chosen)

@@ -149,8 +149,10 @@ def _sheared(
     interface_edges: InterfaceEdges,
     document: Mapping[str, Any],
 ) -> Figure:
-    """Return the cell with an axial stress in colour and lines of equal displacement along the fibres, which moves
-    nothing in the plane."""
+    """Return the cell with an axial stress in colour and lines of equal displacement along the fibres.
+
+    That displacement moves nothing in the plane.
+    """
     figure, axes = _coloured(file, state, drawn, drawn.points, _output(document))
     step = draw_levels(axes, state, drawn)
     length = plain(file.attrs["length_unit"])

@@ -202,8 +202,10 @@ def strain_symbols(count: int) -> tuple[str, ...]:
 
 
 def stress_component(chosen: str, states: Sequence[Any]) -> str:
-    """Return the stress that is chosen, else that of the largest strain of these states on which a macroscopic
-    stress works; of all strains if there is no stress."""
+    """Return the stress that is chosen, else that of the largest strain of these states.
+
+    A macroscopic stress works on that strain; of all strains if there is no stress.
+    """
     if chosen in STRESS_SYMBOLS:
         return chosen
     strains, stresses = (np.array([state.attrs[name] for state in states]) for name in ("strain", "stress"))

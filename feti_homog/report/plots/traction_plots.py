@@ -43,8 +43,11 @@ NAMES = {"traction": (r"$t_\mathrm{n}$", r"$t_\mathrm{t}$", r"$t_\mathrm{a}$"), 
 
 
 def plot(directory: Path, file: Any, edges: InterfaceEdges, document: Mapping[str, Any]) -> list[Path]:
-    """interface.png, if any state has debonded nodes: of a path the state of its peak, dashed, and the valley after it
-    or the last that shows much, else one state."""
+    """Draw interface.png, if any state has debonded nodes.
+
+    It shows, of a path, the state of its peak, dashed, and the valley after it or the last that shows much, else one
+    state.
+    """
     names = sorted(file.get("state", ()), key=int)
     debonded = {name: int((file[f"state/{name}/status"][:] != BONDED).sum()) for name in names}
     if not any(debonded.values()):
@@ -225,8 +228,11 @@ def _arc_length(points: Array, normal: Array, own: Array, chain: Array, period: 
 
 
 def _lines(chain: Array, normal: Array, points: Array, period: Array) -> list[Array]:
-    """Return the boundaries that edges make, each as its nodes in counterclockwise order, of a closed one the first
-    again at the end. It begins where the normal is nearest to x1, or at its end if it is open."""
+    """Return the boundaries that edges make, each as its nodes in counterclockwise order.
+
+    Of a closed one the first node comes again at the end. It begins where the normal is nearest to x1, or at its end if
+    it is open.
+    """
     vertices, ends = np.unique(chain, return_inverse=True)
     first, second = ends.reshape(-1, 2).T
     size = len(vertices)

@@ -63,8 +63,10 @@ def _errors(document: Document) -> Document:
 
 
 def _with_error(document: Document, name: str, form: str) -> tuple[str, str]:
-    """Return a constant and its error, which has two digits that say how many the constant has; in this format and
-    empty without an error."""
+    """Return a constant and its error.
+
+    The error has two digits, which give the number of those of the constant; in this format and empty without an error.
+    """
     value = next(values[name] for key in ("moduli", "constants") if name in (values := document.get(key) or {}))
     error = _errors(document).get("constants", {}).get(name)
     if error is None:
@@ -153,8 +155,7 @@ def bounds(document: Document, label: str) -> list[Table]:
 
 
 def constants(document: Document, label: str) -> list[Table]:
-    """Engineering constants in space, their range over all directions across the fibres, and what closed estimates and
-    bounds are beside them."""
+    """Engineering constants in space, their range across the fibres, and closed estimates and bounds beside them."""
     found, errors = list[Table](), _errors(document).get("constants", {})
     if (values := document.get("constants")) is not None:
         columns = [NAMES, Column("computed"), *_column(errors)]
@@ -180,8 +181,10 @@ def constants_lines(document: Document, label: str) -> list[list[str]]:
 
 
 def estimates(document: Document, label: str) -> list[Table]:
-    """Constants along the fibres and across them: a row for each source that knows one, a column for each constant that
-    some source knows."""
+    """Constants along the fibres and across them.
+
+    A row for each source that knows one, a column for each constant that some source knows.
+    """
     if document.get("transversely_isotropic") is None:
         return []
     rows = {title: _known(row) for title, row in _sources(document).items()}

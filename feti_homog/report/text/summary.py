@@ -22,8 +22,9 @@ Document = Mapping[str, Any]
 
 
 def summary(document: Document) -> str:
-    """Return the document in lines of at most 79 columns, tables of at most 100 (but for long names), without a
-    newline at the end.
+    """Return the document in lines of at most 79 columns, without a newline at the end.
+
+    Tables have at most 100 (but for long names).
 
     Cell, solver, effective stiffness with moduli and bounds or else the points of `angle` or `path`, the state of
     `load`, onsets, checks, timings, memory, warnings and status.

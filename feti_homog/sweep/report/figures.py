@@ -41,8 +41,10 @@ def tables(table: SweepTable) -> list[Path]:
 
 
 def figure(table: SweepTable) -> Figure:
-    """Return a row for each table: distances of neighbours, which are matched, L(r) and local fractions, which
-    follow."""
+    """Return a row for each table.
+
+    Distances of neighbours, which are matched, then L(r) and local fractions, which follow.
+    """
     found = tables(table)[:MOST_TABLES]
     picture = Figure(figsize=(13.0, 0.9 + 3.8 * len(found)), layout="constrained")
     panels = picture.subplots(len(found), 3, squeeze=False)
@@ -111,8 +113,11 @@ def _local_fractions(pattern: FibrePattern) -> tuple[Float, Float]:
 
 
 def plot(directory: Path, table: SweepTable) -> list[Path]:
-    """Draw what varies: moduli.png over the fibre fraction, cell_size.png over the number of fibres, curves.png of
-    paths, match.png of cells that match a table of fibres; returns the files.  On one rank."""
+    """Draw the varied quantities; returns the files.  On one rank.
+
+    moduli.png over the fibre fraction, cell_size.png over the number of fibres, curves.png of paths, match.png of cells
+    that match a table of fibres.
+    """
     with mpl.rc_context(STYLE):
         paths = []
         if varies(table, moduli.FRACTION) and moduli.panels_of(table):

@@ -35,8 +35,10 @@ HASHIN_SHTRIKMAN = "Hashin-Shtrikman"
 
 @dataclass(frozen=True)
 class PanelBounds:
-    """Fibre fractions (n,) and the bounds of each panel over them: rows Reuss, Voigt, and the two tighter ones if they
-    apply, (2 or 4, n); whose these are."""
+    """Fibre fractions (n,) and the bounds of each panel over them, with their names.
+
+    Rows are Reuss, Voigt, and the two tighter ones if they apply, (2 or 4, n).
+    """
 
     fractions: Float
     rows: dict[str, Float]

@@ -19,8 +19,10 @@ PHASES_OF_ONE_FIBRE = 2
 
 
 def numbers(planes: Iterable[str | None]) -> tuple[int, ...]:
-    """Numbers i and j in the names Cij of a sweep over these plane states: where some cases are in space, Cij is the
-    same entry of all."""
+    """Numbers i and j in the names Cij of a sweep over these plane states.
+
+    Where some cases are in space, Cij is the same entry of all.
+    """
     return (GENERALIZED if GENERALIZED.name in planes else PLANE_STRAIN).numbers
 
 
@@ -76,8 +78,10 @@ def _thermal(document: Document) -> dict[str, float]:
 
 
 def _envelope(document: Document) -> dict[str, float]:
-    """Return the load at onset along the first axis of an envelope, the least, and the largest if every direction
-    has one."""
+    """Return loads at onset of an envelope.
+
+    They are that along the first axis, the least, and the largest if every direction has one.
+    """
     if not document.get("envelope"):
         return {}
     first, second = document["case"]["envelope"]["plane"]

@@ -113,8 +113,11 @@ def _in_words(name: str, value: Any) -> str:
 
 @dataclass(frozen=True)
 class Statistics:
-    """Over the realisations that are done, (points, ...): `ci95` is half the width of the 95 % confidence interval of
-    the mean by Student's t; it and `std` are NaN of fewer than two."""
+    """Statistics over the realisations that are done, (points, ...).
+
+    `ci95` is half the width of the 95 % confidence interval of the mean by Student's t; it and `std` are NaN of fewer
+    than two.
+    """
 
     count: Float
     mean: Float

@@ -110,8 +110,10 @@ def test_near_incompressible_is_stable():
 
 
 def in_space(material, plane, strain):
-    """Return the stress (3, 3) and strain (3, 3) of the plane state with these strains [11, 22, 12] in space, turned
-    back."""
+    """Return the stress (3, 3) and strain (3, 3) of the plane state with these strains [11, 22, 12] in space.
+
+    They are turned back.
+    """
     whole = three_dimensional_stiffness(**CONSTANTS)
     c, s = np.cos(np.radians(material.angle)), np.sin(np.radians(material.angle))
     turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])  # to the axes of the material

@@ -55,8 +55,10 @@ def test_slopes_of_plain_fibres_are_eshelbys(fibre):
 
 @pytest.mark.parametrize("coating", [SOFT, BORON])
 def test_few_coated_fibres_have_the_slope_of_one(coating):
-    """The self-consistent estimate and the slope are Eshelby's integral in two ways: with the whole composite around,
-    and with the matrix alone."""
+    """The self-consistent estimate and the slope are Eshelby's integral in two ways.
+
+    With the whole composite around, and with the matrix alone.
+    """
     fraction, share = 1e-5, 0.7
     radius = np.sqrt(fraction)
     layers = [(GLASS, np.sqrt(share) * radius), (coating, radius)]

@@ -1,5 +1,6 @@
-"""Meshes that are finer on interfaces and at tips: sizes as asked for, bounded growth, no more elements than that
-takes.
+"""Meshes that are finer on interfaces and at tips.
+
+Sizes as asked for, bounded growth, no more elements than that takes.
 
 That they are meshes at all, periodic and of good triangles, `test_gmsh_mesher.py` holds for them too.
 """

@@ -32,8 +32,10 @@ def write(directory: Path, whole: Sample) -> Path:
 
 
 def around(whole: Sample, count: int, number: int) -> Sample:
-    """Return the sample with `count` interface nodes on each side of the square fibre, which has this number, in any
-    order; the fibre is moved by half a cell, so that the sides of the cell cut it in four."""
+    """Return the sample with `count` interface nodes on each side of the square fibre, which has this number.
+
+    The nodes are in any order; the fibre is moved by half a cell, so that the sides of the cell cut it in four.
+    """
     steps = np.arange(count)[:, None] / count
     sides = np.concatenate([a + steps * (b - a) for a, b in zip(CORNERS, np.roll(CORNERS, -1, axis=0), strict=True)])
     normals = np.repeat([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]], count, axis=0)
