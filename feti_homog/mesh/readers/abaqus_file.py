@@ -191,7 +191,7 @@ def _range(row: list[str]) -> range:
 
 
 def _members(content: _Content, name: str) -> set[int]:
-    """The elements of a set, however it was made."""
+    """Return the elements of a set, however it was made."""
     found = [members for (_, own), members in content.sets.items() if own == name]
     if not found:
         raise ValueError(f'there is no element set "{name}"')
@@ -256,7 +256,7 @@ def _curves(content: _Content, labels: Mapping[int, tuple[str, ...]]) -> dict[st
 
 
 def _labels(content: _Content, level: int) -> dict[int, tuple[str, ...]]:
-    """The names of the sets of one level that each element is in."""
+    """Return the names of the sets of one level that each element is in."""
     found: dict[int, list[str]] = {}
     for (own, name), members in content.sets.items():
         for tag in members if own == level else ():

@@ -34,7 +34,7 @@ def assembled(
     containers: tuple[str, str] = ("physical surface", "physical curve"),
     aliases: Sequence[tuple[str, ...]] = (),
 ) -> RawMesh:
-    """The mesh of the blocks, one at least, with the corner nodes that they use.
+    """Return the mesh of the blocks, one at least, with the corner nodes that they use.
 
     Args:
         node_tags, points: (n,) and (n, 3) numbers and positions of the file's nodes, all that the blocks have among

@@ -20,7 +20,7 @@ SHIFTS = (0.5, 0.25, 0.75, 0.375, 0.625, 0.125, 0.875)
 
 
 def lattice(plane: Float, triangles: Int32) -> list[str]:
-    """The fault of triangles that fill a parallelogram or a hexagon, with the rectangle of the same lattice."""
+    """Return the fault of triangles that fill a parallelogram or a hexagon, with the rectangle of the same lattice."""
     hull = ConvexHull(plane)
     corners = _corners(plane[hull.vertices])
     if len(corners) not in (4, 6) or np.abs(areas(plane, triangles)).sum() < FILLED * hull.volume:

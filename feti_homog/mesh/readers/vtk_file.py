@@ -155,7 +155,7 @@ def _curves(mesh: Any, name: str) -> dict[str, Int]:
 
 
 def _used(blocks: list[Block]) -> tuple[list[Block], list[int]]:
-    """The blocks with groups numbered without gaps, and the values of these groups."""
+    """Return the blocks with groups numbered without gaps, and the values of these groups."""
     used: Int = np.unique(np.concatenate([block.group for block in blocks]))
     renumbered = [Block(block.tags, block.nodes, np.searchsorted(used, block.group)) for block in blocks]
     return renumbered, used.tolist()
