@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.linalg import eigh
@@ -12,17 +12,22 @@ from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result_records import MeshError
 from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response
-from feti_homog.homogenization.mesh_error import EnergyErrors, energy_errors
 from feti_homog.materials import bounds, spatial_constants
 from feti_homog.runtime.records import plain
 from feti_homog.typing import Float
+
+if TYPE_CHECKING:
+    from feti_homog.homogenization.mesh_error import EnergyErrors
 
 
 def unit_errors(context: AnalysisContext, responses: Sequence[Response]) -> list[EnergyErrors]:
     """Return those of the responses to all unit loads, by problem; none if the case asks for none.  Collective."""
     if not context.case.output.mesh_error:
         return []
-    found, first = list[EnergyErrors](), 0
+    from feti_homog.homogenization.mesh_error import energy_errors  # with the recovery of stresses
+
+    found: list[EnergyErrors] = []
+    first = 0
     for problem in context.loads.problems:
         own = responses[first : first + len(problem.loads)]
         touches = problem.interface.contact and any(response.debonded for response in own)
@@ -65,6 +70,8 @@ def state_error(context: AnalysisContext, responses: Sequence[Response]) -> tupl
     """
     if not context.case.output.mesh_error:
         return None, []
+    from feti_homog.homogenization.mesh_error import energy_errors  # with the recovery of stresses
+
     pairs = zip(context.loads.problems, responses, strict=False)
     errors = [energy_errors(problem.cell, [response]) for problem, response in pairs]
     energy = sum(2 * response.stored for response in responses)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from feti_homog.analysis.constants import constants
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.mesh_errors import mesh_error, unit_errors
 from feti_homog.analysis.registry import Analysis
 from feti_homog.homogenization.averaging import asymmetry
-from feti_homog.homogenization.mesh_error import EnergyErrors
+
+if TYPE_CHECKING:
+    from feti_homog.homogenization.mesh_error import EnergyErrors
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
@@ -24,7 +26,8 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     starts = context.loads.zero_multipliers()
     one_sided = context.plane.interface.contact and context.plane.counts(bonds.status)["open"] > 0
     columns, responses = context.unit_responses("", bonds, starts, 1.0)
-    errors, errors_of_minus = unit_errors(context, responses), list[EnergyErrors]()
+    errors = unit_errors(context, responses)
+    errors_of_minus: list[EnergyErrors] = []
     context.record_unit_states(responses, 1.0, "", 0)
     document: dict[str, Any] = {"effective_stiffness": columns.pop("stiffness")} | columns
     under, loads = list(responses), list(context.loads.names)

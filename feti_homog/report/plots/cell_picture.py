@@ -33,8 +33,10 @@ LEAST_SIZE, LARGEST_SIZE = 3.0, 11.0  # of the letters, in points
 
 
 def figure(file: Any, drawn: DrawnMesh, borders: Array) -> Figure:
-    """Return the materials, with the fibres' numbers and, where they differ, the factors of their strengths, beside the
-    subdomains."""
+    """Return the materials, beside the subdomains.
+
+    Materials have the fibres' numbers and, where they differ, the factors of their strengths.
+    """
     attributes, fibres = file.attrs, file["fibre"]
     picture, (left, right) = figure_of(attributes, panels=2)
     edges = len(drawn.triangles) <= MESH_LINES

@@ -54,8 +54,10 @@ def panels_of(table: SweepTable) -> tuple[str, ...]:
 
 
 def figure(table: SweepTable) -> Figure:
-    """Moduli over the fibre fraction, between their bounds if there are any; in space also Poisson's ratios and thermal
-    expansions."""
+    """Moduli over the fibre fraction, between their bounds if there are any.
+
+    In space there are also Poisson's ratios and thermal expansions.
+    """
     bounds, series = _bounds(table), series_over(table, FRACTION)[: len(COLOURS)]
     ratios = RATIOS if panels_of(table) == SPATIAL_PANELS else ()
     names = [*panels_of(table), *(name for name in ratios if name in table.outputs)]
