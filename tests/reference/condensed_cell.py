@@ -101,21 +101,26 @@ class CondensedCell:
         return (A + A.T) / 2
 
     def equilibrium(self, load, bonded):
-        """Return the state under a load with the `bonded` (k,) nodes holding."""
-        d, n = self.d, self.n
+        """Return the state under a load with the `bonded` (k,) nodes holding.
+
+        Numbers below 1 are shares of the stiffness that damaged bonds have left, but for compression: there the rest is
+        a face that touches.
+        """
+        d, n, kept = self.d, self.n, bonded.astype(float)
         free_jumps = np.ones((self.k, d), bool)
         if self.glued:
-            free_jumps[bonded] = False
+            free_jumps[kept == 1.0] = False
         free = np.r_[free_jumps.ravel(), load.by_stress]
         held = np.r_[np.zeros(n), np.where(load.by_stress, 0.0, load.values)]
         pulled = np.r_[np.zeros(n), self.area * np.where(load.by_stress, load.values, 0.0)]
-        H = self.A + np.diag(np.r_[(self.springs * bonded[:, None]).ravel(), np.zeros(self.m)])
-        touching = np.flatnonzero(~bonded) if self.contact else np.zeros(0, int)
+        H = self.A + np.diag(np.r_[(self.springs * kept[:, None]).ravel(), np.zeros(self.m)])
+        touching = np.flatnonzero(kept < 1.0) if self.contact else np.zeros(0, int)
         # How far the springs of touching faces give way is an unknown of its own.
         gives = 0 if self.glued else len(touching)
         K = np.zeros((free.sum() + gives,) * 2)
         K[: free.sum(), : free.sum()] = H[np.ix_(free, free)]
-        K[range(-gives, 0), range(-gives, 0)] = self.springs[touching, 0] if gives else 0.0
+        pressed = (self.springs[:, 0] * (1.0 - kept))[touching]
+        K[range(-gives, 0), range(-gives, 0)] = pressed if gives else 0.0
         f = np.r_[(pulled - self.A @ held)[free], np.zeros(gives)]
         C = np.zeros((len(touching), len(K)))
         C[np.arange(len(touching)), np.searchsorted(np.flatnonzero(free), d * touching)] = 1.0
@@ -128,11 +133,10 @@ class CondensedCell:
         jump, force = z[:n].reshape(-1, d), -reaction[:n].reshape(-1, d)
         closed = np.zeros(self.k, bool)
         closed[touching] = pressure > 0
-        force[~bonded, 1:] = 0.0
-        force[~bonded & ~closed, 0] = 0.0
-        in_springs = (self.springs * bonded[:, None] * jump**2).sum() / 2 + (
-            self.springs[touching, 0][:gives] @ give**2
-        ) / 2
+        closed &= kept == 0.0
+        force[kept == 0.0, 1:] = 0.0
+        force[(kept == 0.0) & ~closed, 0] = 0.0
+        in_springs = ((self.springs * kept[:, None] * jump**2).sum() + pressed[:gives] @ give**2) / 2
         stored = (z @ reaction / 2 + in_springs) / self.area
         return State(z[n:], reaction[n:] / self.area, stored, in_springs / self.area, jump, force, closed)
 

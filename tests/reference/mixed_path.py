@@ -145,7 +145,7 @@ class MixedPath:
         while True:
             state, used = self.at(load)
             if used.max() <= 1.0:
-                self._report(1.0 / legs, state, np.zeros_like(self.bonded))
+                self._report(1.0 / legs, state, np.zeros(self.cell.k, bool))
                 return
             t = 1.0 / used.max()
             self._report(t / legs, state.scaled(t), used >= used.max() * (1 - TIE))
@@ -163,7 +163,7 @@ class MixedPath:
                 self._report((leg + s) / legs, state, used >= used.max() * (1 - TIE))
                 self._break(load_at(s), self.events[-1], 1.0)
             elif s == 1.0:
-                self._report((leg + 1) / legs, state, np.zeros_like(self.bonded))
+                self._report((leg + 1) / legs, state, np.zeros(self.cell.k, bool))
                 return
             else:
                 low, high = s, min(1.0, (np.floor(s * steps + 1e-9) + 1) / steps)
@@ -176,9 +176,12 @@ class MixedPath:
     def _report(self, load_factor, state, broke):
         self.events.append(Event(load_factor, state, broke, self.lost, self.lost_rising))
 
+    def _weaken(self, event):
+        self.bonded &= ~event.broke
+
     def _break(self, load, event, rise):
         """Break the bonds of an event at constant load; `rise` is how far beyond it the load has been."""
-        self.bonded &= ~event.broke
+        self._weaken(event)
         before, after = event.state, self.cell.equilibrium(load, self.bonded)
         work = before.stress[load.by_stress] @ (after.strain - before.strain)[load.by_stress]
         lost = work + before.stored - after.stored

@@ -50,6 +50,19 @@ CASES: dict[str, dict[str, Any]] = {
         },
         "path": {"waypoints": WAYPOINTS},
     },
+    "softening": {
+        "cell": SQUARE,
+        "interface": {
+            "law": "bilinear",
+            "normal_stiffness": 900.0,
+            "tangential_stiffness": 300.0,
+            **STRENGTHS,
+            "normal_toughness": 0.06,
+            "tangential_toughness": 0.1,
+            "teeth": 3,
+        },
+        "path": {"waypoints": WAYPOINTS},
+    },
     "pairs": {
         "cell": SQUARE | {"coating": 0.2},
         "material": {"matrix": MATRIX, "fibre": FIBRE, "coating": {"young": 120.0, "poisson": 0.25}},

@@ -25,7 +25,7 @@ pytestmark = pytest.mark.slow
 
 MATERIAL = {"stress", "stress 33", "equilibrium", "mean stress", "Hill"}
 SPRINGS = {"bond", "penetration", "complementarity"}
-PATHS = ("path", "thinned", "peaks", "energy", "pairs", "springs' energy", "increments", *MIXED_PATHS)
+PATHS = ("path", "thinned", "peaks", "energy", "softening", "pairs", "springs' energy", "increments", *MIXED_PATHS)
 SPATIAL = ("spatial", "spatial contact", "spatial springs")
 ENVELOPES = ("envelope", "envelope by energy", "envelope in space")
 MATERIAL_33 = MATERIAL | {"bounds"}
@@ -84,6 +84,11 @@ FALSE = {
     ),
     "one traction": ("bonded", scale("traction"), {"equilibrium", "vectors"}),
     "one traction of a path": ("path", scale("traction", state=7), {"equilibrium", "vectors"}),
+    "a damage": ("softening", shift("damage", 0.01, state=3), {"bond", "breaks", "energy", "strength"}),
+    "bonds that softened": ("softening", document("path", 3, "softened", to=9), {"breaks", "strength"}),
+    "a toughness of a law that softens": (
+        "softening", document("case", "interface", "normal_toughness", factor=1.01), {"strength", "energy"},
+    ),
     "one jump": ("angle", scale("jump", state=3), {"jump", "vectors"}),
     "tractions of two nodes": ("bonded", swap_rows("state/0/traction"), {"equilibrium", "vectors"}),
     "an interface node moved": ("bonded", shift("points", 1e-3, group="interface"), {"interface", "jump"}),

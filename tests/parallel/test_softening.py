@@ -1,0 +1,163 @@
+"""Interfaces that soften: paths against brute force, a laminate in closed form, limits of the law."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from reference.closed_forms import lame
+from reference.softening_path import SofteningPath, Teeth
+from support.loaded_twins import EPOXY_GLASS, LoadedTwin, solved
+from unit.mesh.faulty_meshes import grid
+
+from feti_homog.parallel.mpi_errors import on_root
+
+pytestmark = [pytest.mark.parallel, pytest.mark.usefixtures("shared_interfaces")]
+
+BILINEAR = {
+    "law": "bilinear",
+    "normal_stiffness": 100.0,
+    "tangential_stiffness": 60.0,
+    "normal_strength": 0.03,
+    "tangential_strength": 0.05,
+    "normal_toughness": 2e-5,
+    "tangential_toughness": 6e-5,
+    "teeth": 4,
+}
+INFLUENCE = {"feti_pc_type": "influence"}
+PATHS = {
+    "uniaxial": ("strain", {"petsc": INFLUENCE}, [{"E11": 0.03, "S22": 0.0, "S12": 0.004}]),
+    "pressed and sheared": ("stress", {"petsc": INFLUENCE}, [{"E11": -0.04, "E22": 0.015, "gamma12": 0.01}]),
+    "iterative": ("strain", {}, [{"E11": 0.02, "E22": 0.005, "gamma12": 0.004}]),
+    "cycle": (
+        "strain",
+        {"petsc": INFLUENCE},
+        [{"E11": 0.006, "S12": 0.004}, {"E11": -0.004, "S12": 0.0}, {"E11": 0.012, "S12": -0.01}],
+    ),
+}
+
+
+def law_of(interface):
+    """Return the law of the oracle."""
+    kinds = (tuple(interface[f"{mode}_{kind}"] for mode in ("normal", "tangential")) for kind in KINDS)
+    return Teeth(*kinds, interface.get("mixing_exponent", 2.0), interface["teeth"])
+
+
+KINDS = ("stiffness", "strength", "toughness")
+
+
+@pytest.mark.parametrize("name", PATHS)
+def test_paths_are_those_of_brute_force(comm, name):
+    plane, others, waypoints = PATHS[name]
+    case = {"cell": {}, "phases": EPOXY_GLASS, "plane": plane, "interface": BILINEAR} | others
+    case |= {"path": {"waypoints": waypoints} if len(waypoints) > 1 else {"to": waypoints[0]}}
+    result, twin = solved(comm, **case), LoadedTwin(comm, **case)
+
+    def followed():
+        path = SofteningPath(twin.cell, law_of(BILINEAR))
+        return path.follow(twin.loads, 12), path.fracture
+
+    events, fracture = on_root(comm, followed)
+    points = [p for p in result.path if p.broke + p.softened or abs(p.load_factor * len(waypoints) % 1) < 1e-9]
+    assert len(points) == len(events) > 20
+    size = np.abs([e.state.stress for e in events]).max()
+    energy = max(e.state.stored for e in events)
+    for k, (point, event) in enumerate(zip(points, events, strict=True)):
+        assert point.broke + point.softened == event.broke.sum()
+        assert point.load_factor == pytest.approx(event.load_factor, rel=1e-8)
+        np.testing.assert_allclose(point.stress, event.state.stress, atol=1e-8 * size)
+        assert point.dissipated == pytest.approx(event.dissipated, abs=1e-8 * energy)
+        taken = fracture[sum(bool(e.broke.any()) for e in events[:k])]
+        assert point.fracture_energy == pytest.approx(taken, rel=1e-8, abs=1e-12 * energy)
+    _check_the_energy_book(result.path)
+
+
+MOOSE = {
+    "law": "bilinear",
+    "normal_stiffness": 100.0,
+    "tangential_stiffness": 100.0,
+    "normal_strength": 1.0,
+    "tangential_strength": 1.0,
+    "normal_toughness": 0.05,
+    "tangential_toughness": 0.1,
+}
+BRANCH = {"openings": [0.01, 0.05, 0.12], "tractions": [1.0, 0.25, 0.0]}
+TABLE = {name: MOOSE[name] for name in MOOSE if name[:6] != "normal"} | {"law": "table"} | BRANCH
+STRETCH = (0.05 - 0.005) / 1.0
+
+
+@pytest.fixture
+def strip(comm, shared_path):
+    """Provide a function that runs a strip of fibre, a quarter of a cell of width 1, to a strain; M* of the cell."""
+    if comm.rank == 0:
+        grid(lambda x, y: 0.25 < x < 0.5).write(shared_path / "strip.msh")
+    comm.barrier()
+    phases = ({"young": 2.0, "poisson": 0.299}, {"young": 5.0, "poisson": 0.222})
+
+    def stretched(interface, to):
+        cell, petsc = {"geometry": "mesh", "file": "strip.msh"}, INFLUENCE
+        case = {"phases": phases, "plane": "strain", "interface": interface, "petsc": petsc, "path": {"to": to}}
+        return solved(comm, shared_path, cell=cell, **case)
+
+    moduli = np.array([sum(np.array(lame(phase)) * (1, 2)) for phase in phases])
+    return stretched, 1.0 / (np.array([0.75, 0.25]) @ (1.0 / moduli))
+
+
+@pytest.mark.parametrize(
+    ("interface", "branch", "energy"),
+    [
+        (MOOSE, lambda x: np.interp(x, [0.01, 0.1], [1.0, 0.0]), 0.05),
+        (MOOSE | {"law": "exponential"}, lambda x: np.exp(-(x - 0.01) / STRETCH), 0.05),
+        (TABLE, lambda x: np.interp(x, BRANCH["openings"], BRANCH["tractions"]), 0.03875),
+    ],
+    ids=["bilinear", "exponential", "table"],
+)
+def test_a_laminate_follows_its_law_through_snap_back(comm, strip, interface, branch, energy):
+    """S = M* (E - 2 jump / W): what the law takes is exact, points are about the curve, and the loss tends to it."""
+    run_strip, modulus = strip
+    excess = []
+    for teeth in (10, 20):
+        path = run_strip(interface | {"teeth": teeth}, {"E11": 1.0, "E22": 0.0, "gamma12": 0.0}).path
+        S, E = np.array([p.stress[0] for p in path]), np.array([p.strain[0] for p in path])
+        assert len(path) == teeth + 1 and abs(S[-1]) < 1e-9 and (np.diff(E[:-1]) < 0.0).any()
+        jump = (E - S / modulus)[:-1] / 2
+        # Each tooth is above the branch where it breaks, and after it below.
+        assert (S[:-1] >= branch(jump) * (1 - 1e-9)).all()
+        after = (S / E)[1:-1]
+        slope = 2.0 / (1.0 / after - 1.0 / modulus)
+        assert (slope * jump[:-1] <= branch(jump[:-1]) * (1 + 1e-9)).all()
+        assert path[-1].fracture_energy == pytest.approx(2 * energy, rel=1e-12)
+        _check_the_energy_book(path)
+        excess.append(path[-1].dissipation_ratio - 1.0)
+    assert excess[0] > excess[1] > 0.0 and excess[0] / excess[1] == pytest.approx(2.0, rel=0.35)
+
+
+def test_limits_of_the_law(comm, strip):
+    """One tooth is the energy criterion on springs, the least toughness a strength on them, the largest numbers
+    neither."""
+    run_strip, _ = strip
+    to = {"E11": 3.0, "E22": 0.0, "gamma12": 0.0}
+    springs = {name: MOOSE[name] for name in ("normal_stiffness", "tangential_stiffness")}
+    strengths = {name: MOOSE[name] for name in ("normal_strength", "tangential_strength")}
+    by_energy = springs | {"criterion": "energy", "growth": "springs", "toughness": 0.05}
+    strong = {name: 1e9 * value for name, value in MOOSE.items() if "str" in name or "tough" in name} | springs
+    strong |= {"law": "bilinear", "normal_toughness": 1e18, "tangential_toughness": 1e18, "teeth": 2}
+    least = {"normal_toughness": 0.005, "tangential_toughness": 0.005, "teeth": 1}
+    pairs = [(MOOSE | {"teeth": 1}, by_energy), (MOOSE | least, springs | strengths), (strong, springs)]
+    for softening, other in pairs:
+        found, expected = run_strip(softening, to).path, run_strip(other, to).path
+        assert len(found) == len(expected)
+        for one, two in zip(found, expected, strict=True):
+            assert one.load_factor == pytest.approx(two.load_factor, rel=1e-9)
+            np.testing.assert_allclose(one.stress, two.stress, atol=1e-9)
+            assert one.dissipated == pytest.approx(two.dissipated, abs=1e-9)
+
+
+def _check_the_energy_book(path):
+    """Where nothing breaks the work is that of the mean stress on the mean strain, on straight lines."""
+    largest, work = max(p.stored for p in path), 0.0
+    for before, after in zip(path[:-1], path[1:], strict=True):
+        if before.broke + before.softened == 0:
+            work = (after.strain - before.strain) @ (after.stress + before.stress) / 2
+            assert after.work - before.work == pytest.approx(work, abs=1e-9 * largest)
+        assert after.work == pytest.approx(after.stored + after.dissipated, abs=1e-9 * largest)
+        assert after.dissipated >= before.dissipated - 1e-12 * largest
