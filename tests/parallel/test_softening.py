@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from reference.closed_forms import lame
@@ -155,7 +157,7 @@ def test_limits_of_the_law(comm, strip):
 def _check_the_energy_book(path):
     """Where nothing breaks the work is that of the mean stress on the mean strain, on straight lines."""
     largest, work = max(p.stored for p in path), 0.0
-    for before, after in zip(path[:-1], path[1:], strict=True):
+    for before, after in pairwise(path):
         if before.broke + before.softened == 0:
             work = (after.strain - before.strain) @ (after.stress + before.stress) / 2
             assert after.work - before.work == pytest.approx(work, abs=1e-9 * largest)

@@ -18,7 +18,7 @@ from PIL import Image
 
 from feti_homog.errors import FetiHomogError
 from feti_homog.report.plots.decimation import DrawnMesh, drawn_displacement, drawn_mesh, largest_scale, outline_edges
-from feti_homog.report.plots.interface_marks import STATE_NAMES, InterfaceEdges, state_legend
+from feti_homog.report.plots.interface_marks import DAMAGED, STATE_NAMES, InterfaceEdges, state_legend, states_of_nodes
 from feti_homog.report.plots.load_labels import LoadLabels
 from feti_homog.report.plots.plot_helpers import (
     STRESS_SYMBOLS,
@@ -91,7 +91,7 @@ class DeformedCell:
             axes, self.drawn, moved, nodal_stress(state, self.component, self.drawn), norm, colours
         )
         draw_segments(axes, moved[self.borders], "black", 0.5)
-        self.interface_edges.mark(axes, moved, state["status"][:], magnified=0.8)
+        self.interface_edges.mark(axes, moved, states_of_nodes(state), magnified=0.8)
         axes.set_aspect("equal")
         axes.set(xticks=(), yticks=())
         axes.set_axis_off()
@@ -134,11 +134,11 @@ def draw_state(axes: Axes, directory: Path, number: int, stress: str = "auto", s
         with h5py.File(path, "r") as file:
             cell = DeformedCell.of(file, [number], {"case": {"output": {"stress": stress}}}, scale, STATE_LIMIT)
             cell.bar(axes, cell.draw(axes, number, cell.moved(number)))
-            caption = cell.caption
+            caption, softens = cell.caption, bool((states_of_nodes(file[f"state/{number}"]) == DAMAGED).any())
     except (OSError, KeyError) as error:
         raise FetiHomogError(f"cannot draw state {number} of {path}: {error}") from error
     axes.autoscale_view()
-    for line in state_legend(list(STATE_NAMES)):
+    for line in state_legend([kind for kind in STATE_NAMES if softens or kind != DAMAGED]):
         axes.add_line(line)
     return caption
 
@@ -209,7 +209,7 @@ def _side_by_side(file: Any, numbers: Sequence[int], document: Document, scale: 
         axes.set_axis_off()
     grid[0].autoscale_view()
     figure.suptitle(f"{plain(file.attrs['title'])}: {cell.caption}".lstrip(": "), fontsize=11)
-    states = [cell.interface_edges.state(file[f"state/{n}/status"][:]) for n in numbers]
+    states = [cell.interface_edges.state(states_of_nodes(file[f"state/{n}"])) for n in numbers]
     found = np.unique(np.concatenate(states))
     handles = state_legend([kind for kind in STATE_NAMES if kind in found])
     if handles:

@@ -26,7 +26,7 @@ from feti_homog.report.plots.decimation import (
     nodal_values,
     outline_edges,
 )
-from feti_homog.report.plots.interface_marks import InterfaceEdges
+from feti_homog.report.plots.interface_marks import InterfaceEdges, states_of_nodes
 from feti_homog.report.plots.load_labels import LoadLabels
 from feti_homog.report.plots.plot_helpers import (
     STRESS_SYMBOLS,
@@ -187,7 +187,7 @@ def _outlined(
 ) -> None:
     """Outlines of the bodies and the states of the interfaces, and a legend of them and of other lines."""
     draw_segments(axes, moved[borders], "black", 0.8)
-    marks = interface_edges.mark(axes, moved, state["status"][:])
+    marks = interface_edges.mark(axes, moved, states_of_nodes(state))
     label_cell_axes(axes, state.file.attrs)
     handles = [*(marks if len(marks) > 1 else ()), *lines]
     figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), IN_LEGEND), frameon=False)

@@ -1,4 +1,4 @@
-"""The interface in a picture: which drawn edges are bonded, in contact or open."""
+"""The interface in a picture: which drawn edges are bonded, damaged, in contact or open."""
 
 from __future__ import annotations
 
@@ -14,10 +14,12 @@ from feti_homog.report.plots.decimation import DrawnMesh
 from feti_homog.report.plots.plot_helpers import draw_segments
 from feti_homog.typing import Array
 
-BONDED, CLOSED, OPEN = 0, 1, 2
-STATE_NAMES = {BONDED: "bonded", CLOSED: "in contact", OPEN: "open"}
-STATE_COLOURS = {BONDED: "black", CLOSED: "#ff7f0e", OPEN: "#00a14b"}
-STATE_WIDTHS = {BONDED: 0.8, CLOSED: 2.6, OPEN: 2.0}
+BONDED, CLOSED, OPEN, DAMAGED = 0, 1, 2, 3
+STATE_NAMES = {BONDED: "bonded", DAMAGED: "damaged", CLOSED: "in contact", OPEN: "open"}
+STATE_COLOURS = {BONDED: "black", CLOSED: "#ff7f0e", OPEN: "#00a14b", DAMAGED: "#9467bd"}
+STATE_WIDTHS = {BONDED: 0.8, CLOSED: 2.6, OPEN: 2.0, DAMAGED: 2.0}
+# The state of an edge is the one of its ends that comes last here.
+ORDER = np.array(list(STATE_NAMES))
 HALO = 1.6  # points
 SAME_PLACE = 1e-6  # of the width of the cell
 
@@ -43,8 +45,8 @@ class InterfaceEdges:
         return cls(borders[there], nearest.reshape(-1, 2)[there])
 
     def state(self, status: Array) -> Array:
-        """(e,) states of the edges for those of the nodes: open if an end is, else in contact if one is."""
-        states: Array = status[self.nodes].max(axis=1, initial=BONDED)
+        """(e,) states of the edges for those of the nodes: open if an end is, else in contact or damaged if one is."""
+        states: Array = ORDER[np.argsort(ORDER)[status[self.nodes]].max(axis=1, initial=0)]
         return states
 
     def mark(self, axes: Axes, points: Array, status: Array, magnified: float = 1.0) -> list[Line2D]:
@@ -59,6 +61,14 @@ class InterfaceEdges:
                 draw_segments(axes, segments, "white", magnified * (STATE_WIDTHS[kind] + HALO), cap)
             draw_segments(axes, segments, STATE_COLOURS[kind], magnified * STATE_WIDTHS[kind], cap)
         return state_legend(found)
+
+
+def states_of_nodes(state: Any) -> Array:
+    """(k,) states of the interface nodes in a group of result.h5: their status, DAMAGED of damaged bonds that hold."""
+    status = state["status"][:]
+    damage = state["damage"][:] if "damage" in state else np.zeros(len(status))
+    nodes: Array = np.where((status == BONDED) & (damage > 0.0), DAMAGED, status)
+    return nodes
 
 
 def state_legend(kinds: list[int]) -> list[Line2D]:
