@@ -41,11 +41,12 @@ REAL = (
     "mix",
     "mix_contrast",
     "voids",
+    "poisson",
     "vectors",
     "seconds",
 )
 HEADING = (
-    "fibres fraction   gap pieces contrast refine coating contrast   mix contrast voids"
+    "fibres fraction   gap pieces contrast refine coating contrast   mix contrast voids   poisson"
     "     dofs subdom. boundary vectors iterations s"
 )
 # Coarse elements along the side of a cell with one fibre.
@@ -61,7 +62,8 @@ class Cell:
     `pieces` of the matrix per fibre, `gap` in fibre diameters, `coating` thickness / radius, 0 of none, with a
     stiffness over that of the matrix of `coating_contrast`. `mix` is the radius of fibres of a second phase / that of
     the others, 0 of none; they have half the fraction, and the stiffness `mix_contrast`. `voids` is the radius of voids
-    / that of the fibres, 0 of none; their fraction is POROSITY.
+    / that of the fibres, 0 of none; their fraction is POROSITY. `poisson` is that of the matrix; where it is nearly
+    incompressible the elements are quadratic.
     """
 
     fibres: int
@@ -75,6 +77,7 @@ class Cell:
     mix: float = 0.0
     mix_contrast: float = 1.0
     voids: float = 0.0
+    poisson: float = 0.35
 
     @property
     def possible(self) -> bool:
@@ -93,11 +96,12 @@ class Cell:
                 "cell": {
                     "geometry": "random", "fibres": self.fibres, "min_gap": self.gap, **self._fractions(),
                     "mesh_size": 1 / (ELEMENTS * self.fibres**0.5), "refine": self.refine,
+                    **({"order": 2} if self.poisson > 0.49 else {}),
                     **({"coating": self.coating} if self.coating else {}),
                     **({"voids": POROSITY, "void_radius": self.voids} if self.voids else {}),
                 },
                 "material": {
-                    "matrix": {"young": 3.0, "poisson": 0.35},
+                    "matrix": {"young": 3.0, "poisson": self.poisson},
                     "fibre": {"young": 3.0 * self.contrast, "poisson": 0.3},
                     **coating,
                     **other,
@@ -137,7 +141,7 @@ class Row(Cell):
         """Of the table."""
         return (
             f"{self.fibres:6}{self.fraction:9.2f}{self.gap:6.2f}{self.pieces:7}{self.contrast:9.0e}{self.refine:7}"
-            f"{self.coating:8.2g}{self.coating_contrast:9.0e}{self.mix:6.2g}{self.mix_contrast:9.0e}{self.voids:6.2g}"
+            f"{self.coating:8.2g}{self.coating_contrast:9.0e}{self.mix:6.2g}{self.mix_contrast:9.0e}{self.voids:6.2g}{self.poisson:10.9g}"
             f"{self.dofs:9}{self.subdomains:8}{self.boundary:9}{self.vectors:8.2f}{self.iterations:11}{self.seconds:6.1f}"
         )
 
@@ -173,7 +177,8 @@ def combinations(arguments: argparse.Namespace) -> list[Cell]:
     coats = [(0.0, 1.0)] if a.coatings is None else list(product(a.coatings, a.coating_contrasts))
     mixes = [(0.0, 1.0)] if a.mix is None else list(product(a.mix, a.mix_contrasts))
     voids = [0.0] if a.voids is None else a.voids
-    return [Cell(*of, *coat, *mix, v) for of in product(*bare) for coat in coats for mix in mixes for v in voids]
+    others = list(product(coats, mixes, voids, a.poisson))
+    return [Cell(*of, *coat, *mix, v, poisson) for of in product(*bare) for coat, mix, v, poisson in others]
 
 
 def summary(rows: list[Row]) -> str:
@@ -233,6 +238,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--mix", type=float, nargs="+", help="radius of fibres of a second phase / of the others")
     parser.add_argument("--mix-contrasts", type=float, nargs="+", default=[1e-3, 1.0, 1e3], help="of the matrix")
     parser.add_argument("--voids", type=float, nargs="+", help="radius of voids / of the fibres")
+    parser.add_argument("--poisson", type=float, nargs="+", default=[0.35], help="ratio of the matrix")
     parser.add_argument("--space", choices=("natural", "adaptive"), default="adaptive")
     parser.add_argument("--out", type=Path, default=Path("results/robustness.csv"), metavar="FILE.csv")
     return parser

@@ -10,7 +10,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from feti_homog.case import element_sizes
+from feti_homog.case import element_choice, element_sizes
 from feti_homog.case.asked import AnalysisSection, Stiffness
 from feti_homog.case.cell_files import with_files, with_match
 from feti_homog.case.cell_section import GEOMETRY, TOUCHING, Cell, size_faults
@@ -43,16 +43,14 @@ from feti_homog.case.sections import (
 )
 from feti_homog.case.selectors import ANALYSIS_TYPE, CRITERION, METHOD, PLANE
 from feti_homog.errors import CaseError
-from feti_homog.materials.forms import Isotropic, Material
+from feti_homog.materials.forms import Material
 from feti_homog.materials.laws import contrast_faults, contrast_warnings
-from feti_homog.materials.plane_state import PLANE_STATES
 from feti_homog.runtime import input_files
 from feti_homog.schema.keys import Selected, TableReader, selected_value, to_table
 from feti_homog.schema.values import text
 from feti_homog.schema.wording import limit_in_words, suggestion, toml_key, toml_value
 
 FIELDS = {"load": "single_load"}  # of a section whose name is that of a method
-LOCKING_POISSON, ROUNDING_POISSON = 0.49, 0.49999
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,30 +117,15 @@ class Case:
 
     def warnings(self) -> tuple[str, ...]:
         """List settings that are valid but probably unintended, a line each."""
-        contrast = contrast_warnings(self.materials, self.analysis.plane)
-        if PLANE_STATES[self.analysis.plane].is_sheet:
-            return tuple(contrast)
-        solids = {phase: material for phase, material in self.materials.items() if isinstance(material, Isotropic)}
-        lines = {
-            f"[material.{toml_key(phase)}] poisson = {material.poisson}: ": material.poisson
-            for phase, material in solids.items()
-        }
-        locking = [
-            f"{line}linear triangles lock above {LOCKING_POISSON} in plane strain; use order = 2 in [cell]"
-            for line, poisson in lines.items()
-            if self.cell.order == 1 and poisson > LOCKING_POISSON
-        ]
-        rounding = [
-            f"{line}so near to 0.5 that rounding may exceed the tolerance of the checks; use at most {ROUNDING_POISSON}"
-            for line, poisson in lines.items()
-            if poisson > ROUNDING_POISSON
-        ]
-        return (*locking, *rounding, *contrast)
+        of_elements = element_choice.warnings(self.cell, self.materials, self.analysis.plane)
+        return (*of_elements, *contrast_warnings(self.materials, self.analysis.plane))
 
     def remarks(self) -> tuple[str, ...]:
         """List the assumptions about settings that are not given, a line each."""
+        plane = self.analysis.plane
+        of_elements = element_choice.remarks(self.materials, plane)
         of_table = () if self.cell.table is None else self.cell.table.remarks
-        return (*of_table, *stress_free(self.analysis.type, self.section.placed, self.analysis.plane))
+        return (*of_elements, *of_table, *stress_free(self.analysis.type, self.section.placed, plane))
 
     def resolved(self) -> dict[str, Any]:
         """Return the case with its defaults as a plain document, of which `parse` makes an equal case."""
@@ -287,7 +270,7 @@ def _sized_cell(table: Mapping[str, Any], sections: Mapping[str, Any], faults: l
     """Return the cell with the sizes of elements, and unless its table says it the order, that it asks for."""
     cell: Cell = sections["cell"]
     plane, free_faces = sections["analysis"].plane, bool(sections["interfaces"]) or cell.has_voids
-    orders = (cell.order,) if "order" in table else (1, 2)
+    orders = element_choice.orders(cell, table, sections["materials"], plane, faults)
     return element_sizes.with_sizes(cell, sections["materials"], plane, free_faces, orders, faults)
 
 

@@ -130,9 +130,17 @@ class Cell:
     )
     order: int = key(
         integer(least=1, most=2),
-        "Order of the triangles. 1: linear; they lock in plane strain where poisson is above 0.49. 2: quadratic, "
-        "curved on round interfaces. With accuracy that of the two which takes fewer nodes, unless it is given.",
+        "Order of the triangles. 1: linear; they lock above poisson = 0.49, but in plane stress. 2: quadratic, curved on "
+        "round interfaces. With accuracy that of the two which takes fewer nodes, unless it is given.",
         default=1,
+        default_words="1, or 2 above poisson = 0.49",
+    )
+    element: str = key(
+        choice("mixed", "displacement"),
+        'Quadratic triangles of isotropic phases in plane strain and generalized plane strain. "mixed": with a cubic '
+        "bubble and a linear pressure of their own, which serve up to poisson = 0.5 and err less everywhere; "
+        '"displacement": without.',
+        default="mixed",
     )
     bodies: str = key(
         choice("torus", "plane"),

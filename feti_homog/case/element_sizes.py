@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import permutations
 from typing import Any
@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.case.cell_section import FIBRES_OF, Cell
+from feti_homog.case.element_choice import MIXED, is_mixed
 from feti_homog.case.mixed_cell import fibre_counts
 from feti_homog.case.phase_names import COATING
 from feti_homog.materials.forms import Material
@@ -25,6 +26,8 @@ CHOSEN = ("mesh_size", "interface_size", "tip_size", "refine")
 # with soft ones: 1.5 times the largest that `scripts/measure_accuracy.py` finds.
 COARSE_ERROR = {1: 0.12, 2: 0.0075}
 SOFT_FACTOR = 6.0
+# Largest condition that counts of mixed elements.
+MIXED_CONDITION = 33.0
 # Of the coarsest mesh: largest elements / distance of fibres on a square lattice, and / width of the cell. Circles and
 # gaps have smaller ones; still coarser meshes have hardly less elements.
 PITCH_SHARE, LARGEST = 0.5, 0.5
@@ -39,7 +42,7 @@ def with_sizes(
     materials: Mapping[str, Material],
     plane: str,
     free_faces: bool,
-    orders: Collection[int],
+    orders: Sequence[int],
     faults: list[str],
 ) -> Cell:
     """Return the cell with the mesh_size, the refine and the order that its accuracy or its element_size asks for.
@@ -52,15 +55,17 @@ def with_sizes(
 
     Args:
         free_faces: whether there are faces that no other phase holds firmly: of voids, of bonds that are soft or part.
-        orders: among which an accuracy chooses.
+        orders: among which an accuracy chooses; without one it is the first.
     """
+    cell = replace(cell, order=orders[0])
     if cell.element_size is not None:
         largest = min(coarsest(cell), FREE_SHARE * 2 * math.pi * _mean_radius(cell) / EDGES_AROUND)
         refine = min(MOST_REFINED, max(0, math.floor(math.log2(largest / cell.element_size))))
         return replace(cell, mesh_size=min(coarsest(cell), cell.element_size * 2**refine), refine=refine)
     if cell.accuracy is None:
         return cell
-    refinements = {order: _refinements(cell.accuracy, materials, plane, order, free_faces) for order in orders}
+    errors = {order: coarse_error(materials, plane, order, free_faces, cell.element) for order in orders}
+    refinements = {order: _refinements(error, cell.accuracy, order) for order, error in errors.items()}
     order = min(refinements, key=lambda p: (p**2 * 4 ** refinements[p], p))
     if refinements[order] > MOST_REFINED:
         better = "a larger one, or order = 2" if order == 1 else "a larger one"
@@ -71,9 +76,8 @@ def with_sizes(
     return replace(cell, mesh_size=coarsest(cell), refine=refinements[order], order=order)
 
 
-def _refinements(accuracy: float, materials: Mapping[str, Material], plane: str, order: int, free_faces: bool) -> int:
-    """Return the least r for which coarse_error / 4^(p r) is at most the accuracy."""
-    error = coarse_error(materials, plane, order, free_faces)
+def _refinements(error: float, accuracy: float, order: int) -> int:
+    """Return the least r for which error / 4^(p r) is at most the accuracy."""
     return max(0, math.ceil(math.log(error / accuracy, 4**order))) if error > 0 else 0
 
 
@@ -117,13 +121,16 @@ def _mean_radius(cell: Cell) -> float:
     return math.sqrt(math.fsum(cell.fractions.values()) * height / (math.pi * fibres))
 
 
-def coarse_error(materials: Mapping[str, Material], plane: str, order: int, free_faces: bool) -> float:
+def coarse_error(
+    materials: Mapping[str, Material], plane: str, order: int, free_faces: bool, element: str = MIXED
+) -> float:
     """Return an upper estimate of the relative error of the strain energy on the coarsest mesh,
 
         C_p kappa max s beta^2,  beta = |lambda - 1| / (lambda + 1),
 
     lambda the eigenvalues of the stiffness of a phase relative to that around it, 0 of free faces, s SOFT_FACTOR where
-    lambda < 1 and else 1, and kappa the condition of the stiffness in the plane of the phase nearest to incompressible.
+    lambda < 1 and else 1, and kappa the condition of the stiffness in the plane of the phase nearest to incompressible,
+    of mixed elements at most MIXED_CONDITION.
     """
     stiffness = {phase: stiffness_of(material, plane) for phase, material in materials.items()}
     ratios = [
@@ -133,8 +140,14 @@ def coarse_error(materials: Mapping[str, Material], plane: str, order: int, free
     ]
     if free_faces:
         ratios.append(np.zeros(1))
-    kappa = max(np.linalg.cond(_orthonormal(plane_stiffness(material, plane))) for material in materials.values())
-    return float(COARSE_ERROR[order] * kappa * _contrast(ratios))
+    conditions = [
+        min(
+            float(np.linalg.cond(_orthonormal(plane_stiffness(material, plane)))),
+            MIXED_CONDITION if is_mixed(element, order, material, plane) else math.inf,
+        )
+        for material in materials.values()
+    ]
+    return float(COARSE_ERROR[order] * max(conditions) * _contrast(ratios))
 
 
 def _contrast(ratios: Iterable[Float]) -> float:

@@ -15,6 +15,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 
+from feti_homog.fem import bubble
 from feti_homog.fem.problem import PLANE, Problem
 from feti_homog.fem.shape_functions import gradients
 from feti_homog.mesh.refinement import FineMesh, ReferenceLattice
@@ -40,17 +41,18 @@ class Assembly:
     area: float
 
 
-def assemble(mesh: FineMesh, L: Float, problem: Problem = PLANE) -> Assembly:
+def assemble(mesh: FineMesh, L: Float, problem: Problem = PLANE, is_mixed: bool = False) -> Assembly:
     """Assemble the subdomain `mesh` of the stiffness L (v, v).
 
-    Its first rows and columns are those of the strains that displacements make, the others of uniform ones.
+    Its first rows and columns are those of the strains that displacements make, the others of uniform ones.  Quadratic
+    elements of a stiffness that is isotropic in the plane may be mixed: with a bubble and a pressure (`fem.bubble`).
     """
     macro, tensor, c = MacroElement.of(mesh.lattice), _tensor(L, problem), problem.components
     couples, loads = np.empty((len(mesh.nodes), len(macro.rows), c * c)), np.empty((*mesh.nodes.shape, 2))
     area = 0.0
     for part in _parts(mesh):
         integrate = _curved if mesh.curved[part[0]] else _affine
-        couples[part], loads[part], own = integrate(macro, mesh, part, tensor)
+        couples[part], loads[part], own = integrate(macro, mesh, part, tensor, L if is_mixed else None)
         area += own
     classes, n = mesh.node_class[mesh.nodes], mesh.n_classes
     load = np.stack([np.bincount(classes.ravel(), loads[..., k].ravel(), n) for k in range(2)], axis=1)
@@ -88,20 +90,36 @@ def _parts(mesh: FineMesh) -> Iterator[Int]:
         yield from (members[first : first + most] for first in range(0, len(members), most))
 
 
-def _affine(macro: MacroElement, mesh: FineMesh, part: Int, tensor: Float) -> tuple[Float, Float, float]:
-    """Couples (t, p, c^2), loads (t, q, 2) and area of affine coarse triangles: pulled back to the unit triangle."""
+def _affine(
+    macro: MacroElement, mesh: FineMesh, part: Int, tensor: Float, mixed: Float | None
+) -> tuple[Float, Float, float]:
+    """Couples (t, p, c^2), loads (t, q, 2) and area of affine coarse triangles: pulled back to the unit triangle.
+
+    Elements of a stiffness `mixed` are.
+    """
     g, w = gradients(mesh.points[mesh.nodes[part, :3]])
     # The last two of the three linear functions are the reference coordinates: inverse_rk = dr_r / dx_k.
     inverse, determinant = g[:, 0, 1:], 2 * w[..., None]
-    pulled = np.einsum("trk,tsl->trskl", inverse, inverse).reshape(-1, 4, 4) @ tensor
-    return macro.products @ (determinant * pulled), macro.integrals @ (determinant * inverse), float(w.sum())
+    pulled = determinant * (np.einsum("trk,tsl->trskl", inverse, inverse).reshape(-1, 4, 4) @ tensor)
+    products = macro.products
+    if mixed is not None:
+        products = np.concatenate([products, macro.hessians], axis=1)
+        pulled = np.concatenate([pulled, bubble.affine_couples(mixed, inverse, determinant[:, 0, 0])], axis=1)
+    return products @ pulled, macro.integrals @ (determinant * inverse), float(w.sum())
 
 
-def _curved(macro: MacroElement, mesh: FineMesh, part: Int, tensor: Float) -> tuple[Float, Float, float]:
+def _curved(
+    macro: MacroElement, mesh: FineMesh, part: Int, tensor: Float, mixed: Float | None
+) -> tuple[Float, Float, float]:
     """Return the same of coarse triangles with curved edges, by integration over each of their elements."""
     elements = mesh.lattice.triangles
-    g, w = gradients(mesh.points[mesh.nodes[part][:, elements].reshape(-1, elements.shape[1])])
-    return macro.couples(products(g, w)) @ tensor, macro.nodes(integrals(g, w)), float(w.sum())
+    points = mesh.points[mesh.nodes[part][:, elements].reshape(-1, elements.shape[1])]
+    g, w = gradients(points)
+    if mixed is None:
+        couples = macro.couples(products(g, w)) @ tensor
+    else:
+        couples = macro.couples(bubble.Elements.of(points, mixed).couples())
+    return couples, macro.nodes(integrals(g, w)), float(w.sum())
 
 
 def _tensor(L: Float, problem: Problem) -> Float:
@@ -155,6 +173,8 @@ class MacroElement:
         couples: from the entries (4**refine, a, a) of the element matrices to the couples.
         nodes: from the nodes (4**refine, a) of the elements to those of the lattice.
         products: (p, 4) int dN_A/dr_k dN_B/dr_l over the unit triangle, with (k, l) flat.
+        hessians: (p, 9) sums over the elements of the products of second derivatives of their functions (`fem.bubble`)
+            if they are quadratic.
         integrals: (q, 2) int dN_A/dr_k over the unit triangle.
     """
 
@@ -163,6 +183,7 @@ class MacroElement:
     couples: GroupedSum
     nodes: GroupedSum
     products: Float
+    hessians: Float
     integrals: Float
 
     @classmethod
@@ -173,7 +194,13 @@ class MacroElement:
         pair = elements[:, :, None] * q + elements[:, None, :]
         couples, nodes, each = GroupedSum.of(pair), GroupedSum.of(elements), np.unique(pair)
         g, w = gradients(lattice.nodes[elements][..., 1:] / lattice.intervals)
-        return cls(each // q, each % q, couples, nodes, couples(products(g, w))[0], nodes(integrals(g, w))[0])
+        second = np.einsum("ar,bs->abrs", bubble.HESSIANS, bubble.HESSIANS).reshape(-1, 9)
+        # Two-dimensional stiffness does not change with the size: every element has that of the coarse triangle.
+        of_all = np.tile(second, (len(elements), 1)) if lattice.order == 2 else np.zeros((pair.size, 9))
+        return cls(
+            each // q, each % q, couples, nodes, couples(products(g, w))[0], couples(of_all)[0],
+            nodes(integrals(g, w))[0],
+        )  # fmt: skip
 
 
 def products(g: Float, w: Float) -> Float:

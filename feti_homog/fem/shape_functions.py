@@ -1,4 +1,4 @@
-"""Shape functions of linear and quadratic triangles, and their gradients at the points of a quadrature."""
+"""Shape functions of linear and quadratic triangles, and gradients, also of a bubble, at the points of a quadrature."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from feti_homog.typing import Float
 
 # Linear: exact for constants.  Quadratic: degree 4 with 6 points (Dunavant 1985), so that stiffness and
-# area are exact on straight elements and of full order on curved ones.
+# area are exact on straight elements, with a bubble too, and of full order on curved ones.
 _A, _B = 0.445948490915965, 0.091576213509771
 _P2_POINTS = np.array(
     [[1 - 2 * c, c] for c in (_A, _B)] + [[c, 1 - 2 * c] for c in (_A, _B)] + [[c, c] for c in (_A, _B)]
@@ -20,28 +20,31 @@ _P2_WEIGHTS = np.tile([0.223381589678011, 0.109951743655322], 3) / 2
 
 @dataclass(frozen=True)
 class Quadrature:
-    """Reference gradients (q, a, 2) and weights (q,) at the q quadrature points of an a-node triangle."""
+    """Reference gradients (q, a, 2) of a functions, weights (q,) and barycentric coordinates (q, 3) of q points."""
 
     gradients: Float
     weights: Float
+    coordinates: Float
 
 
 @cache
-def quadrature(nodes: int) -> Quadrature:
-    """Return the rule for the 3- or 6-node triangle."""
-    if nodes == 3:
-        return Quadrature(np.array([[[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]]]), np.array([0.5]))
+def quadrature(functions: int) -> Quadrature:
+    """Return the rule for the 3- or 6-node triangle; the seventh function is the bubble 27 r_0 r_1 r_2."""
+    if functions == 3:
+        return Quadrature(np.array([[[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]]]), np.array([0.5]), np.full((1, 3), 1 / 3))
     x, y = _P2_POINTS.T
     z, o = 1 - x - y, np.zeros_like(x)
-    by_x = np.stack([1 - 4 * z, 4 * x - 1, o, 4 * (z - x), 4 * y, -4 * y], axis=1)
-    by_y = np.stack([1 - 4 * z, o, 4 * y - 1, -4 * x, 4 * x, 4 * (z - y)], axis=1)
-    return Quadrature(np.stack([by_x, by_y], axis=2), _P2_WEIGHTS)
+    by_x = np.stack([1 - 4 * z, 4 * x - 1, o, 4 * (z - x), 4 * y, -4 * y, 27 * y * (z - x)], axis=1)
+    by_y = np.stack([1 - 4 * z, o, 4 * y - 1, -4 * x, 4 * x, 4 * (z - y), 27 * x * (z - y)], axis=1)
+    by_both = np.stack([by_x, by_y], axis=2)[:, :functions]
+    return Quadrature(by_both, _P2_WEIGHTS, np.stack([z, x, y], axis=1))
 
 
-def gradients(corners: Float) -> tuple[Float, Float]:
+def gradients(corners: Float, with_bubble: bool = False) -> tuple[Float, Float]:
     """Physical gradients (e, q, a, 2) and weights times Jacobian (e, q) of elements with nodes (e, a, 2)."""
-    rule = quadrature(corners.shape[1])
-    (xr, xs), (yr, ys) = np.moveaxis(np.tensordot(corners, rule.gradients, (1, 1)), (1, 3), (0, 1))
+    nodes = corners.shape[1]
+    rule = quadrature(nodes + with_bubble)
+    (xr, xs), (yr, ys) = np.moveaxis(np.tensordot(corners, rule.gradients[:, :nodes], (1, 1)), (1, 3), (0, 1))
     determinant = xr * ys - yr * xs
     by_r, by_s = np.moveaxis(rule.gradients, 2, 0)
     # x_d = J_rd r_r, so dN/dx_d = (J^-1)_dr dN/dr_r.

@@ -92,6 +92,10 @@ KEPT_EXCHANGES = 4
 # Seconds, up to a common factor, for the choice: of a dense inverse per n^3 of n boundary dofs, and of one application
 # of the dual operator and the preconditioner by triangular solves per dof; measured with `scripts/benchmark_path`.
 DENSE_INVERSE_SECONDS, APPLY_SECONDS = 5e-10, 3.5e-7
+# lambda / mu up to which the diagonal of K scales jumps, in mixed elements (`scripts/robustness --poisson`): beside a
+# matrix of nu = 0.4999 fibres of its own modulus take 15 iterations and 9 coarse vectors a subdomain with 2, 11 with 9,
+# 36 without, and pieces beside fibres a thousand times stiffer 15, 15 and 79 iterations.
+SCALED_LAME = 2.0
 # Columns up to which dense products one after the other are faster than all at once (`scripts/measure_kernels.py`).
 DENSE_COLUMNS_ONE_BY_ONE = 6
 # Columns for which sparse factors are solved at once: bounds the memory of their right-hand sides, 8 bytes a dof each.
@@ -101,6 +105,9 @@ SPARSE_COLUMNS_AT_ONCE = 64
 # inverse are refined: up to 3e3 of discs and of pieces around them, 1.5e4 of rings a twentieth of their radius thick,
 # 4e6 of a hundredth.  Forces balance to 4e-12 there, and to 5e-8 without.
 ILL_CONDITIONED = 1e4
+# Share of a diagonal (`Subdomain.compressible_share`) below which they are refined too: nu above 0.49999. Beside fibres
+# of a thousandth of its modulus a matrix of nu = 0.4999999 balances energies to 3e-9, and to 2e-4 without.
+INCOMPRESSIBLE_SHARE = 1e-4
 
 # solver, krylov
 

@@ -84,7 +84,7 @@ class _Elements:
         share = np.clip((reach - np.linalg.norm(away, axis=2)) / (reach * (1 - CORE)), 0.0, 1.0)[..., None]
         total = u[nodes] + away @ E
         moved, changed = share * ((away + spoke) @ QUARTER_TURN.T), share * (total @ QUARTER_TURN.T)
-        return energy_change(points, total, self.subdomain.L[:3, :3], moved, changed)
+        return energy_change(points, total, self.subdomain.L[:3, :3], moved, changed, self.subdomain.is_mixed)
 
 
 def body_boundaries(comm: MPI.Comm, subdomains: Sequence[Subdomain]) -> tuple[Float, Int]:

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from feti_homog.case import element_choice
 from feti_homog.case.case import Case
 from feti_homog.fem.problem import AXIAL, GENERALIZED, PLANE, Problem
 from feti_homog.materials.laws import expansion, plane_stiffness, spatial_stiffness
@@ -49,6 +50,12 @@ def plane_law(case: Case, phase: str) -> Float:
         return C
     N = np.column_stack([np.eye(4), -alpha[IN_PLANE]])
     return np.asarray(N.T @ C @ N)
+
+
+def is_mixed(case: Case, phase: str) -> bool:
+    """Whether the elements of a phase have a bubble and a pressure of their own in the plane problem."""
+    cell = case.cell
+    return element_choice.is_mixed(cell.element, cell.order, case.material_of(phase), case.analysis.plane)
 
 
 def axial_law(case: Case, phase: str) -> Float:

@@ -212,9 +212,12 @@ def _assemble(case: Case, submeshes: SubmeshesOfRank, lattice: ReferenceLattice)
     """Return the subdomains of this rank, refined and assembled."""
     problem = phase_laws.plane_problem(case)
     return [
-        Subdomain.build(s, lattice, phase_laws.plane_law(case, s.phase), problem, **_flags(s.phase))
+        Subdomain.build(
+            s, lattice, phase_laws.plane_law(case, s.phase), problem, is_mixed=phase_laws.is_mixed(case, s.phase),
+            **_flags(s.phase),
+        )
         for s in submeshes.cut()
-    ]
+    ]  # fmt: skip
 
 
 def _flags(phase: str) -> dict[str, bool]:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.errors import CaseError
-from feti_homog.typing import Float
+from feti_homog.typing import Bool, Float
 
 PLANE = [0, 1, 5]  # of the order [11, 22, 33, 23, 13, 12]
 # Places of the components of a tensor in the orders [11, 22, 12] and [11, 22, 33, 23, 13, 12].
@@ -42,6 +42,18 @@ def plane_stiffnesses(case: Mapping[str, Any], phases: Sequence[str]) -> Float:
         CaseError: a phase of the mesh has no material in the case.
     """
     return np.stack([_plane_stiffness(_constants(case, phase), case["analysis"]["plane"]) for phase in phases])
+
+
+def mixed_phases(case: Mapping[str, Any], phases: Sequence[str]) -> Bool:
+    """(phases,) whether quadratic elements have a bubble and a pressure: those of isotropic phases but in plane stress.
+
+    Unless the case has another `element`; cases of older versions have none.
+
+    Raises:
+        CaseError: a phase of the mesh has no material in the case.
+    """
+    wanted = case["cell"].get("element") == "mixed" and case["analysis"]["plane"] != "stress"
+    return np.array([wanted and "young" in _constants(case, phase) for phase in phases], bool)
 
 
 def out_of_plane(case: Mapping[str, Any], phases: Sequence[str]) -> Float:

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from feti_homog.typing import Bool, Float, Int
 from feti_homog.verify.bonds import inwardness, pairs_of
-from feti_homog.verify.constitutive_law import expansions, plane_stiffnesses, spatial_stiffnesses
+from feti_homog.verify.constitutive_law import expansions, mixed_phases, plane_stiffnesses, spatial_stiffnesses
 from feti_homog.verify.elements import Elements
 from feti_homog.verify.reading import ResultFiles, gradient
 from feti_homog.verify.torus import TornNodes, TornSides, along_one_line, constituents, torn, wrapped
@@ -99,7 +99,7 @@ class DiscreteCell:
         mesh = files.mesh
         stiffnesses = (spatial_stiffnesses if files.is_spatial else plane_stiffnesses)(files.case, files.phases)
         free = expansions(files.case, files.phases) if files.is_spatial else None
-        elements = Elements(mesh, stiffnesses)
+        elements = Elements(mesh, stiffnesses, mixed_phases(files.case, files.phases))
         sides, nodes, radius = torn(mesh, files.size)
         parts = constituents(mesh, sides)
         inwards = inwardness(mesh, files.phases, sides, parts)

@@ -15,8 +15,9 @@ from functools import cache, cached_property
 
 import numpy as np
 
-from feti_homog.typing import Float, Int
+from feti_homog.typing import Bool, Float, Int
 from feti_homog.verify.cell_tables import Mesh
+from feti_homog.verify.mixed_elements import NORMAL, inner_fields
 
 ELEMENTS_AT_ONCE = 1 << 15
 # Gradients of so many numbers are kept from state to state: 400 MB.
@@ -51,10 +52,12 @@ class ElementFields:
 
 
 class Elements:
-    """The elements of a mesh whose phases have the stiffnesses (phases, v, v)."""
+    """The elements of a mesh whose phases have the stiffnesses (phases, v, v); quadratic ones of `mixed` phases
+    (phases,) have a bubble and a pressure."""
 
-    def __init__(self, mesh: Mesh, stiffnesses: Float) -> None:
+    def __init__(self, mesh: Mesh, stiffnesses: Float, mixed: Bool) -> None:
         self._mesh, self._stiffnesses = mesh, stiffnesses
+        self._mixed = mixed & (mesh.triangles.shape[1] == 6)
 
     @cached_property
     def area(self) -> Float:
@@ -91,7 +94,9 @@ class Elements:
             u, share = displacement[nodes], weights / weights.sum(axis=1)[:, None]
             slope = np.einsum("eqad,eai->eqid", gradients, u)
             local, own_free = _strains(slope, v, along), free[self._mesh.phase[part]]
+            excess = self._add_bubbles(part, gradients, weights, local, own_free)
             answer = np.einsum("eij,eqj->eqi", self._stiffnesses[self._mesh.phase[part]], local - own_free[:, None])
+            answer[..., NORMAL[v]] += excess[..., None]
             strain[part], stress[part] = (np.einsum("eqi,eq->ei", field, share) for field in (local, answer))
             size[part] = np.einsum("eqad,eai->eq", np.abs(gradients), terms_of_u[nodes]).max(axis=1)
             size[part] += self._rounded_places(part, gradients, slope) + abs(along) + np.abs(own_free).max(axis=1)
@@ -103,6 +108,25 @@ class Elements:
             largest = max(largest, float(np.abs(own).max()))
             energy += float(np.einsum("eqi,eqi,eq->", answer, local, weights, optimize=True))
         return ElementFields(strain, stress, size, force, float(terms.max()), largest, energy)
+
+    def _add_bubbles(self, part: slice, gradients: Float, weights: Float, local: Float, free: Float) -> Float:
+        """(e, q) pressure of mixed elements less lambda tr eps, 0 in others; adds the bubbles' strains to `local`."""
+        excess, phase = np.zeros(local.shape[:2]), self._mesh.phase[part]
+        own = np.flatnonzero(self._mixed[phase])
+        if not len(own):
+            return excess
+        v, lame = (
+            local.shape[2],
+            np.stack([self._stiffnesses[phase[own], 0, 1], self._stiffnesses[phase[own], -1, -1]], 1),
+        )
+        elastic = local[own] - free[own, None]
+        slope, pressure = inner_fields(_places(), gradients[own], weights[own], elastic, lame)
+        if v == 6:
+            slope = np.concatenate([slope, np.zeros((*slope.shape[:2], 1, 2))], axis=2)
+        bubble = _strains(slope, v, 0.0)
+        local[own] += bubble
+        excess[own] = pressure - lame[:, :1] * (elastic + bubble)[..., NORMAL[v]].sum(axis=2)
+        return excess
 
     def _rounded_places(self, part: slice, gradients: Float, slope: Float) -> Float:
         """(e,) |du/dx| sum |x_a| |dN_a/dx|: gradients are off by the rounding of places, in small elements most."""
@@ -140,25 +164,28 @@ class Elements:
 def _rule(nodes: int) -> tuple[Float, Float]:
     """dN_a/dr_b (q, a, 3) and the weights (q,), their sum 1, of a rule exact for constants or for degree 4.
 
-    The six points are Dunavant's (1985) in closed form: (b, b, 1 - 2 b) with 18 b = 8 - sqrt(10) +- sqrt(38 - 44
-    sqrt(2/5)).
+    The six points are Dunavant's (1985), `_places`.
     """
     if nodes == 3:
         return np.eye(3)[None], np.ones(1)
-    root, more = np.sqrt(10.0), np.sqrt(213125 - 53320 * np.sqrt(10.0))
-    spread = np.sqrt(38 - 44 * np.sqrt(0.4))
-    places, weights = [], []
-    for sign in (1.0, -1.0):
-        b = (8 - root + sign * spread) / 18
-        places += [np.roll([1 - 2 * b, b, b], turn) for turn in range(3)]
-        weights += [(620 + sign * more) / 3720] * 3
-    r = np.array(places)
+    more = np.sqrt(213125 - 53320 * np.sqrt(10.0))
+    weights, r = [(620 + sign * more) / 3720 for sign in (1, 1, 1, -1, -1, -1)], _places()
     slopes = np.zeros((6, 6, 3))
     for a in range(3):
         slopes[:, a, a] = 4 * r[:, a] - 1
     for side, (a, b) in enumerate(SIDES):
         slopes[:, 3 + side, a], slopes[:, 3 + side, b] = 4 * r[:, b], 4 * r[:, a]
     return slopes, np.array(weights)
+
+
+@cache
+def _places() -> Float:
+    """(6, 3) barycentric coordinates (b, b, 1 - 2 b), turned, with 18 b = 8 - sqrt(10) +- sqrt(38 - 44 sqrt(2/5))."""
+    spread, places = np.sqrt(38 - 44 * np.sqrt(0.4)), []
+    for sign in (1.0, -1.0):
+        b = (8 - np.sqrt(10.0) + sign * spread) / 18
+        places += [np.roll([1 - 2 * b, b, b], turn) for turn in range(3)]
+    return np.array(places)
 
 
 def _strains(slope: Float, v: int, along: float) -> Float:

@@ -11,13 +11,14 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import splu
 
 
-def effective_stiffness(points, triangles, stiffness, width, height):
-    """L^ef (3, 3) of elements `triangles` (m, 3 or 6) on `points`, with `stiffness` (m, 3, 3) of each."""
+def effective_stiffness(points, triangles, stiffness, width, height, mixed):
+    """L^ef (3, 3) of elements `triangles` (m, 3 or 6) on `points`, with `stiffness` (m, 3, 3) of each; those of `mixed`
+    (m,) have a bubble and a pressure."""
     node, n = periodic_numbers(points, width, height)
     rows, columns, values, loads = [], [], [], np.zeros((2 * n, 3))
     mean = np.zeros((3, 3))
-    for corners, L in zip(triangles, stiffness, strict=True):
-        k, q, area = element(points[corners], L)
+    for corners, L, is_mixed in zip(triangles, stiffness, mixed, strict=True):
+        k, q, area = element(points[corners], L, is_mixed)
         dofs = (2 * node[corners][:, None] + [0, 1]).ravel()
         rows.append(np.repeat(dofs, len(dofs)))
         columns.append(np.tile(dofs, len(dofs)))
@@ -42,8 +43,8 @@ def periodic_numbers(points, width, height):
     return number.ravel(), len(classes)
 
 
-def element(corners, L):
-    """Stiffness, load int B^T L and area of one triangle with 3 or 6 nodes."""
+def element(corners, L, is_mixed=False):
+    """Stiffness, load int B^T L and area of one triangle with 3 or 6 nodes, or of a mixed one with 6."""
     a = len(corners)
     k, q, area = np.zeros((2 * a, 2 * a)), np.zeros((2 * a, 3)), 0.0
     for x, y, w in rule(6 if a == 6 else 1):
@@ -56,7 +57,27 @@ def element(corners, L):
         k += weight * B.T @ L @ B
         q += weight * B.T @ L
         area += weight
-    return k, q, area
+    return (mixed_stiffness(corners, L) if is_mixed else k), q, area
+
+
+def mixed_stiffness(corners, L):
+    """Stiffness (12, 12) of 6 nodes with a bubble and a linear pressure p, in both of which
+    int 2 mu eps : eps + 2 p div u - p^2 / lambda is stationary."""
+    lame, shear = L[0, 1], L[2, 2]
+    A = np.zeros((17, 17))
+    for x, y, w in rule(6):
+        g = np.vstack([shape_gradients(6, x, y), 27 * np.array([y * (1 - 2 * x - y), x * (1 - x - 2 * y)])])
+        J = g[:6].T @ corners
+        dN = g @ np.linalg.inv(J).T
+        weight, pressure = w * np.linalg.det(J), np.array([1.0, x - 1 / 3, y - 1 / 3])
+        for i in range(2):
+            A[i:14:2, i:14:2] += weight * shear * dN @ dN.T
+            for j in range(2):
+                A[i:14:2, j:14:2] += weight * shear * np.outer(dN[:, j], dN[:, i])
+            A[i:14:2, 14:] += weight * np.outer(dN[:, i], pressure)
+        A[14:, 14:] -= weight * np.outer(pressure, pressure)
+    A[14:, :14] = lame * A[:14, 14:].T
+    return A[:12, :12] - A[:12, 12:] @ np.linalg.solve(A[12:, 12:], A[12:, :12])
 
 
 def shape_gradients(a, x, y):

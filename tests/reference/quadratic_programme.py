@@ -43,9 +43,10 @@ def torus_keys(points, size):
 
 
 class QuadraticProgramme:
-    """The cell of round fibres made of meshed parts (points, triangles, body, depth, L).
+    """The cell of round fibres made of meshed parts (points, triangles, body, depth, L, is_mixed).
 
-    The depth is how many interfaces are around a part: 0 of the matrix. `centres` (f, 2) are those of the fibres,
+    Elements may be mixed as in `monolithic`. The depth is how many interfaces are around a part: 0 of the matrix.
+    `centres` (f, 2) are those of the fibres,
     `radii` (f,) or, of coated ones, (depths, f) those of the circles around depths 1, 2, ...; circle (d - 1) f + k is
     that of fibre k. Interface nodes are sorted by `key`; `matrix` and `fibre_node` are the outer and the inner node,
     `fibre` the circle.
@@ -53,7 +54,7 @@ class QuadraticProgramme:
 
     def __init__(self, parts, centres, radii, size):
         self.size = np.array(size)
-        labels = [np.stack([np.full(len(p), body), torus_keys(p, size)], axis=1) for p, _, body, _, _ in parts]
+        labels = [np.stack([np.full(len(p), body), torus_keys(p, size)], axis=1) for p, _, body, *_ in parts]
         classes, number = np.unique(np.concatenate(labels), axis=0, return_inverse=True)
         first = np.cumsum([0] + [len(label) for label in labels])
         self.n = len(classes)
@@ -62,12 +63,12 @@ class QuadraticProgramme:
         depth, middle = np.zeros(self.n, int), np.zeros(self.n, bool)
         self.mean, self.Q = np.zeros((3, 3)), np.zeros((2 * self.n, 3))
         rows, columns, values = [], [], []
-        for (points, triangles, _, around, L), start in zip(parts, first, strict=False):
+        for (points, triangles, _, around, L, is_mixed), start in zip(parts, first, strict=False):
             nodes = number.ravel()[start:][triangles]
             depth[nodes] = around
             middle[nodes[:, 3:]] = True
             for own, corners in zip(nodes, points[triangles], strict=True):
-                k, q, area = monolithic.element(corners, L)
+                k, q, area = monolithic.element(corners, L, is_mixed)
                 dofs = (2 * own[:, None] + [0, 1]).ravel()
                 rows.append(np.repeat(dofs, len(dofs)))
                 columns.append(np.tile(dofs, len(dofs)))

@@ -16,6 +16,7 @@ from reference import monolithic
 from reference.quadratic_programme import minimise, nearest, rigid_motions, torus_keys
 
 LOADS = 7  # six strains and a temperature
+PLANE = [0, 1, 5]
 
 
 @dataclass(frozen=True)
@@ -30,8 +31,8 @@ class Part:
     alpha: np.ndarray
 
 
-def elements(corners, C, alpha):
-    """K (m, 3a, 3a), loads Q (m, 3a, 7) and areas (m,) of triangles with corners (m, a, 2)."""
+def elements(corners, C, alpha, is_mixed):
+    """K (m, 3a, 3a), loads Q (m, 3a, 7) and areas (m,) of triangles with corners (m, a, 2); isotropic if mixed."""
     m, a, _ = corners.shape
     imposed = np.column_stack([np.eye(6), -alpha])
     K, Q, area = np.zeros((m, 3 * a, 3 * a)), np.zeros((m, 3 * a, LOADS)), np.zeros(m)
@@ -46,7 +47,18 @@ def elements(corners, C, alpha):
         K += np.einsum("m,mip,ij,mjq->mpq", weight, B, C, B, optimize=True)
         Q += np.einsum("m,mip,ij->mpj", weight, B, C @ imposed, optimize=True)
         area += weight
+    if is_mixed:
+        plane = np.flatnonzero(np.arange(3 * a) % 3 < 2)
+        L = C[np.ix_(PLANE, PLANE)]
+        K[:, plane[:, None], plane] = [monolithic.mixed_stiffness(own, L) for own in corners]
     return K, Q, area
+
+
+def is_isotropic(C):
+    """Whether a stiffness (6, 6) is that of an isotropic material."""
+    expected = np.diag([2.0, 2, 2, 1, 1, 1]) * C[3, 3]
+    expected[:3, :3] += C[0, 1]
+    return np.allclose(C, expected, rtol=1e-12)
 
 
 class SpatialProgramme:
@@ -65,7 +77,9 @@ class SpatialProgramme:
         for part, start in zip(parts, first, strict=False):
             nodes = number.ravel()[start:][part.triangles]
             matrix[nodes], middle[nodes[:, 3:]] = part.is_matrix, True
-            k, q, area = elements(part.points[part.triangles], part.C, part.alpha)
+            k, q, area = elements(
+                part.points[part.triangles], part.C, part.alpha, part.triangles.shape[1] == 6 and is_isotropic(part.C)
+            )  # fmt: skip
             dofs = (3 * nodes[:, :, None] + np.arange(3)).reshape(len(nodes), -1)
             np.add.at(self.Q, dofs, q)
             entries.append(

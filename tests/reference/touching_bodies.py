@@ -37,7 +37,7 @@ class TouchingBodies(QuadraticProgramme):
         self.held = several - parting
         labels = np.where(np.isin(self._keys, sorted(parting)), self._body[:, None], -1)
         parts = [
-            (corners, np.arange(3)[None], label, int(own > 0), L[own])
+            (corners, np.arange(3)[None], label, int(own > 0), L[own], False)
             for corners, label, own in zip(self._corners, labels, self._phase, strict=True)
         ]
         super().__init__(parts, np.zeros((0, 2)), np.zeros((0, 0)), size)

@@ -57,17 +57,18 @@ def solve(case, comm, thresholds=DEFAULTS, policy=DEFAULT_POLICY):
 
 def monolithic_stiffness(cell):
     """L^ef of the same refined mesh by one monolithic solve, on every rank."""
-    parts = cell.comm.gather([(s.mesh.points, s.mesh.triangles, s.L) for s in cell.subdomains])
+    parts = cell.comm.gather([(s.mesh.points, s.mesh.triangles, s.L, s.is_mixed) for s in cell.subdomains])
     result = None
     if cell.comm.rank == 0:
         own = [part for parts_of_rank in parts for part in parts_of_rank]
-        first = np.cumsum([0] + [len(points) for points, _, _ in own])
+        first = np.cumsum([0] + [len(points) for points, *_ in own])
         result = monolithic.effective_stiffness(
-            np.concatenate([points for points, _, _ in own]),
-            np.concatenate([triangles + n for (_, triangles, _), n in zip(own, first, strict=False)]),
-            np.concatenate([np.broadcast_to(L, (len(triangles), 3, 3)) for _, triangles, L in own]),
+            np.concatenate([points for points, *_ in own]),
+            np.concatenate([triangles + n for (_, triangles, *_), n in zip(own, first, strict=False)]),
+            np.concatenate([np.broadcast_to(L, (len(triangles), 3, 3)) for _, triangles, L, _ in own]),
             cell.summary.width,
             cell.summary.height,
+            np.concatenate([np.full(len(triangles), is_mixed) for _, triangles, _, is_mixed in own]),
         )
     return cell.comm.bcast(result)
 

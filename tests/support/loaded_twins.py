@@ -139,7 +139,7 @@ class LoadedTwin:
 
 
 def _plane(s):
-    return s.mesh.points, s.mesh.triangles, s.submesh.body, int(s.submesh.phase != "matrix"), s.L
+    return s.mesh.points, s.mesh.triangles, s.submesh.body, int(s.submesh.phase != "matrix"), s.L, s.is_mixed
 
 
 def _spatial(s, C, alpha):

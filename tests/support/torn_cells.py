@@ -103,7 +103,8 @@ def referenced(cell):
     inwards = ["matrix", *(["coating"] if fibres.coated.all() else []), "fibre"]
     radii = np.array([fibres.outer_radii, fibres.radii])[-len(inwards) + 1 :]
     parts = [
-        (s.mesh.points, s.mesh.triangles, s.submesh.body, inwards.index(s.submesh.phase), s.L) for s in cell.subdomains
+        (s.mesh.points, s.mesh.triangles, s.submesh.body, inwards.index(s.submesh.phase), s.L, s.is_mixed)
+        for s in cell.subdomains
     ]
     parts, points = comm.gather(parts), comm.gather(cell.solver.jump_operator.nodes.points)
     if parts is None:

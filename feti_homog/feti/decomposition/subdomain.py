@@ -9,9 +9,10 @@ from scipy.sparse import csr_matrix, diags
 
 from feti_homog.errors import MeshError
 from feti_homog.fem.assembly import assemble
+from feti_homog.fem.bubble import lame
 from feti_homog.fem.problem import PLANE, Problem
 from feti_homog.fem.void_boundary import void_integrals
-from feti_homog.feti.thresholds import KERNEL_TOLERANCE
+from feti_homog.feti.thresholds import KERNEL_TOLERANCE, SCALED_LAME
 from feti_homog.mesh.mesh_fibres import unwrap
 from feti_homog.mesh.refinement import FineMesh, ReferenceLattice, refine
 from feti_homog.mesh.submesh import Submesh
@@ -37,6 +38,7 @@ class Subdomain:
         positions: (n, 2) unwrapped positions of the classes.
         is_thin: whether the body is, such as a ring much thinner than its radius: the inverse is ill-conditioned.
         is_outer: whether no other body lies around it.
+        is_mixed: whether its elements have a bubble and a pressure of their own, see `assemble`.
     """
 
     submesh: Submesh
@@ -50,12 +52,13 @@ class Subdomain:
     _built_stiffness: csr_matrix | None = field(repr=False)
     is_thin: bool = False
     is_outer: bool = False
+    is_mixed: bool = False
 
     @classmethod
     def build(
         cls, submesh: Submesh, lattice: ReferenceLattice, L: Float, problem: Problem = PLANE, **flags: bool
     ) -> Subdomain:
-        """Refine and assemble, without communication; `flags` are `is_thin` and `is_outer`.
+        """Refine and assemble, without communication; `flags` are `is_thin`, `is_outer` and `is_mixed`.
 
         Raises:
             MeshError: an element is inverted, or the rigid-body modes are not in the kernel of K.
@@ -67,7 +70,7 @@ class Subdomain:
     @classmethod
     def on(cls, submesh: Submesh, mesh: FineMesh, L: Float, problem: Problem, **flags: bool) -> Subdomain:
         """Assemble on a refined mesh, without communication.  Arguments and errors as of `build`."""
-        body = assemble(mesh, L, problem)
+        body = assemble(mesh, L, problem, flags.get("is_mixed", False))
         shift, closes = unwrap(submesh)
         positions = np.empty((mesh.n_classes, 2))
         positions[mesh.node_class[mesh.nodes]] = mesh.points[mesh.nodes] + shift[:, None]
@@ -97,6 +100,17 @@ class Subdomain:
         """cn."""
         return len(self.Q)
 
+    @property
+    def compressible_share(self) -> float:
+        """Share of the diagonal of K in the scaling D: that of a phase with the same mu and lambda <= 2 mu.
+
+        A boundary that keeps the volume is as stiff as mu says, but single nodes of mixed elements are as lambda.
+        """
+        if not self.is_mixed:
+            return 1.0
+        first, shear = lame(self.L)
+        return (min(first, SCALED_LAME * shear) + 3 * shear) / (first + 3 * shear)
+
     def take_stiffness(self) -> csr_matrix:
         """(cn, cn) K, which belongs to the caller: that of `build` the first time, then one assembled anew."""
         K, self._built_stiffness = self._built_stiffness, None
@@ -104,7 +118,7 @@ class Subdomain:
 
     def assemble_stiffness(self) -> csr_matrix:
         """(cn, cn) K, Eq. (28), the pinned class (15) eliminated by a unit row scaled like the others."""
-        return _pinned(assemble(self.mesh, self.L, self.problem).K, self.problem, self.submesh.pinned)
+        return _pinned(assemble(self.mesh, self.L, self.problem, self.is_mixed).K, self.problem, self.submesh.pinned)
 
     def fixing(self, K: csr_matrix, candidates: Int) -> tuple[Int, Float]:
         """Degrees of freedom and dense block rho Rf Rf^T that make K + block an SPD matrix.

@@ -14,7 +14,7 @@ from scipy.sparse import csr_matrix
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.linalg.dense_cholesky import full_from_lower, invert_upper
 from feti_homog.feti.linalg.schur_complement import schur_complement
-from feti_homog.feti.thresholds import DENSE_COLUMNS_ONE_BY_ONE, ILL_CONDITIONED
+from feti_homog.feti.thresholds import DENSE_COLUMNS_ONE_BY_ONE, ILL_CONDITIONED, INCOMPRESSIBLE_SHARE
 from feti_homog.typing import Float, Int
 
 
@@ -46,9 +46,8 @@ class ExplicitInterfaceOperator:
         self._flexibility_diagonal = both.diagonal().copy()
         # Each diagonal has less than the norm of its matrix.
         conditioning = self._schur_diagonal.max(initial=0.0) * self._flexibility_diagonal.max(initial=0.0)
-        # Where pieces are ill-conditioned because they are nearly incompressible, refined products and the coarse
-        # matrices would no longer agree to rounding.
-        self._refines = subdomain.is_thin and bool(conditioning > ILL_CONDITIONED)
+        is_thin = subdomain.is_thin and bool(conditioning > ILL_CONDITIONED)
+        self._refines = is_thin or subdomain.compressible_share < INCOMPRESSIBLE_SHARE
         np.fill_diagonal(both, 0.0)
         self._both = both
 
@@ -59,7 +58,8 @@ class ExplicitInterfaceOperator:
     def apply_flexibility(self, x: Float, out: Float | None = None) -> Float:
         """S+ x for x (n,) or (n, k), into `out` if it is given; else in Fortran order.
 
-        Of a thin body, whose inverse is ill-conditioned, with one step of iterative refinement.
+        Of a body whose inverse is ill-conditioned, thin or nearly incompressible, with one step of iterative
+        refinement.
         """
         y = self._product(x, out, self._flexibility_diagonal, lower=0)
         if self._refines:

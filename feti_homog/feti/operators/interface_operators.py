@@ -109,6 +109,7 @@ class InterfaceOperators:
             self.operators.append(operator)
             self.with_springs.append(operator if root is None else WithSprings(operator, root, subdomain.R[dofs]))
             bodies.append(diagonal)
+            diagonal = diagonal * subdomain.compressible_share
             if root is not None:
                 diagonal = 1.0 / (1.0 / diagonal + np.asarray(root.multiply(root).sum(axis=1)).ravel())
             diagonals.append(diagonal)

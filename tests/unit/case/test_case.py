@@ -44,7 +44,7 @@ def test_keys_that_are_left_out_have_their_defaults(tmp_path):
         "accuracy": None, "element_size": None,
         "refine": 0, "order": 1, "bodies": "torus", "fibres": None, "width": None, "fibre_radius": None,
         "coating": None, "min_gap": 0.05, "seed": 0, "radius_spread": 0.0, "file": None,
-        "phases": None, "columns": None, "repair": "none", "snap_tolerance": 1e-3,
+        "phases": None, "columns": None, "repair": "none", "snap_tolerance": 1e-3, "element": "mixed",
         "height": None, "fibre_list": None, "window": "periodic", "table": None, "match": None, "matched": None,
         "voids": None, "void_radius": None,
         "mix": None, "radii": None,
@@ -187,12 +187,19 @@ def test_high_contrast_is_warned_of(tmp_path, plane):
     assert case_of(tmp_path, case.replace("1e13", "1e11")).warnings() == ()
 
 
-def test_locking_is_warned_of(tmp_path):
-    locking = BASE.replace("0.299", "0.4999")
-    (warning,) = case_of(tmp_path, locking).warnings()
-    assert warning.startswith("[material.matrix] poisson = 0.4999") and "order = 2" in warning
-    assert case_of(tmp_path, locking.replace('"strain"', '"stress"')).warnings() == ()
-    assert case_of(tmp_path, locking.replace("mesh_size", "order = 2\nmesh_size")).warnings() == ()
+@pytest.mark.parametrize("sizes", ["", "accuracy = 0.1\n", "element_size = 0.1\n"])
+def test_elements_of_nearly_incompressible_phases_are_quadratic(tmp_path, sizes):
+    sized = BASE if not sizes else BASE.replace("mesh_size = 0.05\n", sizes)
+    locking = sized.replace("0.299", "0.4999")
+    case, sheet = (case_of(tmp_path, text) for text in (locking, locking.replace('"strain"', '"stress"')))
+    (remark,) = case.remarks()
+    assert remark.startswith("[material.matrix] poisson = 0.4999: elements are quadratic")
+    assert case.cell.order == 2 and case.warnings() == ()
+    assert sheet.cell.order == 1 and sheet.remarks() == sheet.warnings() == ()
+    with pytest.raises(CaseError, match=r"^\[cell\] order = 1: .*lock: \[material.matrix\] poisson = 0.4999; expected"):
+        case_of(tmp_path, locking.replace("[cell]\n", "[cell]\norder = 1\n"))
+    (warning,) = case_of(tmp_path, locking.replace("[cell]\n", '[cell]\nelement = "displacement"\n')).warnings()
+    assert "displacements alone err" in warning
 
 
 def test_incompressible_is_allowed_in_plane_stress(tmp_path):

@@ -87,6 +87,13 @@ def test_the_estimate_of_isotropic_phases_in_closed_form():
         assert found == pytest.approx(constant * kappa * SOFT_FACTOR * beta[shear] ** 2)
 
 
+@pytest.mark.parametrize(("order", "element", "kappa"), [(1, "mixed", 1e4), (2, "displacement", 1e4), (2, "mixed", 33)])
+def test_mixed_elements_err_no_more_with_a_phase_that_keeps_its_volume(order, element, kappa):
+    matrix, fibre = Isotropic(young=1.0, poisson=0.49995), Isotropic(young=1e9, poisson=0.49995)
+    found = coarse_error({"matrix": matrix, "fibre": fibre}, "strain", order, False, element)
+    assert found == pytest.approx(COARSE_ERROR[order] * kappa)
+
+
 def test_a_homogeneous_cell_needs_no_split():
     assert splits(3.5, matrix={"young": 3.5, "poisson": 0.2}, accuracy=1e-7) == 0
 
