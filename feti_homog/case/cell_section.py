@@ -130,8 +130,8 @@ class Cell:
     )
     order: int = key(
         integer(least=1, most=2),
-        "Order of the triangles. 1: linear; they lock above poisson = 0.49, but in plane stress. 2: quadratic, curved on "
-        "round interfaces. With accuracy that of the two which takes fewer nodes, unless it is given.",
+        "Order of the triangles. 1: linear; they lock above poisson = 0.49, but in plane stress. 2: quadratic, curved "
+        "on round interfaces. With accuracy that of the two which takes fewer nodes, unless it is given.",
         default=1,
         default_words="1, or 2 above poisson = 0.49",
     )
