@@ -96,7 +96,6 @@ class Cell:
                 "cell": {
                     "geometry": "random", "fibres": self.fibres, "min_gap": self.gap, **self._fractions(),
                     "mesh_size": 1 / (ELEMENTS * self.fibres**0.5), "refine": self.refine,
-                    **({"order": 2} if self.poisson > 0.49 else {}),
                     **({"coating": self.coating} if self.coating else {}),
                     **({"voids": POROSITY, "void_radius": self.voids} if self.voids else {}),
                 },

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from reference.closed_forms import bulk_and_shear, cubic, dilute_slopes, hashin_shtrikman, lame, laminate
-from reference.references import BONDED
+from reference.references import BONDED, NEARLY_INCOMPRESSIBLE
 from support.cases import FIBRE, MATRIX, make_case, monolithic_stiffness, relative_error, solve
 from unit.mesh.faulty_meshes import grid
 
@@ -49,6 +49,24 @@ def test_errors_fall_with_twice_the_order_of_the_elements(geometry, plane, order
     errors = [relative_error(L, expected) for L in ladder(geometry, plane, order)[-3:]]
     rate = -np.polyfit(np.arange(3), np.log2(errors), 1)[0]
     assert LADDERS[order][2] < rate < 2 * order + 0.5, (rate, errors)
+
+
+def rubber_errors(comm, poisson, refinements, mesh_size):
+    """(refinements, 3) relative errors of C11, C12 and C33."""
+    phases = {"matrix": {"young": 1.0, "poisson": poisson}, "fibre": {"young": 1e3, "poisson": 0.3}}
+    found = [solve(make_case(**phases, refine=k, mesh_size=mesh_size), comm)[1] for k in refinements]
+    return np.abs([L[[0, 0, 2], [0, 1, 2]] for L in found] / np.array(NEARLY_INCOMPRESSIBLE[poisson].value) - 1)
+
+
+@pytest.mark.parametrize("poisson", NEARLY_INCOMPRESSIBLE)
+def test_errors_of_nearly_incompressible_cells_fall_as_those_of_others(comm, poisson):
+    bulk, _, shear = rubber_errors(comm, poisson, (0, 1, 2), 0.12).T
+    assert (np.log2(shear[:-1] / shear[1:]) > [3.2, 3.6]).all(), shear
+    assert shear[-1] < 3e-5 and bulk[-1] < 3e-7
+
+
+def test_a_nearly_incompressible_cell_reaches_the_reference(comm):
+    assert rubber_errors(comm, 0.49999, [2], 0.045).max() < 1e-6
 
 
 @pytest.mark.parametrize("order", LADDERS)

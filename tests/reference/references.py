@@ -30,6 +30,13 @@ BONDED = {
     ("hexagonal", "stress"): Reference((127.573943, 35.321585, 46.126179), 5e-7, SERIES),
 }
 
+# nu of the matrix: C11, C12, C33 of the hexagonal cell, E = 1 and fibres of 1000 and 0.3; plane strain, relative error.
+NEARLY_INCOMPRESSIBLE = {
+    0.4999: Reference((1289.5648, 1287.8861, 0.83934843), 2e-7, SERIES),
+    0.49999: Reference((2213.6065, 2211.9276, 0.83944046), 2e-7, SERIES),
+    0.499999: Reference((2384.5479, 2382.8690, 0.83944968), 2e-7, SERIES),
+}
+
 # cell: C11, C12, C33 with all fibres debonded and faces that may overlap, which is a cell with holes; plane strain.
 VOID = {
     "square": Reference((40.268438, 9.710096, 6.303568), 5e-7, SERIES),
