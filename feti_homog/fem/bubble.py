@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from feti_homog.fem.shape_functions import gradients, quadrature
+from feti_homog.fem.shape_functions import barycentric, gradients
 from feti_homog.typing import Float
 
 BUBBLE = 6
@@ -60,48 +60,71 @@ class Elements:
     """Elements of any shape, of a stiffness that is isotropic in the plane, with their bubble.
 
     Attributes:
+        lame: lambda and mu.
         gradients, weights: (e, q, 7, 2) of the shape functions, the bubble's last, and (e, q).
         projected: (e, q, 7, 2) Pi dN_a/dx_i at the quadrature points: Pi div u = projected : u.
-        K: (e, 14, 14) stiffness before the bubble is eliminated.
     """
 
+    lame: tuple[float, float]
     gradients: Float
     weights: Float
     projected: Float
-    K: Float
 
     @classmethod
     def of(cls, points: Float, L: Float) -> Elements:
         """Integrate the elements of nodes (e, 6, 2)."""
-        first, shear = lame(L)
         g, w = gradients(points, with_bubble=True)
-        linear = quadrature(BUBBLE).coordinates
-        mass = np.einsum("eq,qm,qn->emn", w, linear, linear)
-        moments = np.einsum("qm,eq,eqak->emak", linear, w, g, optimize=True)
-        e, q, a, _ = g.shape
-        projected = np.linalg.solve(mass, moments.reshape(e, 3, 2 * a))
-        flat = g.reshape(e, q, 2 * a)
-        products = ((flat * w[..., None]).transpose(0, 2, 1) @ flat).reshape(e, a, 2, a, 2)
-        # mu (delta_ij dN_a/dx_k dN_b/dx_k + dN_a/dx_j dN_b/dx_i) + lambda Pi dN_a/dx_i Pi dN_b/dx_j
-        K = shear * products.transpose(0, 1, 4, 3, 2)
-        along = shear * np.einsum("eakbk->eab", products)
-        for i in range(2):
-            K[:, :, i, :, i] += along
-        K = K.reshape(e, 2 * a, 2 * a) + first * moments.reshape(e, 3, 2 * a).transpose(0, 2, 1) @ projected
-        return cls(g, w, (linear @ projected).reshape(g.shape), K)
+        linear, (e, q, a, _) = barycentric(BUBBLE), g.shape
+        mass = np.einsum("eq,qm,qn->emn", w, linear, linear, optimize=True)
+        moments = (linear.T * w[:, None]) @ g.reshape(e, q, 2 * a)
+        return cls(lame(L), g, w, (linear @ np.linalg.solve(mass, moments)).reshape(g.shape))
 
     def couples(self) -> Float:
         """(e, 6, 6, 4) stiffness of the nodes, with (i, j) flat."""
-        n = 2 * BUBBLE
-        nodes = self.K[:, :n, :n] - self.K[:, :n, n:] @ self._follows()
+        K, n = self._stiffness(slice(None)), 2 * BUBBLE
+        nodes = K[:, :n, :n] - K[:, :n, n:] @ np.linalg.solve(K[:, n:, n:], K[:, n:, :n])
         return np.asarray(nodes.reshape(-1, BUBBLE, 2, BUBBLE, 2).transpose(0, 1, 3, 2, 4).reshape(-1, 6, 6, 4))
 
     def with_bubble(self, u: Float) -> Float:
-        """(e, 7, 2) displacements (e, 6, 2) and the bubble that they make."""
-        bubble = -self._follows() @ u.reshape(len(u), 2 * BUBBLE, 1)
-        return np.concatenate([u, bubble.reshape(-1, 1, 2)], axis=1)
+        """(e, 7, 2, k) displacements (e, 6, 2, k) and those of the bubble that they make."""
+        K, n = self._stiffness(slice(BUBBLE, None)), 2 * BUBBLE
+        bubble = np.linalg.solve(K[:, :, n:], K[:, :, :n] @ u.reshape(len(u), n, -1))
+        return np.concatenate([u, -bubble[:, None]], axis=1)
 
-    def _follows(self) -> Float:
-        """(e, 2, 12) K_bb^-1 K_bu."""
-        n = 2 * BUBBLE
-        return np.linalg.solve(self.K[:, n:, n:], self.K[:, n:, :n])
+    def strain(self, u: Float) -> Float:
+        """(e, q, 3, k) of displacements (e, 7, 2, k)."""
+        e, q, a, _ = self.gradients.shape
+        slope = self.gradients.transpose(0, 1, 3, 2).reshape(e, 2 * q, a) @ u.reshape(e, a, -1)
+        slope = slope.reshape(e, q, 2, 2, -1)
+        shear = slope[:, :, 1, 0] + slope[:, :, 0, 1]
+        return np.stack([slope[:, :, 0, 0], slope[:, :, 1, 1], shear], axis=2)
+
+    def dilatation(self, u: Float) -> Float:
+        """(e, q, k) Pi div u, p / lambda, of displacements (e, 7, 2, k)."""
+        e, q, a, _ = self.gradients.shape
+        return np.asarray(self.projected.reshape(e, q, 2 * a) @ u.reshape(e, 2 * a, -1))
+
+    def stress(self, u: Float) -> Float:
+        """(e, q, 3, k) 2 mu eps + p of displacements (e, 7, 2, k)."""
+        first, shear = self.lame
+        stress = shear * np.array([2.0, 2.0, 1.0])[:, None] * self.strain(u)
+        stress[:, :, :2] += first * self.dilatation(u)[:, :, None]
+        return np.asarray(stress)
+
+    def _stiffness(self, functions: slice) -> Float:
+        """(e, 2n, 14) rows of some functions in the stiffness before the bubble is eliminated:
+
+        mu (delta_ij dN_a/dx_k dN_b/dx_k + dN_a/dx_j dN_b/dx_i) + lambda Pi dN_a/dx_i dN_b/dx_j.
+        """
+        (first, shear), (e, q, a, _) = self.lame, self.gradients.shape
+        flat, weights = self.gradients.reshape(e, q, 2 * a), self.weights[..., None, None]
+        own, projected = (
+            (weights * of[:, :, functions]).reshape(e, q, -1).transpose(0, 2, 1)
+            for of in (self.gradients, self.projected)
+        )
+        products = (own @ flat).reshape(e, -1, 2, a, 2)
+        K = shear * products.transpose(0, 1, 4, 3, 2)
+        along = shear * (products[:, :, 0, :, 0] + products[:, :, 1, :, 1])
+        for i in range(2):
+            K[:, :, i, :, i] += along
+        return np.asarray(K.reshape(e, -1, 2 * a) + first * projected @ flat)

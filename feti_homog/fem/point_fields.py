@@ -38,14 +38,12 @@ def point_fields(points: Float, u: Float, L: Float, is_mixed: bool = False) -> P
         strain = voigt(np.einsum("eai,eqad->eqid", u, g))
         stress = strain @ L
         return PointFields(g, weights, u, strain, stress, (stress * strain).sum(axis=2) / 2)
-    elements, (first, shear) = bubble.Elements.of(points, L), bubble.lame(L)
-    u = elements.with_bubble(u)
-    strain = voigt(np.einsum("eai,eqad->eqid", u, elements.gradients))
-    divergence, mean = strain[..., 0] + strain[..., 1], np.einsum("eqai,eai->eq", elements.projected, u)
-    pressure = first * mean
-    stress = shear * strain * [2, 2, 1] + pressure[..., None] * [1, 1, 0]
-    density = (stress * strain).sum(axis=2) / 2 + pressure * (divergence - mean) / 2
-    return PointFields(elements.gradients, elements.weights, u, strain, stress, density)
+    elements = bubble.Elements.of(points, L)
+    inner = elements.with_bubble(u[..., None])
+    strain, stress, mean = (found(inner)[..., 0] for found in (elements.strain, elements.stress, elements.dilatation))
+    off = strain[..., 0] + strain[..., 1] - mean
+    density = ((stress * strain).sum(axis=2) + elements.lame[0] * mean * off) / 2
+    return PointFields(elements.gradients, elements.weights, inner[..., 0], strain, stress, density)
 
 
 def voigt(gradient: Float) -> Float:

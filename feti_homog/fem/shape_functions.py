@@ -20,24 +20,22 @@ _P2_WEIGHTS = np.tile([0.223381589678011, 0.109951743655322], 3) / 2
 
 @dataclass(frozen=True)
 class Quadrature:
-    """Reference gradients (q, a, 2) of a functions, weights (q,) and barycentric coordinates (q, 3) of q points."""
+    """Reference gradients (q, a, 2) of a functions and weights (q,) at the q quadrature points of a triangle."""
 
     gradients: Float
     weights: Float
-    coordinates: Float
 
 
 @cache
 def quadrature(functions: int) -> Quadrature:
     """Return the rule for the 3- or 6-node triangle; the seventh function is the bubble 27 r_0 r_1 r_2."""
     if functions == 3:
-        return Quadrature(np.array([[[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]]]), np.array([0.5]), np.full((1, 3), 1 / 3))
+        return Quadrature(np.array([[[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]]]), np.array([0.5]))
     x, y = _P2_POINTS.T
     z, o = 1 - x - y, np.zeros_like(x)
     by_x = np.stack([1 - 4 * z, 4 * x - 1, o, 4 * (z - x), 4 * y, -4 * y, 27 * y * (z - x)], axis=1)
     by_y = np.stack([1 - 4 * z, o, 4 * y - 1, -4 * x, 4 * x, 4 * (z - y), 27 * x * (z - y)], axis=1)
-    by_both = np.stack([by_x, by_y], axis=2)[:, :functions]
-    return Quadrature(by_both, _P2_WEIGHTS, np.stack([z, x, y], axis=1))
+    return Quadrature(np.stack([by_x, by_y], axis=2)[:, :functions], _P2_WEIGHTS)
 
 
 def gradients(corners: Float, with_bubble: bool = False) -> tuple[Float, Float]:

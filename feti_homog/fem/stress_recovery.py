@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import csr_matrix
 
+from feti_homog.fem import bubble
 from feti_homog.fem.assembly import ELEMENTS_AT_ONCE
 from feti_homog.fem.problem import Problem
 from feti_homog.fem.shape_functions import barycentric, gradients, shape_functions
@@ -54,6 +55,7 @@ class RecoveredStress:
         L, problem: as of `Subdomain`; m strains of displacements, v loads.
         u: (classes, c, k) fluctuating displacements.
         loads: (v, k) the strains and other loads.
+        is_mixed: whether the elements have a bubble and a pressure of their own.
     """
 
     points: Float
@@ -63,16 +65,19 @@ class RecoveredStress:
     problem: Problem
     u: Float
     loads: Float
+    is_mixed: bool = False
 
     @classmethod
-    def on(cls, meshes: Sequence[FineMesh], L: Float, problem: Problem, u: Float, loads: Float) -> RecoveredStress:
+    def on(
+        cls, meshes: Sequence[FineMesh], L: Float, problem: Problem, u: Float, loads: Float, is_mixed: bool = False
+    ) -> RecoveredStress:
         """On some meshes, one after the other; arguments as the attributes."""
         nodes = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
         classes = np.cumsum([0, *(mesh.n_classes for mesh in meshes)])
         triangles = [mesh.triangles + first for mesh, first in zip(meshes, nodes, strict=False)]
         node_class = [mesh.node_class + first for mesh, first in zip(meshes, classes, strict=False)]
         points = np.concatenate([mesh.points for mesh in meshes])
-        return cls(points, np.concatenate(triangles), np.concatenate(node_class), L, problem, u, loads)
+        return cls(points, np.concatenate(triangles), np.concatenate(node_class), L, problem, u, loads, is_mixed)
 
     @property
     def order(self) -> int:
@@ -106,18 +111,27 @@ class RecoveredStress:
         return list(self._elements())
 
     def _elements(self) -> Iterator[ElementStresses]:
-        problem, m = self.problem, self.problem.strains
-        lam = barycentric(self.triangles.shape[1])
+        m, lam = self.problem.strains, barycentric(self.triangles.shape[1])
         for first in range(0, len(self.triangles), ELEMENTS_AT_ONCE):
             part = slice(first, min(first + ELEMENTS_AT_ONCE, len(self.triangles)))
             corners = self.points[self.triangles[part]]
-            g, w = gradients(corners)
-            gradient = self.gradient(part, g)
-            strain = np.zeros((*w.shape, m, self.loads.shape[1]))
-            for number, (i, d) in enumerate(np.nonzero(problem.voigt == n) for n in range(m)):
-                strain[:, :, number] = gradient[:, :, i, d].sum(axis=2)
-            stress = self.L[:m, :m] @ strain + self.L[:m] @ self.loads
+            fluctuating, w = self._fluctuating(part, corners)
+            stress = fluctuating + self.L[:m] @ self.loads
             yield ElementStresses(part, shape_functions(corners.shape[1], lam) @ corners, w, stress)
+
+    def _fluctuating(self, part: slice, corners: Float) -> tuple[Float, Float]:
+        """(e, q, m, k) stresses that u makes in the elements `part` of nodes (e, a, 2), and weights (e, q)."""
+        if self.is_mixed:
+            elements = bubble.Elements.of(corners, self.L)
+            return elements.stress(
+                elements.with_bubble(self.u[self.node_class[self.triangles[part]]])
+            ), elements.weights
+        g, w = gradients(corners)
+        gradient, m = self.gradient(part, g), self.problem.strains
+        strain = np.zeros((*w.shape, m, self.loads.shape[1]))
+        for number, (i, d) in enumerate(np.nonzero(self.problem.voigt == n) for n in range(m)):
+            strain[:, :, number] = gradient[:, :, i, d].sum(axis=2)
+        return self.L[:m, :m] @ strain, w
 
     @cached_property
     def fits(self) -> Float:

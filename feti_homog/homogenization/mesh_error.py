@@ -81,4 +81,4 @@ def _recovered(cell: TornCell, responses: Sequence[Response]) -> Iterator[tuple[
         members = [number for number, own in enumerate(phases) if own == phase]
         own = np.concatenate([u[cell.offsets[n] : cell.offsets[n + 1]] for n in members]).reshape(-1, c, len(responses))
         first, meshes = cell.subdomains[members[0]], [cell.subdomains[n].mesh for n in members]
-        yield members, RecoveredStress.on(meshes, first.L, first.problem, own, loads)
+        yield members, RecoveredStress.on(meshes, first.L, first.problem, own, loads, first.is_mixed)
