@@ -52,8 +52,10 @@ class ElementFields:
 
 
 class Elements:
-    """The elements of a mesh whose phases have the stiffnesses (phases, v, v); quadratic ones of `mixed` phases
-    (phases,) have a bubble and a pressure."""
+    """The elements of a mesh whose phases have the stiffnesses (phases, v, v).
+
+    Quadratic ones of `mixed` phases (phases,) have a bubble and a pressure.
+    """
 
     def __init__(self, mesh: Mesh, stiffnesses: Float, mixed: Bool) -> None:
         self._mesh, self._stiffnesses = mesh, stiffnesses

@@ -12,8 +12,10 @@ from scipy.sparse.linalg import splu
 
 
 def effective_stiffness(points, triangles, stiffness, width, height, mixed):
-    """L^ef (3, 3) of elements `triangles` (m, 3 or 6) on `points`, with `stiffness` (m, 3, 3) of each; those of `mixed`
-    (m,) have a bubble and a pressure."""
+    """L^ef (3, 3) of elements `triangles` (m, 3 or 6) on `points`, with `stiffness` (m, 3, 3) of each.
+
+    Those of `mixed` (m,) have a bubble and a pressure.
+    """
     node, n = periodic_numbers(points, width, height)
     rows, columns, values, loads = [], [], [], np.zeros((2 * n, 3))
     mean = np.zeros((3, 3))
@@ -61,8 +63,10 @@ def element(corners, L, is_mixed=False):
 
 
 def mixed_stiffness(corners, L):
-    """Stiffness (12, 12) of 6 nodes with a bubble and a linear pressure p, in both of which
-    int 2 mu eps : eps + 2 p div u - p^2 / lambda is stationary."""
+    """Stiffness (12, 12) of 6 nodes with a bubble and a linear pressure p.
+
+    int 2 mu eps : eps + 2 p div u - p^2 / lambda is stationary in both.
+    """
     lame, shear = L[0, 1], L[2, 2]
     A = np.zeros((17, 17))
     for x, y, w in rule(6):
