@@ -1,4 +1,4 @@
-"""What the drivers of the paper's Figures 3 to 5 share: options, cases, tables."""
+"""Parts that the drivers of the paper's Figures 3 to 5 share: options, cases, tables."""
 
 from __future__ import annotations
 

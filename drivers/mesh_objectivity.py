@@ -1,4 +1,4 @@
-"""What a curve owes to its mesh: bonds that break by strength beside bonds that break by energy, on four meshes.
+"""Dependence of a curve on its mesh: bonds that break by strength beside bonds that break by energy, on four meshes.
 
     mpirun -n 2 .venv/bin/python drivers/mesh_objectivity.py --out results/mesh_objectivity
 

@@ -1,4 +1,4 @@
-"""How many fibres make a representative cell: apparent stiffness and its scatter against the size of the cell.
+"""Size of a representative cell: apparent stiffness and its scatter against the number of fibres.
 
     mpirun -n 2 .venv/bin/python drivers/representative_cell.py --out results/representative_cell
 

@@ -1,4 +1,4 @@
-"""What the drivers that are sweeps share: options, sections, and the way from cases to tables and pictures."""
+"""Parts that the drivers that are sweeps share: options, sections, and the way from cases to tables and pictures."""
 
 from __future__ import annotations
 

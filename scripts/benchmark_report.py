@@ -1,4 +1,4 @@
-"""What the benchmark's tools took, as a table, a CSV file and a picture."""
+"""Times and memory of the benchmark's tools, as a table, a CSV file and a picture."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ WRONG = 1e-4
 
 @dataclass
 class Row:
-    """What a tool took: seconds of each stage, iterations of each load (none of a direct solver), MB.
+    """Cost of a tool: seconds of each stage, iterations of each load (none of a direct solver), MB.
 
     Attributes:
         plane: the plane state.

@@ -1,4 +1,4 @@
-"""What the cases of the scripts share: the composite of Eq. (38), in GPa, and its stiffness without files of fields."""
+"""Parts that the scripts' cases share: the composite of Eq. (38), in GPa, its stiffness without files of fields."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the values of one of the solver's thresholds (feti_homog/feti/thresholds.py) cost and gain, on hard cells.
+"""Cost and gain of values of one of the solver's thresholds (feti_homog/feti/thresholds.py), on hard cells.
 
     mpirun -n 2 .venv/bin/python scripts/measure_thresholds.py min_trace_dofs 40 100 250
 

@@ -122,7 +122,7 @@ class Cell:
 
 @dataclass(frozen=True, kw_only=True)
 class Row(Cell):
-    """What came of a cell: `vectors` coarse vectors per subdomain, `boundary` dofs of the largest subdomain."""
+    """Outcome of a cell: `vectors` coarse vectors per subdomain, `boundary` dofs of the largest subdomain."""
 
     dofs: int
     subdomains: int

@@ -1,4 +1,4 @@
-"""What an event of a debonding path costs on a number of ranks: runs, table and cost model.
+"""Cost of an event of a debonding path on a number of ranks: runs, table and cost model.
 
 Seconds of an event = c + N (s + q / p) + messages(p) for N dofs on p ranks.  c, s and q are of least squares over the
 runs whose ranks each have a core; the messages are those that were counted on p ranks, with the latency that was

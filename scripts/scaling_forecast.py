@@ -1,4 +1,4 @@
-"""What the cost model of the scaling study says, in words."""
+"""Forecast of the cost model of the scaling study, in words."""
 
 from __future__ import annotations
 

@@ -57,7 +57,7 @@ class FibreInfo:
 
 @dataclass(frozen=True)
 class SolverInfo:
-    """How the dual problem was solved."""
+    """Solution of the dual problem, in numbers."""
 
     ranks: int = described("MPI ranks")
     bodies: int = described("bodies, the matrix and the fibres")
@@ -96,7 +96,7 @@ class Checks:
 
 @dataclass(frozen=True)
 class StiffnessBounds:
-    """What the phases bound L^ef by, whatever their arrangement."""
+    """Bounds of L^ef by the phases, whatever their arrangement."""
 
     voigt: Float = described("upper bound of the stiffness: uniform strain", STRESS, "(3, 3)")
     reuss: Float = described("lower bound of the stiffness: uniform stress", STRESS, "(3, 3)")

@@ -1,4 +1,4 @@
-"""Where the states of a run go."""
+"""Recorder of the states of a run."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from feti_homog.results.seals import FileSeal
 
 
 class StateRecorder:
-    """Where the states of a run go: to the file if there is one, and to memory if they are to be kept.
+    """Recorder of the states of a run: to the file if there is one, and to memory if they are to be kept.
 
     Attributes:
         has_place: whether states go anywhere.

@@ -27,7 +27,7 @@ ELEMENTS_AT_ONCE = 1 << 16
 
 @dataclass(frozen=True)
 class Assembly:
-    """What a body of area |Omega| made of the material L contributes.
+    """Contribution of a body of area |Omega| made of the material L.
 
     Attributes:
         K: (dofs, dofs) stiffness, Eq. (28), force per length.

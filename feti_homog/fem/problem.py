@@ -1,4 +1,4 @@
-"""What is solved for on the plane mesh: the displacements, the strains that they make, and the unit loads.
+"""Unknowns on the plane mesh: the displacements, the strains that they make, and the unit loads.
 
 For long fibres strains do not vary along x3, and x3 is a plane of symmetry of every phase.  Then the displacements in
 the plane and the one along x3 have a problem each: generalized plane strain and axial shear.

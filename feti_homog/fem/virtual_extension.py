@@ -1,4 +1,4 @@
-"""How the strain energy of elements changes when their nodes are moved: what a crack that grows releases."""
+"""Change of the strain energy of elements when their nodes are moved, which a growing crack releases."""
 
 from __future__ import annotations
 

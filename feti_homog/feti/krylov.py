@@ -28,7 +28,7 @@ ESTIMATES_SINGULAR_VALUES = (PETSc.KSP.Type.CG, PETSc.KSP.Type.GMRES, PETSc.KSP.
 
 
 class ActiveRows:
-    """Which owned rows carry multipliers: `mask` (owned rows,) is 1 where they do, else 0."""
+    """Owned rows that carry multipliers: `mask` (owned rows,) is 1 where they do, else 0."""
 
     def __init__(self, rows: int) -> None:
         self.mask = np.ones(rows)

@@ -1,4 +1,4 @@
-"""Which preconditioner and coarse space a problem gets: chosen from its sizes and the options, before any is made."""
+"""Preconditioner and coarse space of a problem, chosen from its sizes and the options before any is made."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class SolverOptions:
 
 @dataclass(frozen=True)
 class ProblemSizes:
-    """What the choice depends on, summed up over all ranks.
+    """Quantities that the choice depends on, summed up over all ranks.
 
     Attributes:
         applications: how many times the dual operator is expected to be applied.

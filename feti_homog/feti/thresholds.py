@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Thresholds:
-    """Where the solver changes its ways.  Tests and studies pass others than the defaults.
+    """Sizes at which the solver changes its methods.  Tests and studies pass others than the defaults.
 
     "Measured" is what `scripts/measure_thresholds.py NAME VALUE...` says of the values in brackets.
 

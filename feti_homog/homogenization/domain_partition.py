@@ -61,7 +61,7 @@ DEFAULT_POLICY = PartitionPolicy()
 
 @dataclass(frozen=True)
 class CellSummary:
-    """What every rank knows of the whole cell.
+    """Data of the whole cell, known to every rank.
 
     Attributes:
         width, height: periods.
@@ -139,7 +139,7 @@ class CellSummary:
 
 @dataclass(frozen=True)
 class RankShare:
-    """What one rank gets of the cut cell.
+    """Share of one rank in the cut cell.
 
     Attributes:
         summary, table: of the whole cell.

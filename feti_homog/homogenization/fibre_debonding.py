@@ -1,4 +1,4 @@
-"""How much of the fibres' interfaces has debonded."""
+"""Debonded parts of the fibres' interfaces."""
 
 from __future__ import annotations
 

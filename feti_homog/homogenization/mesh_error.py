@@ -22,7 +22,7 @@ LEAST_SHARE_OF_CONTACT = 1.0
 
 @dataclass(frozen=True)
 class EnergyErrors:
-    """Of k responses under the strains E_i of a cell of area |UC|, by how much E_i . Sigma_j errs: (k, k).
+    """Errors of E_i . Sigma_j, (k, k), of k responses under the strains E_i of a cell of area |UC|.
 
     Attributes:
         elements: 1/|UC| int ds_i : S : ds_j of recovered stresses less those of elements: the stiffness is too high.

@@ -1,4 +1,4 @@
-"""Whether elements resolve the length along which bonds break by energy, and what else a cohesive law asks for."""
+"""Length along which bonds break by energy, which elements must resolve, and other demands of a cohesive law."""
 
 from __future__ import annotations
 

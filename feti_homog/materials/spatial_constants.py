@@ -59,7 +59,7 @@ class TransverselyIsotropic:
 
 @dataclass(frozen=True)
 class TransverseModuli:
-    """What moduli across the fibres range over, of 720 directions in half a turn about x3."""
+    """Range of moduli across the fibres, of 720 directions in half a turn about x3."""
 
     E_least: float = described("least Young's modulus across the fibres", STRESS)
     E_largest: float = described("the largest one", STRESS)

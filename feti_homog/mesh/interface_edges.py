@@ -1,4 +1,4 @@
-"""Which edges of a mesh are interfaces on the torus, between phases or beside voids."""
+"""Edges of a mesh that are interfaces on the torus, between phases or beside voids."""
 
 from __future__ import annotations
 

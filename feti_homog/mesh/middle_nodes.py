@@ -12,7 +12,7 @@ from feti_homog.typing import Float, Int, Int32
 
 @dataclass(frozen=True)
 class MiddleNodes:
-    """Those of k sides of triangles; a side of two triangles is listed twice.
+    """Middle nodes of k sides of triangles; a side of two triangles is listed twice.
 
     Attributes:
         edges: (k, 2) corner nodes at the ends of each side, numbered from 0.

@@ -63,7 +63,7 @@ class Submesh:
 
 @dataclass(frozen=True)
 class SubdomainTable:
-    """What every rank knows of the s subdomains of all.
+    """Data of the s subdomains of all, known to every rank.
 
     Attributes:
         body: (s,) constituent that each is a piece of.

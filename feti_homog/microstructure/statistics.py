@@ -129,7 +129,7 @@ def envelope(
 
 @dataclass(frozen=True)
 class FibreStatistics:
-    """What `measure` finds.
+    """Results of `measure`.
 
     Attributes:
         pattern: the fibres.

@@ -60,7 +60,7 @@ def _has_reader(pipe: str) -> bool:
 
 @dataclass(frozen=True)
 class Rule:
-    """What an option takes, in words, and whether a text is that; the text is empty if no value is given."""
+    """Values that an option takes, in words and as a test of a text, which is empty if no value is given."""
 
     expected: str
     holds: Callable[[str], bool]

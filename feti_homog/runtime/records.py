@@ -24,7 +24,7 @@ WORDS = {float: "number", int: "integer", str: "text", bool: "true or false"}
 
 @dataclass(frozen=True)
 class Description:
-    """What a field holds.
+    """Content of a field.
 
     Attributes:
         meaning: in words.

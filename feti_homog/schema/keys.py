@@ -33,7 +33,7 @@ class Selector:
 
 @dataclass(frozen=True)
 class Condition:
-    """That a selector has one of some values."""
+    """Condition that a selector has one of some values."""
 
     selector: Selector
     values: tuple[str, ...]

@@ -41,7 +41,7 @@ class Place:
 
 @dataclass(frozen=True)
 class Rule:
-    """What must hold at a path of a document under some conditions.
+    """Requirement at a path of a document under some conditions.
 
     Attributes:
         path: from the section to a table or value; where there is none, the rule holds. Empty: the whole document.

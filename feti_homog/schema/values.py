@@ -19,7 +19,7 @@ MAGNITUDES = f"; numbers other than 0 have magnitudes from {SMALLEST:g} to {LARG
 
 @dataclass(frozen=True)
 class ValueType:
-    """What a value must be.
+    """Type of a value.
 
     Attributes:
         expected: in words, for faults and for the reference.

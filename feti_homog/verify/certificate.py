@@ -69,7 +69,7 @@ def _send(end: Connection, function: Callable[[Path], T], directory: Path) -> No
 
 @dataclass(frozen=True)
 class Certificate:
-    """What was found in a folder.
+    """Findings in a folder.
 
     Attributes:
         findings: of every law that applies.

@@ -43,7 +43,7 @@ class UnitLoad:
 
 @dataclass(frozen=True)
 class StateNumbers:
-    """What the laws of paths and tables need of a state.
+    """Numbers of a state that the laws of paths and tables need.
 
     Attributes:
         strain, stress: (v,) macroscopic.

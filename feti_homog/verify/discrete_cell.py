@@ -23,7 +23,7 @@ ROUNDED_TERMS = 1e-5
 
 
 class Loaded(Protocol):
-    """What has a macroscopic strain (v,) and a change of temperature."""
+    """Object with a macroscopic strain (v,) and a change of temperature."""
 
     @property
     def strain(self) -> Float: ...
@@ -34,7 +34,7 @@ class Loaded(Protocol):
 
 @dataclass(frozen=True)
 class Faces:
-    """Which torn nodes make up the two faces at each of the k interface nodes.
+    """Torn nodes that make up the two faces at each of the k interface nodes.
 
     Attributes:
         row: (b,) the interface node at the place of each torn node, -1 if there is none.

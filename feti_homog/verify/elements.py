@@ -29,7 +29,7 @@ PLACES = {3: np.array([[0, 2], [2, 1]]), 6: np.array([[0, 5], [5, 1], [4, 3]])}
 
 @dataclass(frozen=True)
 class ElementFields:
-    """What displacements (n, c) make in the elements.
+    """Fields that displacements (n, c) make in the elements.
 
     Attributes:
         strain, stress: (m, v) means.

@@ -48,7 +48,7 @@ class Loads(NamedTuple):
 
 @dataclass(frozen=True)
 class PointNumbers:
-    """What the laws of energy need of a point.
+    """Numbers of a point that the laws of energy need.
 
     Attributes:
         strain, stress: (n,) with the temperature and what works on it, which is NaN where no file tells of it.

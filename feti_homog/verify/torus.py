@@ -1,4 +1,4 @@
-"""Which nodes and sides of a torn mesh are the same place of the periodic cell."""
+"""Nodes and sides of a torn mesh that are the same place of the periodic cell."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ LOADED = {"img", "script", "link", "source", "iframe"}
 
 
 class Page(HTMLParser):
-    """What an HTML file refers to: (tag, address) pairs; and the names of its places."""
+    """References of an HTML file, (tag, address) pairs, and the names of its places."""
 
     def __init__(self, path: Path) -> None:
         super().__init__()

@@ -36,7 +36,7 @@ from feti_homog.typing import Float, Float32, Int
 
 
 class _Jumps(NamedTuple):
-    """What the modes of one subdomain, itself or a neighbour, open on the rows of a subdomain: B V there.
+    """Jumps that the modes of one subdomain, itself or a neighbour, open on the rows of a subdomain: B V there.
 
     `rows` (r,) are positions among the subdomain's rows, `columns` (c,) numbers of coarse modes, `values` (r, c).
     """

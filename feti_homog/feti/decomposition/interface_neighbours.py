@@ -1,4 +1,4 @@
-"""Which interface nodes lie beside each other: what debonds spreads along the interface."""
+"""Interface nodes that lie beside each other, along which debonding spreads."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which subdomains meet in which constraints, and messages between them."""
+"""Subdomains that meet in constraints, and messages between them."""
 
 from __future__ import annotations
 

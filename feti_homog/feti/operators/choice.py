@@ -1,4 +1,4 @@
-"""Which subdomains get dense boundary operators, and which are examined for soft modes face by face.
+"""Choice of the subdomains with dense boundary operators, and of those examined for soft modes face by face.
 
 A pure function of sizes: it needs no mesh and no MPI.
 """
@@ -15,7 +15,7 @@ KINDS = ("auto", "implicit", "explicit")
 
 @dataclass(frozen=True)
 class SubdomainSize:
-    """What the choice depends on.
+    """Quantities that the choice depends on.
 
     Attributes:
         dofs: degrees of freedom of the subdomain.
@@ -32,7 +32,7 @@ class SubdomainSize:
 
 @dataclass(frozen=True)
 class OperatorChoice:
-    """Of one subdomain.
+    """Choice for one subdomain.
 
     Attributes:
         explicit: whether its boundary operators are dense matrices; else they are sparse factorizations.

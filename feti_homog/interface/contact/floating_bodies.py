@@ -1,4 +1,4 @@
-"""Where fibres lie that nothing holds: rigid motions that open all their gaps, or the nodes that squeeze them.
+"""Places of fibres that nothing holds: rigid motions that open all their gaps, or the nodes that squeeze them.
 
 The gaps of such a fibre are known up to its rigid motions M a.  What is unique is whether it has room, i.e. whether
 there are amplitudes a with gap + M a >= 0: a linear programme for each fibre, solved on rank 0.

@@ -18,7 +18,7 @@ SIGN_NOISE_PER_RTOL = 10.0
 
 
 class LoadScales:
-    """Of the loads (v,) of a problem: its m strains, and what else acts."""
+    """Loads (v,) of a problem: its m strains, and what else acts."""
 
     def __init__(self, solver: FetiSolver, size: Float) -> None:
         """`size` (2,) is that of the cell."""

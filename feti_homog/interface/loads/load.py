@@ -89,7 +89,7 @@ class Macroscopic:
 
 @dataclass(frozen=True)
 class Load:
-    """Of each of n macroscopic strains, a change of temperature among them, its value or that of its stress.
+    """Values of n macroscopic strains, a change of temperature among them, or of their stresses.
 
     Attributes:
         values: (n,) strains and stresses.

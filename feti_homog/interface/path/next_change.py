@@ -1,4 +1,4 @@
-"""Where a straight response changes: the first bond breaks, the contact begins to change."""
+"""End of a straight response: the first bond breaks, or the contact begins to change."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ UTILISATION_TIE = 1e-6
 
 @dataclass(frozen=True)
 class PathState:
-    """Where a path stands, enough to go on from.
+    """Position on a path, enough to go on from.
 
     Attributes:
         leg, position: the load is the share `position`, 0..1, of the way to waypoint `leg`; of increments, `leg` is the

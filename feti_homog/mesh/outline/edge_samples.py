@@ -1,4 +1,4 @@
-"""Where the nodes of a curve are: at distances that follow the size of edges along it."""
+"""Nodes of a curve, at distances that follow the size of edges along it."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ WHOLE, IN_TILES = Sampling(65, 513, 17, 120_000), Sampling(17, 129, 17, 3_000_00
 
 @dataclass(frozen=True)
 class Stations:
-    """Where the nodes of c lines are.
+    """Nodes of c lines.
 
     Attributes:
         share: (n,) of the lengths of the lines, from 0 to 1.

@@ -142,7 +142,7 @@ def _ellipse_at(ellipses: Ellipses, points: Float) -> Int:
 
 @dataclass(frozen=True)
 class _EllipticArcs:
-    """As `Lines`.
+    """Lines of ellipses, as `Lines`.
 
     Attributes:
         ellipses: that of each of a arcs.

@@ -1,4 +1,4 @@
-"""How fine the coarse mesh is beside ellipses: the size of edges on the lines of their cell."""
+"""Fineness of the coarse mesh beside ellipses: the size of edges on the lines of their cell."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How fine the coarse mesh is: the size of edges on lines of the cell, finer on circles and at tips of debonds."""
+"""Fineness of the coarse mesh: the size of edges on lines of the cell, smaller on circles and at tips of debonds."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ from feti_homog.typing import Array, Int, Int32
 
 @dataclass(frozen=True)
 class Regions:
-    """What is where in a cell that is drawn, known to every rank.
+    """Regions of a cell that is drawn, known to every rank.
 
     Attributes:
         width, height, scale: of the mesh, and its lengths / those of its tiles.

@@ -24,7 +24,7 @@ from feti_homog.typing import Float, Int
 
 @dataclass(frozen=True)
 class TilePolicy:
-    """Which cells are cut into tiles, and into how many.
+    """Choice of the cells that are cut into tiles, and of the number of tiles.
 
     Attributes:
         least_discs: cells with fewer are filled at once.
@@ -41,7 +41,7 @@ DEFAULT_TILES = TilePolicy()
 
 @dataclass(frozen=True)
 class Tiling:
-    """Which tile each part of a cell is in.
+    """Tiles of the parts of a cell.
 
     Attributes:
         bridges: those on borders of tiles.

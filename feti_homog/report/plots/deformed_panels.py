@@ -50,7 +50,7 @@ LOADS_IN_PANEL, LINE = 2, 0.15  # in a line of its title; inches of a line
 
 @dataclass(frozen=True)
 class DeformedCell:
-    """What is the same in every panel."""
+    """Data that all panels share."""
 
     file: Any
     drawn: DrawnMesh

@@ -23,7 +23,7 @@ LONG = 2  # strains beyond which a label of a path has the leading one alone
 
 @dataclass(frozen=True)
 class LoadLabels:
-    """How the states of a result are labelled.
+    """Labels of the states of a result.
 
     Attributes:
         leading: the component that a path is about; None of others.
