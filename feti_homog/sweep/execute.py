@@ -161,7 +161,7 @@ def _prepare_and_lock(lock: Lock, directory: Path, sweep: Sweep) -> None:
 
 
 class Outcome(Enum):
-    """What came of a request to run a case."""
+    """Outcome of a request to run a case."""
 
     COMPUTED = auto()
     FINISHED_BEFORE = auto()

@@ -24,7 +24,7 @@ MAX_NAMED_CASES = 4  # in one fault
 
 @dataclass(frozen=True)
 class SweepCase:
-    """Which case of a sweep one is.
+    """Place of a case in a sweep.
 
     Attributes:
         number: of the case, from 1.

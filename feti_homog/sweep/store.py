@@ -38,7 +38,7 @@ INDEX_LOCK_FILE, INDEX_LOCK_TIMEOUT_S = "index.lock", 30.0
 
 
 class Status(StrEnum):
-    """How far a case has come.
+    """Progress of a case.
 
     UNCONVERGED has a result that its checks refuse, FAILED an error instead; DAMAGED has a result that cannot be
     read or is of another case; WAITING has neither.
@@ -59,7 +59,7 @@ class Status(StrEnum):
 
 @dataclass(frozen=True)
 class CaseState:
-    """How far a case has come, why it did not come further, and its result.json if that is there."""
+    """Progress of a case, why it did not come further, and its result.json if that is there."""
 
     status: Status
     reason: str = ""
@@ -68,7 +68,7 @@ class CaseState:
 
 @dataclass(frozen=True)
 class SweepIndex:
-    """What sweep.json says."""
+    """Content of sweep.json."""
 
     name: str
     stress_unit: str

@@ -134,8 +134,10 @@ def test_a_laminate_follows_its_law_through_snap_back(comm, strip, interface, br
 
 
 def test_limits_of_the_law(comm, strip):
-    """One tooth is the energy criterion on springs, the least toughness a strength on them, the largest numbers
-    neither."""
+    """One tooth is the energy criterion on springs, the least toughness a strength on them.
+
+    The largest numbers of teeth are neither.
+    """
     run_strip, _ = strip
     to = {"E11": 3.0, "E22": 0.0, "gamma12": 0.0}
     springs = {name: MOOSE[name] for name in ("normal_stiffness", "tangential_stiffness")}

@@ -11,8 +11,10 @@ from reference.mixed_path import MixedPath
 
 @dataclass(frozen=True)
 class Teeth:
-    """The bilinear law of bonds with stiffnesses K (n, t), strengths N, S, toughnesses (G_I, G_II) and eta in n teeth,
-    whose openings in mode I or II, where df / d0 is larger, have constant quotients."""
+    """The bilinear law of bonds with stiffnesses K (n, t), strengths N, S, toughnesses (G_I, G_II) and eta in n teeth.
+
+    Openings in mode I or II, where df / d0 is larger, have constant quotients.
+    """
 
     stiffness: tuple
     strength: tuple
