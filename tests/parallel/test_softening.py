@@ -136,7 +136,7 @@ def test_a_laminate_follows_its_law_through_snap_back(comm, strip, interface, br
 def test_limits_of_the_law(comm, strip):
     """One tooth is the energy criterion on springs, the least toughness a strength on them.
 
-    The largest numbers of teeth are neither.
+    The largest numbers are neither.
     """
     run_strip, _ = strip
     to = {"E11": 3.0, "E22": 0.0, "gamma12": 0.0}
