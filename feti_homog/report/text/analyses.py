@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.materials.plane_state import plane_state_of
-from feti_homog.report.text import point_tables, stiffness_tables
+from feti_homog.report.text import material_axes, point_tables, stiffness_tables
 from feti_homog.report.text.path_table import path_table
 from feti_homog.report.text.table import Table
 from feti_homog.results.kept_points import chosen, chosen_states
@@ -61,7 +61,8 @@ def _stiffness_lines(document: Document, label: str, toughness: str) -> list[lis
     tips = [table.lines for table in point_tables.tip_table(document.get("tips"), toughness)]
     if plane_state_of(document).is_spatial:
         thermal = [table.lines for table in stiffness_tables.thermal(document, label)]
-        return [*blocks, *thermal, *stiffness_tables.constants_lines(document, label), *tips]
+        own = material_axes.lines(document, label)
+        return [own, *blocks, *thermal, *stiffness_tables.constants_lines(document, label), *tips]
     if document["case"].get("interface"):  # moduli and bounds are of bonded, linear composites
         return [*blocks, *tips]
     bounds = [table.lines for table in stiffness_tables.bounds(document, label)]
@@ -71,6 +72,7 @@ def _stiffness_lines(document: Document, label: str, toughness: str) -> list[lis
 
 def _stiffness_tables(document: Document, label: str, most: int) -> list[Table]:
     return [
+        *material_axes.table(document, label),
         *stiffness_tables.stiffnesses(document, label, "Effective stiffness under minus the unit strains"),
         *stiffness_tables.thermal(document, label),
         *stiffness_tables.constants(document, label),

@@ -16,9 +16,9 @@ STIFF = ("C11", "C22", "C33")
 STRESS_MODULI = ("E1", "E2", "G12", "bulk", "shear")  # in the unit of the stresses; the others are ratios
 ENGINEERING = (("E1", "E2", "E3"), ("G12", "G13", "G23"), ("nu12", "nu13", "nu23"))
 THERMAL = {
-    "thermal_stress": "stress at no strain",
+    "thermal_stress": "thermal stress",
     "thermal_stress_compression": "under minus one",
-    "thermal_expansion": "strain at no stress",
+    "thermal_expansion": "thermal expansion",
 }
 THERMAL_DIGITS = 7  # below the last of the largest there is zero
 THIS_CELL, ITS_ERROR, LOWER, UPPER, UNKNOWN = "this cell", "error of its mesh", "lower bound", "upper bound", "-"
@@ -26,6 +26,7 @@ MESH_ERROR = "Mesh error, estimated"
 # Of a value by which an error is below the digits that are printed without it.
 NO_ERROR = 1e-7
 LEAST_DECIMAL, MOST_DECIMAL = 1e-4, 1e8  # numbers between these are printed to the digits of their errors
+CELL_AXES = ", axes of the cell, x3 along the fibres"
 ABREAST = 5  # constants beside each other in text
 SHORT = {
     "E_axial": "E axial",
@@ -50,7 +51,8 @@ def stiffnesses(document: Document, label: str, under_minus: str = "Under minus 
     found, errors = list[Table](), _errors(document)
     for key, title in titles.items():
         if document.get(key) is not None:
-            found.append(_matrix(f"{title}{label}", document[key]))
+            axes = "" if len(document[key]) == len(STRAINS) else CELL_AXES
+            found.append(_matrix(f"{title}{axes}{label}", document[key]))
         if errors.get(key) is not None:
             found.append(_matrix(f"{MESH_ERROR}{label}", errors[key], ".1e"))
     return found
@@ -63,12 +65,22 @@ def _errors(document: Document) -> Document:
 
 
 def _with_error(document: Document, name: str, form: str) -> tuple[str, str]:
+    """Return a constant and its error as `value_and_error`."""
+    value = next(values[name] for key in ("moduli", "constants") if name in (values := document.get(key) or {}))
+    return value_and_error(value, error_of(document, name), form)
+
+
+def error_of(document: Document, name: str) -> float | None:
+    """Return the estimated error of a constant of the axes of the cell, None without one."""
+    error: float | None = _errors(document).get("constants", {}).get(name)
+    return error
+
+
+def value_and_error(value: float, error: float | None, form: str) -> tuple[str, str]:
     """Return a constant and its error.
 
     The error has two digits, which give the number of those of the constant; in this format and empty without an error.
     """
-    value = next(values[name] for key in ("moduli", "constants") if name in (values := document.get(key) or {}))
-    error = _errors(document).get("constants", {}).get(name)
     if error is None:
         return number(value, form), ""
     if not error > NO_ERROR * abs(value) or not LEAST_DECIMAL < abs(value) < MOST_DECIMAL:
@@ -77,7 +89,8 @@ def _with_error(document: Document, name: str, form: str) -> tuple[str, str]:
     return f"{value:.{decimals}f}", f"{error:.{decimals}f}"
 
 
-def _beside(error: str) -> str:
+def beside(error: str) -> str:
+    """Return an error as it stands behind its value."""
     return f" +- {error:<9}" if error else ""
 
 
@@ -100,7 +113,7 @@ def thermal(document: Document, label: str) -> list[Table]:
     rows = list(zip(names, *(_rounded(document[key]) for key in known), *errors.values(), strict=True))
     columns = [Column("", -6), *(Column(title, 22, ".7g") for title in known.values())]
     columns += [Column(f"{key.rpartition('_')[2]}: error", 18, ".1e") for key in errors]
-    return [Table(f"Per unit of temperature{label}", columns, rows)] if known else []
+    return [Table(f"Per unit of temperature, axes of the cell{label}", columns, rows)] if known else []
 
 
 def _rounded(numbers: Sequence[float]) -> list[float]:
@@ -131,7 +144,7 @@ def moduli_lines(document: Document, label: str) -> list[str]:
         is_stress = name in STRESS_MODULI
         value, error = _with_error(document, name, ".7g" if is_stress else ".6f")
         width, column = (6, left) if is_stress else (11, right)
-        column.append(f"{name:<{width}}{value:>13}{_beside(error)}")
+        column.append(f"{name:<{width}}{value:>13}{beside(error)}")
     count = max(len(left), len(right))
     pairs = zip(left + [""] * (count - len(left)), right + [""] * (count - len(right)), strict=True)
     return [f"Engineering moduli{label}", *(f"  {modulus:<34}{ratio}".rstrip() for modulus, ratio in pairs)]
@@ -174,7 +187,7 @@ def constants_lines(document: Document, label: str) -> list[list[str]]:
     values, block = document.get("constants"), list[str]()
     if values is not None:
         parts = {name: _with_error(document, name, ".7g") for names in ENGINEERING for name in names}
-        words = {name: f"{name:<5}{value:>13}{_beside(error)}" for name, (value, error) in parts.items()}
+        words = {name: f"{name:<5}{value:>13}{beside(error)}" for name, (value, error) in parts.items()}
         rows = ("    ".join(words[name] for name in names).rstrip() for names in ENGINEERING)
         block = [f"Engineering constants in the axes of the cell{label}", *(f"  {row}" for row in rows)]
     return [block, *(_estimates_lines(document, table) for table in estimates(document, label))]

@@ -204,7 +204,8 @@ def test_results_can_be_told_apart():
 @pytest.mark.parametrize("name", RESULTS)
 def test_what_is_printed_is_short(name):
     text = str(RESULTS[name])
-    assert len(text.splitlines()) < 40 and "largest relative error 3.0e-09 (jump)" in text
+    # In space with the constants in the axes of the material and in those of the cell.
+    assert len(text.splitlines()) < (45 if name == "space" else 40) and "largest relative error 3.0e-09 (jump)" in text
     assert text.splitlines()[-1].split() == ["Status", "done"]
 
 

@@ -1,0 +1,54 @@
+"""Engineering constants in the axes of the material, as data sheets and cards have them: 1 is along the fibres.
+
+Axes 1, 2, 3 of the material are x3, x1, x2 of the cell.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from feti_homog.report.text.stiffness_tables import beside, error_of, value_and_error
+from feti_homog.report.text.table import Column, Table
+
+TITLE = "Material axes: 1 along the fibres (x3 of the cell), 2 and 3 across (x1, x2)"
+# The constants of the cell with the same value, and the axes of the cell in whose order thermal expansions are.
+IN_THE_CELL = {"E1": "E3", "E2": "E1", "E3": "E2", "G12": "G13", "G13": "G23", "G23": "G12", "nu23": "nu12"}
+ROWS = (("E1", "E2", "E3"), ("G12", "G13", "G23"), ("nu12", "nu13", "nu23"), ("alpha1", "alpha2", "alpha3"))
+EXPANSIONS = {"alpha1": 2, "alpha2": 0, "alpha3": 1}
+
+Document = Mapping[str, Any]
+
+
+def constants(document: Document) -> dict[str, float]:
+    """Return the constants, in the order of ROWS, those that follow from what the result has.
+
+    nu_ij = -eps_j / eps_i under stress along i: nu12 = nu13' E3' / E1' of those with a dash, in the axes of the cell.
+    """
+    cell, expansion = document.get("constants") or {}, document.get("thermal_expansion")
+    found = {name: cell[own] for name, own in IN_THE_CELL.items() if own in cell}
+    for name, ratio, across in (("nu12", "nu13", "E1"), ("nu13", "nu23", "E2")):
+        if {ratio, across, "E3"} <= cell.keys():
+            found[name] = cell[ratio] * cell["E3"] / cell[across]
+    if cell and expansion is not None:
+        found |= {name: float(expansion[place]) for name, place in EXPANSIONS.items()}
+    return {name: found[name] for names in ROWS for name in names if name in found}
+
+
+def table(document: Document, label: str) -> list[Table]:
+    """Return the constants as a table; `label` is the unit of stresses in brackets, or empty."""
+    found = constants(document)
+    columns = [Column("", -28), Column("computed")]
+    return [Table(f"{TITLE}{label}", columns, list(found.items()))] if found else []
+
+
+def lines(document: Document, label: str) -> list[str]:
+    """Return the same as text, with the estimated errors of the mesh."""
+    found = constants(document)
+    words = {}
+    for name, number in found.items():
+        error = error_of(document, IN_THE_CELL[name]) if name in IN_THE_CELL else None
+        value, off = value_and_error(number, error, ".7g")
+        words[name] = f"{name:<6}{value:>13}{beside(off)}"
+    rows = ("    ".join(words[name] for name in names if name in words).rstrip() for names in ROWS)
+    return [f"{TITLE}{label}", *(f"  {row}" for row in rows if row)] if found else []
