@@ -27,7 +27,6 @@ from feti_homog.case.material_sections import (
 )
 from feti_homog.case.mixed_cell import mix_faults
 from feti_homog.case.mixed_load import completed
-from feti_homog.case.petsc_section import Scalar, read_petsc
 from feti_homog.case.rules import RULES
 from feti_homog.case.sections import (
     KEY_OWNERS,
@@ -40,6 +39,8 @@ from feti_homog.case.sections import (
     Angle,
     Decomposition,
     Output,
+    Scalar,
+    read_petsc,
 )
 from feti_homog.case.selectors import ANALYSIS_TYPE, CRITERION, METHOD, PLANE
 from feti_homog.errors import CaseError

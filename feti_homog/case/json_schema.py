@@ -14,10 +14,18 @@ from feti_homog.case.cell_section import ALL_CIRCULAR
 from feti_homog.case.interface_section import Arc, Scatter
 from feti_homog.case.material_sections import CONSTANTS
 from feti_homog.case.mixed_load import TEMPERATURE, MixedLoad
-from feti_homog.case.petsc_section import PREFIXED
 from feti_homog.case.phase_names import COATING, FIBRE, MATRIX, PHASE
 from feti_homog.case.rules import PLACES_OF_LOADS, PLACES_OF_TABLES, RULES
-from feti_homog.case.sections import AXIS_MEANING, RANGE_KEYS, REQUIRED, SECTIONS, SWEEP, TOP_LEVEL, SweepSection
+from feti_homog.case.sections import (
+    AXIS_MEANING,
+    PREFIXED,
+    RANGE_KEYS,
+    REQUIRED,
+    SECTIONS,
+    SWEEP,
+    TOP_LEVEL,
+    SweepSection,
+)
 from feti_homog.case.selectors import CRITERION, GENERALIZED, PLANE
 from feti_homog.materials.forms import EXPANSION_PAIR, MATERIAL_FORMS
 from feti_homog.materials.laws import NEEDED

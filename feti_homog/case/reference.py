@@ -8,10 +8,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from feti_homog.case.petsc_section import OPTION_EXPECTED
 from feti_homog.case.sections import (
     AXIS_EXPECTED,
     AXIS_MEANING,
+    OPTION_EXPECTED,
     RANGE_KEYS,
     SECTIONS_OF_AN_ANALYSIS,
     SWEEP,

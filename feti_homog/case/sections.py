@@ -1,7 +1,12 @@
-"""Sections of a case file, [sweep] among them: their keys, accepted values and meanings."""
+"""Sections of a case file, [sweep] among them: their keys, accepted values and meanings.
+
+[petsc] has PETSc's options of the solver without their dash.  What PETSc itself takes, as -log_view, it reads when it
+starts and ends, which is on the command line alone.
+"""
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,8 +19,13 @@ from feti_homog.case.section_values import OPENINGS, SEED, STATES, STRAIN
 from feti_homog.case.selectors import ANGLE_ANALYSIS, ENVELOPE_ANALYSIS, IN_THE_PLANE, LOAD_ANALYSIS, PATH_ANALYSIS
 from feti_homog.materials.forms import MATERIAL_FORMS
 from feti_homog.schema.keys import Key, key, keys_of
-from feti_homog.schema.values import boolean, choice, integer, real, text
+from feti_homog.schema.values import boolean, choice, integer, is_number, real, text
+from feti_homog.schema.wording import toml_key, toml_value
 
+Scalar = str | int | float | bool
+
+PREFIXED = r"feti_\w+"  # options of [petsc]
+OPTION_EXPECTED = "a text, a number, true or false"
 SWEEP = "sweep"
 MAX_CASES = 20_000
 
@@ -222,3 +232,26 @@ def _places(name: str) -> str:
 
 KEY_OWNERS = {name: _places(name) for table in TABLES for name in keys_of(table.contents)}
 """By key, the tables to which it belongs, in words."""
+
+
+def read_petsc(table: object, faults: list[str]) -> dict[str, Scalar]:
+    """PETSc's options by name; whether PETSc knows one of prefix feti_ only the run can tell."""
+    if not isinstance(table, dict):
+        faults.append(f"petsc = {toml_value(table)}: expected a section [petsc]")
+        return {}
+    wrong = {name: _option_fault(name, value) for name, value in table.items()}
+    faults += [
+        f"[petsc] {toml_key(name)} = {toml_value(table[name])}: {words}" for name, words in wrong.items() if words
+    ]
+    return dict(table)
+
+
+def _option_fault(name: str, value: object) -> str:
+    """Return the fault of an option, empty if there is none."""
+    if name.startswith("-"):
+        return "expected the option's name without its dash"
+    if not re.fullmatch(PREFIXED, name):
+        return "expected the prefix feti_; PETSc's own options are for the command line"
+    if not (isinstance(value, bool) or is_number(value) or text.accepts(value)):
+        return f"expected {OPTION_EXPECTED}"
+    return ""

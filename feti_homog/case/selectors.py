@@ -18,7 +18,5 @@ BY_ENERGY, BY_STRENGTH, BY_AXIAL_STRENGTH, SOFTENING, BY_TABLE = (
     for key in ("toughness", "normal_strength", "axial_strength", "mixing_exponent", "openings")
 )
 
-DRAWN_STRESS = Selector("output", "stress")
-
 IN_THE_PLANE, GENERALIZED = PLANE.among("strain", "stress"), PLANE.among("generalized")
 BY_EVENTS, BY_INCREMENTS = METHOD.among("events"), METHOD.among("increments")

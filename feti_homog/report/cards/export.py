@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from feti_homog.errors import CaseError
-from feti_homog.report.cards import abaqus, ansys, calculix, csv_table, moose
+from feti_homog.report.cards import abaqus, ansys, csv_table, moose
 from feti_homog.report.cards.effective_material import (
     EffectiveMaterial,
     in_axes_of_the_cell,
@@ -17,7 +17,7 @@ from feti_homog.results import result_json
 
 FORMATS: dict[str, Callable[[EffectiveMaterial], str]] = {
     "abaqus": abaqus.text,
-    "calculix": calculix.text,
+    "calculix": abaqus.calculix_text,
     "ansys": ansys.text,
     "moose": moose.text,
     "csv": csv_table.text,
