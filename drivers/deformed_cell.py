@@ -37,7 +37,7 @@ def main(given: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def largest_overlap(result: Result, comm: Intracomm) -> float:
-    """How far the matrix intrudes into a fibre at most: minus the smallest gap at the nodes of all ranks."""
+    """Return how far the matrix intrudes into a fibre at most: minus the smallest gap at the nodes of all ranks."""
     if result.fields is None:
         raise ValueError("the case was run without fields")
     (state,) = result.fields.states

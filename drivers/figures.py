@@ -30,7 +30,7 @@ def parser(description: str, name: str, mesh_size: float, refine: int, order: in
 
 
 def quick_parser(description: str, name: str, quick: str) -> argparse.ArgumentParser:
-    """Where results go, by default to results/`name`, what is written, and --quick, of which `quick` is the help."""
+    """Options: where results go, by default results/`name`, what is written, and --quick, whose help is `quick`."""
     options = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--out", type=Path, default=Path("results") / name, metavar="DIR")
     add_output_options(options)

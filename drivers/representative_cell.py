@@ -68,7 +68,7 @@ def report(table: Any, tolerance: float) -> list[str]:
 
 
 def _laws(statistics: Any, number: int) -> str:
-    """Whether the means are isotropic and between the Hashin-Shtrikman bounds, in words."""
+    """Return whether the means are isotropic and between the Hashin-Shtrikman bounds, in words."""
     found = []
     for name, words in (("anisotropy_axial", "C11 - C22"), ("anisotropy_shear", "C33 - (C11 + C22 - 2 C12)/4")):
         mean, half = statistics[name].mean[number], statistics[name].ci95[number]

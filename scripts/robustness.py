@@ -81,7 +81,7 @@ class Cell:
 
     @property
     def possible(self) -> bool:
-        """Whether such a packing exists."""
+        """Return whether such a packing exists."""
         return not (self.fraction >= 0.65 and self.gap > 0.1)
 
     def case(self, space: str) -> Case:
@@ -137,7 +137,7 @@ class Row(Cell):
         return Cell(*(getattr(self, f.name) for f in fields(Cell)))
 
     def line(self) -> str:
-        """Of the table."""
+        """Line of the table."""
         return (
             f"{self.fibres:6}{self.fraction:9.2f}{self.gap:6.2f}{self.pieces:7}{self.contrast:9.0e}{self.refine:7}"
             f"{self.coating:8.2g}{self.coating_contrast:9.0e}{self.mix:6.2g}{self.mix_contrast:9.0e}{self.voids:6.2g}{self.poisson:10.9g}"

@@ -52,7 +52,7 @@ class Run(NamedTuple):
     way: str | None = None
 
     def report(self, out: Path) -> Path:
-        """Where its report is."""
+        """Return where its report is."""
         name = f"{self.fibres}_fibres_{self.dofs}_dofs_refine_{self.refine}_ranks_{self.ranks}"
         return out / "scaling" / f"{name}{f'_{self.way}' if self.way else ''}.json"
 

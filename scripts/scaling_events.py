@@ -66,7 +66,7 @@ class EventModel:
         return self.latency * (row.exchanges * row.neighbours + row.collectives * ceil(log2(row.ranks)))
 
     def seconds(self, row: EventRow) -> float:
-        """Of an event of the size and the counts of the row."""
+        """Seconds of an event of the size and the counts of the row."""
         return self.constant + row.dofs * (self.serial + self.parallel / row.ranks) + self.messages(row)
 
 

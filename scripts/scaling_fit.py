@@ -19,7 +19,7 @@ class Shares:
     parallel: float
 
     def seconds(self, work: float, ranks: float) -> float:
-        """Of so much work on so many ranks."""
+        """Seconds of so much work on so many ranks."""
         return work * (self.serial + self.parallel / ranks)
 
 

@@ -46,7 +46,7 @@ class Factor:
     solve_power: float
 
     def seconds(self, n: float, ranks: int) -> tuple[float, float]:
-        """Of both."""
+        """Seconds of both."""
         return self.factor.seconds(n**self.factor_power, ranks), self.solve.seconds(n**self.solve_power, ranks)
 
 
@@ -142,12 +142,12 @@ def _local_times(rows: Sequence[Row], cores: int) -> dict[str, Any]:
 
 
 def _meshed_alike(rows: Sequence[Row]) -> Sequence[Row]:
-    """Those of cells so large that all ranks mesh them, as those of the forecast; all rows, if there are none."""
+    """Rows of cells so large that all ranks mesh them, as those of the forecast; all rows, if there are none."""
     return [row for row in rows if row.fibres >= DEFAULT_TILES.least_discs] or rows
 
 
 def _coarse_times(rows: Sequence[Row], cores: int) -> dict[str, Any]:
-    """Of one factor of all ranks and, if it was timed, of multigrid."""
+    """Return the times of one factor of all ranks and, if it was timed, of multigrid."""
     factored, grids = ([row for row in rows if row.way == way and row.ranks <= cores] for way in (FACTOR, MULTIGRID))
     return dict(
         coarse=_factor(factored, "vectors", "coarse_factor", "coarse_solve"),
@@ -168,7 +168,7 @@ def _factor(rows: Sequence[Row], unknowns: str, factor: str, solve: str) -> Fact
 
 
 def _multigrid(rows: Sequence[Row]) -> Multigrid | None:
-    """Of the rows by multigrid, None without any."""
+    """Return the times of the rows by multigrid, None without any."""
     if not rows:
         return None
     setup, solve = (

@@ -71,7 +71,7 @@ def _sizes(axes: Axes, rows: Sequence[Row]) -> None:
 
 
 def _shares(axes: Axes, futures: dict[str, list[Prediction]]) -> None:
-    """Where the model sees the time go."""
+    """Return where the model sees the time go."""
     found = [p for series in futures.values() for p in series]
     names = [f"{title.split()[0]}, p = {p.ranks}: {p.total:.0f} s" for title, series in futures.items() for p in series]
     places, start = np.arange(len(found)), np.zeros(len(found))

@@ -170,7 +170,7 @@ def _per_dof(row: Row, seconds: float) -> float:
 
 
 def speedups(rows: Sequence[Row], cores: int) -> list[str]:
-    """How many times as many dofs a second as on one rank."""
+    """Return how many times as many dofs a second as on one rank."""
     lines = []
     for one in (row for row in rows if row.ranks == 1):
         for row in (row for row in rows if 1 < row.ranks <= cores):

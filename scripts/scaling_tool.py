@@ -94,14 +94,14 @@ class StagePeaks(Progress):
 
     @contextmanager
     def stage(self, name: str) -> Iterator[list[str]]:
-        """As `Progress.stage`."""
+        """Time a stage, as `Progress.stage`."""
         process_memory.forget_peak()
         with super().stage(name) as words:
             yield words
         self.peaks[name] = peak()
 
     def all_peaks(self) -> dict[str, list[float]]:
-        """Of every rank, by stage.  Collective."""
+        """Peaks of every rank, by stage.  Collective."""
         return {name: self.comm.allgather(megabytes) for name, megabytes in self.peaks.items()}
 
 

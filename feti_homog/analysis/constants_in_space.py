@@ -95,7 +95,7 @@ def _constants_of(cell: TornCell, phase: str) -> TransverselyIsotropic:
 
 
 def _springs(cell: TornCell, radius: float) -> Springs:
-    """Those of the interfaces of fibres with this radius."""
+    """Return those of the interfaces of fibres with this radius."""
     ((normal, tangential),) = bonds.springs(cell.case).stiffness
     ((axial,),) = bonds.axial_springs(cell.case).stiffness
     return Springs(normal, tangential, axial, radius)

@@ -184,7 +184,7 @@ class _Finder:
         return np.asarray(table[first, np.arange(n)])
 
     def _of_bond(self, bond: Float) -> dict[str, Any]:
-        """Where a bond is, and how it breaks."""
+        """Return where a bond is, and how it breaks."""
         names = self._break_names(self._unit.shape[2])
         pair = {"interface": int(bond[2]) + 1} if self._interfaces > 1 else {}
         where = {"fibre": int(bond[1])} | pair | {"bond_angle": float(bond[3])}

@@ -76,7 +76,7 @@ def _document(context: AnalysisContext, entries: Sequence[dict[str, Any]]) -> di
 
 
 def _known(context: AnalysisContext) -> int:
-    """How many events of the checkpoint are used; if none are wanted it is cleared.
+    """Return how many events of the checkpoint are used; if none are wanted it is cleared.
 
     Raises:
         CaseError: the checkpoint cannot be used.

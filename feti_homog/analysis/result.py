@@ -187,7 +187,7 @@ class Result:
 
     @property
     def document(self) -> dict[str, Any]:
-        """What result.json holds, in its order; arrays are NumPy's."""
+        """Return what result.json holds, in its order; arrays are NumPy's."""
         document: dict[str, Any] = plain(self)
         return document
 

@@ -102,7 +102,7 @@ def _fibres(cell: TornCell) -> tuple[FibreInfo, ...]:
 
 
 def _solver_info(context: AnalysisContext) -> SolverInfo:
-    """Of all problems together.  Collective."""
+    """Return the solver's entry of all problems together.  Collective."""
     cell = context.cell
     plan, solver = cell.summary, cell.solver
     solvers = [problem.solver for problem in cell.problems]

@@ -90,7 +90,7 @@ class Case:
 
     @property
     def arcs(self) -> tuple[Arc, ...]:
-        """What is debonded from the start; none if the bonding is perfect."""
+        """Return what is debonded from the start; none if the bonding is perfect."""
         return tuple(arc for interface in self.interfaces for arc in interface.debonded)
 
     @property

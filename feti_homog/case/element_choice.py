@@ -19,7 +19,7 @@ ROUNDING_POISSON = {MIXED: 0.49999999, "displacement": 0.49999}
 
 
 def is_mixed(element: str, order: int, material: Material, plane: str) -> bool:
-    """Whether the elements of a phase have a bubble and a pressure of their own in the plane problem."""
+    """Return whether the elements of a phase have a bubble and a pressure of their own in the plane problem."""
     has_pressure = isinstance(material, Isotropic) and not PLANE_STATES[plane].is_sheet
     return has_pressure and order == 2 and element == MIXED
 

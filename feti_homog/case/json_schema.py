@@ -174,7 +174,7 @@ def _if(condition: Condition) -> Schema:
 
 
 def _material_rules() -> list[Schema]:
-    """Which constants and phases belong together."""
+    """Return which constants and phases belong together."""
     complete = [
         {"required": [name for name, entry in keys_of(contents).items() if entry.required]}
         for contents in MATERIAL_FORMS.values()

@@ -176,7 +176,7 @@ def expansion_faults(path: LoadPath | None, load: SingleLoad | None, materials: 
 
 
 def stress_free(section: str, placed: Mapping[str, Strain | MixedLoad], plane: str) -> tuple[str, ...]:
-    """Which components are free of stress because no load of a section names them, or none so far; a line each."""
+    """List the components free of stress because no load of a section names them, or none so far; a line each."""
     first = first_named(tuple(placed.values()), plane)
     words = ["", *(f"stress-free until {place}" for place in [*placed][1:]), "never named: stress-free"]
     unnamed = {k: [name for name, number in first.items() if number == k] for k in range(1, len(words))}

@@ -13,7 +13,7 @@ FEWEST = 0.5  # fibres of a phase, below which one would be another phase's wort
 
 
 def fibre_counts(cell: Cell) -> dict[str, int]:
-    """How many fibres of each phase a random cell has.
+    """Return how many fibres of each phase a random cell has.
 
     Fibres of the fraction c_p and the radius r_p are as many as e_p ~ c_p / r_p^2. Each phase has one, and each further
     fibre is of the phase with the largest e_p / (2 n_p + 1), the rule of Sainte-Lague: whole numbers next to e_p.

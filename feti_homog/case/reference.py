@@ -175,7 +175,7 @@ def _row_text(row: KeyRow) -> str:
 
 
 def _presence(row: KeyRow) -> str:
-    """Whether, and when, a key must or may be given."""
+    """Return whether, and when, a key must or may be given."""
     if row.default == "required":
         return f"required if {row.applies}" if row.applies else "required"
     default = f"default {row.default}" if row.default else "optional"

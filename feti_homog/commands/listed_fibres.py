@@ -94,7 +94,7 @@ class ListedFibres:
 
 
 def read(source: Path) -> ListedFibres:
-    """Those of a case file or a folder of results.  On one rank.
+    """Return those of a case file or a folder of results.  On one rank.
 
     Raises:
         CaseError, MeshError: the source is faulty, or a fibre is neither round nor an ellipse.
@@ -116,7 +116,7 @@ def _of_result(directory: Path) -> ListedFibres:
 
 
 def _of_records(fibres: Sequence[Mapping[str, Any]], cell: Mapping[str, Any]) -> ListedFibres:
-    """Those of `fibres` and `cell` of a result."""
+    """Return those of `fibres` and `cell` of a result."""
     unknown = (np.nan, np.nan)
     centres = np.array([fibre.get("centre") or unknown for fibre in fibres], float).reshape(-1, 2)
     axes = [

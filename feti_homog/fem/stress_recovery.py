@@ -81,7 +81,7 @@ class RecoveredStress:
 
     @property
     def order(self) -> int:
-        """Of the elements and of the fits."""
+        """Order of the elements and of the fits."""
         return 1 if self.triangles.shape[1] == 3 else 2
 
     @cached_property

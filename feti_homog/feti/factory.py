@@ -157,7 +157,7 @@ def build(
 def _sizes(
     comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators, applications: int
 ) -> ProblemSizes:
-    """Those of a torn cell; collective."""
+    """Return those of a torn cell; collective."""
     dense = [o.is_dense for o in operators.operators]
     return ProblemSizes(
         applications=applications,

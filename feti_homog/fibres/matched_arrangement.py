@@ -49,6 +49,6 @@ def matched_arrangement(cell: Cell) -> Arrangement:
 
 
 def distance_of(window: FibrePattern, width: float, height: float, centres: Float, radii: Float) -> float:
-    """How far a periodic cell with these fibres is from the window that it matches, in mean diameters."""
+    """Return how far a periodic cell with these fibres is from the window that it matches, in mean diameters."""
     pattern = FibrePattern(width, height, centres, radii, periodic=True)
     return match_distance(pattern, wanted_distances(window, pattern.count))

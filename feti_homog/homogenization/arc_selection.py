@@ -121,7 +121,7 @@ class InterfaceNodes:
         return tuple(moved)
 
     def within(self, pair: int) -> InterfaceNodes:
-        """Those of one interface of the case."""
+        """Return those of one interface of the case."""
         own = self.pair == pair
         return InterfaceNodes(self.fibre[own], self.pair[own], self.direction[own], self.is_vertex[own])
 

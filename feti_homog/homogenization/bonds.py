@@ -19,12 +19,12 @@ from feti_homog.typing import Float, Int
 
 
 def springs(case: Case) -> InterfaceSprings:
-    """Those of the problem in the plane: normal and tangential."""
+    """Return those of the problem in the plane: normal and tangential."""
     return InterfaceSprings(tuple(map(plane_stiffnesses, case.interfaces)), has_softening(case))
 
 
 def axial_springs(case: Case) -> InterfaceSprings:
-    """Those of the problem along the fibres."""
+    """Return those of the problem along the fibres."""
     return InterfaceSprings(tuple((axial_stiffness(bond),) for bond in case.interfaces), has_softening(case))
 
 

@@ -159,7 +159,7 @@ class EnergyReleaseRates:
         return np.asarray(-outward * allreduce_sum(self.cell.comm, change) / self._radius(tips))
 
     def _steps(self, tips: CrackTips, within: Float) -> int:
-        """How many nodes of a chain lie within distances (t,) of the tips at most, and one element more."""
+        """Return how many nodes of a chain lie within distances (t,) of the tips at most, and one element more."""
         places = wrapped(self.points[tips.node], self._period)
         counts = self._tree.query_ball_point(places, within, return_length=True)
         return self.cell.case.cell.order + int(counts.max(initial=1))
@@ -194,5 +194,5 @@ class EnergyReleaseRates:
 
 
 def _leading(which: Bool) -> int:
-    """How many are true before the first that is not."""
+    """Return how many are true before the first that is not."""
     return int(np.argmin(np.append(which, False)))

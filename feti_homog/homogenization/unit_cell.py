@@ -61,7 +61,7 @@ class TornCell:
 
     @cached_property
     def offsets(self) -> Int:
-        """Where each subdomain begins in this rank's vectors of degrees of freedom."""
+        """Return where each subdomain begins in this rank's vectors of degrees of freedom."""
         return np.cumsum([0, *(len(s.Q) for s in self.subdomains)])
 
     @cached_property

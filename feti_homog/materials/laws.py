@@ -138,7 +138,7 @@ def _angle(material: Material) -> float:
 
 
 def _general_in_plane(stiffness: Float, plane: str) -> Float:
-    """Of a stiffness in space the block of plane strain, or what is left in plane stress."""
+    """Return the block of plane strain of a stiffness in space, or what is left in plane stress."""
     if len(stiffness) == 3:
         return stiffness
     block, out = stiffness[IN_PLANE_BLOCK], stiffness[IN_PLANE, 2]

@@ -41,7 +41,7 @@ class PlaneState:
 
     @property
     def normals(self) -> int:
-        """How many components, the first ones, are normal strains that are loads."""
+        """Return how many components, the first ones, are normal strains that are loads."""
         return len(self.strains) - (3 if self.is_spatial else 1)
 
 

@@ -54,7 +54,7 @@ def _neighbours(mesh: CoarseMesh) -> tuple[Int32, Index]:
 
 
 def _alone(pairs: Int32, order: Index) -> Bool:
-    """Which of the edges of `_neighbours` (3m, 2) no other triangle has."""
+    """Return which of the edges of `_neighbours` (3m, 2) no other triangle has."""
     alone = np.ones(len(pairs), bool)
     alone[order] = False
     return alone

@@ -26,7 +26,7 @@ class MiddleNodes:
 
     @classmethod
     def none(cls) -> MiddleNodes:
-        """Those of triangles of three nodes."""
+        """Return those of triangles of three nodes."""
         return cls(np.zeros((0, 2), np.int32), np.zeros(0, np.int64), np.zeros((0, 3)))
 
     def between(self, pairs: Int32) -> Float:

@@ -53,7 +53,7 @@ class ReferenceLattice:
 
     @property
     def order(self) -> int:
-        """Of the elements: 1 or 2."""
+        """Order of the elements: 1 or 2."""
         return 1 if self.triangles.shape[1] == 3 else 2
 
     def number(self, vertices: Int, edges: Int, backwards: Bool, n_vertices: int, n_edges: int) -> Int:

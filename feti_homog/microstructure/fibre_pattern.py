@@ -37,7 +37,7 @@ class FibrePattern:
 
     @property
     def area(self) -> float:
-        """Of the rectangle."""
+        """Area of the rectangle."""
         return self.width * self.height
 
     @property

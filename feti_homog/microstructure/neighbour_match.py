@@ -64,7 +64,7 @@ class NearestNeighbours:
 
 
 def nearest_neighbours(pattern: FibrePattern, count: int = 3) -> NearestNeighbours:
-    """Those of each fibre, in a periodic cell its images and its own among them."""
+    """Return those of each fibre, in a periodic cell its images and its own among them."""
     candidates, _ = pattern.images(_reach(pattern, count))
     known = min(count, len(candidates) - 1)
     distances, directions = np.full((pattern.count, count), np.inf), np.full((pattern.count, count), np.nan)

@@ -50,7 +50,7 @@ class VoronoiCells:
 
 
 def voronoi_cells(pattern: FibrePattern) -> VoronoiCells:
-    """Of a periodic cell by the images around it, of a window by mirror images, which cut the cells at its sides.
+    """Cells of a periodic pattern by images around it, of a window by mirror images, which cut them at its sides.
 
     A cell in a window counts if the circles about its corners, through its centre, lie within the window: no fibre
     outside could change it.
@@ -74,7 +74,7 @@ def voronoi_cells(pattern: FibrePattern) -> VoronoiCells:
 
 
 def _weights(pattern: FibrePattern, lowest: Float, highest: Float) -> Float:
-    """Those of cells whose circles lie between the corners `lowest` and `highest` (N, 2)."""
+    """Return those of cells whose circles lie between the corners `lowest` and `highest` (N, 2)."""
     if pattern.periodic:
         return np.full(pattern.count, 1 / pattern.count)
     within = np.all((lowest >= 0) & (highest <= pattern.size), axis=1)

@@ -116,7 +116,7 @@ def _fault(name: str, advice: str) -> str:
 
 
 def _unfit(name: str, error: Exception, advice: str) -> str:
-    """Of a module that cannot be imported; errors about NumPy's types mean that it was built for another release."""
+    """Text on a module that cannot be imported; errors about NumPy's types mean that it fits another release."""
     if "numpy" not in str(error):
         return f"{name} cannot be imported ({error}): {advice}"
     import numpy as np

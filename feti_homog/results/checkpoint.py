@@ -48,7 +48,7 @@ class Checkpoint:
         return on_root(self.comm, self._clear)
 
     def count(self) -> int:
-        """How many events there are, each of which is checked.
+        """Return how many events there are, each of which is checked.
 
         Raises:
             CaseError: an event is missing, unreadable or of another run.
@@ -197,7 +197,7 @@ def remove(directory: Path) -> None:
 
 
 def _remove_events(folder: Path) -> None:
-    """As far as it can be: what stays, the next run removes."""
+    """Remove events as far as it can be: what stays, the next run removes."""
     with contextlib.suppress(OSError):
         for path in folder.iterdir():
             if _is_event(path):

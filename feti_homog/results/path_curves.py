@@ -57,7 +57,7 @@ def changed_components(document: Document) -> list[int]:
 
 
 def leading_component(document: Document) -> int:
-    """Of the components that the waypoints of a path change the one of the largest strain.
+    """Return the component of the largest strain among those that the waypoints of a path change.
 
     Of all if they change but the temperature.
     """
@@ -86,12 +86,12 @@ def what_rises(document: Document) -> str:
 
 
 def legs(document: Document) -> int:
-    """How many straight legs the path of a case has."""
+    """Return how many straight legs the path of a case has."""
     return len(document["case"]["path"].get("waypoints", [0]))
 
 
 def first_leg(document: Document) -> int:
-    """How many points of a path are on its first leg; of increments all, for they are drawn alike."""
+    """Return how many points of a path are on its first leg; of increments all, for they are drawn alike."""
     points = document["path"]
     if document["case"]["path"]["method"] == "increments":
         return len(points)

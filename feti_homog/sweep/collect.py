@@ -77,12 +77,12 @@ def _table(index: SweepIndex, states: Sequence[CaseState]) -> SweepTable:
 
 
 def _inputs(entries: Sequence[SweepCase]) -> dict[str, list[Any]]:
-    """Of each key that varies its values in all cases, None where a case has none."""
+    """Return the values of each key that varies in all cases, None where a case has none."""
     names = dict.fromkeys(name for entry in entries for name in entry.inputs)
     return {name: [entry.inputs.get(name) for entry in entries] for name in names}
 
 
 def _columns(rows: Sequence[Mapping[str, float]]) -> dict[str, Float]:
-    """Of each name its values in all rows, NaN where a row has none."""
+    """Return the values of each name in all rows, NaN where a row has none."""
     names = dict.fromkeys(name for row in rows for name in row)
     return {name: np.array([row.get(name, np.nan) for row in rows]) for name in names}

@@ -97,7 +97,7 @@ def _described(
 
 
 def _plan(case: Case, summary: CellSummary, multipliers: int, applications: int, options: SolverOptions) -> SolverPlan:
-    """How the plane problem will be solved, if its operators are of the kind asked for; pieces are dense by default."""
+    """Plan of the plane problem, if its operators are of the kind asked for; pieces are dense by default."""
     dense = options.operator != "implicit"
     sizes = ProblemSizes(
         applications, summary.subdomains > summary.bodies, dense, dense, multipliers, COATING in case.materials
@@ -113,7 +113,7 @@ def _match_lines(case: Case, summary: CellSummary) -> list[str]:
 
 
 def _mix_lines(case: Case, summary: CellSummary) -> list[str]:
-    """How many fibres each phase of a mix has got, and how large they are."""
+    """Return how many fibres each phase of a mix has got, and how large they are."""
     if case.cell.mix is None:
         return []
     phase, radii = summary.constituent_phase[summary.is_fibre], summary.radii[summary.is_fibre]

@@ -120,7 +120,7 @@ def _identity(case: Case) -> str:
 
 
 def case_names(numbers: list[int]) -> str:
-    """Which cases, in words."""
+    """Return which cases, in words."""
     names = ", ".join(f"case-{number:04d}" for number in numbers[:MAX_NAMED_CASES])
     rest = len(numbers) - MAX_NAMED_CASES
     return names if rest <= 0 else f"{names} and {rest} more"

@@ -123,14 +123,14 @@ def read_index(directory: Path) -> SweepIndex:
 
 
 def case_state(directory: Path, entry: SweepCase) -> CaseState:
-    """How far a case has come; RUNNING while another process holds its lock.  On one rank."""
+    """Return how far a case has come; RUNNING while another process holds its lock.  On one rank."""
     state = stored_state(directory, entry)
     is_open = state.status in (Status.WAITING, Status.FAILED)
     return CaseState(Status.RUNNING) if is_open and is_locked(directory / entry.folder / LOCK_FILE) else state
 
 
 def stored_state(directory: Path, entry: SweepCase) -> CaseState:
-    """How far a case has come by its files alone, as the holder of its lock needs it.  On one rank."""
+    """Return how far a case has come by its files alone, as the holder of its lock needs it.  On one rank."""
     folder = directory / entry.folder
     try:
         if (folder / result_json.NAME).exists():

@@ -95,7 +95,7 @@ class Certificate:
 
     @property
     def document(self) -> dict[str, Any]:
-        """The same for programs."""
+        """Certificate for programs."""
         laws = [dict(finding.document) for finding in self.findings]
         return {"title": self.title, "status": self.status, "holds": self.holds, "laws": laws}
 

@@ -77,7 +77,7 @@ class StateNumbers:
 
     @classmethod
     def of(cls, cell: DiscreteCell, state: State, fields: ElementFields) -> StateNumbers:
-        """Those of a state of a cell."""
+        """Return those of a state of a cell."""
         law = law_at(cell.files, damage=state.damage)
         released = tips(cell, state.status) & law.grows_by_release
         used = np.where(state.status == BONDED, law.utilisation(state.traction), 0.0)

@@ -37,7 +37,7 @@ def check_arcs(findings: Findings, cell: DiscreteCell, states: Sequence[StateNum
 
 
 def _sides(cell: DiscreteCell, opening: float | None) -> tuple[Bool, Bool]:
-    """Which interface nodes (k,) are inside of an arc, and which are outside of all of them."""
+    """Return which interface nodes (k,) are inside of an arc, and which are outside of all of them."""
     rows, angle = cell.files.interface, directions(cell)
     inside, outside = np.zeros(len(angle), bool), np.ones(len(angle), bool)
     arcs = [(n, arc) for n, section in enumerate(cell.files.interfaces) for arc in section.get("debonded", ())]

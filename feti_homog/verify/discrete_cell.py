@@ -156,7 +156,7 @@ class DiscreteCell:
 
     @property
     def area(self) -> float:
-        """Of the rectangle."""
+        """Area of the rectangle."""
         return float(self.files.size.prod())
 
     @property
@@ -212,7 +212,7 @@ def _inner_sides(files: ResultFiles, sides: TornSides, inwards: Int) -> Bool:
 
 
 def _faces(files: ResultFiles, nodes: TornNodes, on_line: Bool, parts: Int, inwards: Int, radius: float) -> Faces:
-    """Where the interface nodes of a result are on its mesh.
+    """Return where the interface nodes of a result are on its mesh.
 
     `inwards` (parts,) as `inwardness` has it, `on_line` (places,) as `along_one_line`.
     """

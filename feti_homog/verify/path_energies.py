@@ -98,7 +98,7 @@ def check_path_energies(
 
 
 def _numbers(cell: DiscreteCell, states: Sequence[StateNumbers], points: Sequence[Point]) -> list[PointNumbers]:
-    """Those of every point, the energy from the fields where they are kept, else by Hill E.Sigma / 2.
+    """Return those of every point, the energy from the fields where they are kept, else by Hill E.Sigma / 2.
 
     What works on a temperature follows from what is stored.
     """

@@ -192,7 +192,7 @@ class AdaptiveCoarseSpace:
             return scale_rows(self._weights, self.solver.solve(scale_rows(self._weights, work)))
 
     def _parts(self) -> zip[tuple[Int, Float, slice]]:
-        """Of each subdomain places of the modes that reach it, S Z_0, and where it is among the boundary dofs."""
+        """Return places of the modes that reach each subdomain, S Z_0, and where it is among the boundary dofs."""
         return zip(self._columns, self._forces, self._operators.slices, strict=True)
 
     def destroy(self) -> None:

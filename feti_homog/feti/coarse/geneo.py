@@ -187,7 +187,7 @@ def kernels_and_soft_modes(
 def _eigenproblems(
     blocks: Sequence[SubdomainBlocks], neighbours: Neighbours, thresholds: Thresholds
 ) -> list[SubdomainEigenproblem | FaceEigenproblems]:
-    """Those of this rank's subdomains, without communication."""
+    """Return those of this rank's subdomains, without communication."""
     return [eigenproblem(block, common, thresholds) for block, common in zip(blocks, neighbours.common, strict=True)]
 
 

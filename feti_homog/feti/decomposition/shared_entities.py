@@ -58,7 +58,7 @@ class InterfaceGeometry:
     precracked: Bool
 
     def chosen(self, which: Int) -> InterfaceGeometry:
-        """Of the entities of these numbers (k,)."""
+        """Return the geometry of the entities of these numbers (k,)."""
         return InterfaceGeometry(self.normal[which], self.turn[which], self.precracked[which])
 
 

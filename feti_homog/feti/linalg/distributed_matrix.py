@@ -94,7 +94,7 @@ def allreduce_sparse(comm: MPI.Intracomm, part: csr_matrix) -> csr_matrix:
 
 
 def _even_share(comm: MPI.Intracomm, n: int) -> int:
-    """How many of n rows this rank gets if all ranks get about as many."""
+    """Return how many of n rows this rank gets if all ranks get about as many."""
     return n // comm.size + (comm.rank < n % comm.size)
 
 

@@ -99,7 +99,7 @@ class DistributedSolver:
 
     @property
     def iterations(self) -> int:
-        """Of the last solve for one column, if the options ask for an iterative method; else 1."""
+        """Iterations of the last solve for one column, if the options ask for an iterative method; else 1."""
         assert self._ksp is not None, "nothing is factored"
         return 1 if is_direct(self._ksp) else int(self._ksp.getIterationNumber())
 

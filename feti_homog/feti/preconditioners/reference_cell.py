@@ -157,7 +157,7 @@ class ResponseColumns:
         return self._block[: len(self.rows), : len(self.rows)]
 
     def positions(self, rows: Int) -> Int:
-        """Where rows are in K; -1 if they are not."""
+        """Return where rows are in K; -1 if they are not."""
         return self._position[rows]
 
     def clear(self) -> None:

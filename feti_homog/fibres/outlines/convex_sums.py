@@ -85,7 +85,7 @@ class ConvexSums:
         return np.asarray(core + np.linalg.norm(np.einsum("kij,k...i->k...j", self.frames, normal), axis=-1))
 
     def parting(self, first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
-        """As in `Outlines`: the gap of convex bodies is max_n v . n - h_1(n) - h_2(-n) with their supports h."""
+        """Gaps as in `Outlines`: of convex bodies max_n v . n - h_1(n) - h_2(-n) with their supports h."""
         one, other = self[first], self[second]
 
         def gap(angle: Float) -> Float:
@@ -96,7 +96,7 @@ class ConvexSums:
         return normal, one.support(normal) + other.support(-normal)
 
     def distances(self, offsets: Float) -> Float:
-        """As in `Outlines`: those of POINTS points or more."""
+        """Distances as in `Outlines`: those of POINTS points or more."""
         points, _, which = self.at(np.zeros_like(self.centres)).boundary(POINTS)
         first = np.flatnonzero(np.diff(which, prepend=-1))
         each = [np.minimum.reduceat(np.linalg.norm(own[which] - points, axis=1), first) for own in offsets]

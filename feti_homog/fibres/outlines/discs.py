@@ -67,7 +67,7 @@ class Discs:
         return np.broadcast_to(self.radii.reshape(-1, *[1] * (normal.ndim - 2)), normal.shape[:-1])
 
     def parting(self, first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
-        """As in `Outlines`: along the vectors, or along x where that is 0."""
+        """Gaps as in `Outlines`: along the vectors, or along x where that is 0."""
         length = np.linalg.norm(vector, axis=1)
         normal = np.where(length[:, None] > 0, vector / np.maximum(length, 1e-300)[:, None], [1.0, 0.0])
         return normal, self.radii[first] + self.radii[second]

@@ -26,7 +26,7 @@ class Ellipses:
 
     @classmethod
     def of(cls, centres: Float, a: Float, b: Float, angle: Float) -> Ellipses:
-        """Those of semi-axes a, b (k,), the first at `angle` (k,) in degrees from x."""
+        """Return those of semi-axes a, b (k,), the first at `angle` (k,) in degrees from x."""
         cosine, sine = np.cos(np.radians(angle)), np.sin(np.radians(angle))
         axes = np.stack([np.stack([cosine, sine], axis=1), np.stack([-sine, cosine], axis=1)], axis=2)
         return cls(centres, axes * np.stack([a, b], axis=1)[:, None])
@@ -157,7 +157,7 @@ class Ellipses:
         return normal, one.support(normal) + other.support(normal)
 
     def distances(self, offsets: Float) -> Float:
-        """As in `Outlines`: ||F^-1 d| - 1| times the mean radius."""
+        """Distances as in `Outlines`: ||F^-1 d| - 1| times the mean radius."""
         unit = np.einsum("kij,nkj->nki", np.linalg.inv(self.frames), offsets)
         return np.asarray(np.abs(np.linalg.norm(unit, axis=2) - 1) * self.radii)
 

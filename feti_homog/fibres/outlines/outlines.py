@@ -115,7 +115,7 @@ class Shape(Protocol):
         """Faults of rows that have it or seem to: which rows (N,), and the words."""
 
     def outlines(self, rows: Columns, centres: Float) -> Outlines:
-        """Those of rows (k,) that have it, about centres (k, 2)."""
+        """Return those of rows (k,) that have it, about centres (k, 2)."""
 
 
 def directions(angle: Float) -> Float:

@@ -126,7 +126,7 @@ class ContactProblem:
 
     @cached_property
     def scales(self) -> LoadScales:
-        """Of what loads make.  Its properties are collective when first used, and so are its methods."""
+        """Scales of what loads make.  Its properties are collective when first used, and so are its methods."""
         return LoadScales(self.solver, self.size)
 
     @property

@@ -43,7 +43,7 @@ class CoupledInterfaces:
 
     @property
     def area(self) -> float:
-        """Of the cell."""
+        """Area of the cell."""
         return float(self.plane.size.prod())
 
     @property
@@ -52,7 +52,7 @@ class CoupledInterfaces:
         return tuple(name for each in self.problems for name in each.solver.problem.loads)
 
     def no_multipliers(self) -> Multipliers:
-        """Those of an unloaded cell."""
+        """Return those of an unloaded cell."""
         return Multipliers(np.zeros(each.solver.rows) for each in self.problems)
 
     def linear(self, load: Load, bonds: BondState, start: Multipliers) -> CoupledSolution:
@@ -73,7 +73,7 @@ class CoupledInterfaces:
         return load.parts([len(each.solver.problem.loads) for each in self.problems])
 
     def leg_start(self, origin: Macroscopic, before: Load | None, end: Load) -> Load:
-        """Where a leg begins: at the waypoint before, which the last point, `origin`, need not meet.  Collective.
+        """Return the begin of a leg, the waypoint before, which the last point, `origin`, need not meet.  Collective.
 
         Components that are given in another way now are as that has them, stresses without the solver's error.
         """

@@ -109,7 +109,7 @@ def admissible_share(
     ahead: Float,
     noise: float,
 ) -> tuple[float, float]:
-    """How far every fibre has room on the way from the gaps `here` (k,) to `ahead` (k,), of which it has some here.
+    """Return the room of every fibre on the way from the gaps `here` (k,) to `ahead` (k,), of which it has some here.
 
     The largest shares w <= 1 of the way for which all fibres have amplitudes a with
 

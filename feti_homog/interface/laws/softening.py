@@ -26,7 +26,7 @@ class PiecewiseLinear(CohesiveLaw):
 
     @property
     def last(self) -> float:
-        """Where tau is none."""
+        """Return where tau is none."""
         return self.knots[-1]
 
     def shape(self, u: Float) -> Float:
@@ -74,7 +74,7 @@ class Exponential(CohesiveLaw):
 
     @property
     def last(self) -> float:
-        """Where little is left."""
+        """Return where little is left."""
         return -math.log(EXPONENTIAL_TAIL)
 
     def shape(self, u: Float) -> Float:

@@ -42,7 +42,7 @@ class PathState:
     broken: float | None = None
 
     def energies_to(self, here: Macroscopic) -> Energies:
-        """Those of the way from the last point's state to one under the load at which this stands.
+        """Return those of the way from the last point's state to one under the load at which this stands.
 
         The response between them may bend where contact changes, but that loses nothing: the work is what is stored or
         lost."""
@@ -61,7 +61,7 @@ class Energies(NamedTuple):
     fracture: float
 
     def plus(self, more: Energies) -> Energies:
-        """Those of two parts."""
+        """Return those of two parts."""
         return Energies(*(a + b for a, b in zip(self, more, strict=True)))
 
 

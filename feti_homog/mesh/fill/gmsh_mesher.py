@@ -88,7 +88,7 @@ def begin(
 
 
 def _sizes(cell: Cell, marks: Mapping[int, Sequence[float]]) -> MeshSizes:
-    """Those that a cell of width 1 is asked for."""
+    """Return those that a cell of width 1 is asked for."""
     interface = cell.mesh_size if cell.interface_size is None else cell.interface_size
     tip = interface if cell.tip_size is None or not marks else cell.tip_size
     return MeshSizes(cell.mesh_size, interface, tip)

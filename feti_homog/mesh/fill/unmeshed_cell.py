@@ -61,7 +61,7 @@ class UnmeshedCell:
 
     @property
     def phases(self) -> tuple[str, ...]:
-        """Those of the mesh."""
+        """Return those of the mesh."""
         return self.arrangement.phases
 
     def with_nodes(self, stations: LineStations | None = None) -> NodedCell:
@@ -100,7 +100,7 @@ class NodedCell:
 
     @property
     def phases(self) -> tuple[str, ...]:
-        """Those of the mesh."""
+        """Return those of the mesh."""
         return self.arrangement.phases
 
     def filled(self) -> CoarseMesh:
@@ -148,7 +148,7 @@ class NodedCell:
 
     @cached_property
     def regions(self) -> Regions:
-        """What is where.  The matrix of round fibres is one constituent: the plane without discs that do not touch."""
+        """Regions of the cell.  The matrix of round fibres is one: the plane without discs that do not touch."""
         phase, precedence = self._within
         solid = phase < len(self.phases)
         _, first, constituent = np.unique(precedence[solid], return_index=True, return_inverse=True)

@@ -42,7 +42,7 @@ class SizedLines:
         ]
 
     def stations(self, field: SizeField) -> LineStations:
-        """Where their nodes are.
+        """Return where their nodes are.
 
         Raises:
             MeshError: there would be more than the sampling allows.
@@ -64,7 +64,7 @@ class LineStations:
 
     @classmethod
     def joined(cls, parts: Sequence[LineStations], sampling: Sampling) -> LineStations:
-        """Of all parts.
+        """Return the stations of all parts.
 
         Raises:
             MeshError: they are more than the sampling allows.
@@ -136,7 +136,7 @@ class BareOutline:
         return cls(size, circles, disc, around, places, vertices, circle, lines, field)
 
     def stations(self) -> LineStations:
-        """Where the nodes of its lines are, all found here.
+        """Return where the nodes of its lines are, all found here.
 
         Raises:
             MeshError: there would be more than the sampling allows.

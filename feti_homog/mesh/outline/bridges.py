@@ -36,11 +36,11 @@ class Bridges:
 
     @property
     def on_circles(self) -> OnCircles:
-        """Where all of them begin, and then where all end."""
+        """Return where all of them begin, and then where all end."""
         return self.ends.T.ravel(), np.concatenate([self.angle, self.angle + np.pi]) % TURN
 
     def chosen(self, those: Bool) -> Bridges:
-        """Those where the mask (b,) is true."""
+        """Return those where the mask (b,) is true."""
         return Bridges(self.ends[those], self.angle[those])
 
 
@@ -64,7 +64,7 @@ class CentreLines:
 
 
 def centre_lines(circles: Float, which: Int) -> CentreLines:
-    """Those of the discs `which` (n,) of circles (k, 3)."""
+    """Return those of the discs `which` (n,) of circles (k, 3)."""
     centres, radii = circles[which, :2], circles[which, 2]
     corners = Delaunay(centres).simplices
     pairs = np.sort(np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]]), axis=1)

@@ -73,7 +73,7 @@ class Curves:
 
 
 def rows_of(first: Int, those: Int) -> tuple[Int, Int]:
-    """Where the rows of the groups `those` (k,) are, and where each of these groups begins among them.
+    """Return where the rows of the groups `those` (k,) are, and where each of these groups begins among them.
 
     Group i has the rows from first[i] up to first[i + 1].
     """

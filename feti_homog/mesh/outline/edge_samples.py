@@ -52,7 +52,7 @@ class Stations:
 
     @classmethod
     def joined(cls, parts: Sequence[Stations], most: int) -> Stations:
-        """Of all these lines, one after the other.
+        """Return the samples of all these lines, one after the other.
 
         Raises:
             MeshError: they have more than `most` edges together.

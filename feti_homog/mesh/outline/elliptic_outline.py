@@ -30,7 +30,7 @@ LENGTH_STEPS = 256
 def outline(
     arrangement: Arrangement, inner: Ellipses, sizes: MeshSizes, marks: Mapping[int, Sequence[float]]
 ) -> Outline:
-    """As `BareOutline.of`, of an arrangement whose outlines are the ellipses `inner`, with the nodes on its lines."""
+    """Lines as `BareOutline.of`, of an arrangement with the ellipses `inner` as outlines, with the nodes on them."""
     size = arrangement.size
     ellipses, fibre, around = _images(arrangement, inner, size)
     places = [_crossings(ellipses, axis, size) for axis in (0, 1)]

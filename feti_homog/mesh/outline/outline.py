@@ -59,7 +59,7 @@ def images(arrangement: Arrangement) -> tuple[Float, Int, Int]:
 
 
 def _outer_images(arrangement: Arrangement, size: Float) -> tuple[Float, Int]:
-    """Those of the discs with their coatings."""
+    """Return those of the discs with their coatings."""
     radii = arrangement.outer_radii
     circles, fibre = [], []
     for step in product((-1, 0, 1), repeat=2):

@@ -73,7 +73,7 @@ def _curves(mesh: CoarseMesh, pairs: Int32) -> Int32:
 
 
 def _offsets(middle: Float, start: Float, stop: Float) -> tuple[Float, Float, Float]:
-    """Of each middle node from the middle of its chord: along it and across it, and the length of the chord."""
+    """Offsets of middle nodes from the middle of the chord: along it and across it, and the length of the chord."""
     chord, offset = stop - start, middle - (start + stop) / 2
     length = np.hypot(*chord.T)
     along = (chord * offset).sum(axis=1) / length

@@ -103,7 +103,7 @@ def refuse_many(size_at: Callable[[Float], Float], period: Float, most: int = MA
 
 
 def triangles_of_a_tip(ratio: np.float64 | float) -> float:
-    """Those that a tip adds where elements are smaller by `ratio` than around.
+    """Return those that a tip adds where elements are smaller by `ratio` than around.
 
     int 2 pi r dr / (A (h + g r)^2) up to the radius at which h + g r is the size of the others, less those of this.
     """
@@ -112,13 +112,13 @@ def triangles_of_a_tip(ratio: np.float64 | float) -> float:
 
 
 def ratio_at_a_tip(count: float) -> float:
-    """How much smaller elements at a tip may be than around, if it is to add no more triangles than `count`."""
+    """Return how much smaller elements at a tip may be than around, if it is to add no more triangles than `count`."""
     counts = [triangles_of_a_tip(ratio) for ratio in RATIOS]
     return float(np.interp(count, counts, RATIOS))
 
 
 def _triangles_of_ends(ovals: Ellipses, around: float) -> float:
-    """Those that the ends of long axes, where the radius of curvature is b^2 / a, add among elements of this size."""
+    """Triangles that the ends of long axes, of radius of curvature b^2 / a, add among elements of this size."""
     short, long = np.sort(ovals.semi_axes, axis=1).T
     at_ends = 2 * np.pi * short**2 / long / MIN_EDGES_AROUND
     return 2 * math.fsum(map(triangles_of_a_tip, np.maximum(1.0, around / at_ends).tolist()))

@@ -37,7 +37,7 @@ def size_field(
     crossings: tuple[Float, Float],
     tips: Float,
 ) -> SizeField:
-    """As `graded_size.size_field`, for the ellipses `inner`.
+    """Field of sizes as `graded_size.size_field`, for the ellipses `inner`.
 
     `crossings` are where sides of the cell meet ellipses (c, 2), and the length (c,) R phi of the angle phi between
     them where the radius of curvature is R.
@@ -115,7 +115,7 @@ def _between(ellipses: Ellipses, size: Float, largest: float) -> Source:
 
 
 def _beside_sides(ellipses: Ellipses, size: Float, largest: float) -> Source:
-    """Where an ellipse comes near a side or hardly crosses it: its extreme point, and the foot of that on the side."""
+    """Points where an ellipse comes near a side or hardly crosses it: its extreme point, its foot on the side."""
     sources: list[Source] = []
     for axis, sign in product((0, 1), (-1.0, 1.0)):
         normal = np.zeros((len(ellipses), 2))

@@ -82,7 +82,7 @@ def passage_growth(width: Float, curvature: Float) -> Float:
 
 
 def _at_sides(circles: Float, size: Float, caps: Float, largest: float) -> Source:
-    """Where a circle comes near a side or hardly crosses it: extreme point, foot on the side, crossings."""
+    """Return where a circle comes near a side or hardly crosses it: extreme point, foot on the side, crossings."""
     centres, radii = circles[:, :2] % size, circles[:, 2]
     sources: list[Source] = []
     for axis, sign in product((0, 1), (-1.0, 1.0)):
@@ -115,7 +115,7 @@ def _where(chosen: Bool, *source: Float) -> Source:
 
 
 def _at_corners(circles: Float, size: Float, caps: Float) -> Source:
-    """Where a circle passes near the corner: the corner and the nearest point of the circle."""
+    """Return where a circle passes near the corner: the corner and the nearest point of the circle."""
     offset = (circles[:, :2] + size / 2) % size - size / 2
     distance = np.linalg.norm(offset, axis=1)
     length = PASSAGE_EDGE * np.abs(distance - circles[:, 2])

@@ -115,7 +115,7 @@ class DeformedCell:
 
     @property
     def caption(self) -> str:
-        """What is drawn."""
+        """Return what is drawn."""
         unit = unit_label(self.file.attrs["stress_unit"]) or "(unit of the moduli)"
         scale = "true scale" if self.scale == 1 else f"displacement × {self.scale:g}"
         return f"${STRESS_SYMBOLS[self.component]}$ {unit}, {scale}"

@@ -33,7 +33,7 @@ class InterfaceEdges:
 
     @classmethod
     def of(cls, file: Any, drawn: DrawnMesh, borders: Array) -> InterfaceEdges:
-        """Those among the outlines of the bodies; /interface has one node for all its periodic images."""
+        """Return those among the outlines of the bodies; /interface has one node for all its periodic images."""
         points, period = file["interface/points"][:], np.array([file.attrs["width"], file.attrs["height"]])
         if not len(points):
             return cls(borders[:0], borders[:0])

@@ -37,7 +37,7 @@ class LoadLabels:
 
     @classmethod
     def of(cls, document: Mapping[str, Any]) -> LoadLabels:
-        """Those of a result.json."""
+        """Return those of a result.json."""
         analysis = reported(document)
         if analysis.is_followed:
             largest = np.abs([point["stress"] for point in document[analysis.name]]).max()

@@ -197,7 +197,7 @@ def largest_length(vectors: Array) -> float:
 
 
 def strain_symbols(count: int) -> tuple[str, ...]:
-    """Those of the strains, 3 in the plane or 6 in space."""
+    """Return those of the strains, 3 in the plane or 6 in space."""
     return STRAIN_SYMBOLS if count == len(STRAIN_SYMBOLS) else SPATIAL_STRAIN_SYMBOLS
 
 

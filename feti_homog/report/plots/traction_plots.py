@@ -194,7 +194,7 @@ class Coordinate:
 
 
 def coordinate(file: Any, edges: InterfaceEdges, body: int) -> Coordinate:
-    """Of a body that is a round fibre, or its coating, the direction of the normal, in degrees.
+    """Direction of the normal, in degrees, of a body that is a round fibre, or its coating.
 
     Of any other the arc length, counterclockwise from where the normal is nearest to x1 (around each of its boundaries,
     if it has several, one after the other).

@@ -99,7 +99,7 @@ def _cell(document: Document) -> list[str]:
 
 
 def _sizes(shape: Document, cell: Document) -> list[str]:
-    """How often elements were split, and the coarse mesh where the program chose it."""
+    """Return how often elements were split, and the coarse mesh where the program chose it."""
     if "refine" in shape:
         return [f"refine {shape['refine']}"]
     asked = [f"{name} = {shape[name]:g}" for name in ASKED if name in shape]
@@ -107,7 +107,7 @@ def _sizes(shape: Document, cell: Document) -> list[str]:
 
 
 def _match(shape: Document, cell: Document) -> list[str]:
-    """How far the fibres are from those of a table."""
+    """Return how far the fibres are from those of a table."""
     distance = cell.get("match_distance")
     words = f"distances of neighbours differ by {distance or 0:.4f} mean diameters"
     return [] if distance is None else _field("Match", [Path(shape["match"]).name, words])

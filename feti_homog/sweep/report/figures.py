@@ -105,7 +105,7 @@ def _clustering(pattern: FibrePattern) -> tuple[Float, Float]:
 
 
 def _local_fractions(pattern: FibrePattern) -> tuple[Float, Float]:
-    """Those of the Voronoi cells that count, sorted, and the weighted share up to each."""
+    """Return those of the Voronoi cells that count, sorted, and the weighted share up to each."""
     cells = voronoi_cells(pattern)
     order = np.argsort(cells.fractions)
     order = order[cells.whole[order]]
@@ -197,7 +197,7 @@ def convergence_names(table: SweepTable) -> tuple[str, ...]:
 
 
 def _strength_names(table: SweepTable) -> tuple[str, ...]:
-    """Of the stress along the leading strain of paths, the first and the largest.
+    """Names of the stress along the leading strain of paths, the first and the largest.
 
     Of a given stress the strain at the end instead of the latter.
     """

@@ -122,7 +122,7 @@ def _has_voids(table: SweepTable) -> bool:
 
 
 def _bounds_at(shares: list[float], phases: list[Float]) -> dict[str, list[float]]:
-    """Of each panel Reuss, Voigt, and the two of Hashin and Shtrikman for isotropic phases."""
+    """Bounds of each panel: Reuss, Voigt, and the two of Hashin and Shtrikman for isotropic phases."""
     found: dict[str, list[float]] = {name: [] for name in PANELS}
     for stiffness in (mechanics.reuss(shares, phases), mechanics.voigt(shares, phases)):
         bulk, shear = mechanics.isotropic_part(stiffness)
@@ -136,7 +136,7 @@ def _bounds_at(shares: list[float], phases: list[Float]) -> dict[str, list[float
 
 
 def _spatial_bounds_at(shares: list[float], phases: list[Float]) -> dict[str, list[float]]:
-    """Of each panel Reuss, Voigt, and the two of fibres of any section for phases that are alike across them."""
+    """Bounds of each panel: Reuss, Voigt, and the two of fibres of any section for phases alike across them."""
     ends = [transversely_isotropic_part(bound(shares, phases)) for bound in (mechanics.reuss, mechanics.voigt)]
     found = {name: [float(getattr(end, name)) for end in ends] for name in SPATIAL_PANELS}
     own = [transversely_isotropic_part(phase) for phase in phases]

@@ -42,7 +42,7 @@ class BondLaw(ABC):
 
     @abstractmethod
     def breaks(self, traction: Float) -> dict[str, float]:
-        """How a traction (1, c) breaks a bond, by the names of an envelope's points."""
+        """Return how a traction (1, c) breaks a bond, by the names of an envelope's points."""
 
     def jumps(self, traction: Float) -> Float:
         """(k, c) what elastic bonds give way: traction / stiffness."""

@@ -190,7 +190,7 @@ class Table(Cohesive):
 
     @property
     def last(self) -> float:
-        """Where the traction is none."""
+        """Return where the traction is none."""
         return float(self._points[0][-1])
 
     def branch(self, u: Float) -> Float:
