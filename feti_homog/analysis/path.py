@@ -140,11 +140,16 @@ def _label(path: LoadPath, number: int) -> str:
 def _entry(
     context: AnalysisContext, law: BondLaw, point: Point, responses: Sequence[Response], work: Work
 ) -> dict[str, Any]:
-    """Return the entry of a point in result.json."""
+    """Return the entry of a point in result.json.  Collective."""
+    damage = law.damage(point.state.bonds)
+    softening = {}
+    if damage is not None:
+        length = context.fibre_interfaces.damaged_length(damage)
+        softening = {"softened": point.softened, "damaged_length": length}
     return {
         "load_factor": point.load_factor,
         "broke": point.broke,
-        **({} if law.damage(point.state.bonds) is None else {"softened": point.softened}),
+        **softening,
         "free_motions": point.state.free_motions,
         "work": work.all_equilibria.work,
         "dissipated": work.all_equilibria.released,

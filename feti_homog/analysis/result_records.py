@@ -171,6 +171,12 @@ class PathPoint:
     debonded_share: float = described("debonded share of the length of all interfaces")
     debonded_shares: Float | None = described(DEBONDED_SHARES, "", "(i,)", default=None)
     debonded_length: Float = described("debonded length of each fibre's interface", LENGTH, "(f,)")
+    damaged_length: Float | None = described(
+        "length of each fibre's interface that is damaged, but holds: of its process zones; of laws that soften",
+        LENGTH,
+        "(f,)",
+        default=None,
+    )
     debonding_angle: Float = described(DEBONDED_ANGLE, DEGREES, "(f,)")
     tips: Tips | None = described(
         "of bonds that break by energy, at the points that `states` in [output] chooses", default=None

@@ -31,6 +31,13 @@ class FibreInterfaces:
         """(f,) debonded length of each fibre's interface, for the states (k,) of this rank's nodes.  Collective."""
         return self._sums(self._nodes.length * (status != BONDED))
 
+    def damaged_length(self, damage: Float) -> Float:
+        """(f,) length of each fibre's interface that is damaged, but holds; `damage` (k,) is 1 of broken bonds.
+
+        Collective.
+        """
+        return self._sums(self._nodes.length * ((damage > 0.0) & (damage < 1.0)))
+
     def angle(self, length: Float) -> Float:
         """(f,) degrees of arc of lengths (f,).
 

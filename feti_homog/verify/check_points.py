@@ -85,9 +85,10 @@ def _directions(cell: DiscreteCell) -> Float:
 def _check_debonding(findings: Findings, cell: DiscreteCell, state: StateNumbers, point: Point) -> None:
     """Lengths and angles of what has debonded."""
     rows, fibres = cell.files.interface, cell.files.fibres
-    whole, debonded = (
+    softened = (state.damage > 0.0) & (state.damage < 1.0)
+    whole, debonded, damaged = (
         np.bincount(rows.fibre - 1, weights, len(fibres.radius))
-        for weights in (rows.length, rows.length * (state.status != BONDED))
+        for weights in (rows.length, rows.length * (state.status != BONDED), rows.length * softened)
     )
     coated = np.bincount(rows.fibre - 1, rows.body != fibres.body[rows.fibre - 1], len(fibres.radius)) > 0
     radius = np.where(coated, np.nan, fibres.radius)
@@ -96,6 +97,8 @@ def _check_debonding(findings: Findings, cell: DiscreteCell, state: StateNumbers
     share = debonded.sum() / (whole.sum() or 1.0)
     expected = {"debonded_length": debonded, "debonding_angle": np.nan_to_num(angle), "debonded_share": share}
     scales = {"debonded_length": float(whole.max(initial=0.0)), "debonding_angle": 360.0}
+    if "damaged_length" in point:
+        expected["damaged_length"], scales["damaged_length"] = damaged, scales["debonded_length"]
     if len(cell.files.interfaces) > 1:
         expected["debonded_shares"] = _shares_of_pairs(cell, state)
     for name, value in expected.items():

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 from reference.closed_forms import lame
 from reference.softening_path import SofteningPath, Teeth
-from support.loaded_twins import EPOXY_GLASS, LoadedTwin, solved
+from support.loaded_twins import EPOXY_GLASS, LoadedTwin, document, solved
 from unit.mesh.faulty_meshes import grid
 
+from feti_homog import Case, run
+from feti_homog.errors import ConvergenceError
 from feti_homog.parallel.mpi_errors import on_root
 
 pytestmark = [pytest.mark.parallel, pytest.mark.usefixtures("shared_interfaces")]
@@ -71,6 +73,22 @@ def test_paths_are_those_of_brute_force(comm, name):
         taken = fracture[sum(bool(e.broke.any()) for e in events[:k])]
         assert point.fracture_energy == pytest.approx(taken, rel=1e-8, abs=1e-12 * energy)
     _check_the_energy_book(result.path)
+
+
+def test_a_path_goes_on_where_it_was_ended(comm, shared_path):
+    """The checkpoint carries the damage: the rest of the path is that of a run without a break."""
+    written = document({}, EPOXY_GLASS, "strain", BILINEAR, INFLUENCE, path={"waypoints": PATHS["cycle"][2]})
+    whole = run(Case.parse(written), comm).path
+    written["path"]["max_events"] = len(whole) // 2
+    with pytest.raises(ConvergenceError, match="max_events"):
+        run(Case.parse(written), comm, out=shared_path / "out")
+    del written["path"]["max_events"]
+    result = run(Case.parse(written), comm, out=shared_path / "out", resume=True)
+    assert result.resumed == len(whole) // 2 and len(result.path) == len(whole)
+    for found, expected in zip(result.path, whole, strict=True):
+        assert (found.broke, found.softened) == (expected.broke, expected.softened)
+        np.testing.assert_allclose(found.stress, expected.stress, atol=1e-12)
+        np.testing.assert_allclose(found.damaged_length, expected.damaged_length)
 
 
 MOOSE = {
