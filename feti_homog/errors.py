@@ -6,7 +6,7 @@ import re
 
 EXIT_DONE, EXIT_DEFECT, EXIT_INPUT, EXIT_UNCONVERGED = 0, 1, 2, 3
 # Characters of a fault and number of faults: a file may have any number of them, with words of any length.
-LONGEST_LINE, MOST_FAULTS = 1000, 30
+LONGEST_LINE, KEPT_END, MOST_FAULTS = 1000, 200, 30
 
 
 def escaped(text: str, kept: str = "") -> str:
@@ -17,7 +17,7 @@ def escaped(text: str, kept: str = "") -> str:
 class FetiHomogError(Exception):
     """An error told to the user in words, one line per fault, without a traceback.
 
-    Lines are cut after LONGEST_LINE characters; beyond MOST_FAULTS the others are counted.
+    Lines are cut to LONGEST_LINE characters, before their last KEPT_END; beyond MOST_FAULTS the others are counted.
     """
 
     exit_code = EXIT_DEFECT
@@ -35,7 +35,9 @@ class FetiHomogError(Exception):
 
 def _line(fault: str) -> str:
     line = escaped(fault)
-    return line if len(line) <= LONGEST_LINE else f"{line[: LONGEST_LINE - 3]}..."
+    if len(line) > LONGEST_LINE:  # the reason stands at its end
+        line = f"{line[: LONGEST_LINE - KEPT_END - 3]}...{line[-KEPT_END:]}"
+    return line
 
 
 class CaseError(FetiHomogError):

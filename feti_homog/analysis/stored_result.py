@@ -21,7 +21,7 @@ def read(directory: Path) -> dict[str, Any]:
     """
     document = result_json.read(directory)
     result = _restored(directory, document)
-    if document["case"]["output"]["fields"]:
+    if result.case["output"]["fields"]:
         _check_fields(directory, result)
     return document
 
@@ -59,7 +59,12 @@ def finished(directory: Path, case: Case) -> bool:
 
 def _restored(directory: Path, document: Mapping[str, Any]) -> Result:
     try:
-        return Result.of(document)
+        result = Result.of(document)
+        if not all(isinstance(result.case[section], Mapping) for section in ("cell", "analysis", "output")):
+            raise TypeError("its case has no sections")
+        if not isinstance(result.case["output"]["fields"], bool):
+            raise TypeError("its case has no [output] fields")
+        return result
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         path, place = directory / result_json.NAME, f"{type(error).__name__}: {error}"
         raise CaseError(f"{path}: it is damaged, or no result of this program ({place})") from error

@@ -30,7 +30,8 @@ def with_files(cell: Cell, folder: Path, faults: list[str]) -> Cell:
         return cell
     if cell.file is None:
         return cell if cell.fibre_list is None else _with_table(cell, faults)
-    file = Path(os.path.realpath(folder / cell.file))  # unlike resolve, no error for links in a circle
+    named = folder / cell.file  # a link's own suffix counts
+    file = Path(os.path.realpath(named.parent)) / named.name  # unlike resolve, no error for links in a circle
     if file.suffix not in SUFFIXES[cell.geometry]:
         return cell
     if words := missing(file):

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.case.phase_names import VOID
+from feti_homog.case.phase_names import MATRIX, PHASE, VOID
 from feti_homog.case.section_values import FIBRE_CELLS, NUMBERS
 from feti_homog.case.table_columns import Column, misspelt, number_of, understood
 from feti_homog.errors import CaseError
@@ -27,7 +27,6 @@ SIZES = ("width", "height", "left", "bottom")
 """What comment lines may say of the cell: its size, and the coordinates of its lower left corner."""
 OF_FIBRES = ("coating", "inner_radius")
 MAX_BYTES = 1 << 26
-PHASE_NAME = re.compile(r"[A-Za-z0-9_:-]+")
 SIZE = re.compile(r"\b(width|height|left|bottom)\s*[=:]\s*([^\s;=]+?)(?=,?\s|,?$|;|,[a-z])")
 
 
@@ -278,7 +277,7 @@ def _phase_faults(cells: Mapping[str, Any]) -> Iterator[str]:
     phase = cells.get("phase", "fibre")
     if phase == VOID:
         yield from (f"{key} = {toml_value(cells[key])}: a void has none" for key in OF_FIBRES if cells.get(key))
-    if not isinstance(phase, str) or not PHASE_NAME.fullmatch(phase) or phase == "matrix":
+    if not isinstance(phase, str) or not (phase == VOID or PHASE.fullmatch(phase)) or phase == MATRIX:
         yield (
             f"phase = {toml_value(phase)}: expected a name of letters, digits, _, - and :, "
             'but not "matrix", which is around the fibres'

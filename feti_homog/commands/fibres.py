@@ -74,8 +74,12 @@ def _statistics(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
     size = None if arguments.size is None else tuple(arguments.size)
     words = arguments.source, arguments.out, arguments.model, arguments.simulations, size
-    for line in on_root_only(comm, fibre_statistics.run, *words) or []:
-        say(line)
+    lines = on_root_only(comm, fibre_statistics.run, *words) or []
+    if arguments.out is None:
+        on_root_only(comm, print_product, "\n".join(lines))
+    else:
+        for line in lines:
+            say(line)
 
 
 def _add_fibres(actions: argparse._SubParsersAction[Any]) -> None:

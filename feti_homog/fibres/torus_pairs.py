@@ -11,7 +11,7 @@ from feti_homog.errors import MeshError
 from feti_homog.typing import Bool, Float, Int
 
 # Fibres beside each other have three pairs each; those on top of each other would fill the memory.
-MOST_PAIRS = 20_000_000
+MOST_PAIRS = 100_000_000
 
 
 def neighbours(centres: Float, size: Float, reach: float) -> tuple[Int, Int, Float]:
@@ -30,11 +30,9 @@ def neighbours(centres: Float, size: Float, reach: float) -> tuple[Int, Int, Flo
             points.append(inside[near] + np.array(step) * size)
             owner.append(near)
     place, who = np.concatenate(points), np.concatenate(owner)
+    _refuse_many(place, reach)
     # A tree that is used once is not worth being balanced.
-    tree = cKDTree(place, balanced_tree=False, compact_nodes=False)
-    if len(place) ** 2 > 2 * MOST_PAIRS:
-        _refuse_many(tree, reach)
-    pairs = tree.query_pairs(reach, output_type="ndarray")
+    pairs = cKDTree(place, balanced_tree=False, compact_nodes=False).query_pairs(reach, output_type="ndarray")
     first, second = pairs.T
     keep = np.flatnonzero((first < len(centres)) & (who[first] <= who[second]))
     keep = keep[np.argsort(first[keep] * len(place) + second[keep])]
@@ -42,8 +40,16 @@ def neighbours(centres: Float, size: Float, reach: float) -> tuple[Int, Int, Flo
     return who[first], who[second], place[second] - place[first]
 
 
-def _refuse_many(tree: cKDTree, reach: float) -> None:
-    count = (int(tree.count_neighbors(tree, reach)) - tree.n) // 2
+def _refuse_many(points: Float, reach: float) -> None:
+    """Raise MeshError where the pairs of points (n, 2) are too many.
+
+    A point has about 2 pi times as many neighbours as are in its square of the diagonal `reach`.
+    """
+    if len(points) ** 2 < 2 * MOST_PAIRS or reach <= 0:
+        return
+    column, row = np.floor(points * (np.sqrt(2) / reach)).astype(np.int64).T
+    _, own = np.unique(column * 2**32 + row, return_counts=True)
+    count = np.pi * float((own.astype(float) ** 2).sum())
     if count > MOST_PAIRS:
         raise MeshError(
             f"[cell] about {count:.2g} pairs of fibres are nearer to each other than {reach:.2g}; expected at most "

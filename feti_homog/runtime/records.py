@@ -19,6 +19,7 @@ T = TypeVar("T")
 
 DESCRIPTION = "description"
 STRESS, LENGTH, SECONDS, BYTES, DEGREES = "unit of the moduli", "unit of the cell", "s", "bytes", "degrees"
+KINDS = {float: int | float, int: int, str: str, bool: bool, Mapping: Mapping}
 WORDS = {float: "number", int: "integer", str: "text", bool: "true or false"}
 
 
@@ -99,14 +100,19 @@ def restored(kind: type[T], document: Mapping[str, Any]) -> T:
 
     Raises:
         KeyError: a key without a default is missing.
+        TypeError: a value is of another kind than the record's.
     """
+    _require(document, Mapping)
     hints, values = typing.get_type_hints(kind), {}
     for field in dataclasses.fields(kind):  # type: ignore[arg-type]
         if DESCRIPTION not in field.metadata or (
             field.name not in document and field.default is not dataclasses.MISSING
         ):
             continue
-        values[field.name] = _restored_value(hints[field.name], document[field.name])
+        value = values[field.name] = _restored_value(hints[field.name], document[field.name])
+        shape = field.metadata[DESCRIPTION].shape
+        if isinstance(value, np.ndarray) and value.ndim not in {_axes(each) for each in shape.split(" or ")}:
+            raise TypeError(f"{field.name} is no array {shape}")
     return kind(**values)
 
 
@@ -131,16 +137,33 @@ def is_record(hint: Any) -> bool:
 
 
 def _restored_value(hint: Any, value: Any) -> Any:
-    hint = _without_none(hint)
-    if value is None:
+    if value is None and _without_none(hint) != hint:
         return None
+    hint = _without_none(hint)
     if dataclasses.is_dataclass(hint):
         return restored(typing.cast(type, hint), value)
-    if (record := _record_of_tuple(hint)) is not None:
-        return tuple(restored(record, item) for item in value)
-    if typing.get_origin(hint) is np.ndarray:
+    origin = typing.get_origin(hint) or hint
+    if origin is np.ndarray:
         return np.asarray(value, dtype=float)
-    return tuple(value) if typing.get_origin(hint) is tuple else value
+    if origin is tuple:
+        _require(value, list | tuple)
+        return tuple(_restored_value(typing.get_args(hint)[0], item) for item in value)
+    if origin in KINDS:
+        _require(value, KINDS[origin])
+    if origin is Mapping and (inner := typing.get_args(hint)[1]) in KINDS:
+        return {name: _restored_value(inner, item) for name, item in value.items()}
+    return value
+
+
+def _axes(shape: str) -> int:
+    """Return the number of axes of an array of a shape in words, as "(n, 2)"."""
+    return sum(bool(size.strip("() ")) for size in shape.split(","))
+
+
+def _require(value: Any, kind: Any) -> None:
+    """Raise TypeError for a value of another kind; truth is no number."""
+    if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
+        raise TypeError(f"{value!r:.40} is of another type than expected")
 
 
 def _without_none(hint: Any) -> Any:

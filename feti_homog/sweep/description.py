@@ -127,14 +127,14 @@ def of_file(path: Path, comm: Intracomm) -> str:
     Raises:
         CaseError, MeshError: the file is faulty, or the cell of its first case.
     """
-    document = on_root(comm, read_document, path)
+    document = on_root(comm, read_document, path)  # once: it may be a pipe
     if SWEEP in document:
-        sweep = on_root(comm, plan.load, path)
+        sweep = on_root(comm, plan.expand, document, path.parent)
         check_options(sweep)
         case, points = sweep.cases[0], len({entry.point for entry in sweep.entries})
         words = f"sweep      {len(sweep.cases)} cases, {points} points, all of them valid; the first:\n"
     else:
-        case, words = on_root(comm, cases.load, path), ""
+        case, words = on_root(comm, cases.parse, document, path.parent), ""
     with case_options(case.petsc):
         text = describe(case, comm)
     return f"{words}{text}" if comm.rank == 0 else ""

@@ -114,6 +114,8 @@ def read_index(directory: Path) -> SweepIndex:
     try:
         document = seals.loads(input_files.read(path).decode("utf-8"))
         entries = tuple(SweepCase(**entry) for entry in document["cases"])
+        if not all(isinstance(e.number, int) and isinstance(e.inputs, dict) for e in entries):
+            raise TypeError("a case has no number or no inputs")
         return SweepIndex(document["name"], document["stress_unit"], entries)
     except OSError as error:
         raise CaseError(f"{path}: cannot be read: {error.strerror}; expected the folder of a sweep") from error

@@ -25,6 +25,9 @@ from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.findings import Finding, Findings, checks
 from feti_homog.verify.reading import ResultFiles, altered, opened
 
+# What reading numbers of another kind or shape than expected raises.
+DAMAGE = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, MemoryError, RecursionError)
+
 T = TypeVar("T")
 PATIENCE = 300.0  # seconds
 
@@ -114,7 +117,7 @@ def _of(directory: Path) -> Certificate:
         try:
             with np.errstate(all="ignore"):  # numbers that are not finite break the laws that they are in
                 return _verified(files, directory)
-        except (KeyError, TypeError, IndexError, ValueError, AttributeError, MemoryError) as error:
+        except DAMAGE as error:
             words = f"{type(error).__name__} {error}"
             raise CaseError(f"{directory}: its files do not belong together or are incomplete: {words}") from error
 

@@ -130,25 +130,6 @@ CASES: dict[str, tuple[str, str]] = {
 MESHES = {"two": (1, 1.0), "huge": (4, 1e200), "tiny": (4, 1e-200), "plain": (4, 1.0)}
 
 
-def write_inputs(folder: Path) -> dict[str, tuple[list[str], str]]:
-    """Make all files in a folder; the words of each command, and those that its line must have."""
-    (folder / "ok.toml").write_text(changed(SMALL))
-    for name, (count, size) in MESHES.items():
-        write_grid(folder / f"{name}.msh", count, size)
-    commands = {
-        name: (["check", str(folder / "ok.toml"), *words.split()], expected)
-        for name, (words, expected) in OPTIONS.items()
-    }
-    for name, (content, expected) in CASES.items():
-        path = folder / f"{name.replace(' ', '_')}.toml"
-        if name == "a folder":
-            path.mkdir()
-        else:
-            path.write_bytes(content.encode("utf-16" if name == "UTF-16" else "utf-8"))
-        commands[name] = (["check", str(path)], expected)
-    return commands
-
-
 def write_grid(path: Path, count: int, size: float) -> None:
     """Write a square of count x count squares of two triangles, the first of which are fibre."""
     n = count + 1

@@ -170,7 +170,7 @@ def checks(document: Document) -> list[Check]:
     return [
         Check(law, error, contact if law.startswith("kkt_") else limit)
         for law, error in document["checks"].items()
-        if has_interface or not law.startswith("kkt_")
+        if error is not None and (has_interface or not law.startswith("kkt_"))
     ]
 
 

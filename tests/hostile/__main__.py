@@ -1,0 +1,73 @@
+"""Try hostile inputs and print how many of each kind there were, and the faults of those that did not end as they must.
+
+Exit code 1 if there are any.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from collections import Counter
+from pathlib import Path
+
+from support.jobs import mpirun
+
+from hostile import case_files, fibre_tables, fuzzer, meshes, processes, results
+from hostile.running import in_one_job, in_processes
+
+# Which of the attempts are tried on so many ranks: every one, every fifth, every eleventh.
+EVERY = {1: 1, 2: 5, 3: 11}
+CASES, SEED = 200, 1
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the words of the command."""
+    words = argparse.ArgumentParser(prog="python -m hostile", description=__doc__)
+    words.add_argument("--cases", type=int, default=CASES, help="how many files with random damage are read besides")
+    words.add_argument("--seed", type=int, default=SEED, help="of these")
+    words.add_argument("--only", default="", metavar="WORDS", help="attempts that have these in `kind: name`, no files")
+    return words
+
+
+def prepare(folder: Path) -> None:
+    """Make the folders that attempts damage."""
+    folder.mkdir()
+    for name, (command, case) in results.PREPARED.items():
+        (folder / f"{name}.toml").write_text(case)
+        job = mpirun(0, "-m", "feti_homog", command, folder / f"{name}.toml", "--out", folder / name)
+        assert job.returncode == 0, job.stderr
+
+
+def tried(folder: Path, only: str) -> dict[str, list[str]]:
+    """Return the faults of all attempts whose kind and name have these words."""
+    prepared = folder / "prepared"
+    shared = [*case_files.attempts(), *fibre_tables.attempts(), *meshes.attempts(), *results.attempts(prepared)]
+    shared, alone = (
+        [a for a in some if only in f"{a.kind}: {a.name}"] for some in (shared, processes.attempts(prepared))
+    )
+    found: dict[str, list[str]] = {}
+    for ranks, step in EVERY.items() if shared else ():
+        found |= in_one_job(shared[::step], ranks, folder / f"{ranks} ranks")
+    return found | in_processes(alone, folder / "processes")
+
+
+def main() -> int:
+    given = parser().parse_args()
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        folder.chmod(0o755)  # for other users
+        prepare(folder / "prepared")
+        found, cases = tried(folder, given.only), 0 if given.only else given.cases
+        damaged = [*fuzzer.faults(folder / "prepared", folder / "random", cases, given.seed)]
+    for kind, count in Counter(name.partition(":")[0] for name in found).items():
+        print(f"{kind:20} {count:4}")
+    faulty = {name: faults for name, faults in found.items() if faults}
+    for line in [f"{name}: {'; '.join(faults)}" for name, faults in faulty.items()] + damaged:
+        print(line)
+    print(f"{len(found)} attempts, {len(faulty)} with faults; {cases} files at random, {len(damaged)} with faults")
+    return 1 if faulty or damaged else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,70 @@
+"""Case files and options, those of `support.hostile_inputs` among them, and sizes that a case asks for."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+
+from support.base_case import BASE, MESH_CELL, changed
+from support.hostile_inputs import CASES, MESHES, OPTIONS, PATH, SMALL, write_grid
+
+from hostile.attempts import Attempt, Content
+
+MIX = 'geometry = "random"\nmix = {glass = 0.3, carbon = 0.2}\nradii = {glass = 0.5, carbon = 0.4}\n'
+CELLS = {
+    "a coating that nearly touches its image": (
+        'geometry = "square"\nfibre_fraction = 0.5\ncoating = 0.2533\nmesh_size = 0.1\n',
+        "narrow gaps, thin coatings or small fibres need about 4.9e+06 elements",
+    ),
+    "fibres of 1e5 widths": (MIX + "width = 1e5\n", "makes 7.8e+09 fibres"),
+    "voids without number": (
+        'geometry = "random"\nfibres = 50000\nfibre_fraction = 0.1\nvoids = 0.1\nvoid_radius = 0.05\nmesh_size = 0.5\n',
+        "",
+    ),
+    "1e5 fibres": (
+        'geometry = "random"\nfibres = 100000\nfibre_fraction = 0.3\nmesh_size = 1e-4\n',
+        "elements before refine",
+    ),
+}
+FILES: dict[str, tuple[Content, str]] = {
+    "endless": (lambda path: path.symlink_to("/dev/zero"), "more than 16 MiB"),
+    "a link in a circle": (lambda path: path.symlink_to(path), "Too many levels of symbolic links"),
+    "sparse": (lambda path: os.truncate(os.open(path, os.O_CREAT | os.O_RDWR), 20 << 30), "more than 16 MiB"),
+    "colours": ("[cell]\n\x1b[31m = 1\n", "not TOML"),
+    "colours of a key": (changed(("young = 88.0", '"\\u001b[31m" = 88.0')), r"\u001b[31m"),
+    "colours of a name": (changed(('"strain"', '"\\u001b[31m"')), r"\u001b[31m"),
+    "turned text": (changed(('"strain"', '"\u202e"')), "\\u202e"),
+    "1e5 keys": (BASE + "".join(f"x{k} = 1\n" for k in range(100_000)), "more faults"),
+    "a bad range of 1e4 cases": (
+        BASE + '[sweep]\n"cell.fibre_fraction" = {from = 1.0, to = 2.0, step = 1e-4}\n',
+        "more faults",
+    ),
+    "1e5 waypoints": (
+        changed(SMALL, PATH, end=f"[path]\nwaypoints = [{'[nan, 0, 0], ' * 100_000}]\n"),
+        "",
+    ),
+}
+
+
+def attempts() -> Iterator[Attempt]:
+    for name, (words, said) in OPTIONS.items():
+        yield Attempt("options", name, ("check", "@/c.toml", *words.split()), said, {"c.toml": changed(SMALL)})
+    grids = {f"{name}.msh": grid_of(*sizes) for name, sizes in MESHES.items()}
+    for name, (content, said) in CASES.items():
+        file: Content = content.encode("utf-16") if name == "UTF-16" else os.mkdir if name == "a folder" else content
+        yield Attempt("case files", name, ("check", "@/c.toml"), said, {"c.toml": file, **grids})
+    for name, (cell, said) in CELLS.items():
+        case = changed((MESH_CELL[0], cell))
+        for phase in ("coating", "glass", "carbon"):
+            if phase in cell:
+                case += f"[material.{phase}]\nyoung = 1.0\npoisson = 0.3\n"
+        yield Attempt("cells", name, ("check", "@/c.toml"), said, {"c.toml": case})
+    for name, (content, said) in FILES.items():
+        yield Attempt("case files", name, ("check", "@/c.toml"), said, {"c.toml": content})
+    yield Attempt("case files", "of no name", ("check", "@/a\0b.toml"), "null character")
+    yield Attempt("case files", "none", ("check", "@/\x1b[31m.toml"), r"\x1b[31m")
+    yield Attempt("options", "of control characters", ("check", "@/c.toml", "--\x1b[31m"), r"\x1b[31m")
+
+
+def grid_of(count: int, size: float) -> Content:
+    return lambda path: write_grid(path, count, size)

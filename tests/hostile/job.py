@@ -1,0 +1,39 @@
+"""Commands one after the other in one job, as a program that starts the command line; each must end in time."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+from pathlib import Path
+
+from mpi4py import MPI
+
+from feti_homog import cli
+
+
+def main(commands: Path, limit: int) -> None:
+    """Run the commands in a file; rank 0 writes output, errors and exit code of number K beside it: K.1, K.2, K.code.
+
+    What other ranks print, whose errors are of their own, goes to K.2 too.
+    """
+    for number, words in enumerate(json.loads(commands.read_text())):
+        for stream in (1, 2):
+            end = os.open(f"{commands}.{number}.{stream}", os.O_WRONLY | os.O_CREAT | os.O_APPEND)
+            os.dup2(end, stream)
+            os.close(end)
+        signal.alarm(limit)  # ends the job
+        try:
+            code = cli.main(words)
+        except SystemExit as end_of_help:
+            code = int(str(end_of_help.code or 0))
+        signal.alarm(0)
+        sys.stdout.flush()
+        sys.stderr.flush()
+        if MPI.COMM_WORLD.rank == 0:
+            Path(f"{commands}.{number}.code").write_text(str(code))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), int(sys.argv[2]))

@@ -1,0 +1,108 @@
+"""What surrounds a process: limits, settings of the folder, rights, full disks, kills, ranks."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from support.base_case import changed
+
+from hostile.attempts import Attempt, Content, copy_of
+from hostile.results import SMALL
+
+DRAWN = SMALL.replace("pictures = false", "pictures = true")
+BROKEN = changed(("fibre_fraction = 0.4", "fibre_fraction = 1.4"))
+BIG = changed(("mesh_size = 0.05", "mesh_size = 0.003"), end="[output]\npictures = false\n")
+NOBODY = "setpriv --reuid=65534 --regid=65534 --clear-groups"
+RUN, IN_OUT = "feti run c.toml --out out", "feti run ../c.toml --out ."
+QUIET_MPI = "mpirun -q --oversubscribe"
+# A file system in memory of so many bytes or files; it ends with the shell, which has its own.
+DISK = "mkdir out/disk && mount -t tmpfs -o {} none out/disk && "
+LIMITS: dict[str, tuple[str, str, tuple[int, ...]]] = {
+    "little memory": (f"ulimit -v 800000; {RUN}", "memory (ulimit -v) of the process is limited", (1,)),
+    "very little memory": (f"ulimit -v 100000; {RUN}", "memory (ulimit -v) of the process is limited", (1,)),
+    "little memory of a rank": (
+        f"{QUIET_MPI} -n 1 feti run c.toml --out out : -n 1 bash -c 'ulimit -v 800000; feti run c.toml --out out'",
+        "rank 1: the memory (ulimit -v)",
+        (1,),
+    ),
+    "a small stack": (f"ulimit -s 128; {RUN}", "stack (ulimit -s) of the process is limited", (1,)),
+    "little time": ("ulimit -St 5; feti run big.toml --out out", "interrupted by SIGXCPU", (152,)),
+    "no standard output": (f"{RUN} >&-", "", (0,)),
+}
+SURROUNDINGS: dict[str, tuple[str, str, tuple[int, ...]]] = {
+    "a .petscrc": (
+        f"cd out; echo -feti_ksp_rtol abc > .petscrc; echo -help > petscrc; {IN_OUT}",
+        "",
+        (0,),
+    ),
+    "a matplotlibrc": (
+        f"cd out; printf 'font.size : \\xff' > matplotlibrc; {IN_OUT.replace('c.toml', 'drawn.toml')}",
+        "",
+        (0,),
+    ),
+    "a backend that is none": ("MPLBACKEND=nonexistent feti run drawn.toml --out out", "cell.png", (0,)),
+    "a case by a pipe": ("feti check <(cat c.toml)", "the case is valid", (0,)),
+    "an endless case by a pipe": ("cat /dev/zero | feti check /dev/stdin", "more than 16 MiB", (2,)),
+}
+FULL: dict[str, str] = {
+    "keys": "feti keys",
+    "check": "feti check c.toml",
+    "statistics": "feti statistics out --model poisson",
+    "fibres": "feti fibres out",
+    "verify": "feti verify out",
+    "export": "feti export out --format abaqus",
+}
+ON_DISKS = {
+    "a full disk, run": (DISK.format("size=200k") + "feti run drawn.toml --out out/disk/r", "No space left", (1,)),
+    "no more files, run": (DISK.format("nr_inodes=4") + "feti run drawn.toml --out out/disk/r", "No space left", (1,)),
+    "read only": (DISK.format("ro") + "feti run c.toml --out out/disk/r", "out/disk", (1, 2)),
+    **{
+        f"a full disk, {name}": (
+            DISK.format("size=400k") + f"cp out/result.* out/disk; head -c 400k /dev/zero > out/disk/x 2>&-; {words}",
+            "No space left",
+            (1,),
+        )
+        for name, words in {
+            "plot": "feti plot out/disk",
+            "report": "feti report out/disk",
+            "export": "feti export out/disk --format csv --out out/disk/card.csv",
+        }.items()
+    },
+}
+OTHERS = {
+    "fields without rights, plot": ("chmod 000 out/result.h5; {} plot out", "Permission denied", (1,)),
+    "fields without rights, verify": ("chmod 000 out/result.h5; {} verify out", "Permission denied", (1,)),
+    "fields without rights, report": ("chmod 000 out/result.h5; {} report out", "Permission denied", (1,)),
+    "results without rights": ("chmod 000 out/result.json; {} export out --format csv", "Permission denied", (1,)),
+    "a folder without rights, plot": ("chmod 700 out; {} plot out", "Permission denied", (1,)),
+    "a folder without rights, verify": ("chmod 700 out; {} verify out", "Permission denied", (1,)),
+    "a folder that may not be written": ("chmod 755 out; {} plot out", "Permission denied", (1,)),
+    "a case without rights": ("chmod 000 c.toml; {} check c.toml", "Permission denied", (2,)),
+}
+
+
+def attempts(prepared: Path) -> Iterator[Attempt]:
+    """Yield those that need a process of their own; some need root."""
+    files: dict[str, Content] = {"c.toml": SMALL, "drawn.toml": DRAWN, "big.toml": BIG, "broken.toml": BROKEN}
+    made = {**files, "out": copy_of(prepared / "card")}
+    for kind, table in (("limits", LIMITS), ("surroundings", SURROUNDINGS)):
+        for name, (shell, said, codes) in table.items():
+            yield Attempt(kind, name, (), said, files | {"out/x": ""}, codes, shell)
+    for name, words in FULL.items():
+        yield Attempt("full outputs", name, (), "standard output cannot be written", made, (1,), f"{words} > /dev/full")
+    tag = '"$(hostname).1.0"'  # of a process that began with the machine, which none did
+    shell = f"touch out/cell.png.{tag}.part; feti plot out && [ ! -e out/cell.png.{tag}.part ]"
+    yield Attempt("leftovers", "of a dead plot", (), "cell.png", made, (0,), shell)
+    for name, words in {"reports": "report", "plots": "plot"}.items():
+        shell = f'feti {words} out & feti {words} out && wait $! && [ -z "$(ls out | grep part)" ]'
+        yield Attempt("two at once", name, (), "", made, (0,), shell)
+    shell = f"{QUIET_MPI} -n 2 feti check broken.toml"
+    yield Attempt("ranks", "a faulty case", (), "fibre_fraction = 1.4", files, (2,), shell)
+    if os.geteuid() == 0:
+        for name, (shell, said, codes) in OTHERS.items():
+            words = shell.format(f"{NOBODY} feti")
+            yield Attempt("other users", name, (), said, made, codes, f"chmod 755 . ; {words}")
+        for name, (shell, said, codes) in ON_DISKS.items():
+            yield Attempt("disks", name, (), said, made, codes, shell)

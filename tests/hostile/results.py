@@ -1,0 +1,160 @@
+"""Folders of results and of sweeps, and what stands in the place of --out."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from support.base_case import changed
+from support.small_path import PATH
+
+from feti_homog.results import seals
+from hostile.attempts import Attempt, Content, copy_of
+
+SMALL = changed(
+    ("mesh_size = 0.05", "mesh_size = 0.3"), ('"strain"', '"generalized"'), end="[output]\npictures = false\n"
+)
+PREPARED = {
+    "path": ("run", PATH),
+    "card": ("run", SMALL),
+    "sweep": ("sweep", SMALL + '[sweep]\n"cell.fibre_fraction" = [0.2, 0.3]\n'),
+}
+"""Folders that attempts copy and damage: the command that makes each, and its case."""
+
+COMMANDS = {
+    "plot": ("plot", "@/out"),
+    "report": ("report", "@/out"),
+    "verify": ("verify", "@/out"),
+    "export": ("export", "@/out", "--format", "abaqus", "--out", "@/out/card.inp"),
+    "statistics": ("statistics", "@/out"),
+    "fibres": ("fibres", "@/out"),
+    "collect": ("collect", "@/out"),
+}
+READERS = ("plot", "report", "verify")
+
+
+def link_to(target: str) -> Callable[[Path], None]:
+    def make(path: Path) -> None:
+        path.unlink(missing_ok=True)
+        path.symlink_to(target)
+
+    return make
+
+
+def replaced(make: Callable[[Path], object]) -> Callable[[Path], None]:
+    def remake(path: Path) -> None:
+        path.unlink(missing_ok=True)
+        make(path)
+
+    return remake
+
+
+def sparse(path: Path) -> None:
+    os.truncate(path, 20 << 30)
+
+
+def sealed(change: Callable[[dict[str, Any]], object]) -> Callable[[Path], None]:
+    """Change a document, which then has the checksum of what it is."""
+
+    def make(path: Path) -> None:
+        document = json.loads(path.read_text())
+        change(document)
+        path.write_text(seals.dumps(document))
+
+    return make
+
+
+def without(*names: str) -> Callable[[Path], None]:
+    return sealed(lambda document: [document.pop(name) for name in names])
+
+
+def with_entries(**entries: Any) -> Callable[[Path], None]:
+    return sealed(lambda document: document.update(entries))
+
+
+JSON: dict[str, tuple[Content, str]] = {
+    "a pipe": (replaced(os.mkfifo), "it is a pipe"),
+    "a folder": (replaced(os.mkdir), "Is a directory"),
+    "endless": (link_to("/dev/zero"), "it is no file but a device"),
+    "a link in a circle": (link_to("result.json"), "Too many levels of symbolic links"),
+    "sparse": (sparse, "more than 1024 MiB"),
+    "empty": ("", "cannot read"),
+    "zeros": (b"\0" * 1000, "cannot read"),
+    "not UTF-8": (b"\xff" * 1000, "cannot read"),
+    "nested": ("[" * 100_000, "cannot read"),
+    "a number of a megabyte": ("1" * 1_000_000, "cannot read"),
+    "a list": ("[]", ""),
+    "another layout": (with_entries(schema=[]), "schema"),
+    "no case": (without("case"), ""),
+    "a case of text": (with_entries(case="\x1b[31m"), ""),
+    "no path": (without("path"), ""),
+    "a path of text": (with_entries(path="\x1b[31m"), ""),
+    "a path of nothing": (with_entries(path=[{}]), ""),
+    "fibres of text": (with_entries(fibres="\x1b[31m"), ""),
+    "a cell of numbers": (with_entries(cell=17), ""),
+    "a status of control characters": (with_entries(status="\x1b[31m"), ""),
+}
+FIELDS: dict[str, tuple[Content, str]] = {
+    "a pipe": (replaced(os.mkfifo), ""),
+    "a folder": (replaced(os.mkdir), ""),
+    "endless": (link_to("/dev/zero"), ""),
+    "a link in a circle": (link_to("result.h5"), ""),
+    "sparse": (sparse, ""),
+    "empty": ("", ""),
+    "cut off": (lambda path: os.truncate(path, path.stat().st_size // 2), ""),
+    "text": ("\x1b[31m" * 1000, ""),
+}
+SWEEPS: dict[str, tuple[Content, str]] = {
+    "a pipe": (replaced(os.mkfifo), "it is a pipe"),
+    "endless": (link_to("/dev/zero"), "it is no file but a device"),
+    "empty": ("", "is damaged"),
+    "nested": ("[" * 100_000, "is damaged"),
+    "no cases": (without("cases"), "is damaged"),
+    "cases of text": (with_entries(cases="\x1b[31m"), "is damaged"),
+    "cases of nothing": (with_entries(cases=[{}]), "is damaged"),
+    "folders above": (sealed(lambda d: [case.update(folder="../../..") for case in d["cases"]]), "is damaged"),
+    "a name of control characters": (with_entries(name="\x1b[31m"), ""),
+}
+HARMLESS = ("no path", "a status of control characters")  # commands that do not need it go on
+MINE = {"out/result.json": "mine"}
+OUTS: dict[str, tuple[str, Mapping[str, Content], str]] = {
+    "a file": ("@/out", {"out": "mine"}, "is a file"),
+    "below a file": ("@/out/deeper", {"out": "mine"}, "is a file"),
+    "a pipe": ("@/out", {"out": os.mkfifo}, "is a file"),
+    "a link in a circle": ("@/out", {"out": link_to("out")}, ""),
+    "a link to nowhere": ("@/out", {"out": link_to("/nonexistent/x")}, "leads nowhere"),
+    "a device": ("/dev/null", {}, "is a file"),
+    "of the system": ("/proc/1", {}, ""),
+    "a long name": ("@/" + "x" * 300, {}, "File name too long"),
+    "a null character": ("@/a\0b", {}, "null character"),
+    "nothing": ("", {}, "no name of a folder"),
+    "results of others": ("@/out", MINE, "no run of this program wrote result.json"),
+    "a checkpoint elsewhere": ("@/out", {"out/checkpoint": link_to("/etc")}, "checkpoint is a link"),
+}
+
+
+def attempts(prepared: Path) -> Iterator[Attempt]:
+    """Yield those that damage copies of the `PREPARED` folders."""
+    for name, (content, said) in JSON.items():
+        for command in READERS if name in ("a pipe", "endless", "a link in a circle", "nested") else COMMANDS:
+            if command == "collect":
+                continue
+            files = {"out": copy_of(prepared / "path", result_json=content)}
+            codes = (0, 2, 3) if name in HARMLESS else (2, 3) if command == "verify" else (2,)
+            yield Attempt("result.json", f"{name}, {command}", COMMANDS[command], said, files, codes)
+    for name, (content, said) in FIELDS.items():
+        for command in READERS:
+            files = {"out": copy_of(prepared / "path", result_h5=content)}
+            yield Attempt("result.h5", f"{name}, {command}", COMMANDS[command], said, files, (2, 3))
+    files = {"out": copy_of(prepared / "path", path_csv=link_to("/dev/zero"))}
+    yield Attempt("tables of points", "endless, which is none", COMMANDS["verify"], "", files, (0,))
+    for name, (content, said) in SWEEPS.items():
+        files = {"out": copy_of(prepared / "sweep", sweep_json=content)}
+        yield Attempt("sweeps", name, COMMANDS["collect"], said, files, (2,) if said else (0,))
+    for name, (out, files, said) in OUTS.items():
+        yield Attempt("folders", name, ("run", "@/c.toml", "--out", out), said, {"c.toml": SMALL, **files})
+    for command, words in COMMANDS.items():
+        yield Attempt("no results", command, words, "")
