@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.analysis.context import AnalysisContext
+from feti_homog.analysis.mesh_errors import energy_error, state_error, unit_errors
 from feti_homog.analysis.registry import Analysis
 from feti_homog.analysis.result_records import AnglePoint
 from feti_homog.case.sections import Angle
@@ -29,14 +30,16 @@ def run(context: AnalysisContext) -> dict[str, Any]:
         responses: list[Response]
         if unit:
             columns, responses = context.unit_responses(f"{label} ", bonds, starts, 1.0)
-            point |= columns
+            errors, responses = unit_errors(context, responses)
+            point |= columns | energy_error(columns["stiffness"], errors)
             if not (context.plane.interface.contact and responses[0].debonded):
                 context.checks.require(label, {"symmetry": asymmetry(columns["stiffness"])})
             context.record_unit_states(responses, 1.0, f"{label} ", number)
         else:
             responses = context.plane.respond(np.array([section.strain]), bonds, starts)
             context.progress.say(context.checks.record(label, responses[0]))
-            point |= {"strain": responses[0].strain, "stress": responses[0].stress}
+            error, responses = state_error(context, responses)
+            point |= error | {"strain": responses[0].strain, "stress": responses[0].stress}
             point |= {"stored": responses[0].stored, "stored_in_springs": responses[0].in_springs}
             context.record_state(responses, 1.0, label, number)
         starts = [r.state.solution.lam for r in responses]

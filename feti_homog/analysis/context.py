@@ -102,6 +102,7 @@ class AnalysisContext:
         checkpoint: where the events of a path go; `resume` goes on from it.
         log: called with a line about each event of a path; `events` is where all of them are.
         undetermined: of every point under one load, the strains that nothing determines.
+        notes: remarks on the result.
     """
 
     loads: CellLoads
@@ -113,6 +114,7 @@ class AnalysisContext:
     log: Callable[[str], object] = lambda line: None
     events: str = "result.path"
     undetermined: list[list[str]] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
 
     @classmethod
     def of(cls, cell: TornCell, progress: Progress, states: StateRecorder | None = None) -> AnalysisContext:
@@ -205,15 +207,16 @@ class AnalysisContext:
         return self.loads.means(responses) | energies | self.point(responses[:1]) | {"iterations": iterations}
 
     def remarks(self) -> list[str]:
-        """Name the strains that nothing determines, in one line."""
+        """List the notes and, in one line, the strains that nothing determines."""
         points = sum(map(bool, self.undetermined))
         names = [name for name in SPATIAL_STRAINS if any(name in each for each in self.undetermined)]
         if not names:
-            return []
+            return self.notes
         where = f" at {points} of {len(self.undetermined)} points" if self.case.section.is_followed else ""
         return [
+            *self.notes,
             f"[{self.case.analysis.type}] {', '.join(names)}: undetermined{where}: with a given stress nothing resists "
-            "them, and the result has one value of many"
+            "them, and the result has one value of many",
         ]
 
     def warnings(self) -> list[str]:

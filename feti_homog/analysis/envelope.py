@@ -15,6 +15,7 @@ from mpi4py import MPI
 from feti_homog.analysis.constants import constants
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.criteria import criterion_of
+from feti_homog.analysis.mesh_errors import mesh_error, unit_errors
 from feti_homog.analysis.registry import Analysis
 from feti_homog.analysis.result_records import EnvelopePoint
 from feti_homog.analysis.tip_records import DIRECTION_DIGITS, bond_directions
@@ -70,6 +71,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
             "superposes loads, which contact forbids"
         )
     columns, responses = context.unit_responses("", bonds, context.loads.zero_multipliers(), 1.0)
+    errors, responses = unit_errors(context, responses)
     context.record_unit_states(responses, 1.0, "", 0)
     stiffness = columns.pop("stiffness")
     context.checks.require("L^ef", {"symmetry": asymmetry(stiffness)})
@@ -79,8 +81,9 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     finder = _Finder(context, responses, onset)
     pairs = zip(angles, finder.points(rays), strict=True)
     points = tuple(EnvelopePoint(angle=float(angle), **point) for angle, point in pairs)
-    secants = {"effective_stiffness": stiffness} | columns
-    return {"envelope": points} | secants | constants(context.cell, secants)
+    secants: dict[str, Any] = {"effective_stiffness": stiffness} | columns
+    secants |= constants(context.cell, secants)
+    return {"envelope": points} | secants | mesh_error(context, secants, errors, [])
 
 
 def rays_of(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from feti_homog.analysis.context import AnalysisContext
+from feti_homog.analysis.mesh_errors import state_error
 from feti_homog.analysis.registry import Analysis
 from feti_homog.analysis.result_records import LoadPoint
 from feti_homog.analysis.tip_records import IN_PLANE_LOADS
@@ -21,8 +22,9 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     responses = context.loads.responses(state, 1.0)
     for response, problem in zip(responses, ("load", "load, along the fibres"), strict=False):
         context.progress.say(context.checks.record(problem, response))
+    error, responses = state_error(context, responses)
     context.record_state(responses, 1.0, "load", 0)
-    point = context.loaded_point(responses) | {"free_motions": state.free_motions}
+    point = context.loaded_point(responses) | error | {"free_motions": state.free_motions}
     others = dict(zip(cell.loads, cell.macroscopic(state.solutions).strain.tolist(), strict=True))
     only_in_plane = not any(strain for name, strain in others.items() if name not in IN_PLANE_LOADS)
     if context.case.interface is not None and only_in_plane:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,27 +21,38 @@ from feti_homog.typing import Float
 if TYPE_CHECKING:
     from feti_homog.homogenization.mesh_error import EnergyErrors
 
+Named = Mapping[str, Float]
+# Of a bound by which rounding leaves a value outside.
+ROUNDING = 1e-9
 
-def unit_errors(context: AnalysisContext, responses: Sequence[Response]) -> list[EnergyErrors]:
-    """Return those of the responses to all unit loads, by problem; none if the case asks for none.  Collective."""
+
+def unit_errors(context: AnalysisContext, responses: list[Response]) -> tuple[list[EnergyErrors], list[Response]]:
+    """Return those of the responses to all unit loads, by problem, and the responses with the elements' shares.
+
+    No errors if the case asks for none.  Collective.
+    """
     if not context.case.output.mesh_error:
-        return []
+        return [], responses
     from feti_homog.homogenization.mesh_error import energy_errors  # with the recovery of stresses
 
     found: list[EnergyErrors] = []
-    first = 0
+    first, shared = 0, list[Response]()
     for problem in context.loads.problems:
         own = responses[first : first + len(problem.loads)]
         touches = problem.interface.contact and any(response.debonded for response in own)
         found.append(energy_errors(problem.cell, own, touches))
+        shared += [replace(response, shares=part) for response, part in zip(own, found[-1].shares.T, strict=True)]
         first += len(problem.loads)
-    return found
+    return found, shared
 
 
-def mesh_error(secants: Mapping[str, Any], of_plus: list[EnergyErrors], of_minus: list[EnergyErrors]) -> dict[str, Any]:
+def mesh_error(
+    context: AnalysisContext, secants: Mapping[str, Any], of_plus: list[EnergyErrors], of_minus: list[EnergyErrors]
+) -> dict[str, Any]:
     """Return the entry `mesh_error` of `Result`, empty without errors.
 
-    A constant f(C) errs by |f(C - signed) - f(C)| or, if that is more, |f(C - least) - f(C)|.
+    A constant f(C) errs by |f(C - signed) - f(C)| or, if that is more, |f(C - least) - f(C)|.  Notes where the error is
+    more than the case asked for, and values outside their bounds, which are faults if they are by more than it.
 
     Args:
         secants: `effective_stiffness` and what follows from it, as in `Result`.
@@ -48,35 +61,87 @@ def mesh_error(secants: Mapping[str, Any], of_plus: list[EnergyErrors], of_minus
     """
     if not of_plus:
         return {}
-    parts = {name: _secants(of_plus, name) for name in ("absolute", "signed", "least")}
+    parts = {name: _secants(of_plus, name) for name in ("absolute", "signed", "least", "apart")}
     found = parts["absolute"]
     found |= {f"{name}_compression": entry for name, entry in _secants(of_minus, "absolute").items()}
     stiffness, heat = secants["effective_stiffness"], secants.get("thermal_stress")
-    energy, constants = _of_energy(stiffness, parts), dict[str, float]()
+    constants, energy = dict[str, float](), _of_energy(stiffness, parts)
     if "moduli" in secants or "constants" in secants:
         here = _constants(stiffness, heat)
-        changed = [_constants(*_changed(stiffness, heat, parts[name])) for name in ("signed", "least")]
-        apart = {name: np.max([np.abs(each[name] - value) for each in changed], axis=0) for name, value in here.items()}
-        expansion = apart.pop("thermal_expansion", None)
+        changed = {name: _constants(*_changed(stiffness, heat, parts[name])) for name in ("signed", "least", "apart")}
+        off = {part: {name: np.abs(each[name] - here[name]) for name in here} for part, each in changed.items()}
+        errors = {name: np.maximum(off["signed"][name], off["least"][name]) for name in here}
+        _note_bounds(context, secants, here, errors, off["apart"])
+        expansion = errors.pop("thermal_expansion", None)
         found |= {} if expansion is None else {"thermal_expansion": expansion}
-        constants = {name: float(value) for name, value in apart.items()}
+        constants = {name: float(value) for name, value in errors.items()}
+    note_accuracy(context, energy)
     return {"mesh_error": MeshError(**found, energy=energy, constants=constants)}
 
 
-def state_error(context: AnalysisContext, responses: Sequence[Response]) -> tuple[float | None, list[Float]]:
-    """Return the estimated relative error of the energy of one state, of all problems, and the share of the elements.
+def note_accuracy(context: AnalysisContext, energy: float) -> None:
+    """Note which mesh would do if the relative error of the energy is more than the case asks for."""
+    cell = context.case.cell
+    if cell.accuracy is None or energy <= cell.accuracy:
+        return
+    finer = math.ceil(math.log(energy / cell.accuracy, 4**cell.order))
+    context.notes.append(
+        f"[cell] accuracy = {cell.accuracy:g}: the estimated error of the strain energy is {energy:.1e}; mesh_size = "
+        f"{cell.mesh_size:g}, refine = {cell.refine + finer} and order = {cell.order} in its place would do"
+    )
 
-    None and nothing if the case asks for none. Collective.
+
+def _note_bounds(
+    context: AnalysisContext, secants: Mapping[str, Any], here: Named, errors: Named, apart: Named
+) -> None:
+    """Note constants outside the bounds of their phases, of a cell as symmetric as these ask for, within its errors.
+
+    The bounds are those of the phases' meshed shares, from which the elements alone err.
+    """
+    limits: dict[str, Sequence[float]] = {}
+    if (known := secants.get("bounds")) is not None and known.hashin_shtrikman is not None:
+        C, off = secants["effective_stiffness"], errors["bulk"]
+        is_square = max(abs(C[0, 0] - C[1, 1]), *np.abs(C[:2, 2])) <= off
+        is_isotropic = here["anisotropy"] <= errors["anisotropy"]
+        limits |= {"bulk": known.hashin_shtrikman.bulk} if is_square else {}
+        limits |= {"shear": known.hashin_shtrikman.shear} if is_isotropic else {}
+    if secants.get("fibre_bounds") is not None and here["deviation"] <= errors["deviation"]:
+        limits |= {name: pair for name, pair in plain(secants["fibre_bounds"]).items() if pair is not None}
+    for name, (lower, upper) in limits.items():
+        value, error = float(here[name]), float(max(errors[name], apart[name]))
+        outside = max(lower - value, value - upper)
+        if outside <= ROUNDING * abs(upper):
+            continue
+        words = f"{name} = {value:.6g} is outside its bounds, {lower:.6g} and {upper:.6g}, by {outside:.1e}"
+        if outside > error:
+            context.checks.faults.append(
+                f"{words}, more than the estimated error of the mesh, {error:.1e}; result marked"
+            )
+        else:
+            context.notes.append(f"{words}, within the estimated error of the mesh, {error:.1e}: refine")
+
+
+def state_error(context: AnalysisContext, responses: Sequence[Response]) -> tuple[dict[str, float], list[Response]]:
+    """Return `mesh_error`, the relative error of the energy of one state, and its responses with the elements' shares.
+
+    No error if the case asks for none.  Collective.
     """
     if not context.case.output.mesh_error:
-        return None, []
+        return {}, list(responses)
     from feti_homog.homogenization.mesh_error import energy_errors  # with the recovery of stresses
 
     pairs = zip(context.loads.problems, responses, strict=False)
     errors = [energy_errors(problem.cell, [response]) for problem, response in pairs]
     energy = sum(2 * response.stored for response in responses)
-    size = max(abs(sum(each.signed.item() for each in errors)), abs(sum(each.least.item() for each in errors)))
-    return (size / energy if energy > 0 else 0.0), [each.shares[:, 0] for each in errors]
+    size = max(abs(sum(getattr(each, part).item() for each in errors)) for part in ("signed", "least"))
+    shared = [replace(r, shares=each.shares[:, 0]) for r, each in zip(responses, errors, strict=True)]
+    return {"mesh_error": size / energy if energy > 0 else 0.0}, shared
+
+
+def energy_error(stiffness: Float, errors: list[EnergyErrors]) -> dict[str, float]:
+    """Return `mesh_error` of a secant stiffness, the largest relative error of the strain energy, if there is one."""
+    parts = {name: _secants(errors, name) for name in ("absolute", "signed", "least")}
+    return {"mesh_error": _of_energy(stiffness, parts)} if errors else {}
 
 
 def _secants(errors: Sequence[EnergyErrors], name: str) -> dict[str, Float]:

@@ -119,6 +119,9 @@ class AnglePoint:
     stress: Float | None = described("macroscopic stress under it", STRESS, "(3,)", STRESSES, default=None)
     stored: float | None = described("energy stored under it per area of the cell", STRESS, default=None)
     stored_in_springs: float | None = described("the share of elastic interfaces in it", STRESS, default=None)
+    mesh_error: float | None = described(
+        "estimated relative error of the strain energy by the mesh, of unit strains the largest", default=None
+    )
     debonded_share: float = described("debonded share of the length of all interfaces")
     debonded_shares: Float | None = described(DEBONDED_SHARES, "", "(i,)", default=None)
     debonded_length: Float = described("debonded length of each fibre's interface", LENGTH, "(f,)")
@@ -224,6 +227,7 @@ class LoadPoint:
     free_motions: int = described("rigid motions of fibres that no interface force resists")
     stored: float = described("elastic energy stored per area of the cell", STRESS)
     stored_in_springs: float = described("the share of elastic interfaces in it", STRESS)
+    mesh_error: float | None = described("estimated relative error of `stored` by the mesh", default=None)
     debonded_share: float = described("debonded share of the length of all interfaces")
     debonded_shares: Float | None = described(DEBONDED_SHARES, "", "(i,)", default=None)
     debonded_length: Float = described("debonded length of each fibre's interface", LENGTH, "(f,)")

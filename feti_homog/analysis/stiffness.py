@@ -26,14 +26,14 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     starts = context.loads.zero_multipliers()
     one_sided = context.plane.interface.contact and context.plane.counts(bonds.status)["open"] > 0
     columns, responses = context.unit_responses("", bonds, starts, 1.0)
-    errors = unit_errors(context, responses)
+    errors, responses = unit_errors(context, responses)
     errors_of_minus: list[EnergyErrors] = []
     context.record_unit_states(responses, 1.0, "", 0)
     document: dict[str, Any] = {"effective_stiffness": columns.pop("stiffness")} | columns
     under, loads = list(responses), list(context.loads.names)
     if one_sided:
         minus, responses = context.unit_responses("", bonds, starts, -1.0)
-        errors_of_minus = unit_errors(context, responses)
+        errors_of_minus, responses = unit_errors(context, responses)
         context.record_unit_states(responses, -1.0, "-", 0)
         document["effective_stiffness_compression"] = minus.pop("stiffness")
         document |= {f"{name}_compression": column for name, column in minus.items()}
@@ -43,7 +43,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     if context.case.interface is not None:
         document["tips"] = context.tips.of(under, loads)
     document |= constants(context.cell, document)
-    return document | mesh_error(document, errors, errors_of_minus)
+    return document | mesh_error(context, document, errors, errors_of_minus)
 
 
 ANALYSIS = Analysis(run)

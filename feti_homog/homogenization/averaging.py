@@ -44,6 +44,7 @@ class Response:
             bonded cell at least.
         counts: numbers of `bonded`, `open` and `closed` interface nodes.
         damage: (k,) of the bonds, 0 intact to 1 broken.
+        shares: (m,) what each element of this rank has of the estimated error of E . Sigma, where it is known.
     """
 
     strain: Float
@@ -56,6 +57,7 @@ class Response:
     checks: dict[str, float]
     counts: dict[str, int]
     damage: Float
+    shares: Float | None = None
 
     @property
     def debonded(self) -> int:

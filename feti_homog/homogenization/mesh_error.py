@@ -27,7 +27,7 @@ class EnergyErrors:
     Attributes:
         elements: 1/|UC| int ds_i : S : ds_j of recovered stresses less those of elements: the stiffness is too high.
         arcs: what the sides of elements make of arcs, of either sign.
-        shares: (m, k) of the first one's diagonal what each element of this rank has, / (E_k . Sigma_k).
+        shares: (m, k) what each element of this rank has of the first one's diagonal.
         contact: whether states touch at different places.
     """
 
@@ -42,9 +42,14 @@ class EnergyErrors:
         return self.elements + self.arcs
 
     @property
+    def apart(self) -> Float:
+        """(k, k) both parts as if they did not cancel."""
+        return self.elements - self.arcs
+
+    @property
     def least(self) -> Float:
-        """(k, k) a share of both parts, as if they did not cancel."""
-        return LEAST_SHARE * (self.elements - self.arcs)
+        """(k, k) the share of these that is left at least."""
+        return LEAST_SHARE * self.apart
 
     @property
     def absolute(self) -> Float:
@@ -66,10 +71,8 @@ def energy_errors(cell: TornCell, responses: Sequence[Response], contact: bool =
         parts = np.split(each, np.cumsum([sizes[n] for n in members])[:-1])
         for number, part in zip(members, parts, strict=True):
             shares[number] = part
-    stored = np.array([2 * response.stored for response in responses])
-    energy = np.where(stored > 0, stored, 1.0) * cell.summary.area
     elements, arcs = allreduce_sum(cell.comm, found) / cell.summary.area
-    return EnergyErrors(elements, arcs, np.concatenate([np.zeros((0, k)), *shares]) / energy, contact)
+    return EnergyErrors(elements, arcs, np.concatenate([np.zeros((0, k)), *shares]) / cell.summary.area, contact)
 
 
 def _recovered(cell: TornCell, responses: Sequence[Response]) -> Iterator[tuple[list[int], RecoveredStress]]:

@@ -21,6 +21,7 @@ class RecoveredFields:
         displacement, fluctuation: (n, c).
         strain, stress: (m, v) means over the elements: the loads in each, and what works on them.
         traction, jump: (k, c).
+        shares: (m,) what each has of the estimated error of E . Sigma; NaN if the case asks for no estimate.
     """
 
     displacement: Float
@@ -29,16 +30,17 @@ class RecoveredFields:
     stress: Float
     traction: Float
     jump: Float
+    shares: Float
 
 
 def recover(cell: TornCell, response: Response | None) -> RecoveredFields:
-    """Recover the fields of a response; zero without one.  Collective when first called."""
+    """Recover the fields of a response; zero without one.  Collective."""
     nodes, problem = cell.solver.jump_operator.nodes, cell.solver.problem
     if response is None:
         c, v = problem.components, len(problem.loads)
         n, m = (sum(sizes) for sizes in zip(*_sizes(cell), strict=True)) if cell.subdomains else (0, 0)
         points, elements, pairs = np.zeros((n, c)), np.zeros((m, v)), np.zeros((len(nodes.row), c))
-        return RecoveredFields(points, points, elements, elements, pairs, pairs)
+        return RecoveredFields(points, points, elements, elements, pairs, pairs, np.zeros(m))
     solution = response.state.solution
     u = response.scale * cell.solver.displacement(solution)
     pair = nodes.row[:, None] + np.arange(problem.components)
@@ -48,7 +50,18 @@ def recover(cell: TornCell, response: Response | None) -> RecoveredFields:
         *_element_fields(cell, response.strain, u),
         response.scale * solution.lam[pair] / nodes.length[:, None],
         response.scale * cell.solver.opening(solution)[pair],
+        _shares(cell, response),
     )
+
+
+def _shares(cell: TornCell, response: Response) -> Float:
+    if response.shares is not None:
+        return response.shares
+    if not cell.case.output.mesh_error:
+        return np.full(sum(len(s.mesh.triangles) for s in cell.subdomains), np.nan)
+    from feti_homog.homogenization.mesh_error import energy_errors  # cases may forgo it
+
+    return energy_errors(cell, [response]).shares[:, 0]
 
 
 def _sizes(cell: TornCell) -> list[tuple[int, int]]:

@@ -14,7 +14,7 @@ from typing import Any
 from feti_homog.materials.voigt import AXIAL_STRESSES, SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS, STRESSES
 from feti_homog.results.field_views import GROUP_OF_STATES, SPATIAL_VIEWS, VIEWS, View
 from feti_homog.runtime.records import LENGTH, STRESS, Description, described, descriptions, type_words
-from feti_homog.typing import AnyInt, Float
+from feti_homog.typing import AnyInt, Float, Float32
 
 PROGRAM = "feti_homog"
 
@@ -107,6 +107,12 @@ class StatePart:
         "stress 33, out of the plane: 0 in plane stress, NaN where the material's constants do not determine it",
         STRESS,
         "(m,)",
+    )
+    mesh_error: Float32 = described(
+        "estimated error of the strain energy that is in each element / the strain energy of the cell; NaN without "
+        "`mesh_error` in [output]",
+        shape="(m,)",
+        dtype="float32",
     )
     traction: Float = described("sigma n, normal (tension positive) and tangential", STRESS, "(k, 2)")
     jump: Float = described(

@@ -12,7 +12,7 @@ from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.recovered_fields import out_of_plane_stress, recover
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.results.field_layout import FibrePart, Header, InterfacePart, MeshPart, SpatialStatePart, StatePart
-from feti_homog.typing import Float
+from feti_homog.typing import Float, Float32
 from feti_homog.version import __version__
 
 
@@ -97,6 +97,7 @@ def state_part(cell: TornCell, response: Response, load_factor: float, label: st
         displacement=fields.displacement,
         stress=fields.stress,
         stress_33=out_of_plane_stress(cell, fields.stress),
+        mesh_error=_relative(fields.shares, response),
         traction=fields.traction,
         jump=fields.jump,
         traction_vector=_vectors(_in_axes(nodes.normal, fields.traction)),
@@ -135,6 +136,7 @@ def spatial_state_part(
         displacement=in_plane.displacement,
         stress=in_plane.stress[:, :3],
         stress_33=in_plane.stress[:, 3],
+        mesh_error=_relative(in_plane.shares + along.shares, plane, axial),
         axial_displacement=along.displacement[:, 0],
         axial_stress=along.stress[:, ::-1],  # the axial problem has [13, 23], the file [23, 13]
         traction=in_plane.traction,
@@ -148,6 +150,12 @@ def spatial_state_part(
         status=response.state.status,
         damage=response.damage,
     )
+
+
+def _relative(shares: Float, *responses: Response | None) -> Float32:
+    """(m,) shares of an error of E . Sigma relative to that of all responses."""
+    energy = sum(2 * response.stored for response in responses if response is not None)
+    return (shares / (energy if energy > 0 else 1.0)).astype(np.float32)
 
 
 def _in_axes(normal: Float, pairs: Float) -> Float:

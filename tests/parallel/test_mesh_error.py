@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from reference.closed_forms import cubic
-from reference.references import AXIAL_SHEAR, BONDED, ELASTIC, ENGINEERING_CONSTANTS, VOID
+from reference.references import ARC_OF_120_DEGREES_FINE, AXIAL_SHEAR, BONDED, ELASTIC, ENGINEERING_CONSTANTS, VOID
 from support.cases import FIBRE, MATRIX, make_case, solve
 
 from feti_homog import Case, run
+from feti_homog.analysis.mesh_errors import note_accuracy
 from feti_homog.fem.arc_error import ArcSides
 from feti_homog.fem.stress_recovery import RecoveredStress
 
@@ -18,6 +21,11 @@ ALL_ROUND = {"contact": False, "debonded": [{"fibre": "all", "centre": 0.0, "ang
 GLASS = {"young": 73.0, "poisson": 0.22, "expansion": 5.0e-6}
 EPOXY = {"young": 3.45, "poisson": 0.35, "expansion": 54.0e-6}
 SIZES = {1: 0.05, 2: 0.1}
+ASKED = {
+    "cell": {"geometry": "square", "fibre_fraction": 0.4, "accuracy": 1e-3, "order": 1},
+    "material": {"matrix": MATRIX, "fibre": FIBRE},
+    "analysis": {"type": "stiffness", "plane": "strain"},
+}
 
 
 def springs(normal, tangential):
@@ -134,3 +142,60 @@ def test_displacements_of_the_order_of_elements_are_recovered(comm, order):
         assert shares[away].max(initial=0.0) < 1e-16 * s.L[0, 0]
     assert comm.allreduce(inner) > 50
     cell.destroy()
+
+
+def test_what_the_elements_have_of_it_is_a_field_of_every_state(comm):
+    materials = {"matrix": MATRIX, "fibre": FIBRE}
+    document = {"cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.1, "order": 2}}
+    document |= {"material": materials, "analysis": {"type": "stiffness", "plane": "stress"}}
+    found = run(Case.parse(document), comm, fields=True)
+    for k, state in enumerate(found.fields.states):
+        share = comm.allreduce(float(state.mesh_error.sum()))
+        # All but what curved sides make of arcs.
+        assert share * found.effective_stiffness[k, k] == pytest.approx(
+            found.mesh_error.effective_stiffness[k, k], rel=0.2
+        )
+        assert (state.mesh_error >= 0).all()
+
+
+@pytest.mark.parametrize("kind", ["load", "angle", "envelope"])
+def test_states_of_other_analyses_have_theirs(comm, kind):
+    arcs = {"fibre": "all", "centre": 0.0} | ({} if kind == "angle" else {"angle": 120.0 if kind == "load" else 0.0})
+    interface = {"contact": kind == "load", "debonded": [arcs]}
+    if kind == "envelope":
+        interface |= {"normal_strength": 1.0, "tangential_strength": 1.0}
+    asked = {
+        "load": {"to": {"E11": -1.0, "E22": 0.0, "gamma12": 0.0}},
+        "angle": {"values": [120.0], "strain": [1.0, 0.0, 0.0]},
+        "envelope": {"plane": ["S11", "S22"], "directions": 4},
+    }
+    document = {"cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.05}, "interface": interface}
+    document |= {"material": {"matrix": MATRIX, "fibre": FIBRE}, "analysis": {"type": kind, "plane": "strain"}}
+    result = run(Case.parse(document | {kind: asked[kind]}), comm)
+    if kind == "envelope":
+        assert 0 < result.mesh_error.energy < 0.01
+        return
+    point = result.load if kind == "load" else result.angle[0]
+    # S11 of the arc with contact under E11 = -1 and free under E11 = 1.
+    exact = ARC_OF_120_DEGREES_FINE.value[4 if kind == "load" else 0]
+    assert 0.5 < abs(point.stress[0] / exact - 1) / point.mesh_error < 2.0
+
+
+def test_what_is_outside_its_bounds_within_its_error_is_remarked(comm):
+    # Soft fibres: the hexagonal cell is near the upper bound, and elements are too stiff.
+    stiff, soft = {"young": 73.0, "poisson": 0.45}, {"young": 1.0, "poisson": 0.3}
+    found = result(comm, phases=(stiff, soft), cell={"mesh_size": 0.5, "fibre_fraction": 0.1})
+    value, (_, upper) = found.moduli.bulk, found.bounds.hashin_shtrikman.bulk
+    assert value > upper
+    assert any(f"bulk = {value:.6g} is outside its bounds" in remark for remark in found.remarks)
+
+
+def test_more_error_than_asked_for_is_remarked_with_a_mesh_that_would_do(comm):
+    context = SimpleNamespace(case=Case.parse(ASKED), notes=[])
+    note_accuracy(context, 0.9e-3)
+    assert not context.notes
+    note_accuracy(context, 5e-3)
+    chosen = context.case.cell
+    (note,) = context.notes
+    # A fifth of the error takes two more halvings of linear elements.
+    assert f"refine = {chosen.refine + 2} and order = 1" in note and "5.0e-03" in note

@@ -170,6 +170,7 @@ def _state(mesh: MeshPart, gradient: np.ndarray, number: int) -> StatePart:
         displacement=displacement,
         stress=stress,
         stress_33=4.0 + place,
+        mesh_error=(0.01 * place**2).astype(np.float32),
         traction=traction,
         jump=jump,
         **{name: np.stack([n * k, k, 0 * k], axis=1) for n, name in enumerate(VECTORS)},

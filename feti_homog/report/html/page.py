@@ -43,6 +43,7 @@ PICTURES = {
     "load": "Deformed cell under the load",
     "envelope": "Onset of debonding",
     "interface": "Tractions and jumps of interfaces",
+    "mesh_error": "Where the estimated error of the mesh is",
 }
 MOST_STATES, TRIANGLES = 48, 8000  # of the viewer, which keep a page below some megabytes
 LARGEST_SHORT, LARGEST_BYTE = 32767, 255

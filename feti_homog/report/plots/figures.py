@@ -17,7 +17,7 @@ from matplotlib.tri import Triangulation
 
 from feti_homog.errors import FetiHomogError
 from feti_homog.materials.voigt import voigt_names
-from feti_homog.report.plots import cell_picture, deformed_panels, response_curves, traction_plots
+from feti_homog.report.plots import cell_picture, deformed_panels, mesh_error_picture, response_curves, traction_plots
 from feti_homog.report.plots.decimation import (
     DrawnMesh,
     drawn_displacement,
@@ -58,7 +58,7 @@ IN_LEGEND = 2  # entries of a legend in a line: four are wider than a narrow cel
 def plot(directory: Path) -> list[Path]:
     """Draws the pictures of `directory`/result.h5 and result.json beside them and returns their paths.
 
-    - cell.png: bodies and subdomains;
+    - cell.png: bodies and subdomains; mesh_error.png: where the estimated error of the mesh is;
     - of each load case case_E11.png, case_minus_E11.png, ... (unit strains), case_temperature.png or state_K.png;
     - of `angle` angle.png and angle_states.png, of `path` path.png, path_states.png and path.gif;
     - of `load` load.png, of `envelope` envelope.png;
@@ -94,6 +94,8 @@ def _pictures(directory: Path, document: Mapping[str, Any]) -> list[Path]:
         borders = outline_edges(drawn, drawn.body)
         interface_edges = InterfaceEdges.of(file, drawn, borders)
         paths = [save(cell_picture.figure(file, drawn, borders), directory / "cell.png")]
+        if (error := mesh_error_picture.figure(file, drawn, borders)) is not None:
+            paths.append(save(error, directory / "mesh_error.png"))
         if reported(document).is_curve:
             paths += deformed_panels.plot(directory, file, document)
         else:

@@ -18,7 +18,7 @@ NOISE = 1e-12  # what the solver leaves of a zero
 
 def unit(name: str, stress_unit: str) -> str:
     """Return the unit of a key of a case file, dotted, or of a column of a sweep's table; empty if it has none."""
-    last = name.rpartition(".")[2]
+    last = name.rpartition(".")[2].removesuffix("_mesh_error")
     if last.startswith("seconds_"):
         return "s"
     if last in STRESSES or MODULI.fullmatch(last):

@@ -36,11 +36,12 @@ def outputs(document: Document, numbers: Sequence[int] = PLANE_STRAIN.numbers) -
     found |= {name: solver[name] for name in ("ranks", "subdomains", "dofs", "multipliers")}
     found |= {"iterations": sum(solver["iterations"])}
     for name, suffix in (("effective_stiffness", ""), ("effective_stiffness_compression", "_compression")):
-        found |= {f"{entry}{suffix}": value for entry, value in _entries(document.get(name, ()), numbers).items()}
+        found |= _entries(document.get(name, ()), numbers, suffix)
     found |= _thermal(document)
     found |= _anisotropy(document.get("effective_stiffness"))
     for section in ("moduli", "constants", "transversely_isotropic"):
         found |= {name: value for name, value in document.get(section, {}).items() if value is not None}
+    found |= _mesh_errors(document.get("mesh_error", {}), numbers)
     found |= _bounds(document.get("bounds", {}), numbers)
     found |= _angles(document.get("angle", ()), numbers) | _path(document)
     found |= _load(document.get("load"))
@@ -61,10 +62,10 @@ def _cell(cell: Mapping[str, Any]) -> dict[str, float]:
     return found | ({"match_distance": cell["match_distance"]} if "match_distance" in cell else {})
 
 
-def _entries(stiffness: Any, numbers: Sequence[int]) -> dict[str, float]:
+def _entries(stiffness: Any, numbers: Sequence[int], suffix: str = "") -> dict[str, float]:
     """C11, C12, ... of a stiffness (6, 6), or (3, 3) with the `numbers`; none of an empty one."""
     rows = range(1, 7) if len(stiffness) == len(SPATIAL_STRESSES) else numbers
-    names = [f"C{i}{j}" for i in rows for j in rows]
+    names = [f"C{i}{j}{suffix}" for i in rows for j in rows]
     return dict(zip(names, np.ravel(stiffness).tolist(), strict=False))
 
 
@@ -75,6 +76,15 @@ def _thermal(document: Document) -> dict[str, float]:
     }
     named = zip(SPATIAL_STRAINS, document.get("thermal_expansion", ()), strict=False)
     return found | {f"expansion_{name}": value for name, value in named}
+
+
+def _mesh_errors(errors: Document, numbers: Sequence[int]) -> dict[str, float]:
+    """Estimated errors of the entries and constants, by their names with an ending."""
+    found = _entries(errors.get("effective_stiffness", ()), numbers)
+    found |= _entries(errors.get("effective_stiffness_compression", ()), numbers, "_compression")
+    found |= _thermal(errors) | errors.get("constants", {})
+    named = {f"{name}_mesh_error": value for name, value in found.items()}
+    return named | ({"energy_mesh_error": errors["energy"]} if errors else {})
 
 
 def _envelope(document: Document) -> dict[str, float]:
