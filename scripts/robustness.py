@@ -1,4 +1,4 @@
-"""Iterations to 1e-8 at every combination of fibres, fraction, gap, cut, contrast, mesh size, coating, mix and voids.
+"""Iterations to 1e-8 at every combination of fibres, fraction, gap, cut, contrast, mesh, coating, mix, voids and nu.
 
 Each line of the CSV is one cell with its three load cases; cells that the file holds already are not run again, so that
 a long list can be worked off in parts.  "uncut" leaves the matrix whole and looks for soft modes none the less.
