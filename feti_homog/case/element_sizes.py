@@ -26,7 +26,7 @@ CHOSEN = ("mesh_size", "interface_size", "tip_size", "refine")
 # with soft ones: 1.5 times the largest that `scripts/measure_accuracy.py` finds.
 COARSE_ERROR = {1: 0.12, 2: 0.0075}
 SOFT_FACTOR = 6.0
-# Largest condition that counts of mixed elements.
+# Largest kappa s of cells of mixed elements.
 MIXED_CONDITION = 33.0
 # Of the coarsest mesh: largest elements / distance of fibres on a square lattice, and / width of the cell. Circles and
 # gaps have smaller ones; still coarser meshes have hardly less elements.
@@ -130,7 +130,7 @@ def coarse_error(
 
     lambda the eigenvalues of the stiffness of a phase relative to that around it, 0 of free faces, s SOFT_FACTOR where
     lambda < 1 and else 1, and kappa the condition of the stiffness in the plane of the phase nearest to incompressible,
-    of mixed elements at most MIXED_CONDITION.
+    of mixed elements at most MIXED_CONDITION, as is kappa s where all are mixed.
     """
     stiffness = {phase: stiffness_of(material, plane) for phase, material in materials.items()}
     ratios = [
@@ -140,21 +140,19 @@ def coarse_error(
     ]
     if free_faces:
         ratios.append(np.zeros(1))
-    conditions = [
-        min(
-            float(np.linalg.cond(_orthonormal(plane_stiffness(material, plane)))),
-            MIXED_CONDITION if is_mixed(element, order, material, plane) else math.inf,
-        )
-        for material in materials.values()
-    ]
-    return float(COARSE_ERROR[order] * max(conditions) * _contrast(ratios))
+    mixed = [is_mixed(element, order, material, plane) for material in materials.values()]
+    kappa = max(
+        min(float(np.linalg.cond(_orthonormal(plane_stiffness(material, plane)))), MIXED_CONDITION if own else math.inf)
+        for material, own in zip(materials.values(), mixed, strict=True)
+    )
+    return COARSE_ERROR[order] * _contrast(ratios, kappa, MIXED_CONDITION if all(mixed) else math.inf)
 
 
-def _contrast(ratios: Iterable[Float]) -> float:
-    """max s beta^2."""
+def _contrast(ratios: Iterable[Float], kappa: float, most: float) -> float:
+    """max min(kappa s, most) beta^2."""
     of_all = np.concatenate([np.ones(1), *ratios])
     beta = (of_all - 1) / (of_all + 1)
-    return float(np.max(np.where(beta < 0, SOFT_FACTOR, 1.0) * beta**2))
+    return float(np.max(np.minimum(kappa * np.where(beta < 0, SOFT_FACTOR, 1.0), most) * beta**2))
 
 
 def _orthonormal(stiffness: Float) -> Float:
