@@ -19,6 +19,7 @@ from feti_homog.analysis.result_records import (
     MeshError,
     PathPoint,
     Peak,
+    Sensitivities,
     TipRates,
 )
 from feti_homog.materials.bounds import Moduli
@@ -99,6 +100,7 @@ class Result:
         compliance, thermal_stress, thermal_expansion: of generalized plane strain, (6, 6) and (6,), else None.
         moduli, bounds: of perfectly bonded cells, else None.
         mesh_error: estimated errors by the mesh of a stiffness and of what follows from it, unless the case forgoes it.
+        sensitivities: derivatives of a stiffness by the constants of the case, if it asks for them, else None.
         tips: energy release rates of a stiffness with debonded arcs, else None; those of an angle are in its points.
         angle, path, envelope: the points of these analyses, else None; `points` has those of the first two as arrays.
         fields: mesh, interface and states on this rank if they were asked for, else None; not written to result.json.
@@ -156,6 +158,9 @@ class Result:
     estimates: Estimates | None = described("closed estimates of the same, of a cell without debonding", default=None)
     fibre_bounds: FibreBounds | None = described("bounds of the same, of rigid bonds", default=None)
     mesh_error: MeshError | None = described("estimated errors of a stiffness by its mesh", default=None)
+    sensitivities: Sensitivities | None = described(
+        "derivatives of a stiffness, if the case asks for them", default=None
+    )
     tips: TipRates | None = described("energy release rates at the tips of debonded arcs, of a stiffness", default=None)
     angle: tuple[AnglePoint, ...] | None = described("points of analysis `angle`, as in angle.csv", default=None)
     path: tuple[PathPoint, ...] | None = described("points of analysis `path`, as in path.csv", default=None)

@@ -16,7 +16,14 @@ from feti_homog.case.interface_section import Arc, InterfaceSection, Scatter
 from feti_homog.case.load_section import Envelope, LoadPath, SingleLoad
 from feti_homog.case.mixed_load import MixedLoad, Strain
 from feti_homog.case.section_values import OPENINGS, SEED, STATES, STRAIN
-from feti_homog.case.selectors import ANGLE_ANALYSIS, ENVELOPE_ANALYSIS, IN_THE_PLANE, LOAD_ANALYSIS, PATH_ANALYSIS
+from feti_homog.case.selectors import (
+    ANALYSIS_TYPE,
+    ANGLE_ANALYSIS,
+    ENVELOPE_ANALYSIS,
+    IN_THE_PLANE,
+    LOAD_ANALYSIS,
+    PATH_ANALYSIS,
+)
 from feti_homog.materials.forms import MATERIAL_FORMS
 from feti_homog.schema.keys import Key, key, keys_of
 from feti_homog.schema.values import boolean, choice, integer, is_number, real, text
@@ -155,6 +162,12 @@ class Output:
         "Estimate the error that the mesh makes of every constant: some percent of a run that writes fields, up to a "
         "half more of one that writes none.",
         default=True,
+    )
+    sensitivities: bool = key(
+        boolean,
+        "Derivatives of every constant of the cell by every constant of its phases and elastic interfaces.",
+        default=False,
+        only=ANALYSIS_TYPE.among("stiffness"),
     )
     pictures: bool = key(boolean, "Draw the PNG files; without fields, the curves alone.", default=True)
     report: bool = key(boolean, "Write report.html: numbers, pictures, curves and states on one page.", default=False)

@@ -14,6 +14,7 @@ import numpy as np
 from feti_homog.case import element_choice
 from feti_homog.case.case import Case
 from feti_homog.fem.problem import AXIAL, GENERALIZED, PLANE, Problem
+from feti_homog.materials.derivatives import LawChange
 from feti_homog.materials.laws import expansion, plane_stiffness, spatial_stiffness
 from feti_homog.materials.plane_state import PLANE_STATES
 from feti_homog.typing import Float
@@ -61,6 +62,23 @@ def is_mixed(case: Case, phase: str) -> bool:
 def axial_law(case: Case, phase: str) -> Float:
     """(2, 2) stiffness of a phase in the axial problem."""
     return spatial_stiffness(case.material_of(phase))[np.ix_(AXIAL_SHEAR, AXIAL_SHEAR)]
+
+
+def law_derivatives(case: Case, phase: str, change: LawChange) -> tuple[Float, ...]:
+    """Return the derivatives of `plane_law` and, if there is an axial problem, of `axial_law`."""
+    problem, dC = plane_problem(case), change.stiffness
+    if problem == PLANE:
+        return (dC,)
+    axial, dC = dC[np.ix_(AXIAL_SHEAR, AXIAL_SHEAR)], dC[np.ix_(IN_PLANE, IN_PLANE)]
+    material = case.material_of(phase)
+    alpha = expansion(material)
+    if problem != GENERALIZED or alpha is None:
+        return dC, axial
+    C = spatial_stiffness(material)[np.ix_(IN_PLANE, IN_PLANE)]
+    N, dN = np.column_stack([np.eye(4), -alpha[IN_PLANE]]), np.zeros((4, 5))
+    dN[:, 4] = -change.expansion[IN_PLANE]
+    mixed = N.T @ C @ dN
+    return N.T @ dC @ N + mixed + mixed.T, axial
 
 
 def secants(plane: Float, *axial: Float) -> dict[str, Float]:

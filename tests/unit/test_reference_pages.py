@@ -54,7 +54,10 @@ SOFTENING = {
     "teeth": 2,
 }
 CASES = {
-    "bonded": {"analysis": {"type": "stiffness", "plane": "strain"}},
+    "bonded": {
+        "analysis": {"type": "stiffness", "plane": "strain"},
+        "output": BASE["output"] | {"sensitivities": True},
+    },
     "debonded": {"analysis": {"type": "stiffness", "plane": "strain"}, "interface": HALF_OPEN},
     "matched": {
         "analysis": {"type": "stiffness", "plane": "strain"},

@@ -13,7 +13,7 @@ import numpy as np
 
 from feti_homog.materials.plane_state import plane_state_of
 from feti_homog.report.text import material_axes, point_tables, stiffness_tables
-from feti_homog.report.text.path_table import path_table, peak_table
+from feti_homog.report.text.path_table import path_table
 from feti_homog.report.text.table import Table
 from feti_homog.results.kept_points import chosen, chosen_states
 
@@ -58,16 +58,17 @@ def _envelope_lines(document: Document, label: str, toughness: str) -> list[list
 def _stiffness_lines(document: Document, label: str, toughness: str) -> list[list[str]]:
     """Return the effective stiffness with what follows from it; units in brackets."""
     blocks = [table.lines for table in stiffness_tables.stiffnesses(document, label)]
-    tips = [table.lines for table in point_tables.tip_table(document.get("tips"), toughness)]
+    last = [table.lines for table in point_tables.tip_table(document.get("tips"), toughness)]
+    last += [table.lines for table in stiffness_tables.sensitivities(document)]
     if plane_state_of(document).is_spatial:
         thermal = [table.lines for table in stiffness_tables.thermal(document, label)]
         own = material_axes.lines(document, label)
-        return [own, *blocks, *thermal, *stiffness_tables.constants_lines(document, label), *tips]
+        return [own, *blocks, *thermal, *stiffness_tables.constants_lines(document, label), *last]
     if document["case"].get("interface"):  # moduli and bounds are of bonded, linear composites
-        return [*blocks, *tips]
+        return [*blocks, *last]
     bounds = [table.lines for table in stiffness_tables.bounds(document, label)]
     moduli = stiffness_tables.moduli_lines(document, label)
-    return [*blocks, moduli, *(bounds or [["Bounds: none of cells with voids"]])]
+    return [*blocks, moduli, *(bounds or [["Bounds: none of cells with voids"]]), *last]
 
 
 def _stiffness_tables(document: Document, label: str, most: int) -> list[Table]:
@@ -78,6 +79,7 @@ def _stiffness_tables(document: Document, label: str, most: int) -> list[Table]:
         *stiffness_tables.constants(document, label),
         *stiffness_tables.moduli(document, document["case"].get("output", {}).get("stress_unit", "")),
         *stiffness_tables.bounds(document, label),
+        *stiffness_tables.sensitivities(document),
     ]
 
 
@@ -87,7 +89,7 @@ def _angle_tables(document: Document, label: str, most: int) -> list[Table]:
 
 
 def _path_tables(document: Document, label: str, most: int) -> list[Table]:
-    return [peak_table(document, label), point_tables.all_numbers("path", document, label, chosen(document, most))]
+    return [point_tables.all_numbers("path", document, label, chosen(document, most))]
 
 
 def _load_tables(document: Document, label: str, most: int) -> list[Table]:

@@ -9,7 +9,7 @@ from typing import Any
 
 from feti_homog.case.phase_names import COATING
 from feti_homog.materials.voigt import SPATIAL_STRESSES, STRAINS, voigt_names
-from feti_homog.report.text.table import Column, Table, number, with_unit
+from feti_homog.report.text.table import Column, Table, number, with_unit, without_noise
 
 NAMES = Column("", -28)
 STIFF = ("C11", "C22", "C33")
@@ -27,6 +27,12 @@ MESH_ERROR = "Mesh error, estimated"
 NO_ERROR = 1e-7
 LEAST_DECIMAL, MOST_DECIMAL = 1e-4, 1e8  # numbers between these are printed to the digits of their errors
 CELL_AXES = ", axes of the cell, x3 along the fibres"
+# Constants of which sensitivities are shown, by whether the cell is in space; all are in result.json.
+SHOWN = {
+    False: ("C11", "C22", "C12", "C33", "E1", "E2", "nu12", "G12"),
+    True: ("E_axial", "E_transverse", "nu_axial", "nu_transverse", "G_axial", "G_transverse", "expansion.3",
+           "expansion.1"),
+}  # fmt: skip
 ABREAST = 5  # constants beside each other in text
 SHORT = {
     "E_axial": "E axial",
@@ -259,3 +265,27 @@ def _known(row: Document) -> dict[str, Any]:
 
 def _short(value: float | None, form: str = ".5g") -> str:
     return UNKNOWN if value is None else f"{value:{form}}"
+
+
+def sensitivities(document: Document) -> list[Table]:
+    """Elasticities d ln c / d ln p of constants c by parameters p, and derivatives dc / dp; none if not asked for."""
+    if (found := document.get("sensitivities")) is None:
+        return []
+    shown = SHOWN["E3" in found["constants"]]
+    at = [found["constants"].index(name) for name in shown if name in found["constants"]]
+    width = max(len(name) for name in found["parameters"]) + 4
+    columns = [Column("", -width)]
+    columns += [Column(SHORT.get(name, name), 13, ".4g") for name in shown if name in found["constants"]]
+    slopes, shares = list[list[Any]](), list[list[Any]]()
+    for j, (name, value) in enumerate(zip(found["parameters"], found["parameter_values"], strict=True)):
+        row = [found["derivatives"][k][j] for k in at]
+        sizes = [found["constant_values"][k] for k in at]
+        slopes.append([name, *row])
+        shares.append([name, *(_share(slope * value, size) for slope, size in zip(row, sizes, strict=True))])
+    words = "Elasticities, the relative change of a constant by that of a parameter"
+    return [Table(words, columns, shares), Table("Derivatives by the same parameters", columns, slopes)]
+
+
+def _share(change: float, size: float) -> float | str:
+    """Return a relative change, zero in place of noise; text of a constant that is zero."""
+    return without_noise(change / size) if size else UNKNOWN

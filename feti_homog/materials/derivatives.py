@@ -1,0 +1,167 @@
+"""Derivatives of the laws of phases by their constants, and of constants of a composite by its stiffness.
+
+Stiffnesses are (3, 3) or (6, 6) in Voigt order with engineering shears, as of `laws.stiffness_of`.  Functions without
+absolute values are differentiated by an imaginary step, f'(x) = Im f(x + i h) / h, which is exact to rounding (Squire
+and Trapp, SIAM Review 40 (1998) 110).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feti_homog.materials.forms import EXPANSION_PAIR, General, Isotropic, Material, Orthotropic, TransverselyIsotropic
+from feti_homog.materials.laws import COUPLINGS, expansion, known_compliance, stiffness_of
+from feti_homog.materials.plane_state import PLANE_STATES
+from feti_homog.materials.spatial_constants import transverse_constants
+from feti_homog.materials.voigt import IN_PLANE, IN_PLANE_BLOCK, strain_rotation
+from feti_homog.typing import Float
+
+STEP = 1e-30  # its square is lost beside 1
+ISOTROPIC_COMPLIANCE = {"E_axial": "young", "E_transverse": "young", "nu_axial": "poisson", "nu_transverse": "poisson"}
+# Derivative of `strain_rotation` by the angle in degrees, at 0.
+TURN = np.zeros((6, 6))
+TURN[IN_PLANE_BLOCK] = [[0, 0, 1], [0, 0, -1], [-2, 2, 0]]
+TURN[3:5, 3:5] = [[0, -1], [1, 0]]
+TURN *= np.pi / 180
+
+
+@dataclass(frozen=True)
+class LawChange:
+    """Derivatives of the law of a phase by one of its constants.
+
+    Attributes:
+        name: the key, of one of several numbers with its place, such as `stiffness.C12` or `expansion.3`.
+        value: the constant.
+        stiffness: dC, (3, 3) or (6, 6).
+        expansion: (6,) d alpha.
+    """
+
+    name: str
+    value: float
+    stiffness: Float
+    expansion: Float
+
+
+def law_changes(material: Material, plane: str) -> Iterator[LawChange]:
+    """Yield the derivatives by every constant that is given; those of expansions, (6, 6) alone, come last."""
+    C, none = stiffness_of(material, plane), np.zeros(6)
+    is_general = isinstance(material, General)
+    for name, value, change in (_of_entries if is_general else _of_constants)(material, plane, C):
+        yield LawChange(name, value, change, none)
+    free = expansion(material)
+    if isinstance(material, Orthotropic):
+        turn = TURN if len(C) == 6 else TURN[IN_PLANE_BLOCK]
+        yield LawChange("angle", material.angle, turn.T @ C + C @ turn, none if free is None else -TURN @ free)
+    if len(C) == 6 and free is not None:
+        to_cell = strain_rotation(-material.angle if isinstance(material, Orthotropic) else 0.0)[:, :3]
+        for name, value, axes in _expansions(material):
+            yield LawChange(name, value, np.zeros((6, 6)), to_cell @ axes)
+
+
+def _of_constants(material: Any, plane: str, C: Float) -> Iterator[tuple[str, float, Float]]:
+    """Engineering constants: dC = -C dS C with the compliance S of the plane state, in the axes of the cell."""
+    skipped = ("angle", "expansion", *EXPANSION_PAIR)
+    names = [field.name for field in fields(material) if field.name not in skipped]
+    values = {name: value for name in names if (value := getattr(material, name)) is not None}
+    turn = strain_rotation(-getattr(material, "angle", 0.0))
+    turn = turn if len(C) == 6 else turn[IN_PLANE_BLOCK]
+    for name, value in values.items():
+        moved = {other: complex(known, STEP * (other == name)) for other, known in values.items()}
+        changed = _of_plane_state(_compliance(replace(material, **moved)), plane, condensed="strain")
+        yield name, value, -C @ turn @ changed @ turn.T @ C
+
+
+def _compliance(material: Any) -> NDArray[Any]:
+    """(6, 6) complex compliance in the material axes; NaN where the constants do not say it."""
+    if isinstance(material, Isotropic):
+        shear = material.young / (2 * (1 + material.poisson))
+        named = {name: getattr(material, key) for name, key in ISOTROPIC_COMPLIANCE.items()}
+        material = TransverselyIsotropic(**named, G_axial=shear)
+    with np.errstate(invalid="ignore"):
+        return known_compliance(material)
+
+
+def _of_entries(material: Any, plane: str, C: Float) -> Iterator[tuple[str, float, Float]]:
+    """Entries of a stiffness, on both sides of its diagonal."""
+    given = np.array(material.stiffness)
+    for i, j in zip(*np.triu_indices(len(given)), strict=True):
+        if (i, j) in COUPLINGS and len(given) == 6:
+            continue
+        changed = (given + given.T) / 2 + 0j
+        changed[[i, j], [j, i]] += 1j * STEP
+        whole = changed.imag / STEP if len(given) == len(C) else _of_plane_state(changed, plane, condensed="stress")
+        yield f"stiffness.C{i + 1}{j + 1}", float((given[i, j] + given[j, i]) / 2), whole
+
+
+def _of_plane_state(M: NDArray[Any], plane: str, *, condensed: str) -> Float:
+    """Differentiate what a plane state has of a complex stiffness or compliance.
+
+    That is all of it, the block of the plane or, in the state `condensed`, this less the share of 33.
+    """
+    if PLANE_STATES[plane].is_spatial:
+        return np.asarray(M.imag / STEP)
+    block = M[IN_PLANE_BLOCK]
+    if plane == condensed:
+        block = block - np.outer(M[IN_PLANE, 2], M[IN_PLANE, 2]) / M[2, 2]
+    return np.asarray(block.imag / STEP)
+
+
+def _expansions(material: Material) -> Iterator[tuple[str, float, Float]]:
+    """Yield each expansion that is given, and (3,) along which of the material axes it is."""
+    if isinstance(material.expansion, tuple):
+        for axis, value in enumerate(material.expansion):
+            yield f"expansion.{axis + 1}", value, np.eye(3)[axis]
+    elif material.expansion is not None:
+        yield "expansion", material.expansion, np.ones(3)
+    elif isinstance(material, TransverselyIsotropic):
+        for name, axes in zip(EXPANSION_PAIR, ([0.0, 0.0, 1.0], [1.0, 1.0, 0.0]), strict=True):
+            yield name, getattr(material, name), np.array(axes)
+
+
+def composite_constants(C: NDArray[Any], thermal: NDArray[Any] | None) -> dict[str, Any]:
+    """Return the constants of a stiffness C, real or complex, (3, 3) or (6, 6).
+
+    They are entries Cij of its upper half, moduli and ratios and, with the stress `thermal` (6,) under a unit of
+    temperature, `thermal_stress` and `expansion` along axes 1, 2 and 3.
+
+    Raises numpy.linalg.LinAlgError if C is singular.
+    """
+    S, n = np.linalg.inv(C), len(C)
+    entries = [(i, j) for i in range(n) for j in range(i, n) if n == 3 or (i, j) not in COUPLINGS]
+    found = {f"C{i + 1}{j + 1}": C[i, j] for i, j in entries}
+    if n == 3:
+        found |= {"E1": 1 / S[0, 0], "E2": 1 / S[1, 1], "nu12": -S[1, 0] / S[0, 0], "nu21": -S[0, 1] / S[1, 1]}
+        return found | {"G12": 1 / S[2, 2]}
+    found |= {f"E{i + 1}": 1 / S[i, i] for i in range(3)}
+    found |= {f"nu{i + 1}{j + 1}": -S[j, i] / S[i, i] for i, j in ((0, 1), (0, 2), (1, 2))}
+    found |= {"G12": 1 / S[5, 5], "G13": 1 / S[4, 4], "G23": 1 / S[3, 3]} | _about_fibres(C)
+    if thermal is not None:
+        strains = -S @ thermal
+        found |= {f"{name}.{i + 1}": x[i] for name, x in (("thermal_stress", thermal), ("expansion", strains))
+                  for i in range(3)}  # fmt: skip
+    return found
+
+
+def _about_fibres(C: NDArray[Any]) -> dict[str, Any]:
+    """Return the constants of `spatial_constants.transversely_isotropic_part`, by Hill's moduli."""
+    k, across = (C[0, 0] + C[1, 1] + 2 * C[0, 1]) / 4, (C[0, 2] + C[1, 2]) / 2
+    m = (C[0, 0] + C[1, 1] - 2 * C[0, 1] + 4 * C[5, 5]) / 8
+    E, nu = C[2, 2] - across**2 / k, across / (2 * k)
+    E_transverse, nu_transverse = transverse_constants(E, nu, k, m)
+    return {
+        "E_axial": E, "E_transverse": E_transverse, "nu_axial": nu, "nu_transverse": nu_transverse,
+        "G_axial": (C[3, 3] + C[4, 4]) / 2, "G_transverse": m, "K_transverse": k,
+    }  # fmt: skip
+
+
+def constant_changes(C: Float, thermal: Float | None, dC: Float, dthermal: Float | None) -> dict[str, float]:
+    """Return the derivatives of `composite_constants` where C and the thermal stress have these."""
+    size = float(np.abs(dC).max() / np.abs(C).max()) or 1.0
+    h = STEP / size
+    heat = None if thermal is None or dthermal is None else thermal + 1j * h * dthermal
+    return {name: float(value.imag / h) for name, value in composite_constants(C + 1j * h * dC, heat).items()}

@@ -1,0 +1,128 @@
+"""Derivatives of stiffnesses against differences of whole runs, and Euler's relation, at any number of ranks."""
+
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+import pytest
+from support.cases import FIBRE, MATRIX
+
+from feti_homog import Case, CaseError, run
+from feti_homog.runtime.records import plain
+
+pytestmark = pytest.mark.parallel
+
+CARBON = {
+    "E_axial": 230.0, "E_transverse": 15.0, "nu_axial": 0.2, "nu_transverse": 0.07, "G_axial": 24.0,
+    "expansion_axial": -5e-7, "expansion_transverse": 7e-6,
+}  # fmt: skip
+EPOXY = {"young": 3.45, "poisson": 0.35, "expansion": 5.4e-5}
+TURNED = {
+    "E1": 20.0, "E2": 9.0, "E3": 30.0, "nu12": 0.2, "nu13": 0.1, "nu23": 0.15, "G12": 5.0, "G13": 4.0, "G23": 6.0,
+    "angle": 33.0,
+}  # fmt: skip
+GENERAL = {"stiffness": [[10.0, 2.0, 0.5], [2.0, 8.0, 0.1], [0.5, 0.1, 3.0]]}
+SIZING = {"young": 1.2, "poisson": 0.4, "expansion": 8e-5}
+ARC = [{"fibre": "all", "centre": 20.0, "angle": 90.0}]
+SPRINGS = {"normal_stiffness": 50.0, "tangential_stiffness": 20.0, "contact": False}
+COATED = {"geometry": "hexagonal", "fibre_fraction": 0.4, "mesh_size": 0.2, "coating": 0.1}
+PLAIN = {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.25}
+VOIDS = {"geometry": "random", "fibres": 2, "fibre_fraction": 0.2, "voids": 0.1, "mesh_size": 0.25}
+STIFF = ("young", "E_axial", "E_transverse", "E1", "E2", "E3", "G12", "G13", "G23", "G_axial")
+
+
+def document(cell, plane, materials, interface=None):
+    """Return a small case that asks for sensitivities, solved to rounding."""
+    given = {
+        "cell": cell,
+        "material": materials,
+        "analysis": {"type": "stiffness", "plane": plane},
+        "output": {"sensitivities": True, "mesh_error": False},
+        "petsc": {"feti_ksp_rtol": 1e-13},
+    }
+    return given | ({} if interface is None else {"interface": interface})
+
+
+CASES = {
+    "springs, coatings, expansions": document(
+        COATED | {"order": 1}, "generalized", {"matrix": EPOXY, "fibre": CARBON, "coating": SIZING}, SPRINGS
+    ),
+    "along the fibres alone": document(
+        PLAIN | {"order": 2}, "generalized", {"matrix": EPOXY, "fibre": TURNED}, SPRINGS | {"axial_stiffness": 5.0}
+    ),
+    "debonded": document(
+        PLAIN | {"order": 2}, "strain", {"matrix": MATRIX, "fibre": FIBRE}, {"contact": False, "debonded": ARC}
+    ),
+    "mixed elements": document(
+        PLAIN | {"order": 2, "element": "mixed"}, "generalized",
+        {"matrix": EPOXY | {"poisson": 0.4}, "fibre": CARBON}, SPRINGS,
+    ),
+    "voids": document(VOIDS | {"order": 1}, "stress", {"matrix": GENERAL, "fibre": TURNED}),
+}  # fmt: skip
+
+
+def moved(case, names, values):
+    """Return the case with other values of its parameters."""
+    changed = copy.deepcopy(case)
+    for name, value in zip(names, values, strict=True):
+        section, *keys = name.split(".")
+        place = changed[section] if section == "interface" else changed[section][keys.pop(0)]
+        if keys[0] == "stiffness":
+            i, j = int(keys[1][1]) - 1, int(keys[1][2]) - 1
+            place["stiffness"][i][j] = place["stiffness"][j][i] = float(value)
+        else:
+            place[keys[0]] = float(value)
+    return changed
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_derivatives_are_those_of_the_answer(comm, name):
+    """Along a direction in which every parameter changes, by central differences of three steps, extrapolated."""
+    case = CASES[name]
+    found = run(Case.parse(case), comm).sensitivities
+    at, sign = found.parameter_values, np.resize([1.0, -0.7, 0.5, 0.9, -0.8], len(found.parameters))
+    direction = sign * at
+
+    def slope(h):
+        ends = [run(Case.parse(moved(case, found.parameters, at + s * h * direction)), comm) for s in (1, -1)]
+        return (ends[0].sensitivities.constant_values - ends[1].sensitivities.constant_values) / (2 * h)
+
+    first, second, third = (slope(h) for h in (0.02, 0.01, 0.005))
+    once, twice = (4 * second - first) / 3, (4 * third - second) / 3
+    expected = (16 * twice - once) / 15
+    values = dict(zip(found.constants, found.constant_values, strict=True))
+    largest = {key: max(abs(v) for n, v in values.items() if n.startswith(key)) for key in {n[0] for n in values}}
+    scale = np.array([max(abs(v), 1e-3 * largest[n[0]]) for n, v in values.items()])
+    assert (np.abs(found.derivatives @ direction - expected) < 1e-7 * scale).all()
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_stiffness_is_homogeneous_of_degree_one_in_those_of_all_phases(comm, name):
+    found = run(Case.parse(CASES[name]), comm).sensitivities
+    stiff = [n.endswith((*STIFF, "_stiffness")) or ".stiffness." in n for n in found.parameters]
+    moduli = [k for k, n in enumerate(found.constants) if n[0] in "CEGK"]
+    total = found.derivatives[:, stiff] @ found.parameter_values[stiff]
+    largest = np.abs(found.constant_values[moduli]).max()
+    np.testing.assert_allclose(total[moduli], found.constant_values[moduli], rtol=1e-10, atol=1e-10 * largest)
+
+
+def test_one_sided_contact_has_none(comm):
+    case = copy.deepcopy(CASES["debonded"])
+    del case["interface"]["contact"]
+    with pytest.raises(CaseError, match="sensitivities: contact of debonded faces is not linear"):
+        run(Case.parse(case), comm)
+
+
+def test_only_a_stiffness_has_them():
+    case = copy.deepcopy(CASES["voids"])
+    case["analysis"]["type"] = "load"
+    case["load"] = {"to": {"E11": 0.01, "E22": 0.0, "gamma12": 0.0}}
+    with pytest.raises(CaseError, match=r"\[output\] sensitivities = true: belongs to .*stiffness"):
+        Case.parse(case)
+
+
+def test_they_are_not_computed_unasked(comm):
+    case = copy.deepcopy(CASES["debonded"])
+    del case["output"]["sensitivities"]
+    assert "sensitivities" not in plain(run(Case.parse(case), comm))
