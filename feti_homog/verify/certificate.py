@@ -61,6 +61,9 @@ def in_own_process(directory: Path, function: Callable[[Path], T], patience: flo
 def _send(end: Connection, function: Callable[[Path], T], directory: Path) -> None:
     # The thread that listens for signals stays with the parent; Ctrl-C ends both.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    # Handlers of PETSc, in a program that has started it, would not come to an end here.
+    for crash in (signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGILL, signal.SIGABRT):
+        signal.signal(crash, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_SETMASK, ())
     try:
         end.send(function(directory))
