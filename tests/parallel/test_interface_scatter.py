@@ -18,13 +18,21 @@ COLUMN = [1.2, 0.7, 1.1]
 SPRINGS = {"normal_stiffness": 2.0, "tangential_stiffness": 0.5}
 STRENGTH = {"criterion": "quadratic", "normal_strength": 0.06, "tangential_strength": 0.08}
 ENERGY = SPRINGS | {"criterion": "energy", "toughness": 4e-4}
-LAWS = {"strength": STRENGTH, "released": ENERGY, "springs": ENERGY | {"growth": "springs"}}
-POWERS = {"normal_strength": 1, "tangential_strength": 1, "toughness": 2}
+BILINEAR = {"law": "bilinear", "normal_stiffness": 20.0, "tangential_stiffness": 12.0, "teeth": 2}
+BILINEAR |= {
+    "normal_strength": 0.06,
+    "tangential_strength": 0.08,
+    "normal_toughness": 4e-4,
+    "tangential_toughness": 8e-4,
+}
+LAWS = {"strength": STRENGTH, "released": ENERGY, "springs": ENERGY | {"growth": "springs"}, "bilinear": BILINEAR}
+POWERS = {name: 1 for name in ("normal_strength", "tangential_strength")}
+POWERS |= {name: 2 for name in ("toughness", "normal_toughness", "tangential_toughness")}
 PATH = {"to": {"E11": 0.1, "E22": 0.0, "gamma12": 0.02}}
 ENVELOPE = {"plane": ["S11", "S12"], "directions": 8}
 
 
-def case_of(interface, rows, mesh_size=0.1, **analysis):
+def case_of(interface, rows, mesh_size=0.14, **analysis):
     """Return a case of three fibres; `rows` is what their table has beside circles."""
     (kind,) = analysis
     circles = [{"x": x, "y": y, "radius": 0.7} for x, y in CENTRES]
@@ -59,6 +67,7 @@ def weibull(shape, seed, n=3):
         ("strength", False, {"path": PATH}),
         ("released", True, {"path": PATH}),
         ("springs", False, {"path": PATH}),
+        ("bilinear", True, {"path": PATH}),
         ("strength", True, {"envelope": ENVELOPE}),
     ],
 )

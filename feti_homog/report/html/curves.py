@@ -20,6 +20,7 @@ from feti_homog.typing import Array
 COUNTS = {BONDED: "bonded", OPEN: "open", CLOSED: "closed"}
 MARKERS = "shown"  # name of the sources whose point the viewer of states moves
 DIRECTIONS = 181
+EQUILIBRIA = 0.4  # opacity
 
 Document = Mapping[str, Any]
 Curves = Mapping[str, Array]
@@ -49,11 +50,14 @@ def _path(document: Document, unit: str) -> dict[str, Any]:
     )
     _draw(first, strain, stress, number)
     if path_curves.is_proportional(document):
+        # Equilibria, with their snap-back, are behind the response to a rising load.
+        for line in first.renderers:
+            line.glyph.line_alpha = EQUILIBRIA
         rising = path_curves.load_controlled(points)
         for k, ink in zip(shown, INK, strict=False):
             label = f"{names[k]}, rising {path_curves.what_rises(document)}"
             x, y = rising[:, len(names) + component], rising[:, k]
-            first.line(x, y, color=ink, line_width=3, alpha=0.35, legend_label=label)
+            first.line(x, y, color=ink, line_width=2.5, legend_label=label)
     second = _figure("Stress along the path", "number of the point", f"macroscopic stress ({unit})")
     _draw(second, number, stress, number)
     return {"curve": _finished(first), "along": _finished(second), "counts": _counts(points, number, second.x_range)}

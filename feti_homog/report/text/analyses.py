@@ -13,7 +13,7 @@ import numpy as np
 
 from feti_homog.materials.plane_state import plane_state_of
 from feti_homog.report.text import material_axes, point_tables, stiffness_tables
-from feti_homog.report.text.path_table import path_table
+from feti_homog.report.text.path_table import path_table, peak_table
 from feti_homog.report.text.table import Table
 from feti_homog.results.kept_points import chosen, chosen_states
 
@@ -89,7 +89,7 @@ def _angle_tables(document: Document, label: str, most: int) -> list[Table]:
 
 
 def _path_tables(document: Document, label: str, most: int) -> list[Table]:
-    return [point_tables.all_numbers("path", document, label, chosen(document, most))]
+    return [peak_table(document, label), point_tables.all_numbers("path", document, label, chosen(document, most))]
 
 
 def _load_tables(document: Document, label: str, most: int) -> list[Table]:

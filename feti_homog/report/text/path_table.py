@@ -40,6 +40,23 @@ def path_table(document: Document, label: str) -> Table:
     return Table(f"Path{label}: {len(points)} points{some}; {broke} bonds broke", columns, rows, totals)
 
 
+def peak_table(document: Document, label: str) -> Table:
+    """Return first break, peak and valley: stress, strain and point."""
+    peak = peak_of(document)
+    places = {
+        "first break": ("first_break_stress", "first_break_strain", "first_break_event"),
+        "peak": ("stress", "strain", "event"),
+        "left after the peak": ("stress_left", "", "event_left"),
+    }
+    rows = [
+        [words, *(without_noise(peak[name]) if name else "" for name in names)]
+        for words, names in places.items()
+        if names[0] in peak
+    ]
+    columns = [Column(""), Column(f"{peak['stress_name']}{label}"), Column(peak["strain_name"]), Column("point")]
+    return Table("Peak of the path", columns, rows)
+
+
 def _path_columns(document: Document) -> dict[str, Any]:
     """Return the columns that vary along a path.
 

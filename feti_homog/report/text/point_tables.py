@@ -61,11 +61,11 @@ def _path_numbers(document: Document, title: str, names: Sequence[str], numbers:
     leading, points = path_curves.leading_component(document), document["path"]
     strains, stresses = voigt_names(len(points[0]["stress"]))
     head = ["point", "mark", strains[leading], *stresses, *names]
-    shown = [points[number] for number in numbers]
-    rows = [
-        [number, point.get("mark", ""), point["strain"][leading], *point["stress"], *(point[name] for name in names)]
-        for number, point in zip(numbers, shown, strict=True)
-    ]
+    strain, stress = (columns_without_noise([point[name] for point in points]) for name in ("strain", "stress"))
+    rows = []
+    for number in numbers:
+        point, means = points[number], [strain[number, leading], *stress[number]]
+        rows.append([number, point.get("mark", ""), *map(float, means), *(point[name] for name in names)])
     return Table(title, [*map(Column, head)], rows)
 
 

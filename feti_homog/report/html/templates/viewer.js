@@ -64,7 +64,7 @@
     const state = states[slider.value], component = Number(chosen.value), field = state.fields[component];
     const range = common.checked ? ranges[component] : [field.low, field.high];
     const ratio = window.devicePixelRatio || 1, margin = 6;
-    const width = view.parentElement.clientWidth, most = Math.max(240, 0.75 * window.innerHeight);
+    const width = view.parentElement.clientWidth, most = Math.max(240, 0.62 * window.innerHeight);
     const size = Math.min((width - 2 * margin) / frame.width, most / frame.height);
     const height = size * frame.height + 2 * margin;
     view.style.height = `${height}px`;
