@@ -165,7 +165,8 @@ class Output:
     )
     sensitivities: bool = key(
         boolean,
-        "Derivatives of every constant of the cell by every constant of its phases and elastic interfaces.",
+        "Derivatives of every constant of the cell by every constant of its phases and elastic interfaces, without "
+        "further solves. Debonded faces must have contact = false.",
         default=False,
         only=ANALYSIS_TYPE.among("stiffness"),
     )

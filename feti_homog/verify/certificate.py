@@ -19,6 +19,7 @@ from feti_homog.verify.check_loads import StateNumbers, check_load
 from feti_homog.verify.check_mesh import check_arcs, check_interface, check_mesh
 from feti_homog.verify.check_path import check_envelope, check_path
 from feti_homog.verify.check_points import check_points
+from feti_homog.verify.check_sensitivities import check_sensitivities
 from feti_homog.verify.check_spatial import check_spatial
 from feti_homog.verify.check_summary import check_summary, check_tables
 from feti_homog.verify.discrete_cell import DiscreteCell
@@ -153,6 +154,8 @@ def _verified(files: ResultFiles, directory: Path) -> Certificate:
     check_tables(findings, directory, files.document)
     if files.is_spatial:
         check_spatial(findings, cell, states)
+    if "sensitivities" in files.document:
+        check_sensitivities(findings, cell)
     return Certificate(findings.worst(), _title(files, states), _status(files))
 
 

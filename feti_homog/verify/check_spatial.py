@@ -48,8 +48,8 @@ def _check_stiffness(findings: Findings, document: Section) -> None:
         off = np.array(document["thermal_expansion"]) - strains
         findings.record("compliance", relative(off, float(np.abs(strains).max())), "thermal_expansion")
     for section, values in (
-        ("constants", _constants(stiffness)),
-        ("transversely_isotropic", _about_fibres(stiffness, strains)),
+        ("constants", engineering_constants(stiffness)),
+        ("transversely_isotropic", about_fibres(stiffness, strains)),
         ("transverse_moduli", _across_fibres(stiffness)),
     ):
         if document.get(section) is not None:
@@ -66,7 +66,7 @@ def _check_numbers(findings: Findings, section: str, told: Section, values: Mapp
             findings.record("moduli", relative(np.array(told[name] - value), scale), place)
 
 
-def _constants(stiffness: Float) -> dict[str, float]:
+def engineering_constants(stiffness: Float) -> dict[str, float]:
     """From the strains under unit stresses: E_i, nu_ij = -eps_j / eps_i under stress along i, G_ij."""
     strain = np.linalg.solve(stiffness, np.eye(6)).T
     found = {f"E{i + 1}": float(1 / strain[i, i]) for i in range(3)}
@@ -74,11 +74,11 @@ def _constants(stiffness: Float) -> dict[str, float]:
     return found | {f"G{name}": float(1 / strain[k, k]) for name, k in (("23", 3), ("13", 4), ("12", 5))}
 
 
-def _about_fibres(stiffness: Float, strains: Float | None) -> dict[str, float | None]:
+def about_fibres(stiffness: Float, strains: Float | None) -> dict[str, float | None]:
     """Constants of the mean of the tensor over turns about x3, and how far it is from that."""
     angles = np.arange(5) * 2 * np.pi / 5  # exact: the turned tensor has no more than four waves in a turn
     mean = np.mean([_turned(stiffness, angle) for angle in angles], axis=0)
-    own = _constants(mean)
+    own = engineering_constants(mean)
     voigt = VOIGT[6]
     norms = [
         np.linalg.norm(matrix[voigt[:, :, None, None], voigt[None, None]]) for matrix in (stiffness - mean, stiffness)
@@ -94,7 +94,7 @@ def _about_fibres(stiffness: Float, strains: Float | None) -> dict[str, float | 
 
 def _across_fibres(stiffness: Float) -> dict[str, float]:
     """Return the ranges of E1 and G12 in axes turned about x3."""
-    turned = [_constants(_turned(stiffness, angle)) for angle in np.pi * np.arange(DIRECTIONS) / DIRECTIONS]
+    turned = [engineering_constants(_turned(stiffness, angle)) for angle in np.pi * np.arange(DIRECTIONS) / DIRECTIONS]
     E, G = (np.array([own[name] for own in turned]) for name in ("E1", "G12"))
     return {
         "E_least": float(E.min()), "E_largest": float(E.max()),

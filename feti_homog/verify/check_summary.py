@@ -27,7 +27,7 @@ def check_summary(findings: Findings, cell: DiscreteCell) -> None:
     _check_fibres(findings, cell, document["fibres"])
     if document.get("moduli") is not None:
         stiffness = np.array(document["effective_stiffness"])
-        for name, value in _moduli(stiffness).items():
+        for name, value in moduli(stiffness).items():
             scale = max(abs(value), 1.0) if name in ("eta1", "eta2", "anisotropy") else abs(value)
             findings.record("moduli", relative(np.array(document["moduli"][name] - value), scale), f"moduli.{name}")
     if document.get("bounds") is not None:
@@ -82,7 +82,7 @@ def _unlike_scatter(cell: DiscreteCell) -> Float:
     return np.asarray(np.abs(np.log(strength) - np.log(hazard) / m + gammaln(1.0 + 1.0 / m)))
 
 
-def _moduli(stiffness: Float) -> dict[str, float]:
+def moduli(stiffness: Float) -> dict[str, float]:
     """Engineering moduli of a stiffness (3, 3), from the strains under unit stresses."""
     strain = np.linalg.solve(stiffness, np.eye(3))
     by_s11, by_s22, by_s12 = strain.T

@@ -26,6 +26,8 @@ CHECK_PER_RTOL, LARGEST_CHECK = 1e3, 1e-4
 CONTACT_PER_RTOL, LEAST_CONTACT = 100.0, 1e-6
 # Bonds whose utilisation differs by 1e-6 break together.
 STRENGTH = 2e-6
+# Differences of energies over a step of 1e-6.
+SLOPE = 1e-6
 # Utilisations at onset, from the same tractions as the onset.
 ONSET = 1e-9
 # Coordinates of a user's mesh are rounded: sides match to 1e-7 of the cell, circles are round to 1e-6 of their radius.
@@ -151,6 +153,11 @@ def checks(rtol: float, users_mesh: bool, has_coatings: bool) -> tuple[Check, ..
         ("moduli", "moduli follow from the stiffness, relative to each", 1e-10),
         ("compliance", "compliance and expansion follow from stiffness and thermal stress, relative to each", 1e-10),
         ("Levin", "thermal stress = - mean of expansion : stiffness : strain under unit strains, relative", solver),
+        (
+            "sensitivities",
+            "constants change with the materials and springs of the case as told, relative to each",
+            max(SLOPE, solver),
+        ),
         ("bounds", "bounds follow from fractions and materials, and the stiffness is between them", 1e-10),
     )
     return tuple(Check(*row) for row in rows)

@@ -1,0 +1,144 @@
+"""Law of the sensitivities: energies of the fields of unit loads change as told where constants of a case change."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from feti_homog.typing import Float
+from feti_homog.verify.check_spatial import about_fibres, engineering_constants
+from feti_homog.verify.check_summary import moduli
+from feti_homog.verify.constitutive_law import expansions, mixed_phases, plane_stiffnesses, spatial_stiffnesses
+from feti_homog.verify.discrete_cell import DiscreteCell
+from feti_homog.verify.elements import Elements
+from feti_homog.verify.findings import Findings, relative
+from feti_homog.verify.reading import State
+
+STEP = 1e-6
+# Constants beside the largest of their kind below which they are noise.
+NOISE = 1e-3
+WEIGHTS = (1.0, -0.7, 0.5, 0.9, -0.8)
+ORDER = [0, 1, 5, 2, 4, 3]  # of the unit strains of space among their states, a temperature left out
+Case = dict[str, Any]
+
+
+def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
+    """Check the values of all constants and parameters, and one derivative along a direction in which all change."""
+    told = cell.files.document["sensitivities"]
+    names, values = told["parameters"], np.array(told["parameter_values"])
+    own = np.array([_place(dict(cell.files.case), name)[2] for name in names])
+    findings.record("tables", relative(values - own, np.abs(own)), lambda k: f"sensitivities, {names[k]}")
+    sizes = np.array([_size(name, value) for name, value in zip(names, own, strict=True)])
+    direction = sizes * np.resize(WEIGHTS, len(own))
+    states = list(cell.files.states())
+    ends = [_energies(cell, states, _moved(cell, names, own + sign * STEP * direction)) for sign in (1, -1)]
+    slope = (ends[0] - ends[1]) / (2 * STEP)
+    document = cell.files.document
+    C, heat = np.array(document["effective_stiffness"]), document.get("thermal_stress")
+    heat = None if heat is None else np.array(heat)
+    here = _constants(C, heat)
+    step = 1e-5 * np.abs(C).max() / max(float(np.abs(slope).max()), 1e-300)
+    moved = [_constants(*_changed(C, heat, sign * step * slope)) for sign in (1, -1)]
+    for k, name in enumerate(told["constants"]):
+        kind = max(abs(value) for other, value in here.items() if other[0] == name[0])
+        terms = np.array(told["derivatives"][k]) * direction
+        expected = (moved[0][name] - moved[1][name]) / (2 * step)
+        scale = max(float(np.abs(terms).max()), abs(here[name]), NOISE * kind)
+        findings.record("sensitivities", relative(np.array(terms.sum() - expected), scale), name)
+        findings.record("moduli", abs(told["constant_values"][k] - here[name]) / max(abs(here[name]), NOISE * kind),
+                        f"sensitivities, {name}")  # fmt: skip
+
+
+def _place(case: Case, name: str) -> tuple[Any, Any, float]:
+    """Return the table and key of a parameter, and its value."""
+    section, *keys = name.split(".")
+    table: Any = case[section]
+    if section == "material" or isinstance(table, list):
+        first = keys.pop(0)
+        table = table[int(first) - 1] if isinstance(table, list) else table[first]
+    if len(keys) == 1:
+        return table, keys[0], float(table[keys[0]])
+    place = tuple(int(digit) - 1 for digit in keys[1] if digit.isdigit())
+    numbers = np.array(table[keys[0]], float)
+    return table, (keys[0], place), float(numbers[place])
+
+
+def _size(name: str, value: float) -> float:
+    """Return a change of a parameter over which the laws are nearly linear."""
+    return 0.5 - value if name.endswith(".poisson") and value < 0.5 else abs(value) or 1.0
+
+
+def _moved(cell: DiscreteCell, names: Sequence[str], values: Float) -> Case:
+    """Return the case with other values of the parameters."""
+    case: Case = copy.deepcopy(dict(cell.files.case))
+    for name, value in zip(names, values, strict=True):
+        table, key, _ = _place(case, name)
+        if isinstance(key, str):
+            table[key] = float(value)
+        else:
+            numbers = np.array(table[key[0]], float)
+            numbers[key[1]] = numbers[key[1][::-1]] = value
+            table[key[0]] = numbers.tolist()
+    return case
+
+
+def _energies(cell: DiscreteCell, states: Sequence[State], case: Mapping[str, Any]) -> Float:
+    """(v, v) or (6, 7) energies of pairs of the fields of unit loads, of which the first is a strain, in this case."""
+    files, phases = cell.files, cell.files.phases
+    stiffnesses = (spatial_stiffnesses if files.is_spatial else plane_stiffnesses)(case, phases)
+    free = expansions(case, phases) if files.is_spatial else None
+    elements = Elements(files.mesh, stiffnesses, mixed_phases(case, phases))
+    strains, heated = _in_order(states)
+    columns = []
+    for state in (*strains, *heated):
+        own = None if free is None else state.temperature * free
+        fields = elements.fields(state.displacement, np.abs(state.displacement), state.along, own)
+        out = float(elements.area @ fields.stress[:, 2]) if files.is_spatial else 0.0
+        column = [float((other.displacement * fields.force).sum()) + other.along * out for other in strains]
+        columns.append(np.array(column) + [_springs(cell, case, other, state) for other in strains])
+    return np.asarray(np.stack(columns, axis=1) / cell.area)
+
+
+def _in_order(states: Sequence[State]) -> tuple[list[State], list[State]]:
+    """Return those under unit strains in the order of their components, and that under a temperature."""
+    strains = [state for state in states if not state.temperature]
+    ordered = [strains[ORDER.index(k)] for k in range(6)] if len(strains) == len(ORDER) else strains
+    return ordered, [state for state in states if state.temperature]
+
+
+def _springs(cell: DiscreteCell, case: Mapping[str, Any], first: State, second: State) -> float:
+    """Sum of [u] k l [u] over the bonds that are no glue."""
+    sections, rows = case.get("interface") or [], cell.files.interface
+    found = 0.0
+    for number, section in enumerate(sections if isinstance(sections, list) else [sections]):
+        around = section.get("tangential_stiffness")
+        stiffnesses = section.get("normal_stiffness"), around, section.get("axial_stiffness") or around
+        bonded = (rows.pair == number) & (first.status == 0)
+        for k, stiffness in zip(range(first.jump.shape[1]), stiffnesses, strict=False):
+            if stiffness is not None and np.isfinite(float(stiffness)):
+                own = rows.length * first.jump[:, k] * second.jump[:, k]
+                found += float(stiffness) * float(own[bonded].sum())
+    return found
+
+
+def _changed(C: Float, heat: Float | None, change: Float) -> tuple[Float, Float | None]:
+    n = len(C)
+    return C + change[:, :n], None if heat is None else heat + change[:, n]
+
+
+def _constants(C: Float, heat: Float | None) -> dict[str, float]:
+    """Return every constant by its name."""
+    n = len(C)
+    found = {f"C{i + 1}{j + 1}": float(C[i, j]) for i in range(n) for j in range(i, n)}
+    if n == 3:
+        return found | moduli(C)
+    strains = None if heat is None else -np.linalg.solve(C, heat)
+    about = about_fibres(C, strains)
+    found |= engineering_constants(C) | {name: value for name, value in about.items() if value is not None}
+    if heat is None or strains is None:
+        return found
+    numbers = {"thermal_stress": heat, "expansion": strains}
+    return found | {f"{name}.{k + 1}": float(x[k]) for name, x in numbers.items() for k in range(3)}

@@ -1,0 +1,49 @@
+"""Sensitivities are verified from the fields; one derivative that is false breaks their law."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from support.falsifications import broken
+from support.verified_results import CARBON, FIBRE, HEXAGONAL, MATRIX, SPRINGS, SQUARE, TURNED, WARM, falsified
+
+from feti_homog import Case, run
+from feti_homog.verify.certificate import verify
+
+SIZING = {"young": 120.0, "poisson": 0.25, "expansion": 3e-5}
+CASES = {
+    "space": ("generalized", SQUARE | {"order": 2}, {"matrix": WARM, "fibre": CARBON}, SPRINGS),
+    "pairs": (
+        "generalized",
+        HEXAGONAL | {"coating": 0.2},
+        {"matrix": WARM, "fibre": CARBON, "coating": SIZING},
+        [SPRINGS | {"between": ["coating", "matrix"]}, SPRINGS | {"between": ["fibre", "coating"]}],
+    ),
+    "strain": ("strain", SQUARE | {"order": 2}, {"matrix": MATRIX, "fibre": TURNED}, None),
+    "stress": ("stress", SQUARE, {"matrix": {"stiffness": [[10, 2, 0], [2, 8, 0], [0, 0, 3]]}, "fibre": FIBRE}, None),
+}
+
+
+@pytest.mark.parametrize("kind", CASES)
+def test_sensitivities_are_verified(tmp_path, kind):
+    plane, cell, materials, interface = CASES[kind]
+    case = {
+        "cell": cell | {"mesh_size": 0.25},
+        "material": materials,
+        "analysis": {"type": "stiffness", "plane": plane},
+        "output": {"sensitivities": True, "pictures": False, "mesh_error": False},
+        "petsc": {"feti_ksp_rtol": 1e-10},
+    } | ({} if interface is None else {"interface": interface})
+    run(Case.parse(case), MPI.COMM_SELF, out=tmp_path / "own")
+    certificate = verify(tmp_path / "own")
+    assert certificate.holds, certificate.text
+    assert "sensitivities" in {finding.check.name for finding in certificate.findings}
+
+    def edit(document, _):
+        told = document["sensitivities"]
+        rows = np.abs(np.array(told["derivatives"]) * told["parameter_values"])
+        k = told["constants"].index("E1")
+        told["derivatives"][k][int(rows[k].argmax())] *= 1 + 1e-3
+
+    assert broken(falsified(tmp_path / "own", tmp_path / "copy", edit)) == {"files", "sensitivities"}
