@@ -274,8 +274,8 @@ def sensitivities(document: Document) -> list[Table]:
     shown = SHOWN["E3" in found["constants"]]
     at = [found["constants"].index(name) for name in shown if name in found["constants"]]
     width = max(len(name) for name in found["parameters"]) + 4
-    columns = [Column("", -width)]
-    columns += [Column(SHORT.get(name, name), 13, ".4g") for name in shown if name in found["constants"]]
+    heads = [SHORT.get(name, name) for name in shown if name in found["constants"]]
+    columns, of_slopes = ([Column("", -width), *(Column(head, 12, form) for head in heads)] for form in (".4f", ".3g"))
     slopes, shares = list[list[Any]](), list[list[Any]]()
     for j, (name, value) in enumerate(zip(found["parameters"], found["parameter_values"], strict=True)):
         row = [found["derivatives"][k][j] for k in at]
@@ -283,7 +283,7 @@ def sensitivities(document: Document) -> list[Table]:
         slopes.append([name, *row])
         shares.append([name, *(_share(slope * value, size) for slope, size in zip(row, sizes, strict=True))])
     words = "Elasticities, the relative change of a constant by that of a parameter"
-    return [Table(words, columns, shares), Table("Derivatives by the same parameters", columns, slopes)]
+    return [Table(words, columns, shares), Table("Derivatives by the same parameters", of_slopes, slopes)]
 
 
 def _share(change: float, size: float) -> float | str:
