@@ -271,19 +271,20 @@ def sensitivities(document: Document) -> list[Table]:
     """Elasticities d ln c / d ln p of constants c by parameters p, and derivatives dc / dp; none if not asked for."""
     if (found := document.get("sensitivities")) is None:
         return []
-    shown = SHOWN["E3" in found["constants"]]
-    at = [found["constants"].index(name) for name in shown if name in found["constants"]]
-    width = max(len(name) for name in found["parameters"]) + 4
-    heads = [SHORT.get(name, name) for name in shown if name in found["constants"]]
-    columns, of_slopes = ([Column("", -width), *(Column(head, 12, form) for head in heads)] for form in (".4f", ".3g"))
+    constants, width = found["constants"], max(map(len, found["parameters"])) + 4
+    at = [constants.index(name) for name in SHOWN["E3" in constants] if name in constants]
     slopes, shares = list[list[Any]](), list[list[Any]]()
     for j, (name, value) in enumerate(zip(found["parameters"], found["parameter_values"], strict=True)):
         row = [found["derivatives"][k][j] for k in at]
-        sizes = [found["constant_values"][k] for k in at]
         slopes.append([name, *row])
-        shares.append([name, *(_share(slope * value, size) for slope, size in zip(row, sizes, strict=True))])
+        shares.append(
+            [name, *(_share(slope * value, found["constant_values"][k]) for slope, k in zip(row, at, strict=True))]
+        )
     words = "Elasticities, the relative change of a constant by that of a parameter"
-    return [Table(words, columns, shares), Table("Derivatives by the same parameters", of_slopes, slopes)]
+    return [
+        Table(title, [Column("", -width), *(Column(SHORT.get(constants[k], constants[k]), 12, form) for k in at)], rows)
+        for title, form, rows in ((words, ".4f", shares), ("Derivatives by the same parameters", ".3g", slopes))
+    ]
 
 
 def _share(change: float, size: float) -> float | str:
