@@ -14,6 +14,7 @@ from unit.mesh.faulty_meshes import grid
 from feti_homog import Case, run
 from feti_homog.errors import ConvergenceError
 from feti_homog.parallel.mpi_errors import on_root
+from feti_homog.verify.certificate import verify
 
 pytestmark = [pytest.mark.parallel, pytest.mark.usefixtures("shared_interfaces")]
 
@@ -27,6 +28,7 @@ BILINEAR = {
     "tangential_toughness": 6e-5,
     "teeth": 4,
 }
+TOUGH = BILINEAR | {"normal_toughness": 2e-4, "tangential_toughness": 6e-4}
 INFLUENCE = {"feti_pc_type": "influence"}
 PATHS = {
     "uniaxial": ("strain", {"petsc": INFLUENCE}, [{"E11": 0.03, "S22": 0.0, "S12": 0.004}]),
@@ -36,6 +38,11 @@ PATHS = {
         "strain",
         {"petsc": INFLUENCE},
         [{"E11": 0.006, "S12": 0.004}, {"E11": -0.004, "S12": 0.0}, {"E11": 0.012, "S12": -0.01}],
+    ),
+    "faces overlap": (
+        "strain",
+        {"petsc": INFLUENCE, "interface": TOUGH | {"contact": False}},
+        [{"E11": -0.012, "gamma12": 0.03}, {"E11": 0.006, "gamma12": 0.0}, {"E11": -0.008, "gamma12": -0.03}],
     ),
 }
 
@@ -57,7 +64,7 @@ def test_paths_are_those_of_brute_force(comm, name):
     result, twin = solved(comm, **case), LoadedTwin(comm, **case)
 
     def followed():
-        path = SofteningPath(twin.cell, law_of(BILINEAR))
+        path = SofteningPath(twin.cell, law_of(case["interface"]))
         return path.follow(twin.loads, 12), path.fracture
 
     events, fracture = on_root(comm, followed)
@@ -91,6 +98,17 @@ def test_a_path_goes_on_where_it_was_ended(comm, shared_path):
         np.testing.assert_allclose(found.damaged_length, expected.damaged_length)
 
 
+def test_increments_count_bonds_that_soften_once(comm, shared_path):
+    """Bonds that lose several teeth in a step are one each: states before and after have as many."""
+    path = {"waypoints": [{"E11": 0.012, "gamma12": 0.004}], "method": "increments", "increments": 3}
+    written = document({}, EPOXY_GLASS, "strain", TOUGH, INFLUENCE, path=path)
+    written["output"] |= {"fields": True, "states": "all"}
+    result = run(Case.parse(written), comm, out=shared_path / "out")
+    assert sum(point.softened for point in result.path) > 4
+    certificate = on_root(comm, verify, shared_path / "out")
+    assert certificate.holds, certificate
+
+
 MOOSE = {
     "law": "bilinear",
     "normal_stiffness": 100.0,
@@ -100,7 +118,7 @@ MOOSE = {
     "normal_toughness": 0.05,
     "tangential_toughness": 0.1,
 }
-BRANCH = {"openings": [0.01, 0.05, 0.12], "tractions": [1.0, 0.25, 0.0]}
+BRANCH = {"openings": [0.01, 0.05, 0.12, 0.2], "tractions": [1.0, 0.25, 0.0, 0.0]}
 TABLE = {name: MOOSE[name] for name in MOOSE if name[:6] != "normal"} | {"law": "table"} | BRANCH
 STRETCH = (0.05 - 0.005) / 1.0
 

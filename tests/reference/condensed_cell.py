@@ -114,7 +114,7 @@ class CondensedCell:
         held = np.r_[np.zeros(n), np.where(load.by_stress, 0.0, load.values)]
         pulled = np.r_[np.zeros(n), self.area * np.where(load.by_stress, load.values, 0.0)]
         H = self.A + np.diag(np.r_[(self.springs * kept[:, None]).ravel(), np.zeros(self.m)])
-        touching = np.flatnonzero(kept < 1.0) if self.contact else np.zeros(0, int)
+        touching = np.flatnonzero((kept < 1.0) & (self.contact | (kept > 0.0)))
         # How far the springs of touching faces give way is an unknown of its own.
         gives = 0 if self.glued else len(touching)
         K = np.zeros((free.sum() + gives,) * 2)

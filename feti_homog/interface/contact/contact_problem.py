@@ -53,7 +53,7 @@ class ContactProblem:
 
     Attributes:
         solver: of the dual problem.
-        contact: false lets debonded faces overlap.
+        contact: false lets debonded faces overlap; damaged bonds are stiff under pressure all the same.
         size: (2,) of the cell, for the scale of displacements.
         softening: of the law of the bonds.
         block_pivots: see `BlockPivoting`.
@@ -94,10 +94,13 @@ class ContactProblem:
         return C
 
     def _gained(self, bonds: BondState) -> Float:
-        """(k,) normal compliance that damaged bonds have more if pulled than if pressed; 0 of others."""
+        """(k,) normal compliance that damaged bonds have more if pulled than if pressed; 0 of others.
+
+        None has along the fibres.
+        """
         pulled = np.ones(len(bonds.status), bool)
         soft, stiff = self.softening(bonds, pulled), self.softening(bonds, ~pulled)
-        if soft is None or stiff is None or not self.contact:
+        if soft is None or stiff is None or self.solver.jump_operator.components != 2:
             return np.zeros(len(pulled))
         C = self.solver.intact_compliance[self.nodes.row]
         return np.where(bonds.status == BONDED, C * (soft - stiff)[:, 0], 0.0)
@@ -201,19 +204,19 @@ class ContactProblem:
 
     def _placed(self, bonds: BondState, solution: DualSolution) -> tuple[DualSolution, Bool]:
         """Return the solution with free fibres where they have room, and which nodes (k,) break the KKT conditions."""
-        status = bonds.status
-        if not self.contact:
-            return solution, np.zeros(len(status), bool)
+        status, damaged = bonds.status, self.damaged(bonds)
         pressed = np.zeros(len(status), bool)
+        if not self.contact and not self._any(damaged):
+            return solution, pressed
         coarse, noise = self.solver.natural, self.scales.gap_noise(solution.strain)
-        if coarse.unconstrained_modes.shape[1]:
+        if self.contact and coarse.unconstrained_modes.shape[1]:
             placement = place(self.solver.comm, coarse, self.nodes, status == OPEN, solution, noise)
             alpha, jump = solution.alpha + placement.alpha, solution.jump + placement.jump(coarse)
             solution, pressed = replace(solution, alpha=alpha, jump=jump), placement.pressed
         force, gap = solution.lam[self.nodes.row], solution.jump[self.nodes.row]
-        force_noise, damaged = self.scales.force_noise(solution), self.damaged(bonds)
+        force_noise, meets = self.scales.force_noise(solution), (status == OPEN) & self.contact
         pulled = ((status == CLOSED) | (damaged & bonds.pressed)) & (force > force_noise)
-        overlaps = ((status == OPEN) & (gap < -noise)) | (damaged & ~bonds.pressed & (force < -force_noise))
+        overlaps = (meets & (gap < -noise)) | (damaged & ~bonds.pressed & (force < -force_noise))
         return solution, pulled | overlaps | pressed
 
     def _equilibrium(

@@ -26,8 +26,8 @@ class PiecewiseLinear(CohesiveLaw):
 
     @property
     def last(self) -> float:
-        """Return where tau is none."""
-        return self.knots[-1]
+        """Return where tau is none at first."""
+        return self.knots[self.heights.index(0.0)]
 
     def shape(self, u: Float) -> Float:
         """tau(u) of u >= 0."""

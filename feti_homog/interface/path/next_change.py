@@ -46,8 +46,6 @@ def first_change(interface: ContactProblem, state: Equilibrium, ahead: DualSolut
     when its force is none; open nodes of a fibre that is held close when their gap is none, those of a free
     fibre when it has no more room (its gaps are not unique).  Collective.
     """
-    if not interface.contact:
-        return 1.0, 1.0
     solver, nodes = interface.solver, interface.nodes
     tension = np.maximum(interface.scales.force_noise(state.solution), interface.scales.force_noise(ahead))
     # Damaged bonds turn from pulled to pressed, or back, where their force is none.
@@ -56,9 +54,11 @@ def first_change(interface: ContactProblem, state: Equilibrium, ahead: DualSolut
     pressure = np.where(damaged & ~state.bonds.pressed, 1.0, -1.0)[at]
     here, there = (pressure * lam[nodes.row][at] for lam in (state.solution.lam, ahead.lam))
     shares = [shares_to_zero(here, there, tension[at])]
-    is_open, here, there = state.status == OPEN, state.solution.jump[nodes.row], ahead.jump[nodes.row]
+    # Faces without contact overlap.
+    is_open = (state.status == OPEN) & interface.contact
+    here, there = state.solution.jump[nodes.row], ahead.jump[nodes.row]
     noise = max(interface.scales.gap_noise(state.solution.strain), interface.scales.gap_noise(ahead.strain))
-    if solver.natural.unconstrained_modes.shape[1]:
+    if interface.contact and solver.natural.unconstrained_modes.shape[1]:
         shares.append(admissible_share(solver.comm, solver.natural, nodes, is_open, here, there, noise))
     else:
         shares.append(shares_to_zero(here[is_open], there[is_open], noise))

@@ -15,6 +15,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
+from feti_homog.interface.contact.states import BONDED
 from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.loads.load import Load
 from feti_homog.interface.path.later_leg import LaterLeg
@@ -25,6 +26,7 @@ from feti_homog.interface.path.path_points import (
     PathState,
     Point,
     break_bonds,
+    count_on_all_ranks,
     most_utilised,
 )
 
@@ -73,7 +75,7 @@ def increments(
 
 def _increment(cell: CoupledInterfaces, law: BondLaw, load: Load, worst_only: bool, begin: PathState) -> Point:
     """Return the state under a load after all overloaded bonds have broken."""
-    bonds, lam, here, broke, softened = begin.bonds, begin.lam, begin, 0, 0
+    bonds, lam, here, broke = begin.bonds, begin.lam, begin, 0
     energies = NO_ENERGIES
     while True:
         state = cell.equilibrium(load, bonds, lam)
@@ -82,11 +84,13 @@ def _increment(cell: CoupledInterfaces, law: BondLaw, load: Load, worst_only: bo
         used, largest, which = most_utilised(cell, law, state)
         here = PathState(begin.leg, 0.0, state.bonds, lam, begin.origin, reached)
         if largest <= 1.0 + UTILISATION_TIE or not state.converged:
+            weaker = (bonds.history != begin.bonds.history).any(axis=1) & (state.status == BONDED)
+            softened = count_on_all_ranks(cell, weaker)
             return Point(0.0, 1.0, state, broke, softened, energies, used, here)
         if not worst_only:
             which = used > 1.0
-        bonds, parted, damaged, fracture = break_bonds(cell, law, which, state)
-        broke, softened = broke + parted, softened + damaged
+        bonds, parted, _, fracture = break_bonds(cell, law, which, state)
+        broke += parted
         here = PathState(begin.leg, 0.0, bonds, lam, begin.origin, reached, fracture)
 
 

@@ -77,7 +77,7 @@ class Point:
         scale: the state is `scale` times the equilibrium `state`.
         state: that equilibrium.
         broke: number of bonds that part at this state, after it; of increments, that did in the step, before it.
-        softened: number of bonds that are damaged there, but hold.
+        softened: number of bonds that are damaged there, but hold; of increments each once, whatever its teeth.
         energies: between the last point's state and this one.
         used: (k,) share of their strength that bonds use in the state, 0 where there are none.
         after: from where the path goes on.
@@ -120,7 +120,7 @@ def break_bonds(cell: CoupledInterfaces, law: BondLaw, which: Bool, state: Equil
     energy = _fracture_energy(cell, law, which, state.bonds, traction)
     # A first guess, which the search for contact checks.
     pressed = np.where(which, traction[:, 0] < 0.0, state.bonds.pressed)
-    parted, softened = (_count_on_all_ranks(cell, nodes) for nodes in (parts, which & ~parts))
+    parted, softened = (count_on_all_ranks(cell, nodes) for nodes in (parts, which & ~parts))
     return Break(BondState(status, history, pressed), parted, softened, energy)
 
 
@@ -144,6 +144,6 @@ def most_utilised(cell: CoupledInterfaces, law: BondLaw, state: Equilibrium) -> 
     return used, float(largest), (used >= largest * (1.0 - UTILISATION_TIE)) & (used > 0.0)
 
 
-def _count_on_all_ranks(cell: CoupledInterfaces, which: Bool) -> int:
+def count_on_all_ranks(cell: CoupledInterfaces, which: Bool) -> int:
     """Count the nodes of `which` (k,) on all ranks.  Collective."""
     return int(cell.comm.allreduce(int(which.sum())))

@@ -190,8 +190,9 @@ class Table(Cohesive):
 
     @property
     def last(self) -> float:
-        """Return where the traction is none."""
-        return float(self._points[0][-1])
+        """Return where the traction is none at first."""
+        places, heights = self._points
+        return float(places[heights == 0.0][0])
 
     def branch(self, u: Float) -> Float:
         """Interpolate the table."""
