@@ -86,6 +86,17 @@ feti_pc_type = "influence"
 """
 INCREMENTS = 'waypoints = [[0.1, 0.0, 0.0], [-0.05, 0.02, 0.0]]\nmethod = "increments"\nincrements = 24'
 LATER_LEGS = "waypoints = [[0.02, 0.0, 0.0], [-0.05, 0.02, 0.0], [0.1, 0.0, 0.0]]"
+TEETH = """\
+law = "bilinear"
+normal_stiffness = 4000.0
+tangential_stiffness = 3000.0
+normal_toughness = 0.01
+tangential_toughness = 0.02
+teeth = 3
+normal_strength = 4.0"""
+# What is changed in a case, by the key of its line.
+KINDS = {"increments": {"strain": INCREMENTS}, "later legs": {"strain": LATER_LEGS}}
+KINDS["softening"] = {"mesh_size": "mesh_size = 0.2", "normal_strength": TEETH}
 SOLVE = "feti_homog.feti.solver:FetiSolver.solve"
 
 
@@ -176,15 +187,20 @@ def test_a_path_killed_again_and_again_ends_as_one_left_in_peace(tmp_path, refer
     assert not (out / "checkpoint").exists()
 
 
-@pytest.mark.parametrize(("ranks", "path"), [(2, INCREMENTS), (1, LATER_LEGS)], ids=["increments", "later legs"])
-def test_paths_of_every_kind_resume(tmp_path, ranks, path):
-    case = case_file(tmp_path, strain=path)
+@pytest.mark.parametrize(("ranks", "kind"), [(2, "increments"), (1, "later legs"), (1, "softening")])
+def test_paths_of_every_kind_resume(tmp_path, ranks, kind):
+    case = case_file(tmp_path, **KINDS[kind])
     assert command_line(ranks, "run", case, "--out", tmp_path / "whole").returncode == 0
     kept = killed(ranks, case, tmp_path / "out", 8)
     job = command_line(ranks, "run", case, "--out", tmp_path / "out", "--resume")
     assert job.returncode == 0, job.stderr
-    assert document(tmp_path / "out")["resumed"] == kept == 8
-    assert_same_curve(document(tmp_path / "out")["path"], document(tmp_path / "whole")["path"])
+    found, expected = (document(tmp_path / name) for name in ("out", "whole"))
+    assert found["resumed"] == kept == 8
+    assert_same_curve(found["path"], expected["path"])
+    if kind == "softening":
+        assert sum(point["softened"] for point in expected["path"][:kept]) > 0
+        for key in ("softened", "fracture_energy", "damaged_length"):
+            np.testing.assert_allclose(*([point[key] for point in of["path"]] for of in (found, expected)), rtol=1e-6)
 
 
 def test_a_cooled_path_in_space_resumes(tmp_path):

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from reference.closed_forms import lame
-from reference.softening_path import SofteningPath, Teeth
+from reference.softening_path import SofteningPath, Teeth, exact_stresses
 from support.loaded_twins import EPOXY_GLASS, LoadedTwin, document, solved
 from unit.mesh.faulty_meshes import grid
 
@@ -80,6 +80,24 @@ def test_paths_are_those_of_brute_force(comm, name):
         taken = fracture[sum(bool(e.broke.any()) for e in events[:k])]
         assert point.fracture_energy == pytest.approx(taken, rel=1e-8, abs=1e-12 * energy)
     _check_the_energy_book(result.path)
+
+
+def test_teeth_converge_to_the_law(comm):
+    """So tough an interface holds without snap-back: the law itself is followed by small steps of the strain."""
+    tough = BILINEAR | {"normal_toughness": 4e-4, "tangential_toughness": 8e-4}
+    case = {"cell": {}, "phases": EPOXY_GLASS, "plane": "strain", "petsc": INFLUENCE, "path": {"to": {"E11": 0.03}}}
+    case["path"]["to"] |= {"E22": 0.0, "gamma12": 0.0}
+    twin, steps = LoadedTwin(comm, interface=tough, **case), 40
+    exact = on_root(comm, lambda: exact_stresses(twin.cell, law_of(tough), twin.loads[0], steps))[:, 0]
+    errors = []
+    for teeth in (5, 10, 20):
+        rising = solved(comm, interface=tough | {"teeth": teeth}, **case).rising_strain()
+        found = np.interp(np.arange(1, steps + 1) / steps * 0.03, rising["E11"], rising["S11"])
+        errors.append(np.sqrt(np.mean((found - exact) ** 2)) / exact.max())
+    assert exact[-1] < 0.7 * steps * exact[0]
+    for coarse, fine in pairwise(errors):
+        assert coarse / fine == pytest.approx(2.0, rel=0.35)
+    assert errors[-1] < 0.02
 
 
 def test_a_path_goes_on_where_it_was_ended(comm, shared_path):
@@ -169,16 +187,16 @@ def test_a_laminate_follows_its_law_through_snap_back(comm, strip, interface, br
     assert excess[0] > excess[1] > 0.0 and excess[0] / excess[1] == pytest.approx(2.0, rel=0.35)
 
 
-def test_limits_of_the_law(comm, strip):
+@pytest.mark.parametrize("to", [{"E11": 3.0, "E22": 0.0, "gamma12": 0.0}, {"E11": 0.0, "E22": 0.0, "gamma12": 5.0}])
+def test_limits_of_the_law(comm, strip, to):
     """One tooth is the energy criterion on springs, the least toughness a strength on them.
 
     The largest numbers are neither.
     """
     run_strip, _ = strip
-    to = {"E11": 3.0, "E22": 0.0, "gamma12": 0.0}
     springs = {name: MOOSE[name] for name in ("normal_stiffness", "tangential_stiffness")}
     strengths = {name: MOOSE[name] for name in ("normal_strength", "tangential_strength")}
-    by_energy = springs | {"criterion": "energy", "growth": "springs", "toughness": 0.05}
+    by_energy = springs | {"criterion": "energy", "growth": "springs", "toughness": 0.05, "mode_sensitivity": 0.5}
     strong = {name: 1e9 * value for name, value in MOOSE.items() if "str" in name or "tough" in name} | springs
     strong |= {"law": "bilinear", "normal_toughness": 1e18, "tangential_toughness": 1e18, "teeth": 2}
     least = {"normal_toughness": 0.005, "tangential_toughness": 0.005, "teeth": 1}

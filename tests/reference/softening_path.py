@@ -50,10 +50,34 @@ class Teeth:
         at = first * last / (last - d * (last - first))
         return np.sqrt(at[0] * at[1])
 
+    def damage(self, jump):
+        """(k,) damage of the law itself at jumps (k, 2)."""
+        delta, _, first, last = self.openings(jump)
+        delta = np.clip(delta, first, last)
+        return last * (delta - first) / delta / (last - first)
+
     def used(self, cell, state, kept):
         """(k,) opening over that of the next tooth."""
         level = np.abs(np.subtract.outer(1 - kept, self.levels)).argmin(axis=1)
         return self.openings(state.jump)[0] / self.breaking(state.jump, level) * (kept > 0)
+
+
+def exact_stresses(cell, law, load, steps, substitutions=2000):
+    """Return (steps, m) stresses at equal steps of a load under the law without teeth.
+
+    Its damage is an internal variable, by repeated substitution, which converges where the cell is stable.
+    """
+    damage, found = np.zeros(cell.k), []
+    for step in range(1, steps + 1):
+        for _ in range(substitutions):
+            state, before = cell.equilibrium(load.scaled(step / steps), 1.0 - damage), damage
+            damage = np.maximum(damage, law.damage(state.jump))
+            if np.abs(damage - before).max() < 1e-9:
+                break
+        else:
+            raise ArithmeticError(f"step {step} does not settle")
+        found.append(state.stress)
+    return np.array(found)
 
 
 class SofteningPath(MixedPath):
