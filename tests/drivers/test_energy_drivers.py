@@ -32,6 +32,22 @@ def test_curves_by_energy_that_is_released_depend_little_on_the_mesh(tmp_path):
     assert spread["released"] < 0.05 < spread["springs"] < spread["strength"]
 
 
+def test_a_cohesive_law_beside_brittle_bonds(tmp_path):
+    rows = driven("cohesive_fibre", tmp_path, "--table")
+    onset, teeth = column(rows, "onset S11"), column(rows, "teeth")
+    assert [row["law"] for row in rows[:3]] == ["strength", "released", "bilinear"]
+    # On the same mesh with two numbers of teeth: the first exceeds the peak by rho^(1 / 2 n), rho = 2 K G / N^2.
+    rho = 2 * 1e4 * 2 / 60**2
+    assert teeth[2] == 2 and teeth[4] == 4
+    assert onset[2] / onset[4] == pytest.approx(rho ** (1 / 8), rel=1e-9)
+    # The last row is that of a prototype with other triangles: first event, then where debonding is stable.
+    assert onset[-1] == pytest.approx(49.723, rel=0.01)
+    at = [float(rows[-1][f"S11 at {x:g}"]) for x in (0.6, 0.8, 1.0, 1.5, 2.0, 3.0)]
+    np.testing.assert_allclose(at, [27.27, 26.27, 26.68, 29.94, 35.66, 49.97], rtol=0.03)
+    # Twice the toughness holds more bonds at the same strength.
+    assert rows[3]["toughness"] == "2.0" and float(rows[3]["debonding angle"]) < float(rows[2]["debonding angle"])
+
+
 def of_its_path(row, folder, component, name=""):
     """Return the result in a folder.
 
