@@ -33,7 +33,7 @@ APPLY_SECONDS = 4.2e-8
 BASE_BYTES, DOF_BYTES, COLUMN_BYTES = 1.8e8, 1.5e3, 2.0e4
 # Bytes of result.h5: of a state for each node, element and interface node in the plane, and what is along the fibres
 # besides; of the mesh for each node and element, and of the interface's nodes.
-STATE_BYTES, AXIAL_BYTES = np.array([16, 32, 137]), np.array([8, 16, 16])
+STATE_BYTES, AXIAL_BYTES = np.array([16, 36, 137]), np.array([8, 16, 16])
 MESH_BYTES, CORNER_BYTES = np.array([16, 16, 80]), 8
 # Seconds to make and write the fields of a state, for each element.
 STATE_SECONDS = 6e-7

@@ -25,6 +25,8 @@ OF_UNITS = {
 }
 # The same of entries whose unit the reference leaves to the case.
 OF_PATHS = {"path[].temperature": (0, 0, 1), "load.temperature": (0, 0, 1)}
+# Entries of constants, whose errors have their units.
+OF_CONSTANTS = {"moduli", "constants", "transversely_isotropic", "transverse_moduli"}
 # What is no number of the response: where and when it was computed, and the case itself.
 APART = {"case", "digest", "version", "timings", "memory", "checksum", "result_h5"}
 
@@ -85,7 +87,10 @@ def powers_of_keys(document: Mapping[str, Any]) -> dict[str, tuple[int, int, int
     """
     axes = document["case"].get("envelope", {}).get("plane", [""])
     factor = int(axes[0].startswith("S")), 0, 0
-    return {key.path: OF_UNITS[key.unit] for key in schema_keys()} | OF_PATHS | {"envelope[].factor": factor}
+    powers = {key.path: OF_UNITS[key.unit] for key in schema_keys()} | OF_PATHS | {"envelope[].factor": factor}
+    places = [path.split(".") for path in powers if path.count(".") == 1]
+    errors = {f"mesh_error.constants.{name}": powers[f"{of}.{name}"] for of, name in places if of in OF_CONSTANTS}
+    return powers | errors
 
 
 def in_units(document: Mapping[str, Any], units: Units) -> dict[str, Any]:

@@ -29,7 +29,7 @@ def case_of(folder: Path, image: np.ndarray, **interface: Any) -> Case:
         "cell": {"geometry": "mesh", "file": "pixels.msh"},
         "material": {"matrix": MATRIX, "fibre": FIBRE},
         "analysis": {"type": "stiffness", "plane": "strain"},
-        "output": {"pictures": False},
+        "output": {"pictures": False, "mesh_error": False},
     }
     return Case.parse(document | interface, folder)
 
