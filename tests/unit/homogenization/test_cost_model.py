@@ -76,6 +76,6 @@ def test_kept_states_are_told():
     case = make_case(plane="generalized")
     assert "6 states of 6.1 MiB, 41 MiB in" in cost_model.fields_line(case, 50_000, 100_000, 0, 1)
     path = replace(case, analysis=replace(case.analysis, type="path"), path=LoadPath(to={"E11": 1.0}))
-    assert "at most 20 states of 6.2 MiB, 128 MiB in" in cost_model.fields_line(path, 50_000, 100_000, 3000, 1)
+    assert "at most 20 states of 6.5 MiB, 136 MiB in" in cost_model.fields_line(path, 50_000, 100_000, 3000, 1)
     every = replace(path, output=replace(path.output, states="all"))
     assert "for each state" in cost_model.fields_line(every, 50_000, 100_000, 3000, 1)
