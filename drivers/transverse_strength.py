@@ -4,7 +4,9 @@
 
 Each seed is another arrangement of 50 fibres of 7.5 um, 50 %, plane strain, strained along 1 alone.  Springs of 2025
 and 506.25 MPa/um, toughness 2 J/m2; where debonding has begun bonds break by what that releases, so that elements of
-0.8 um on the interface are fine enough.  The matrix stays elastic: the peak is that of debonding.
+0.8 um on the interface are fine enough.  `--law bilinear` has springs of 1e4 MPa/um instead, strengths of 50 and
+70.71 MPa in opening and shear and toughnesses of 2 and 4 J/m2, with a process zone of three such elements; the first
+break is then that of a tooth.  The matrix stays elastic: the peak is that of debonding.
 """
 
 from __future__ import annotations
@@ -12,6 +14,7 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
+from typing import Any
 
 import figures
 import numpy as np
@@ -21,11 +24,22 @@ from mpi4py.MPI import Intracomm
 from feti_homog import Case, Result, launch
 
 MATERIAL = {"matrix": {"young": 2790.0, "poisson": 0.33}, "fibre": {"young": 70800.0, "poisson": 0.22}}  # MPa
-INTERFACE = {
-    "normal_stiffness": 2025.0,
-    "tangential_stiffness": 506.25,
-    "criterion": "energy",
-    "toughness": 2.0,
+INTERFACES: dict[str, dict[str, Any]] = {
+    "energy": {
+        "normal_stiffness": 2025.0,
+        "tangential_stiffness": 506.25,
+        "criterion": "energy",
+        "toughness": 2.0,
+    },
+    "bilinear": {
+        "normal_stiffness": 1e4,
+        "tangential_stiffness": 1e4,
+        "law": "bilinear",
+        "normal_strength": 50.0,
+        "tangential_strength": 50.0 * np.sqrt(2.0),
+        "normal_toughness": 2.0,
+        "tangential_toughness": 4.0,
+    },
 }
 RADIUS = 7.5  # um
 COLUMNS = ("seed", "C11", "first break S11", "peak S11", "E11 at peak", "points")
@@ -34,13 +48,14 @@ COLUMNS = ("seed", "C11", "first break S11", "peak S11", "E11 at peak", "points"
 def main(given: argparse.Namespace, comm: Intracomm) -> None:
     """Follow the path of each seed; print, write and draw."""
     if given.quick:
-        given.seeds, given.fibres, given.refine = 2, 4, 0
+        given.seeds, given.fibres, given.refine, given.teeth = 2, 4, 0, 2
     found = {seed: solved(given, comm, seed) for seed in range(given.seeds)}
     figures.finish(comm, write, given.out, found)
 
 
 def solved(given: argparse.Namespace, comm: Intracomm, seed: int) -> Result:
     """Return the path of one arrangement."""
+    teeth = {"teeth": given.teeth} if given.law == "bilinear" else {}
     document = {
         "name": f"seed {seed}",
         "cell": {
@@ -56,7 +71,7 @@ def solved(given: argparse.Namespace, comm: Intracomm, seed: int) -> Result:
         },
         "material": MATERIAL,
         "analysis": {"type": "path", "plane": "strain"},
-        "interface": INTERFACE,
+        "interface": INTERFACES[given.law] | teeth,
         "path": {"strain": [given.strain, 0.0, 0.0]},
         "output": figures.written(given) | {"stress_unit": "MPa", "length_unit": "um"},
     }
@@ -102,6 +117,8 @@ def write(folder: Path, found: dict[int, Result]) -> list[Path]:
 
 if __name__ == "__main__":
     options = figures.quick_parser(__doc__ or "", "transverse_strength", "two cells of four fibres, long elements")
+    options.add_argument("--law", default="energy", choices=list(INTERFACES), help="of the interface")
+    options.add_argument("--teeth", type=int, default=16, help="of a bilinear law")
     options.add_argument("--seeds", type=int, default=10, help="arrangements: 0, 1, ...")
     options.add_argument("--fibres", type=int, default=50)
     options.add_argument("--fibre-fraction", type=float, default=0.5)
