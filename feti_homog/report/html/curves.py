@@ -60,7 +60,14 @@ def _path(document: Document, unit: str) -> dict[str, Any]:
             first.line(x, y, color=ink, line_width=2.5, legend_label=label)
     second = _figure("Stress along the path", "number of the point", f"macroscopic stress ({unit})")
     _draw(second, number, stress, number)
-    return {"curve": _finished(first), "along": _finished(second), "counts": _counts(points, number, second.x_range)}
+    found = {"curve": _finished(first), "along": _finished(second), "counts": _counts(points, number, second.x_range)}
+    if "damaged_length" in points[0]:
+        length = document["case"]["output"].get("length_unit", "") or "unit of the cell"
+        third = _figure("Damaged bonds that hold", "number of the point", f"damaged length ({length})")
+        third.x_range = second.x_range
+        _draw(third, number, {"damaged": np.array([sum(point["damaged_length"]) for point in points])}, number)
+        found["damaged"] = _finished(third)
+    return found
 
 
 def _angle(document: Document, unit: str) -> dict[str, Any]:

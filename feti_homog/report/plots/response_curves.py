@@ -106,6 +106,7 @@ def _path(document: Document) -> Figure:
     _mark_peak(upper, document, INK[component])
     for axes in (upper, middle, lower):
         _finish(axes)
+    _damaged_length(lower, document, style)
     return figure
 
 
@@ -147,13 +148,26 @@ def _stress_curves(
 def _temperature(axes: Axes, points: Sequence[Mapping[str, Any]], style: Mapping[str, Any]) -> None:
     """Draw the change of temperature along a path, if there is any, on its own axis."""
     if any(point.get("temperature") for point in points):
-        beside = axes.twinx()
-        label = r"change of temperature $\Delta T$"
-        beside.plot([point["temperature"] for point in points], color="0.5", linestyle="--", linewidth=1.0, **style)
-        beside.axhline(0.0, linestyle="none")  # from which the change is
-        beside.set_ylabel(label, color="0.4", fontsize=8)
-        beside.tick_params(colors="0.4", labelsize=8)
-        beside.spines["top"].set_visible(False)
+        _beside(axes, [point["temperature"] for point in points], r"change of temperature $\Delta T$", style)
+
+
+def _damaged_length(axes: Axes, document: Document, style: Mapping[str, Any]) -> None:
+    """Draw the length of bonds that are damaged but hold, of laws that soften, on its own axis."""
+    if "damaged_length" in document["path"][0]:
+        unit = unit_label(document["case"].get("output", {}).get("length_unit", ""))
+        lengths = [sum(point["damaged_length"]) for point in document["path"]]
+        _beside(axes, lengths, f"damaged length {unit}".rstrip(), style)
+        axes.legend(frameon=False, fontsize=9, loc="upper left", bbox_to_anchor=(1.12, 1.0))
+
+
+def _beside(axes: Axes, values: Sequence[float], label: str, style: Mapping[str, Any]) -> None:
+    """Draw values along a path on an axis at the right."""
+    beside = axes.twinx()
+    beside.plot(values, color="0.5", linestyle="--", linewidth=1.0, **style)
+    beside.axhline(0.0, linestyle="none")  # from which they are measured
+    beside.set_ylabel(label, color="0.4", fontsize=8)
+    beside.tick_params(colors="0.4", labelsize=8)
+    beside.spines["top"].set_visible(False)
 
 
 def _count_curves(axes: Axes, points: Sequence[Mapping[str, Any]], style: Mapping[str, Any]) -> None:

@@ -222,7 +222,13 @@ def test_points_of_a_path_are_numbered_where_its_curve_folds_back(tmp_path: Path
 
 
 def test_curves_of_the_page_have_their_names_and_units() -> None:
-    found = {name: curves(figure) for name, figure in interactive.figures(path_of([0.5, 0.2, 1.0])).items()}
+    document = path_of([0.5, 0.2, 1.0])
+    document["case"]["output"]["length_unit"] = "um"
+    document["path"] = [point | {"damaged_length": [point["strain"][0], 0.5]} for point in document["path"]]
+    found = {name: curves(figure) for name, figure in interactive.figures(document).items()}
+    beside = response_curves._path(document).axes[-1]
+    assert found["damaged"][1] == beside.get_ylabel() == "damaged length (um)"
+    assert found["damaged"][2]["damaged"].tolist() == list(beside.lines[0].get_ydata()) == [1.0, 0.7, 1.5]
     assert found["curve"][:2] == ("macroscopic strain E11", "macroscopic stress (GPa)")
     for name, factor in (("S11", 3.0), ("S22", 1.0), ("S12", 0.5)):
         assert found["along"][2][name] == pytest.approx([factor * t for t in (0.5, 0.2, 1.0)])
