@@ -137,6 +137,13 @@ def _files() -> Iterator[Rule]:
         yield needed(CELL, name, line, TABLE, beside="fibre_list")
 
 
+def _output() -> Iterator[Rule]:
+    """Yield what some analyses cannot give."""
+    others = ANALYSIS_TYPE.among(*(name for name in _values(ANALYSIS_TYPE) if name != "stiffness"))
+    line = 'belongs to [analysis] type = "stiffness"'
+    yield refused(("output", "sensitivities"), {"type": "boolean", "enum": [True]}, line, others)
+
+
 def _loads() -> Iterator[Rule]:
     """One form of a path; of each component its strain or its stress, by name in generalized plane strain."""
     given: Schema = {"anyOf": [{"required": [name]} for name in LOADS]}
@@ -191,6 +198,7 @@ RULES = (
     *_conditional_keys(),
     *_cell(),
     *_files(),
+    *_output(),
     exclusive(("decomposition",), "subdomains", "max_dofs"),
     *_bonds(),
     *_loads(),

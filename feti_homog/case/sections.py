@@ -17,7 +17,6 @@ from feti_homog.case.load_section import Envelope, LoadPath, SingleLoad
 from feti_homog.case.mixed_load import MixedLoad, Strain
 from feti_homog.case.section_values import OPENINGS, SEED, STATES, STRAIN
 from feti_homog.case.selectors import (
-    ANALYSIS_TYPE,
     ANGLE_ANALYSIS,
     ENVELOPE_ANALYSIS,
     IN_THE_PLANE,
@@ -166,9 +165,8 @@ class Output:
     sensitivities: bool = key(
         boolean,
         "Derivatives of every constant of the cell by every constant of its phases and elastic interfaces, without "
-        "further solves. Debonded faces must have contact = false.",
+        'further solves, in [analysis] type = "stiffness". Debonded faces must have contact = false.',
         default=False,
-        only=ANALYSIS_TYPE.among("stiffness"),
     )
     pictures: bool = key(boolean, "Draw the PNG files; without fields, the curves alone.", default=True)
     report: bool = key(boolean, "Write report.html: numbers, pictures, curves and states on one page.", default=False)

@@ -16,7 +16,7 @@ Path = tuple[str, ...]
 
 ITEMS = "items"
 """In a path: the entries of a list."""
-_TYPES: dict[str, Any] = {"object": dict, "array": list, "string": str}
+_TYPES: dict[str, Any] = {"object": dict, "array": list, "string": str, "boolean": bool}
 
 
 @dataclass(frozen=True)
