@@ -8,6 +8,7 @@ reaches across an interface, where stresses jump.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -221,7 +222,7 @@ def _translations(d: Float, order: int) -> Float:
 def _gathered(place: Int, values: Float, size: int) -> Float:
     """(size, ..) sums of the values (n, ..) at the places (n,)."""
     n = len(place)
-    sums = csr_matrix((np.ones(n), (place, np.arange(n))), (size, n)) @ values.reshape(n, -1)
+    sums = csr_matrix((np.ones(n), (place, np.arange(n))), (size, n)) @ values.reshape(n, math.prod(values.shape[1:]))
     return np.asarray(sums.reshape(size, *values.shape[1:]))
 
 
