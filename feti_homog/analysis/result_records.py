@@ -173,7 +173,7 @@ class PathPoint:
         default=None,
     )
     broke: int = described("bonds that break at this event, or broke in the step to this increment")
-    softened: int | None = described("bonds that are damaged there, but hold; of laws that soften", default=None)
+    softened: int | None = described("bonds that lose a tooth at this event but hold, of softening laws", default=None)
     free_motions: int = described("rigid motions of fibres that no interface force resists")
     stored: float = described("elastic energy stored per area of the cell", STRESS)
     stored_in_springs: float = described("the share of elastic interfaces in it", STRESS)

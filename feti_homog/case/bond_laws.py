@@ -41,7 +41,7 @@ STRENGTHS = ("normal_strength", "tangential_strength", "axial_strength")
 OF_SOFTENING = ("mixing_exponent", "teeth", "softening_tolerance")
 COHESIVE = (*STRENGTHS[:2], "normal_toughness", "tangential_toughness")
 BRANCH = ("openings", "tractions")
-"""Of one cohesive law, the numbers that all of these have, and the softening branch of a table."""
+"""Keys of one cohesive law: the numbers of all of them, and the softening branch of a table."""
 OF_STRENGTHS = ((r"R^\mathrm{n}", "normal_strength", True), (r"R^\mathrm{t}", "tangential_strength", True))
 
 REGISTRY = (

@@ -1,4 +1,4 @@
-"""What surrounds a process: limits, settings of the folder, rights, full disks, kills, ranks."""
+"""Surroundings of a process: limits, settings of the folder, rights, full disks, kills, ranks."""
 
 from __future__ import annotations
 

@@ -99,7 +99,7 @@ def test_fibres_break_as_with_interfaces_of_their_own(comm, shared_path, law, co
 
 
 def test_factors_are_of_the_fibre_alone():
-    """They have mean 1 and the coefficient of variation of the reference, and other fibres or seeds do not matter."""
+    """Factors have mean 1 and the right coefficient of variation; other fibres or seeds do not matter."""
     case = case_of(STRENGTH | {"scatter": {"shape": 8.0, "seed": 3}}, [{}] * 3, path=PATH)
     other = case_of(STRENGTH | {"scatter": {"shape": 8.0, "seed": 4}}, [{}] * 3, path=PATH)
     finer = case_of(STRENGTH | {"scatter": {"shape": 8.0, "seed": 3}}, [{}] * 3, mesh_size=0.04, path=PATH)

@@ -70,7 +70,7 @@ def test_coarse_cells_have_vertices_alone(torus, comm):
 
 
 def test_normals_are_radii_of_the_fibres(torus, comm):
-    """As long as dx / ds: of an edge its circle's radius times the angle that it turns by, with fine nodes or not.
+    """Length of dx / ds: of an edge its circle's radius times the angle that it turns by, with fine nodes or not.
 
     Of a vertex the mean of both sides of elements.
     """

@@ -77,7 +77,7 @@ class Point:
         scale: the state is `scale` times the equilibrium `state`.
         state: that equilibrium.
         broke: number of bonds that part at this state, after it; of increments, that did in the step, before it.
-        softened: number of bonds that are damaged there, but hold; of increments each once, whatever its teeth.
+        softened: number of bonds that lose a tooth there but hold; of increments each once, whatever its teeth.
         energies: between the last point's state and this one.
         used: (k,) share of their strength that bonds use in the state, 0 where there are none.
         after: from where the path goes on.

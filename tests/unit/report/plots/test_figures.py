@@ -207,7 +207,7 @@ def test_the_colour_range_leaves_out_outliers(values: Any, expected: tuple[float
 
 
 def test_values_count_by_their_area() -> None:
-    """Of a thousand values at a tip, which is no part of the cell, most are beyond the colours."""
+    """Most of a thousand values at a tip, which is no part of the cell, are beyond the colours."""
     values = np.append(np.linspace(1, 2, 1001), np.linspace(-90, 90, 1001))
     areas = np.append(np.ones(1001), np.full(1001, 1e-9))
     norm, colours, extend = plot_helpers.colour_range(values, areas)
