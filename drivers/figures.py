@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import csv
+import sys
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -72,12 +73,12 @@ def solved(
 
 
 def computed(comm: Intracomm, case: Case, folder: Path, keep_fields: bool = False) -> Result:
-    """Return the result of a case, on every rank, and print on rank 0 how long it took."""
+    """Return the result of a case, on every rank, and print on stderr of rank 0 how long it took."""
     start = time.perf_counter()
     result = run(case, comm, out=folder, fields=keep_fields)
     if comm.rank == 0:
         points = f", {len(result.path)} points" if result.path else ""
-        print(f"  {folder.name}: {time.perf_counter() - start:.1f} s{points}", flush=True)
+        print(f"  {folder.name}: {time.perf_counter() - start:.1f} s{points}", file=sys.stderr, flush=True)
     return result
 
 
