@@ -22,12 +22,12 @@ if TYPE_CHECKING:
     from feti_homog.homogenization.mesh_error import EnergyErrors
 
 Named = Mapping[str, Float]
-# Of a bound by which rounding leaves a value outside.
+# Share of a bound by which rounding may leave a value outside.
 ROUNDING = 1e-9
 
 
 def unit_errors(context: AnalysisContext, responses: list[Response]) -> tuple[list[EnergyErrors], list[Response]]:
-    """Return those of the responses to all unit loads, by problem, and the responses with the elements' shares.
+    """Return the errors of the responses to all unit loads, by problem, and the responses with elements' shares.
 
     No errors if the case asks for none.  Collective.
     """

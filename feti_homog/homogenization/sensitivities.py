@@ -46,7 +46,7 @@ class Derivative:
 
 
 def derivatives(cells: Sequence[TornCell], responses: Sequence[Sequence[Response]]) -> list[Derivative]:
-    """Return those by all constants, from the responses of each problem to its unit loads.  Collective."""
+    """Return the derivatives by all constants, from the responses of each problem to its unit loads.  Collective."""
     case, area = cells[0].case, cells[0].summary.area
     grams = [_grams(cell, own) for cell, own in zip(cells, responses, strict=True)]
     springs = [_stretched_springs(cell, own) for cell, own in zip(cells, responses, strict=True)]

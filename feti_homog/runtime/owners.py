@@ -19,7 +19,7 @@ def tag() -> str:
 
 
 def has_ended(name: str) -> bool:
-    """Return whether a `tag` is that of a process of this machine that is no more; of other machines nobody knows."""
+    """Return whether a `tag` names a process of this machine that has ended; False for other machines."""
     match = TAG.fullmatch(name)
     return match is not None and match["host"] == socket.gethostname() and match["began"] != _began(match["process"])
 
@@ -32,7 +32,7 @@ def remove_files() -> None:
 
 
 def _began(process: int | str) -> str:
-    """When a process began, in ticks of the clock since the machine did; empty if there is none.  See proc(5)."""
+    """Return when a process began, in clock ticks since boot; empty if there is none.  See proc(5)."""
     try:
         return Path(f"/proc/{process}/stat").read_text(errors="replace").rpartition(")")[2].split()[19]
     except OSError:
