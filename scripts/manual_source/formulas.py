@@ -28,7 +28,8 @@ def _warn_of_faults(app: Sphinx, doctree: nodes.document) -> None:
 def fault(formula: str) -> str:
     """Return the part of a formula in TeX that docutils does not understand; empty if there is none."""
     formula = re.sub(r"\\tag\{[^{}]*\}", "", formula).strip()  # known to MathJax only
-    if r"\\" in formula and not formula.startswith(r"\begin"):
+    outside = re.sub(r"\\begin\{(\w+\*?)\}.*?\\end\{\1\}", "", formula, flags=re.DOTALL)
+    if r"\\" in outside:
         environment = pick_math_environment(formula)
         formula = rf"\begin{{{environment}}}{formula}\end{{{environment}}}"
     try:
