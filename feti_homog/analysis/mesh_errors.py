@@ -169,6 +169,8 @@ def _constants(stiffness: Float, heat: Float | None) -> dict[str, Float]:
     )
     named = {name: value for record in records for name, value in plain(record).items() if value is not None}
     found = {name: np.asarray(value) for name, value in named.items()}
+    compliance = np.linalg.inv(stiffness)
+    found |= {f"nu3{k + 1}": -compliance[2, k] / compliance[2, 2] for k in range(2)}  # nu12, nu13 of the material
     return found if strains is None else found | {"thermal_expansion": strains}
 
 

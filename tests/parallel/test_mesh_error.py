@@ -80,6 +80,8 @@ def test_constants_that_follow(comm):
     exact |= {"expansion_axial": 1e-6 * alpha1, "expansion_transverse": 1e-6 * alpha2}
     for name, value in exact.items():
         assert 0.5 < abs(getattr(values, name) - value) / errors[name] < 2.0, name
+    compliance = np.linalg.inv(found.effective_stiffness)
+    assert 0.5 < abs(-compliance[2, 0] / compliance[2, 2] - nu12) / errors["nu31"] < 2.0
     off = np.abs(found.thermal_expansion - 1e-6 * np.array([alpha2, alpha2, alpha1, 0, 0, 0]))
     assert (off < 3 * found.mesh_error.thermal_expansion + 1e-12).all()
 

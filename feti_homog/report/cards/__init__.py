@@ -1,4 +1,4 @@
 """Effective constants as material cards of other programs: Abaqus, CalculiX, ANSYS, MOOSE, and as a table.
 
-Imports `materials` and `results`.  Main entry: `export.card`.
+Imports `materials`, `report.text` and `results`.  Main entry: `export.card`.
 """

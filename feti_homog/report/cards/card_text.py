@@ -26,6 +26,9 @@ def comments(material: EffectiveMaterial, mark: str) -> list[str]:
     ]
     if material.expansion is None:
         paragraphs.append("No thermal expansion: not every phase of the case gives one.")
+    if material.errors:
+        errors = ", ".join(f"{name} {error:.1e}" for name, error in material.errors.items())
+        paragraphs.append(f"Estimated errors by the mesh: {errors}.")
     lines = (line for words in paragraphs for line in wrap(_ascii(words), LONGEST))
     return [f"{mark} {line}" for line in lines]
 

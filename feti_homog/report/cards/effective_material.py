@@ -10,6 +10,7 @@ import numpy as np
 
 from feti_homog.errors import CaseError
 from feti_homog.materials.voigt import is_positive_definite
+from feti_homog.report.text import material_axes
 from feti_homog.typing import Float
 
 FIBRE_FIRST = (2, 0, 1)
@@ -21,6 +22,12 @@ ORDER = [PAIRS.index(tuple(sorted((FIBRE_FIRST[i], FIBRE_FIRST[j])))) for i, j i
 COUPLINGS = ~np.eye(6, dtype=bool)
 """(6, 6) where the stiffness of an orthotropic material is 0 in its axes."""
 COUPLINGS[:3, :3] = False
+# The constants about the fibre that are those of a transversely isotropic material in the axes of a card.
+ABOUT_THE_FIBRE = {
+    "E1": "E_axial", "E2": "E_transverse", "E3": "E_transverse", "nu12": "nu_axial", "nu13": "nu_axial",
+    "nu23": "nu_transverse", "G12": "G_axial", "G13": "G_axial", "G23": "G_transverse",
+    "alpha1": "expansion_axial", "alpha2": "expansion_transverse", "alpha3": "expansion_transverse",
+}  # fmt: skip
 TINY = float(np.finfo(float).tiny)
 NEGLIGIBLE = 1e-3
 """Couplings up to this part of sqrt(C_ii C_jj), and shears up to this part of the largest expansion, are left out. It
@@ -39,6 +46,7 @@ class EffectiveMaterial:
         compliance: (6, 6) in Voigt's order [11, 22, 33, 23, 13, 12] with engineering shears, symmetric
             positive definite.
         expansion: (6,) strains per unit of temperature in the same order, or None.
+        errors: estimated errors of `constants` and of alpha1, alpha2, alpha3 by the mesh, of those that are known.
     """
 
     name: str
@@ -47,6 +55,7 @@ class EffectiveMaterial:
     symmetry: str
     compliance: Float
     expansion: Float | None
+    errors: Mapping[str, float]
 
     @property
     def is_orthotropic(self) -> bool:
@@ -99,7 +108,7 @@ def in_axes_of_the_cell(document: Mapping[str, Any]) -> EffectiveMaterial:
         symmetry = f"Orthotropic; {words} are left out."
         compliance = np.where(COUPLINGS, 0.0, compliance)
         expansion = None if expansion is None else expansion * [1, 1, 1, 0, 0, 0]
-    return _material(document, symmetry, compliance, expansion)
+    return _material(document, symmetry, compliance, expansion, material_axes.errors(document))
 
 
 def nearest_transversely_isotropic(document: Mapping[str, Any]) -> EffectiveMaterial:
@@ -123,11 +132,17 @@ def nearest_transversely_isotropic(document: Mapping[str, Any]) -> EffectiveMate
         axial, transverse = _numbers([given["expansion_axial"], given["expansion_transverse"]], (2,))
         expansion = np.array([axial, transverse, transverse, 0.0, 0.0, 0.0])
     symmetry = f"The nearest transversely isotropic material, at a relative distance of {given['deviation']:.2g}."
-    return _material(document, symmetry, compliance, expansion)
+    known = (document.get("mesh_error") or {}).get("constants", {})
+    errors = {name: float(known[own]) for name, own in ABOUT_THE_FIBRE.items() if own in known}
+    return _material(document, symmetry, compliance, expansion, errors)
 
 
 def _material(
-    document: Mapping[str, Any], symmetry: str, compliance: Float, expansion: Float | None
+    document: Mapping[str, Any],
+    symmetry: str,
+    compliance: Float,
+    expansion: Float | None,
+    errors: Mapping[str, float],
 ) -> EffectiveMaterial:
     return EffectiveMaterial(
         name=document["case"]["name"],
@@ -136,6 +151,7 @@ def _material(
         symmetry=symmetry,
         compliance=(compliance + compliance.T) / 2.0,
         expansion=expansion,
+        errors=errors,
     )
 
 

@@ -8,12 +8,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from feti_homog.report.text.stiffness_tables import beside, error_of, value_and_error
+from feti_homog.report.text.stiffness_tables import beside, value_and_error
 from feti_homog.report.text.table import Column, Table
 
 TITLE = "Material axes: 1 along the fibres (x3 of the cell), 2 and 3 across (x1, x2)"
-# The constants of the cell with the same value, and the axes of the cell in whose order thermal expansions are.
+# The constants of the cell with the same value, those that only estimates of errors have, and the axes of the cell in
+# whose order thermal expansions are.
 IN_THE_CELL = {"E1": "E3", "E2": "E1", "E3": "E2", "G12": "G13", "G13": "G23", "G23": "G12", "nu23": "nu12"}
+RATIOS = {"nu12": "nu31", "nu13": "nu32"}
 ROWS = (("E1", "E2", "E3"), ("G12", "G13", "G23"), ("nu12", "nu13", "nu23"), ("alpha1", "alpha2", "alpha3"))
 EXPANSIONS = {"alpha1": 2, "alpha2": 0, "alpha3": 1}
 
@@ -35,20 +37,30 @@ def constants(document: Document) -> dict[str, float]:
     return {name: found[name] for names in ROWS for name in names if name in found}
 
 
+def errors(document: Document) -> dict[str, float]:
+    """Return the estimated errors of the constants by the mesh, of those that the result has."""
+    known: Document = document.get("mesh_error") or {}
+    of_constants, of_expansion = known.get("constants", {}), known.get("thermal_expansion")
+    places = (IN_THE_CELL | RATIOS).items()
+    found = {name: float(of_constants[own]) for name, own in places if own in of_constants}
+    if of_expansion is not None:
+        found |= {name: float(of_expansion[place]) for name, place in EXPANSIONS.items()}
+    return found
+
+
 def table(document: Document, label: str) -> list[Table]:
     """Return the constants as a table; `label` is the unit of stresses in brackets, or empty."""
-    found = constants(document)
-    columns = [Column("", -28), Column("computed")]
-    return [Table(f"{TITLE}{label}", columns, list(found.items()))] if found else []
+    found, off = constants(document), errors(document)
+    rows = [[name, value, *([off[name]] if name in off else [])] for name, value in found.items()]
+    columns = [Column("", -28), Column("computed"), *([Column("mesh error", 12, ".1e")] if off else [])]
+    return [Table(f"{TITLE}{label}", columns, rows)] if found else []
 
 
 def lines(document: Document, label: str) -> list[str]:
     """Return the same as text, with the estimated errors of the mesh."""
-    found = constants(document)
-    words = {}
+    found, off, words = constants(document), errors(document), {}
     for name, number in found.items():
-        error = error_of(document, IN_THE_CELL[name]) if name in IN_THE_CELL else None
-        value, off = value_and_error(number, error, ".7g")
-        words[name] = f"{name:<6}{value:>13}{beside(off)}"
+        value, error = value_and_error(number, off.get(name), ".7g")
+        words[name] = f"{name:<6}{value:>13}{beside(error)}"
     rows = ("    ".join(words[name] for name in names if name in words).rstrip() for names in ROWS)
     return [f"{TITLE}{label}", *(f"  {row}" for row in rows if row)] if found else []

@@ -73,13 +73,7 @@ def _errors(document: Document) -> Document:
 def _with_error(document: Document, name: str, form: str) -> tuple[str, str]:
     """Return a constant and its error as `value_and_error`."""
     value = next(values[name] for key in ("moduli", "constants") if name in (values := document.get(key) or {}))
-    return value_and_error(value, error_of(document, name), form)
-
-
-def error_of(document: Document, name: str) -> float | None:
-    """Return the estimated error of a constant of the axes of the cell, None without one."""
-    error: float | None = _errors(document).get("constants", {}).get(name)
-    return error
+    return value_and_error(value, _errors(document).get("constants", {}).get(name), form)
 
 
 def value_and_error(value: float, error: float | None, form: str) -> tuple[str, str]:

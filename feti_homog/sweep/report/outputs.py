@@ -16,6 +16,7 @@ Document = Mapping[str, Any]
 
 
 PHASES_OF_ONE_FIBRE = 2
+ERROR, ENERGY_ERROR = "_mesh_error", "energy_mesh_error"
 
 
 def numbers(planes: Iterable[str | None]) -> tuple[int, ...]:
@@ -41,7 +42,8 @@ def outputs(document: Document, numbers: Sequence[int] = PLANE_STRAIN.numbers) -
     found |= _anisotropy(document.get("effective_stiffness"))
     for section in ("moduli", "constants", "transversely_isotropic"):
         found |= {name: value for name, value in document.get(section, {}).items() if value is not None}
-    found |= _mesh_errors(document.get("mesh_error", {}), numbers)
+    errors = _mesh_errors(document.get("mesh_error", {}), numbers)
+    found |= {name: v for name, v in errors.items() if name == ENERGY_ERROR or name.removesuffix(ERROR) in found}
     found |= _bounds(document.get("bounds", {}), numbers)
     found |= _angles(document.get("angle", ()), numbers) | _path(document)
     found |= _load(document.get("load"))
@@ -83,8 +85,8 @@ def _mesh_errors(errors: Document, numbers: Sequence[int]) -> dict[str, float]:
     found = _entries(errors.get("effective_stiffness", ()), numbers)
     found |= _entries(errors.get("effective_stiffness_compression", ()), numbers, "_compression")
     found |= _thermal(errors) | errors.get("constants", {})
-    named = {f"{name}_mesh_error": value for name, value in found.items()}
-    return named | ({"energy_mesh_error": errors["energy"]} if errors else {})
+    named = {f"{name}{ERROR}": value for name, value in found.items()}
+    return named | ({ENERGY_ERROR: errors["energy"]} if errors else {})
 
 
 def _envelope(document: Document) -> dict[str, float]:

@@ -15,6 +15,9 @@ from feti_homog.sweep.report.sweep_table import Series, SweepTable
 COLOURS = ("#1f4e9c", "#c44e00", "#2a7f3f", "#7a3e9d", "#8c6d1f", "#c2185b")
 MARKERS = ("o", "s", "^", "D", "v", "P")
 REALISATION_STYLE: dict[str, Any] = {"markersize": 3.5, "alpha": 0.4, "markeredgewidth": 0}
+MESH_ERROR_STYLE: dict[str, Any] = {
+    "fmt": "none", "elinewidth": 7.0, "alpha": 0.35, "zorder": 1, "label": "estimated error of the mesh",
+}  # fmt: skip
 LEGEND_HANDLE, LEGEND_CHARACTER = 0.7, 0.085  # inches of an entry: its line with the space around, a letter
 WAYS = {"axial": "along", "transverse": "across"}
 NAMES = {
@@ -35,7 +38,10 @@ NAMES = {
 
 
 def plot_series(axes: Axes, table: SweepTable, series: Series, name: str, style: int, x_factor: float = 1.0) -> None:
-    """Every realisation as a faint mark, at x times `x_factor`, and the means with their confidence intervals."""
+    """Every realisation as a faint mark, at x times `x_factor`, and the means with their confidence intervals.
+
+    Wide pale bars are the mean estimates of the mesh error, if there are any.
+    """
     colour, marker = COLOURS[style], MARKERS[style]
     statistics, values = table.statistics[name], table.outputs[name]
     numbers = [table.points.index(point) for point in series.points]
@@ -48,6 +54,8 @@ def plot_series(axes: Axes, table: SweepTable, series: Series, name: str, style:
         series.x, mean, spread, color=colour, marker=marker, markersize=4.5, linewidth=1.2,
         capsize=2.5, label=series.label or None,
     )  # fmt: skip
+    if (errors := table.statistics.get(f"{name}_mesh_error")) is not None:
+        axes.errorbar(series.x, mean, np.nan_to_num(errors.mean[numbers]), ecolor=colour, **MESH_ERROR_STYLE)
 
 
 def label_axes(axes: Axes, name: str, table: SweepTable, xlabel: str) -> None:

@@ -103,21 +103,6 @@ def test_curves_of_a_given_stress_have_six_components(tmp_path):
     assert_drawn(tmp_path, table, ["cell_size.png", "curves.png"])
 
 
-def test_the_state_under_a_load_has_columns():
-    point = {
-        "strain": [0.1, -0.02, 0.0],
-        "stress": [5.0, 0.0, 0.0],
-        "stored": 0.25,
-        "bonded": 9,
-        "open": 1,
-        "closed": 0,
-    }
-    base = document(0.4, 2, 0.0) | {"load": point}
-    found = outputs(base)
-    assert found["load_E11"] == 0.1 and found["load_S11"] == 5.0 and found["load_open"] == 1.0
-    assert unit("load_S11", "GPa") == "GPa" == unit("load_stored", "GPa") and unit("load_E11", "GPa") == ""
-
-
 def test_columns_of_a_path_are_its_first_point_its_peaks_and_its_end():
     path = path_document(2, 0.0)
     path["path"][-1] |= {"stress": [-7.0, 1.0, 0.5], "bonded": 5, "open": 3, "closed": 2}
@@ -215,6 +200,18 @@ def test_moduli_are_drawn(tmp_path):
     assert not figures.plot(tmp_path, collected({"cell.order": [1]}, [document(0.4, 8, 0)], [1], [1]))
     waiting = collected({"cell.fibre_fraction": [0.1, 0.2]}, [None] * 2, [1, 2], [1] * 2)
     assert not figures.plot(tmp_path, waiting)
+
+
+def test_bars_are_the_mean_errors_of_the_mesh():
+    errors = ({"constants": {"bulk": error, "nu31": 1.0}, "energy": 0.01} for error in (2.0, 4.0, 1.0, 3.0))
+    documents = [document(c, 8, shift) for shift in (0.0, 1.0) for c in (0.2, 0.4)]
+    documents = [each | {"mesh_error": error} for each, error in zip(documents, errors, strict=True)]
+    table = collected({"cell.fibre_fraction": [0.2, 0.4] * 2}, documents, [1, 2] * 2, [1, 1, 2, 2])
+    assert "nu31_mesh_error" not in table.outputs  # of a constant that has no column
+    panel = moduli.figure(table).axes[moduli.PANELS.index("bulk")]
+    (bars,) = (each for each in panel.containers if each.get_label() == "estimated error of the mesh")
+    (ends,) = (lines.get_segments() for lines in bars.lines[2])
+    assert [end[:, 1].tolist() for end in ends] == [pytest.approx([96.0, 99.0]), pytest.approx([106.0, 113.0])]
 
 
 def assert_drawn(folder, table, names):

@@ -111,6 +111,19 @@ def test_comments_say_what_the_axes_and_units_are(form, mark):
         assert words in said
 
 
+@pytest.mark.parametrize("form", ["abaqus", "ansys", "moose"])
+def test_comments_have_the_errors_of_the_mesh_in_the_axes_of_the_card(form):
+    errors = {"constants": {"E3": 0.25, "E1": 0.5, "nu31": 0.01, "nu13": 0.9, "G13": 0.03}}
+    errors |= {"thermal_expansion": [2e-8, 0.0, 1e-8, 0.0, 0.0, 0.0]}
+    words = " ".join(FORMATS[form](in_axes_of_the_cell(document(DISTINCT, mesh_error=errors))).split())
+    for entry in ("by the mesh: E1 2.5e-01", "E2 5.0e-01", "nu12 1.0e-02", "G12 3.0e-02", "alpha1 1.0e-08"):
+        assert entry in words
+    assert "9.0e-01" not in words
+    errors = {"constants": {"E_axial": 0.25, "G_transverse": 0.5}}
+    words = " ".join(FORMATS[form](nearest_transversely_isotropic(document(DISTINCT, mesh_error=errors))).split())
+    assert "by the mesh: E1 2.5e-01, G23 5.0e-01." in words
+
+
 @pytest.mark.parametrize(
     "value", [215.33468712345678, -1.0993681512345678e-05, 1e-300, 123456789012345678.0, 0.1, -0.0]
 )

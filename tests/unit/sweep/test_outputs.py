@@ -1,4 +1,4 @@
-"""What a sweep's table has of an envelope."""
+"""Columns of a sweep's table: those of a state under a load and of an envelope."""
 
 from __future__ import annotations
 
@@ -19,6 +19,21 @@ def document(factors: list[float | None], plane: tuple[str, str]) -> dict[str, A
 
 def of_envelope(factors: list[float | None], plane: tuple[str, str] = ("S22", "S12")) -> dict[str, float]:
     return {name: value for name, value in outputs(document(factors, plane)).items() if name.startswith("envelope")}
+
+
+def test_the_state_under_a_load_has_columns():
+    point = {
+        "strain": [0.1, -0.02, 0.0],
+        "stress": [5.0, 0.0, 0.0],
+        "stored": 0.25,
+        "bonded": 9,
+        "open": 1,
+        "closed": 0,
+    }
+    base = document([], ("S22", "S12")) | {"load": point}
+    found = outputs(base)
+    assert found["load_E11"] == 0.1 and found["load_S11"] == 5.0 and found["load_open"] == 1.0
+    assert unit("load_S11", "GPa") == "GPa" == unit("load_stored", "GPa") and unit("load_E11", "GPa") == ""
 
 
 def test_the_first_axis_the_least_and_the_largest():
