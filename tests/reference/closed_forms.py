@@ -91,3 +91,34 @@ def zeta(k, mu):
 def hill_bulk(bulks, mu, fractions):
     """k* of phases of one shear modulus: sum c_i / (k_i + mu) = 1 / (k* + mu), for any geometry (Hill 1964)."""
     return 1 / (fractions / (bulks + mu)).sum() - mu
+
+
+def fibre_tractions(matrix, fibre):
+    """p, q of a fibre in a medium under a stress s along x1: t_n = s (p + q cos 2t) / 2, t_t = -s q sin 2t / 2."""
+    (k, mu), (k_f, mu_f) = bulk_and_shear(matrix), bulk_and_shear(fibre)
+    ratio = mu_f / mu
+    return k_f * (k + mu) / (k * (k_f + mu)), ratio / (1 + (ratio - 1) * (k + 2 * mu) / (2 * (k + mu)))
+
+
+def first_slip(matrix, fibre, friction):
+    """s / q and the angle in degrees at which a debonded fibre in a medium under -q + s, -q - s first slips.
+
+    Rising in one step, t_n = -q p + s N cos 2t and t_t = -s N sin 2t, and N sin 2t + mu N cos 2t is largest at
+    tan 2t = 1 / mu.
+    """
+    p, n = fibre_tractions(matrix, fibre)
+    return friction * p / n / np.sqrt(1 + friction**2), np.degrees(np.arctan(1 / friction)) / 2
+
+
+def rubbing_laminate(across, shear, friction, strain, shears):
+    """S12 and the heat per area of debonded layers at the shear strains gamma12, one after the other, under E11 < 0.
+
+    Under the stress `across` E11 the layers follow `shear` gamma12 until |S12| = mu |S11|, then slip.
+    """
+    most, before, stress, heat, found = -friction * across * strain, 0.0, 0.0, 0.0, []
+    for gamma in shears:
+        elastic = stress + shear * (gamma - before)
+        stress, before = np.clip(elastic, -most, most), gamma
+        heat += most * abs(elastic - stress) / shear
+        found.append((stress, heat))
+    return np.array(found).T

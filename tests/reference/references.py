@@ -145,3 +145,33 @@ AXIAL_SHEAR = {
     ("hexagonal", 0.5): Reference((1.400063, 2.386467, 2.852937, 3.004726), 1e-6, SERIES),
     ("hexagonal", 0.8): Reference((1.729477, 4.948865, 8.260013, 9.958625), 1e-6, SERIES),
 }
+
+# One glass fibre in epoxy (70 800 MPa, 0.22; 2790 MPa, 0.33), square cell, 40 %, plane strain, wholly debonded from the
+# start, friction 0.2, rigid faces: S11, S22, S12 in MPa and the heat per area since the start, at (E11, E22, gamma12).
+RUBBING_PROTOTYPE = "independent prototype, straight linear triangles, 40 small steps a leg; difference of two meshes"
+RUBBING_WAYPOINTS = ((-0.01, -0.004, 0.0), (-0.01, -0.004, 0.02), (-0.01, -0.004, -0.02), (-0.01, -0.004, 0.02))
+# By the length of elements for a radius of 7.5.
+RUBBING_STRESSES = {
+    0.42: (
+        Reference((-92.117, -62.186, 0.0), 0.02, RUBBING_PROTOTYPE),
+        Reference((-88.837, -65.005, 31.684), 0.03, RUBBING_PROTOTYPE),
+        Reference((-88.123, -65.653, -31.890), 0.03, RUBBING_PROTOTYPE),
+        Reference((-87.920, -65.838, 31.894), 0.04, RUBBING_PROTOTYPE),
+    ),
+    0.21: (
+        Reference((-92.122, -62.197, 0.0), 0.02, RUBBING_PROTOTYPE),
+        Reference((-88.867, -64.993, 31.682), 0.03, RUBBING_PROTOTYPE),
+        Reference((-88.145, -65.648, -31.894), 0.03, RUBBING_PROTOTYPE),
+        Reference((-87.952, -65.824, 31.898), 0.04, RUBBING_PROTOTYPE),
+    ),
+}
+RUBBING_HEATS = {
+    0.84: Reference((6.47e-4, 0.05060, 0.13593, 0.21860), 3e-3, RUBBING_PROTOTYPE),
+    0.42: Reference((5.86e-4, 0.05032, 0.13484, 0.21641), 2e-3, RUBBING_PROTOTYPE),
+    0.21: Reference((5.75e-4, 0.05024, 0.13456, 0.21588), 6e-4, RUBBING_PROTOTYPE),
+}
+# friction: s / q and degrees of the first slip of a debonded fibre in a medium under -q + s, -q - s.
+FIRST_SLIP = {
+    0.25: Reference((0.20398428, 37.98), 5e-3, FORMULA),
+    0.5: Reference((0.37612843, 31.72), 5e-3, FORMULA),
+}

@@ -1,0 +1,162 @@
+"""Paths of faces with friction, from change to change of status, rates by trying statuses one after the other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from reference.condensed_cell import MixedLoad
+from reference.friction import BACKWARD, BONDED, FORWARD, OPEN, SIGN, STICK, NoEquilibriumError, RubbingFaces, State
+
+TIE = 1e-9  # of forces and jumps: what is equal
+MOST = 4**8  # statuses that are tried
+
+
+@dataclass(frozen=True)
+class Point:
+    """A change of status or the end of a leg: its place on the whole path, 0 to 1, the state, energies per area."""
+
+    load_factor: float
+    state: State
+    work: float
+    stored: float
+    heat: float
+
+
+class FrictionPath:
+    """The path of `faces` from rest; nothing breaks."""
+
+    def __init__(self, faces: RubbingFaces):
+        self.faces, self.state = faces, faces.at_rest
+        self.points = []
+        self.work = self.heat = 0.0
+        self.force = self.jump = 0.0
+
+    def follow(self, loads):
+        """Return the points of all legs, straight from one load to the next."""
+        for leg, load in enumerate(loads):
+            self._leg(load, leg, len(loads))
+        return self.points
+
+    def _leg(self, load, leg, legs):
+        start, s, stays = self.state.start_of(load), 0.0, 0
+        way = MixedLoad(load.values - start.values, load.by_stress)
+        while s < 1.0:
+            rate = self.rate(way)
+            step = min(self._next_change(rate), 1.0 - s)
+            stays = stays + 1 if step < TIE else 0
+            if stays > 20:
+                raise NoEquilibriumError(f"statuses change for ever at {(leg + s) / legs}")
+            s = 1.0 if step >= 1.0 - s else s + step
+            (after,) = self.faces.linear(rate.status, self.state.slip, start.towards(load, s))
+            self._book(after)
+            stored = after.stored(self.faces.area)
+            self.points.append(Point((leg + s) / legs, after, self.work, stored, self.heat))
+
+    def _book(self, after):
+        before = self.state
+        self.work += (after.stress + before.stress) @ (after.strain - before.strain) / 2
+        self.heat += (after.shear + before.shear) @ (after.slip - before.slip) / 2 / self.faces.area
+        self.state = after
+        self.force = max(self.force, np.abs(after.pressure).max(), np.abs(after.shear).max())
+        self.jump = max(self.jump, np.abs(after.gap).max(), np.abs(after.slip).max())
+
+    def choices(self):
+        """Return which statuses each node (k,) may have from the state on."""
+        state, faces = self.state, self.faces
+        room = faces.mu * state.pressure - np.abs(state.shear)
+        small = TIE * self.force
+        found = []
+        for i in range(faces.k):
+            if faces.bonded[i]:
+                found.append((BONDED,))
+            elif state.gap[i] > TIE * self.jump:
+                found.append((OPEN,))
+            elif state.pressure[i] <= small:
+                found.append((STICK, FORWARD, BACKWARD, OPEN))
+            elif room[i] > small:
+                found.append((STICK,))
+            else:
+                found.append((STICK, FORWARD if state.shear[i] > 0 else BACKWARD))
+        return found
+
+    def rate(self, way):
+        """Return the rate of the state along a way, its status that of the next stretch."""
+        choices = self.choices()
+        last = self.state.status
+        now = np.array([status if status in own else own[0] for status, own in zip(last, choices, strict=True)])
+        found = self._by_exchange(now, choices, way)
+        if found is None:
+            found = next(self.rates(way, now), None)
+        if found is None:
+            raise NoEquilibriumError("no statuses of the next stretch are admissible")
+        return found
+
+    def rates(self, way, now=None):
+        """Yield all admissible rates, those first whose statuses differ least from `now`."""
+        choices = self.choices()
+        if np.prod([float(len(own)) for own in choices]) > MOST:
+            raise NoEquilibriumError("too many nodes may change")
+        tried = np.array(list(product(*choices)))
+        if now is not None:
+            tried = tried[np.argsort((tried != now).sum(axis=1), kind="stable")]
+        for some in np.array_split(tried, max(1, len(tried) // 256)):
+            for rate in self.faces.linear(some, np.zeros(self.faces.k), way):
+                if not self.wrong(rate, choices).any():
+                    yield rate
+
+    def wrong(self, rate, choices):
+        """(k,) which of the nodes that may change contradict their status."""
+        several = np.array([len(own) for own in choices])
+        p, f, gap, slip, status = rate.pressure, rate.shear, rate.gap, rate.slip, rate.status
+        force, jump = (TIE * max(np.abs(a).max(), np.abs(b).max(), 1e-300) for a, b in ((p, f), (gap, slip)))
+        sign = np.where(self.state.shear > 0, 1.0, -1.0)
+        room = self.faces.mu * p - np.where(several == 4, np.abs(f), sign * f)
+        bad = (status == STICK) & (room < -force)
+        bad |= (SIGN[status] != 0) & (SIGN[status] * slip < -jump)
+        bad |= (several == 4) & (np.where(status == OPEN, gap < -jump, p < -force))
+        return bad & (several > 1)
+
+    def _by_exchange(self, status, choices, way):
+        """Return the rate found by exchanging wrong statuses; None if that does not end soon."""
+        status = status.copy()
+        for _ in range(60):
+            (rate,) = self.faces.linear(status, np.zeros(self.faces.k), way)
+            wrong = np.flatnonzero(self.wrong(rate, choices))
+            if not len(wrong):
+                return rate
+            for i in wrong:
+                status[i] = self._other(i, rate, choices[i])
+        return None
+
+    def _other(self, i, rate, own):
+        """Return the status to try at a node instead of a wrong one."""
+        if len(own) == 2:
+            return own[int(own[0] == rate.status[i])]
+        if rate.status[i] == OPEN:
+            return STICK
+        if rate.pressure[i] < 0:
+            return OPEN
+        if rate.status[i] == STICK:
+            return FORWARD if rate.shear[i] > 0 else BACKWARD
+        return STICK
+
+    def _next_change(self, rate):
+        """Return how far along the way the first status changes."""
+        state, faces, status = self.state, self.faces, rate.status
+        closed = (status != OPEN) & ~faces.bonded
+        force = max(np.abs(rate.pressure).max(), np.abs(rate.shear).max())
+        jump = max(np.abs(rate.gap).max(), np.abs(rate.slip).max())
+        levels = [(closed, state.pressure, rate.pressure, force), (status == OPEN, state.gap, rate.gap, jump)]
+        for sign in (1.0, -1.0):
+            room = faces.mu * state.pressure - sign * state.shear
+            levels.append((status == STICK, room, faces.mu * rate.pressure - sign * rate.shear, force))
+        first = np.inf
+        for which, value, slope, scale in levels:
+            # What falls by rounding does not change again.
+            falls = which & (slope < -10 * TIE * scale)
+            ends = np.maximum(value[falls], 0.0) / -slope[falls]
+            first = min(first, ends.min(initial=np.inf))
+        return first
