@@ -73,6 +73,8 @@ def _written(value: Any) -> str:
 def _of_table(interface: InterfaceSection) -> dict[str, Any]:
     """Return normal stiffness, strength and toughness of a table that begins at its peak, where they are not given."""
     openings, tractions = interface.openings, interface.tractions
+    if BRANCH[0] not in LAWS[interface.criterion].keys:
+        return {}
     if not openings or not tractions or len(openings) != len(tractions) or openings[0] == 0.0:
         return {}
     points = list(zip(openings, tractions, strict=True))
@@ -98,7 +100,7 @@ def _cohesive_faults(interface: InterfaceSection, label: str) -> list[str]:
 def _branch_faults(interface: InterfaceSection) -> Iterator[str]:
     """Yield the faults of the table of a softening branch."""
     openings, tractions = interface.openings, interface.tractions
-    if openings is None or tractions is None:
+    if openings is None or tractions is None or BRANCH[0] not in LAWS[interface.criterion].keys:
         return
     if len(openings) != len(tractions):
         yield f"openings, tractions: {len(openings)} and {len(tractions)} numbers; expected as many of both"

@@ -168,7 +168,7 @@ def _bonds() -> Iterator[Rule]:
     yield _document({"properties": {"interface": _any_section(ways)}}, line, unbroken, MESHED)
     yield exclusive(INTERFACE, "law", "criterion", words="exclude each other; criterion is the older word for law")
     for law in REGISTRY:
-        missing = f"missing; {'law' if law.softens else 'criterion'} = {toml_value(law.name)} needs it"
+        missing = f"missing; law = {toml_value(law.name)} needs it"
         for name in law.needs:
             yield needed(INTERFACE, name, missing, BREAKING, CRITERION.among(law.name))
     type_, unlimited = ENVELOPE_ANALYSIS.in_words(""), [law.name for law in REGISTRY if not law.limits]

@@ -8,7 +8,7 @@ from feti_homog.schema.keys import Selector
 ANALYSIS_TYPE = Selector("analysis", "type")
 PLANE = Selector("analysis", "plane")
 METHOD = Selector("path", "method")
-CRITERION = Selector("interface", "criterion")
+CRITERION = Selector("interface", "criterion", word="law")
 
 ANGLE_ANALYSIS, PATH_ANALYSIS = ANALYSIS_TYPE.among("angle"), ANALYSIS_TYPE.among("path")
 LOAD_ANALYSIS = ANALYSIS_TYPE.among("load")

@@ -66,7 +66,7 @@ def warnings(case: Case, width: float, edge: float) -> list[str]:
         found += f" after refine = {case.cell.refine}"
     symbols, share = ("E' G / N^2", "a third") if softens else ("E' G_Ic / sigma_c^2", "half")
     wanted = f"the process zone is {symbols} = {length:.3g} long, elements should be at most {share} of that"
-    law = f'[interface] {"law" if softens else "criterion"} = "{case.interfaces[0].criterion}"'
+    law = f'[interface] law = "{case.interfaces[0].criterion}"'
     return [f"{law}: {found}; {wanted}: set {_remedies(case, width, edge, resolved * length)}", *others]
 
 

@@ -17,10 +17,14 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Selector:
-    """The key of a section whose value decides which other keys belong to the case."""
+    """The key of a section whose value decides which other keys belong to the case.
+
+    `word` is the key that messages name, if it has several names.
+    """
 
     section: str
     key: str
+    word: str = ""
 
     def among(self, *values: str) -> Condition:
         """Return the condition that the key has one of these values."""
@@ -28,7 +32,8 @@ class Selector:
 
     def in_words(self, section: str) -> str:
         """Return the key as a fault in a section names it."""
-        return self.key if section == self.section else f"[{self.section}] {self.key}"
+        word = self.word or self.key
+        return word if section == self.section else f"[{self.section}] {word}"
 
 
 @dataclass(frozen=True)

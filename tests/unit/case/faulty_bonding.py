@@ -64,15 +64,15 @@ FAULTY_BONDINGS: dict[str, tuple[str, tuple[str, ...]]] = {
     "energy_of_glue": (
         of_type("path", PATH, "[interface]", 'criterion = "energy"', "toughness = 1.0"),
         (
-            '[interface] normal_stiffness: missing; criterion = "energy" needs it',
-            '[interface] tangential_stiffness: missing; criterion = "energy" needs it',
+            '[interface] normal_stiffness: missing; law = "energy" needs it',
+            '[interface] tangential_stiffness: missing; law = "energy" needs it',
         ),
     ),
     "energy_and_a_strength": (
         of_type(
             "path", PATH, "[interface]", SPRINGS, 'criterion = "energy"', "toughness = 1.0", "normal_strength = 1.0"
         ),
-        ('[interface] normal_strength = 1.0: belongs to criterion = "max" or "quadratic" or "bilinear" or ',),
+        ('[interface] normal_strength = 1.0: belongs to law = "max" or "quadratic" or "bilinear" or ',),
     ),
     "energy_without_toughness": (
         of_type("path", PATH, "[interface]", SPRINGS, 'criterion = "energy"'),

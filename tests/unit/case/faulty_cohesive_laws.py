@@ -38,11 +38,20 @@ FAULTY_COHESIVE_LAWS: dict[str, tuple[str, tuple[str, ...]]] = {
     ),
     "growth_of_a_softening_law": (
         of_type("path", PATH, "[interface]", *SOFTENING, "normal_toughness = 1", 'growth = "released"'),
-        ('[interface] growth = "released": belongs to criterion = "energy", not "bilinear"; ', "energy of its teeth"),
+        ('[interface] growth = "released": belongs to law = "energy", not "bilinear"; ', "energy of its teeth"),
     ),
     "table_that_hardens": (
         of_type("path", PATH, "[interface]", *BRANCH, "openings = [0.1, 0.2, 0.3]", "tractions = [1, 2, 0]"),
         ("[interface] tractions = [1.0, 2.0, 0.0]: expected a softening branch, which falls from its peak to 0",),
+    ),
+    "branch_of_another_law": (
+        of_type(
+            "path", PATH, "[interface]", *SOFTENING, "normal_toughness = 1", "openings = [1, 2]", "tractions = [1, 0]"
+        ),
+        (
+            '[interface] openings = [1, 2]: belongs to law = "table", not "bilinear"',
+            '[interface] tractions = [1, 0]: belongs to law = "table", not "bilinear"',
+        ),
     ),
     "table_of_falling_openings": (
         of_type("path", PATH, "[interface]", *BRANCH, "openings = [0.1, 0.1]", "tractions = [1, 0]"),

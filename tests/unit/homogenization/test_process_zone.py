@@ -60,7 +60,7 @@ def test_the_longest_edge_is_a_chord(size, edges):
 def test_long_elements_are_warned_of():
     (line,) = warnings(case_of())
     assert line == (
-        '[interface] criterion = "energy": elements on the interface are up to 0.981 long; the process zone '
+        '[interface] law = "energy": elements on the interface are up to 0.981 long; the process zone '
         "is E' G_Ic / sigma_c^2 = 0.773 long, elements should be at most half of that: set interface_size = 0.018 "
         "(or mesh_size, of all elements), or refine = 2"
     )
@@ -87,5 +87,5 @@ def test_a_mesh_of_ones_own_is_refined(tmp_path):
 
 def test_check_tells_of_it():
     lines = describe(case_of(), MPI.COMM_SELF).splitlines()
-    assert [line.startswith('warning    [interface] criterion = "energy": elements') for line in lines].count(True) == 1
+    assert [line.startswith('warning    [interface] law = "energy": elements') for line in lines].count(True) == 1
     assert "warning" not in describe(case_of(refine=2), MPI.COMM_SELF)
