@@ -31,7 +31,8 @@ LONGEST = "case_minus_temperature.png"  # of a run's files the one of the longes
 # The files of a result, those of all analyses and of what `plot` and `fields` make.
 RESULT_FILE = re.compile(
     r"report\.html|events\.log|result\.(json|h5|xdmf)|interface\.xdmf"
-    r"|(angle|path|load|envelope)\.csv|(cell|mesh_error|interface|load|envelope|(angle|path)(_states)?)\.png|path\.gif"
+    r"|(angle|path|load|envelope)\.csv|path\.gif"
+    r"|(cell|partition|mesh_error|sensitivities|interface|load|envelope|(angle|path)(_states)?)\.png"
     r"|(cell|interface)(_\d{4,}\.vtu|\.pvd|\.vtkhdf)"
     rf"|case_(minus_)?({'|'.join(SPATIAL_STRAINS)}|temperature)\.png|state_\d+\.png"
 )

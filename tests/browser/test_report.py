@@ -93,7 +93,7 @@ def test_the_slider_goes_through_the_states(chromium: Any, reports: dict[str, Pa
     slider = chromium.find_element(By.ID, "state")
     count = int(slider.get_attribute("max")) + 1
     result = json.loads((reports[kind].parent / "result.json").read_text())
-    assert count == (len(result["path"]) if kind == "path" else {"angle": 9, "stiffness": 3}[kind])
+    assert count == (len(result["states"]) if kind == "path" else {"angle": 9, "stiffness": 3}[kind])
     first = label(chromium), view(chromium)
     seen = {first}
     for _ in range(count - 1):
@@ -117,6 +117,15 @@ def test_stress_scale_and_colours_can_be_chosen(chromium: Any, reports: dict[str
     scale.clear()
     scale.send_keys("3", Keys.TAB)
     assert len({before, other, common, view(chromium)}) == 4
+
+
+def test_a_button_shows_the_peak(chromium: Any, reports: dict[str, Path]) -> None:
+    opened(chromium, reports["path"])
+    result = json.loads((reports["path"].parent / "result.json").read_text())
+    buttons = {each.text: each for each in chromium.find_elements(By.CSS_SELECTOR, "#marks button")}
+    next(button for words, button in buttons.items() if words.endswith("peak") and "after" not in words).click()
+    assert "peak: " in label(chromium)
+    assert any(y == pytest.approx(result["peak"]["stress"], abs=1e-12) for _, y in chromium.execute_script(RINGS))
 
 
 def test_play_goes_on_by_itself(chromium: Any, reports: dict[str, Path]) -> None:

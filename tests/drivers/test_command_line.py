@@ -13,7 +13,7 @@ from matplotlib.image import imread
 from reference.references import BONDED
 from support.command_line import case_file, command_line
 
-PICTURES = ("cell.png", "mesh_error.png", "case_E11.png", "case_E22.png", "case_gamma12.png")
+PICTURES = ("cell.png", "partition.png", "mesh_error.png", "case_E11.png", "case_E22.png", "case_gamma12.png")
 FILES = {"result.json", "result.h5", "result.xdmf", "interface.xdmf", *PICTURES}
 DOCUMENT = {
     "version", "case", "cell", "solver", "effective_stiffness", "checks", "timings", "memory", "status",

@@ -28,12 +28,14 @@ from feti_homog.report.text.analyses import reported
 from feti_homog.report.text.summary import checks, title_of
 from feti_homog.results import atomic, field_file, output_folder, result_json
 from feti_homog.results.path_curves import FAINT, components_above
+from feti_homog.results.path_peak import marks
 from feti_homog.version import __version__
 
 NAME, SWEEP = "report.html", "sweep.json"
 UNIT_LOADS = dict.fromkeys((*STRAINS, *SPATIAL_STRAINS, "temperature"))
 PICTURES = {
-    "cell": "The cell: phases, numbers of the fibres, subdomains",
+    "cell": "The cell: phases and numbers of the fibres",
+    "partition": "The subdomains",
     **{f"case_{load}": f"Deformed cell under {load}" for load in UNIT_LOADS},
     **{f"case_minus_{load}": f"Deformed cell under minus {load}" for load in UNIT_LOADS},
     "angle": "Response against the debonding angle",
@@ -44,6 +46,7 @@ PICTURES = {
     "envelope": "Onset of debonding",
     "interface": "Tractions and jumps of interfaces",
     "mesh_error": "Where the estimated error of the mesh is",
+    "sensitivities": "Relative changes of constants by those of parameters",
 }
 MOST_STATES, TRIANGLES = 48, 8000  # of the viewer, which keep a page below some megabytes
 LARGEST_SHORT, LARGEST_BYTE = 32767, 255
@@ -55,7 +58,8 @@ def viewer_data(file: Any, document: Document) -> dict[str, Any]:
     """Return the data of the viewer from an open result.h5: tables as base64 of little-endian numbers.
 
     Displacements are shorts, to be multiplied by `unit` of the state; stresses are bytes between the `low` and `high`
-    of component and state, which leave out the extreme 0.5 %.
+    of component and state, which leave out the extreme 0.5 %.  `ranges` are those of all states but the end of a path,
+    where stresses may be many times those of the peak; curves begin with them (`common`).
     """
     drawn = drawn_mesh(file, TRIANGLES)
     borders = outline_edges(drawn, drawn.body)
@@ -64,6 +68,10 @@ def viewer_data(file: Any, document: Document) -> dict[str, Any]:
     shown = [file[f"state/{number}"] for number in numbers]
     stresses = voigt_names(len(shown[0].attrs["strain"]))[1]
     component = stress_component(document["case"]["output"].get("stress", "auto"), shown)
+    fields = [[drawn_stress(state, name, drawn) for name in stresses] for state in shown]
+    states = [_state(state, drawn, edges, document) for state in shown]
+    ranged = [own for own, state in zip(fields, states, strict=True) if state["mark"] != "end"] or fields
+    areas = np.tile(drawn.areas, len(ranged))
     return {
         "points": _base64(drawn.points, "<f4"),
         "triangles": _base64(drawn.triangles, "<u4"),
@@ -75,40 +83,49 @@ def viewer_data(file: Any, document: Document) -> dict[str, Any]:
         "component": stresses.index(component),
         "unit": str(file.attrs["stress_unit"]),
         "kinds": [{"name": STATE_NAMES[k], "colour": STATE_COLOURS[k], "width": STATE_WIDTHS[k]} for k in range(3)],
-        "states": [_state(file, number, drawn, edges, document) for number in numbers],
+        "ranges": [_range(np.concatenate(values), areas) for values in zip(*ranged, strict=True)],
+        "common": reported(document).is_curve,
+        "states": [
+            state | {"number": number, "fields": [_field(values, drawn.areas) for values in own]}
+            for number, own, state in zip(numbers, fields, states, strict=True)
+        ],
     }
 
 
-def _state(file: Any, number: int, drawn: DrawnMesh, edges: InterfaceEdges, document: Document) -> dict[str, Any]:
-    state = file[f"state/{number}"]
+def _state(state: Any, drawn: DrawnMesh, edges: InterfaceEdges, document: Document) -> dict[str, Any]:
+    """Return all but the number and the fields; `mark` names a first break, a peak, what is after it, or an end."""
     displacement = drawn_displacement(state, drawn)
     unit = float(np.abs(displacement).max()) / LARGEST_SHORT or 1.0
     status = state["status"][:]
     attributes = state.attrs
-    strains, stresses = voigt_names(len(attributes["strain"]))
+    strains = voigt_names(len(attributes["strain"]))[0]
     loads = [(strains[k], attributes["strain"][k]) for k in components_above(FAINT, attributes["strain"][None])]
     loads += [("temperature", value)] if (value := attributes.get("temperature", 0.0)) else []
     words = [f"{name} = {value:.4g}" for name, value in loads]
+    point, analysis = int(attributes["point"]), reported(document)
     return {
-        "number": number,
-        "point": int(attributes["point"]) if reported(document).is_curve else None,
+        "point": point if analysis.is_curve else None,
+        "mark": marks(document).get(point, "") if analysis.is_followed else "",
         "label": str(attributes["label"]),
         "load": ", ".join(words) or "no strain",
         "stress": [float(value) for value in attributes["stress"]],
         "nodes": [int((status == kind).sum()) for kind in range(3)],
         "unit": unit,
         "displacement": _base64(np.round(displacement / unit), "<i2"),
-        "fields": [_field(drawn_stress(state, name, drawn), drawn.areas) for name in stresses],
         "status": _base64(edges.state(status), "u1"),
     }
 
 
 def _field(values: NDArray[Any], areas: NDArray[Any]) -> dict[str, Any]:
     """Bytes of values on triangles of these areas, and the range they are in."""
-    norm, _ = value_range(values, areas)
-    low, high = float(norm.vmin or 0.0), float(norm.vmax or 0.0)
+    low, high = _range(values, areas)
     scaled = np.clip((values - low) / (high - low), 0.0, 1.0)
     return {"low": low, "high": high, "values": _base64(np.round(scaled * LARGEST_BYTE), "u1")}
+
+
+def _range(values: NDArray[Any], areas: NDArray[Any]) -> tuple[float, float]:
+    norm, _ = value_range(values, areas)
+    return float(norm.vmin or 0.0), float(norm.vmax or 0.0)
 
 
 def _base64(values: Any, kind: str) -> str:

@@ -1,4 +1,4 @@
-"""cell.png: materials and subdomains, and the numbers of the fibres, those that `fibre = N` of a case file means."""
+"""cell.png: materials and the numbers of the fibres, those that `fibre = N` of a case file means; partition.png."""
 
 from __future__ import annotations
 
@@ -33,35 +33,45 @@ LEAST_SIZE, LARGEST_SIZE = 3.0, 11.0  # of the letters, in points
 
 
 def figure(file: Any, drawn: DrawnMesh, borders: Array) -> Figure:
-    """Return the materials, beside the subdomains.
-
-    Materials have the fibres' numbers and, where they differ, the factors of their strengths.
-    """
+    """Return the materials with the fibres' numbers and, where they differ, the factors of their strengths."""
     attributes, fibres = file.attrs, file["fibre"]
-    picture, (left, right) = figure_of(attributes, panels=2)
-    edges = len(drawn.triangles) <= MESH_LINES
-    bodies, subdomains = drawn.body.max() + 1, drawn.subdomain.max() + 1
     phases = list(attributes["phases"])
     inks = np.array([mpl.colors.to_rgba(MATRIX), *(_material(k) for k in range(len(phases) - 1))])
-    for axes, colours in ((left, inks[drawn.phase]), (right, _distinct(subdomains)[drawn.subdomain])):
-        fill_triangles(axes, drawn, drawn.points, colours, edges)
-        draw_segments(axes, drawn.points[borders], "black", 0.9)
-        label_cell_axes(axes, attributes)
-    draw_segments(right, drawn.points[outline_edges(drawn, drawn.subdomain)], "black", 0.5)
+    picture, axes = _outlined(file, drawn, borders, inks[drawn.phase])
     factors = fibres["strength"][:] if "strength" in fibres else np.ones(len(fibres["number"]))
     varies = bool((factors != 1.0).any())
-    write_fibre_numbers(left, file, drawn, borders, cell_scale(attributes), factors if varies else None)
-    words = "; below the numbers: strength / that of [interface]" if varies else ""
-    left.set_title(_count(bodies, "body", "bodies") + words, fontsize=9 if varies else None)
-    right.set_title(_count(subdomains, "subdomain", "subdomains"))
-    right.set_ylabel("")
-    picture.suptitle(plain(attributes["title"]), fontsize=12)
+    write_fibre_numbers(axes, file, drawn, borders, cell_scale(attributes), factors if varies else None)
+    words = "\nbelow the numbers: strength / that of [interface]" if varies else ""
+    axes.set_title(_title(attributes, _count(drawn.body.max() + 1, "body", "bodies")) + words)
     there = np.unique(drawn.phase)
     entries = [Patch(facecolor=inks[k], edgecolor="black", linewidth=0.6, label=phases[k]) for k in there[:IN_LEGEND]]
     if len(there) > IN_LEGEND:
         entries.append(Patch(facecolor="none", edgecolor="none", label=f"and {len(there) - IN_LEGEND} others"))
-    picture.legend(handles=entries, loc="outside lower center", ncols=6, frameon=False)
+    picture.legend(handles=entries, loc="outside lower center", ncols=3, frameon=False)
     return picture
+
+
+def partition(file: Any, drawn: DrawnMesh, borders: Array) -> Figure:
+    """Return the subdomains into which the bodies are cut."""
+    subdomains = drawn.subdomain.max() + 1
+    picture, axes = _outlined(file, drawn, borders, _distinct(subdomains)[drawn.subdomain])
+    draw_segments(axes, drawn.points[outline_edges(drawn, drawn.subdomain)], "black", 0.5)
+    words = f"{_count(drawn.body.max() + 1, 'body', 'bodies')} in {_count(subdomains, 'subdomain', 'subdomains')}"
+    axes.set_title(_title(file.attrs, words))
+    return picture
+
+
+def _outlined(file: Any, drawn: DrawnMesh, borders: Array, colours: Array) -> tuple[Figure, Axes]:
+    """Return the cell in the colours (q, 4) of its triangles, with the outlines of the bodies."""
+    picture, (axes,) = figure_of(file.attrs, panels=1)
+    fill_triangles(axes, drawn, drawn.points, colours, len(drawn.triangles) <= MESH_LINES)
+    draw_segments(axes, drawn.points[borders], "black", 0.9)
+    label_cell_axes(axes, file.attrs)
+    return picture, axes
+
+
+def _title(attributes: Any, words: str) -> str:
+    return f"{plain(attributes['title'])}\n{words}".lstrip()
 
 
 def _material(number: int) -> Any:

@@ -17,7 +17,14 @@ from matplotlib.tri import Triangulation
 
 from feti_homog.errors import FetiHomogError
 from feti_homog.materials.voigt import voigt_names
-from feti_homog.report.plots import cell_picture, deformed_panels, mesh_error_picture, response_curves, traction_plots
+from feti_homog.report.plots import (
+    cell_picture,
+    deformed_panels,
+    mesh_error_picture,
+    response_curves,
+    sensitivities_picture,
+    traction_plots,
+)
 from feti_homog.report.plots.decimation import (
     DrawnMesh,
     drawn_displacement,
@@ -26,6 +33,7 @@ from feti_homog.report.plots.decimation import (
     nodal_values,
     outline_edges,
 )
+from feti_homog.report.plots.free_expansion import FreeExpansion
 from feti_homog.report.plots.interface_marks import InterfaceEdges, states_of_nodes
 from feti_homog.report.plots.load_labels import LoadLabels
 from feti_homog.report.plots.plot_helpers import (
@@ -51,6 +59,8 @@ from feti_homog.typing import Array
 LEVEL_INK, LEVEL_WIDTH = "0.15", 0.6  # of lines of equal displacement along the fibres
 LEVELS = 12  # about so many lines
 OUTLINED_BODIES = 8  # up to which the deformed cell is drawn over all that it has left
+FREE = r"free expansion by $\Delta T = 1$"
+POWERS = (-2, 4)  # of ten between which numbers of a colour bar have no common factor
 UNDEFORMED, BAR_INCHES = "0.5", 1.1
 IN_LEGEND = 2  # entries of a legend in a line: four are wider than a narrow cell
 
@@ -58,8 +68,10 @@ IN_LEGEND = 2  # entries of a legend in a line: four are wider than a narrow cel
 def plot(directory: Path) -> list[Path]:
     """Draws the pictures of `directory`/result.h5 and result.json beside them and returns their paths.
 
-    - cell.png: bodies and subdomains; mesh_error.png: where the estimated error of the mesh is;
+    - cell.png: materials; partition.png: subdomains; mesh_error.png: where the estimated error of the mesh is;
     - of each load case case_E11.png, case_minus_E11.png, ... (unit strains), case_temperature.png or state_K.png;
+      that of the temperature expands freely if its expansion is known, else it is held;
+    - sensitivities.png, if the case asks for them;
     - of `angle` angle.png and angle_states.png, of `path` path.png, path_states.png and path.gif;
     - of `load` load.png, of `envelope` envelope.png;
     - interface.png, if some interface is debonded.
@@ -76,6 +88,8 @@ def plot(directory: Path) -> list[Path]:
     with mpl.rc_context(STYLE):
         try:
             paths = _pictures(directory, document) if _output(document).get("fields", True) else []
+            if (changes := sensitivities_picture.figure(document)) is not None:
+                paths.append(save(changes, directory / "sensitivities.png"))
             return paths + response_curves.plot(directory, document)
         except OSError as error:
             raise FetiHomogError(f"cannot draw {directory / field_file.NAME}: {error.strerror or error}") from error
@@ -93,7 +107,10 @@ def _pictures(directory: Path, document: Mapping[str, Any]) -> list[Path]:
         drawn = drawn_mesh(file)
         borders = outline_edges(drawn, drawn.body)
         interface_edges = InterfaceEdges.of(file, drawn, borders)
-        paths = [save(cell_picture.figure(file, drawn, borders), directory / "cell.png")]
+        paths = [
+            save(cell_picture.figure(file, drawn, borders), directory / "cell.png"),
+            save(cell_picture.partition(file, drawn, borders), directory / "partition.png"),
+        ]
         if (error := mesh_error_picture.figure(file, drawn, borders)) is not None:
             paths.append(save(error, directory / "mesh_error.png"))
         if reported(document).is_curve:
@@ -102,7 +119,8 @@ def _pictures(directory: Path, document: Mapping[str, Any]) -> list[Path]:
             for number in sorted(file.get("state", ()), key=int):
                 state = file[f"state/{number}"]
                 draw = _sheared if is_axial(state) else _deformed
-                figure = draw(file, state, drawn, borders, interface_edges, document)
+                shown = FreeExpansion.of(state, document) or state
+                figure = draw(file, shown, drawn, borders, interface_edges, document)
                 name = reported(document).picture or _name(number, state.attrs)
                 paths.append(save(figure, directory / f"{name}.png"))
         return paths + traction_plots.plot(directory, file, interface_edges, document)
@@ -137,9 +155,8 @@ def _deformed(
     draw_segments(axes, _left(file.attrs, drawn, borders), UNDEFORMED, 0.7)
     undeformed = Line2D([], [], color=UNDEFORMED, linewidth=0.7, label="undeformed")
     _outlined(figure, axes, state, moved, borders, interface_edges, [undeformed])
-    axes.set_title(
-        f"{plain(file.attrs['title'])}\n{LoadLabels.of(document).label(state.attrs)}, displacement × {scale:g}".lstrip()
-    )
+    load = FREE if isinstance(state, FreeExpansion) else LoadLabels.of(document).label(state.attrs)
+    axes.set_title(f"{plain(file.attrs['title'])}\n{load}, displacement × {scale:g}".lstrip())
     return figure
 
 
@@ -174,6 +191,7 @@ def _coloured(file: Any, state: Any, drawn: DrawnMesh, moved: Array, output: Map
     norm, colours, extend = colour_range(stress, drawn.node_areas)
     picture = shade_triangles(axes, drawn, moved, stress, norm, colours)
     bar = figure.colorbar(picture, cax=axes.inset_axes((1.03, 0.0, 0.04, 1.0)), extend=extend)
+    bar.ax.ticklabel_format(axis="y", scilimits=POWERS)
     bar.set_label(f"${STRESS_SYMBOLS[component]}$ " + (unit_label(attributes["stress_unit"]) or "(unit of the moduli)"))
     return figure, axes
 

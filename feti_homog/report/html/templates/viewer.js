@@ -19,10 +19,6 @@
     fields: state.fields.map((field) => ({ ...field, values: decoded(field.values, Uint8Array) })),
     status: decoded(state.status, Uint8Array),
   }));
-  const ranges = data.components.map((_, k) => [
-    Math.min(...states.map((state) => state.fields[k].low)),
-    Math.max(...states.map((state) => state.fields[k].high)),
-  ]);
   const view = at("view"), slider = at("state"), chosen = at("component"), scale = at("scale"), common = at("common");
   const moved = new Float32Array(points.length);
   const bins = new Uint8Array(count);
@@ -62,7 +58,7 @@
 
   const draw = () => {
     const state = states[slider.value], component = Number(chosen.value), field = state.fields[component];
-    const range = common.checked ? ranges[component] : [field.low, field.high];
+    const range = common.checked ? data.ranges[component] : [field.low, field.high];
     const ratio = window.devicePixelRatio || 1, margin = 6;
     const width = view.parentElement.clientWidth, most = Math.max(240, 0.62 * window.innerHeight);
     const size = Math.min((width - 2 * margin) / frame.width, most / frame.height);
@@ -111,7 +107,7 @@
 
   const tell = (state, range, component) => {
     const unit = data.unit ? ` ${data.unit}` : "";
-    at("label").textContent = state.label;
+    at("label").textContent = state.mark ? `${state.mark}: ${state.label}` : state.label;
     at("load").textContent = state.load;
     at("mean").textContent = `mean ${data.components[component]}: ${digits(state.stress[component])}${unit}`;
     at("nodes").textContent = edges.length
@@ -151,6 +147,15 @@
 
   data.components.forEach((name, k) => chosen.add(new Option(name, k)));
   chosen.value = data.component;
+  common.checked = data.common;
+  states.forEach((state, k) => {
+    if (!state.mark) return;
+    const jump = document.createElement("button");
+    jump.type = "button";
+    jump.textContent = state.mark;
+    jump.addEventListener("click", () => { stop(); slider.value = k; draw(); });
+    at("marks").append(jump);
+  });
   slider.max = states.length - 1;
   scale.value = data.scale;
   const bar = at("bar").getContext("2d");

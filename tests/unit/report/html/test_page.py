@@ -141,6 +141,7 @@ def test_the_states_of_a_path_know_their_points(tmp_path: Path) -> None:
     page.write(directory)
     shown = json.loads(Words((tmp_path / "report.html").read_text(encoding="utf-8")).data)["states"]
     assert [(state["number"], state["point"]) for state in shown] == [(0, 0), (1, 5), (2, 8)]
+    assert [state["mark"] for state in shown] == ["first break", "", "peak and end"]
 
 
 @pytest.mark.parametrize("result", [path, angle, bonded])
@@ -191,7 +192,21 @@ def test_the_viewer_draws_the_fields(tmp_path: Path) -> None:
                 clipped = np.clip(exact, field["low"], field["high"])
                 np.testing.assert_allclose(field["low"] + width * values / 255, clipped, atol=0.6 * width / 255)
             assert state["nodes"] == np.bincount(file[f"state/{number}/status"][:], minlength=3).tolist()
-    assert shown["component"] == 0 and shown["points"]
+    assert shown["component"] == 0 and shown["points"] and shown["common"]
+
+
+def test_one_scale_is_that_of_all_states_but_the_end(tmp_path: Path) -> None:
+    """At the end of a path that falls and rises again stresses may be many times those before."""
+    fallen = path()
+    for point, stress in zip(fallen["path"], (9.0, 1.0, 3.0), strict=True):
+        point["stress"] = [stress, 0.0, 0.0]
+    with h5py.File(written(tmp_path, fallen) / "result.h5", "a") as file:
+        file["state/2/stress"][...] *= 1e3
+        shown = viewer_data(file, fallen)
+        before = np.concatenate([file[f"state/{k}/stress"][:, 0] for k in range(2)])
+    assert [state["mark"] for state in shown["states"]] == ["first break and peak", "after the peak", "end"]
+    low, high = shown["ranges"][0]
+    assert before.min() - 0.1 <= low < high <= before.max() + 0.1
 
 
 def test_the_table_of_a_load() -> None:

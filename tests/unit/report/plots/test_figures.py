@@ -90,7 +90,7 @@ def test_all_pictures_are_made(tmp_path: Path, order: int, refine: int) -> None:
     write(tmp_path, sample(4, refine, order))
     paths = figures.plot(tmp_path)
     cases = ["case_E11.png", "case_E22.png", "case_gamma12.png"]
-    assert [path.name for path in paths] == ["cell.png", "mesh_error.png", *cases, "interface.png"]
+    assert [path.name for path in paths] == ["cell.png", "partition.png", "mesh_error.png", *cases, "interface.png"]
     for path in paths:
         picture = imread(path)
         assert min(picture.shape[:2]) > 500 and picture[..., :3].std() > 0.1
@@ -129,7 +129,7 @@ def test_pictures_of_paths_and_angles_are_made(tmp_path: Path, document: dict[st
     write(tmp_path, sample(4, refine=1))
     (tmp_path / "result.json").write_text(json.dumps(document))
     paths = figures.plot(tmp_path)
-    assert [path.name for path in paths] == ["cell.png", "mesh_error.png", *names]
+    assert [path.name for path in paths] == ["cell.png", "partition.png", "mesh_error.png", *names]
     for path in paths:
         with Image.open(path) as picture:
             assert getattr(picture, "n_frames", 1) == (3 if path.suffix == ".gif" else 1)
@@ -163,7 +163,7 @@ def test_loads_in_space_have_their_pictures(tmp_path: Path) -> None:
     write(tmp_path, in_space(sample(4)))
     paths = figures.plot(tmp_path)
     names = ["case_E33.png", "case_temperature.png", "case_minus_gamma13.png"]
-    assert [path.name for path in paths] == ["cell.png", "mesh_error.png", *names, "interface.png"]
+    assert [path.name for path in paths] == ["cell.png", "partition.png", "mesh_error.png", *names, "interface.png"]
     for path in paths:
         picture = imread(path)
         assert min(picture.shape[:2]) > 500 and picture[..., :3].std() > 0.1
@@ -171,7 +171,7 @@ def test_loads_in_space_have_their_pictures(tmp_path: Path) -> None:
     output = {"stress": "S23"}
     (tmp_path / "result.json").write_text(json.dumps({"schema": SCHEMA, "case": {"output": output}}))
     after = [path.read_bytes() for path in figures.plot(tmp_path)]
-    assert before[:2] == after[:2] and all(a != b for a, b in zip(before[2:5], after[2:5], strict=True))
+    assert before[:3] == after[:3] and all(a != b for a, b in zip(before[3:6], after[3:6], strict=True))
 
 
 @pytest.mark.parametrize(("wanted", "step"), [(0.083, 0.1), (0.1, 0.1), (0.11, 0.2), (3.0, 5.0), (6e4, 1e5), (0, 1)])
@@ -186,7 +186,7 @@ def test_the_case_chooses_component_and_scale(tmp_path: Path) -> None:
     output = {"stress": "S22", "deformation_scale": 0.3}
     (tmp_path / "result.json").write_text(json.dumps({"schema": SCHEMA, "case": {"output": output}}))
     after = [path.read_bytes() for path in figures.plot(tmp_path)]
-    assert before[:2] == after[:2] and all(a != b for a, b in zip(before[2:5], after[2:5], strict=True))
+    assert before[:3] == after[:3] and all(a != b for a, b in zip(before[3:6], after[3:6], strict=True))
 
 
 @pytest.mark.parametrize(
