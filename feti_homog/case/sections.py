@@ -164,8 +164,9 @@ class Output:
     )
     sensitivities: bool = key(
         boolean,
-        "Derivatives of every constant of the cell by every constant of its phases and elastic interfaces, without "
-        'further solves, in [analysis] type = "stiffness". Debonded faces must have contact = false.',
+        "Derivatives of every constant of the cell by every constant of its phases and elastic interfaces, and a "
+        'picture of them, at no further solve, in [analysis] type = "stiffness". Debonded faces must have '
+        "contact = false.",
         default=False,
     )
     pictures: bool = key(boolean, "Draw the PNG files; without fields, the curves alone.", default=True)
