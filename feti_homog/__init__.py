@@ -10,6 +10,7 @@ From a program of one's own, under `mpirun` or not:
 
 - `Case`: a checked case, of a file (`Case.load`) or of a document of the same sections (`Case.parse`).
 - `run`: a case's `Result`.  `run_sweep`, `collect_sweep`: those of many cases, and their table.
+- `run_fit`: constants of cases from measured values.
 - `draw_state`: the deformed cell of a state into Matplotlib's axes.  `read_state`: its fields as arrays.
 - `launch`: a program with options of its own and PETSc's, whose errors end as those of the command line do.
 - `CaseError`, `MeshError`, `ConvergenceError`, all of them `FetiHomogError`: raised on all ranks, `faults` in words.
@@ -29,7 +30,7 @@ from feti_homog.version import __version__
 
 if TYPE_CHECKING:
     from feti_homog.analysis.result import Result
-    from feti_homog.api import collect_sweep, draw_state, launch, read_state, run, run_sweep
+    from feti_homog.api import collect_sweep, draw_state, launch, read_state, run, run_fit, run_sweep
     from feti_homog.case.case import Case
 
 __all__ = [
@@ -45,6 +46,7 @@ __all__ = [
     "launch",
     "read_state",
     "run",
+    "run_fit",
     "run_sweep",
 ]
 

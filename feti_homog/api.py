@@ -114,6 +114,36 @@ def collect_sweep(out: str | Path, comm: Intracomm | None = None, *, pictures: b
     return on_root(comm, collect.collect, Path(out), pictures)
 
 
+def run_fit(
+    fit: str | Path | Mapping[str, Any],
+    out: str | Path,
+    comm: Intracomm | None = None,
+    *,
+    ranks_per_case: int | None = None,
+    retry: bool = False,
+    quiet: bool = True,
+) -> dict[str, Any]:
+    """Fit the unknowns of a file, or of such a document, and return the content of fit.json on every rank.  Collective.
+
+    Every evaluation is kept in `out`, so that the same call goes on after an interruption.  Arguments are those of
+    `run_sweep`.
+
+    Raises:
+        CaseError: the fit is faulty, or `out` cannot be used.
+        ConvergenceError: a case failed, or the data do not determine the unknowns.
+    """
+    comm = _started(comm)
+    from feti_homog.fit import description, execute
+    from feti_homog.parallel.mpi_errors import on_root
+
+    if isinstance(fit, str | Path):
+        read = on_root(comm, description.load, Path(fit))
+    else:
+        read = on_root(comm, description.parse, fit, Path())
+    group = comm.size if ranks_per_case is None else ranks_per_case
+    return execute.run(read, folder(out), comm, group, retry, quiet)
+
+
 def draw_state(axes: Axes, out: str | Path, number: int = 0, **choices: Any) -> str:
     """Draw the deformed cell of a state of `out`/result.h5 into Matplotlib's axes; returns what is drawn, in words.
 

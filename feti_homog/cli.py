@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NoReturn
 
 from feti_homog.api import parsed, start
-from feti_homog.commands import fibres, products, reference, run, sweep, verify
+from feti_homog.commands import fibres, fit, products, reference, run, sweep, verify
 from feti_homog.errors import EXIT_DONE, CaseError
 from feti_homog.petsc.command_words import split_argv
 from feti_homog.petsc.option_table import help_text
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 LAUNCHER_HELP = "Switches of Open MPI go to mpirun: --allow-run-as-root, --oversubscribe (more ranks than cores)."
-COMMANDS = (run, products, verify, fibres, sweep, reference)
+COMMANDS = (run, products, verify, fibres, sweep, fit, reference)
 
 
 class Parser(argparse.ArgumentParser):

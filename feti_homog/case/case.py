@@ -15,6 +15,7 @@ from feti_homog.case.asked import AnalysisSection, Stiffness
 from feti_homog.case.cell_files import with_files, with_match
 from feti_homog.case.cell_section import GEOMETRY, TOUCHING, Cell, size_faults
 from feti_homog.case.document import read_document, to_document
+from feti_homog.case.fit_sections import FIT_SECTIONS
 from feti_homog.case.interface_faults import read_interfaces
 from feti_homog.case.interface_section import Arc, InterfaceSection, interface_tables
 from feti_homog.case.load_section import Envelope, LoadPath, SingleLoad, expansion_faults, load_faults, stress_free
@@ -227,6 +228,8 @@ def _top_level_faults(document: Mapping[str, Any]) -> list[str]:
     faults = [f"[{section}]: missing section" for section in REQUIRED if section not in document]
     for name, value in document.items():
         hint = suggestion(name, TOP_LEVEL, KEY_OWNERS)
+        if name in FIT_SECTIONS:
+            hint = "it belongs to the file of a fit; `feti-homog fit` runs it"
         if name == SWEEP:
             words = f"{SWEEP} = {toml_value(value)}: expected a section [{SWEEP}]"
             many = "[sweep]: this file describes many cases; `feti-homog sweep` runs them"

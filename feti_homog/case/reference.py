@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from feti_homog.case.fit_sections import CURVE, MEASURED, UNKNOWN, Measured, MeasuredCurve, Unknown
 from feti_homog.case.sections import (
     AXIS_EXPECTED,
     AXIS_MEANING,
@@ -38,8 +39,17 @@ ORDER = (
     "output",
     "petsc",
     SWEEP,
+    UNKNOWN,
+    MEASURED,
 )
 """Sections in the order of the reference."""
+
+FIT_TABLES = (
+    Table(UNKNOWN, f"[{UNKNOWN}] SECTION.KEY", Unknown),
+    Table(MEASURED, f"[{MEASURED}] NAME", Measured),
+    Table(MEASURED, f"[{MEASURED}] {CURVE}", MeasuredCurve),
+)
+"""Tables of the file of `feti-homog fit`, beside those of its cases."""
 
 WIDTH = 100  # characters of a printed line
 INDENT: dict[str, Any] = {"initial_indent": "      ", "subsequent_indent": "      ", "break_on_hyphens": False}
@@ -87,7 +97,7 @@ class TableReference:
 
 def tables() -> list[TableReference]:
     """All tables of the case file, in the order of `ORDER`."""
-    found = [_name_table(), *map(_table, TABLES), _petsc_table(), _sweep_table(), _range_table()]
+    found = [_name_table(), *map(_table, (*TABLES, *FIT_TABLES)), _petsc_table(), _sweep_table(), _range_table()]
     return sorted(found, key=lambda table: ORDER.index(table.section))
 
 

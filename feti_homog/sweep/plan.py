@@ -88,10 +88,10 @@ def expand(values: Mapping[str, Any], folder: Path) -> Sweep:
     unchecked = case_documents(document, points, settings.realisations, faults)
     if faults:
         raise CaseError(*dict.fromkeys(faults))
-    return _checked(str(document.get("name", "case")), unchecked, folder)
+    return checked(str(document.get("name", "case")), unchecked, folder)
 
 
-def _checked(name: str, unchecked: Sequence[CaseDocument], folder: Path) -> Sweep:
+def checked(name: str, unchecked: Sequence[CaseDocument], folder: Path) -> Sweep:
     """Return the sweep of its documents.
 
     Raises CaseError with the faults of all cases, each with the cases that have it.
@@ -137,16 +137,20 @@ class CaseDocument:
 
 
 def case_documents(
-    base: Mapping[str, Any], points: Sequence[Assignment], realisations: int | None, faults: list[str]
+    base: Mapping[str, Any],
+    points: Sequence[Assignment],
+    realisations: int | None,
+    faults: list[str],
+    section: str = SWEEP,
 ) -> list[CaseDocument]:
     """Return the cases in their order: all points, then the next realisation of those with a random cell.
 
-    What is wrong with the points and their number of realisations is added to `faults`.
+    What is wrong with the points, of a section, and their number of realisations is added to `faults`.
     """
-    documents = [_with_values(base, point, faults) for point in points]
+    documents = [_with_values(base, point, faults, section) for point in points]
     if realisations is not None:
         faults += _realisation_faults(documents, points)
-    faults += _repeated(points[0]) if points else []
+    faults += _repeated(points[0], section) if points else []
     return [] if faults else list(_ordered(points, documents, realisations))
 
 
@@ -170,7 +174,7 @@ def _seed(document: Mapping[str, Any], realisation: int) -> Any:
     return first + realisation - 1 if isinstance(first, int) else first
 
 
-def _with_values(base: Mapping[str, Any], point: Assignment, faults: list[str]) -> dict[str, Any]:
+def _with_values(base: Mapping[str, Any], point: Assignment, faults: list[str], section: str) -> dict[str, Any]:
     """Return the base with the values of a point; a table is merged into the section that it is a value of."""
     document = copy.deepcopy(dict(base))
     for path, value in point.items():
@@ -178,10 +182,10 @@ def _with_values(base: Mapping[str, Any], point: Assignment, faults: list[str]) 
         for name in path[:-1]:
             table = _entry(table, name)
             if table is None:
-                faults.append(f"[{SWEEP}] {dotted_key(path)}: {toml_value(name)} is no section")
+                faults.append(f"[{section}] {dotted_key(path)}: {toml_value(name)} is no section")
                 return document
         if isinstance(table, list):
-            faults.append(f"[{SWEEP}] {dotted_key(path)}: {_several(path, table)}")
+            faults.append(f"[{section}] {dotted_key(path)}: {_several(path, table)}")
             return document
         last = path[-1]
         if isinstance(value, dict) and isinstance(table.get(last, {}), dict):
@@ -220,10 +224,10 @@ def _realisation_faults(documents: Sequence[dict[str, Any]], points: Sequence[As
     return faults
 
 
-def _repeated(point: Assignment) -> list[str]:
+def _repeated(point: Assignment, section: str) -> list[str]:
     """Faults of keys that vary by themselves and within a table too."""
     given = [key for path, value in point.items() for key in _inputs({path: value})]
-    return [f"[{SWEEP}] {key}: given twice" for key in dict.fromkeys(given) if given.count(key) > 1]
+    return [f"[{section}] {key}: given twice" for key in dict.fromkeys(given) if given.count(key) > 1]
 
 
 def _is_random(document: Mapping[str, Any]) -> bool:

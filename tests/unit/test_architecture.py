@@ -65,6 +65,7 @@ FLOORS = (
     ("analysis",),
     ("sweep.report",),
     ("sweep",),
+    ("fit",),
     ("api",),
     ("commands",),
     ("cli",),

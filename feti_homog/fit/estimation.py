@@ -1,0 +1,169 @@
+"""Weighted least squares: estimates, their covariance, and unknowns that the data do not determine.
+
+With residuals r_i = (f_i(x) - y_i) / s_i of data y of independent errors of standard deviations s, and J = dr/dx, the
+estimate is the minimum of r^T r within bounds, and its covariance (J^T J)^-1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.stats import chi2, norm
+
+from feti_homog.typing import Array, Float
+
+CONFIDENCE = 0.95
+# Of the largest singular value: below are directions that no datum sees; of a direction: smaller entries are rounding.
+RANK_TOLERANCE, ENTRY = 1e-6, 1e-2
+STEP, FALL, SLOPE, MOST_EVALUATIONS = 1e-8, 1e-9, 1e-9, 60
+Model = Callable[[Float], Float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Estimates:
+    """Estimates of n unknowns from m data.
+
+    Attributes:
+        x: (n,) estimates.
+        computed, residuals: (m,) f(x) and (f(x) - y) / s.
+        jacobian: (m, n) of the residuals.
+        at_bound: (n,) -1 at the lower bound, 1 at the upper one, else 0.
+        singular_values: of the Jacobian with every unknown relative to its estimate.
+        directions: (n, n) in rows, of these the right singular vectors.
+        evaluations: number of evaluations of f.
+        converged: whether the minimum is found.
+    """
+
+    x: Float
+    computed: Float
+    residuals: Float
+    jacobian: Float
+    at_bound: Array
+    singular_values: Float
+    directions: Float
+    evaluations: int
+    converged: bool
+
+    @property
+    def rank(self) -> int:
+        """Number of directions that the data determine."""
+        return int(np.count_nonzero(self.singular_values > RANK_TOLERANCE * self.singular_values.max(initial=0.0)))
+
+    @property
+    def undetermined(self) -> list[list[int]]:
+        """The unknowns in each direction that the data do not determine."""
+        return [[int(k) for k in np.flatnonzero(np.abs(row) > ENTRY)] for row in self.directions[self.rank :]]
+
+    @property
+    def influence(self) -> Float:
+        """(n, m) change of each estimate per standard deviation of each datum."""
+        size, kept = _sizes(self.x), self.directions[: self.rank]
+        pseudo = kept.T @ ((kept @ (self.jacobian * size).T) / self.singular_values[: self.rank, None] ** 2)
+        return np.asarray(size[:, None] * pseudo)
+
+    @property
+    def covariance(self) -> Float:
+        """(n, n); infinite variances of unknowns that the data do not determine."""
+        found = self.influence @ self.influence.T
+        for row in self.undetermined:
+            found[row, row] = np.inf
+        return np.asarray(found)
+
+    @property
+    def std(self) -> Float:
+        """(n,) standard deviations of the estimates."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+    @property
+    def half_width(self) -> Float:
+        """(n,) of the confidence intervals."""
+        return np.asarray(norm.ppf((1 + CONFIDENCE) / 2) * self.std)
+
+    @property
+    def correlation(self) -> Float:
+        """(n, n); NaN of unknowns that the data do not determine."""
+        with np.errstate(invalid="ignore"):
+            return np.asarray(self.covariance / np.outer(self.std, self.std))
+
+    @property
+    def shares(self) -> Float:
+        """(n, m) share of each datum in the variance of each estimate."""
+        squares = self.influence**2
+        total = squares.sum(axis=1, keepdims=True)
+        return np.asarray(np.divide(squares, total, out=np.zeros_like(squares), where=total > 0))
+
+    @property
+    def chance(self) -> float | None:
+        """Probability of residuals as large as these, if the model is right; None without a degree of freedom."""
+        freedom = len(self.residuals) - self.rank
+        return float(chi2.sf(self.residuals @ self.residuals, freedom)) if freedom else None
+
+
+def estimate(
+    model: Model, jacobian: Model, measured: tuple[Float, Float], start: Float, bounds: tuple[Float, Float]
+) -> Estimates:
+    """Return the estimates from the values (m,) that `model` gives of unknowns (n,), and their derivatives (m, n).
+
+    `measured` are the data and their standard deviations.  Steps are those of a dogleg in the box of the bounds; where
+    no datum sees a direction, those of a trust region, which do not go along it.
+    """
+    y, std = measured
+    size = _sizes(start)
+    singular = np.linalg.svd(jacobian(start) / std[:, None] * size, compute_uv=False)
+    is_full = len(y) >= len(start) and singular.min() > RANK_TOLERANCE * singular.max()
+    found = least_squares(
+        lambda x: (model(x) - y) / std,
+        start,
+        lambda x: jacobian(x) / std[:, None],
+        bounds=bounds,
+        method="dogbox" if is_full else "trf",
+        x_scale=size,
+        xtol=STEP,
+        ftol=FALL,
+        gtol=SLOPE,
+        max_nfev=MOST_EVALUATIONS,
+    )
+    return summarize(found.x, found.fun * std + y, measured, found.jac * std[:, None], bounds,
+                     evaluations=found.nfev, converged=bool(found.success))  # fmt: skip
+
+
+def summarize(
+    x: Float,
+    computed: Float,
+    measured: tuple[Float, Float],
+    derivatives: Float,
+    bounds: tuple[Float, Float],
+    evaluations: int = 0,
+    converged: bool = True,
+) -> Estimates:
+    """Return the estimates x (n,) with the computed values (m,) and their derivatives (m, n) there."""
+    y, std = measured
+    J = derivatives / std[:, None]
+    _, s, V = np.linalg.svd(J * _sizes(x), full_matrices=True)
+    lower, upper = bounds
+    near = STEP * (upper - lower)
+    at_bound = np.where(x >= upper - near, 1, np.where(x <= lower + near, -1, 0))
+    s = np.pad(s, (0, len(x) - len(s)))
+    return Estimates(x=x, computed=computed, residuals=(computed - y) / std, jacobian=J, at_bound=at_bound,
+                     singular_values=s, directions=V, evaluations=evaluations, converged=converged)  # fmt: skip
+
+
+def names_of(rows: Sequence[Sequence[int]], names: Sequence[str]) -> list[str]:
+    """Return a line for each direction that the data do not determine, with its unknowns."""
+    lines = []
+    for row in rows:
+        own = ", ".join(names[k] for k in row)
+        lines.append(
+            f"[unknown] {own}: no measured value depends on it"
+            if len(row) == 1
+            else f"[unknown] {own}: the measured values do not determine them together"
+        )
+    return lines
+
+
+def _sizes(x: Float) -> Float:
+    """(n,) magnitudes of unknowns; 1 of zeros."""
+    return np.where(x == 0.0, 1.0, np.abs(x))

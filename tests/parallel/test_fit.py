@@ -1,0 +1,110 @@
+"""Fits of cells: they return the constants from which data were made, resume, and are the same on any ranks."""
+
+from __future__ import annotations
+
+import copy
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.fitted_composites import COMPOSITES, fit, model, truth
+
+from feti_homog import CaseError, ConvergenceError, run, run_fit
+from feti_homog.fit import description, execute
+
+pytestmark = pytest.mark.parallel
+
+
+@pytest.fixture(scope="module")
+def glass():
+    """Provide the document of a fit of glass/epoxy to values without noise."""
+    from mpi4py import MPI
+
+    name = "glass/epoxy"
+    return fit(name, model(name, MPI.COMM_WORLD)([*truth(name).values()])[0])
+
+
+@pytest.mark.parametrize("name", COMPOSITES)
+def test_data_without_noise_return_the_truth(comm, shared_path, name):
+    """The four composites, within eight evaluations; intervals and shares are those of the normal equations."""
+    values, derivatives = model(name, comm)([*truth(name).values()])
+    found = run_fit(fit(name, values), shared_path / "out", comm)
+    estimates = {key: own["estimate"] for key, own in found["unknowns"].items()}
+    assert estimates == pytest.approx(truth(name), rel=1e-6)
+    assert found["evaluations"] <= 8 and found["status"] == "done" and found["sum_of_squares"] < 1e-8
+    J = derivatives / (0.01 * np.abs(values))[:, None]
+    covariance = np.linalg.inv(J.T @ J)
+    shares = ((covariance @ J.T) ** 2).T / np.diag(covariance)
+    for k, own in enumerate(found["unknowns"].values()):
+        half = 1.959964 * covariance[k, k] ** 0.5
+        assert own["interval"] == pytest.approx([own["estimate"] - half, own["estimate"] + half], rel=1e-3)
+        assert own["shares"] == pytest.approx(shares[:, k], abs=1e-3)
+
+
+def test_an_interrupted_fit_goes_on_with_what_it_has(comm, shared_path, glass, monkeypatch):
+    """It computes again what was not finished, and no more."""
+    out, calls, compute = shared_path / "out", [], execute.execute.run_all
+
+    def counted(sweep, folder, *arguments, **named):
+        calls.append(folder.name)
+        if len(calls) == 3:
+            raise ConvergenceError("the power is gone")
+        compute(sweep, folder, *arguments, **named)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(execute.execute, "run_all", counted)
+        with pytest.raises(ConvergenceError, match="the power is gone"):
+            run_fit(glass, out, comm)
+    before = stamps(out)
+    assert calls == ["evaluation-0001", "evaluation-0002", "evaluation-0003"] and len(before) == 2
+    whole = run_fit(glass, shared_path / "whole", comm)
+    found = run_fit(glass, out, comm)
+    assert before.items() <= stamps(out).items() and len(stamps(out)) == found["evaluations"]
+    assert found["unknowns"].keys() == whole["unknowns"].keys()
+    for key, own in found["unknowns"].items():
+        assert own["estimate"] == pytest.approx(whole["unknowns"][key]["estimate"], rel=1e-9)
+    other = copy.deepcopy(glass)
+    other["measured"]["E1"]["value"] *= 1.01
+    with pytest.raises(CaseError, match="holds another fit"):
+        run_fit(other, out, comm)
+
+
+def stamps(out: Path) -> dict[str, int]:
+    return {str(path): path.stat().st_mtime_ns for path in out.glob("evaluation-*/case-*/result.json")}
+
+
+def test_tests_share_unknowns_and_fractions_are_fitted_by_differences(comm, shared_path, glass):
+    """Two arrangements of one fibre at an unknown fraction, on groups of ranks."""
+    document = copy.deepcopy(glass)
+    for key in truth("glass/epoxy").keys() - {"material.fibre.young"}:
+        del document["unknown"][key]
+    document["material"]["fibre"] |= {"poisson": 0.22, "expansion": 5.0}
+    document["material"]["matrix"] |= {"young": 3.45, "poisson": 0.35, "expansion": 54.0}
+    del document["measured"]
+    document["unknown"]["cell.fibre_fraction"] = {"start": 0.5, "lower": 0.3, "upper": 0.6}
+    document["cell"] = {"mesh_size": 0.3, "order": 2}
+    true = {"material.fibre.young": 73.0, "cell.fibre_fraction": 0.53}
+    tests = [{"cell": {"geometry": geometry}} for geometry in ("square", "hexagonal")]
+    anything = {name: {"value": 1.0, "std": 0.1} for name in ("E3", "E1", "G13")}
+    document["test"] = [test | {"measured": anything} for test in tests]
+    asked = description.parse(document, Path())
+    sweep = asked.at([true[name] for name in asked.unknowns])
+    for test, case in zip(document["test"], sweep.cases, strict=True):
+        found = run(case, comm).sensitivities
+        values = dict(zip(found.constants, found.constant_values, strict=True))
+        test["measured"] = {n: {"value": float(values[n]), "std": float(0.01 * values[n])} for n in anything}
+    found = run_fit(document, shared_path / "out", comm, ranks_per_case=1)
+    assert {key: own["estimate"] for key, own in found["unknowns"].items()} == pytest.approx(true, rel=1e-3)
+    assert len({*(shared_path / "out").glob("differences-*")}) >= 2
+
+
+def test_unknowns_that_the_data_do_not_determine_are_named(comm, shared_path, glass):
+    document = copy.deepcopy(glass)
+    document["measured"] = {k: v for k, v in glass["measured"].items() if "expansion" not in k}
+    with pytest.raises(ConvergenceError) as error:
+        run_fit(document, shared_path / "out", comm)
+    assert [line for line in error.value.faults if "no measured value depends" in line] == [
+        "[unknown] material.fibre.expansion: no measured value depends on it",
+        "[unknown] material.matrix.expansion: no measured value depends on it",
+    ]
+    assert (shared_path / "out" / "fit.json").exists()
