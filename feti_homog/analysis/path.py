@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from types import TracebackType
 from typing import Any, Self
 
+import numpy as np
+
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.criteria import criterion_of
 from feti_homog.analysis.path_events import Work, restored, stored
@@ -16,9 +18,11 @@ from feti_homog.analysis.tip_records import TipRecorder
 from feti_homog.case.load_section import LoadPath
 from feti_homog.errors import NotCarriedError
 from feti_homog.homogenization.averaging import Response
+from feti_homog.interface.friction.sliding_cell import SlidingCell
 from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.path.path_following import events, increments
 from feti_homog.interface.path.path_points import Energies, Point, unloaded
+from feti_homog.interface.path.sliding_path import sliding_events
 from feti_homog.results.kept_points import kept
 from feti_homog.results.path_peak import marks, peak_of
 from feti_homog.runtime.progress import Progress
@@ -110,7 +114,9 @@ def _points(
         point, energies = restored(context.checkpoint.read(number), cell)
         begin = point.after
         yield point, energies
-    if path.method == "events":
+    if context.case.has_friction:
+        found = sliding_events(cell, _sliding_cell(context), law, waypoints, begin)
+    elif path.method == "events":
         found = events(cell, law, waypoints, begin)
     else:
         found = increments(cell, law, waypoints, path.increments or 1, path.release == "worst", begin)
@@ -122,6 +128,13 @@ def _points(
         if count == 0:
             raise
         context.checks.faults.append(f"[path]: {error} beyond the last point; prescribe strains there")
+
+
+def _sliding_cell(context: AnalysisContext) -> SlidingCell:
+    """Return the faces of the case with the friction of its interfaces.  Collective; raises as `SlidingCell`."""
+    coefficients = np.array([interface.friction for interface in context.case.interfaces])
+    plane = context.plane.interface
+    return SlidingCell(plane, coefficients[plane.nodes.pair])
 
 
 def _tell(context: AnalysisContext, shown: EventProgress, name: str, responses: Sequence[Response]) -> None:
@@ -154,6 +167,7 @@ def _entry(
         "work": work.all_equilibria.work,
         "dissipated": work.all_equilibria.released,
         "dissipated_strain_controlled": work.load_controlled,
+        **({"friction_heat": work.all_equilibria.friction} if context.case.has_friction else {}),
         **(_fracture(work.all_equilibria) if law.has_toughness else {}),
     } | context.loaded_point(responses)
 

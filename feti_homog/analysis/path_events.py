@@ -90,8 +90,9 @@ def restored(event: Arrays, cell: CoupledInterfaces) -> tuple[Point, tuple[Energ
         None if np.isnan(broken) else broken,
     )
     broke, softened = map(int, counts)
-    point = Point(load_factor, scale, state, broke, softened, Energies(*energies[:3]), event["used"], after)
-    return point, (Energies(*energies[3:6]), energies[6])
+    own = len(NO_ENERGIES)
+    point = Point(load_factor, scale, state, broke, softened, Energies(*energies[:own]), event["used"], after)
+    return point, (Energies(*energies[own : 2 * own]), energies[2 * own])
 
 
 def _taken_apart(state: Equilibrium) -> tuple[dict[str, Any], Arrays]:
@@ -123,9 +124,9 @@ def _put_together(event: Arrays, interface: ContactProblem, suffix: str) -> Equi
 
 def _bonds_apart(bonds: BondState, suffix: str) -> Arrays:
     """Return the state of bonds as distributed arrays with this suffix."""
-    return {f"{name}{suffix}": values for name, values in vars(bonds).items()}
+    return {f"{name}{suffix}": values for name, values in vars(bonds).items() if values is not None}
 
 
 def _bonds_together(event: Arrays, suffix: str) -> BondState:
     """Rebuild the state of bonds from the arrays of `_bonds_apart`."""
-    return BondState(*(event[f"{field.name}{suffix}"] for field in fields(BondState)))
+    return BondState(*(event.get(f"{field.name}{suffix}") for field in fields(BondState)))  # type: ignore[arg-type]

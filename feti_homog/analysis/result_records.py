@@ -183,6 +183,9 @@ class PathPoint:
     )
     dissipated: float = described("energy lost to breaks so far per area of the cell, along all equilibria", STRESS)
     dissipated_strain_controlled: float = described("the same if the load only rises on the first leg", STRESS)
+    friction_heat: float | None = described(
+        "heat of friction so far per area of the cell: `work` is `stored`, `dissipated` and this", STRESS, default=None
+    )
     fracture_energy: float | None = described(
         "toughness of the bonds that the load broke so far, each in the mode in which it broke, times their lengths, "
         "per area of the cell; of bonds that break by energy",

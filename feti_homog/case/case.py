@@ -100,6 +100,11 @@ class Case:
         return self.interfaces[0] if self.interfaces else None
 
     @property
+    def has_friction(self) -> bool:
+        """Return True if some debonded faces resist sliding."""
+        return any(interface.friction for interface in self.interfaces)
+
+    @property
     def targets(self) -> tuple[Mapping[str, float], ...]:
         """The loads of a path after its unloaded start, or the one load of the case, in full.
 

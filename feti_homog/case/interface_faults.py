@@ -33,7 +33,7 @@ def read_interfaces(document: Mapping[str, Any], reader: TableReader) -> tuple[I
     interfaces = tuple(map(_completed, filter(None, read)))
     reader.faults += _faults_between(interfaces)
     for label, interface in zip(labels, interfaces, strict=True):
-        reader.faults += _cohesive_faults(interface, label)
+        reader.faults += [*_cohesive_faults(interface, label), *_friction_faults(interface, label)]
     return interfaces
 
 
@@ -95,6 +95,19 @@ def _cohesive_faults(interface: InterfaceSection, label: str) -> list[str]:
     found = [f"[{label}] {name}: {words} needs a finite one" for name in needed]
     found += [f"[{label}] {line}" for line in _branch_faults(interface)]
     return found or [f"[{label}] {line}" for line in _short_of_energy(interface)]
+
+
+def _friction_faults(interface: InterfaceSection, label: str) -> list[str]:
+    """List the keys that exclude friction, a line each."""
+    if interface.friction == 0.0:
+        return []
+    law, words = LAWS[interface.criterion], f"[{label}] friction = {interface.friction:g}"
+    found = [] if interface.contact else [f"{words}: expected 0 with contact = false: faces that overlap do not press"]
+    if "growth" in law.keys and interface.growth == "released":
+        found.append(f'{words}: expected 0 with growth = "released"; growth = "springs" goes with it')
+    if law.softens:
+        found.append(f"{words}: expected 0 with law = {toml_value(law.name)}, of which sliding bonds are not known")
+    return found
 
 
 def _branch_faults(interface: InterfaceSection) -> Iterator[str]:

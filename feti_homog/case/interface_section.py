@@ -13,9 +13,12 @@ from feti_homog.case.selectors import (
     BREAKING,
     BY_AXIAL_STRENGTH,
     BY_ENERGY,
+    BY_EVENTS,
     BY_STRENGTH,
     BY_TABLE,
     GENERALIZED,
+    IN_THE_PLANE,
+    PATH_ANALYSIS,
     SOFTENING,
 )
 from feti_homog.schema.keys import key
@@ -79,8 +82,17 @@ class InterfaceSection:
 
     contact: bool = key(
         boolean,
-        "true: debonded faces do not overlap, they touch without friction. false: they overlap freely.",
+        "true: debonded faces do not overlap, they touch, with friction where there is a coefficient. false: they "
+        "overlap freely.",
         default=True,
+    )
+    friction: float = key(
+        real(least=0.0),
+        "Coulomb's coefficient mu of debonded faces: they stick while |t_t| < mu |t_n|, and slide at that traction. "
+        "The load is controlled from the first leg on, without snap-back. Cells too large for influence columns are "
+        "refused.",
+        default=0.0,
+        only=(PATH_ANALYSIS, BY_EVENTS, IN_THE_PLANE),
     )
     debonded: tuple[Arc, ...] = key(
         ARCS,

@@ -38,6 +38,7 @@ class Response:
             the strain of voids, which is that of their boundaries, as parts of <eps>;
             `hill` <sigma:eps> = Sigma:E, Eq. (8), springs included, relative to <sigma:eps> or, if
             that is less, to what a bonded cell stores at least by Reuss' bound, for a debonded one may store nothing;
+            with friction <sigma:eps> and what the forces on debonded faces do on their jumps;
             `jump`, the largest opening of a glued node relative to the largest displacement, which does not vanish
             where forces do; the KKT certificate of contact; and if stresses are prescribed `stress`, the
             largest error of one relative to the largest stress or, if that is less, to what the strains would make in a
@@ -122,12 +123,13 @@ class Homogenization:
         opening = allreduce_sum(cell.comm, self._strain_of_jumps.T @ opened)
         stretched = float(cell.comm.allreduce(float(state.solution.lam @ springs))) / cell.summary.area
         energy += stretched
+        rubbing = self._rubbing(state)
         largest = (self._largest(u) + self.interface.scales.imposed(strain)) or 1.0
         imposed = float(self.interface.scales.imposed_strain(strain).max()) or 1.0
         least = self.interface.scales.stress_scale(strain) * imposed
         checks = {
             "strain": float(np.abs(star - opening / cell.summary.area).max() / imposed) + self._strain_inside,
-            "hill": float(abs(energy - stress @ strain) / (max(abs(energy), least) or 1.0)),
+            "hill": float(abs(energy + rubbing - stress @ strain) / (max(abs(energy), least) or 1.0)),
             "jump": self._largest(active * state.solution.jump) / largest,
         }
         if state.load.by_stress.any():
@@ -137,6 +139,16 @@ class Homogenization:
         damage = self.law.damage(state.bonds)
         damage = (state.status != BONDED).astype(float) if damage is None else damage
         return Response(*means, scale, *energies, state, scale * u, checks | state.certificate, counts, damage)
+
+    def _rubbing(self, state: Equilibrium) -> float:
+        """Return the sum of force times slip of faces with friction, per area: what the loads do not store.
+
+        Collective.
+        """
+        if state.bonds.gap_and_slip is None:
+            return 0.0
+        own = float(state.solution.lam @ state.solution.jump)
+        return float(self.cell.comm.allreduce(own)) / self.cell.summary.area
 
     def _unmet_stress(self, state: Equilibrium, stress: Float) -> float:
         """Return the error of the prescribed stresses. Collective."""

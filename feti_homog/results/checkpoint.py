@@ -23,7 +23,7 @@ from feti_homog.parallel.mpi_errors import on_root, on_root_only
 from feti_homog.results import atomic
 
 FOLDER, DROPPED = "checkpoint", "checkpoint.dropped"  # the second while it is removed
-FORMAT = 7  # of an event's file: to be raised when what an event holds changes
+FORMAT = 8  # of an event's file: to be raised when what an event holds changes
 # HDF5 leaves so many bytes at the beginning of a file to its writer; there stands the header.
 USER_BLOCK = 512
 HEADER = re.compile(rb"feti-homog checkpoint, format (\d+), sha256 ([0-9a-f]{64})\n")

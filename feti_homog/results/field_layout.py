@@ -128,6 +128,11 @@ class StatePart:
     )
     status: AnyInt = described("0 bonded, 1 closed (debonded, in contact), 2 open", shape="(k,)", dtype="int8")
     damage: Float = described("damage of bonds: 0 intact, 1 broken; between only by laws that soften", shape="(k,)")
+    sliding: AnyInt = described(
+        "sign of the growing slip of faces that slide with friction; 0 of others, closed ones of which stick",
+        shape="(k,)",
+        dtype="int8",
+    )
 
     def __repr__(self) -> str:
         sizes = f"{len(self.displacement)} nodes, {len(self.stress)} elements, {len(self.status)} interface nodes"

@@ -106,6 +106,7 @@ def state_part(cell: TornCell, response: Response, load_factor: float, label: st
         displacement_matrix=_vectors(fibre + opening),
         status=response.state.status,
         damage=response.damage,
+        sliding=response.state.bonds.sliding_signs,
     )
 
 
@@ -149,6 +150,7 @@ def spatial_state_part(
         displacement_matrix=fibre + opening,
         status=response.state.status,
         damage=response.damage,
+        sliding=response.state.bonds.sliding_signs,
     )
 
 

@@ -16,13 +16,13 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = {
     **dict.fromkeys(("alpha", "cte", "thermal_expansion"), ("expansion",)),
     **dict.fromkeys(("strength", "bond_strength", "tensile_strength"), ("normal_strength", "tangential_strength")),
     "shear_strength": ("tangential_strength",),
+    **dict.fromkeys(("mu", "coefficient_of_friction", "friction_coefficient"), ("friction",)),
     **dict.fromkeys(("k", "kn", "k_n", "stiffness"), ("normal_stiffness", "tangential_stiffness")),
     **dict.fromkeys(("gc", "g_c", "gic", "fracture_energy"), ("toughness",)),
     **dict.fromkeys(("vf", "fraction", "volume_fraction", "fibre_volume_fraction"), ("fibre_fraction",)),
 }
 # What there is none of, and what there is in its place.
 ABSENT = {
-    "friction": "there is no friction: debonded faces touch without it, see contact in [interface]",
     "strength": "phases do not break; bonds do, see normal_strength and tangential_strength in [interface]",
     "g": "it follows from young and poisson",
 }

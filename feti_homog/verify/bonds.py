@@ -43,6 +43,13 @@ def law_at(files: ResultFiles, nodes: AnyInt | Bool | slice = slice(None), damag
     return law_of(section if damage is None else {**section, "damage": damage[nodes]})
 
 
+def friction_at(files: ResultFiles) -> Float:
+    """(k,) coefficient of friction of the interface nodes."""
+    own = [float(section.get("friction", 0.0)) for section in files.interfaces or [{}]]
+    found: Float = np.array(own)[np.minimum(files.interface.pair, len(own) - 1)]
+    return found
+
+
 def _number(section: Mapping[str, Any], name: str) -> float:
     """Return the value of a section, or of the key that it defaults to; inf if there is none."""
     value = section.get(name)

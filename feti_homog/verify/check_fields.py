@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from feti_homog.typing import Float, Int
-from feti_homog.verify.bonds import law_at
+from feti_homog.verify.bonds import friction_at, law_at
 from feti_homog.verify.constitutive_law import out_of_plane
 from feti_homog.verify.discrete_cell import ROUNDED_TERMS, DiscreteCell
 from feti_homog.verify.elements import PLACES, ElementFields
@@ -35,16 +35,22 @@ def check_interface_state(findings: Findings, cell: DiscreteCell, state: State) 
 
 
 def _check_contact(findings: Findings, cell: DiscreteCell, state: State) -> None:
-    """gap >= 0, traction <= 0, gap traction = 0, and no other force on debonded faces."""
+    """gap >= 0, traction <= 0, gap traction = 0, and no other force on debonded faces than friction."""
     at = f"{state.name}, interface node {{}}".format
     debonded, closed = state.status != BONDED, state.status == CLOSED
     gap = (state.jump - law_at(cell.files, damage=state.damage).jumps(state.traction))[:, 0]
     normal, shear = state.traction[:, 0], np.abs(state.traction[:, 1:]).max(axis=1)
+    friction = friction_at(cell.files) * np.maximum(-normal, 0.0)
     length, imposed, least = cell.files.interface.length, cell.imposed(state), cell.least_stress(state)
     pull, force = max(float(np.abs(state.traction).max()), least), np.abs(normal) * length
     push = max(float(force.max()), least * float(length.max()))
-    free = np.where(debonded, shear, 0.0) + np.where(state.status == OPEN, np.abs(normal), 0.0)
+    excess = np.maximum(shear - friction, 0.0)
+    free = np.where(debonded, excess, 0.0) + np.where(state.status == OPEN, np.abs(normal), 0.0)
     findings.record("free faces", relative(free, pull), at)
+    if friction.any():
+        opposed = state.sliding * state.traction[:, 1] - friction
+        findings.record("sliding", relative(np.where(state.sliding != 0, opposed, 0.0), pull), at)
+        findings.record("sliding", np.where(closed, 0.0, np.abs(state.sliding)), at)
     if cell.files.contact:
         findings.record("penetration", relative(np.where(debonded, np.maximum(-gap, 0.0), 0.0), imposed), at)
         findings.record("tension", relative(np.where(closed, np.maximum(normal, 0.0), 0.0), pull), at)

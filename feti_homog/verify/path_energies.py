@@ -86,6 +86,9 @@ def check_path_energies(
     findings: Findings, cell: DiscreteCell, states: Sequence[StateNumbers], points: Sequence[Point]
 ) -> None:
     """`work`, `stored` and what was dissipated at all points; fields are kept of those of `states`."""
+    if "friction_heat" in points[0]:
+        _check_heat(findings, states, points)
+        return
     numbers = _numbers(cell, states, points)
     scale = max(each.stored for each in numbers) + cell.rounded_energy or 1e-300
     for each, point in zip(numbers, points, strict=True):
@@ -95,6 +98,25 @@ def check_path_energies(
         _check_events(findings, numbers, points, 1.0 / len(targets(cell.files.case)), scale)
     else:
         _check_increments(findings, _stiffest(cell), numbers, points, scale)
+
+
+def _check_heat(findings: Findings, states: Sequence[StateNumbers], points: Sequence[Point]) -> None:
+    """Check that the work is stored, lost to breaks or heat, which never falls; breaks alone lose what is `dissipated`.
+
+    With friction the energy depends on the way, so nothing bounds what breaks lose.
+    """
+    stored = {number: float(point["stored"]) for number, point in enumerate(points)}
+    stored |= {state.point: state.stored for state in states}
+    scale = max(map(abs, stored.values())) or 1e-300
+    for number, point in enumerate(points):
+        off = point["work"] - stored[number] - point["dissipated"] - point["friction_heat"]
+        findings.record("heat", abs(off) / scale, f"path[{number}].work")
+    for number, (before, after) in enumerate(pairwise(points), 1):
+        cooled = before["friction_heat"] - after["friction_heat"]
+        findings.record("heat", max(cooled, 0.0) / scale, f"path[{number}].friction_heat")
+        lost = after["dissipated"] - before["dissipated"]
+        off = 0.0 if damaged_at(before) else abs(lost)
+        findings.record("heat", off / scale, f"path[{number}].dissipated")
 
 
 def _numbers(cell: DiscreteCell, states: Sequence[StateNumbers], points: Sequence[Point]) -> list[PointNumbers]:

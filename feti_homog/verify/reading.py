@@ -47,6 +47,7 @@ class State:
         traction, jump: (k, c) normal, tangential and along the fibres.
         status: (k,) 0 bonded, 1 closed, 2 open.
         damage: (k,) 0 intact to 1 broken, also of bonds that break at once.
+        sliding: (k,) sign of the growing slip of closed nodes that slide.
         derived: the tables of `DERIVED` or `SPATIAL_DERIVED`, which follow from those above.
         temperature: its change.
     """
@@ -63,6 +64,7 @@ class State:
     jump: Float
     status: AnyInt
     damage: Float
+    sliding: AnyInt
     derived: Mapping[str, Float]
     temperature: float = 0.0
 
@@ -132,9 +134,11 @@ class ResultFiles:
         )
         if self.is_spatial:
             arrays |= self._spatial(number, arrays)
-        # Results of before there were laws that soften have no damage.
+        # Results of before there were laws that soften, or friction, have no damage and nothing that slides.
         known = "damage" in group
         arrays["damage"] = self._table(number, "damage", (k,)) if known else (arrays["status"] != 0).astype(float)
+        slides = "sliding" in group
+        arrays["sliding"] = self._table(number, "sliding", (k,)) if slides else np.zeros(k, np.int8)
         strain, mean = (np.array(group.attrs[name], float) for name in ("strain", "stress"))
         v = 6 if self.is_spatial else 3
         _expect(

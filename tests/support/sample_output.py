@@ -176,6 +176,7 @@ def _state(mesh: MeshPart, gradient: np.ndarray, number: int) -> StatePart:
         **{name: np.stack([n * k, k, 0 * k], axis=1) for n, name in enumerate(VECTORS)},
         status=status,
         damage=np.where(status == 0, 0.1 * np.arange(10) % 1.0, 1.0),
+        sliding=np.where(status == 1, np.arange(10) % 3 - 1, 0),
     )
 
 

@@ -51,6 +51,7 @@ FLOORS = (
     ("feti",),
     ("interface.loads",),
     ("interface.contact",),
+    ("interface.friction",),
     ("interface.tips",),
     ("interface.laws",),
     ("interface.path",),

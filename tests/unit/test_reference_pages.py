@@ -142,6 +142,11 @@ CASES = {
         "interface": HALF_OPEN | SOFTENING,
         "path": {"strain": STRAIN},
     },
+    "path with friction": {
+        "analysis": {"type": "path", "plane": "strain"},
+        "interface": HALF_OPEN | {"friction": 0.3},
+        "path": {"strain": STRAIN},
+    },
     "path in space": {
         "analysis": SPACE | {"type": "path"},
         "material": WARM,

@@ -129,6 +129,15 @@ class ExactInverse(Preconditioner):
         paired = U.reshape(len(pairs), 2, len(members))
         return np.asarray(own - np.matmul((U @ self._inverse.N).reshape(paired.shape), paired.transpose(0, 2, 1)))
 
+    def columns(self, rows: Int) -> tuple[Float, Float]:
+        """(owned rows, k) columns of H of the reference cell, and their (k, k) block, for the same global rows (k,).
+
+        They are those of the bonded cell until rows are first restricted.  Collective.
+        """
+        self._find(rows)
+        at = self._columns.positions(rows)
+        return self._columns.owned[:, at], self._columns.block[at[:, None], at]
+
     def _changed(self) -> Int:
         """Return the global rows that are active here or in the reference cell, not both, and those that softened.
 

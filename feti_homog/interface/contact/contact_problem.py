@@ -192,6 +192,8 @@ class ContactProblem:
 
         Collective.
         """
+        if state.bonds.gap_and_slip is not None:
+            return np.zeros(len(state.load.values), bool)
         if not state.load.by_stress.any() or not self._any(state.status != BONDED):
             return np.zeros(len(state.load.values), bool)
         self.prepare(state.bonds)

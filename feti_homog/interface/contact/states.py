@@ -26,16 +26,25 @@ class BondState:
         history: (k, h) internal variables of the law of the bonds, from its `begin`; h = 0 of laws without memory.
         pressed: (k,) which of the bonds that hold have the normal stiffness of compression, where damage makes that
             another one than in tension.
+        gap_and_slip: (k, 2) of debonded faces with friction, 0 of bonds that hold; None without friction.
+        sliding: (k,) the sign with which the slip of a closed node grows, 0 where it sticks; None without friction.
     """
 
     status: Status
     history: Float
     pressed: Bool
+    gap_and_slip: Float | None = None
+    sliding: Status | None = None
 
     @classmethod
     def without_memory(cls, status: Status) -> BondState:
         """State of bonds whose law has no internal variables."""
         return cls(status, np.zeros((len(status), 0)), np.zeros(len(status), bool))
+
+    @property
+    def sliding_signs(self) -> Status:
+        """(k,) `sliding`, 0 without friction."""
+        return np.zeros(len(self.status), np.int8) if self.sliding is None else self.sliding
 
     def with_status(self, status: Status) -> BondState:
         """Replace the status; contact changes no internal variable."""

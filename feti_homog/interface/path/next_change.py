@@ -9,9 +9,10 @@ from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.floating_bodies import admissible_share, shares_to_zero
-from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, Equilibrium
+from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, Equilibrium
 from feti_homog.interface.laws.bond_law import BISECTIONS, BondLaw
 from feti_homog.interface.loads.load import CoupledSolution
+from feti_homog.typing import Float
 
 # Parts of a straight way in which a utilisation that is not convex is looked at.
 PARTS = 32
@@ -23,8 +24,12 @@ def first_break(cell: CoupledInterfaces, law: BondLaw, state: Equilibrium, ahead
     Utilisation that is convex along a straight way, below 1 here and above 1 there, passes 1 once: bisection.  Others
     are bisected up to the first of some equal parts at whose end they are above 1.
     """
-    here, there = cell.traction(state.solutions), cell.traction(ahead)
-    utilisation, bonded = law.utilisation(cell, state.bonds), state.status == BONDED
+    return first_break_between(cell, law, state.bonds, cell.traction(state.solutions), cell.traction(ahead))
+
+
+def first_break_between(cell: CoupledInterfaces, law: BondLaw, bonds: BondState, here: Float, there: Float) -> float:
+    """Return the same of the way between tractions (k, c).  Collective."""
+    utilisation, bonded = law.utilisation(cell, bonds), bonds.status == BONDED
     step, low, high = there - here, np.zeros(len(here)), np.full(len(here), np.inf)
     parts = 1 if utilisation.is_convex(len(here)).all() else PARTS
     for k in range(1, parts + 1):

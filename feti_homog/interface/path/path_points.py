@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -53,12 +53,13 @@ class PathState:
 class Energies(NamedTuple):
     """Energies per area of the cell of a part of a path.
 
-    The work of the loads, what breaks lost of it, and the fracture energy of these breaks.
+    The work of the loads, what breaks lost of it, the fracture energy of these breaks, and the heat of friction.
     """
 
     work: float
     released: float
     fracture: float
+    friction: float = 0.0
 
     def plus(self, more: Energies) -> Energies:
         """Return those of two parts."""
@@ -121,7 +122,7 @@ def break_bonds(cell: CoupledInterfaces, law: BondLaw, which: Bool, state: Equil
     # A first guess, which the search for contact checks.
     pressed = np.where(which, traction[:, 0] < 0.0, state.bonds.pressed)
     parted, softened = (count_on_all_ranks(cell, nodes) for nodes in (parts, which & ~parts))
-    return Break(BondState(status, history, pressed), parted, softened, energy)
+    return Break(replace(state.bonds, status=status, history=history, pressed=pressed), parted, softened, energy)
 
 
 def _fracture_energy(cell: CoupledInterfaces, law: BondLaw, which: Bool, bonds: BondState, traction: Float) -> float:

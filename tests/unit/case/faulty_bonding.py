@@ -294,7 +294,7 @@ FAULTY_BONDINGS: dict[str, tuple[str, tuple[str, ...]]] = {
             "[interface] debonded[1].fibres = 1: unknown key; it belongs to [cell]",
             "[interface] debonded[1].fibre: missing; ",
             "[interface] normal_strength = -1: ",
-            "[interface] mu = 0.3: unknown key; expected one of contact, debonded",
+            "[interface] mu = 0.3: unknown key; did you mean friction?",
         ),
     ),
 }

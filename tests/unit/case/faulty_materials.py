@@ -73,8 +73,8 @@ FAULTY_MATERIALS: dict[str, tuple[str, tuple[str, ...]]] = {
         ),
     ),
     "words_of_bonds": (
-        cell("young = 200.0", "young = 200.0\n[interface]\nfriction = 0.3\nstrength = 1.0\n[material.other]"),
-        ("there is no friction: ", "unknown key; did you mean normal_strength or tangential_strength?"),
+        cell("young = 200.0", "young = 200.0\n[interface]\nstrength = 1.0\n[material.other]"),
+        ("unknown key; did you mean normal_strength or tangential_strength?", "[interface] debonded: missing; "),
     ),
     "strength_of_a_phase": (
         cell("young = 200.0", "young = 200.0\nstrength = 3.0"),

@@ -20,7 +20,7 @@ def write(directory: Path, whole: Sample) -> None:
             file.write_state(k, state)
 
 
-@pytest.mark.parametrize(("name", "tables"), [("cell", 2 + 1 + 10), ("interface", 2 + 15)])
+@pytest.mark.parametrize(("name", "tables"), [("cell", 2 + 1 + 10), ("interface", 2 + 16)])
 def test_xdmf_points_at_tables_of_the_right_shape(tmp_path: Path, name: str, tables: int) -> None:
     write(tmp_path, sample(4, order=2))
     paths = dict(zip(("cell", "interface"), xdmf.write(tmp_path), strict=True))

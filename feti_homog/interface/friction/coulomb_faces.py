@@ -1,0 +1,235 @@
+"""Coulomb friction on n debonded nodes, by dense arrays: the statuses of a state and of its rates.
+
+The jumps g = (g_n, g_t) of the nodes and the macroscopic strains E are the unknowns x = (g, E) of the energy
+x.S x / 2: the forces on the nodes are f = -(S x)_g, tension positive, and (S x)_E works on the strains.  With the
+pressure p = -f_n
+
+    g_n >= 0,  p >= 0,  g_n p = 0,        |f_t| <= mu p,  f_t = s mu p where the slip grows with the sign s.
+
+A node is apart (f = 0), sticks (g_n = 0, g_t as it was), or slides (g_n = 0, f_t = s mu p).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from feti_homog.errors import NotCarriedError
+from feti_homog.interface.contact.states import Status
+from feti_homog.interface.friction.lemke import complementary
+from feti_homog.interface.friction.status_system import BACKWARD, FORWARD, OPEN_FACE, STICK, StatusSystem
+from feti_homog.typing import Bool, Float
+
+# Forces and jumps below this share of the largest are rounding; both are scaled by the stiffness of a node.
+NOISE = 1e-10
+# Block pivots without progress, after which one node at random changes at a time: with friction a fixed order may come
+# back to where it was.  And solves after which Lemke's method takes over.
+BLOCK_PIVOTS, LEAST_SOLVES, SOLVES_PER_NODE = 11, 50, 4
+SEARCHED = "friction: no status of the faces is admissible"
+INDEFINITE = "friction: the sliding faces resist no more (an indefinite pivot)"
+
+
+class StuckError(NotCarriedError):
+    """No statuses of debonded faces go on from a state."""
+
+
+@dataclass(frozen=True)
+class Prescribed:
+    """What is prescribed.
+
+    Attributes:
+        by_stress: (v,) which of the loads are given by what works on them.
+        values: (v,) strains, or (S x)_E of the others.
+        slip: (n,) slip of nodes that stick.
+    """
+
+    by_stress: Bool
+    values: Float
+    slip: Float
+
+
+class CoulombFaces:
+    """Debonded faces.
+
+    Attributes:
+        friction: (n,) mu.
+        S: (m, m) the scaled stiffness, of 1 on the diagonal of a node, and `size` (m,): S_ij size_i size_j is that of
+            the cell.
+    """
+
+    def __init__(self, stiffness: Float, friction: Float) -> None:
+        """`stiffness` (2n + v, 2n + v) of normal and tangential jumps of each node, then of the loads."""
+        n, diagonal = len(friction), stiffness.diagonal()
+        self.friction = friction
+        nodes = np.repeat(diagonal[: 2 * n].reshape(n, 2).max(axis=1, initial=0.0), 2)
+        size = np.sqrt(np.concatenate([nodes, np.maximum(diagonal[2 * n :], 0.0)]))
+        self.size = np.where(size > 0.0, size, 1.0)
+        self.S = stiffness / np.outer(self.size, self.size)
+        self._last: tuple[bytes, StatusSystem] | None = None
+
+    @classmethod
+    def of_compliance(cls, compliance: Float, loads: Float, friction: Float, gap: Float) -> CoulombFaces:
+        """Return faces with the jumps d E - F f, d (2n, v) `loads`, F (2n, 2n) and initial gaps (n,).
+
+        The gap is one more load, the last one, of the value 1; the stiffness of the loads themselves is that of d.
+        """
+        apart = np.zeros((len(compliance), 1))
+        apart[::2, 0] = gap
+        K = np.linalg.inv(compliance)
+        b = K @ np.hstack([loads, apart])
+        d = np.hstack([loads, apart])
+        return cls(np.block([[K, -b], [-b.T, d.T @ b]]), friction)
+
+    @property
+    def nodes(self) -> int:
+        """n."""
+        return len(self.friction)
+
+    def forces(self, x: Float) -> tuple[Float, Float]:
+        """(n,) scaled normal and tangential forces."""
+        f = -(self.S[: 2 * self.nodes] @ x)
+        return f[::2], f[1::2]
+
+    def linear(self, status: Status, given: Prescribed, start: Float) -> Float:
+        """(m,) scaled x with these statuses; what nothing determines stays as it is at the start (m,)."""
+        return self._system(status, given.by_stress).solve(*self._prescribed(status, given, start))
+
+    def _system(self, status: Status, by_stress: Bool) -> StatusSystem:
+        """Return the system of these statuses; the last one is kept."""
+        key = status.tobytes() + by_stress.tobytes()
+        if self._last is None or self._last[0] != key:
+            self._last = key, StatusSystem(self.S, self.friction, status, by_stress)
+        return self._last[1]
+
+    def _prescribed(self, status: Status, given: Prescribed, start: Float) -> tuple[Float, Float]:
+        """(m,) x with what is prescribed, and (m,) S x on the rows of loads."""
+        last, x, rows = 2 * self.nodes, start.copy(), np.zeros(len(start))
+        x[:last:2] = np.where(status == OPEN_FACE, x[:last:2], 0.0)
+        x[1:last:2] = np.where(status == STICK, given.slip, x[1:last:2])
+        x[last:] = np.where(given.by_stress, x[last:], given.values)
+        rows[last:] = given.values
+        return x, rows
+
+    def _noise(self, x: Float, slip: Float) -> float:
+        """Return the scaled force, and jump, that is rounding where the loads of x and a slip (n,) act."""
+        n, nodes = self.nodes, self.S[: 2 * self.nodes]
+        by_loads = np.abs(nodes[:, 2 * n :] @ x[2 * n :]).max(initial=0.0)
+        return NOISE * float(
+            max(by_loads, np.abs(nodes[:, 1 : 2 * n : 2] @ slip).max(initial=0.0) if slip.any() else 0.0)
+        )
+
+    def search(self, status: Status, allowed: Bool, given: Prescribed, start: Float) -> tuple[Status, Float]:
+        """Return statuses (n,) and scaled x that are admissible, from a first guess.
+
+        `allowed` (n, 4) are the statuses that a node may have, in the columns [STICK, FORWARD, OPEN_FACE, BACKWARD];
+        conditions between a status and one that is not allowed do not count.
+
+        Raises:
+            StuckError: none was found.
+        """
+        fewest, left, random = self.nodes + 1, 0, np.random.default_rng(0)
+        for _ in range(LEAST_SOLVES + SOLVES_PER_NODE * self.nodes):
+            x = self.linear(status, given, start)
+            better = self._improved(status, allowed, given.slip, x)
+            wrong = np.flatnonzero(better != status)
+            if not len(wrong):
+                return status, x
+            left -= 1
+            if len(wrong) < fewest:
+                fewest, left = len(wrong), BLOCK_PIVOTS
+            chosen = wrong if left > 0 else random.choice(wrong, 1)
+            status = status.copy()
+            status[chosen] = better[chosen]
+        return self._complementary(allowed, given, start)
+
+    def _improved(self, status: Status, allowed: Bool, slip: Float, x: Float) -> Status:
+        """(n,) the statuses that the signs of forces and jumps call for."""
+        normal, tangential = self.forces(x)
+        noise, gap, moved = self._noise(x, slip), x[: 2 * self.nodes : 2], x[1 : 2 * self.nodes : 2] - slip
+        better, closed = status.copy(), status != OPEN_FACE
+        limit = -self.friction * normal
+        pulled = closed & (normal > noise) & allowed[:, OPEN_FACE]
+        for sign in (FORWARD, BACKWARD):
+            over = (status == STICK) & (sign * tangential - limit > noise) & allowed[:, sign]
+            back = (status == sign) & (sign * moved < -noise) & allowed[:, STICK]
+            better[over] = sign
+            better[back] = STICK
+        touches = ~closed & (gap < -noise) & allowed[:, STICK]
+        better[touches] = np.where(np.abs(moved) > noise, np.sign(moved), 0.0)[touches]
+        better[pulled] = OPEN_FACE
+        return better
+
+    def _complementary(self, allowed: Bool, given: Prescribed, start: Float) -> tuple[Status, Float]:
+        """Return the same by Lemke's method."""
+        apart = np.where(allowed[:, STICK], STICK, OPEN_FACE).astype(np.int8)
+        x, rows = self._prescribed(apart, given, start)
+        found = complementary(self.S, self.friction, allowed, given.by_stress, x, rows)
+        if found is not None:
+            x = self.linear(found, given, start)
+            if (self._improved(found, allowed, given.slip, x) == found).all():
+                return found, x
+        raise StuckError(SEARCHED)
+
+    def all_allowed(self) -> Bool:
+        """(n, 4) True."""
+        return np.ones((self.nodes, 4), bool)
+
+    def rates(self, status: Status, x: Float, by_stress: Bool, rate: Float) -> tuple[Status, Float]:
+        """Return the statuses (n,) with which a state x goes on, and the rate (m,) of x, as the loads (v,) change.
+
+        Raises:
+            StuckError: there are none, or the determinant of the sliding faces has lost its sign.
+        """
+        given = Prescribed(by_stress, rate, np.zeros(self.nodes))
+        allowed = self._at_limits(status, x)
+        status, v = self.search(status, allowed, given, np.zeros(len(x)))
+        if self._system(status, by_stress).sign < 0:
+            raise StuckError(INDEFINITE)
+        return status, v
+
+    def _at_limits(self, status: Status, x: Float) -> Bool:
+        """(n, 4) the statuses that nodes of a state may go on with: their own, and others where a limit is reached."""
+        closed, gap = status != OPEN_FACE, x[: 2 * self.nodes : 2]
+        (normal, tangential), noise = self.forces(x), self._noise_of_state(x)
+        allowed = np.zeros((self.nodes, 4), bool)
+        allowed[np.arange(self.nodes), status] = True
+        for sign in (FORWARD, BACKWARD):
+            limited = closed & ((status == sign) | (sign * tangential + self.friction * normal >= -noise))
+            allowed[limited, sign] = allowed[limited, STICK] = True
+        allowed[np.where(closed, normal >= -noise, gap <= noise)] = True
+        return allowed
+
+    def _noise_of_state(self, x: Float) -> float:
+        """Return the force, and jump, that is rounding in an equilibrium, with forces of its own where none load it."""
+        return max(self._noise(x, np.zeros(self.nodes)), NOISE * float(np.abs(self.forces(x)).max(initial=0.0)))
+
+    def next_change(self, status: Status, x: Float, rate: Float) -> float:
+        """Return how far x goes on along its `rate` until a status ends, inf if none does."""
+        noise, closed = self._noise(rate, np.zeros(self.nodes)), status != OPEN_FACE
+        (normal, tangential), (dn, dt) = self.forces(x), self.forces(rate)
+        sticks, last = status == STICK, 2 * self.nodes
+        rooms = [(x[:last:2][~closed], rate[:last:2][~closed]), (-normal[closed], -dn[closed])]
+        for sign in (FORWARD, BACKWARD):
+            room = -self.friction * np.stack([normal, dn]) - sign * np.stack([tangential, dt])
+            rooms.append((room[0][sticks], room[1][sticks]))
+        here, falls = (np.concatenate(each) for each in zip(*rooms, strict=True))
+        ends = falls < -noise
+        return float((np.maximum(here[ends], 0.0) / -falls[ends]).min(initial=np.inf))
+
+    def heat(self, status: Status, before: Float, after: Float) -> float:
+        """Return the heat of friction on a straight way between two states, whose statuses these are."""
+        sliding, tangential = np.abs(status) == 1, (self.forces(before)[1] + self.forces(after)[1]) / 2
+        return float((tangential * (after - before)[1 : 2 * self.nodes : 2])[sliding].sum())
+
+    def losses(self, status: Status, before: Float, after: Float) -> tuple[float, float]:
+        """Return what all faces lose in a step at constant load, and the heat of those that slide behind it.
+
+        Along the way the forces change as the jumps do; heat is the slip times the force behind the step, as of one
+        implicit step.
+        """
+        last, step = 2 * self.nodes, after - before
+        forces = -(self.S[:last] @ (before + after)) / 2
+        sliding = np.abs(status) == 1
+        heat = (self.forces(after)[1] * step[1:last:2])[sliding].sum()
+        return float(forces @ step[:last]), float(heat)

@@ -1,0 +1,59 @@
+"""The linear system of debonded faces with given statuses."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import lu_factor, lu_solve
+
+from feti_homog.interface.contact.states import Status
+from feti_homog.typing import Bool, Float
+
+STICK, FORWARD, OPEN_FACE, BACKWARD = 0, 1, 2, -1
+"""Statuses of a debonded node: tied, sliding with a rising or a falling slip, apart."""
+
+# Stiffness, relative to that of a node, that holds what nothing else does where it is; steps of refinement remove it.
+HELD = 1e-9
+REFINEMENTS = 3
+
+
+class StatusSystem:
+    """S x = 0 on the rows that are free, with x given on the others, factored.
+
+    Sliding nodes have the row S_t + s mu S_n: their traction is s mu times the pressure.
+
+    Attributes:
+        free: (m,) which entries of x are unknown.
+        sign: of the determinant; 0 where the matrix is singular.
+    """
+
+    def __init__(self, S: Float, friction: Float, status: Status, by_stress: Bool) -> None:
+        """`S` (m, m) with 2n rows of normal and tangential jumps first, then those of the loads."""
+        self.free = np.concatenate([np.stack([status == OPEN_FACE, status != STICK], axis=1).ravel(), by_stress])
+        sliding = np.flatnonzero(np.abs(status) == 1)
+        place = np.cumsum(self.free) - 1
+        self._rows = S[self.free]
+        self._rows[place[2 * sliding + 1]] += (status * friction)[sliding, None] * S[2 * sliding]
+        A = self._rows[:, self.free]
+        A.ravel()[:: len(A) + 1] += HELD
+        self._factor = lu_factor(A, overwrite_a=True, check_finite=False) if len(A) else None
+
+    @property
+    def sign(self) -> int:
+        """Sign of the determinant."""
+        if self._factor is None:
+            return 1
+        lu, pivots = self._factor
+        swaps = int((pivots != np.arange(len(pivots))).sum())
+        return int(np.prod(np.sign(lu.diagonal()))) * (-1 if swaps % 2 else 1)
+
+    def solve(self, x: Float, given: Float) -> Float:
+        """(m,) or (m, k) x with the rows `given`, (m,) or (m, k), from a start that has the entries that are not free.
+
+        What nothing determines stays as it was at the start.
+        """
+        x = x.copy()
+        if self._factor is not None:
+            for _ in range(REFINEMENTS):
+                left = given[self.free] - self._rows @ x
+                x[self.free] += lu_solve(self._factor, left, check_finite=False)
+        return x

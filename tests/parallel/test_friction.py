@@ -1,0 +1,69 @@
+"""Paths of debonded faces with Coulomb friction: an independent prototype, a slow twin, and every law of `verify`."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from reference.friction import RubbingFaces
+from reference.friction_path import FrictionPath
+from reference.references import RUBBING_HEATS, RUBBING_STRESSES, RUBBING_WAYPOINTS
+from support.loaded_twins import EPOXY_GLASS, LoadedTwin, document, is_end, solved
+from support.ranks import PIECES, parallel_assert
+
+from feti_homog import Case, run
+from feti_homog.parallel.mpi_errors import on_root
+from feti_homog.verify.certificate import verify
+
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
+WHOLE = {"debonded": [{"fibre": "all", "angle": 360.0}]}
+PHASES = ({"young": 2790.0, "poisson": 0.33}, {"young": 70800.0, "poisson": 0.22})
+
+
+def test_one_fibre_slides_as_in_a_prototype(comm):
+    """Stresses at the waypoints within 0.3 % of the largest, heat within 2 % on elements of 1.3."""
+    cell = {"geometry": "square", "fibre_radius": 7.5, "mesh_size": 0.08, "interface_size": 0.06, "refine": 1}
+    path = {"waypoints": [list(point) for point in RUBBING_WAYPOINTS]}
+    points = solved(comm, cell=cell, phases=PHASES, plane="strain", interface=WHOLE | {"friction": 0.2}, path=path).path
+    ends = [point for point in points if is_end(point, len(RUBBING_WAYPOINTS))]
+    for point, stress, heat in zip(ends, RUBBING_STRESSES[0.21], RUBBING_HEATS[0.21].value, strict=True):
+        np.testing.assert_allclose(point.stress, stress.value, atol=3e-3 * 92.0)
+        assert point.friction_heat == pytest.approx(heat, rel=0.02, abs=1e-4)
+    work, stored, heat = np.array([[p.work, p.stored, p.friction_heat] for p in points]).T
+    assert np.abs(work - stored - heat).max() < 1e-10 * work.max() and (np.diff(heat) >= -1e-14).all()
+
+
+@pytest.mark.parametrize(
+    ("waypoints", "springs"),
+    [
+        ([{"E11": -0.01}, {"gamma12": 0.02}, {"gamma12": -0.02}, {"E11": 0.004}, {"E11": -0.01}], {}),
+        ([{"S11": -0.02}, {"gamma12": 0.03}, {"S11": -0.005, "gamma12": -0.01}], {}),
+        ([{"S22": -0.03}, {"S12": 0.006}, {"S12": -0.006}], {"normal_stiffness": 80.0, "tangential_stiffness": 30.0}),
+    ],
+)
+def test_paths_are_those_of_a_slow_twin(comm, waypoints, springs):
+    interface = {"debonded": [{"fibre": 1, "centre": 20.0, "angle": 150.0}]} | springs
+    case = {"cell": {"mesh_size": 0.3}, "phases": EPOXY_GLASS, "plane": "strain", "path": {"waypoints": waypoints}}
+    twin = LoadedTwin(comm, **case, interface=interface)
+    expected = on_root(comm, lambda: FrictionPath(RubbingFaces.of(twin.cell, twin.bonded, 0.4)).follow(twin.loads))
+    found = solved(comm, **case, interface=interface | {"friction": 0.4}).path
+    known = np.array([point.load_factor for point in expected])
+    most = max(np.abs(point.state.stress).max() for point in expected)
+    assert len(found) > len(waypoints) + 2
+    for point in found:
+        k = int(np.abs(known - point.load_factor).argmin())
+        assert point.load_factor == pytest.approx(known[k], abs=1e-8)
+        np.testing.assert_allclose(point.stress, expected[k].state.stress[:3], atol=1e-7 * most)
+        assert point.friction_heat == pytest.approx(expected[k].heat, abs=1e-7 * most * 0.01)
+
+
+def test_breaks_with_friction_obey_every_law(comm, shared_path):
+    interface = {"normal_strength": 0.05, "tangential_strength": 0.05, "friction": 0.3}
+    interface |= {"debonded": [{"fibre": 1, "angle": 360.0}, {"fibre": 2, "angle": 90.0}]}
+    cell = {"geometry": "random", "fibres": 3, "seed": 3, "fibre_fraction": 0.35, "mesh_size": 0.12}
+    path = {"waypoints": [{"S11": -0.05}, {"gamma12": 0.03}, {"gamma12": -0.02}, {"S11": 0.02}]}
+    asked = document(cell, EPOXY_GLASS, "strain", interface, path=path) | {"decomposition": PIECES}
+    asked["output"] = {"pictures": False, "states": 6}
+    result = run(Case.parse(asked), comm, out=shared_path / "out")
+    assert sum(point.broke for point in result.path) > 10 and result.path[-1].friction_heat > 0.0
+    certificate = verify(shared_path / "out") if comm.rank == 0 else None
+    parallel_assert(comm, certificate is None or certificate.holds, certificate and certificate.text)

@@ -1,0 +1,111 @@
+"""The statuses of debonded faces with friction against brute force over all of them, and whole paths of dense cells."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import pytest
+from reference.condensed_cell import MixedLoad
+from reference.friction import RubbingFaces
+from reference.friction_path import FrictionPath
+
+from feti_homog.interface.friction.coulomb_faces import CoulombFaces, Prescribed, StuckError
+from feti_homog.interface.friction.lemke import lemke
+from feti_homog.interface.friction.status_system import BACKWARD, FORWARD, OPEN_FACE, STICK
+
+BY_STRAIN = np.zeros(2, bool)
+
+
+def random_faces(rng, most_friction):
+    """Return compliance, loads, friction, gaps and slips of up to three nodes."""
+    n = int(rng.integers(1, 4))
+    root = rng.standard_normal((2 * n, 2 * n + int(rng.integers(0, 3))))
+    gap, slip = (own * (rng.random() < 0.5) for own in (0.3 * rng.random(n), 0.2 * rng.standard_normal(n)))
+    return root @ root.T, rng.standard_normal((2 * n, 1)), rng.uniform(0.0, most_friction, n), gap, slip
+
+
+def admissible(compliance, load, friction, gap, slip):
+    """Jumps (2n,) of all admissible statuses, one after the other, from the compliance."""
+    n, found = len(friction), []
+    jump = load[:, 0] + np.stack([gap, 0.0 * gap], axis=1).ravel()
+    for statuses in product((STICK, FORWARD, OPEN_FACE, BACKWARD), repeat=n):
+        A, b, s = np.zeros((2 * n, 2 * n)), np.zeros(2 * n), np.array(statuses)
+        for i, status in enumerate(statuses):
+            rows = slice(2 * i, 2 * i + 2)
+            A[rows], b[rows] = compliance[rows], jump[rows] - [0.0, slip[i]]
+            if status == OPEN_FACE:
+                A[rows], b[rows] = np.eye(2 * n)[rows], 0.0
+            elif status != STICK:
+                A[2 * i + 1], b[2 * i + 1] = np.eye(2 * n)[2 * i + 1] + status * friction[i] * np.eye(2 * n)[2 * i], 0.0
+        force = np.linalg.solve(A, b)
+        g = jump - compliance @ force
+        rooms = [g[::2], -force[::2], -friction * force[::2] - np.abs(force[1::2])]
+        rooms.append(np.where(np.abs(s) == 1, s * (g[1::2] - slip), 0.0))
+        if np.min(rooms) > -1e-9:
+            found.append(g)
+    return found
+
+
+@pytest.mark.parametrize("most_friction", [0.4, 3.0])
+def test_statuses_are_those_of_brute_force_or_none_are_found(most_friction):
+    rng, stuck = np.random.default_rng(7), 0
+    for _ in range(120):
+        compliance, load, friction, gap, slip = random_faces(rng, most_friction)
+        faces, n = CoulombFaces.of_compliance(compliance, load, friction, gap), len(friction)
+        given = Prescribed(BY_STRAIN, faces.size[2 * n :], slip * faces.size[1 : 2 * n : 2])
+        start, first = np.zeros(2 * n + 2), np.zeros(n, np.int8)
+        expected = admissible(compliance, load, friction, gap, slip)
+        try:
+            _, x = faces.search(first, faces.all_allowed(), given, start)
+        except StuckError:
+            stuck += 1
+            continue
+        off = [np.abs(x[: 2 * n] / faces.size[: 2 * n] - g).max() / np.abs(load).max() for g in expected]
+        assert min(off) < 1e-7
+    # At 3 the method of Lemke may end on rays where there is a solution.
+    assert stuck <= (0 if most_friction < 1.0 else 2)
+
+
+def follow(faces, area, loads):
+    """Points of a path: load factor, strain and stress (m,), statuses (k,), and the heat up to each."""
+    n, (status, x, heat) = faces.nodes, (np.zeros(faces.nodes, np.int8), np.zeros(len(faces.S)), 0.0)
+    points = []
+    for leg, load in enumerate(loads):
+        E, Sigma = x[2 * n :] / faces.size[2 * n :], (faces.S @ x)[2 * n :] * faces.size[2 * n :] / area
+        start = np.where(load.by_stress, Sigma, E)
+        unit = np.where(load.by_stress, area / faces.size[2 * n :], faces.size[2 * n :])
+        share = 0.0
+        while share < 1.0:
+            status, rate = faces.rates(status, x, load.by_stress, unit * (load.values - start))
+            way = min(faces.next_change(status, x, rate), 1.0 - share)
+            heat += faces.heat(status, x, x + way * rate) / area
+            share, x = share + way if way < 1.0 - share else 1.0, x + way * rate
+            y = (faces.S @ x) * faces.size
+            points.append(((leg + share) / len(loads), x[2 * n :] / faces.size[2 * n :], y[2 * n :] / area, heat))
+    return points
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_paths_with_reversals_are_those_of_slow_ones(seed):
+    rng = np.random.default_rng(seed)
+    nodes = 2 + seed % 4
+    B = rng.normal(size=(2 * nodes + 7, 2 * nodes + 3))
+    A, friction = B.T @ B / len(B), rng.uniform(0.0, 0.4, nodes)
+    loads = [MixedLoad(rng.normal(size=3), rng.random(3) < 0.3) for _ in range(4)]
+    expected = FrictionPath(RubbingFaces(A, np.zeros(nodes, bool), friction)).follow(loads)
+    found = follow(CoulombFaces(A, friction), 1.0, loads)
+    assert len(found) == len(expected)
+    most = max(np.abs(p.state.stress).max() for p in expected)
+    for (factor, strain, stress, heat), point in zip(found, expected, strict=True):
+        assert factor == pytest.approx(point.load_factor, rel=1e-8)
+        np.testing.assert_allclose(stress, point.state.stress, atol=1e-8 * most)
+        np.testing.assert_allclose(strain, point.state.strain, atol=1e-8)
+        assert heat == pytest.approx(point.heat, abs=1e-8)
+
+
+def test_lemke_solves_a_problem_whose_matrix_is_not_symmetric():
+    M, q = np.array([[2.0, -1.0, 0.0], [3.0, 4.0, 1.0], [0.0, -2.0, 3.0]]), np.array([-1.0, 2.0, -3.0])
+    z = lemke(M, q, np.ones(3))
+    w = q + M @ z
+    assert z.min() >= 0.0 and w.min() >= -1e-12 and abs(w @ z) < 1e-12
