@@ -139,6 +139,11 @@ class AnalysisContext:
         """The case that is analysed."""
         return self.cell.case
 
+    @property
+    def recovers_again(self) -> bool:
+        """Whether displacements inside bodies are asked for more than once, so that factors of interiors pay."""
+        return self.states.has_place or self.case.output.sensitivities or self.case.analysis.type == "angle"
+
     def bonds(self, opening: float | None) -> BondState:
         """State of the interfaces before any load: prescribed debonded nodes are open."""
         return self.plane.intact.with_status(np.where(self.cell.debonded(opening), OPEN, 0).astype(np.int8))

@@ -29,21 +29,21 @@ ROUNDING = 1e-9
 def unit_errors(context: AnalysisContext, responses: list[Response]) -> tuple[list[EnergyErrors], list[Response]]:
     """Return the errors of the responses to all unit loads, by problem, and the responses with elements' shares.
 
-    No errors if the case asks for none.  Collective.
+    No errors if the case asks for none, no shares if nobody does.  Collective.
     """
     if not context.case.output.mesh_error:
         return [], responses
     from feti_homog.homogenization.mesh_error import energy_errors  # with the recovery of stresses
 
     found: list[EnergyErrors] = []
-    first, shared = 0, list[Response]()
+    first, shared, keep = 0, list[Response](), context.recovers_again
     for problem in context.loads.problems:
         own = responses[first : first + len(problem.loads)]
         touches = problem.interface.contact and any(response.debonded for response in own)
-        found.append(energy_errors(problem.cell, own, touches))
+        found.append(energy_errors(problem.cell, own, touches, keep))
         shared += [replace(response, shares=part) for response, part in zip(own, found[-1].shares.T, strict=True)]
         first += len(problem.loads)
-    return found, shared
+    return found, shared if keep else responses
 
 
 def mesh_error(
@@ -124,17 +124,18 @@ def _note_bounds(
 def state_error(context: AnalysisContext, responses: Sequence[Response]) -> tuple[dict[str, float], list[Response]]:
     """Return `mesh_error`, the relative error of the energy of one state, and its responses with the elements' shares.
 
-    No error if the case asks for none.  Collective.
+    No error if the case asks for none, no shares if nobody does.  Collective.
     """
     if not context.case.output.mesh_error:
         return {}, list(responses)
     from feti_homog.homogenization.mesh_error import energy_errors  # with the recovery of stresses
 
     pairs = zip(context.loads.problems, responses, strict=False)
-    errors = [energy_errors(problem.cell, [response]) for problem, response in pairs]
+    keep = context.recovers_again
+    errors = [energy_errors(problem.cell, [response], keep=keep) for problem, response in pairs]
     energy = sum(2 * response.stored for response in responses)
     size = max(abs(sum(getattr(each, part).item() for each in errors)) for part in ("signed", "least"))
-    shared = [replace(r, shares=each.shares[:, 0]) for r, each in zip(responses, errors, strict=True)]
+    shared = [replace(r, shares=each.shares[:, 0] if keep else None) for r, each in zip(responses, errors, strict=True)]
     return {"mesh_error": size / energy if energy > 0 else 0.0}, shared
 
 

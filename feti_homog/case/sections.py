@@ -158,8 +158,8 @@ class Output:
     )
     mesh_error: bool = key(
         boolean,
-        "Estimate the error that the mesh makes of every constant: some percent of a run that writes fields; a large "
-        "cell without fields takes up to two thirds more time and twice the memory.",
+        "Estimate the error that the mesh makes of every constant: some percent of a run that writes fields; without "
+        "fields a large cell takes about three fifths more time, for the interiors of its bodies are solved for it.",
         default=True,
     )
     sensitivities: bool = key(

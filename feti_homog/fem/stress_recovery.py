@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import csr_matrix
+from scipy.sparse import csc_matrix
 
 from feti_homog.fem import bubble
 from feti_homog.fem.assembly import ELEMENTS_AT_ONCE
@@ -28,8 +28,6 @@ from feti_homog.typing import Bool, Float, Int
 NEIGHBOURS = {1: 0.1, 2: 0.001}
 # Of the moments of a fit, whose diagonal is 1: where all points lie on a line, a fit does not vary across it.
 RIDGE = 1e-9
-# Where linear stresses are compared with those of linear elements, which are uniform: the middles of the sides.
-MIDDLES = np.array([[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]])
 
 
 @dataclass(frozen=True)
@@ -136,18 +134,20 @@ class RecoveredStress:
 
     @cached_property
     def fits(self) -> Float:
-        """(vertices, p, m k) coefficients of the polynomials about each vertex, see `polynomials`."""
+        """(vertices, p, m k) coefficients of the polynomials about each vertex, see `polynomials`; p = 1 of order 1."""
         size = int(self.vertices.max()) + 1
         moments, sums = np.zeros(()), np.zeros(())
+        # Matrices of one point are multiplied faster number by number.
+        product = np.multiply if self.order == 1 else np.matmul
         for own in self.elements:
-            corners, stress = self.points[self.triangles[own.part, :3]], own.stress
-            stress = stress.reshape(*stress.shape[:2], -1)
-            for k in range(3):
-                basis = polynomials(own.points - corners[:, None, k], self.order)
-                weighted = (basis * own.weights[..., None]).transpose(0, 2, 1)
-                moments = moments + _gathered(self.vertices[own.part, k], weighted @ basis, size)
-                sums = sums + _gathered(self.vertices[own.part, k], weighted @ stress, size)
-        return _solved(*self._with_neighbours(moments, sums))
+            corners = self.points[self.triangles[own.part, :3]]
+            basis = polynomials(own.points[:, None] - corners[:, :, None], self.order)
+            weighted = (basis * own.weights[:, None, :, None]).transpose(0, 1, 3, 2)
+            stress = own.stress.reshape(len(corners), 1, own.points.shape[1], -1)
+            moments = moments + _gathered(self.vertices[own.part], product(weighted, basis), size)
+            sums = sums + _gathered(self.vertices[own.part], product(weighted, stress), size)
+        moments, sums = self._with_neighbours(moments, sums)
+        return _values(moments, sums) if self.order == 1 else _solved(moments, sums)
 
     def recovered(self, part: Int | slice, lam: Float) -> Float:
         """(e, q, m, k) recovered stresses in the elements `part` at the barycentric coordinates lam (q, 3)."""
@@ -161,18 +161,28 @@ class RecoveredStress:
             found = found + (lam[:, k, None] * basis) @ self.fits[vertices[:, k]]
         return found.reshape(*points.shape[:2], *shape)
 
-    def difference(self) -> tuple[Float, Float]:
-        """(k, k) int ds_i : S : ds_j, ds recovered less own stress; (e, k) what the elements have of its diagonal."""
-        root = np.linalg.cholesky(self.flexibility).T
-        total, shares = np.zeros((self.loads.shape[1],) * 2), np.empty((len(self.triangles), self.loads.shape[1]))
-        lam = MIDDLES if self.order == 1 else barycentric(6)
+    def difference(self, with_shares: bool = True) -> tuple[Float, Float]:
+        """(k, k) int ds_i : S : ds_j, ds recovered less own stress; (e, k) what the elements have of its diagonal.
+
+        Without shares (0, k).
+        """
+        m, k = self.problem.strains, self.loads.shape[1]
+        total, shares = np.zeros((m * k, m * k)), [np.zeros((0, k))]
         for own in self.elements:
-            weights = np.repeat(own.weights / 3, 3, axis=1) if self.order == 1 else own.weights
-            off = root @ (self.recovered(own.part, lam) - own.stress) * np.sqrt(weights)[..., None, None]
-            flat = off.reshape(-1, off.shape[-1])
+            off = self._off(own)
+            flat = off.reshape(-1, m * k)
             total += flat.T @ flat
-            shares[own.part] = np.square(off).sum(axis=(1, 2))
-        return total, shares
+            if with_shares:
+                shares.append((self.flexibility @ off * off).sum(axis=(1, 2)))
+        return np.einsum("ab,akbl->kl", self.flexibility, total.reshape(m, k, m, k)), np.concatenate(shares)
+
+    def _off(self, own: ElementStresses) -> Float:
+        """(e, q, m, k) recovered less own stress at places of the elements, times the root of their weights."""
+        if self.order == 2:
+            return np.asarray((self.recovered(own.part, barycentric(6)) - own.stress) * _roots(own.weights))
+        # Linear less uniform stresses, in the middles of the sides.
+        off = self.fits[:, 0].reshape(-1, *own.stress.shape[2:])[self.vertices[own.part]] - own.stress
+        return np.asarray((off + np.roll(off, 1, axis=1)) * _roots(own.weights / 12))
 
     def _with_neighbours(self, moments: Float, sums: Float) -> tuple[Float, Float]:
         """Moments and sums of the vertices, at the boundary with a share of those of their neighbours."""
@@ -219,15 +229,33 @@ def _translations(d: Float, order: int) -> Float:
     return T
 
 
+def _roots(weights: Float) -> Float:
+    """(e, q, 1, 1) roots of weights (e, q)."""
+    return np.sqrt(weights)[..., None, None]
+
+
 def _gathered(place: Int, values: Float, size: int) -> Float:
-    """(size, ..) sums of the values (n, ..) at the places (n,)."""
-    n = len(place)
-    sums = csr_matrix((np.ones(n), (place, np.arange(n))), (size, n)) @ values.reshape(n, math.prod(values.shape[1:]))
-    return np.asarray(sums.reshape(size, *values.shape[1:]))
+    """(size, ..) sums of the values (n, .., p, q) at the places (n, ..)."""
+    n, shape = place.size, values.shape[-2:]
+    sums = csc_matrix((np.ones(n), place.ravel(), np.arange(n + 1)), (size, n)) @ values.reshape(n, math.prod(shape))
+    return np.asarray(sums.reshape(size, *shape))
+
+
+def _normalized(moments: Float) -> tuple[Float, Float]:
+    """Moments (n, p, p) scaled to a diagonal of 1 and a little more, and the scales (n, p, 1)."""
+    scale = 1 / np.sqrt(np.einsum("nii->ni", moments))[..., None]
+    return moments * scale * scale.transpose(0, 2, 1) + RIDGE * np.eye(moments.shape[1]), scale
 
 
 def _solved(moments: Float, sums: Float) -> Float:
-    """Solve for the coefficients, with the moments scaled to a diagonal of 1."""
-    scale = 1 / np.sqrt(np.einsum("nii->ni", moments))[..., None]
-    scaled = moments * scale * scale.transpose(0, 2, 1) + RIDGE * np.eye(moments.shape[1])
+    """(n, p, mk) coefficients."""
+    scaled, scale = _normalized(moments)
     return np.asarray(scale * np.linalg.solve(scaled, scale * sums))
+
+
+def _values(moments: Float, sums: Float) -> Float:
+    """(n, 1, mk) the first coefficients alone, of linear fits."""
+    scaled, scale = _normalized(moments)
+    cofactors = np.cross(scaled[:, 1], scaled[:, 2])
+    row = cofactors / (cofactors * scaled[:, 0]).sum(axis=1, keepdims=True) * scale[:, :, 0] * scale[:, :1, 0]
+    return np.asarray(row[:, None] @ sums)

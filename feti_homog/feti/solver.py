@@ -175,10 +175,7 @@ class FetiSolver:
             self.preconditioner.activate(active)
 
     def solve(self, strain: Float, start: Float) -> DualSolution:
-        """Solve for the loads (v,), beginning with the multipliers `start` (owned rows,).  Collective.
-
-        Not to converge is no error here: the solution says so in its `reason`.
-        """
+        """Solve for the loads (v,) from the multipliers `start` (owned rows,); see its `reason`.  Collective."""
         return self.solve_many(strain[None], start[:, None])[0]
 
     def solve_many(self, strains: Float, starts: Float) -> list[DualSolution]:
@@ -224,11 +221,13 @@ class FetiSolver:
 
     def displacement(self, solution: DualSolution) -> Float:
         """(local dofs,) u* of a solution; factors the interiors when first called.  Collective."""
-        u = self.interface_operators.extend(self.boundary_displacement(solution))
-        ends = np.cumsum([len(s.Q) for s in self.subdomains])
-        for place, inner in self.condensed.inner.items():
-            u[ends[place] - len(inner) : ends[place]] += inner @ solution.strain
-        return u
+        u, places = self.boundary_displacement(solution), range(len(self.subdomains))
+        return np.concatenate([np.zeros(0), *(self.extended(place, u, solution.strain) for place in places)])
+
+    def extended(self, place: int, u: Float, loads: Float, keep: bool = True) -> Float:
+        """(dofs, k) u* of one subdomain, of u (boundary dofs, k) on all boundaries under the loads (v, k)."""
+        own = self.interface_operators.extend(place, u[self.interface_operators.slices[place]], keep)
+        return own + self.condensed.inner[place] @ loads if place in self.condensed.inner else own
 
     def destroy(self) -> None:
         """Free the Krylov methods and the coarse factor, after the last solve; collective.

@@ -9,11 +9,14 @@ import numpy as np
 
 from feti_homog.fem.arc_error import ArcSides, arc_energy
 from feti_homog.fem.stress_recovery import RecoveredStress
+from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.parallel.distributed_arrays import allreduce_sum
 from feti_homog.typing import Float
 
+# Subdomains of so many elements at once: few enough for the processor's cache, many enough for NumPy.
+ELEMENTS_AT_ONCE = 1 << 13
 # The two parts may cancel; what is left of both at least, `scripts/measure_mesh_error.py`.
 LEAST_SHARE = 0.05
 # The same of pairs of states whose faces touch at different places, for which the energy is not bilinear.
@@ -27,7 +30,7 @@ class EnergyErrors:
     Attributes:
         elements: 1/|UC| int ds_i : S : ds_j of recovered stresses less those of elements: the stiffness is too high.
         arcs: what the sides of elements make of arcs, of either sign.
-        shares: (m, k) what each element of this rank has of the first one's diagonal.
+        shares: (m, k) what each element of this rank has of the first one's diagonal, none if they are not kept.
         contact: whether states touch at different places.
     """
 
@@ -60,28 +63,45 @@ class EnergyErrors:
         return np.asarray(np.maximum(np.abs(self.signed), share * np.outer(size, size)))
 
 
-def energy_errors(cell: TornCell, responses: Sequence[Response], contact: bool = False) -> EnergyErrors:
-    """Return the estimates of responses of one problem.  Collective."""
-    k, sizes = len(responses), [len(s.mesh.triangles) for s in cell.subdomains]
-    found, shares = np.zeros((2, k, k)), [np.zeros((size, k)) for size in sizes]
-    for members, stress in _recovered(cell, responses):
-        total, each = stress.difference()
-        sides = ArcSides.of(stress, [cell.subdomains[n].submesh for n in members], cell.lattice)
-        found += total, arc_energy(stress, sides)
-        parts = np.split(each, np.cumsum([sizes[n] for n in members])[:-1])
-        for number, part in zip(members, parts, strict=True):
-            shares[number] = part
-    elements, arcs = allreduce_sum(cell.comm, found) / cell.summary.area
-    return EnergyErrors(elements, arcs, np.concatenate([np.zeros((0, k)), *shares]) / cell.summary.area, contact)
+def energy_errors(
+    cell: TornCell, responses: Sequence[Response], contact: bool = False, keep: bool = True
+) -> EnergyErrors:
+    """Return the estimates of responses of one problem, a few subdomains at a time.  Collective.
+
+    `keep` what states of the cell need later: the factors of interiors, and `shares`.
+    """
+    k, area = len(responses), cell.summary.area
+    found, shares = np.zeros((2, k, k)), [np.zeros((0, k))]
+    for members, stress in _recovered(cell, responses, keep):
+        total, each = stress.difference(keep)
+        found += total, arc_energy(stress, ArcSides.of(stress, [s.submesh for s in members], cell.lattice))
+        shares.append(each / area)
+    elements, arcs = allreduce_sum(cell.comm, found) / area
+    return EnergyErrors(elements, arcs, np.concatenate(shares), contact)
 
 
-def _recovered(cell: TornCell, responses: Sequence[Response]) -> Iterator[tuple[list[int], RecoveredStress]]:
-    """Yield the numbers of this rank's subdomains of each phase, and their stresses.  Collective at first."""
+def _recovered(
+    cell: TornCell, responses: Sequence[Response], keep: bool
+) -> Iterator[tuple[list[Subdomain], RecoveredStress]]:
+    """Yield some of this rank's subdomains after the other, those of each group of one phase, and their stresses."""
+    u = np.stack([response.u for response in responses], axis=1)
     loads = np.stack([response.strain for response in responses], axis=1)
-    u = np.stack([r.scale * cell.solver.displacement(r.state.solution) for r in responses], axis=1)
-    phases, c = [s.submesh.phase for s in cell.subdomains], cell.solver.problem.components
-    for phase in dict.fromkeys(phases):
-        members = [number for number, own in enumerate(phases) if own == phase]
-        own = np.concatenate([u[cell.offsets[n] : cell.offsets[n + 1]] for n in members]).reshape(-1, c, len(responses))
-        first, meshes = cell.subdomains[members[0]], [cell.subdomains[n].mesh for n in members]
+    for group in _groups(cell.subdomains):
+        members = [cell.subdomains[place] for place in group]
+        own = np.concatenate([cell.solver.extended(place, u, loads, keep) for place in group])
+        first, meshes = members[0], [s.mesh for s in members]
+        own = own.reshape(-1, first.problem.components, len(responses))
         yield members, RecoveredStress.on(meshes, first.L, first.problem, own, loads, first.is_mixed)
+
+
+def _groups(subdomains: Sequence[Subdomain]) -> Iterator[list[int]]:
+    """Yield the places of subdomains that follow each other, of one phase, and of ELEMENTS_AT_ONCE elements at most."""
+    group, elements = list[int](), 0
+    for place, s in enumerate(subdomains):
+        elements += len(s.mesh.triangles)
+        if group and (elements > ELEMENTS_AT_ONCE or s.submesh.phase != subdomains[group[0]].submesh.phase):
+            yield group
+            group, elements = [], len(s.mesh.triangles)
+        group.append(place)
+    if group:
+        yield group

@@ -14,6 +14,7 @@ from feti_homog import Case, run
 from feti_homog.analysis.mesh_errors import note_accuracy
 from feti_homog.fem.arc_error import ArcSides
 from feti_homog.fem.stress_recovery import RecoveredStress
+from feti_homog.homogenization.mesh_error import energy_errors
 
 pytestmark = pytest.mark.parallel
 
@@ -143,6 +144,20 @@ def test_displacements_of_the_order_of_elements_are_recovered(comm, order):
         inner += int(away.sum())
         assert shares[away].max(initial=0.0) < 1e-16 * s.L[0, 0]
     assert comm.allreduce(inner) > 50
+    cell.destroy()
+
+
+def test_without_states_nothing_is_kept_and_errors_are_the_same(comm):
+    cell, _, responses = solve(make_case(order=2, mesh_size=0.2), comm)
+    kept = cell.solver.interface_operators.interiors
+    lean = energy_errors(cell, responses, keep=False)
+    assert not kept and not len(lean.shares)
+    whole = energy_errors(cell, responses)
+    assert len(kept) == len(cell.subdomains)
+    np.testing.assert_allclose(lean.elements, whole.elements, rtol=1e-9, atol=1e-12 * whole.elements.max())
+    np.testing.assert_allclose(lean.arcs, whole.arcs, rtol=1e-9, atol=1e-12 * np.abs(whole.arcs).max())
+    shares = comm.allreduce(whole.shares.sum(axis=0))
+    assert shares == pytest.approx(np.diag(whole.elements))
     cell.destroy()
 
 

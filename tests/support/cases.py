@@ -37,6 +37,8 @@ def make_case(*, matrix=MATRIX, fibre=FIBRE, plane="strain", petsc=None, decompo
 class Responses:
     """Takes the responses that are to be kept as states, in place of `StateRecorder`."""
 
+    has_place = False
+
     def __init__(self):
         self.taken = []
 

@@ -53,7 +53,6 @@ class Interior:
 
     Attributes:
         dofs: their local numbers, sorted.
-        coupling: (n, inner dofs) K_bi.
     """
 
     def __init__(self, K: csr_matrix, dofs: Int) -> None:
@@ -63,9 +62,13 @@ class Interior:
         self.dofs = np.flatnonzero(inside)
         rows = K[self.dofs]
         self._Kib, self._Kbb = rows[:, dofs], K[dofs][:, dofs]
-        self.coupling = self._Kib.T.tocsr()
         if len(self.dofs):
             self._solver = DirectSolver(rows[:, self.dofs].tocsr(), "feti_interior_")
+
+    @cached_property
+    def coupling(self) -> csr_matrix:
+        """(n, inner dofs) K_bi."""
+        return self._Kib.T.tocsr()
 
     def extend(self, x: Float) -> Float:
         """-K_ii^-1 K_ib x: the interior in equilibrium with boundary displacements x (n,) or (n, k)."""

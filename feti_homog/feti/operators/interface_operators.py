@@ -63,6 +63,7 @@ class InterfaceOperators:
         of_inner: (n,) whether each boundary dof is that of the inner of two bodies.
         body_diagonal: (n,) of K.
         diagonal: (n,) the same, with springs that of their chain.
+        interiors: of some subdomains, by their places, factored and kept.
         springs: (owned rows,) compliance of the springs.
         compliance: the same of those that no subdomain has, where both bodies are cut.
     """
@@ -103,6 +104,7 @@ class InterfaceOperators:
         self.facewise = [choice.facewise for choice in chosen]
         self.operators: list[InterfaceOperator] = []
         self.with_springs: list[BoundaryOperator] = []
+        self.interiors: dict[int, Interior] = {}
         bodies, diagonals = [np.zeros(0)], [np.zeros(0)]
         for subdomain, dofs, choice, root in zip(subdomains, self.dofs, chosen, roots, strict=True):
             operator, diagonal = _factor(subdomain, dofs, choice.explicit)
@@ -172,28 +174,27 @@ class InterfaceOperators:
         blocks = [s.take_stiffness()[d][:, d] for s, d in zip(self.subdomains, self.dofs, strict=True)]
         return csr_matrix(block_diag(blocks or [csr_matrix((0, 0))]))
 
-    @cached_property
-    def _interiors(self) -> list[Interior]:
-        """The interior of each subdomain, factored."""
-        return [
-            operator.interior
-            if isinstance(operator, ImplicitInterfaceOperator)
-            else Interior(subdomain.take_stiffness(), dofs)
-            for subdomain, dofs, operator in zip(self.subdomains, self.dofs, self.operators, strict=True)
-        ]
+    def _interior(self, place: int, keep: bool) -> Interior:
+        """Return the factored interior of the subdomain at a place, kept for other loads if that is asked for."""
+        operator = self.operators[place]
+        if isinstance(operator, ImplicitInterfaceOperator):
+            return operator.interior
+        if place in self.interiors:
+            return self.interiors[place]
+        interior = Interior(self.subdomains[place].take_stiffness(), self.dofs[place])
+        if keep:
+            self.interiors[place] = interior
+        return interior
 
-    def extend(self, x: Float) -> Float:
-        """(local dofs,) displacements that have the values x (n,) on the boundaries, with interiors in equilibrium.
+    def extend(self, place: int, x: Float, keep: bool = True) -> Float:
+        """(dofs, k) displacements of one subdomain that are x (n_s, k) on its boundary, and inside in equilibrium.
 
-        The first call factors the interiors.
+        The first call factors the interior, each one if it is not to be kept.
         """
-        parts = [np.zeros(0)]
-        each = zip(self.subdomains, self.dofs, self._interiors, self.slices, strict=True)
-        for subdomain, dofs, interior, own in each:
-            u = np.empty(subdomain.n_dofs)
-            u[dofs], u[interior.dofs] = x[own], interior.extend(x[own])
-            parts.append(u)
-        return np.concatenate(parts)
+        interior = self._interior(place, keep)
+        u = np.empty((self.subdomains[place].n_dofs, *x.shape[1:]))
+        u[self.dofs[place]], u[interior.dofs] = x, interior.extend(x)
+        return u
 
 
 def _factor(subdomain: Subdomain, dofs: Int, explicit: bool) -> tuple[InterfaceOperator, Float]:
