@@ -11,6 +11,8 @@ from support.fitted_composites import COMPOSITES, fit, model, truth
 
 from feti_homog import CaseError, ConvergenceError, run, run_fit
 from feti_homog.fit import description, execute
+from feti_homog.fit.predictions import exact_derivatives, predicted
+from feti_homog.parallel.mpi_errors import on_root
 
 pytestmark = pytest.mark.parallel
 
@@ -108,3 +110,38 @@ def test_unknowns_that_the_data_do_not_determine_are_named(comm, shared_path, gl
         "[unknown] material.matrix.expansion: no measured value depends on it",
     ]
     assert (shared_path / "out" / "fit.json").exists()
+
+
+STRAINS = (0.008, 0.02, 0.049)
+FIBRE_THAT_DEBONDS = {
+    "cell": {"geometry": "square", "fibre_fraction": 0.4, "fibre_radius": 7.5, "mesh_size": 0.15},
+    "material": {"fibre": {"young": 70800.0, "poisson": 0.22}, "matrix": {"young": 2790.0, "poisson": 0.33}},
+    "analysis": {"type": "path", "plane": "strain"},
+    "interface": {
+        "criterion": "energy", "normal_stiffness": 2025.0, "tangential_stiffness": 506.25, "mode_sensitivity": 0.25,
+    },
+    "path": {"strain": [0.05, 0.0, 0.0]},
+}  # fmt: skip
+
+
+def test_toughness_is_fitted_to_peaks_and_curves_without_differences(comm, shared_path):
+    """Derivatives by the scaling law are those of a central difference; the fit returns the toughness."""
+    document = copy.deepcopy(FIBRE_THAT_DEBONDS)
+    document["unknown"] = {"interface.toughness": {"start": 3.0, "lower": 0.5, "upper": 10.0}}
+    rows = "".join(f"{strain}, 1.0\n" for strain in STRAINS)
+    on_root(comm, (shared_path / "curve.csv").write_text, f"E11, S11\n{rows}")
+    document["measured"] = {
+        "onset_S11": {"value": 1.0, "std": 0.1},
+        "curve": {"file": str(shared_path / "curve.csv"), "std": 0.5},
+    }
+    asked = on_root(comm, description.parse, document, Path())
+    below, found, above = (run(asked.at([G]).cases[0], comm).document for G in (1.9999, 2.0, 2.0001))
+    difference = (predicted(above, asked.data) - predicted(below, asked.data)) / 2e-4
+    assert exact_derivatives(found, asked.data, "interface.toughness") == pytest.approx(difference, rel=1e-4, abs=1e-4)
+    onset, *stresses = predicted(found, asked.data)
+    document["measured"]["onset_S11"]["value"] = onset
+    rows = "".join(f"{strain}, {stress!r}\n" for strain, stress in zip(STRAINS, map(float, stresses), strict=True))
+    on_root(comm, (shared_path / "curve.csv").write_text, f"E11, S11\n{rows}")
+    fitted = run_fit(document, shared_path / "out", comm)
+    assert fitted["unknowns"]["interface.toughness"]["estimate"] == pytest.approx(2.0, rel=1e-6)
+    assert fitted["status"] == "done" and not [*(shared_path / "out").glob("differences-*")]
