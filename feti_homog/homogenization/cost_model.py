@@ -29,11 +29,13 @@ MESH_SECONDS = 2.7e-5
 SETUP_SECONDS, SUBDOMAIN_SECONDS = 4.4e-6, 2.9e-3
 # Seconds for each degree of freedom in one application of operator and preconditioner.
 APPLY_SECONDS = 4.2e-8
+# Seconds for each degree of freedom to estimate the errors of the mesh: of factoring the interiors, above all.
+ERROR_SECONDS = 5.0e-6
 # Bytes of a rank without degrees of freedom, for each of these, and for each multiplier that has influence columns.
 BASE_BYTES, DOF_BYTES, COLUMN_BYTES = 1.8e8, 1.5e3, 2.0e4
 # Bytes of result.h5: of a state for each node, element and interface node in the plane, and what is along the fibres
 # besides; of the mesh for each node and element, and of the interface's nodes.
-STATE_BYTES, AXIAL_BYTES = np.array([16, 36, 137]), np.array([8, 16, 16])
+STATE_BYTES, AXIAL_BYTES = np.array([16, 36, 138]), np.array([8, 16, 16])
 MESH_BYTES, CORNER_BYTES = np.array([16, 16, 80]), 8
 # Seconds to make and write the fields of a state, for each element.
 STATE_SECONDS = 6e-7
@@ -64,6 +66,11 @@ def applications(case: Case, problem: Problem) -> int:
     return _iterations(case) * solves * (SOLVES_OF_A_CONTACT if contact else 1)
 
 
+def has_errors(case: Case) -> bool:
+    """Return whether errors of the mesh are estimated: on a path only for states that are written."""
+    return case.output.mesh_error and (case.output.fields or not case.section.is_followed)
+
+
 def _iterations(case: Case) -> int:
     """About those of a solve by a preconditioner."""
     return ITERATIONS_WITH_COATINGS if COATING in case.materials else ITERATIONS_OF_A_SOLVE
@@ -83,15 +90,17 @@ def estimate(
     bodies: int,
     problems: Mapping[int, int],
     columns: int,
+    with_errors: bool = False,
 ) -> Estimate:
     """Estimate the cost of a case with `nodes` and `subdomains` on each rank.
 
-    `problems` has for each problem, by its displacements of a node, how many times it applies its dual operator, and
-    `columns` multipliers have influence columns.
+    `problems` has for each problem, by its displacements of a node, how many times it applies its dual operator,
+    `columns` multipliers have influence columns, and errors of the mesh are estimated `with_errors`.
 
     As many ranks are suggested as there are bodies at most, for more would cut bodies, which costs iterations.
     """
-    of_node = sum(c * (SETUP_SECONDS + applications * APPLY_SECONDS) for c, applications in problems.items())
+    once = SETUP_SECONDS + with_errors * ERROR_SECONDS
+    of_node = sum(c * (once + applications * APPLY_SECONDS) for c, applications in problems.items())
     of_subdomain = len(problems) * SUBDOMAIN_SECONDS
     slowest = max(n * of_node + k * of_subdomain for n, k in zip(nodes, subdomains, strict=True))
     dofs = [sum(problems) * n for n in nodes]

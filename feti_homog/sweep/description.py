@@ -61,7 +61,8 @@ def _described(
     problems = {problem.components: cost_model.applications(case, problem) for problem in phase_laws.problems(case)}
     plan = _plan(case, summary, multipliers, max(problems.values()), options)
     columns = multipliers if plan.preconditioner == "influence" else 0
-    taken = cost_model.estimate(nodes, own, summary.coarse_triangles, summary.bodies, problems, columns)
+    errors = cost_model.has_errors(case)
+    taken = cost_model.estimate(nodes, own, summary.coarse_triangles, summary.bodies, problems, columns, errors)
     unresolved = process_zone.warnings(case, summary.width, summary.interface_edge)
     lines = [
         f"case       {case.name}: {case.analysis.type}, plane {case.analysis.plane}",

@@ -43,6 +43,17 @@ def test_a_problem_more_takes_more():
     assert one.seconds < both.seconds < 2 * one.seconds and one.memory < both.memory and one.ranks < both.ranks
 
 
+def test_estimates_of_the_mesh_error_are_counted_where_they_are_made():
+    counts = [50_000], [9], 10_000, 99, {2: 60, 1: 40}, 0
+    without, with_errors = (cost_model.estimate(*counts, asked) for asked in (False, True))
+    assert with_errors.seconds - without.seconds == pytest.approx(3 * 50_000 * cost_model.ERROR_SECONDS)
+    case = make_case()
+    path = replace(case, analysis=replace(case.analysis, type="path"), path=LoadPath(to={"E11": 1.0}))
+    for each, fields, asked in ((case, False, True), (path, True, True), (path, False, False)):
+        assert cost_model.has_errors(replace(each, output=replace(each.output, fields=fields))) is asked
+    assert not cost_model.has_errors(replace(case, output=replace(case.output, mesh_error=False)))
+
+
 def test_more_work_takes_more_time_and_memory():
     base = estimate()
     assert estimate(applications=72).seconds > base.seconds and estimate(dofs=(200_000,)).memory > base.memory
