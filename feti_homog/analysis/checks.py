@@ -38,7 +38,8 @@ class Checks:
         state = response.state
         self.iterations.append(state.iterations)
         self.reasons.append(state.solution.reason)
-        jump = f"relative jump {response.checks['jump']:.1e}"
+        confirmed = response.checks.get("jump")
+        jump = "by influence columns" if confirmed is None else f"relative jump {confirmed:.1e}"
         words = f"{state.iterations} iterations, {jump}"
         if response.debonded:
             words += f", {response.debonded} debonded ({response.counts['closed']} closed), {state.solves} solves"

@@ -57,12 +57,12 @@ class CellLoads:
         """First multipliers of each unit load when there are no better ones."""
         return [np.zeros(problem.cell.solver.rows) for problem in self.problems for _ in problem.loads]
 
-    def responses(self, state: Equilibrium, scale: float) -> list[Response]:
+    def responses(self, state: Equilibrium, scale: float, brief: bool = False) -> list[Response]:
         """Return the averages of `scale` times the equilibrium of all problems.
 
-        Collective; raises as `Homogenization.response`.
+        Collective; arguments and errors as of `Homogenization.response`.
         """
-        return [problem.response(own, scale) for problem, own in zip(self.problems, state.problems, strict=True)]
+        return [problem.response(own, scale, brief) for problem, own in zip(self.problems, state.problems, strict=True)]
 
     def undetermined(self, responses: Sequence[Response]) -> list[str]:
         """Return the strains under a load that nothing determines. Collective."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from types import TracebackType
 from typing import Any, Self
 
@@ -50,20 +51,23 @@ def follow(context: AnalysisContext, path: LoadPath, law: BondLaw) -> dict[str, 
     work, entries, last = Work(), list[dict[str, Any]](), None
     with EventProgress(context.progress, BARS[path.method], context.events) as shown:
         for number, (point, energies) in enumerate(_points(context, path, law, known)):
-            responses = context.loads.responses(point.state, point.scale)
+            responses = context.loads.responses(point.state, point.scale, brief=True)
             source = "" if energies is None else ", from the checkpoint"
             if energies is not None:
                 work.resume_from(*energies, point)
             else:
                 work.arrive(point)
                 if point.state.converged:
-                    context.checkpoint.write(number, *stored(point, work))
+                    # Teeth are many and found again at once.
+                    event = stored(point, work, context.loads.interfaces)
+                    context.checkpoint.write(number, *event, light=point.broke == 0 < point.softened)
             _tell(context, shown, f"{_label(path, number)} at {point.load_factor:.6f}{source}", responses)
             entries.append(_entry(context, law, point, responses, work))
             shown.advance(point.load_factor, f"{len(entries)} {path.method}, {_counts(entries[-1])}")
             last = point
             if not _goes_on(context, path, point, number + 1):
                 break
+    context.checkpoint.flush()
     states = _kept(context, path, law, entries, last)
     if not entries:
         return {"path": (), "resumed": known} | states
@@ -219,6 +223,7 @@ def _kept(
                 if number == len(entries) - 1
                 else restored(context.checkpoint.read(number), context.loads.interfaces)[0]
             )
+            point = replace(point, state=context.loads.interfaces.completed(point.state))
             if tips is not None:
                 entries[number]["tips"] = tips.of(point)
             if context.states.has_place:

@@ -13,7 +13,7 @@ from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BondState, Equilibrium
 from feti_homog.interface.loads.load import Load, Macroscopic
 from feti_homog.interface.path.path_points import NO_ENERGIES, Energies, PathState, Point
-from feti_homog.results.checkpoint import Arrays
+from feti_homog.results.checkpoint_file import Arrays
 
 KKT_LAWS = ("kkt_complementarity", "kkt_penetration", "kkt_tension")
 # Behind the names of what belongs to each problem.
@@ -51,7 +51,7 @@ class Work:
         self._load, self._largest_load = point.load_factor, max(point.load_factor, self._largest_load)
 
 
-def stored(point: Point, work: Work) -> tuple[dict[str, Any], Arrays]:
+def stored(point: Point, work: Work, cell: CoupledInterfaces) -> tuple[dict[str, Any], Arrays]:
     """Return a point as plain numbers and distributed arrays, for the checkpoint.
 
     A path goes on from the multipliers of its last state.
@@ -64,8 +64,8 @@ def stored(point: Point, work: Work) -> tuple[dict[str, Any], Arrays]:
         "broken": np.nan if after.broken is None else after.broken,
     }
     distributed: Arrays = {"used": point.used} | _bonds_apart(after.bonds, "_after")
-    for suffix, state in zip(SUFFIXES, point.state.problems, strict=False):
-        numbers, arrays = _taken_apart(state)
+    for suffix, each, state in zip(SUFFIXES, cell.problems, point.state.problems, strict=False):
+        numbers, arrays = _taken_apart(state, each.solver.natural.kernel_dimension)
         whole |= {f"{name}{suffix}": value for name, value in numbers.items()}
         distributed |= {f"{name}{suffix}": value for name, value in arrays.items()}
     return whole, distributed
@@ -95,14 +95,14 @@ def restored(event: Arrays, cell: CoupledInterfaces) -> tuple[Point, tuple[Energ
     return point, (Energies(*energies[own : 2 * own]), energies[2 * own])
 
 
-def _taken_apart(state: Equilibrium) -> tuple[dict[str, Any], Arrays]:
-    """Return the equilibrium of one problem."""
+def _taken_apart(state: Equilibrium, kernel: int) -> tuple[dict[str, Any], Arrays]:
+    """Return the equilibrium of one problem with so many amplitudes, NaN where there are none."""
     solution = state.solution
     whole: dict[str, Any] = {
         "numbers": [state.iterations, state.solves, state.free_motions, solution.iterations, solution.reason],
         "load": np.stack([state.load.values, state.load.by_stress]),
         "strain": solution.strain,
-        "alpha": solution.alpha,
+        "alpha": np.full(kernel, np.nan) if solution.alpha is None else solution.alpha,
         "residual": solution.residual,
         "certificate": [state.certificate[law] for law in KKT_LAWS],
     }
@@ -118,7 +118,7 @@ def _put_together(event: Arrays, interface: ContactProblem, suffix: str) -> Equi
     load = Load(values, by_stress.astype(bool))
     bonds = _bonds_together(event, suffix)
     residual, C = float(event[f"residual{suffix}"]), interface.compliance(bonds)
-    solution = DualSolution(strain, lam, jump, alpha, last, reason, residual, C)
+    solution = DualSolution(strain, lam, jump, None if np.isnan(alpha).any() else alpha, last, reason, residual, C)
     return Equilibrium(load, bonds, solution, iterations, solves, free_motions, certificate)
 
 

@@ -3,7 +3,7 @@
 Imports `fem`, `feti.coarse`, `feti.decomposition`, `feti.operators`, `feti.preconditioners`, `mesh`, `parallel`,
 `petsc` and `runtime`.  Main entry: `solver.FetiSolver`. Its own floors, each on those below:
 
-    solver, factory, solver_plan, krylov, active_jumps
+    solver, factory, solver_plan, krylov, active_jumps, confirmation
     coarse           natural and adaptive coarse space, the preconditioner with the latter
     preconditioners  lumped, Dirichlet, influence columns
     operators        S and S+ of subdomains, the dual operator F

@@ -6,6 +6,7 @@ import numpy as np
 from mpi4py import MPI
 
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace
+from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.feti.krylov import ActiveRows
 from feti_homog.feti.operators.interface_operators import DualOperator
 from feti_homog.feti.thresholds import CANCELLED, ROUNDING_MARGIN, SMALL_JUMP, ZERO_JUMP
@@ -55,6 +56,30 @@ class ActiveJumps:
             left = self._natural.project(self._active.restrict(self._rounding @ loads))
             rounding = np.maximum(rounding, ROUNDING_MARGIN * self.norms(left))
         return rounding
+
+    def solutions(
+        self, strains: Float, lam: Float, jump: Float, iterations: int, reason: int, scale: Float
+    ) -> list[DualSolution]:
+        """Amplitudes, jumps, residuals of `lam` (owned rows, k); `jump` = d E - F lam but for rigid motions."""
+        alpha = np.zeros((self._natural.kernel_dimension, len(strains)))
+        if self._natural.kernel_dimension:
+            alpha -= self._natural.amplitudes(self._active.restrict(jump))
+            jump = jump + self._natural.G @ alpha
+        residual = self.norms(self._active.restrict(jump)) / np.where(scale > 0, scale, 1.0)
+        C, parts = self._operator.compliance, (strains, lam.T.copy(), jump.T.copy(), alpha.T.copy(), residual)
+        rows = zip(*parts, strict=True)
+        return [DualSolution(E, x, g, a, iterations, reason, float(left), C) for E, x, g, a, left in rows]
+
+    def completed(self, solution: DualSolution, d: Float) -> DualSolution:
+        """Return a solution of the present state with amplitudes, jumps and residual by F lambda.
+
+        d (owned rows, v) are the jumps of the torn cell.
+        """
+        torn = (d @ solution.strain)[:, None]
+        left = torn - self._operator.apply(solution.lam[:, None])
+        scale = self.norms(self.projected(torn, self.norms(torn)))
+        parts = solution.iterations, solution.reason, scale
+        return self.solutions(solution.strain[None], solution.lam[:, None], left, *parts)[0]
 
 
 def jump_rounding(operator: DualOperator, displacement: Float) -> Float:

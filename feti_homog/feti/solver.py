@@ -97,6 +97,11 @@ class FetiSolver:
         process_memory.trim()
         self.active = ActiveRows(self.rows)
         self._jumps = ActiveJumps(comm, self.operator, self.natural, self.active)
+        self._by_columns = None
+        if self.exact_inverse is not None:
+            from feti_homog.feti.confirmation import InfluenceSolutions  # with the modules of the exact inverse
+
+            self._by_columns = InfluenceSolutions(comm, self.exact_inverse, self.operator, self.natural, self._jumps)
         self._view = PETSc.Options("feti_").getBool("view", False)
         self._krylov: dict[int, Krylov] = {}
         # The shells call Python, so they are destroyed with the solver: PETSc's own finalization comes when the
@@ -184,6 +189,9 @@ class FetiSolver:
         One Krylov method works on all of them side by side, each scaled by the jump of its torn cell.
         """
         k = len(strains)
+        self.solves += k
+        if self._by_columns is not None and (found := self._by_columns.solutions(strains, self.d)) is not None:
+            return found
         krylov = self._krylov_for(k)
         torn_jump = self.d @ strains.T
         torn = self._jumps.norms(torn_jump)
@@ -194,28 +202,32 @@ class FetiSolver:
         is_seen = jump > rounding
         scale = np.where(is_seen, jump, 1.0)
         right = np.where(is_seen, right, 0.0) / scale
-        self.solves += k
         E, inverse = np.where(is_seen, strains.T, 0.0) / scale, self.exact_inverse
         closing = self.preconditioner.closing_forces(right) if inverse is None else inverse.multipliers(self.d, E)
         closing = self.natural.project(closing)
         krylov.test.set_scales(float(np.sqrt(is_seen.sum())), float(np.linalg.norm(self._jumps.norms(closing))))
         starts = np.where(is_seen, self.natural.project(self.active.restrict(starts)), 0.0) / scale
         lam = closing if self.preconditioner.is_exact else starts
-        found = Iterate(lam, np.zeros_like(lam), right)
+        last = Iterate(lam, np.zeros_like(lam), right)
         iterations, reason = 0, int(PETSc.KSP.ConvergedReason.CONVERGED_ATOL)
         if is_seen.any():
-            found, iterations, reason = self._solve_with_restarts(krylov, lam, right)
+            last, iterations, reason = self._solve_with_restarts(krylov, lam, right)
             if self._view:
                 PETSc.Sys.Print(krylov.describe(iterations), comm=self.comm)
-        lam, jump_left = found.lam * scale, torn_jump - found.applied * scale
-        return self._solutions(strains, lam, jump_left, iterations, reason, np.maximum(jump, rounding))
+        lam, jump_left = last.lam * scale, torn_jump - last.applied * scale
+        solutions = self._jumps.solutions(strains, lam, jump_left, iterations, reason, np.maximum(jump, rounding))
+        if self._by_columns is not None:
+            self._by_columns.record(solutions if is_seen.all() else [], self.d)
+        return solutions
 
-    def opening(self, solution: DualSolution) -> Float:
-        """(owned rows,) B u*: what the springs give way, and the jump of rows without multipliers."""
-        return solution.jump + solution.compliance * solution.lam
+    def completed(self, solution: DualSolution) -> DualSolution:
+        """Return a solution of the present state, with what F lambda gives if that did not confirm it.  Collective."""
+        return solution if solution.alpha is not None else self._jumps.completed(solution, self.d)
 
     def boundary_displacement(self, solution: DualSolution) -> Float:
-        """(boundary dofs,) u* of a solution, Eq. (34).  Collective."""
+        """(boundary dofs,) u* of a solution, Eq. (34), of the present state unless complete.  Collective."""
+        solution = self.completed(solution)
+        assert solution.alpha is not None
         u = self._torn_displacement @ solution.strain - self.operator.displacement(solution.lam)
         return np.asarray(u + self.natural.rigid_body_motion(solution.alpha))
 
@@ -269,19 +281,6 @@ class FetiSolver:
         is_better = self._jumps.norms(residual) <= self._jumps.norms(right)
         lam, applied = np.where(is_better, lam, 0.0), np.where(is_better, applied, 0.0)
         return Iterate(lam, applied, np.where(is_better, residual, right))
-
-    def _solutions(
-        self, strains: Float, lam: Float, jump: Float, iterations: int, reason: int, scale: Float
-    ) -> list[DualSolution]:
-        """Amplitudes, jumps, residuals of `lam` (owned rows, k); `jump` = d E - F lam but for rigid motions."""
-        alpha = np.zeros((self.natural.kernel_dimension, len(strains)))
-        if self.natural.kernel_dimension:
-            alpha -= self.natural.amplitudes(self.active.restrict(jump))
-            jump = jump + self.natural.G @ alpha
-        residual = self._jumps.norms(self.active.restrict(jump)) / np.where(scale > 0, scale, 1.0)
-        C, parts = self.operator.compliance, (strains, lam.T.copy(), jump.T.copy(), alpha.T.copy(), residual)
-        rows = zip(*parts, strict=True)
-        return [DualSolution(E, x, g, a, iterations, reason, float(left), C) for E, x, g, a, left in rows]
 
     def _krylov_for(self, columns: int) -> Krylov:
         """Return the Krylov method for so many load cases, set up when first asked for."""

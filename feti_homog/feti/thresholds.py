@@ -131,6 +131,11 @@ CANCELLED = 1e-2
 # it was up to 20 times as large with phases 1000 times apart.
 ZERO_JUMP, SMALL_JUMP, ROUNDING_MARGIN = 1e-13, 1e-8, 100.0
 
+# Solves by influence columns at most that F lambda does not confirm, between two that it does.
+MOST_UNCONFIRMED = 32
+# Jump that active rows see, relative to that of the torn cell, below which F lambda confirms every solve.
+LEAST_UNCONFIRMED_JUMP = 1e-6
+
 # preconditioners
 
 # Influence columns found at once: bounds the memory of their right-hand sides, (boundary dofs, this).
@@ -141,6 +146,9 @@ INFLUENCE_COLUMNS = 400
 # Influence columns that each rank finds together at least, with those of bonds near the one that breaks: fewer and
 # larger batches, but columns that may not be needed (`scripts/benchmark_path --to-the-end`).
 INFLUENCE_BATCH = 32
+# Rows that soften at once up to which their columns are followed; columns that are followed at most, 8 bytes an owned
+# row each; changes that wait before all of these follow.
+MOST_SOFTENED, FOLLOWED_COLUMNS, WAITING_COLUMNS = 16, 400, 32
 # Stiffness of a fibre over that of what is around it, as the diagonals of K have them, above which influence columns
 # take the forces of the latter: those of the fibre lose as many digits as this has.
 STIFF_FIBRES = 1e3

@@ -33,7 +33,7 @@ class Response:
         stored: energy per area of the cell, 1/2 <sigma:eps> from the displacements and what the springs store.
         in_springs: the latter, 1/2 sum lam^2 C / |UC|.
         state: interface states, multipliers, jumps and amplitudes.
-        u: (boundary dofs,) fluctuating displacement u* on the boundaries of this rank's subdomains.
+        u: (boundary dofs,) fluctuating displacement u* on the boundaries of this rank's subdomains; (0,) if brief.
         checks: relative errors of the laws: `strain` <eps> = E, Eq. (3), with the opening of debonded faces and
             the strain of voids, which is that of their boundaries, as parts of <eps>;
             `hill` <sigma:eps> = Sigma:E, Eq. (8), springs included, relative to <sigma:eps> or, if
@@ -103,8 +103,11 @@ class Homogenization:
         pairs = zip(strains, starts, strict=True)
         return [self.response(self.interface.equilibrium(Load.strain(E), bonds, start), 1.0) for E, start in pairs]
 
-    def response(self, state: Equilibrium, scale: float) -> Response:
+    def response(self, state: Equilibrium, scale: float, brief: bool = False) -> Response:
         """Return the averages of `scale` times an equilibrium. Collective.
+
+        If `brief`, a state that F lambda did not confirm has those that follow from its multipliers, and of the checks
+        those of contact alone.
 
         Raises:
             ConvergenceError: its numbers are not finite.
@@ -114,28 +117,43 @@ class Homogenization:
                 f"strain {state.solution.strain.tolist()}: the Krylov method broke down after {state.iterations} "
                 f"iterations (KSPConvergedReason {state.solution.reason})"
             )
-        cell, solver = self.cell, self.cell.solver
+        if brief and state.solution.alpha is None:
+            strain, stress = state.solution.strain, self.interface.stress(state.solution)
+            energy = float(stress @ strain) - self._rubbing(state)
+            return self._scaled(state, scale, stress, energy, np.zeros(0), {})
+        solver, state = self.cell.solver, self.interface.completed(state)
         strain, u = state.solution.strain, solver.boundary_displacement(state.solution)
         stress, star, energy = self._averages(strain, u)
         springs = state.solution.compliance * state.solution.lam
         active = self.interface.active(state.status)
         opened = state.solution.jump * (1 - active) + springs
-        opening = allreduce_sum(cell.comm, self._strain_of_jumps.T @ opened)
-        stretched = float(cell.comm.allreduce(float(state.solution.lam @ springs))) / cell.summary.area
-        energy += stretched
+        opening = allreduce_sum(self.cell.comm, self._strain_of_jumps.T @ opened)
+        energy += self._stretched(state)
         rubbing = self._rubbing(state)
         largest = (self._largest(u) + self.interface.scales.imposed(strain)) or 1.0
         imposed = float(self.interface.scales.imposed_strain(strain).max()) or 1.0
         least = self.interface.scales.stress_scale(strain) * imposed
         checks = {
-            "strain": float(np.abs(star - opening / cell.summary.area).max() / imposed) + self._strain_inside,
+            "strain": float(np.abs(star - opening / self.cell.summary.area).max() / imposed) + self._strain_inside,
             "hill": float(abs(energy + rubbing - stress @ strain) / (max(abs(energy), least) or 1.0)),
             "jump": self._largest(active * state.solution.jump) / largest,
         }
         if state.load.by_stress.any():
             checks["stress"] = self._unmet_stress(state, stress)
+        return self._scaled(state, scale, stress, energy, u, checks)
+
+    def _stretched(self, state: Equilibrium) -> float:
+        """Return lam C lam per area, twice what springs store.  Collective."""
+        springs = state.solution.compliance * state.solution.lam
+        return float(self.cell.comm.allreduce(float(state.solution.lam @ springs))) / self.cell.summary.area
+
+    def _scaled(
+        self, state: Equilibrium, scale: float, stress: Float, energy: float, u: Float, checks: dict[str, float]
+    ) -> Response:
+        """Return the response that is `scale` times a state with <sigma:eps> = `energy`.  Collective."""
         counts = self.counts(state.status)
-        means, energies = (scale * strain, scale * stress), (scale**2 * energy / 2, scale**2 * stretched / 2)
+        means = scale * state.solution.strain, scale * stress
+        energies = scale**2 * energy / 2, scale**2 * self._stretched(state) / 2
         damage = self.law.damage(state.bonds)
         damage = (state.status != BONDED).astype(float) if damage is None else damage
         return Response(*means, scale, *energies, state, scale * u, checks | state.certificate, counts, damage)

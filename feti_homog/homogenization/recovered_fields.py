@@ -49,7 +49,7 @@ def recover(cell: TornCell, response: Response | None) -> RecoveredFields:
         fluctuation(cell, u),
         *_element_fields(cell, response.strain, u),
         response.scale * solution.lam[pair] / nodes.length[:, None],
-        response.scale * cell.solver.opening(solution)[pair],
+        response.scale * solution.opening[pair],
         _shares(cell, response),
     )
 

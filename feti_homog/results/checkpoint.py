@@ -1,36 +1,32 @@
-"""Checkpoints of a path: one small HDF5 file an event, written whole or not at all.
+"""Checkpoints of a path: small HDF5 files of an event, or of some that are of little weight, whole or not at all.
 
-Rank 0 writes what the ranks' parts add up to; it concerns the interfaces only.  The events' files are numbered
-without gaps; each carries the run that it belongs to and, ahead of what HDF5 reads, the format and a checksum.
+Rank 0 writes what the ranks' parts add up to; it concerns the interfaces only.  A file has the number of its first
+event, and there are no gaps; each carries the run that it belongs to and, ahead of what HDF5 reads, the format and a
+checksum.
 """
 
 from __future__ import annotations
 
+import bisect
 import contextlib
-import hashlib
 import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
 from feti_homog.errors import CaseError
 from feti_homog.parallel.mpi_errors import on_root, on_root_only
-from feti_homog.results import atomic
+from feti_homog.results import atomic, checkpoint_file
+from feti_homog.results.checkpoint_file import Arrays
 
 FOLDER, DROPPED = "checkpoint", "checkpoint.dropped"  # the second while it is removed
-FORMAT = 8  # of an event's file: to be raised when what an event holds changes
-# HDF5 leaves so many bytes at the beginning of a file to its writer; there stands the header.
-USER_BLOCK = 512
-HEADER = re.compile(rb"feti-homog checkpoint, format (\d+), sha256 ([0-9a-f]{64})\n")
+# Light events that a file has at most; as many a killed run has to find again.
+EVENTS_AT_ONCE = 64
 EVENT_FILE = re.compile(r"\d{6,}\.h5(\..+\.\d+\.part)?")  # also of a writer that was killed
-UNMARKED = re.compile(rb"\x89HDF\r\n\x1a\n")  # HDF5's own first bytes, as in format 1
-
-Arrays = dict[str, NDArray[Any]]
 
 
 class Checkpoint:
@@ -42,6 +38,10 @@ class Checkpoint:
 
     def __init__(self, directory: Path, comm: MPI.Intracomm, signature: str) -> None:
         self.folder, self.comm, self.signature = directory / FOLDER, comm, signature
+        # Of rank 0: events that wait, the first events of the files and one after the last, and the file read last.
+        self._waiting: list[Arrays] = []
+        self._starts = [0]
+        self._read: tuple[int, Arrays] = (-1, {})
 
     def clear(self) -> int:
         """Forget all events; returns how many there were."""
@@ -69,18 +69,29 @@ class Checkpoint:
         own: Arrays = self.comm.scatter(parts)
         return own
 
-    def write(self, number: int, whole: Mapping[str, Any], distributed: Mapping[str, NDArray[Any]]) -> None:
+    def write(
+        self, number: int, whole: Mapping[str, Any], distributed: Mapping[str, NDArray[Any]], light: bool = False
+    ) -> None:
         """Add event `number`: numbers that all ranks share, and arrays of which each has a part.
+
+        A `light` event waits for others whose arrays have the same shapes, up to EVENTS_AT_ONCE or one of weight.
 
         Raises:
             FetiHomogError: the file cannot be written.
         """
         gathered = {name: self.comm.gather(part) for name, part in distributed.items()}
-        on_root(self.comm, self._write, number, whole, gathered)
+        on_root(self.comm, self._write, number, whole, gathered, light)
+
+    def flush(self) -> None:
+        """Write the events that wait.  Raises as `write`."""
+        on_root(self.comm, self._flush)
 
     def _clear(self) -> int:
-        count = len(self._files())
+        files = self._files()
+        # Whatever another run left there.
+        count = sum(map(checkpoint_file.events_in, files))
         remove(self.folder.parent)
+        self._waiting, self._starts, self._read = [], [0], (-1, {})
         return count
 
     def _files(self) -> list[Path]:
@@ -90,43 +101,54 @@ class Checkpoint:
         return self.folder / f"{number:06d}.h5"
 
     def _count_checked(self) -> int:
-        files = self._files()
-        missing = next((n for n, path in enumerate(files) if path != self._file(n)), None)
-        if missing is not None:
-            raise CaseError(f"event {missing:06d} is missing in {self.folder}")
-        for number in range(len(files)):
-            self._read_event(number)
-        return len(files)
+        self._starts = [0]
+        for path in self._files():
+            if path != self._file(self._starts[-1]):
+                raise CaseError(f"event {self._starts[-1]:06d} is missing in {self.folder}")
+            events = self._read_file(self._starts[-1])
+            self._starts.append(self._starts[-1] + checkpoint_file.length(events))
+        return self._starts[-1]
 
     def _read_event(self, number: int) -> Arrays:
-        path = self._file(number)
-        try:
-            _check_bytes(path)
-            with h5py.File(path, "r") as file:
-                signature, found = str(file.attrs.get("signature", "")), int(file.attrs.get("number", -1))
-                event = {name: table[()] for name, table in file.items()}
-        except CaseError:
-            raise
-        except Exception as error:  # h5py may say anything
-            raise CaseError(f"{path} is no readable event of a path: {error}") from error
+        if number >= self._starts[-1]:
+            return self._waiting[number - self._starts[-1]]
+        start = self._starts[bisect.bisect_right(self._starts, number) - 1]
+        if self._read[0] != start:
+            self._read = start, self._read_file(start)
+        return {name: table[number - start] for name, table in self._read[1].items()}
+
+    def _read_file(self, start: int) -> Arrays:
+        """(events, ...) arrays of the file whose first event is `start`."""
+        path = self._file(start)
+        events, signature, found = checkpoint_file.read(path)
         if signature != self.signature:
             raise CaseError(f"{path} is of another run: expected {self.signature}; found {signature}")
-        if found != number:
-            raise CaseError(f"{path} is a copy of event {found:06d}: expected event {number:06d}")
-        return event
+        if found != start:
+            raise CaseError(f"{path} is a copy of event {found:06d}: expected event {start:06d}")
+        return events
 
-    def _write(self, number: int, whole: Mapping[str, Any], gathered: Mapping[str, list[NDArray[Any]]]) -> None:
+    def _write(
+        self, number: int, whole: Mapping[str, Any], gathered: Mapping[str, list[NDArray[Any]]], light: bool
+    ) -> None:
         event = {name: np.asarray(value) for name, value in whole.items()}
         event |= {name: np.concatenate(parts) for name, parts in gathered.items()}
         event |= {f"{name}_ends": np.cumsum([len(p) for p in parts]) for name, parts in gathered.items()}
+        if self._waiting and _shapes(event) != _shapes(self._waiting[0]):
+            self._flush()
+        self._starts[-1] = number - len(self._waiting)
+        self._waiting.append(event)
+        if not light or len(self._waiting) == EVENTS_AT_ONCE:
+            self._flush()
 
-        def write_event(part: Path) -> None:
-            part.parent.mkdir(parents=True, exist_ok=True)
-            image = _image(event, {"signature": self.signature, "number": number})
-            header = f"feti-homog checkpoint, format {FORMAT}, sha256 {hashlib.sha256(image).hexdigest()}\n"
-            part.write_bytes(header.encode().ljust(USER_BLOCK, b"\0") + image)
+    def _flush(self) -> None:
+        if not self._waiting:
+            return
+        start, events = self._starts[-1], self._waiting
+        together = {name: np.stack([event[name] for event in events]) for name in events[0]}
 
-        atomic.replace(self._file(number), write_event)
+        atomic.replace(self._file(start), lambda part: checkpoint_file.write(part, together, self.signature, start))
+        self._starts.append(start + len(events))
+        self._waiting = []
 
 
 class NoCheckpoint(Checkpoint):
@@ -141,7 +163,12 @@ class NoCheckpoint(Checkpoint):
     def count(self) -> int:
         return 0
 
-    def write(self, number: int, whole: Mapping[str, Any], distributed: Mapping[str, NDArray[Any]]) -> None:
+    def write(
+        self, number: int, whole: Mapping[str, Any], distributed: Mapping[str, NDArray[Any]], light: bool = False
+    ) -> None:
+        """Nothing."""
+
+    def flush(self) -> None:
         """Nothing."""
 
 
@@ -155,7 +182,9 @@ class EventsInMemory(NoCheckpoint):
     def read(self, number: int) -> Arrays:
         return self._events[number]
 
-    def write(self, number: int, whole: Mapping[str, Any], distributed: Mapping[str, NDArray[Any]]) -> None:
+    def write(
+        self, number: int, whole: Mapping[str, Any], distributed: Mapping[str, NDArray[Any]], light: bool = False
+    ) -> None:
         self._events[number] = {name: np.asarray(value) for name, value in {**whole, **distributed}.items()}
 
 
@@ -209,40 +238,8 @@ def _is_event(path: Path) -> bool:
     return EVENT_FILE.fullmatch(path.name) is not None and path.is_file()
 
 
-def _digest(path: Path) -> str:
-    """SHA-256 of what follows the user block."""
-    with path.open("rb") as file:
-        file.seek(USER_BLOCK)
-        return hashlib.file_digest(file, "sha256").hexdigest()
-
-
-def _image(event: Arrays, attributes: Mapping[str, Any]) -> bytes:
-    """Return an HDF5 file in memory: on a full disk HDF5 may crash, and writing bytes does not."""
-    with h5py.File("event", "w", driver="core", backing_store=False) as file:
-        for name, value in event.items():
-            file[name] = value
-        file.attrs.update(attributes)
-        file.flush()
-        return bytes(file.id.get_file_image())
-
-
-def _check_bytes(path: Path) -> None:
-    """Refuse a file of another format or other bytes than were written, before HDF5, which a wrong bit may crash.
-
-    Raises:
-        CaseError: what is wrong.
-    """
-    with path.open("rb") as file:
-        start = file.read(USER_BLOCK)
-    header = HEADER.match(start)
-    version = int(header[1]) if header else int(UNMARKED.match(start) is not None)
-    if version not in (0, FORMAT):
-        raise CaseError(
-            f"{path} has the checkpoints' format {version}, this program reads format {FORMAT}; "
-            "go on with the program that wrote it, or start again without --resume"
-        )
-    if header is None or header[2].decode() != _digest(path):
-        raise CaseError(f"{path} is damaged: its checksum is wrong")
+def _shapes(event: Arrays) -> dict[str, tuple[int, ...]]:
+    return {name: value.shape for name, value in event.items()}
 
 
 def _part(event: Arrays, rank: int) -> Arrays:

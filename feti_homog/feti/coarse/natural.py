@@ -70,16 +70,18 @@ class NaturalCoarseSpace:
         self.factor()
 
     def activate(self, active: Float) -> None:
-        """Factor G^T G for the owned rows of which `active` is 1; the others, 0, carry no multiplier.  Collective.
+        """Let the owned rows be active of which `active` is 1; the others, 0, carry no multiplier.  Collective.
 
-        Motions that no active row resists, of a fibre that nothing holds, get a stiffness: G^T G + s Z Z^T.
+        G^T G is factored when next wanted.  Motions that no active row resists, of a fibre that nothing holds, get a
+        stiffness: G^T G + s Z Z^T.
         """
         self.G_active = (diags(active) @ self.G).tocsr()
         self.unconstrained_modes = self._null_space(self._gram.entries(active))
-        self.factor()
+        self._is_factored = False
 
     def factor(self) -> None:
         """Factor G^T G of the active rows.  Collective."""
+        self._is_factored = True
         if not self.kernel_dimension:
             return
         Z = self._own_unconstrained_modes()
@@ -90,6 +92,10 @@ class NaturalCoarseSpace:
         gram = (self._GT @ self._G + self._diagonal.max(initial=0.0) * (Z.T @ Z)).tocsr()
         self.solver.factor(self.unknowns, gram)
         self.factorizations += 1
+
+    def _factor_if_wanted(self) -> None:
+        if not self._is_factored:
+            self.factor()
 
     def _own_unconstrained_modes(self) -> csr_matrix:
         """(z, m) those of the unconstrained modes whose first subdomain is this rank's, as rows."""
@@ -132,6 +138,7 @@ class NaturalCoarseSpace:
 
     def amplitudes(self, x: Float) -> Float:
         """(G^T G)^-1 G^T x on every rank, for the owned rows x (rows,) or (rows, k).  Collective."""
+        self._factor_if_wanted()
         own = np.searchsorted(self.unknowns, np.arange(self.kernel_dimension)[self.owned_modes])
         whole = np.zeros((self.kernel_dimension, *x.shape[1:]))
         whole[self.owned_modes] = self.solve(self._GT @ x)[own]
@@ -145,6 +152,7 @@ class NaturalCoarseSpace:
         """P x for the owned rows x, whose inactive ones are 0: what no rigid-body motion works on.  Collective."""
         if not self.kernel_dimension:
             return x.copy()
+        self._factor_if_wanted()
         projected: Float = x - self._G @ self.solve(self._GT @ x)
         return projected
 

@@ -9,9 +9,9 @@ A spring whose compliance grew by dC is one of C, whose jump dC lam is prescribe
 
     N = (Gamma_CC + D)^-1,  lam_C = D c on such rows,  D = dC^-1 there, and 0 where bonds left.
 
-A bond that breaks costs two columns and two borders of N, a face that closes or opens one border, a bond that softens
-an update of rank two; no factor is made anew.  After as many changes as an option says, the cell as it stands becomes
-the reference, but for what softened.
+A bond that breaks costs two columns and two borders of N, a face that closes or opens one border; bonds that soften
+cost their columns of what `followed_response` keeps up, until N is wanted again; no factor is made anew.  After as many
+changes as an option says, the cell as it stands becomes the reference, but for what softened.
 """
 
 from __future__ import annotations
@@ -26,10 +26,16 @@ from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbou
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.bordered_inverse import BorderedInverse
+from feti_homog.feti.preconditioners.followed_response import FollowedResponse
 from feti_homog.feti.preconditioners.reference_cell import BodyTies, ReferenceCell, ResponseColumns, one_sided_jumps
 from feti_homog.feti.preconditioners.scaled import Preconditioner
-from feti_homog.feti.thresholds import INFLUENCE_BATCH, INFLUENCE_COLUMNS, NORM_ITERATIONS, NORM_MARGIN
-from feti_homog.parallel.distributed_arrays import allreduce_sum, gather_rows, scale_rows
+from feti_homog.feti.thresholds import (
+    INFLUENCE_BATCH,
+    INFLUENCE_COLUMNS,
+    MOST_SOFTENED,
+    NORM_MARGIN,
+)
+from feti_homog.parallel.distributed_arrays import gather_rows, scale_rows
 from feti_homog.typing import Float, Int
 
 
@@ -42,8 +48,6 @@ class ExactInverse(Preconditioner):
         norm: |H| with all bonds intact, which is the largest, as the power method finds it, with a margin.
         stiffness: (all rows,) the most that each diagonal entry of H can be: that of a node of either side and of the
             spring between them, in a row, while all others are held.
-        rounding: the largest force, relative to `stiffness`, that jumps of rigid-body motions of size 1 make in the
-            reference cell, where bodies that follow leave none: a relative error of H.
         factorizations: reference cells so far.
     """
 
@@ -73,24 +77,67 @@ class ExactInverse(Preconditioner):
         # Columns without which the reference cell is not the one at hand.
         self.factorizations = self._tied = 0
         self._answer: Float | None = None
+        self._followed: FollowedResponse | None = None
         self._active, self._more = np.ones(self._rows), np.zeros(self._rows)
+        self._next, self._is_behind = self._more, False
         self._rebase(self._active)
         # Rows that leave make H smaller.
-        self.norm = NORM_MARGIN * self._largest_eigenvalue()
+        self.norm = NORM_MARGIN * self.reference.largest_eigenvalue(self._first)
+
+    @property
+    def rounding(self) -> float:
+        """Return the largest force, relative to `stiffness`, that jumps of rigid-body motions of size 1 make.
+
+        Bodies of the reference cell that follow leave none: it is a relative error of H.  Collective.
+        """
+        self._catch_up()
+        return self._rounding
 
     def soften(self, more: Float) -> None:
         """Let springs have `more` compliance (owned rows,) than at first, from the next `activate` on."""
-        self._more = more
+        self._next = more
 
     def activate(self, active: Float) -> None:
         """Restrict to the rows where `active` is 1.  Collective."""
-        self._active = active
+        if self._followed is not None:
+            more = self._next - self._more
+            changed = np.flatnonzero((more != 0.0) & (active > 0.0))
+            is_other = bool((active != self._active).any() or (more[changed] < 0.0).any())
+            own = (is_other, self._first + changed, more[changed])
+            others, rows, gained = zip(*self.comm.allgather(own), strict=True)
+            self._follow(any(others), np.concatenate(rows), np.concatenate(gained))
+        self._active, self._more, self._is_behind = active, self._next, True
+
+    def _follow(self, is_other: bool, rows: Int, more: Float) -> None:
+        """Keep what is followed up with the rows that soften, or drop it if something else changes.  Collective."""
+        if is_other or self._followed is None or len(rows) > MOST_SOFTENED:
+            self._followed = None
+            return
+        lacking = self._followed.lacking(rows)
+        if len(lacking):
+            self._catch_up()
+            self._find(lacking)
+            at, unit = self._columns.positions(lacking), np.zeros((self._rows, len(lacking)))
+            mine = np.flatnonzero((lacking >= self._first) & (lacking < self._first + self._rows))
+            unit[lacking[mine] - self._first, mine] = 1.0
+            self._followed.add(lacking, self._response(self._columns.owned[:, at], unit))
+            # The columns of all may have been too many.
+            if len(self._followed.lacking(rows)):
+                self._followed = None
+                return
+        self._followed.soften(rows, more)
+
+    def _catch_up(self) -> None:
+        """Let the reference cell and N be those of the present state.  Collective."""
+        if not self._is_behind:
+            return
+        self._is_behind = False
         changed = self._changed()
         if len(changed) > self._tied + self._most_columns:
             # The memory of the old cell goes before the new one takes its own.
             self.reference.destroy()
             self._columns.clear()
-            self._rebase(active)
+            self._rebase(self._active)
             changed = self._changed()
             self._tied = len(changed)
         self._find(changed)
@@ -98,24 +145,42 @@ class ExactInverse(Preconditioner):
 
     def apply(self, r: Float) -> Float:
         """H r for r (owned rows,) or (owned rows, k); 0 on inactive rows.  Collective."""
-        return self._restricted(self.reference.respond(scale_rows(self.reference.active, r)), r)
+        self._catch_up()
+        y = self.reference.respond(scale_rows(self.reference.active, r))
+        return scale_rows(self._active, self._response(y, r))
 
     def multipliers(self, d: Float, E: Float) -> Float:
         """H d E for d (owned rows, v), the same at every call, and E (v, k).
 
-        The solution for the loads E, but for rounding. Collective.
-
-        The reference cell answers to d once.
+        The solution for the loads E, but for rounding; the reference cell answers to d once.  Collective.
         """
+        self._catch_up()
         if self._answer is None:
             self._answer = self.reference.respond(scale_rows(self.reference.active, d))
-        return self._restricted(self._answer @ E, d @ E)
+        answer = self._response(self._answer, d)
+        if self._followed is None:
+            self._followed = FollowedResponse(self.comm, self._first, self._jump_operator.global_rows, answer)
+        self._followed.answer = answer
+        return scale_rows(self._active, answer @ E)
+
+    def answer(self, d: Float, E: Float) -> tuple[Float, Float]:
+        """Multipliers H d E and jumps on inactive rows, (owned rows, k), with arguments as of `multipliers`.
+
+        While bonds only soften they are those of before with updates. Collective.
+        """
+        if self._followed is None:
+            self.multipliers(d, E)
+        assert self._followed is not None
+        whole = self._followed.answer @ E
+        lam = scale_rows(self._active, whole)
+        return lam, whole - lam
 
     def inverse_blocks(self, pairs: Int) -> Float:
         """(m, 2, 2) diagonal blocks of H, for the same pairs (m, 2) of active global rows on every rank.  Collective.
 
         Rows that leave together change the multipliers of their own by all of them, and open by H_ii^-1 lam_i.
         """
+        self._catch_up()
         self._find(pairs.ravel())
         at, members = self._columns.positions(pairs.ravel()), self._inverse.members
         block = self._columns.block
@@ -159,7 +224,8 @@ class ExactInverse(Preconditioner):
         owned = self._jump_operator.owned
         self._columns = ResponseColumns(self.comm, self.reference, owned, self._jump_operator.global_rows)
         self._inverse, self._dependent = BorderedInverse(self.comm), np.zeros(0, np.int64)
-        self._answer, self._tied, self.rounding = None, 0, self._force_of_rigid_motions()
+        self._answer, self._tied = None, 0
+        self._rounding = self.reference.force_of_rigid_motions(self.stiffness[self._first :][: self._rows])
 
     def _find(self, rows: Int) -> None:
         """Find the columns that these rows lack.  Collective.
@@ -211,47 +277,26 @@ class ExactInverse(Preconditioner):
         inverse.append(M, size, left_out, 1, D)
         self._dependent = np.setdiff1d(changed, inverse.members)
 
-    def _force_of_rigid_motions(self) -> float:
-        """Return `rounding`. Collective."""
-        bodies = zip(self._operators.subdomains, self._operators.dofs, strict=True)
-        motions = [s.R[dofs].sum(axis=1) for s, dofs in bodies]
-        moved = np.concatenate([np.zeros(0), *(own / (np.abs(own).max(initial=0.0) or 1.0) for own in motions)])
-        active = self.reference.active
-        jump = scale_rows(active, self._jump_operator.sum(self._operators.B @ moved))
-        force = scale_rows(active, self.reference.respond(jump)) / self.stiffness[self._first :][: self._rows]
-        return float(self.comm.allreduce(np.abs(force).max(initial=0.0), MPI.MAX))
+    def _response(self, y: Float, g: Float) -> Float:
+        """(owned rows,) or (owned rows, k) H g on active rows, and what of g is left on others; y = Gamma g_A.
 
-    def _largest_eigenvalue(self) -> float:
-        """|H| of the reference cell, as some steps of the power method find it.  Collective."""
-        x = np.cos(np.arange(self._first, self._first + self._rows) ** 2.0)
-        norm = 0.0
-        for _ in range(NORM_ITERATIONS):
-            length = np.sqrt(allreduce_sum(self.comm, np.array([x @ x]))[0])
-            if length == 0.0:
-                break
-            x = self.reference.respond(x / length)
-            norm = float(np.sqrt(allreduce_sum(self.comm, np.array([x @ x]))[0]))
-        return norm
-
-    def _restricted(self, y: Float, g: Float) -> Float:
-        """H g for y = Gamma g_A.  Collective."""
+        Collective."""
         members = self._inverse.members
-        z = scale_rows(self.reference.active, y)
+        outside = 1.0 - self.reference.active
+        z = y + scale_rows(outside, g)
         if len(members):
             rows = self._columns.rows[members]
-            outside = 1.0 - self.reference.active
-            jumps = gather_rows(self.comm, y + scale_rows(outside, g), self._first, rows)
-            c = self._inverse.solve(jumps)
+            c = self._inverse.solve(gather_rows(self.comm, z, self._first, rows))
             whole = np.zeros((len(self._columns.rows), *y.shape[1:]))
             whole[members] = c
-            z = z - scale_rows(self.reference.active, self._columns.owned @ whole)
+            z -= self._columns.owned @ whole
             mine = np.flatnonzero((rows >= self._first) & (rows < self._first + self._rows))
             own = rows[mine] - self._first
-            taken_in, stretched = outside[own] > 0, self._inverse.added[mine] > 0
-            z[own[taken_in]] = -c[mine[taken_in]]
-            # Nothing cancels in D c, however soft the spring.
-            z[own[stretched]] = scale_rows(self._inverse.added[mine[stretched]], c[mine[stretched]])
-        return scale_rows(self._active, z)
+            # A row that left opens by c, one that came bears -c.  Nothing cancels in D c, however soft the spring.
+            stretched = self._inverse.added[mine]
+            factor = np.where(outside[own] > 0, -1.0, np.where(stretched > 0, stretched, 1.0))
+            z[own] = scale_rows(factor, c[mine])
+        return z
 
 
 def _stiffness_of_rows(jump_operator: JumpOperator, operators: InterfaceOperators) -> Float:

@@ -19,7 +19,7 @@ from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.assembled_schur import AssembledSchur
 from feti_homog.feti.preconditioners.spring_update import SpringUpdate
-from feti_homog.feti.thresholds import INFLUENCE_CHUNK, STIFF_FIBRES
+from feti_homog.feti.thresholds import INFLUENCE_CHUNK, NORM_ITERATIONS, STIFF_FIBRES
 from feti_homog.parallel.distributed_arrays import allreduce_sum, gather_rows, scale_rows
 from feti_homog.typing import Float, Int
 
@@ -73,7 +73,7 @@ class ReferenceCell:
         active: Float,
     ) -> None:
         """Factor the cell; A must leave no rigid-body motion free.  `one_sided` is B_D.  Collective."""
-        self.active = active
+        self._comm, self.active = comm, active
         self._jump_operator, self._operators = jump_operator, operators
         self._BD, self._BDT = one_sided, one_sided.T.tocsr()
         reached = self._BDT.getnnz(axis=1) > 0
@@ -90,6 +90,30 @@ class ReferenceCell:
     def respond(self, x: Float) -> Float:
         """Gamma x for x (owned rows,) or (owned rows, k).  Collective."""
         return self._springs.apply(self._without_springs(x))
+
+    def force_of_rigid_motions(self, stiffness: Float) -> float:
+        """Return the largest force, relative to `stiffness` (owned rows,), by jumps of rigid-body motions of size 1.
+
+        Collective.
+        """
+        bodies = zip(self._operators.subdomains, self._operators.dofs, strict=True)
+        motions = [s.R[dofs].sum(axis=1) for s, dofs in bodies]
+        moved = np.concatenate([np.zeros(0), *(own / (np.abs(own).max(initial=0.0) or 1.0) for own in motions)])
+        jump = scale_rows(self.active, self._jump_operator.sum(self._operators.B @ moved))
+        force = scale_rows(self.active, self.respond(jump)) / stiffness
+        return float(self._comm.allreduce(np.abs(force).max(initial=0.0), MPI.MAX))
+
+    def largest_eigenvalue(self, first: int) -> float:
+        """|Gamma| as some steps of the power method find it; this rank's rows begin at `first`.  Collective."""
+        x = np.cos(np.arange(first, first + len(self.active)) ** 2.0)
+        norm = 0.0
+        for _ in range(NORM_ITERATIONS):
+            length = np.sqrt(allreduce_sum(self._comm, np.array([x @ x]))[0])
+            if length == 0.0:
+                break
+            x = self.respond(x / length)
+            norm = float(np.sqrt(allreduce_sum(self._comm, np.array([x @ x]))[0]))
+        return norm
 
     def _without_springs(self, x: Float) -> Float:
         """Return the same without the springs at nodes of A where fibre and matrix are both cut.

@@ -11,7 +11,7 @@ node, for which C is infinite.  So the same search finds both.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -64,6 +64,7 @@ class ContactProblem:
     size: Float
     softening: Softening = never_softens
     block_pivots: int = BLOCK_PIVOTS
+    _kept: list[tuple[BondState, tuple[Float, Float] | None]] = field(default_factory=list, compare=False, repr=False)
 
     @property
     def nodes(self) -> InterfaceNodes:
@@ -84,26 +85,33 @@ class ContactProblem:
 
     def compliance(self, bonds: BondState) -> Float:
         """(owned rows,) C of the springs in a state of the bonds."""
-        C, factor = self.solver.intact_compliance, self.softening(bonds, ~bonds.pressed)
-        if factor is None:
+        C, factors = self.solver.intact_compliance, self._factors(bonds)
+        if factors is None:
             return C
         # Normal and tangential springs belong to the problem of the plane, axial ones to the other.
         own = slice(2) if self.solver.jump_operator.components == 2 else slice(2, 3)
         C = C.copy()
-        C[self._pairs] *= factor[:, own]
+        C[self._pairs] *= np.where(bonds.pressed[:, None], factors[1], factors[0])[:, own]
         return C
+
+    def _factors(self, bonds: BondState) -> tuple[Float, Float] | None:
+        """(k, 3) C / C_0 of pulled and of pressed bonds; None of a law that never softens.  The last are kept."""
+        if not (self._kept and self._kept[0][0] is bonds):
+            pulled = np.ones(len(bonds.status), bool)
+            soft, stiff = self.softening(bonds, pulled), self.softening(bonds, ~pulled)
+            self._kept[:] = [(bonds, None if soft is None or stiff is None else (soft, stiff))]
+        return self._kept[0][1]
 
     def _gained(self, bonds: BondState) -> Float:
         """(k,) normal compliance that damaged bonds have more if pulled than if pressed; 0 of others.
 
         None has along the fibres.
         """
-        pulled = np.ones(len(bonds.status), bool)
-        soft, stiff = self.softening(bonds, pulled), self.softening(bonds, ~pulled)
-        if soft is None or stiff is None or self.solver.jump_operator.components != 2:
-            return np.zeros(len(pulled))
+        factors = self._factors(bonds)
+        if factors is None or self.solver.jump_operator.components != 2:
+            return np.zeros(len(bonds.status))
         C = self.solver.intact_compliance[self.nodes.row]
-        return np.where(bonds.status == BONDED, C * (soft - stiff)[:, 0], 0.0)
+        return np.where(bonds.status == BONDED, C * (factors[0] - factors[1])[:, 0], 0.0)
 
     def damaged(self, bonds: BondState) -> Bool:
         """(k,) bonds that hold, with another normal stiffness if pulled than if pressed."""
@@ -121,7 +129,7 @@ class ContactProblem:
 
     def jump(self, solution: DualSolution) -> Float:
         """(k, c) gap and slip, matrix minus fibre; or slip along the fibre."""
-        return np.asarray(self.solver.opening(solution)[self._pairs])
+        return np.asarray(solution.opening[self._pairs])
 
     def stress(self, solution: DualSolution) -> Float:
         """(v,) Sigma from the multipliers alone, and what works on the other loads; collective."""
@@ -132,7 +140,7 @@ class ContactProblem:
         """Scales of what loads make.  Its properties are collective when first used, and so are its methods."""
         return LoadScales(self.solver, self.size)
 
-    @property
+    @cached_property
     def _pairs(self) -> Int:
         """(k, c) rows of the bonds."""
         return self.nodes.row[:, None] + np.arange(self.solver.jump_operator.components)
@@ -148,6 +156,13 @@ class ContactProblem:
         roots = self.scales.roots
         noise = mixed_load.Noise(roots, self.scales.sign_noise, float((roots[: len(given)] * given).max()))
         return mixed_load.solve(self.solver, load, start, float(self.size.prod()), noise)
+
+    def completed(self, state: Equilibrium) -> Equilibrium:
+        """Return a state with the amplitudes and jumps that F lambda gives, if it has none.  Collective."""
+        if state.solution.alpha is not None:
+            return state
+        self.prepare(state.bonds)
+        return replace(state, solution=self.solver.completed(state.solution))
 
     def is_linear(self, status: Status) -> bool:
         """Return whether no face can come to touch another; collective."""
@@ -213,7 +228,8 @@ class ContactProblem:
         coarse, noise = self.solver.natural, self.scales.gap_noise(solution.strain)
         if self.contact and coarse.unconstrained_modes.shape[1]:
             placement = place(self.solver.comm, coarse, self.nodes, status == OPEN, solution, noise)
-            alpha, jump = solution.alpha + placement.alpha, solution.jump + placement.jump(coarse)
+            solution = self.solver.completed(solution)
+            alpha, jump = placement.alpha + np.asarray(solution.alpha), solution.jump + placement.jump(coarse)
             solution, pressed = replace(solution, alpha=alpha, jump=jump), placement.pressed
         force, gap = solution.lam[self.nodes.row], solution.jump[self.nodes.row]
         force_noise, meets = self.scales.force_noise(solution), (status == OPEN) & self.contact
@@ -241,6 +257,9 @@ class ContactProblem:
             self.scales.over_interface,
         )
         status, motions = self._without_idle(status, solution)
+        if motions:
+            # Of the rows that count as open now the amplitudes would be others.
+            solution = self.solver.completed(solution)
         return Equilibrium(load, bonds.with_status(status), solution, iterations, solves, motions, certificate)
 
     def _without_idle(self, status: Status, solution: DualSolution) -> tuple[Status, int]:
@@ -253,7 +272,7 @@ class ContactProblem:
         """
         coarse, idle = self.solver.natural, np.zeros(len(status), bool)
         motions = coarse.unconstrained_modes
-        if self.contact:
+        if self.contact and self._any(status == CLOSED):
             idle = (status == CLOSED) & (solution.lam[self.nodes.row] >= -self.scales.force_noise(solution))
         if not self._any(idle):
             return status, motions.shape[1]

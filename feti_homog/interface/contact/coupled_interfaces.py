@@ -68,6 +68,13 @@ class CoupledInterfaces:
             state = replace(state, axial=axial.equilibrium(along, state.bonds, lam))
         return state
 
+    def completed(self, state: Equilibrium) -> Equilibrium:
+        """Return a state with the amplitudes and jumps that F lambda gives, where it has none.  Collective."""
+        plane, *others = state.problems
+        pairs = zip(self.problems[1:], others, strict=False)
+        axial = next((each.completed(own) for each, own in pairs), None)
+        return replace(self.plane.completed(plane), axial=axial)
+
     def _parts(self, load: Load) -> list[Load]:
         """Return the load of each problem."""
         return load.parts([len(each.solver.problem.loads) for each in self.problems])

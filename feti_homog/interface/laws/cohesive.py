@@ -17,6 +17,7 @@ breaks at W_j = W_0 (phi_j+1 - phi_j) / (d_j+1 - d_j) and takes W_j (d_j+1 - d_j
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -24,6 +25,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from feti_homog.errors import CaseError
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BondState
 from feti_homog.interface.laws.bond_law import BondLaw, KeyValues, Utilisation
@@ -94,6 +96,9 @@ class CohesiveLaw(BondLaw):
 
         Without a number of `teeth` it is the least with which the first tooth exceeds the peak by no more than
         `tolerance` of it.
+
+        Raises:
+            CaseError: that takes more than MOST_TEETH.
         """
         s = self._longest_branch
         for n in [teeth] if teeth else range(1, MOST_TEETH + 1):
@@ -101,9 +106,13 @@ class CohesiveLaw(BondLaw):
             x = (1.0 + s * self.last) ** (np.arange(n) / n)
             d = 1.0 - self.shape((x - 1.0) / s) / x if s > 0.0 else np.arange(n) / n
             levels = np.append(d, 1.0)
-            if float(self._taken(levels[1:2], s)[0] / levels[1]) <= (1.0 + tolerance) ** 2:
-                break
-        return tuple(levels.tolist())
+            excess = math.sqrt(float(self._taken(levels[1:2], s)[0] / levels[1])) - 1.0
+            if teeth or excess <= tolerance:
+                return tuple(levels.tolist())
+        raise CaseError(
+            f"[interface] softening_tolerance = {tolerance:g}: with {MOST_TEETH} teeth, the most, the first exceeds "
+            f"the peak traction by {excess:.1e} of it; expected at least that"
+        )
 
     @property
     def _longest_branch(self) -> float:
@@ -222,7 +231,9 @@ class CohesiveLaw(BondLaw):
 
     def _breaking(self, traction: Float, tooth: Int) -> Float:
         """(p,) W_j of the teeth (p,) or one, in the modes of tractions (p, c)."""
-        B = np.sin(self.mode_angle(traction)) ** 2
+        first, second = self._energies(traction)
+        stored = first + second
+        B = np.divide(second, stored, out=np.zeros(len(stored)), where=stored > 0.0)
         onsets = self._onsets
         onset = 1.0 / ((1.0 - B) / onsets[0] + B / onsets[1])
         toughness = self.normal_toughness + (self.tangential_toughness - self.normal_toughness) * (
@@ -234,9 +245,9 @@ class CohesiveLaw(BondLaw):
 
     def _taken(self, d: Float, s: Float | float) -> Float:
         """(p,) phi at the damage d: what the law has taken, over W_0."""
-        d, s = np.broadcast_arrays(np.asarray(d, float), s)
+        d, s = np.asarray(d, float), np.asarray(s)
         inside = d < 1.0
-        kept = 1.0 - np.where(inside, d, 0.0)
-        u = self.opening(1.0 - kept, s)
-        partly = 1.0 + 2.0 * s * self.area(u) - kept * (1.0 + s * u) ** 2
+        below = np.where(inside, d, 0.0)
+        u = self.opening(below, s)
+        partly = 1.0 + 2.0 * s * self.area(u) - (1.0 - below) * (1.0 + s * u) ** 2
         return np.asarray(np.where(inside, partly, 1.0 + 2.0 * s * self.area(np.inf)))

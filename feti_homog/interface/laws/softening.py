@@ -36,6 +36,8 @@ class PiecewiseLinear(CohesiveLaw):
     def area(self, u: Float | float) -> Float | float:
         """int_0^u tau."""
         u = np.minimum(u, self.last)
+        if len(self.knots) == 2:
+            return np.asarray(u - u**2 / (2.0 * self.knots[1]))
         knots, heights = np.array(self.knots), np.array(self.heights)
         areas = np.concatenate([[0.0], np.cumsum(np.diff(knots) * (heights[1:] + heights[:-1]) / 2.0)])
         k = np.clip(np.searchsorted(knots, u, side="right") - 1, 0, len(knots) - 2)
@@ -43,6 +45,8 @@ class PiecewiseLinear(CohesiveLaw):
 
     def opening(self, d: Float, s: Float | float) -> Float:
         """(p,) the u with tau(u) = (1 - d) (1 + s u), in the piece where that changes sign."""
+        if len(self.knots) == 2:
+            return np.asarray(d / ((1.0 - d) * s + 1.0 / self.knots[1]))
         knots, heights = np.array(self.knots), np.array(self.heights)
         kept = 1.0 - np.asarray(d)
         above = heights - kept[..., None] * (1.0 + np.asarray(s)[..., None] * knots) >= 0.0

@@ -105,10 +105,13 @@ def unresisted(solver: FetiSolver, by_stress: Bool, voigt: Float) -> Bool:
 
 def superposed(solver: FetiSolver, solutions: Sequence[DualSolution], factors: Float) -> DualSolution:
     """Return the sum of solutions with the same active rows, each times its factor. Collective."""
-    strain, lam, jump, alpha = (
-        np.stack([getattr(each, name) for each in solutions], axis=1) @ factors
-        for name in ("strain", "lam", "jump", "alpha")
+    strain, lam, jump = (
+        np.stack([getattr(each, name) for each in solutions], axis=1) @ factors for name in ("strain", "lam", "jump")
     )
+    amplitudes = [each.alpha for each in solutions if each.alpha is not None]
+    if len(amplitudes) < len(solutions):
+        return replace(solutions[0], strain=strain, lam=lam, jump=jump, alpha=None)
+    alpha = np.stack(amplitudes, axis=1) @ factors
     torn = solver.natural.project(solver.active.restrict(solver.d @ strain))
     pairs = np.stack([torn, solver.active.restrict(jump)])
     scale, left = np.sqrt(allreduce_sum(solver.comm, np.einsum("ij,ij->i", pairs, pairs)))

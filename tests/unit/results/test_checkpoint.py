@@ -12,7 +12,8 @@ from mpi4py import MPI
 
 from feti_homog.errors import CaseError
 from feti_homog.results import atomic
-from feti_homog.results.checkpoint import FORMAT, USER_BLOCK, Checkpoint, refuse_others
+from feti_homog.results.checkpoint import EVENTS_AT_ONCE, Checkpoint, refuse_others
+from feti_homog.results.checkpoint_file import FORMAT, USER_BLOCK
 
 EVENTS = 4
 
@@ -38,6 +39,21 @@ def test_what_was_written_is_read(tmp_path):
     assert checkpoint.count() == EVENTS and same(map(checkpoint.read, range(EVENTS)))
     assert checkpoint.clear() == EVENTS and checkpoint.count() == 0 and checkpoint.clear() == 0
     assert list(tmp_path.iterdir()) == []
+
+
+def test_light_events_are_written_together(tmp_path):
+    checkpoint, last = Checkpoint(tmp_path, MPI.COMM_SELF, "this run"), EVENTS_AT_ONCE + 5
+    for number in range(last):
+        event = {"path": [0.1 * number, 1.0]}, {"lam": np.arange(5.0) * number, "jump": np.zeros(0)}
+        checkpoint.write(number, *event, light=number not in (2, last - 1))
+        assert same([*map(checkpoint.read, range(number + 1))])
+    files = sorted(path.name for path in (tmp_path / "checkpoint").iterdir())
+    assert files == ["000000.h5", "000003.h5", f"{3 + EVENTS_AT_ONCE:06d}.h5"]
+    resumed = Checkpoint(tmp_path, MPI.COMM_SELF, "this run")
+    assert resumed.count() == last and same(map(resumed.read, range(last)))
+    resumed.write(last, {"path": [0.1 * last, 1.0]}, {"lam": np.arange(5.0) * last, "jump": np.zeros(0)}, light=True)
+    resumed.flush()
+    assert resumed.count() == last + 1 and resumed.clear() == last + 1
 
 
 def test_the_checkpoint_of_another_run_is_refused(tmp_path):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from feti_homog.errors import CaseError
 from feti_homog.interface.contact.states import BondState
 from feti_homog.interface.laws.energy import SpringEnergy
 from feti_homog.interface.laws.softening import Bilinear, Exponential, Table
@@ -130,3 +131,8 @@ def test_the_onset_of_damage_is_the_quadratic_criterion():
     law = made("bilinear", 100_000, MOOSE | {"tangential_strength": 1.7, "tangential_stiffness": 60.0})
     traction = np.random.default_rng(3).normal(size=(40, 2))
     np.testing.assert_allclose(law.share(traction), law.onset().share(traction), rtol=1e-4)
+
+
+def test_a_tolerance_that_takes_too_many_teeth_is_refused():
+    with pytest.raises(CaseError, match="softening_tolerance = 1e-09: with 10000 teeth, the most, the first exceeds"):
+        made("bilinear", None, tolerance=1e-9)

@@ -1,0 +1,60 @@
+"""Solutions by influence columns, which F lambda confirms seldom while it finds nothing to iterate."""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from feti_homog.feti.active_jumps import ActiveJumps
+from feti_homog.feti.coarse.natural import NaturalCoarseSpace
+from feti_homog.feti.dual_solution import DualSolution
+from feti_homog.feti.operators.interface_operators import DualOperator
+from feti_homog.feti.preconditioners.exact_inverse import ExactInverse
+from feti_homog.feti.thresholds import LEAST_UNCONFIRMED_JUMP, MOST_UNCONFIRMED
+from feti_homog.parallel.distributed_arrays import allreduce_sum
+from feti_homog.typing import Float
+
+
+class InfluenceSolutions:
+    """Twice as many solves as before go without F lambda after each that left nothing, MOST_UNCONFIRMED at most."""
+
+    def __init__(
+        self,
+        comm: MPI.Intracomm,
+        inverse: ExactInverse,
+        operator: DualOperator,
+        natural: NaturalCoarseSpace,
+        jumps: ActiveJumps,
+    ) -> None:
+        self._comm, self._inverse, self._operator, self._natural, self._jumps = comm, inverse, operator, natural, jumps
+        self._granted = self._left = 0
+        self._residual, self._squares = 0.0, np.zeros((2, 0, 0))
+
+    def solutions(self, strains: Float, d: Float) -> list[DualSolution] | None:
+        """Return those of the loads (k, v), with jumps d (owned rows, v) of the torn cell; None if F lambda is due.
+
+        It always is where bodies are free, and for loads of which the active rows see so little that it may be
+        rounding.  Collective.
+        """
+        if not self._left or self._natural.unconstrained_modes.shape[1]:
+            return None
+        seen, torn = np.einsum("ki,nij,kj->nk", strains, self._squares, strains)
+        if not (seen > LEAST_UNCONFIRMED_JUMP**2 * torn).all():
+            return None
+        self._left -= 1
+        reason, C = int(PETSc.KSP.ConvergedReason.CONVERGED_RTOL), self._operator.compliance
+        rows = zip(strains, *(x.T.copy() for x in self._inverse.answer(d, strains.T)), strict=True)
+        return [DualSolution(E, lam, jump, None, 0, reason, self._residual, C) for E, lam, jump in rows]
+
+    def record(self, solutions: list[DualSolution], d: Float) -> None:
+        """Record solutions that F lambda confirmed, or that iterations had to improve; none of loads that are unseen.
+
+        Collective.
+        """
+        confirmed = bool(solutions) and all(each.iterations == 0 and each.reason > 0 for each in solutions)
+        self._granted = min(2 * self._granted + 1, MOST_UNCONFIRMED) if confirmed else 0
+        self._left, self._residual = self._granted, max((each.residual for each in solutions), default=0.0)
+        if confirmed:
+            seen = self._jumps.projected(d, self._jumps.norms(d))
+            self._squares = allreduce_sum(self._comm, np.stack([seen.T @ seen, d.T @ d]))
