@@ -27,14 +27,15 @@ from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.bordered_inverse import BorderedInverse
 from feti_homog.feti.preconditioners.followed_response import FollowedResponse
-from feti_homog.feti.preconditioners.reference_cell import BodyTies, ReferenceCell, ResponseColumns, one_sided_jumps
-from feti_homog.feti.preconditioners.scaled import Preconditioner
-from feti_homog.feti.thresholds import (
-    INFLUENCE_BATCH,
-    INFLUENCE_COLUMNS,
-    MOST_SOFTENED,
-    NORM_MARGIN,
+from feti_homog.feti.preconditioners.reference_cell import (
+    BodyTies,
+    ReferenceCell,
+    ResponseColumns,
+    one_sided_jumps,
+    stiffness_of_rows,
 )
+from feti_homog.feti.preconditioners.scaled import Preconditioner
+from feti_homog.feti.thresholds import INFLUENCE_BATCH, INFLUENCE_COLUMNS, MOST_SOFTENED, NORM_MARGIN
 from feti_homog.parallel.distributed_arrays import gather_rows, scale_rows
 from feti_homog.typing import Float, Int
 
@@ -68,7 +69,7 @@ class ExactInverse(Preconditioner):
         self._most_columns = PETSc.Options("feti_").getInt("influence_columns", INFLUENCE_COLUMNS)
         if self._most_columns < 1:
             raise CaseError(f"-feti_influence_columns {self._most_columns}: expected a whole number above 0")
-        self.stiffness = np.concatenate(comm.allgather(_stiffness_of_rows(jump_operator, operators)))
+        self.stiffness = np.concatenate(comm.allgather(stiffness_of_rows(jump_operator, operators)))
         self._BD = one_sided_jumps(comm, jump_operator, operators)
         self._ties = BodyTies(comm, jump_operator)
         self.neighbours = InterfaceNeighbours(comm, jump_operator, operators.subdomains)
@@ -121,11 +122,10 @@ class ExactInverse(Preconditioner):
             mine = np.flatnonzero((lacking >= self._first) & (lacking < self._first + self._rows))
             unit[lacking[mine] - self._first, mine] = 1.0
             self._followed.add(lacking, self._response(self._columns.owned[:, at], unit))
-            # The columns of all may have been too many.
-            if len(self._followed.lacking(rows)):
-                self._followed = None
-                return
-        self._followed.soften(rows, more)
+        if len(self._followed.lacking(rows)):
+            self._followed = None  # the columns of all were too many
+        else:
+            self._followed.soften(rows, more)
 
     def _catch_up(self) -> None:
         """Let the reference cell and N be those of the present state.  Collective."""
@@ -297,12 +297,3 @@ class ExactInverse(Preconditioner):
             factor = np.where(outside[own] > 0, -1.0, np.where(stretched > 0, stretched, 1.0))
             z[own] = scale_rows(factor, c[mine])
         return z
-
-
-def _stiffness_of_rows(jump_operator: JumpOperator, operators: InterfaceOperators) -> Float:
-    """(owned rows,) 1 / (B D^-1 B^T + C) of each row.  Collective.
-
-    D is the diagonal of the bodies' stiffness, C the compliance of the springs.
-    """
-    flexibility = jump_operator.sum(operators.B.power(2) @ (1.0 / operators.body_diagonal))
-    return np.asarray(1.0 / (flexibility + operators.springs))

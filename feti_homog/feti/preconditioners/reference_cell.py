@@ -154,6 +154,15 @@ def one_sided_jumps(comm: MPI.Intracomm, jump_operator: JumpOperator, operators:
     return csr_matrix(((copies[B.row] * B.data)[moved], (B.row[moved], B.col[moved])), shape=B.shape)
 
 
+def stiffness_of_rows(jump_operator: JumpOperator, operators: InterfaceOperators) -> Float:
+    """(owned rows,) 1 / (B D^-1 B^T + C) of each row.  Collective.
+
+    D is the diagonal of the bodies' stiffness, C the compliance of the springs.
+    """
+    flexibility = jump_operator.sum(operators.B.power(2) @ (1.0 / operators.body_diagonal))
+    return np.asarray(1.0 / (flexibility + operators.springs))
+
+
 class ResponseColumns:
     """Gamma[:, K] and Gamma[K, K] for a growing set K of rows.
 
