@@ -19,6 +19,7 @@ from mpi4py.MPI import Intracomm
 from feti_homog import Result, draw_state, launch
 
 CASES = {"without contact": False, "with contact": True}
+MOST = 12.0  # GPa, of the colours of both
 COLUMNS = ("case", "S11", "S22", "S12", "bonded", "open", "closed", "largest overlap")
 
 
@@ -51,7 +52,7 @@ def write(folder: Path, results: dict[str, Result], overlaps: dict[str, float]) 
     figure = Figure(figsize=(8.4, 6.4), layout="constrained")
     grid, rows = figure.subplots(1, 2, sharex=True, sharey=True), []
     for axes, (name, result) in zip(grid, results.items(), strict=True):
-        caption, (point,) = draw_state(axes, folder / name.replace(" ", "_")), result.angle or ()
+        caption, (point,) = draw_state(axes, folder / name.replace(" ", "_"), most=MOST), result.angle or ()
         stress = point.stress.tolist()
         sigma = ", ".join(f"{round(s, 2) + 0.0:.2f}" for s in stress)
         axes.set_title(f"{name}\n$\\Sigma$ = [{sigma}] GPa\nlargest overlap {overlaps[name]:.3f}", fontsize=10)

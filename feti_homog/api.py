@@ -147,8 +147,8 @@ def run_fit(
 def draw_state(axes: Axes, out: str | Path, number: int = 0, **choices: Any) -> str:
     """Draw the deformed cell of a state of `out`/result.h5 into Matplotlib's axes; returns what is drawn, in words.
 
-    `choices`: `stress` ("S11", "S22" or "S12"; by default that of the largest strain) and `scale` of the displacements
-    (default 1).  Call it on one rank.
+    `choices`: `stress` ("S11", "S22" or "S12"; by default that of the largest strain), `scale` of the displacements
+    (default 1) and `most`, the largest stress of the colours, for pictures beside each other.  Call it on one rank.
     """
     from feti_homog.report.plots import deformed_panels
 

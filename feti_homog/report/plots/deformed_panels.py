@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -121,8 +121,18 @@ class DeformedCell:
         return f"${STRESS_SYMBOLS[self.component]}$ {unit}, {scale}"
 
 
-def draw_state(axes: Axes, directory: Path, number: int, stress: str = "auto", scale: float = 1.0) -> str:
+def draw_state(
+    axes: Axes,
+    directory: Path,
+    number: int,
+    stress: str = "auto",
+    scale: float = 1.0,
+    most: float | None = None,
+) -> str:
     """Draw a state of `directory`/result.h5 into axes; returns the caption.
+
+    Colours are those from minus `most` to `most`, so that pictures beside each other have one scale; by default those
+    that suit the state.
 
     `axes.get_legend_handles_labels()` has the marks of bonded, open and closed interfaces.
 
@@ -133,6 +143,8 @@ def draw_state(axes: Axes, directory: Path, number: int, stress: str = "auto", s
     try:
         with h5py.File(path, "r") as file:
             cell = DeformedCell.of(file, [number], {"case": {"output": {"stress": stress}}}, scale, STATE_LIMIT)
+            if most is not None:
+                cell = replace(cell, colours=(Normalize(-most, most), "RdBu_r", "both"))
             cell.bar(axes, cell.draw(axes, number, cell.moved(number)))
             caption, softens = cell.caption, bool((states_of_nodes(file[f"state/{number}"]) == DAMAGED).any())
     except (OSError, KeyError) as error:
