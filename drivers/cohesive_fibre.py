@@ -183,9 +183,9 @@ def draw(path: Path, panels: dict[str, dict[str, Result]]) -> None:
         axes.set_title(title, fontsize=10)
         axes.set(xlabel="$E_{11}$ (%)", ylabel="$\\Sigma_{11}$ (MPa)")
         axes.label_outer()
-        axes.set_ylim(bottom=0.0)
         axes.grid(color="0.92", linewidth=0.6)
         axes.legend(frameon=False, fontsize=8)
+    axes.set_ylim(bottom=0.0)  # of all: the axes share it, and a limit ends its growth with further curves
     figure.suptitle("One glass fibre that debonds from epoxy", fontsize=11)
     figure.savefig(path)
 

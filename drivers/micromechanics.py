@@ -120,17 +120,18 @@ def _draw(
 
     figure = Figure(figsize=(12.0, 6.0), layout="constrained")
     for k, (name, axes) in enumerate(zip(NAMES, figure.subplots(2, 4).ravel(), strict=True)):
+        scale = 1e-6 if name.startswith("expansion") else 1.0
         for (method, style), ink in zip(METHODS.items(), (*INK, "0.5", "k"), strict=True):
-            values = [estimates[method][contrast, c][k] for c in fractions]
+            values = [estimates[method][contrast, c][k] / scale for c in fractions]
             axes.plot(fractions, values, linestyle=style, color=ink, linewidth=1.4, label=method.replace("_", " "))
         for geometry, mark in MARKS.items():
-            values = [cells[geometry, contrast, c][k] for c in fractions]
+            values = [cells[geometry, contrast, c][k] / scale for c in fractions]
             axes.plot(fractions, values, mark, color="k", markerfacecolor="none", label=f"{geometry} cell")
         axes.set(title=name.replace("_", " "), xlabel="fibre fraction")
         axes.grid(color="0.92", linewidth=0.6)
     handles, labels = axes.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=5, frameon=False)
-    figure.suptitle(f"E_fibre / E_matrix = {contrast:g}; moduli in GPa, expansions in 1/K", fontsize=10)
+    figure.suptitle(f"E_fibre / E_matrix = {contrast:g}; moduli in GPa, expansions in 1e-6/K", fontsize=10)
     figure.savefig(path)
 
 

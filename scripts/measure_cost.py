@@ -3,11 +3,13 @@
     .venv/bin/python scripts/measure_cost.py
 
 Each kind of cell is refined several times; the constants make the logarithms of estimates and measurements agree best,
-so that twice as much is as far off as half.
+so that twice as much is as far off as half.  Times are those of the processor, so that other programs disturb little:
+the stages have the shares of the whole that they have in wall time.
 """
 
 from __future__ import annotations
 
+import resource
 import subprocess
 import sys
 import tempfile
@@ -59,10 +61,10 @@ def fits(runs: list[dict[str, Any]]) -> dict[str, tuple[Any, Any]]:
     dofs, subdomains, iterations = (np.array([cost_of(run)[k] for run in runs]) for k in range(3))
     mesh, assemble, factor, solve = (np.array([run["timings"][name] for run in runs]) for name in STAGES)
     coarse = np.array([run["cell"]["elements"] / 4 ** run["case"]["cell"]["refine"] for run in runs])
-    wall = np.array([run["wall"] for run in runs])
+    whole = np.array([run["whole"] for run in runs])
     one = np.ones(len(runs))
     return {
-        "START_SECONDS": fitted(wall - mesh - assemble - factor - solve, one),
+        "START_SECONDS": fitted(whole - mesh - assemble - factor - solve, one),
         "MESH_SECONDS": fitted(mesh, coarse),
         "SETUP_SECONDS, SUBDOMAIN_SECONDS": fitted(assemble + factor, dofs, subdomains),
         "APPLY_SECONDS": fitted(solve, dofs * iterations),
@@ -87,16 +89,25 @@ def memory_fit(runs: list[dict[str, Any]], coated: list[dict[str, Any]]) -> dict
 
 
 def document(cell: dict[str, Any], refine: int, output: Any = WITHOUT_FIELDS) -> dict[str, Any]:
-    """result.json of one run with this section [output], and the seconds of its whole process as `wall`."""
+    """result.json of one run with this section [output]; times, and `whole`, in seconds of the processor."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "case.toml"
         materials = STIFFNESS["material"] | ({"coating": COATING} if "coating" in cell else {})
         own = {"cell": cell | {"refine": refine}, "material": materials, "output": output}
         path.write_text(tomli_w.dumps(STIFFNESS | own))
         words = ["-m", "feti_homog", "run", path, "--out", folder, "--quiet"]
-        start = time.perf_counter()
+        start, used = time.perf_counter(), processor_seconds()
         subprocess.run([sys.executable, *map(str, words)], check=True)
-        return result_json.read(Path(folder)) | {"wall": time.perf_counter() - start}
+        whole, found = processor_seconds() - used, result_json.read(Path(folder))
+        share = whole / (time.perf_counter() - start)
+        timings = {stage: seconds * share for stage, seconds in found["timings"].items()}
+        return found | {"timings": timings, "whole": whole}
+
+
+def processor_seconds() -> float:
+    """Return those of the processes that have ended."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def cost_of(run: dict[str, Any]) -> tuple[int, int, int]:
