@@ -1,5 +1,5 @@
 """Constants of cases fitted to what was measured.
 
-Imports `analysis`, `case`, `materials`, `parallel`, `report`, `results`, `runtime`, `schema`, `sweep`.  Main entries:
+Imports `case`, `materials`, `parallel`, `report`, `results`, `runtime`, `schema`, `sweep`.  Main entries:
 `description.load` and `execute.run`.
 """

@@ -1,4 +1,5 @@
 """Paths of load: from event to event, onsets, later legs.
 
-Imports `feti`, `interface.contact`, `interface.laws` and `interface.loads`.  Main entry: `path_following`.
+Imports `feti`, `interface.contact`, `interface.friction`, `interface.laws`, `interface.loads` and `parallel`.  Main
+entry: `path_following`.
 """
