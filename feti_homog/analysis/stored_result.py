@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from feti_homog.analysis.result import Result
-from feti_homog.case.case import Case
+from feti_homog.case.case import Case, check_stored
 from feti_homog.errors import CaseError
 from feti_homog.results import checkpoint, field_file, result_json, seals
 
@@ -21,7 +21,7 @@ def read(directory: Path) -> dict[str, Any]:
     """
     document = result_json.read(directory)
     result = _restored(directory, document)
-    if result.case["output"]["fields"]:
+    if result.case["output"].get("fields", True):
         _check_fields(directory, result)
     return document
 
@@ -60,11 +60,12 @@ def finished(directory: Path, case: Case) -> bool:
 def _restored(directory: Path, document: Mapping[str, Any]) -> Result:
     try:
         result = Result.of(document)
-        if not all(isinstance(result.case[section], Mapping) for section in ("cell", "analysis", "output")):
-            raise TypeError("its case has no sections")
-        if not isinstance(result.case["output"]["fields"], bool):
-            raise TypeError("its case has no [output] fields")
+        check_stored(result.case)
+        if "output" not in result.case:
+            raise TypeError("its case has no [output]")
         return result
+    except CaseError as error:
+        raise CaseError(f"{directory / result_json.NAME}: its case is damaged: {error.faults[0]}") from error
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         path, place = directory / result_json.NAME, f"{type(error).__name__}: {error}"
         raise CaseError(f"{path}: it is damaged, or no result of this program ({place})") from error

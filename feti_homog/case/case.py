@@ -178,13 +178,31 @@ def parse(values: Mapping[str, Any], folder: Path) -> Case:
         TypeError: `values` is no mapping.
     """
     document = to_document(values)
+    sections, faults = _read_sections(document, folder)
+    if not faults:
+        faults += contrast_faults(sections["materials"], sections["analysis"].plane)
+    if not faults:
+        sections["cell"] = _sized_cell(document["cell"], sections, faults)
+    if faults:
+        raise CaseError(*faults)
+    return Case(name=document.get("name", "case"), **sections)
+
+
+def check_stored(values: Mapping[str, Any]) -> None:
+    """Check the case that a result holds; its files may be gone, and are not looked at. Raises CaseError as `parse`."""
+    if faults := _read_sections(to_document(values), None)[1]:
+        raise CaseError(*faults)
+
+
+def _read_sections(document: Mapping[str, Any], folder: Path | None) -> tuple[dict[str, Any], list[str]]:
+    """Return what sections hold, with the files of [cell] in `folder` if one is given, and their faults."""
     reader = TableReader(_selected(document), KEY_OWNERS, _top_level_faults(document))
     selected, faults = reader.selected, reader.faults
     of_rules = [[*rule.faults(document, selected)] for rule in RULES]
     foreign = {rule.path[0] for rule, found in zip(RULES, of_rules, strict=True) if found and rule.schema is False}
     cell = _read_section(document, "cell", reader)
     sections = {
-        "cell": None if "cell" in foreign or cell is None else _checked_cell(cell, folder, faults),
+        "cell": None if "cell" in foreign or cell is None or not folder else _checked_cell(cell, folder, faults),
         "materials": read_materials(document.get("material"), document.get("cell"), selected[PLANE], reader),
         "analysis": _read_section(document, "analysis", reader),
         "decomposition": _read_section(document, "decomposition", reader),
@@ -196,13 +214,7 @@ def parse(values: Mapping[str, Any], folder: Path) -> Case:
     faults += chain.from_iterable(of_rules)
     # What has keys of other cases is not looked into.
     faults += _relations(sections | {FIELDS.get(name, name): None for name in foreign}, document, selected)
-    if not faults:
-        faults += contrast_faults(sections["materials"], sections["analysis"].plane)
-    if not faults:
-        sections["cell"] = _sized_cell(document["cell"], sections, faults)
-    if faults:
-        raise CaseError(*faults)
-    return Case(name=document.get("name", "case"), **sections)
+    return sections, faults
 
 
 def _relations(sections: Mapping[str, Any], document: Mapping[str, Any], selected: Selected) -> list[str]:
@@ -244,8 +256,7 @@ def _top_level_faults(document: Mapping[str, Any]) -> list[str]:
         elif name not in TOP_LEVEL:
             faults.append(f"{toml_key(name)}: unknown key; {hint}")
     name = document.get("name", "case")
-    complaint = text.complaint(name)
-    if complaint:
+    if complaint := text.complaint(name):
         faults.append(f"name = {toml_value(name)}: {complaint}")
     return faults
 
@@ -285,6 +296,5 @@ def _sized_cell(table: Mapping[str, Any], sections: Mapping[str, Any], faults: l
 
 def check_phases(case: Case, phases: Iterable[str]) -> None:
     """Raise CaseError if a phase of the mesh has no material, or a material no phase."""
-    faults = phase_faults(case.materials, phases)
-    if faults:
+    if faults := phase_faults(case.materials, phases):
         raise CaseError(*faults)

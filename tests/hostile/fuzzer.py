@@ -110,7 +110,6 @@ def _change(original: Path, path: Path, rng: np.random.Generator) -> None:
     place: Any = document
     while True:
         keys = list(place) if isinstance(place, dict) else list(range(len(place)))
-        keys = [key for key in keys if key != "case" or place is not document]  # a whole case is not checked again
         key = keys[rng.integers(len(keys))]
         inner = place[key]
         if not isinstance(inner, dict | list) or not inner or rng.integers(4) == 0:

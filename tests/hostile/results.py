@@ -75,6 +75,10 @@ def with_entries(**entries: Any) -> Callable[[Path], None]:
     return sealed(lambda document: document.update(entries))
 
 
+def in_case(**sections: Any) -> Callable[[Path], None]:
+    return sealed(lambda document: document["case"].update(sections))
+
+
 JSON: dict[str, tuple[Content, str]] = {
     "a pipe": (replaced(os.mkfifo), "it is a pipe"),
     "a folder": (replaced(os.mkdir), "Is a directory"),
@@ -90,6 +94,11 @@ JSON: dict[str, tuple[Content, str]] = {
     "another layout": (with_entries(schema=[]), "schema"),
     "no case": (without("case"), ""),
     "a case of text": (with_entries(case="\x1b[31m"), ""),
+    "no interface": (in_case(interface=None), ""),
+    "an output of text": (in_case(output="\x1b[31m"), ""),
+    "no output": (sealed(lambda document: document["case"].pop("output")), ""),
+    "a material without constants": (in_case(material={"matrix": {}}), ""),
+    "another analysis": (in_case(analysis={"type": "envelope", "plane": "strain"}), ""),
     "no path": (without("path"), ""),
     "a path of text": (with_entries(path="\x1b[31m"), ""),
     "a path of nothing": (with_entries(path=[{}]), ""),
