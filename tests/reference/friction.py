@@ -110,10 +110,22 @@ class RubbingFaces:
             bound = bound if k < 20 else (bound + last) / 2
         else:
             raise NoEquilibriumError(f"pressures change after {most} problems")
-        (exact,) = self.linear(found.status, before.slip, load)
-        if self.violation(exact, before) > EXACT:
-            raise NoEquilibriumError(f"conditions are violated by {self.violation(exact, before):.1e}")
-        return exact
+        status = found.status
+        for _ in range(10):
+            (exact,) = self.linear(status, before.slip, load)
+            if self.violation(exact, before) <= EXACT:
+                return exact
+            status = self._corrected(exact, before)
+        raise NoEquilibriumError(f"conditions are violated by {self.violation(exact, before):.1e}")
+
+    def _corrected(self, state, before):
+        """(k,) the statuses that the forces and jumps of a state ask for, of nodes that are near two of them."""
+        status, slid = state.status, SIGN[state.status] * (state.slip - before.slip)
+        over = (status == STICK) & (np.abs(state.shear) > self.mu * state.pressure)
+        found = np.where(over, np.where(state.shear > 0, FORWARD, BACKWARD), np.where(slid < 0, STICK, status))
+        found = np.where((status != OPEN) & (state.pressure < 0), OPEN, found)
+        found = np.where((status == OPEN) & (state.gap < 0), STICK, found)
+        return np.where(self.bonded, BONDED, found)
 
     def _given_bounds(self, bound, before, load):
         """min z.A z / 2 + sum bound |slip - slip before|, gap >= 0, by Clarabel: as good as its tolerances."""

@@ -1,9 +1,13 @@
-"""Paths of faces with friction, from change to change of status, rates by trying statuses one after the other."""
+"""Paths of faces with friction, from change to change of status, rates by trying statuses one after the other.
+
+A bond breaks at constant load, by implicit steps: its faces and all others slide from where they are.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import product
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -11,27 +15,33 @@ from reference.condensed_cell import MixedLoad
 from reference.friction import BACKWARD, BONDED, FORWARD, OPEN, SIGN, STICK, NoEquilibriumError, RubbingFaces, State
 
 TIE = 1e-9  # of forces and jumps: what is equal
+TOGETHER = 1e-6  # of utilisations: bonds that break at once
 MOST = 4**8  # statuses that are tried
 
 
 @dataclass(frozen=True)
 class Point:
-    """A change of status or the end of a leg: its place on the whole path, 0 to 1, the state, energies per area."""
+    """A change of status, a break or the end of a leg, on the whole path, 0 to 1.
+
+    With the state, before its `broke` (k,) bonds break, and energies per area up to it.
+    """
 
     load_factor: float
     state: State
+    broke: np.ndarray
     work: float
     stored: float
     heat: float
+    dissipated: float
 
 
 class FrictionPath:
-    """The path of `faces` from rest; nothing breaks."""
+    """The path of `faces` from rest; of a `cell` whose bonds break by `law.used(cell, state, bonded)`."""
 
-    def __init__(self, faces: RubbingFaces):
-        self.faces, self.state = faces, faces.at_rest
+    def __init__(self, faces: RubbingFaces, cell=None, law=None):
+        self.faces, self.cell, self.law, self.state = faces, cell, law, faces.at_rest
         self.points = []
-        self.work = self.heat = 0.0
+        self.work = self.heat = self.dissipated = 0.0
         self.force = self.jump = 0.0
 
     def follow(self, loads):
@@ -49,16 +59,64 @@ class FrictionPath:
             stays = stays + 1 if step < TIE else 0
             if stays > 20:
                 raise NoEquilibriumError(f"statuses change for ever at {(leg + s) / legs}")
-            s = 1.0 if step >= 1.0 - s else s + step
-            (after,) = self.faces.linear(rate.status, self.state.slip, start.towards(load, s))
-            self._book(after)
-            stored = after.stored(self.faces.area)
-            self.points.append(Point((leg + s) / legs, after, self.work, stored, self.heat))
+
+            def after(share, rate=rate):
+                return self.faces.linear(rate.status, self.state.slip, start.towards(load, share))[0]
+
+            there = 1.0 if step >= 1.0 - s else s + step
+            broken = self.used(after(there)).max() > 1.0
+            s = self._break_between(after, s, there) if broken else there
+            self._book(after(s))
+            self._report((leg + s) / legs, self._overloaded(1.0 - TIE) if broken else np.zeros(self.faces.k, bool))
+            while broken and (which := self.points[-1].broke).any():
+                self._break(which, start.towards(load, s))
+                if (which := self._overloaded(1.0 + TOGETHER)).any():
+                    self._report((leg + s) / legs, which)
+                else:
+                    break
+
+    def used(self, state):
+        """(k,) shares of what breaks the bonds."""
+        if self.law is None:
+            return np.zeros(self.faces.k)
+        force = np.column_stack([-state.pressure, state.shear])
+        return self.law.used(self.cell, SimpleNamespace(force=force), self.faces.bonded)
+
+    def _break_between(self, after, low, high):
+        """Return the share at which the first bond breaks."""
+        for _ in range(60):
+            middle = (low + high) / 2
+            low, high = (low, middle) if self.used(after(middle)).max() > 1.0 else (middle, high)
+        return high
+
+    def _overloaded(self, limit):
+        """(k,) the bonds that are used most, if that is more than a limit."""
+        used = self.used(self.state)
+        return (used >= used.max() * (1 - TOGETHER)) & (used > limit)
+
+    def _break(self, which, load):
+        """Break bonds at constant load; what that loses is what the forces on the jumps do not store."""
+        before = self.state
+        self.faces.bonded = self.faces.bonded & ~which
+        after = self.faces.increment(before, load)
+        work = (after.stress + before.stress) @ (after.strain - before.strain) / 2
+        lost = work - after.stored(self.faces.area) + before.stored(self.faces.area)
+        heat = after.shear @ (after.slip - before.slip) / self.faces.area
+        self.work, self.heat, self.dissipated = self.work + work, self.heat + heat, self.dissipated + lost - heat
+        self._stand(after)
+
+    def _report(self, load_factor, broke):
+        stored = self.state.stored(self.faces.area)
+        self.points.append(Point(load_factor, self.state, broke, self.work, stored, self.heat, self.dissipated))
 
     def _book(self, after):
+        """Add the energies of a straight way."""
         before = self.state
         self.work += (after.stress + before.stress) @ (after.strain - before.strain) / 2
         self.heat += (after.shear + before.shear) @ (after.slip - before.slip) / 2 / self.faces.area
+        self._stand(after)
+
+    def _stand(self, after):
         self.state = after
         self.force = max(self.force, np.abs(after.pressure).max(), np.abs(after.shear).max())
         self.jump = max(self.jump, np.abs(after.gap).max(), np.abs(after.slip).max())
