@@ -23,6 +23,8 @@ from feti_homog.typing import Bool, Float
 
 # Forces and jumps below this share of the largest are rounding; both are scaled by the stiffness of a node.
 NOISE = 1e-10
+# Share of the forces of the loads that may be left on a free motion.
+UNBALANCED = 1e-7
 # Block pivots without progress, after which one node at random changes at a time: with friction a fixed order may come
 # back to where it was.  And solves after which Lemke's method takes over.
 BLOCK_PIVOTS, LEAST_SOLVES, SOLVES_PER_NODE = 11, 50, 4
@@ -133,8 +135,10 @@ class CoulombFaces:
             x = self.linear(status, given, start)
             better = self._improved(status, allowed, given.slip, x)
             wrong = np.flatnonzero(better != status)
-            if not len(wrong):
+            if not len(wrong) and self._is_balanced(status, given, start, x):
                 return status, x
+            if not len(wrong):
+                break
             left -= 1
             if len(wrong) < fewest:
                 fewest, left = len(wrong), BLOCK_PIVOTS
@@ -142,6 +146,12 @@ class CoulombFaces:
             status = status.copy()
             status[chosen] = better[chosen]
         return self._complementary(allowed, given, start)
+
+    def _is_balanced(self, status: Status, given: Prescribed, start: Float, x: Float) -> bool:
+        """Return False if a free motion, such as the turning of a fibre that slides all around, has a force on it."""
+        left = self._system(status, given.by_stress).unbalanced(x, self._prescribed(status, given, start)[1])
+        by_loads = np.abs(self.S[:, 2 * self.nodes :] @ x[2 * self.nodes :]).max(initial=0.0)
+        return bool(left <= UNBALANCED * max(by_loads, self._noise(x, given.slip) / NOISE))
 
     def _improved(self, status: Status, allowed: Bool, slip: Float, x: Float) -> Status:
         """(n,) the statuses that the signs of forces and jumps call for."""
@@ -167,7 +177,8 @@ class CoulombFaces:
         found = complementary(self.S, self.friction, allowed, given.by_stress, x, rows)
         if found is not None:
             x = self.linear(found, given, start)
-            if (self._improved(found, allowed, given.slip, x) == found).all():
+            is_right = (self._improved(found, allowed, given.slip, x) == found).all()
+            if is_right and self._is_balanced(found, given, start, x):
                 return found, x
         raise StuckError(SEARCHED)
 

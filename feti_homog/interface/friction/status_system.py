@@ -13,6 +13,8 @@ STICK, FORWARD, OPEN_FACE, BACKWARD = 0, 1, 2, -1
 
 # Stiffness, relative to that of a node, that holds what nothing else does where it is; steps of refinement remove it.
 HELD = 1e-9
+# A smaller pivot is that of a free motion: its sign is rounding.
+LEAST_PIVOT = 1e-6
 REFINEMENTS = 3
 
 
@@ -23,7 +25,7 @@ class StatusSystem:
 
     Attributes:
         free: (m,) which entries of x are unknown.
-        sign: of the determinant; 0 where the matrix is singular.
+        sign: of the determinant; 0 where a motion is free.
     """
 
     def __init__(self, S: Float, friction: Float, status: Status, by_stress: Bool) -> None:
@@ -39,12 +41,18 @@ class StatusSystem:
 
     @property
     def sign(self) -> int:
-        """Sign of the determinant."""
+        """Sign of the determinant, 0 where a motion is free."""
         if self._factor is None:
             return 1
         lu, pivots = self._factor
+        if np.abs(lu.diagonal()).min() < LEAST_PIVOT:
+            return 0
         swaps = int((pivots != np.arange(len(pivots))).sum())
         return int(np.prod(np.sign(lu.diagonal()))) * (-1 if swaps % 2 else 1)
+
+    def unbalanced(self, x: Float, given: Float) -> float:
+        """Return the largest force that x leaves on the rows that are free, as a torque that nothing resists."""
+        return float(np.abs(given[self.free] - self._rows @ x).max(initial=0.0))
 
     def solve(self, x: Float, given: Float) -> Float:
         """(m,) or (m, k) x with the rows `given`, (m,) or (m, k), from a start that has the entries that are not free.

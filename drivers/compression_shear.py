@@ -1,0 +1,117 @@
+"""Transverse compression and shear of a ply that debonds with friction: failure envelopes in (S22, S12).
+
+    mpirun -n 2 .venv/bin/python drivers/compression_shear.py --out results/compression_shear
+
+A random cell of 30 glass fibres in epoxy, 50 %, plane strain: pressed or pulled to S22, then sheared, gamma12, while
+S22 is held and S11 is none.  Bonds have strengths of 40 and 60 MPa in opening and shear; debonded faces rub with each
+coefficient of `--frictions`.  A row has the S12 at which the first bond breaks in shear, and those at half of the
+strain `--strain` and all of it: the matrix stays elastic, so S12 rises without end.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+import figures
+import numpy as np
+from figures import INK
+from mpi4py.MPI import Intracomm
+
+from feti_homog import Case, Result, launch
+
+MATERIAL = {"matrix": {"young": 2790.0, "poisson": 0.33}, "fibre": {"young": 70800.0, "poisson": 0.22}}  # MPa
+STRENGTHS = {"normal_strength": 40.0, "tangential_strength": 60.0}  # MPa
+COLUMNS = ("friction", "S22", "first break S12", "S12 at half", "S12 at end", "heat", "points")
+
+
+def main(given: argparse.Namespace, comm: Intracomm) -> None:
+    """Follow the path of each stress across and friction; print, write and draw."""
+    if given.quick:
+        given.fibres, given.refine, given.frictions, given.stresses = 2, 0, [0.0, 0.4], [-40.0, 0.0]
+    found = {(mu, stress): solved(given, comm, mu, stress) for mu in given.frictions for stress in given.stresses}
+    figures.finish(comm, write, given.out, found)
+
+
+def solved(given: argparse.Namespace, comm: Intracomm, friction: float, stress: float) -> Result:
+    """Return the path of one test."""
+    pressed = [{"S22": stress}] if stress else []
+    document = {
+        "name": f"friction {friction:g}, S22 {stress:g} MPa",
+        "cell": {
+            "geometry": "random",
+            "fibres": given.fibres,
+            "fibre_fraction": 0.5,
+            "min_gap": 0.06,
+            "mesh_size": 0.5 * np.sqrt(0.5 / np.pi / given.fibres),
+            "refine": given.refine,
+        },
+        "material": MATERIAL,
+        "analysis": {"type": "path", "plane": "strain"},
+        "interface": STRENGTHS | {"friction": friction},
+        "path": {"waypoints": [*pressed, {"gamma12": given.strain}]},
+        "output": figures.written(given) | {"stress_unit": "MPa"},
+    }
+    return figures.computed(comm, Case.parse(document), given.out / f"friction_{friction:g}_S22_{stress:g}")
+
+
+def sheared(result: Result) -> np.ndarray:
+    """(n, 3) gamma12 since shear began, S12, and how many bonds break, at the points of the last leg."""
+    points, legs = result.points, len(result.case["path"]["waypoints"])
+    own = points["load_factor"] * legs > legs - 1 - 1e-9
+    strain, stress = points["strain"][own, 2], points["stress"][own, 2]
+    # Without a leg before it shear begins at zero.
+    begin = np.zeros((int(legs == 1), 3))
+    return np.vstack(
+        [begin, np.column_stack([strain - (strain[0] if legs > 1 else 0.0), stress, points["broke"][own]])]
+    )
+
+
+def row(result: Result) -> list[float]:
+    """S12 at the first break in shear, at half of the strain and at its end, heat of friction, points of the path."""
+    strain, stress, broke = sheared(result).T
+    first = stress[np.flatnonzero(broke)[0]] if broke.any() else np.nan
+    last = (result.path or ())[-1]
+    heat = last.friction_heat or 0.0
+    return [first, np.interp(strain[-1] / 2, strain, stress), stress[-1], heat, len(result.path or ())]
+
+
+def write(folder: Path, found: dict[tuple[float, float], Result]) -> list[Path]:
+    """compression_shear.csv and compression_shear.png."""
+    from matplotlib.figure import Figure
+
+    rows = [[*key, *row(result)] for key, result in found.items()]
+    print("friction  S22 MPa  first break S12 MPa  S12 at half MPa  at the end MPa  heat MPa  points")
+    for friction, stress, first, half, end, heat, points in rows:
+        print(f"{friction:>8g}{stress:>9g}{first:>21.2f}{half:>17.2f}{end:>16.2f}{heat:>10.4f}{points:>8}")
+    figure = Figure(figsize=(9.0, 4.0), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    frictions = list(dict.fromkeys(friction for friction, _ in found))
+    pressed = min(stress for _, stress in found)
+    for k, friction in enumerate(frictions):
+        own = np.array([r[1:5] for r in rows if r[0] == friction])
+        style = {"color": INK[k % len(INK)], "linewidth": 1.2, "label": f"friction {friction:g}"}
+        left.plot(own[:, 0], own[:, 3], "o-", markersize=4, **style)
+        strain, curve, _ = sheared(found[friction, pressed]).T
+        right.plot(100 * strain, curve, **style)
+    left.set(xlabel="$\\Sigma_{22}$ (MPa)", ylabel="$\\Sigma_{12}$ at the largest shear (MPa)")
+    left.set_title("Shear that is carried under stress across", fontsize=11)
+    right.set(xlabel="$\\gamma_{12}$ (%)", ylabel="$\\Sigma_{12}$ (MPa)")
+    right.set_title(f"Shear under {pressed:g} MPa", fontsize=11)
+    for axes in (left, right):
+        axes.set_ylim(bottom=0.0)
+        axes.grid(color="0.92", linewidth=0.6)
+    left.legend(frameon=False, fontsize=9)
+    figure.savefig(folder / "compression_shear.png")
+    return [figures.tabulate(folder / "compression_shear.csv", COLUMNS, rows), folder / "compression_shear.png"]
+
+
+if __name__ == "__main__":
+    options = figures.quick_parser(__doc__ or "", "compression_shear", "two fibres, long elements, four tests")
+    options.add_argument("--fibres", type=int, default=30)
+    options.add_argument("--refine", type=int, default=0)
+    options.add_argument("--strain", type=float, default=0.03, help="gamma12 at the end")
+    options.add_argument("--frictions", type=float, nargs="+", default=[0.0, 0.2, 0.4, 0.6])
+    options.add_argument("--stresses", type=float, nargs="+", default=[-80.0, -40.0, 0.0, 20.0], help="S22, MPa")
+    sys.exit(launch(main, options))

@@ -1,0 +1,105 @@
+"""Friction against closed forms and the slow twin: laminates, first slip, limits of mu, breaks, free fibres."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from reference.closed_forms import first_slip, lame, rubbing_laminate
+from reference.friction import RubbingFaces
+from reference.friction_path import FrictionPath
+from support.loaded_twins import EPOXY_GLASS, LoadedTwin, is_end, solved
+from unit.mesh.faulty_meshes import grid
+
+from feti_homog.parallel.mpi_errors import on_root
+
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
+WHOLE = {"debonded": [{"fibre": "all", "angle": 360.0}]}
+GLASS_EPOXY = ({"young": 2790.0, "poisson": 0.33}, {"young": 70800.0, "poisson": 0.22})
+PRESSED = [[-0.01, -0.004, 0.0], [-0.01, -0.004, 0.02], [-0.01, -0.004, -0.02]]
+
+
+def at_ends(points, legs):
+    return [point for point in points if is_end(point, legs)]
+
+
+def test_a_laminate_closes_its_parallelogram(comm, shared_path):
+    """Bonds that nothing holds; ten cycles between the same stresses, with the heat of the area of each."""
+    if comm.rank == 0:
+        grid(lambda x, y: 0.25 < x < 0.5).write(shared_path / "strip.msh")
+    comm.barrier()
+    phases = ({"young": 2.0, "poisson": 0.299}, {"young": 5.0, "poisson": 0.222})
+    moduli = np.array([[sum(np.array(lame(phase)) * (1, 2)), lame(phase)[1]] for phase in phases])
+    across, shear = 1.0 / (np.array([0.75, 0.25]) @ (1.0 / moduli))
+    shears = [0.0, *[0.02, -0.02] * 10]
+    interface = {"friction": 0.3, "normal_strength": 1e-9, "tangential_strength": 1e-9}
+    case = {"cell": {"geometry": "mesh", "file": "strip.msh"}, "phases": phases, "plane": "strain"}
+    path = {"waypoints": [[-0.01, 0.0, gamma] for gamma in shears]}
+    points = at_ends(solved(comm, shared_path, **case, interface=interface, path=path).path, len(shears))
+    stress, heat = rubbing_laminate(across, shear, 0.3, -0.01, shears)
+    np.testing.assert_allclose([p.stress[2] for p in points], stress, atol=1e-10 * stress.max())
+    np.testing.assert_allclose([p.friction_heat for p in points], heat, atol=1e-10 * heat.max())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("friction", [0.25, 0.5])
+def test_a_fibre_in_a_medium_slips_first_where_the_formula_has_it(comm, friction):
+    """One fibre in a cell of 60 radii: s / q within 0.5 %."""
+    cell = {"fibre_fraction": np.pi / 60**2, "mesh_size": 0.2, "interface_size": 0.0024, "order": 2, "refine": 1}
+    load, _ = first_slip(*GLASS_EPOXY, friction)
+    waypoints = [{"S11": -1.0, "S22": -1.0}, {"S11": -1.0 + 2 * load, "S22": -1.0 - 2 * load}]
+    interface = WHOLE | {"friction": friction}
+    case = {"cell": cell, "phases": GLASS_EPOXY, "plane": "strain", "interface": interface}
+    points = solved(comm, **case, path={"waypoints": waypoints}).path
+    slipped = next(p for p in points if p.load_factor > 0.5)
+    assert slipped.stress[0] + 1.0 == pytest.approx(load, rel=5e-3)
+
+
+def test_limits_of_the_coefficient(comm):
+    """Hardly any friction is none, much under pressure is a bonded cell."""
+    case = {"cell": {}, "phases": EPOXY_GLASS, "plane": "strain", "path": {"waypoints": PRESSED}}
+    for interface, other in (({"friction": 1e-11}, WHOLE), ({"friction": 1e3}, {})):
+        found = at_ends(solved(comm, **case, interface=WHOLE | interface).path, 3)
+        expected = at_ends(solved(comm, **case, interface=other).path, 3)
+        for point, known in zip(found, expected, strict=True):
+            np.testing.assert_allclose(point.stress, known.stress, atol=1e-9)
+            assert point.friction_heat < 1e-9
+
+
+OPENED = [[-0.01, -0.004, 0.01], [0.01, 0.01, -0.02]]
+STRENGTHS = {"normal_strength": 0.03, "tangential_strength": 0.035}
+PATHS = {
+    # Of the first rates one set of statuses balances all but the turning of the fibre.
+    "one fibre": ({"mesh_size": 0.081}, GLASS_EPOXY, WHOLE | {"friction": 0.2}, PRESSED),
+    "fibres that come free": ({"geometry": "hexagonal"}, EPOXY_GLASS, WHOLE | {"friction": 0.3}, OPENED),
+    "breaks": ({"bodies": "plane"}, EPOXY_GLASS, STRENGTHS | {"friction": 0.4}, PRESSED),
+    "breaks on springs": (
+        {"geometry": "hexagonal"},
+        EPOXY_GLASS,
+        STRENGTHS | {"friction": 0.8, "normal_stiffness": 40.0, "tangential_stiffness": 15.0},
+        [[-0.006, -0.003, 0.004], [-0.006, -0.003, 0.03], [-0.008, -0.002, -0.03]],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", PATHS)
+def test_paths_are_those_of_the_twin(comm, name):
+    """The same bonds break in the same order at the same loads, with the same energies."""
+    cell, phases, interface, waypoints = PATHS[name]
+    case = {"cell": cell, "phases": phases, "plane": "strain", "path": {"waypoints": waypoints}}
+    twin, legs = LoadedTwin(comm, **case, interface=interface), len(waypoints)
+
+    def followed():
+        faces = RubbingFaces.of(twin.cell, twin.bonded, interface["friction"])
+        return FrictionPath(faces, twin.cell, twin._law).follow(twin.loads)
+
+    known = [p for p in on_root(comm, followed) if p.broke.any() or is_end(p, legs)]
+    found = [p for p in solved(comm, **case, interface=interface).path if p.broke or is_end(p, legs)]
+    assert [p.broke for p in found] == [int(p.broke.sum()) for p in known]
+    most, energy = max(np.abs(p.state.stress).max() for p in known), max(p.stored for p in known)
+    for point, other in zip(found, known, strict=True):
+        assert point.load_factor == pytest.approx(other.load_factor, abs=1e-8)
+        np.testing.assert_allclose(point.stress, other.state.stress, atol=1e-8 * most)
+        energies = (point.work, point.stored, point.friction_heat, point.dissipated)
+        expected = (other.work, other.stored, other.heat, other.dissipated)
+        np.testing.assert_allclose(energies, expected, atol=1e-8 * energy)
+    assert found[-1].friction_heat > 0.0
