@@ -86,6 +86,9 @@ class Checks:
     kkt_complementarity: float | None = described("contact: traction times gap vanishes", default=None)
     kkt_penetration: float | None = described("contact: no gap is negative", default=None)
     kkt_tension: float | None = described("contact: no closed node is pulled", default=None)
+    kkt_friction: float | None = described(
+        "friction: shear on closed faces is within mu p, and that of sliding ones opposes the slip", default=None
+    )
     symmetry: float | None = described("L^ef is symmetric; of bonded or frictionless free faces only", default=None)
 
     def by_law(self) -> dict[str, float]:

@@ -62,6 +62,7 @@ def stored(point: Point, work: Work, cell: CoupledInterfaces) -> tuple[dict[str,
         "energies": [*point.energies, *work.all_equilibria, work.load_controlled],
         "macroscopic": np.stack([after.origin.strain, after.origin.stress, after.last.strain, after.last.stress]),
         "broken": np.nan if after.broken is None else after.broken,
+        "stretched": after.stretched,
     }
     distributed: Arrays = {"used": point.used} | _bonds_apart(after.bonds, "_after")
     for suffix, each, state in zip(SUFFIXES, cell.problems, point.state.problems, strict=False):
@@ -88,6 +89,7 @@ def restored(event: Arrays, cell: CoupledInterfaces) -> tuple[Point, tuple[Energ
         Macroscopic(origin_strain, origin_stress),
         Macroscopic(strain, stress),
         None if np.isnan(broken) else broken,
+        float(event["stretched"]),
     )
     broke, softened = map(int, counts)
     own = len(NO_ENERGIES)

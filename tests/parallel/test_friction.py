@@ -11,11 +11,14 @@ from support.loaded_twins import EPOXY_GLASS, LoadedTwin, document, is_end, solv
 from support.ranks import PIECES, parallel_assert
 
 from feti_homog import Case, run
+from feti_homog.errors import ConvergenceError
 from feti_homog.parallel.mpi_errors import on_root
 from feti_homog.verify.certificate import verify
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 WHOLE = {"debonded": [{"fibre": "all", "angle": 360.0}]}
+SOFTENING = {"law": "bilinear", "normal_stiffness": 80.0, "tangential_stiffness": 60.0, "teeth": 3}
+SOFTENING |= {"normal_toughness": 4e-5, "tangential_toughness": 6e-5}
 PHASES = ({"young": 2790.0, "poisson": 0.33}, {"young": 70800.0, "poisson": 0.22})
 
 
@@ -56,14 +59,18 @@ def test_paths_are_those_of_a_slow_twin(comm, waypoints, springs):
         assert point.friction_heat == pytest.approx(expected[k].heat, abs=1e-7 * most * 0.01)
 
 
-def test_breaks_with_friction_obey_every_law(comm, shared_path):
-    interface = {"normal_strength": 0.05, "tangential_strength": 0.05, "friction": 0.3}
+@pytest.mark.parametrize("law", [{}, SOFTENING], ids=["strength", "softening"])
+def test_breaks_with_friction_obey_every_law_resumed_too(comm, shared_path, law):
+    interface = {"normal_strength": 0.05, "tangential_strength": 0.05, "friction": 0.3} | law
     interface |= {"debonded": [{"fibre": 1, "angle": 360.0}, {"fibre": 2, "angle": 90.0}]}
-    cell = {"geometry": "random", "fibres": 3, "seed": 3, "fibre_fraction": 0.35, "mesh_size": 0.12}
+    cell = {"geometry": "random", "fibres": 3, "seed": 3, "fibre_fraction": 0.35, "mesh_size": 0.15}
     path = {"waypoints": [{"S11": -0.05}, {"gamma12": 0.03}, {"gamma12": -0.02}, {"S11": 0.02}]}
     asked = document(cell, EPOXY_GLASS, "strain", interface, path=path) | {"decomposition": PIECES}
     asked["output"] = {"pictures": False, "states": 6}
-    result = run(Case.parse(asked), comm, out=shared_path / "out")
+    short = asked | {"path": path | {"max_events": 25}}
+    with pytest.raises(ConvergenceError):
+        run(Case.parse(short), comm, out=shared_path / "out")
+    result = run(Case.parse(asked), comm, out=shared_path / "out", resume=True)
     assert sum(point.broke for point in result.path) > 10 and result.path[-1].friction_heat > 0.0
     certificate = verify(shared_path / "out") if comm.rank == 0 else None
     parallel_assert(comm, certificate is None or certificate.holds, certificate and certificate.text)

@@ -241,11 +241,20 @@ class ContactProblem:
         self, load: Load, bonds: BondState, solution: DualSolution, iterations: int, solves: int
     ) -> Equilibrium:
         """Return the state that a search ended with, its free motions and its certificate."""
+        certificate = self.certificate(bonds, solution)
+        status, motions = self._without_idle(bonds.status, solution)
+        if motions:
+            # Of the rows that count as open now the amplitudes would be others.
+            solution = self.solver.completed(solution)
+        return Equilibrium(load, bonds.with_status(status), solution, iterations, solves, motions, certificate)
+
+    def certificate(self, bonds: BondState, solution: DualSolution) -> dict[str, float]:
+        """Return the errors of the KKT conditions.  Collective."""
         status, gained = bonds.status, self._gained(bonds)
         damaged = gained > 0.0
         # A pulled bond opens by its damage; one that is found pulled under pressure overlaps.
         overlap = np.minimum(gained * solution.lam[self.nodes.row], 0.0)
-        certificate = kkt_errors(
+        return kkt_errors(
             self.solver.comm,
             self.traction(solution),
             self.nodes.length,
@@ -256,11 +265,6 @@ class ContactProblem:
             self.scales.bond_stress(solution.strain),
             self.scales.over_interface,
         )
-        status, motions = self._without_idle(status, solution)
-        if motions:
-            # Of the rows that count as open now the amplitudes would be others.
-            solution = self.solver.completed(solution)
-        return Equilibrium(load, bonds.with_status(status), solution, iterations, solves, motions, certificate)
 
     def _without_idle(self, status: Status, solution: DualSolution) -> tuple[Status, int]:
         """Return the status and the number of rigid motions that nothing resists.

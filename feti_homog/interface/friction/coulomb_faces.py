@@ -6,7 +6,9 @@ pressure p = -f_n
 
     g_n >= 0,  p >= 0,  g_n p = 0,        |f_t| <= mu p,  f_t = s mu p where the slip grows with the sign s.
 
-A node is apart (f = 0), sticks (g_n = 0, g_t as it was), or slides (g_n = 0, f_t = s mu p).
+A node is apart (f = 0), sticks (g_n = 0, g_t as it was), or slides (g_n = 0, f_t = s mu p).  Springs between the faces
+of a node are part of S, and f the force beside theirs: a damaged bond is a node without friction on springs of
+1 / (C - C_0), apart while it is pulled.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ import numpy as np
 
 from feti_homog.errors import NotCarriedError
 from feti_homog.interface.contact.states import Status
-from feti_homog.interface.friction.lemke import complementary
+from feti_homog.interface.friction.lemke import complementary, first_guess
 from feti_homog.interface.friction.status_system import BACKWARD, FORWARD, OPEN_FACE, STICK, StatusSystem
 from feti_homog.typing import Bool, Float
 
@@ -130,6 +132,7 @@ class CoulombFaces:
         Raises:
             StuckError: none was found.
         """
+        status = self._known(status)
         fewest, left, random = self.nodes + 1, 0, np.random.default_rng(0)
         for _ in range(LEAST_SOLVES + SOLVES_PER_NODE * self.nodes):
             x = self.linear(status, given, start)
@@ -165,15 +168,15 @@ class CoulombFaces:
             back = (status == sign) & (sign * moved < -noise) & allowed[:, STICK]
             better[over] = sign
             better[back] = STICK
-        touches = ~closed & (gap < -noise) & allowed[:, STICK]
-        better[touches] = np.where(np.abs(moved) > noise, np.sign(moved), 0.0)[touches]
+        touches = ~closed & (gap < -noise) & allowed[:, FORWARD]
+        way = np.where(np.abs(moved) > noise, np.sign(moved), STICK)
+        better[touches] = np.where(self.friction > 0.0, way, FORWARD)[touches]
         better[pulled] = OPEN_FACE
         return better
 
     def _complementary(self, allowed: Bool, given: Prescribed, start: Float) -> tuple[Status, Float]:
         """Return the same by Lemke's method."""
-        apart = np.where(allowed[:, STICK], STICK, OPEN_FACE).astype(np.int8)
-        x, rows = self._prescribed(apart, given, start)
+        x, rows = self._prescribed(first_guess(self.friction, allowed), given, start)
         found = complementary(self.S, self.friction, allowed, given.by_stress, x, rows)
         if found is not None:
             x = self.linear(found, given, start)
@@ -183,8 +186,16 @@ class CoulombFaces:
         raise StuckError(SEARCHED)
 
     def all_allowed(self) -> Bool:
-        """(n, 4) True."""
-        return np.ones((self.nodes, 4), bool)
+        """(n, 4) True, but that faces without friction have one status of touching, FORWARD."""
+        return self._without_friction_free(np.ones((self.nodes, 4), bool))
+
+    def _known(self, status: Status) -> Status:
+        """(n,) FORWARD for each other status of touching faces without friction."""
+        return np.where((self.friction == 0.0) & (status != OPEN_FACE), FORWARD, status).astype(np.int8)
+
+    def _without_friction_free(self, allowed: Bool) -> Bool:
+        allowed[np.ix_(self.friction == 0.0, [STICK, BACKWARD])] = False
+        return allowed
 
     def rates(self, status: Status, x: Float, by_stress: Bool, rate: Float) -> tuple[Status, Float]:
         """Return the statuses (n,) with which a state x goes on, and the rate (m,) of x, as the loads (v,) change.
@@ -192,7 +203,7 @@ class CoulombFaces:
         Raises:
             StuckError: there are none, or the determinant of the sliding faces has lost its sign.
         """
-        given = Prescribed(by_stress, rate, np.zeros(self.nodes))
+        given, status = Prescribed(by_stress, rate, np.zeros(self.nodes)), self._known(status)
         allowed = self._at_limits(status, x)
         status, v = self.search(status, allowed, given, np.zeros(len(x)))
         if self._system(status, by_stress).sign < 0:
@@ -209,7 +220,7 @@ class CoulombFaces:
             limited = closed & ((status == sign) | (sign * tangential + self.friction * normal >= -noise))
             allowed[limited, sign] = allowed[limited, STICK] = True
         allowed[np.where(closed, normal >= -noise, gap <= noise)] = True
-        return allowed
+        return self._without_friction_free(allowed)
 
     def _noise_of_state(self, x: Float) -> float:
         """Return the force, and jump, that is rounding in an equilibrium, with forces of its own where none load it."""

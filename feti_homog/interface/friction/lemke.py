@@ -36,9 +36,10 @@ def complementary(
         rows: (m,) what is given of (S x)_E.
     """
     n, m = len(friction), len(S)
-    apart = ~allowed[:, STICK]
-    system = StatusSystem(S, friction, np.where(apart, OPEN_FACE, STICK).astype(np.int8), by_stress)
-    entry, sign, kind = _unknowns(allowed & ~apart[:, None])
+    base = first_guess(friction, allowed)
+    system = StatusSystem(S, friction, base, by_stress)
+    # Faces without friction have no unknown parts of their slip.
+    entry, sign, kind = _unknowns(allowed & (base == STICK)[:, None] | allowed & _touching(allowed, base))
     columns = np.zeros((m, 1 + len(entry)))
     columns[:, 0] = start
     columns[entry, 1 + np.arange(len(entry))] = sign
@@ -53,10 +54,23 @@ def complementary(
     z = next((each for each in found if each is not None), None)
     if z is None:
         return None
-    status = np.where(apart, OPEN_FACE, STICK).astype(np.int8)
+    status = base.copy()
     for each in (FORWARD, BACKWARD, OPEN_FACE):
         status[node[(kind == each) & (z > 0.0)]] = each
     return status
+
+
+def first_guess(friction: Float, allowed: Bool) -> Status:
+    """(n,) STICK of nodes that may touch, FORWARD where nothing rubs, OPEN_FACE of the others."""
+    touching = np.where(friction > 0.0, STICK, FORWARD)
+    return np.where(allowed[:, FORWARD] | allowed[:, STICK] | allowed[:, BACKWARD], touching, OPEN_FACE).astype(np.int8)
+
+
+def _touching(allowed: Bool, base: Status) -> Bool:
+    """(n, 4) OPEN_FACE of faces without friction that touch."""
+    found = np.zeros_like(allowed)
+    found[:, OPEN_FACE] = base == FORWARD
+    return found
 
 
 def _unknowns(allowed: Bool) -> tuple[Int, Int, Int]:

@@ -31,6 +31,7 @@ class PathState:
         last: the last point's state.
         broken: fracture energy of the bonds that broke there, in the mode in which each broke, per area of the cell, 0
             of bonds without toughness; None if none broke.
+        stretched: with friction, energy per area of the springs of damaged bonds before they broke.
     """
 
     leg: int
@@ -40,6 +41,7 @@ class PathState:
     origin: Macroscopic
     last: Macroscopic
     broken: float | None = None
+    stretched: float = 0.0
 
     def energies_to(self, here: Macroscopic) -> Energies:
         """Return those of the way from the last point's state to one under the load at which this stands.

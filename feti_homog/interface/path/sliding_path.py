@@ -163,7 +163,8 @@ class SlidingLeg:
         state = self._state()
         worst = most_utilised(self.cell, self.law, state)[2]
         bonds, broke, softened, fracture = break_bonds(self.cell, self.law, worst, state)
-        broken = replace(self._path_state(), bonds=bonds, broken=fracture)
+        stretched = self.sliding.stretched(self._here.x)
+        broken = replace(self._path_state(), bonds=bonds, broken=fracture, stretched=stretched)
         yield self._point(broke, softened, broken)
         self._after_break(broken)
 
@@ -181,6 +182,8 @@ class SlidingLeg:
         status, there = on_root(self.cell.comm, faces.search, status, faces.all_allowed(), given, x)
         lost, heat = (own / self.sliding.area for own in faces.losses(status, x, there))
         after = self._standing(status, there)
+        # Springs of the bonds that soften do not keep what they were stretched by before.
+        lost += begin.stretched - self.sliding.stretched(x)
         self._add(after, lost - heat, heat, begin.broken)
         self._here, self._bonds, self._first = after, self.sliding.bonds(begin.bonds, status, there), True
 
