@@ -131,10 +131,14 @@ def committed(at: int, after: bool) -> Hook:
     return Hook("feti_homog.results.atomic:commit", WAIT, when=when, after=after)
 
 
-# When a path is killed: the last of so many events has just been kept, or the next is written or computed.
+# When a path is killed: the last of so many events has just been kept, or the next is written or computed, or a second
+# file has been kept after one of several events.
 MOMENTS = {
     "kept": lambda _, at: committed(at, after=True),
     "written": lambda _, at: committed(at + 1, after=False),
+    "several": lambda *_: Hook(
+        "feti_homog.results.atomic:commit", WAIT, when="'000000.h5' < args[1].name < '999999.h5'", after=True
+    ),
     "computed": lambda out, at: Hook(SOLVE, WAIT, when=f"os.path.exists('{out}/checkpoint/{at - 1:06d}.h5')"),
 }
 
@@ -170,7 +174,7 @@ def interrupted(tmp_path_factory):
 def test_a_path_killed_again_and_again_ends_as_one_left_in_peace(tmp_path, reference, ranks):
     chance, case, out = random.Random(ranks), case_file(tmp_path), tmp_path / "out"
     expected, last = document(reference), 0
-    for moment in MOMENTS:
+    for moment in ("kept", "written", "computed"):
         last += chance.randint(1, 12)
         assert killed(ranks, case, out, last, *(["--resume"] if moment != "kept" else []), moment=moment) == last
         assert not (out / "result.json").exists()
@@ -191,13 +195,15 @@ def test_a_path_killed_again_and_again_ends_as_one_left_in_peace(tmp_path, refer
 def test_paths_of_every_kind_resume(tmp_path, ranks, kind):
     case = case_file(tmp_path, **KINDS[kind])
     assert command_line(ranks, "run", case, "--out", tmp_path / "whole").returncode == 0
-    kept = killed(ranks, case, tmp_path / "out", 8)
+    softens = kind == "softening"
+    files = killed(ranks, case, tmp_path / "out", 8, moment="several" if softens else "kept")
     job = command_line(ranks, "run", case, "--out", tmp_path / "out", "--resume")
     assert job.returncode == 0, job.stderr
     found, expected = (document(tmp_path / name) for name in ("out", "whole"))
-    assert found["resumed"] == kept == 8
+    kept = found["resumed"]
+    assert (files == 2 < kept < len(expected["path"])) if softens else (files == kept == 8)
     assert_same_curve(found["path"], expected["path"])
-    if kind == "softening":
+    if softens:
         assert sum(point["softened"] for point in expected["path"][:kept]) > 0
         for key in ("softened", "fracture_energy", "damaged_length"):
             np.testing.assert_allclose(*([point[key] for point in of["path"]] for of in (found, expected)), rtol=1e-6)
