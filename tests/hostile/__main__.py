@@ -9,6 +9,7 @@ import argparse
 import sys
 import tempfile
 from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from support.jobs import mpirun
@@ -47,9 +48,11 @@ def tried(folder: Path, only: str) -> dict[str, list[str]]:
         [a for a in some if only in f"{a.kind}: {a.name}"] for some in (shared, processes.attempts(prepared))
     )
     found: dict[str, list[str]] = {}
-    for ranks, step in EVERY.items() if shared else ():
-        found |= in_one_job(shared[::step], ranks, folder / f"{ranks} ranks")
-    return found | in_processes(alone, folder / "processes")
+    with ThreadPoolExecutor(1) as beside:  # the job of one rank leaves a core
+        others = beside.submit(in_processes, alone, folder / "processes")
+        for ranks, step in EVERY.items() if shared else ():
+            found |= in_one_job(shared[::step], ranks, folder / f"{ranks} ranks")
+        return found | others.result()
 
 
 def main() -> int:
