@@ -1,9 +1,10 @@
 """Cost of a case: seconds, memory, and how many ranks are worth while; estimates before anything is solved.
 
 About linear in the degrees of freedom, for bodies are cut into pieces of one size.  The constants are those that
-`.venv/bin/python scripts/measure_cost.py` prints, on a 2-core machine.  Times are good to a factor of about two, and
-up to four times longer where elements are so coarse that most nodes of a piece lie on its boundary; a job's time limit
-should leave room for that.
+`.venv/bin/python scripts/measure_cost.py` prints, on a 2-core machine; those of setup, subdomains and applications were
+fitted later to the processor time of 9 stiffnesses of 700 to 130 000 degrees of freedom beside other programs.  Times
+of stiffnesses are within a factor of 1.5; those of paths depend on how many bonds break, so that a job's time limit
+should leave room.
 """
 
 from __future__ import annotations
@@ -26,9 +27,9 @@ START_SECONDS = 0.9
 # Seconds for each coarse triangle, on rank 0.
 MESH_SECONDS = 2.7e-5
 # Seconds for each degree of freedom to assemble and factor, and for each subdomain besides.
-SETUP_SECONDS, SUBDOMAIN_SECONDS = 4.4e-6, 2.9e-3
+SETUP_SECONDS, SUBDOMAIN_SECONDS = 5.7e-6, 1.2e-2
 # Seconds for each degree of freedom in one application of operator and preconditioner.
-APPLY_SECONDS = 4.2e-8
+APPLY_SECONDS = 5.5e-8
 # Seconds for each degree of freedom to estimate the errors of the mesh: of factoring the interiors, above all.
 ERROR_SECONDS = 5.0e-6
 # Bytes of a rank without degrees of freedom, for each of these, and for each multiplier that has influence columns.
