@@ -14,6 +14,7 @@ from feti_homog.case.case import Case
 from feti_homog.case.interface_section import InterfaceSection
 from feti_homog.feti.decomposition.jump_operator import InterfaceSprings
 from feti_homog.interface.laws.bond_law import BondLaw
+from feti_homog.interface.laws.cohesive import CohesiveLaw
 from feti_homog.interface.laws.registry import law_class
 from feti_homog.typing import Float, Int
 
@@ -26,6 +27,14 @@ def springs(case: Case) -> InterfaceSprings:
 def axial_springs(case: Case) -> InterfaceSprings:
     """Return those of the problem along the fibres."""
     return InterfaceSprings(tuple((axial_stiffness(bond),) for bond in case.interfaces), has_softening(case))
+
+
+def teeth_of(case: Case) -> int:
+    """Return the events of a bond until it parts: the teeth of a law that softens, else one."""
+    if not has_softening(case):
+        return 1
+    law = bond_law(case.interfaces, np.zeros(0, np.int64))
+    return len(law.levels) - 1 if isinstance(law, CohesiveLaw) else 1
 
 
 def has_softening(case: Case) -> bool:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from support.cases import FIBRE, MATRIX, make_case
 
+from feti_homog.case.case import Case
 from feti_homog.case.interface_section import Arc, InterfaceSection
 from feti_homog.case.load_section import LoadPath
 from feti_homog.case.sections import Angle
@@ -90,3 +91,16 @@ def test_kept_states_are_told():
     assert "at most 20 states of 6.5 MiB, 136 MiB in" in cost_model.fields_line(path, 50_000, 100_000, 3000, 1)
     every = replace(path, output=replace(path.output, states="all"))
     assert "for each state" in cost_model.fields_line(every, 50_000, 100_000, 3000, 1)
+
+
+def test_paths_name_their_bonds_and_teeth():
+    """A bond parts in as many events as its law has teeth; other analyses have none."""
+    law = {"law": "bilinear", "normal_stiffness": 1e3, "tangential_stiffness": 1e3, "normal_strength": 1.0,
+           "tangential_strength": 1.0, "normal_toughness": 1.0, "tangential_toughness": 1.0, "teeth": 7}  # fmt: skip
+    material = {"matrix": MATRIX, "fibre": FIBRE}
+    document = {"cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.1}, "material": material,
+                "analysis": {"type": "path", "plane": "strain"}, "path": {"strain": [0.01, 0, 0]}}  # fmt: skip
+    toothed, brittle = (Case.parse(document | {"interface": own}) for own in (law, {"normal_strength": 1.0}))
+    assert "up to about 24 bonds break in 7 teeth each;" in cost_model.events_lines(toothed, 48)[0]
+    assert "up to about 24 bonds break;" in cost_model.events_lines(brittle, 48)[0]
+    assert cost_model.events_lines(make_case(), 48) == []
