@@ -19,6 +19,7 @@ from feti_homog.analysis.tip_records import TipRecorder
 from feti_homog.case.load_section import LoadPath
 from feti_homog.errors import NotCarriedError
 from feti_homog.homogenization.averaging import Response
+from feti_homog.interface.friction.coulomb_faces import StuckError
 from feti_homog.interface.friction.sliding_cell import SlidingCell
 from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.path.path_following import events, increments
@@ -107,7 +108,7 @@ def _points(
 ) -> Iterator[tuple[Point, tuple[Energies, float] | None]]:
     """Yield the points of the checkpoint with the energies up to each, then those still to be found.
 
-    Where nothing carries the stresses any more the path ends with a fault.
+    Where nothing carries the stresses any more, or faces with friction cannot go on, the path ends with a fault.
 
     Raises:
         NotCarriedError: nothing carries them from the beginning.
@@ -131,7 +132,8 @@ def _points(
     except NotCarriedError as error:
         if count == 0:
             raise
-        context.checks.faults.append(f"[path]: {error} beyond the last point; prescribe strains there")
+        advice = "" if isinstance(error, StuckError) else "; prescribe strains there"
+        context.checks.faults.append(f"[path]: {error} beyond the last point{advice}")
 
 
 def _sliding_cell(context: AnalysisContext) -> SlidingCell:

@@ -18,6 +18,7 @@ from feti_homog.results.path_peak import peak_of
 
 ROWS = 15  # of the table
 SHOWN = 5  # of its strains, stresses and the temperature
+SAME_LOAD, CLOSED_CYCLE = 1e-9, 1e-6  # of load factors; of strains or stresses of one waypoint, relative
 
 Document = Mapping[str, Any]
 
@@ -93,6 +94,17 @@ def _peak_lines(document: Document, peak: Mapping[str, Any], label: str) -> list
     return lines
 
 
+def _closed_cycle(document: Document) -> str:
+    """Return the area of the last loop in words: the work since a waypoint of the same strains, or stresses."""
+    points, legs = document["path"], path_curves.legs(document)
+    ends = [p for p in points if abs(p["load_factor"] * legs - round(p["load_factor"] * legs)) < SAME_LOAD]
+    for point in reversed(ends[:-1]):
+        pairs = [np.array([point[name], ends[-1][name]]) for name in ("strain", "stress")]
+        if any(np.ptp(pair, axis=0).max() <= CLOSED_CYCLE * np.abs(pair).max() for pair in pairs):
+            return f", area of the last closed loop {ends[-1]['work'] - point['work']:.6g}"
+    return ""
+
+
 def _path_energies(document: Document, label: str) -> list[str]:
     """Return the lines about energies along a path.
 
@@ -107,6 +119,8 @@ def _path_energies(document: Document, label: str) -> list[str]:
         *energies(last, label),
         f"Dissipated per area{label}: {last['dissipated']:.6g} along all equilibria, {rising}",
     ]
+    if "friction_heat" in last:
+        lines.append(f"Heat of friction per area{label}: {last['friction_heat']:.6g}{_closed_cycle(document)}")
     if "dissipation_ratio" in last:
         ratio = f"{last['dissipation_ratio']:.4f} times it was dissipated"
         lines.append(f"Toughness of broken bonds per area{label}: {last['fracture_energy']:.6g}; {ratio}")
