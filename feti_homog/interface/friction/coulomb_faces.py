@@ -99,6 +99,10 @@ class CoulombFaces:
         """(m,) scaled x with these statuses; what nothing determines stays as it is at the start (m,)."""
         return self._system(status, given.by_stress).solve(*self._prescribed(status, given, start))
 
+    def settled(self, status: Status, given: Prescribed, x: Float) -> Float:
+        """(m,) scaled x without the rounding of the way to it; a free motion, which rounding would drive, keeps it."""
+        return self.linear(status, given, x) if self._system(status, given.by_stress).sign else x
+
     def _system(self, status: Status, by_stress: Bool) -> StatusSystem:
         """Return the system of these statuses; the last one is kept."""
         key = status.tobytes() + by_stress.tobytes()

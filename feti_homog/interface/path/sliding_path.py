@@ -109,7 +109,7 @@ class SlidingLeg:
     def _advance(self, status: Status, rate: Float) -> Iterator[Point]:
         """Go on along the rates up to the next change, and past it."""
         here, faces, cell = self._here, self.sliding.faces, self.cell
-        x = on_root(cell.comm, faces.linear, status, self._given(self._share, here.x), here.x)
+        x = on_root(cell.comm, faces.settled, status, self._given(self._share, here.x), here.x)
         change = cell.comm.bcast(faces.next_change(status, x, rate))
         whole = x + min(1.0 - self._share, change) * rate
         tractions = (self._traction(each) for each in (x, whole))
