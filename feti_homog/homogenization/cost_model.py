@@ -20,7 +20,6 @@ from feti_homog.case.case import Case
 from feti_homog.case.phase_names import COATING
 from feti_homog.fem.problem import AXIAL, Problem
 from feti_homog.homogenization import phase_laws
-from feti_homog.homogenization.bonds import teeth_of
 from feti_homog.materials.plane_state import PLANE_STATES
 
 # Seconds to start Python, MPI, PETSc and gmsh.
@@ -132,15 +131,14 @@ def fields_line(case: Case, nodes: int, elements: int, interface_nodes: int, ran
     return f"fields     {words}, {_size(mesh + count * state)} in result.h5, {seconds}"
 
 
-def events_lines(case: Case, multipliers: int) -> list[str]:
+def events_lines(case: Case, multipliers: int, teeth: int) -> list[str]:
     """Return how many events a path may have, in a line as `estimate_lines`; none of another analysis.
 
-    At most as many as bonds, times their teeth; nodes on cuts of bodies are counted with them.
+    At most as many as bonds, times the teeth of each; nodes on cuts of bodies are counted with them.
     """
     if not case.section.is_followed:
         return []
-    bonds, teeth = multipliers // 2, teeth_of(case)
-    words = f"up to about {bonds} bonds break" + (f" in {teeth} teeth each" if teeth > 1 else "")
+    words = f"up to about {multipliers // 2} bonds break" + (f" in {teeth} teeth each" if teeth > 1 else "")
     return [f"events     {words}; the estimate is that of {SOLVES_OF_A_PATH} solves, and grows with what breaks"]
 
 

@@ -21,6 +21,7 @@ from feti_homog.feti.decomposition.shared_entities import share_entities
 from feti_homog.feti.factory import database_options
 from feti_homog.feti.solver_plan import ProblemSizes, SolverOptions, SolverPlan
 from feti_homog.homogenization import cost_model, phase_laws, process_zone
+from feti_homog.homogenization.bonds import teeth_of
 from feti_homog.homogenization.domain_partition import DEFAULT_POLICY, CellSummary
 from feti_homog.homogenization.unit_cell import cut
 from feti_homog.mesh.refinement import ReferenceLattice
@@ -85,7 +86,7 @@ def _described(
             for rank, (count, n) in enumerate(zip(own, nodes, strict=True))
         ),
         *cost_model.estimate_lines(taken, len(loads)),
-        *cost_model.events_lines(case, multipliers),
+        *cost_model.events_lines(case, multipliers, teeth_of(case)),
         *(
             [cost_model.fields_line(case, sum(nodes), elements, multipliers // 2, len(loads))]
             if case.output.fields

@@ -13,6 +13,7 @@ from feti_homog.case.interface_section import Arc, InterfaceSection
 from feti_homog.case.load_section import LoadPath
 from feti_homog.case.sections import Angle
 from feti_homog.homogenization import cost_model
+from feti_homog.homogenization.bonds import teeth_of
 from feti_homog.homogenization.phase_laws import problems
 from feti_homog.results.field_layout import SpatialStatePart, StatePart, rows_of, tables
 
@@ -101,6 +102,6 @@ def test_paths_name_their_bonds_and_teeth():
     document = {"cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.1}, "material": material,
                 "analysis": {"type": "path", "plane": "strain"}, "path": {"strain": [0.01, 0, 0]}}  # fmt: skip
     toothed, brittle = (Case.parse(document | {"interface": own}) for own in (law, {"normal_strength": 1.0}))
-    assert "up to about 24 bonds break in 7 teeth each;" in cost_model.events_lines(toothed, 48)[0]
-    assert "up to about 24 bonds break;" in cost_model.events_lines(brittle, 48)[0]
-    assert cost_model.events_lines(make_case(), 48) == []
+    assert "up to about 24 bonds break in 7 teeth each;" in cost_model.events_lines(toothed, 48, teeth_of(toothed))[0]
+    assert "up to about 24 bonds break;" in cost_model.events_lines(brittle, 48, teeth_of(brittle))[0]
+    assert cost_model.events_lines(make_case(), 48, 1) == []
