@@ -45,7 +45,7 @@ def errors(document: Document) -> dict[str, float]:
     found = {name: float(of_constants[own]) for name, own in places if own in of_constants}
     if of_expansion is not None:
         found |= {name: float(of_expansion[place]) for name, place in EXPANSIONS.items()}
-    return found
+    return {name: found[name] for names in ROWS for name in names if name in found}
 
 
 def table(document: Document, label: str) -> list[Table]:
