@@ -137,7 +137,8 @@ class Cell:
     )
     element: str = key(
         choice("mixed", "displacement"),
-        'Quadratic triangles of isotropic phases in plane strain and generalized plane strain. "mixed": with a cubic '
+        "Quadratic triangles of isotropic phases, also of those that are given as transversely isotropic, in plane "
+        'strain and generalized plane strain. "mixed": with a cubic '
         "bubble and a linear pressure of their own, which serve up to poisson = 0.5 and err less everywhere; "
         '"displacement": without.',
         default="mixed",

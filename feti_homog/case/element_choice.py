@@ -7,6 +7,7 @@ from typing import Any
 
 from feti_homog.case.cell_section import Cell
 from feti_homog.materials.forms import Isotropic, Material
+from feti_homog.materials.laws import isotropic_ratio
 from feti_homog.materials.plane_state import PLANE_STATES
 from feti_homog.schema.wording import toml_key
 
@@ -20,7 +21,7 @@ ROUNDING_POISSON = {MIXED: 0.49999999, "displacement": 0.49999}
 
 def is_mixed(element: str, order: int, material: Material, plane: str) -> bool:
     """Return whether the elements of a phase have a bubble and a pressure of their own in the plane problem."""
-    has_pressure = isinstance(material, Isotropic) and not PLANE_STATES[plane].is_sheet
+    has_pressure = isotropic_ratio(material) is not None and not PLANE_STATES[plane].is_sheet
     return has_pressure and order == 2 and element == MIXED
 
 
@@ -62,5 +63,6 @@ def _above(limit: float, materials: Mapping[str, Material], plane: str) -> list[
     """List the phases of a larger ratio that keep their volume: not in plane stress."""
     if PLANE_STATES[plane].is_sheet:
         return []
-    ratios = {phase: m.poisson for phase, m in materials.items() if isinstance(m, Isotropic)}
-    return [f"[material.{toml_key(phase)}] poisson = {nu}" for phase, nu in ratios.items() if nu > limit]
+    ratios = {phase: isotropic_ratio(material) for phase, material in materials.items()}
+    names = {phase: "poisson" if isinstance(m, Isotropic) else "Poisson's ratio" for phase, m in materials.items()}
+    return [f"[material.{toml_key(phase)}] {names[phase]} = {nu}" for phase, nu in ratios.items() if nu and nu > limit]

@@ -6,6 +6,7 @@ plane of symmetry of every phase, so that [23, 13] are coupled to each other alo
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -36,6 +37,8 @@ NEEDED: dict[type[Orthotropic] | type[TransverselyIsotropic], dict[str, tuple[st
     },
 }
 """The optional constants that a plane state needs."""
+# Relative difference of constants of one material.
+ISOTROPY = 1e-9
 # Beyond the first, rounding of displacements makes stresses as large as those of the soft phase are allowed to be off;
 # beyond the second, it leaves nothing of them.
 WORRYING_CONTRAST, LARGEST_CONTRAST = 1e10, 1e14
@@ -66,6 +69,20 @@ def plane_stiffness(material: Material, plane: str) -> Float:
         out = compliance[IN_PLANE, 2]
         reduced = reduced - np.outer(out, out) / compliance[2, 2]
     return rotated(np.asarray(np.linalg.inv(reduced), float), _angle(material))
+
+
+def isotropic_ratio(material: Material) -> float | None:
+    """Poisson's ratio of an isotropic material, None of another, and of one that gives its stiffness.
+
+    A transversely isotropic one is isotropic if its constants are, to ISOTROPY.
+    """
+    if isinstance(material, TransverselyIsotropic):
+        young, ratio, shear = material.E_transverse, material.nu_transverse, material.G_axial
+        pairs = [(material.E_axial, young), (material.nu_axial, ratio), (shear, young / (2 + 2 * ratio))]
+        known = pairs if shear is not None else pairs[:2]
+        alike = all(own is not None and math.isclose(own, other, rel_tol=ISOTROPY) for own, other in known)
+        return ratio if alike else None
+    return material.poisson if isinstance(material, Isotropic) else None
 
 
 def spatial_stiffness(material: Material) -> Float:

@@ -90,7 +90,8 @@ def _energies(cell: DiscreteCell, states: Sequence[State], case: Mapping[str, An
     files, phases = cell.files, cell.files.phases
     stiffnesses = (spatial_stiffnesses if files.is_spatial else plane_stiffnesses)(case, phases)
     free = expansions(case, phases) if files.is_spatial else None
-    elements = Elements(files.mesh, stiffnesses, mixed_phases(case, phases))
+    # Elements stay what they are where constants that are alike change apart.
+    elements = Elements(files.mesh, stiffnesses, mixed_phases(files.case, phases))
     strains, heated = _in_order(states)
     columns = []
     for state in (*strains, *heated):

@@ -10,6 +10,7 @@ import numpy as np
 from feti_homog.errors import CaseError
 from feti_homog.typing import Bool, Float
 
+ISOTROPY = 1e-9  # relative difference of constants of one material
 PLANE = [0, 1, 5]  # of the order [11, 22, 33, 23, 13, 12]
 # Places of the components of a tensor in the orders [11, 22, 12] and [11, 22, 33, 23, 13, 12].
 VOIGT = {3: np.array([[0, 2], [2, 1]]), 6: np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])}
@@ -53,7 +54,18 @@ def mixed_phases(case: Mapping[str, Any], phases: Sequence[str]) -> Bool:
         CaseError: a phase of the mesh has no material in the case.
     """
     wanted = case["cell"].get("element") == "mixed" and case["analysis"]["plane"] != "stress"
-    return np.array([wanted and "young" in _constants(case, phase) for phase in phases], bool)
+    return np.array([wanted and _is_isotropic(_constants(case, phase)) for phase in phases], bool)
+
+
+def _is_isotropic(constants: Mapping[str, Any]) -> bool:
+    """Return whether one modulus and one ratio say all, to ISOTROPY."""
+    if "E_transverse" in constants:
+        E, nu = float(constants["E_transverse"]), float(constants["nu_transverse"])
+        known = [constants.get("E_axial"), constants.get("nu_axial")]
+        known += [constants["G_axial"]] if constants.get("G_axial") is not None else []
+        expected = [E, nu, E / 2 / (1 + nu)][: len(known)]
+        return None not in known and bool(np.allclose(np.array(known, float), expected, rtol=ISOTROPY, atol=0))
+    return "young" in constants
 
 
 def out_of_plane(case: Mapping[str, Any], phases: Sequence[str]) -> Float:

@@ -50,6 +50,13 @@ def test_mumps_gives_the_stiffness_of_cholmod(comm, option):
     assert relative_error(L, expected) < TIGHT
 
 
+def test_an_isotropic_phase_has_the_same_elements_in_either_form(comm):
+    transverse = {"E_axial": 1.0, "E_transverse": 1.0, "nu_axial": 0.4999, "nu_transverse": 0.4999}
+    forms, fibre = ({"young": 1.0, "poisson": 0.4999}, transverse), {"young": 1000.0, "poisson": 0.3}
+    first, second = (solve(make_case(matrix=form, fibre=fibre, order=2), comm)[1] for form in forms)
+    assert relative_error(second, first) < 1e-7
+
+
 @pytest.mark.parametrize("plane", ["strain", "stress"])
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize(

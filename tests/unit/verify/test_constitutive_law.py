@@ -10,7 +10,7 @@ from support.verified_results import FIBRE, MATRIX, TURNED, TURNED_IN_SPACE, WAR
 from feti_homog.case.case import parse
 from feti_homog.errors import CaseError
 from feti_homog.materials.forms import Orthotropic
-from feti_homog.materials.laws import expansion, out_of_plane, plane_stiffness, spatial_stiffness
+from feti_homog.materials.laws import expansion, isotropic_ratio, out_of_plane, plane_stiffness, spatial_stiffness
 from feti_homog.verify import constitutive_law
 from feti_homog.verify.constitutive_law import expansions, plane_stiffnesses, spatial_stiffnesses
 
@@ -71,3 +71,32 @@ def test_a_phase_without_material_is_told():
     case = {"material": {"matrix": MATRIX}, "analysis": {"plane": "strain"}}
     with pytest.raises(CaseError, match="no material for the phase fibre"):
         plane_stiffnesses(case, ["matrix", "fibre"])
+
+
+ALIKE = {"E_axial": 3.0, "E_transverse": 3.0, "nu_axial": 0.4999, "nu_transverse": 0.4999}
+ORTHOTROPIC = {f"E{k}": 3.0 for k in (1, 2, 3)} | {"nu12": 0.2, "nu13": 0.2, "nu23": 0.2, "G12": 1.25}
+
+
+@pytest.mark.parametrize(
+    ("constants", "ratio"),
+    [
+        ({"young": 3.0, "poisson": 0.3}, 0.3),
+        (ALIKE, 0.4999),
+        (ALIKE | {"G_axial": 3.0 / 2 / 1.4999}, 0.4999),
+        (ALIKE | {"G_axial": 1.01}, None),
+        (ALIKE | {"E_axial": 3.0 * (1 + 1e-7)}, None),
+        (ALIKE | {"nu_axial": 0.4998}, None),
+        (GENERAL, None),
+        (ORTHOTROPIC, None),
+    ],
+)
+def test_both_find_who_is_isotropic(tmp_path, constants, ratio):
+    document = {"cell": {"geometry": "square", "fibre_fraction": 0.4}}
+    document |= {
+        "material": {"matrix": constants, "fibre": FIBRE},
+        "analysis": {"type": "stiffness", "plane": "strain"},
+    }
+    case = parse(document, tmp_path)
+    assert isotropic_ratio(case.material_of("matrix")) == (None if ratio is None else pytest.approx(ratio, rel=1e-9))
+    own = {"cell": {"element": "mixed"}, "analysis": {"plane": "strain"}, "material": {"matrix": constants}}
+    assert constitutive_law.mixed_phases(own, ["matrix"]).tolist() == [ratio is not None]
