@@ -18,6 +18,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 TABLE = ROOT / "tests" / "mutations.toml"
+PYTEST = ("pytest", "-x", "-q", "-p", "no:cacheprovider")
 LIMIT_S = 90  # ranks that wait for each other have noticed the error, too
 PASSED, FAILED, LATE = 0, 1, (124, 137, -9)
 
@@ -34,10 +35,12 @@ def copied(folder: Path) -> Path:
 
 
 def run_tests(folder: Path, tests: str, ranks: int) -> int:
-    """Return the exit status of tests in a folder at this number of ranks."""
-    words = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *shlex.split(tests)]
+    """Return the exit status of tests in a folder at this number of ranks; `tests` are pytest's, or the hostile ones."""
+    is_hostile = tests.startswith("hostile ")
+    words = [sys.executable, "-m", *([] if is_hostile else PYTEST), *shlex.split(tests)]
     command = words if ranks == 1 else ["mpirun", "--oversubscribe", "-n", str(ranks), *words, "-m", "parallel"]
-    environment = os.environ | {"PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1"}
+    paths = ":".join(str(folder / name) for name in ("", "tests", "scripts"))
+    environment = os.environ | {"PYTHONPATH": paths, "PYTHONDONTWRITEBYTECODE": "1"}
     job = ["timeout", "--kill-after=10", str(LIMIT_S), *command]
     return subprocess.run(job, cwd=folder, env=environment, capture_output=True).returncode
 
