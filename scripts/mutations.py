@@ -35,7 +35,7 @@ def copied(folder: Path) -> Path:
 
 
 def run_tests(folder: Path, tests: str, ranks: int) -> int:
-    """Return the exit status of tests in a folder at this number of ranks; `tests` are pytest's, or the hostile ones."""
+    """Return the exit status of tests in a folder at this number of ranks; `tests` are pytest's or hostile ones."""
     is_hostile = tests.startswith("hostile ")
     words = [sys.executable, "-m", *([] if is_hostile else PYTEST), *shlex.split(tests)]
     command = words if ranks == 1 else ["mpirun", "--oversubscribe", "-n", str(ranks), *words, "-m", "parallel"]
