@@ -104,3 +104,14 @@ class StiffnessBounds:
     voigt: Float = described("upper bound of the stiffness: uniform strain", STRESS, "(3, 3)")
     reuss: Float = described("lower bound of the stiffness: uniform stress", STRESS, "(3, 3)")
     hashin_shtrikman: Bounds | None = described("bounds of isotropic composites; null if a phase is not isotropic")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class UncertainConstants:
+    """Scatter of the n constants of a cell by that of p constants of its phases and interfaces, of first order."""
+
+    parameters: tuple[str, ...] = described("uncertain constants of the case, such as `material.fibre.young`")
+    parameter_std: Float = described("their standard deviations, each in its unit", "", "(p,)")
+    constants: tuple[str, ...] = described("as in `sensitivities`")
+    std: Float = described("their standard deviations, each in its unit", "", "(n,)")
+    shares: Float = described("share of each parameter in the variance of each constant", "", "(n, p)")

@@ -1,4 +1,4 @@
-"""Derivatives of a stiffness and of the constants that follow from it, as an entry of result.json."""
+"""Derivatives of a stiffness and of the constants that follow from it, and what scatter of phases makes of them."""
 
 from __future__ import annotations
 
@@ -7,8 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from feti_homog.analysis.cell_records import UncertainConstants
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result_records import Sensitivities
+from feti_homog.case.case import Case
+from feti_homog.errors import CaseError
 from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.sensitivities import derivatives
@@ -42,3 +45,28 @@ def sensitivities(
             derivatives=np.array(columns).T,
         )
     }
+
+
+def propagated(case: Case, document: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the entry `uncertainty` of `Result`: standard deviations of first order, and their shares.
+
+    With the derivatives J of the constants by the uncertain ones, of covariance V, the variances are those of J V J^T;
+    the share of a constant is J_k (V J^T)_k, so that shares of correlated constants may be negative.
+
+    Raises:
+        CaseError: the stiffness does not depend on an uncertain constant.
+    """
+    found: Sensitivities = document["sensitivities"]
+    std = case.uncertainty.std
+    idle = [name for name in std if name not in found.parameters]
+    if idle:
+        raise CaseError(*(f"[uncertainty] {name}: the stiffness does not depend on it" for name in idle))
+    J = found.derivatives[:, [found.parameters.index(name) for name in std]]
+    sizes = np.array([*std.values()])
+    parts = J * (J @ (np.outer(sizes, sizes) * case.uncertainty.matrix()))
+    variance = np.maximum(parts.sum(axis=1), 0.0)
+    shares = np.divide(parts, variance[:, None], out=np.zeros_like(parts), where=variance[:, None] > 0)
+    own = UncertainConstants(
+        parameters=tuple(std), parameter_std=sizes, constants=found.constants, std=np.sqrt(variance), shares=shares
+    )
+    return {"uncertainty": own}

@@ -8,7 +8,7 @@ from feti_homog.analysis.constants import constants
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.mesh_errors import mesh_error, unit_errors
 from feti_homog.analysis.registry import Analysis
-from feti_homog.analysis.sensitivities import sensitivities
+from feti_homog.analysis.sensitivities import propagated, sensitivities
 from feti_homog.errors import CaseError
 from feti_homog.homogenization.averaging import asymmetry
 
@@ -20,14 +20,15 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     """`effective_stiffness`, whose columns are the stresses under the unit strains.
 
     With contact between debonded faces also `effective_stiffness_compression`, its columns -Sigma(-E); `tips` of
-    debonded arcs under each of them; `mesh_error` of the estimated errors; `sensitivities` if the case asks for them.
+    debonded arcs under each of them; `mesh_error` of the estimated errors; `sensitivities` and `uncertainty` if
+    the case asks for them.
 
     If a temperature is a load, `thermal_stress` under a unit of it, and `thermal_stress_compression`.
     """
     bonds = context.bonds(None)
     starts = context.loads.zero_multipliers()
     one_sided = context.plane.interface.contact and context.plane.counts(bonds.status)["open"] > 0
-    if one_sided and context.case.output.sensitivities:
+    if one_sided and context.needs_sensitivities:
         raise CaseError("[output] sensitivities: contact of debonded faces is not linear; expected contact = false")
     columns, responses = context.unit_responses("", bonds, starts, 1.0)
     errors, responses = unit_errors(context, responses)
@@ -47,7 +48,8 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     if context.case.interface is not None:
         document["tips"] = context.tips.of(under, loads)
     document |= constants(context.cell, document)
-    document |= sensitivities(context, document, responses) if context.case.output.sensitivities else {}
+    document |= sensitivities(context, document, responses) if context.needs_sensitivities else {}
+    document |= propagated(context.case, document) if context.case.uncertainty.std else {}
     return document | mesh_error(context, document, errors, errors_of_minus)
 
 

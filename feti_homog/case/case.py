@@ -44,6 +44,7 @@ from feti_homog.case.sections import (
     read_petsc,
 )
 from feti_homog.case.selectors import ANALYSIS_TYPE, CRITERION, METHOD, PLANE
+from feti_homog.case.uncertainty import UNCERTAINTY, Uncertainty, read_uncertainty
 from feti_homog.errors import CaseError
 from feti_homog.materials.forms import Material
 from feti_homog.materials.laws import contrast_faults, contrast_warnings
@@ -64,6 +65,7 @@ class Case:
         interfaces: none if the bonding is perfect; of several each has its pair of phases.
         angle, path, single_load, envelope: there if the analysis is of that type; single_load is the section [load].
         petsc: options without dash.
+        uncertainty: of constants, whose means the case has.
     """
 
     name: str
@@ -78,6 +80,7 @@ class Case:
     decomposition: Decomposition
     output: Output
     petsc: dict[str, Scalar]
+    uncertainty: Uncertainty
 
     @classmethod
     def load(cls, path: str | Path) -> Case:
@@ -151,7 +154,8 @@ class Case:
         document |= {section: to_table(contents, selected) for section, contents in given.items()}
         if len(self.interfaces) > 1:
             document["interface"] = [to_table(interface, selected) for interface in self.interfaces]
-        return document | {"petsc": dict(self.petsc)}
+        uncertain = {UNCERTAINTY: self.uncertainty.to_table()} if self.uncertainty.std else {}
+        return document | uncertain | {"petsc": dict(self.petsc)}
 
     def digest(self) -> str:
         """Short name of what the case computes: the same whatever its name, output, PETSc options and max_events."""
@@ -194,9 +198,11 @@ def check_stored(values: Mapping[str, Any]) -> None:
         raise CaseError(*faults)
 
 
-def _read_sections(document: Mapping[str, Any], folder: Path | None) -> tuple[dict[str, Any], list[str]]:
+def _read_sections(document: dict[str, Any], folder: Path | None) -> tuple[dict[str, Any], list[str]]:
     """Return what sections hold, with the files of [cell] in `folder` if one is given, and their faults."""
-    reader = TableReader(_selected(document), KEY_OWNERS, _top_level_faults(document))
+    uncertain_faults: list[str] = []
+    uncertainty = read_uncertainty(document, uncertain_faults)
+    reader = TableReader(_selected(document), KEY_OWNERS, _top_level_faults(document) + uncertain_faults)
     selected, faults = reader.selected, reader.faults
     of_rules = [[*rule.faults(document, selected)] for rule in RULES]
     foreign = {rule.path[0] for rule, found in zip(RULES, of_rules, strict=True) if found and rule.schema is False}
@@ -210,6 +216,7 @@ def _read_sections(document: Mapping[str, Any], folder: Path | None) -> tuple[di
         **{FIELDS.get(name, name): _read_section(document, name, reader) for name in SECTIONS_OF_AN_ANALYSIS},
         "output": _read_section(document, "output", reader),
         "petsc": read_petsc(document.get("petsc", {}), faults),
+        "uncertainty": uncertainty,
     }
     faults += chain.from_iterable(of_rules)
     # What has keys of other cases is not looked into.

@@ -27,6 +27,7 @@ from feti_homog.case.sections import (
     SweepSection,
 )
 from feti_homog.case.selectors import CRITERION, GENERALIZED, PLANE
+from feti_homog.case.uncertainty import UNCERTAINTY
 from feti_homog.materials.forms import EXPANSION_PAIR, MATERIAL_FORMS
 from feti_homog.materials.laws import NEEDED
 from feti_homog.schema.keys import Condition, Key, defaults_of, keys_of
@@ -50,6 +51,7 @@ def json_schema() -> Schema:
             "interface": {"anyOf": [_reference("interface"), _several(_reference("interface"))]},
             "material": _materials(),
             "petsc": _petsc(),
+            UNCERTAINTY: {"type": "object"},
             SWEEP: _sweep(),
         },
         "additionalProperties": False,

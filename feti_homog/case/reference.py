@@ -20,6 +20,7 @@ from feti_homog.case.sections import (
     SweepSection,
     Table,
 )
+from feti_homog.case.uncertainty import CORRELATION, UNCERTAINTY
 from feti_homog.errors import CaseError
 from feti_homog.materials.forms import Isotropic
 from feti_homog.schema.keys import Key, keys_of
@@ -38,6 +39,7 @@ ORDER = (
     "decomposition",
     "output",
     "petsc",
+    UNCERTAINTY,
     SWEEP,
     UNKNOWN,
     MEASURED,
@@ -97,7 +99,14 @@ class TableReference:
 
 def tables() -> list[TableReference]:
     """All tables of the case file, in the order of `ORDER`."""
-    found = [_name_table(), *map(_table, (*TABLES, *FIT_TABLES)), _petsc_table(), _sweep_table(), _range_table()]
+    found = [
+        _name_table(),
+        *map(_table, (*TABLES, *FIT_TABLES)),
+        _petsc_table(),
+        _uncertainty_table(),
+        _sweep_table(),
+        _range_table(),
+    ]
     return sorted(found, key=lambda table: ORDER.index(table.section))
 
 
@@ -153,6 +162,19 @@ def _petsc_table() -> TableReference:
         "belong there alone."
     )
     return TableReference("petsc", "[petsc]", meaning, (option,))
+
+
+def _uncertainty_table() -> TableReference:
+    place = f"[{UNCERTAINTY}]"
+    words = (
+        "Standard deviation of a constant of [material.PHASE], or of a stiffness of [interface], whose value is the "
+        "mean. In place of both, the constant itself may be {mean, std} or {mean, cv}, cv = std / |mean|."
+    )
+    std = KeyRow(UNCERTAINTY, place, "SECTION.KEY", "a number above 0", "that of the key", "", "", words)
+    accepts = "a list of [KEY, KEY, VALUE], values from -1 to 1"
+    pairs = KeyRow(UNCERTAINTY, place, CORRELATION, accepts, "", "", "", "Correlation of pairs of these constants.")
+    meaning = "scatter of constants, which a stiffness passes on to all constants of the cell, of first order."
+    return TableReference(UNCERTAINTY, place, meaning, (std, pairs))
 
 
 def _sweep_table() -> TableReference:

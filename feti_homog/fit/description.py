@@ -116,7 +116,7 @@ def parse(values: Mapping[str, Any], folder: Path) -> Fit:
         )
     if reader.faults:
         raise CaseError(*reader.faults)
-    own = {dotted_key(path): value for path, value in unknowns.items()}
+    own = {".".join(path): value for path, value in unknowns.items()}
     fit = Fit(str(document.get("name", "fit")), document, folder, own, [*unknowns], assignments, data)
     faults = [*_case_faults(fit)]
     if faults:

@@ -10,7 +10,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from feti_homog.report.plots.plot_helpers import plain
-from feti_homog.report.text import stiffness_tables
+from feti_homog.report.text import sensitivity_tables
 
 CELL = (0.95, 0.42)  # inches of an entry
 LETTER = 0.085  # inches
@@ -20,7 +20,7 @@ DARK = 0.6  # share of the largest from which numbers are white
 
 def figure(document: Mapping[str, Any]) -> Figure | None:
     """Return the elasticities d ln c / d ln p, a row for each p and a column for each c; None without sensitivities."""
-    tables = stiffness_tables.sensitivities(document)
+    tables = sensitivity_tables.sensitivities(document)
     if not tables or not tables[0].rows:
         return None
     names = [plain(str(row[0])) for row in tables[0].rows]

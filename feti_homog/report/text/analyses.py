@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.materials.plane_state import plane_state_of
-from feti_homog.report.text import material_axes, point_tables, stiffness_tables
+from feti_homog.report.text import material_axes, point_tables, sensitivity_tables, stiffness_tables
 from feti_homog.report.text.path_table import path_table, peak_table
 from feti_homog.report.text.table import Table
 from feti_homog.results.kept_points import chosen, chosen_states
@@ -59,7 +59,8 @@ def _stiffness_lines(document: Document, label: str, toughness: str) -> list[lis
     """Return the effective stiffness with what follows from it; units in brackets."""
     blocks = [table.lines for table in stiffness_tables.stiffnesses(document, label)]
     last = [table.lines for table in point_tables.tip_table(document.get("tips"), toughness)]
-    last += [table.lines for table in stiffness_tables.sensitivities(document)]
+    last += [table.lines for table in sensitivity_tables.sensitivities(document)]
+    last += [table.lines for table in sensitivity_tables.uncertainty(document)]
     if plane_state_of(document).is_spatial:
         thermal = [table.lines for table in stiffness_tables.thermal(document, label)]
         own = material_axes.lines(document, label)
@@ -79,7 +80,8 @@ def _stiffness_tables(document: Document, label: str, most: int) -> list[Table]:
         *stiffness_tables.constants(document, label),
         *stiffness_tables.moduli(document, document["case"].get("output", {}).get("stress_unit", "")),
         *stiffness_tables.bounds(document, label),
-        *stiffness_tables.sensitivities(document),
+        *sensitivity_tables.sensitivities(document),
+        *sensitivity_tables.uncertainty(document),
     ]
 
 

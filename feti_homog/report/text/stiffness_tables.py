@@ -9,7 +9,7 @@ from typing import Any
 
 from feti_homog.case.phase_names import COATING
 from feti_homog.materials.voigt import SPATIAL_STRESSES, STRAINS, voigt_names
-from feti_homog.report.text.table import Column, Table, number, with_unit, without_noise
+from feti_homog.report.text.table import Column, Table, number, with_unit
 
 NAMES = Column("", -28)
 STIFF = ("C11", "C22", "C33")
@@ -27,12 +27,6 @@ MESH_ERROR = "Mesh error, estimated"
 NO_ERROR = 1e-7
 LEAST_DECIMAL, MOST_DECIMAL = 1e-4, 1e8  # numbers between these are printed to the digits of their errors
 CELL_AXES = ", axes of the cell, x3 along the fibres"
-# Constants of which sensitivities are shown, by whether the cell is in space; all are in result.json.
-SHOWN = {
-    False: ("C11", "C22", "C12", "C33", "E1", "E2", "nu12", "G12"),
-    True: ("E_axial", "E_transverse", "nu_axial", "nu_transverse", "G_axial", "G_transverse", "expansion.3",
-           "expansion.1"),
-}  # fmt: skip
 ABREAST = 5  # constants beside each other in text
 SHORT = {
     "E_axial": "E axial",
@@ -259,28 +253,3 @@ def _known(row: Document) -> dict[str, Any]:
 
 def _short(value: float | None, form: str = ".5g") -> str:
     return UNKNOWN if value is None else f"{value:{form}}"
-
-
-def sensitivities(document: Document) -> list[Table]:
-    """Elasticities d ln c / d ln p of constants c by parameters p, and derivatives dc / dp; none if not asked for."""
-    if (found := document.get("sensitivities")) is None:
-        return []
-    constants, width = found["constants"], max(map(len, found["parameters"])) + 4
-    at = [constants.index(name) for name in SHOWN["E3" in constants] if name in constants]
-    slopes, shares = list[list[Any]](), list[list[Any]]()
-    for j, (name, value) in enumerate(zip(found["parameters"], found["parameter_values"], strict=True)):
-        row = [found["derivatives"][k][j] for k in at]
-        slopes.append([name, *row])
-        shares.append(
-            [name, *(_share(slope * value, found["constant_values"][k]) for slope, k in zip(row, at, strict=True))]
-        )
-    words = "Elasticities, the relative change of a constant by that of a parameter"
-    return [
-        Table(title, [Column("", -width), *(Column(SHORT.get(constants[k], constants[k]), 12, form) for k in at)], rows)
-        for title, form, rows in ((words, ".4f", shares), ("Derivatives by the same parameters", ".3g", slopes))
-    ]
-
-
-def _share(change: float, size: float) -> float | str:
-    """Return a relative change, zero in place of noise; text of a constant that is zero."""
-    return without_noise(change / size) if size else UNKNOWN

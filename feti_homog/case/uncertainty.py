@@ -1,0 +1,134 @@
+"""Uncertain constants of a case: KEY = {mean, std} or {mean, cv} in place of a number, and their correlation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from feti_homog.case.document import TomlPath
+from feti_homog.schema.values import is_number
+from feti_homog.schema.wording import dotted_key, toml_value
+from feti_homog.typing import Float
+
+UNCERTAINTY, CORRELATION = "uncertainty", "correlation"
+ROUNDING = 1e-12
+EXPECTED = "expected {mean, std} or {mean, cv}, numbers, std and cv above 0"
+PLACES = "expected a constant of [material.PHASE], or a stiffness of [interface]"
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """Standard deviations of constants by dotted key, and correlations of pairs of them."""
+
+    std: Mapping[str, float]
+    correlation: tuple[tuple[str, str, float], ...] = ()
+
+    def matrix(self) -> Float:
+        """(p, p) correlation of all constants."""
+        names, found = [*self.std], np.eye(len(self.std))
+        for first, second, value in self.correlation:
+            i, j = names.index(first), names.index(second)
+            found[i, j] = found[j, i] = value
+        return found
+
+    def to_table(self) -> dict[str, Any]:
+        """Return the section [uncertainty] of a case whose constants are their means; empty of none."""
+        pairs = {CORRELATION: [list(pair) for pair in self.correlation]} if self.correlation else {}
+        return {**self.std, **pairs}
+
+
+def read_uncertainty(document: dict[str, Any], faults: list[str]) -> Uncertainty:
+    """Take the uncertainties out of a document, in which means are left."""
+    table = document.pop(UNCERTAINTY, {})
+    if not isinstance(table, dict):
+        faults.append(f"{UNCERTAINTY} = {toml_value(table)}: expected a section [{UNCERTAINTY}]")
+        return Uncertainty({})
+    pairs = table.get(CORRELATION, [])
+    std = dict(_leaves({name: value for name, value in table.items() if name != CORRELATION}))
+    for section in ("material", "interface"):
+        if section in document:
+            document[section] = _means(document[section], (section,), std, faults)
+    faults += _deviation_faults(document, std)
+    named = {".".join(path): value for path, value in std.items()}
+    faults += _pair_faults(pairs, named)
+    if faults:
+        return Uncertainty({})
+    found = Uncertainty(named, tuple((first, second, float(value)) for first, second, value in pairs))
+    if named and np.linalg.eigvalsh(found.matrix()).min() < -ROUNDING:
+        faults.append(f"[{UNCERTAINTY}] {CORRELATION}: no constants are so correlated; expected a positive matrix")
+    return found
+
+
+def _deviation_faults(document: Mapping[str, Any], std: Mapping[TomlPath, Any]) -> Iterator[str]:
+    """Yield what is wrong with standard deviations and their places."""
+    for path, value in std.items():
+        name = dotted_key(path)
+        if not is_number(value) or value <= 0:
+            yield f"[{UNCERTAINTY}] {name} = {toml_value(value)}: expected a standard deviation above 0"
+        elif not _is_constant(document, path):
+            yield f"[{UNCERTAINTY}] {name}: {PLACES} whose value is a number"
+    analysis = document.get("analysis")
+    if std and isinstance(analysis, dict) and analysis.get("type") != "stiffness":
+        yield f'[{UNCERTAINTY}]: belongs to [analysis] type = "stiffness"'
+
+
+def _pair_faults(pairs: Any, named: Mapping[str, Any]) -> Iterator[str]:
+    """Yield what is wrong with pairs of correlated constants."""
+    words = f"expected [KEY, KEY, VALUE] of two uncertain constants, {' and '.join(named)}, from -1 to 1"
+    for pair in pairs if isinstance(pairs, list) else [pairs]:
+        if not _is_pair(pair, named):
+            yield f"[{UNCERTAINTY}] {CORRELATION} = {toml_value(pair)}: {words}"
+
+
+def _means(value: Any, path: TomlPath, std: dict[TomlPath, Any], faults: list[str]) -> Any:
+    """Return a value with the means of uncertain numbers, whose deviations are added to `std`."""
+    if isinstance(value, list):
+        return [_means(item, (*path, str(k)), std, faults) for k, item in enumerate(value, start=1)]
+    if not isinstance(value, dict):
+        return value
+    if "mean" not in value:
+        return {name: _means(item, (*path, name), std, faults) for name, item in value.items()}
+    deviation = _deviation(value)
+    if deviation is None:
+        faults.append(f"[{dotted_key(path[:-1])}] {path[-1]} = {toml_value(value)}: {EXPECTED}")
+    else:
+        std[path] = deviation
+    return value["mean"]
+
+
+def _deviation(value: Mapping[str, Any]) -> float | None:
+    """Return the standard deviation of {mean, std} or {mean, cv}; None if it is faulty."""
+    if value.keys() not in ({"mean", "std"}, {"mean", "cv"}) or not all(map(is_number, value.values())):
+        return None
+    spread = value["std"] if "std" in value else value["cv"] * abs(value["mean"])
+    return float(spread) if spread > 0 else None
+
+
+def _leaves(table: Mapping[str, Any], above: TomlPath = ()) -> Iterator[tuple[TomlPath, Any]]:
+    for name, value in table.items():
+        path = (*above, *name.split("."))
+        if isinstance(value, dict):
+            yield from _leaves(value, path)
+        else:
+            yield path, value
+
+
+def _is_constant(document: Mapping[str, Any], path: TomlPath) -> bool:
+    """Return whether the place has a number by which there are derivatives."""
+    found: Any = document
+    for name in path:
+        if isinstance(found, list):  # sections of one name, from 1
+            found = {str(number): each for number, each in enumerate(found, start=1)}
+        found = found.get(name) if isinstance(found, dict) else None
+    is_of_derivative = path[0] == "material" or (path[0] == "interface" and path[-1].endswith("_stiffness"))
+    return is_of_derivative and is_number(found)
+
+
+def _is_pair(pair: Any, named: Mapping[str, Any]) -> bool:
+    if not isinstance(pair, list) or len(pair) != len(("KEY", "KEY", "VALUE")):
+        return False
+    *names, value = pair
+    return names[0] != names[1] and all(str(name) in named for name in names) and is_number(value) and abs(value) <= 1

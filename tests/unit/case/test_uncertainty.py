@@ -1,0 +1,66 @@
+"""Uncertain constants of a case: read, refused with a line, and written so that the same case is read again."""
+
+from __future__ import annotations
+
+import tomllib
+
+import numpy as np
+import pytest
+from support.base_case import changed
+
+from feti_homog.case.case import Case
+from feti_homog.errors import CaseError
+
+UNCERTAIN = (
+    ("young = 88.0", "young = {mean = 88.0, cv = 0.05}"),
+    ("young = 200.0", "young = {mean = 200.0, std = 6.0}"),
+)
+PAIR = '[uncertainty]\ncorrelation = [["material.matrix.young", "material.fibre.young", 0.4]]\n'
+
+
+def test_means_stay_in_the_case_and_deviations_beside_them():
+    case = Case.parse(tomllib.loads(changed(*UNCERTAIN, end=PAIR)))
+    assert case.materials["matrix"].young == 88.0 and case.materials["fibre"].young == 200.0
+    assert case.uncertainty.std == pytest.approx({"material.matrix.young": 4.4, "material.fibre.young": 6.0})
+    assert case.uncertainty.matrix() == pytest.approx(np.array([[1.0, 0.4], [0.4, 1.0]]))
+    assert Case.parse(case.resolved()) == case
+    certain = Case.parse(tomllib.loads(changed()))
+    assert "uncertainty" not in certain.resolved() and certain.digest() != case.digest()
+    section = tomllib.loads(changed(end="[uncertainty]\nmaterial.matrix.young = 4.4\nmaterial.fibre.young = 6.0\n"))
+    assert dict(Case.parse(section).uncertainty.std) == pytest.approx(dict(case.uncertainty.std))
+
+
+@pytest.mark.parametrize(
+    ("edits", "end", "line"),
+    [
+        ([("young = 88.0", "young = {mean = 88.0}")], "",
+         "[material.matrix] young = {mean = 88.0}: expected {mean, std}"),
+        ([("young = 88.0", "young = {mean = 88.0, std = -1.0}")], "",
+         "[material.matrix] young = {mean = 88.0, std = -1.0}"),
+        ([("young = 88.0", "young = {mean = -88.0, std = 1.0}")], "",
+         "[material.matrix] young = -88.0: expected a number"),
+        ([("0.4", "{mean = 0.4, std = 0.01}")], "",
+         "[cell] fibre_fraction = {mean = 0.4, std = 0.01}: expected a number"),
+        ([], "[uncertainty]\ncell.fibre_fraction = 0.01\n",
+         "[uncertainty] cell.fibre_fraction: expected a constant of"),
+        ([], "[uncertainty]\nmaterial.fibre.yuong = 1.0\n",
+         "[uncertainty] material.fibre.yuong: expected a constant of"),
+        ([], "[uncertainty]\nmaterial.fibre.young = 0.0\n",
+         "[uncertainty] material.fibre.young = 0.0: expected a standard"),
+        ([], PAIR, "[uncertainty] correlation = "),
+        ([("young = 88.0", "young = {mean = 88.0, std = 1.0}"), ('"stiffness"', '"envelope"')], "",
+         '[uncertainty]: belongs to [analysis] type = "stiffness"'),
+    ],
+)  # fmt: skip
+def test_faults_have_their_line(edits, end, line):
+    with pytest.raises(CaseError) as error:
+        Case.parse(tomllib.loads(changed(*edits, end=end)))
+    assert any(fault.startswith(line) for fault in error.value.faults), error.value.faults
+
+
+def test_impossible_correlations_are_refused():
+    third = ("poisson = 0.222", "poisson = {mean = 0.222, std = 0.01}")
+    names = ["material.matrix.young", "material.fibre.young", "material.fibre.poisson"]
+    pairs = [[names[0], names[1], 0.9], [names[1], names[2], 0.9], [names[0], names[2], -0.9]]
+    with pytest.raises(CaseError, match="no constants are so correlated"):
+        Case.parse(tomllib.loads(changed(*UNCERTAIN, third)) | {"uncertainty": {"correlation": pairs}})
