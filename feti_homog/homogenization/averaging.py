@@ -130,9 +130,10 @@ class Homogenization:
         opening = allreduce_sum(self.cell.comm, self._strain_of_jumps.T @ opened)
         energy += self._stretched(state)
         rubbing = self._rubbing(state)
-        largest = (self._largest(u) + self.interface.scales.imposed(strain)) or 1.0
-        imposed = float(self.interface.scales.imposed_strain(strain).max()) or 1.0
-        least = self.interface.scales.stress_scale(strain) * imposed
+        acting = self.interface.acting(state.bonds, strain)
+        largest = (self._largest(u) + self.interface.scales.imposed(acting)) or 1.0
+        imposed = float(self.interface.scales.imposed_strain(acting).max()) or 1.0
+        least = self.interface.scales.stress_scale(acting) * imposed
         checks = {
             "strain": float(np.abs(star - opening / self.cell.summary.area).max() / imposed) + self._strain_inside,
             "hill": float(abs(energy + rubbing - stress @ strain) / (max(abs(energy), least) or 1.0)),
@@ -172,7 +173,8 @@ class Homogenization:
         """Return the error of the prescribed stresses. Collective."""
         load, scales = state.load, self.interface.scales
         # Scaled by the roots of their stiffnesses, so that none is small beside another.
-        root, imposed = scales.roots, scales.imposed_strain(state.solution.strain)
+        acting = self.interface.acting(state.bonds, state.solution.strain)
+        root, imposed = scales.roots, scales.imposed_strain(acting)
         off = np.abs((stress - load.values)[load.by_stress] / root[load.by_stress]).max()
         largest = max(np.abs(stress / root)[: len(imposed)].max(), (root[: len(imposed)] * imposed).max())
         return float(off / (largest or 1.0))

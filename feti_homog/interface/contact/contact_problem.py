@@ -261,10 +261,22 @@ class ContactProblem:
             np.where(damaged & ~bonds.pressed, overlap, solution.jump[self.nodes.row]),
             ((status != BONDED) & self.contact) | damaged,
             (status == CLOSED) | (damaged & bonds.pressed),
-            self.scales.imposed(solution.strain),
-            self.scales.bond_stress(solution.strain),
+            self.scales.imposed(acting := self.acting(bonds, solution.strain)),
+            self.scales.bond_stress(acting),
             self.scales.over_interface,
         )
+
+    def acting(self, bonds: BondState, strain: Float) -> Float:
+        """(v,) strains that errors are relative to: of the load, and with friction of the jumps that it left.
+
+        Collective.
+        """
+        if bonds.gap_and_slip is None:
+            return strain
+        jump = self.solver.comm.allreduce(float(np.abs(bonds.gap_and_slip).max(initial=0.0)), MPI.MAX)
+        m, acting = self.solver.problem.strains, np.abs(strain)
+        acting[:m] = np.maximum(acting[:m], jump / self.size.max())
+        return acting
 
     def _without_idle(self, status: Status, solution: DualSolution) -> tuple[Status, int]:
         """Return the status and the number of rigid motions that nothing resists.

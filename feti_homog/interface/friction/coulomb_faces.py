@@ -27,6 +27,8 @@ from feti_homog.typing import Bool, Float
 NOISE = 1e-10
 # Share of the forces of the loads that may be left on a free motion.
 UNBALANCED = 1e-7
+# What rounding leaves of a sum, relative to the sum of the sizes of its terms.
+ROUNDED_SUM = 1e-13
 # Block pivots without progress, after which one node at random changes at a time: with friction a fixed order may come
 # back to where it was.  And solves after which Lemke's method takes over.
 BLOCK_PIVOTS, LEAST_SOLVES, SOLVES_PER_NODE = 11, 50, 4
@@ -227,8 +229,13 @@ class CoulombFaces:
         return self._without_friction_free(allowed)
 
     def _noise_of_state(self, x: Float) -> float:
-        """Return the force, and jump, that is rounding in an equilibrium, with forces of its own where none load it."""
-        return max(self._noise(x, np.zeros(self.nodes)), NOISE * float(np.abs(self.forces(x)).max(initial=0.0)))
+        """Return the force, and jump, that is rounding in an equilibrium, with forces of its own where none load it.
+
+        Slips that an unloaded cell keeps leave forces of rounding.
+        """
+        summed = float((np.abs(self.S[: 2 * self.nodes]) @ np.abs(x)).max(initial=0.0))
+        largest = float(np.abs(self.forces(x)).max(initial=0.0))
+        return max(self._noise(x, np.zeros(self.nodes)), NOISE * largest, ROUNDED_SUM * summed)
 
     def next_change(self, status: Status, x: Float, rate: Float) -> float:
         """Return how far x goes on along its `rate` until a status ends, inf if none does."""

@@ -163,7 +163,7 @@ class SlidingCell:
         normal, shear = self.interface.traction(solution).T
         limit, scales = self.friction * np.maximum(-normal, 0.0), self.interface.scales
         largest = scales.over_interface(np.maximum(np.abs(normal), np.abs(shear)))
-        largest = np.maximum(largest, scales.bond_stress(solution.strain))
+        largest = np.maximum(largest, scales.bond_stress(self.interface.acting(bonds, solution.strain)))
         sliding = bonds.sliding_signs
         off = np.where(sliding == 0, np.maximum(np.abs(shear) - limit, 0.0), np.abs(sliding * shear - limit))
         off = np.where(bonds.status == BONDED, 0.0, off) / np.where(largest > 0.0, largest, 1.0)

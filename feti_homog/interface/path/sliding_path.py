@@ -31,6 +31,8 @@ LEAST_SHARE = 0.01
 # Changes in a row at the same load, after which they count as a cycle.
 MOST_CHANGES_AT_A_LOAD = 200
 SAME_LOAD = 1e-12
+# What is left of a jump or a strain, relative to what it was, that is rounding: an unloaded cell bears nothing.
+CANCELLED = 1e-12
 CYCLE = "friction: the statuses of the faces change without end at one load (a cycle)"
 
 
@@ -110,14 +112,17 @@ class SlidingLeg:
         """Go on along the rates up to the next change, and past it."""
         here, faces, cell = self._here, self.sliding.faces, self.cell
         x = on_root(cell.comm, faces.settled, status, self._given(self._share, here.x), here.x)
-        change = cell.comm.bcast(faces.next_change(status, x, rate))
-        whole = x + min(1.0 - self._share, change) * rate
+        change, rest = cell.comm.bcast(faces.next_change(status, x, rate)), 1.0 - self._share
+        if change >= rest - SAME_LOAD:
+            change = np.inf
+        whole = x + min(rest, change) * rate
         tractions = (self._traction(each) for each in (x, whole))
         bonds = self.sliding.bonds(self._bonds, status, x)
         breaks = first_break_between(cell, self.law, bonds, *tractions)
-        way = min(breaks, 1.0) * min(1.0 - self._share, change)
-        self._go(status, x, x + way * rate)
-        at_end = breaks > 1.0 and self._share + change >= 1.0
+        way = min(breaks, 1.0) * min(rest, change)
+        there = x + way * rate
+        self._go(status, x, np.where(np.abs(there) > CANCELLED * np.abs(x), there, 0.0))
+        at_end = breaks > 1.0 and change >= rest
         self._share = 1.0 if at_end else self._share + way
         if breaks <= 1.0:
             yield from self._break()
