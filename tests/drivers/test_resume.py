@@ -66,7 +66,6 @@ expansion = 5e-6
 [analysis]
 type = "path"
 plane = "generalized"
-
 [interface]
 normal_stiffness = 60.0
 tangential_stiffness = 25.0
@@ -80,7 +79,6 @@ waypoints = [{temperature = -100.0}, {S22 = 0.04, S13 = 0.01}, {S22 = -0.01}]
 fields = false
 pictures = false
 states = "all"
-
 [petsc]
 feti_pc_type = "influence"
 """
@@ -125,20 +123,17 @@ def killed(ranks: int, case: Path, out: Path, at: int, *words: str, moment: str 
     return events(out)
 
 
-def committed(at: int, after: bool) -> Hook:
-    """When the file of the `at`-th event gets its name."""
-    when = f"args[1].name == '{at - 1:06d}.h5'"
+def committed(when: str, after: bool) -> Hook:
+    """When the file of an event gets its name."""
     return Hook("feti_homog.results.atomic:commit", WAIT, when=when, after=after)
 
 
 # When a path is killed: the last of so many events has just been kept, or the next is written or computed, or a second
 # file has been kept after one of several events.
 MOMENTS = {
-    "kept": lambda _, at: committed(at, after=True),
-    "written": lambda _, at: committed(at + 1, after=False),
-    "several": lambda *_: Hook(
-        "feti_homog.results.atomic:commit", WAIT, when="'000000.h5' < args[1].name < '999999.h5'", after=True
-    ),
+    "kept": lambda _, at: committed(f"args[1].name == '{at - 1:06d}.h5'", after=True),
+    "written": lambda _, at: committed(f"args[1].name == '{at:06d}.h5'", after=False),
+    "several": lambda *_: committed("'000000.h5' < args[1].name < '999999.h5'", after=True),
     "computed": lambda out, at: Hook(SOLVE, WAIT, when=f"os.path.exists('{out}/checkpoint/{at - 1:06d}.h5')"),
 }
 
