@@ -12,8 +12,8 @@ from typing import Any
 
 from feti_homog.case import element_choice, element_sizes
 from feti_homog.case.asked import AnalysisSection, Stiffness
-from feti_homog.case.cell_files import with_files, with_match
-from feti_homog.case.cell_section import GEOMETRY, TOUCHING, Cell, size_faults
+from feti_homog.case.cell_files import checked_cell
+from feti_homog.case.cell_section import GEOMETRY, Cell
 from feti_homog.case.document import read_document, to_document
 from feti_homog.case.fit_sections import FIT_SECTIONS
 from feti_homog.case.interface_faults import read_interfaces
@@ -26,7 +26,6 @@ from feti_homog.case.material_sections import (
     provider,
     read_materials,
 )
-from feti_homog.case.mixed_cell import mix_faults
 from feti_homog.case.mixed_load import completed
 from feti_homog.case.rules import RULES
 from feti_homog.case.sections import (
@@ -51,7 +50,7 @@ from feti_homog.materials.laws import contrast_faults, contrast_warnings
 from feti_homog.runtime import input_files
 from feti_homog.schema.keys import Selected, TableReader, selected_value, to_table
 from feti_homog.schema.values import text
-from feti_homog.schema.wording import limit_in_words, suggestion, toml_key, toml_value
+from feti_homog.schema.wording import suggestion, toml_key, toml_value
 
 FIELDS = {"load": "single_load"}  # of a section whose name is that of a method
 
@@ -208,7 +207,7 @@ def _read_sections(document: dict[str, Any], folder: Path | None) -> tuple[dict[
     foreign = {rule.path[0] for rule, found in zip(RULES, of_rules, strict=True) if found and rule.schema is False}
     cell = _read_section(document, "cell", reader)
     sections = {
-        "cell": None if "cell" in foreign or cell is None or not folder else _checked_cell(cell, folder, faults),
+        "cell": None if "cell" in foreign or cell is None or not folder else checked_cell(cell, folder, faults),
         "materials": read_materials(document.get("material"), document.get("cell"), selected[PLANE], reader),
         "analysis": _read_section(document, "analysis", reader),
         "decomposition": _read_section(document, "decomposition", reader),
@@ -273,24 +272,6 @@ def _read_section(document: Mapping[str, Any], section: str, reader: TableReader
     if section not in document and section in (*REQUIRED, *SECTIONS_OF_AN_ANALYSIS):
         return None
     return reader.read(SECTIONS[section], document.get(section, {}), section)
-
-
-def _checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
-    """Return the cell with what its files have; faults between its keys are added to `faults`."""
-    cell = with_match(cell, folder, faults)
-    if cell.fibre_fraction is not None:
-        spacing = (cell.coating or 0.0) + (cell.min_gap if cell.geometry == "random" else 0.0)
-        limit = TOUCHING[cell.geometry] / (1.0 + spacing) ** 2
-        if cell.fibre_fraction >= limit:
-            reason = "there the coatings touch" if cell.coating else "there the fibres touch"
-            reason = "no circles min_gap apart are denser" if spacing > (cell.coating or 0.0) else reason
-            faults.append(
-                f"[cell] fibre_fraction = {cell.fibre_fraction}: expected less than "
-                f"{limit_in_words(limit, cell.fibre_fraction, 4)} for "
-                f"geometry = {toml_value(cell.geometry)}: {reason}"
-            )
-    faults += size_faults(cell) + mix_faults(cell)
-    return with_files(cell, folder, faults)
 
 
 def _sized_cell(table: Mapping[str, Any], sections: Mapping[str, Any], faults: list[str]) -> Cell:

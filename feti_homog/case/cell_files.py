@@ -8,13 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-from feti_homog.case.cell_section import Cell
+from feti_homog.case.cell_section import TOUCHING, Cell, size_faults
 from feti_homog.case.fibre_table import FibreTable, read_table, table_of
+from feti_homog.case.mixed_cell import mix_faults
 from feti_homog.case.section_values import MESH_SUFFIXES, TABLE_SUFFIXES
 from feti_homog.case.table_shapes import check_shapes
 from feti_homog.errors import CaseError
 from feti_homog.fibres.outlines.shapes import given_shapes
-from feti_homog.schema.wording import toml_value
+from feti_homog.schema.wording import limit_in_words, toml_value
 
 SUFFIXES = {"mesh": MESH_SUFFIXES, "table": TABLE_SUFFIXES}
 LIST = "fibre_list"
@@ -24,7 +25,25 @@ MOST_LISTED = 20
 FEWEST_MATCHED = 10  # fibres: of fewer, distances have no distribution
 
 
-def with_files(cell: Cell, folder: Path, faults: list[str]) -> Cell:
+def checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
+    """Return the cell with what its files have; faults of them and between its keys are added to `faults`."""
+    cell = _with_match(cell, folder, faults)
+    if cell.fibre_fraction is not None:
+        spacing = (cell.coating or 0.0) + (cell.min_gap if cell.geometry == "random" else 0.0)
+        limit = TOUCHING[cell.geometry] / (1.0 + spacing) ** 2
+        if cell.fibre_fraction >= limit:
+            reason = "there the coatings touch" if cell.coating else "there the fibres touch"
+            reason = "no circles min_gap apart are denser" if spacing > (cell.coating or 0.0) else reason
+            faults.append(
+                f"[cell] fibre_fraction = {cell.fibre_fraction}: expected less than "
+                f"{limit_in_words(limit, cell.fibre_fraction, 4)} for "
+                f"geometry = {toml_value(cell.geometry)}: {reason}"
+            )
+    faults += size_faults(cell) + mix_faults(cell)
+    return _with_files(cell, folder, faults)
+
+
+def _with_files(cell: Cell, folder: Path, faults: list[str]) -> Cell:
     """Return the cell with its file's path completed and its table read; faults are added to `faults`."""
     if cell.geometry not in SUFFIXES or (cell.file is not None and cell.fibre_list is not None):
         return cell
@@ -48,7 +67,7 @@ def missing(file: Path) -> str:
     return f"a folder; expected a file at {file}" if os.path.isdir(file) else f"no such file (expected at {file})"
 
 
-def with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
+def _with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
     """Return the cell with its table read and what follows from it.
 
     The path of the table is completed; number and fraction are those of the table's fibres where the cell has none of

@@ -26,7 +26,7 @@ from feti_homog.case.sections import (
     TOP_LEVEL,
     SweepSection,
 )
-from feti_homog.case.selectors import CRITERION, GENERALIZED, PLANE
+from feti_homog.case.selectors import ANALYSIS_TYPE, CRITERION, GENERALIZED, PLANE
 from feti_homog.case.uncertainty import UNCERTAINTY
 from feti_homog.materials.forms import EXPANSION_PAIR, MATERIAL_FORMS
 from feti_homog.materials.laws import NEEDED
@@ -51,13 +51,14 @@ def json_schema() -> Schema:
             "interface": {"anyOf": [_reference("interface"), _several(_reference("interface"))]},
             "material": _materials(),
             "petsc": _petsc(),
-            UNCERTAINTY: {"type": "object"},
+            UNCERTAINTY: {"type": "object"},  # of cases that are written; files give {mean, std} in place of a number
             SWEEP: _sweep(),
         },
         "additionalProperties": False,
         "$defs": {
             **{section: _table(contents) for section, contents in SECTIONS.items()},
-            **{_definition(form): _table(contents) for form, contents in MATERIAL_FORMS.items()},
+            "interface": _with_uncertain(_table(SECTIONS["interface"]), "_stiffness"),
+            **{_definition(form): _with_uncertain(_table(contents)) for form, contents in MATERIAL_FORMS.items()},
             "arc": _table(Arc),
             "scatter": _table(Scatter),
             "mixed_load": _table(MixedLoad),
@@ -96,6 +97,17 @@ def _table(contents: type[Any]) -> Schema:
 def _key(entry: Key) -> Schema:
     unit = f" Unit: {entry.unit}." if entry.unit else ""
     return dict(entry.type.json_schema) | {"description": entry.meaning + unit}
+
+
+def _with_uncertain(table: Schema, ending: str = "") -> Schema:
+    """Return a table whose numbers, of keys with this ending, may be {mean, std} or {mean, cv}."""
+    for name, one in table["properties"].items():
+        if name.endswith(ending) and one.get("type") == "number":
+            words = {key: one.pop(key) for key in ("description", "default") if key in one}
+            positive = {"type": "number", "exclusiveMinimum": 0}
+            spread = [_object({"mean": one, by: positive}) | {"required": ["mean", by]} for by in ("std", "cv")]
+            table["properties"][name] = {"anyOf": [one, *spread]} | words
+    return table
 
 
 def _materials() -> Schema:
@@ -195,11 +207,17 @@ def _material_rules() -> list[Schema]:
     unmixed = {"allOf": [_if(ALL_CIRCULAR), {"not": _at(("cell",), {"required": ["mix"]})}]}
     coated = _at(("cell",), {"required": ["coating"]})
     uncoated = {"allOf": [_if(ALL_CIRCULAR), {"not": coated}]}
+    certain = {"additionalProperties": {"not": {"type": "object", "required": ["mean"]}}}
+    passed_on = {
+        "if": _if(ANALYSIS_TYPE.among("stiffness")),
+        "else": {"allOf": [_each_material(certain), _at(("interface",), certain)]},
+    }
     return [
         _at(("material",), phases | {"propertyNames": {"not": {"enum": sorted(CONSTANTS)}}}),
         {"if": _if(ALL_CIRCULAR), "then": _at(("material",), of_circles)},
         {"if": unmixed, "then": _at(("material",), of_one_phase)},
         {"if": warm, "then": _each_material(expand)},
+        passed_on,
         *(_needs(form, plane, names) for form, planes in NEEDED.items() for plane, names in planes.items()),
         {"if": _if(GENERALIZED), "then": _each_material({"properties": {"stiffness": {"minItems": 6}}})},
         {"if": coated, "then": _at(("material",), {"required": [COATING]})},

@@ -250,7 +250,7 @@ class ContactProblem:
 
     def certificate(self, bonds: BondState, solution: DualSolution) -> dict[str, float]:
         """Return the errors of the KKT conditions.  Collective."""
-        status, gained = bonds.status, self._gained(bonds)
+        status, gained, acting = bonds.status, self._gained(bonds), self.acting(bonds, solution.strain)
         damaged = gained > 0.0
         # A pulled bond opens by its damage; one that is found pulled under pressure overlaps.
         overlap = np.minimum(gained * solution.lam[self.nodes.row], 0.0)
@@ -261,7 +261,7 @@ class ContactProblem:
             np.where(damaged & ~bonds.pressed, overlap, solution.jump[self.nodes.row]),
             ((status != BONDED) & self.contact) | damaged,
             (status == CLOSED) | (damaged & bonds.pressed),
-            self.scales.imposed(acting := self.acting(bonds, solution.strain)),
+            self.scales.imposed(acting),
             self.scales.bond_stress(acting),
             self.scales.over_interface,
         )
@@ -274,9 +274,8 @@ class ContactProblem:
         if bonds.gap_and_slip is None:
             return strain
         jump = self.solver.comm.allreduce(float(np.abs(bonds.gap_and_slip).max(initial=0.0)), MPI.MAX)
-        m, acting = self.solver.problem.strains, np.abs(strain)
-        acting[:m] = np.maximum(acting[:m], jump / self.size.max())
-        return acting
+        is_strain = np.arange(len(strain)) < self.solver.problem.strains
+        return np.maximum(np.abs(strain), np.where(is_strain, jump / self.size.max(), 0.0))
 
     def _without_idle(self, status: Status, solution: DualSolution) -> tuple[Status, int]:
         """Return the status and the number of rigid motions that nothing resists.
