@@ -69,6 +69,8 @@ def follow(context: AnalysisContext, path: LoadPath, law: BondLaw) -> dict[str, 
             if not _goes_on(context, path, point, number + 1):
                 break
     context.checkpoint.flush()
+    if last is not None and last.state.converged:
+        _checked(context, last, f"{_label(path, len(entries) - 1)}, confirmed")
     states = _kept(context, path, law, entries, last)
     if not entries:
         return {"path": (), "resumed": known} | states
@@ -225,14 +227,22 @@ def _kept(
                 if number == len(entries) - 1
                 else restored(context.checkpoint.read(number), context.loads.interfaces)[0]
             )
-            point = replace(point, state=context.loads.interfaces.completed(point.state))
+            point, responses = _checked(context, point, _label(path, number))
             if tips is not None:
                 entries[number]["tips"] = tips.of(point)
             if context.states.has_place:
-                responses = context.loads.responses(point.state, point.scale)
                 context.record_state(responses, point.load_factor, _label(path, number), number)
         words.append(f"{len(numbers)} of {len(entries)} points")
     return {"states": numbers} if context.states.has_place else {}
+
+
+def _checked(context: AnalysisContext, point: Point, name: str) -> tuple[Point, Sequence[Response]]:
+    """Return a point with what F lambda gives, whose checks are recorded, and its responses.  Collective."""
+    point = replace(point, state=context.loads.interfaces.completed(point.state))
+    responses = context.loads.responses(point.state, point.scale)
+    for response in responses:
+        context.checks.require(name, response.checks)
+    return point, responses
 
 
 class EventProgress:

@@ -6,12 +6,13 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from feti_homog.errors import ConvergenceError
 from feti_homog.feti.active_jumps import ActiveJumps
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace
 from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.feti.operators.interface_operators import DualOperator
 from feti_homog.feti.preconditioners.exact_inverse import ExactInverse
-from feti_homog.feti.thresholds import LEAST_UNCONFIRMED_JUMP, MOST_UNCONFIRMED
+from feti_homog.feti.thresholds import LEAST_UNCONFIRMED_JUMP, MOST_UNCONFIRMED, MOST_UNCONFIRMED_ERROR
 from feti_homog.parallel.distributed_arrays import allreduce_sum
 from feti_homog.typing import Float
 
@@ -51,10 +52,29 @@ class InfluenceSolutions:
         """Record solutions that F lambda confirmed, or that iterations had to improve; none of loads that are unseen.
 
         Collective.
+
+        Raises:
+            ConvergenceError: solves were spared since the last, and the columns are off by more than checks pass.
         """
+        spared = self._granted - self._left
         confirmed = bool(solutions) and all(each.iterations == 0 and each.reason > 0 for each in solutions)
         self._granted = min(2 * self._granted + 1, MOST_UNCONFIRMED) if confirmed else 0
         self._left, self._residual = self._granted, max((each.residual for each in solutions), default=0.0)
+        if spared and solutions and not confirmed and (off := self._error(solutions, d)) > MOST_UNCONFIRMED_ERROR:
+            raise ConvergenceError(
+                f"influence columns: multipliers of the last {spared} solves may be off by {off:.1e}"
+            )
         if confirmed:
             seen = self._jumps.projected(d, self._jumps.norms(d))
             self._squares = allreduce_sum(self._comm, np.stack([seen.T @ seen, d.T @ d]))
+
+    def _error(self, solutions: list[DualSolution], d: Float) -> float:
+        """Return how far the columns are off multipliers that iterations have found, relative to the largest.
+
+        Collective.
+        """
+        lam = np.stack([each.lam for each in solutions], axis=1)
+        by_columns = self._inverse.answer(d, np.stack([each.strain for each in solutions], axis=1))[0]
+        parts = np.abs([by_columns - lam, lam]).max(axis=1, initial=0.0)
+        self._comm.Allreduce(MPI.IN_PLACE, parts, MPI.MAX)
+        return float((parts[0] / np.where(parts[1] > 0.0, parts[1], 1.0)).max())

@@ -114,19 +114,20 @@ def estimate(
     size = _sizes(start)
     singular = np.linalg.svd(jacobian(start) / std[:, None] * size, compute_uv=False)
     is_full = len(y) >= len(start) and singular.min() > RANK_TOLERANCE * singular.max()
+    # Every unknown relative to its start, so that no unit decides where the search ends.
     found = least_squares(
-        lambda x: (model(x) - y) / std,
-        start,
-        lambda x: jacobian(x) / std[:, None],
-        bounds=bounds,
+        lambda z: (model(z * size) - y) / std,
+        start / size,
+        lambda z: jacobian(z * size) * size / std[:, None],
+        bounds=(bounds[0] / size, bounds[1] / size),
         method="dogbox" if is_full else "trf",
-        x_scale=size,
         xtol=STEP,
         ftol=FALL,
         gtol=SLOPE,
         max_nfev=MOST_EVALUATIONS,
     )
-    return summarize(found.x, found.fun * std + y, measured, found.jac * std[:, None], bounds,
+    x, derivatives = found.x * size, found.jac * std[:, None] / size
+    return summarize(x, found.fun * std + y, measured, derivatives, bounds,
                      evaluations=found.nfev, converged=bool(found.success))  # fmt: skip
 
 

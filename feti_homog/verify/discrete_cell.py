@@ -10,10 +10,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from feti_homog.typing import Bool, Float, Int
-from feti_homog.verify.bonds import inwardness, pairs_of
+from feti_homog.verify.bonds import friction_at, inwardness, pairs_of
 from feti_homog.verify.constitutive_law import expansions, mixed_phases, plane_stiffnesses, spatial_stiffnesses
 from feti_homog.verify.elements import Elements
-from feti_homog.verify.reading import ResultFiles, gradient
+from feti_homog.verify.reading import ResultFiles, State, gradient
 from feti_homog.verify.torus import TornNodes, TornSides, along_one_line, constituents, torn, wrapped
 
 # Scales of a state are no less than this share of those of the run: a path may come back to zero strain.
@@ -171,7 +171,15 @@ class DiscreteCell:
     def loads(self, state: Loaded) -> Float:
         """(v,) strains that the loads of a state make, for scales: E, and the largest that temperature makes."""
         free = self.free_strains(state)
-        return state.strain if free is None else np.asarray(state.strain + np.abs(free).max(axis=0))
+        own = state.strain if free is None else np.asarray(state.strain + np.abs(free).max(axis=0))
+        # Slips that friction holds load an unloaded cell.
+        slip = float(np.abs(state.jump).max(initial=0.0)) if isinstance(state, State) and self._has_friction else 0.0
+        return np.asarray(own + np.copysign(slip / float(self.files.size.max()), own))
+
+    @property
+    def _has_friction(self) -> bool:
+        """True where faces of the result resist sliding."""
+        return bool(friction_at(self.files).any())
 
     def imposed(self, state: Loaded) -> float:
         """Largest displacement E x that a state imposes across the cell, at least that of a faint strain."""

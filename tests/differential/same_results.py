@@ -81,8 +81,8 @@ def resume(setting: Setting) -> Compared:
     last = int(setting.rng.integers(events))
     write = Checkpoint.write
 
-    def written(checkpoint: Checkpoint, number: int, *arrays: Any) -> None:
-        write(checkpoint, number, *arrays)
+    def written(checkpoint: Checkpoint, number: int, *arrays: Any, light: bool) -> None:
+        write(checkpoint, number, *arrays, light=light)
         if number == last:
             raise Killed(f"at event {number}")
 

@@ -96,7 +96,7 @@ def attempts(prepared: Path) -> Iterator[Attempt]:
     shell = f"touch out/cell.png.{tag}.part; feti plot out && [ ! -e out/cell.png.{tag}.part ]"
     yield Attempt("leftovers", "of a dead plot", (), "cell.png", made, (0,), shell)
     for name, words in {"reports": "report", "plots": "plot"}.items():
-        shell = f'feti {words} out & feti {words} out && wait $! && [ -z "$(ls out | grep part)" ]'
+        shell = rf'feti {words} out & feti {words} out && wait $! && [ -z "$(ls out | grep "[.]part\$")" ]'
         yield Attempt("two at once", name, (), "", made, (0,), shell)
     shell = f"{QUIET_MPI} -n 2 feti check broken.toml"
     yield Attempt("ranks", "a faulty case", (), "fibre_fraction = 1.4", files, (2,), shell)

@@ -160,7 +160,7 @@ class ExactInverse(Preconditioner):
         answer = self._response(self._answer, d)
         if self._followed is None:
             self._followed = FollowedResponse(self.comm, self._first, self._jump_operator.global_rows, answer)
-        self._followed.answer = answer
+        self._followed.renew(answer)
         return scale_rows(self._active, answer @ E)
 
     def answer(self, d: Float, E: Float) -> tuple[Float, Float]:

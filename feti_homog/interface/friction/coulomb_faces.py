@@ -32,7 +32,7 @@ ROUNDED_SUM = 1e-13
 # Block pivots without progress, after which one node at random changes at a time: with friction a fixed order may come
 # back to where it was.  And solves after which Lemke's method takes over.
 BLOCK_PIVOTS, LEAST_SOLVES, SOLVES_PER_NODE = 11, 50, 4
-SEARCHED = "friction: no status of the faces is admissible"
+SEARCHED = "friction: no admissible statuses of the faces were found"
 INDEFINITE = "friction: the sliding faces resist no more (an indefinite pivot)"
 
 

@@ -86,7 +86,7 @@ class SlidingLeg:
         self._share, self._bonds = begin.position, begin.bonds
         status, x = sliding.begin(begin.bonds, begin.last.strain)
         self._here = self._standing(status, x)
-        self._reported, self._energies, self._first = begin.position, NO_ENERGIES, True
+        self._reported, self._energies, self._first = begin.position, NO_ENERGIES, begin.position == 0.0
         self._after_break(begin)
 
     def points(self) -> Iterator[Point]:

@@ -95,12 +95,12 @@ def _peak_lines(document: Document, peak: Mapping[str, Any], label: str) -> list
 
 
 def _closed_cycle(document: Document) -> str:
-    """Return the area of the last loop in words: the work since a waypoint of the same strains, or stresses."""
+    """Return the area of the last loop in words: the work since a waypoint of the same strains."""
     points, legs = document["path"], path_curves.legs(document)
     ends = [p for p in points if abs(p["load_factor"] * legs - round(p["load_factor"] * legs)) < SAME_LOAD]
     for point in reversed(ends[:-1]):
-        pairs = [np.array([point[name], ends[-1][name]]) for name in ("strain", "stress")]
-        if any(np.ptp(pair, axis=0).max() <= CLOSED_CYCLE * np.abs(pair).max() for pair in pairs):
+        pair = np.array([point["strain"], ends[-1]["strain"]])
+        if np.ptp(pair, axis=0).max() <= CLOSED_CYCLE * np.abs(pair).max():
             return f", area of the last closed loop {ends[-1]['work'] - point['work']:.6g}"
     return ""
 

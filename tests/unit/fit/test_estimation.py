@@ -62,3 +62,18 @@ def test_directions_without_data_are_named_and_not_followed():
 def test_an_estimate_at_its_bound_is_marked():
     found = fitted(decay(TRUTH), bounds=(BOUNDS[0], np.array([1.5, 5.0])))
     assert found.at_bound.tolist() == [1, 0] and found.x[0] == pytest.approx(1.5)
+
+
+def test_units_do_not_decide_where_the_search_ends():
+    """The first unknown in 1e-9 of its unit, beside one of order 1."""
+    unit = np.array([1e9, 1.0])
+    bounds = tuple(bound * unit for bound in BOUNDS)
+    found = fitted(
+        decay(TRUTH),
+        start=np.array([1.5, 1.0]) * unit,
+        model=lambda x: decay(x / unit),
+        jacobian=lambda x: slopes(x / unit) / unit,
+        bounds=bounds,
+    )
+    other = fitted(decay(TRUTH))
+    assert found.x == pytest.approx(TRUTH * unit, rel=1e-9) and found.evaluations == other.evaluations

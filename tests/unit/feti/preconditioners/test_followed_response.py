@@ -1,33 +1,26 @@
-"""Answers and columns that follow bonds which soften, against inverses made anew."""
+"""The answer that follows softening bonds, against the formula on a dense response."""
 
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from mpi4py import MPI
 
+from feti_homog.errors import ConvergenceError
 from feti_homog.feti.preconditioners.followed_response import FollowedResponse
-from feti_homog.feti.thresholds import FOLLOWED_COLUMNS, WAITING_COLUMNS
 
 
-def test_answers_follow_springs_that_soften():
-    rng = np.random.default_rng(0)
-    half, d, C = rng.standard_normal((12, 12)), rng.standard_normal((12, 3)), np.zeros(12)
-    F = half @ half.T + np.eye(12)
-    found = FollowedResponse(MPI.COMM_SELF, 0, 12, np.linalg.solve(F, d))
-    for step in range(2 * WAITING_COLUMNS):
-        rows, more = rng.permutation(12)[: 1 + step % 3], 10.0 ** rng.uniform(-3.0, 2.0, 1 + step % 3)
-        lacking = found.lacking(rows)
-        found.add(lacking, np.linalg.inv(F + np.diag(C))[:, lacking])
-        found.soften(rows, more)
-        C[rows] += more
-        expected = np.linalg.solve(F + np.diag(C), d)
-        np.testing.assert_allclose(found.answer, expected, rtol=1e-9, atol=1e-12 * np.abs(expected).max())
-    assert not len(found.lacking(np.arange(12)))
-
-
-def test_columns_that_are_too_many_go():
-    n = FOLLOWED_COLUMNS + 1
-    found = FollowedResponse(MPI.COMM_SELF, 0, n, np.zeros((n, 1)))
-    for rows in np.split(np.arange(n), [FOLLOWED_COLUMNS]):
-        found.add(rows, np.eye(n)[:, rows])
-    np.testing.assert_array_equal(found.lacking(np.arange(n)), np.arange(FOLLOWED_COLUMNS))
+def test_it_follows_and_refuses_another_answer():
+    """U = (F + C)^-1 d after more compliance on three rows; an answer that is off by more than rounding raises."""
+    rng, more = np.random.default_rng(3), np.array([0.4, 0.1, 2.0])
+    A = rng.normal(size=(9, 9))
+    F, d = A @ A.T + np.eye(9), rng.normal(size=(9, 3))
+    rows, softer = np.array([1, 4, 7]), np.diag(np.bincount([1, 4, 7], more, 9))
+    followed = FollowedResponse(MPI.COMM_SELF, 0, 9, np.linalg.solve(F, d))
+    followed.add(rows, np.linalg.inv(F)[:, rows])
+    followed.soften(rows, more)
+    expected = np.linalg.solve(F + softer, d)
+    np.testing.assert_allclose(followed.answer, expected, rtol=1e-12, atol=1e-12)
+    followed.renew(expected)
+    with pytest.raises(ConvergenceError, match="off by"):
+        followed.renew(expected * (1.0 + 1e-6))
