@@ -17,7 +17,8 @@ from feti_homog.case.fit_sections import CURVE, MEASURED, TEST, UNKNOWN, Measure
 from feti_homog.case.sections import SWEEP
 from feti_homog.errors import CaseError
 from feti_homog.fit.predictions import Datum, available
-from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES
+from feti_homog.materials.plane_state import PLANE_STATES
+from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, voigt_names
 from feti_homog.runtime import input_files
 from feti_homog.schema.keys import TableReader, keys_of
 from feti_homog.schema.values import is_number
@@ -149,11 +150,19 @@ def _name_faults(place: str, case: Case, data: Sequence[Datum]) -> Iterator[str]
     if not known:
         yield f'[analysis] type = "{case.analysis.type}": a fit takes "stiffness" and "path"'
         return
-    if any(each.strain is not None for each in data) and case.analysis.type != "path":
-        yield f"{place}{CURVE}: expected an analysis of type path"
+    yield from _curve_faults(place, case, [each for each in data if each.strain is not None])
     for name in dict.fromkeys(each.name for each in data if each.strain is None):
         if name not in known:
             yield f"{place}{toml_key(name)}: the analysis does not give it; {suggestion(name, known, {})}"
+
+
+def _curve_faults(place: str, case: Case, points: Sequence[Datum]) -> Iterator[str]:
+    """Yield what the analysis of a test does not give of the points of a measured curve."""
+    if points and case.analysis.type != "path":
+        yield f"{place}{CURVE}: expected an analysis of type path"
+    known = voigt_names(6 if PLANE_STATES[case.analysis.plane].is_spatial else 3)
+    for name in sorted({name for each in points for name in (each.strain_name, each.name)}.difference(*known)):
+        yield f'{place}{CURVE}: plane = "{case.analysis.plane}" has no {name}'
 
 
 @dataclass
@@ -227,7 +236,7 @@ class FitReader:
         path = self.folder / own.file
         try:
             names, rows = _curve_rows(path)
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError, csv.Error) as error:
             words = error.strerror if isinstance(error, OSError) else error
             self.faults.append(f"[{place}] {CURVE}.file = {toml_value(str(own.file))}: {words}")
             return []

@@ -42,6 +42,7 @@ def run(fit: Fit, directory: Path, comm: Intracomm, ranks_per_case: int, retry: 
         ConvergenceError: a case failed, or there is no minimum, or unknowns that the data do not determine; in the
             latter cases the files are written.
     """
+    execute.check_groups(comm, ranks_per_case)
     on_root(comm, output_folder.usable, directory)
     digest = on_root(comm, fit.digest)
     on_root(comm, files.begin, directory, digest)

@@ -136,7 +136,9 @@ def _on_curve(document: Document, datum: Datum) -> tuple[float, float]:
     if curve is None or datum.strain_name != leading:
         raise CaseError(f"{place}: expected the strain that rises along a path of one leg, {leading}")
     strain, stress = curve[:, -1], curve[:, stresses.index(datum.name)]
-    at = abs(datum.strain or 0.0)
+    at, end = abs(datum.strain or 0.0), document["path"][-1]["strain"][strains.index(leading)]
+    if (datum.strain or 0.0) * end < 0.0:
+        raise CaseError(f"{place}: expected the sign of the strain of the path, which ends at {end:g}")
     if at > strain[-1] * (1 + path_curves.SAME_LOAD):
         raise CaseError(f"{place}: beyond the end of the path at {strain[-1]:g}")
     k = int(np.clip(np.searchsorted(strain, at), 1, len(strain) - 1))

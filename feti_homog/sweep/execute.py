@@ -44,6 +44,12 @@ def list_cases(sweep: Sweep, directory: Path | None) -> list[str]:
     ]
 
 
+def check_groups(comm: Intracomm, ranks_per_case: int) -> None:
+    """Raise CaseError unless the ranks make groups of this size."""
+    if ranks_per_case < 1 or comm.size % ranks_per_case:
+        raise CaseError(f"--ranks-per-case {ranks_per_case}: expected a divisor of the {comm.size} ranks")
+
+
 def run_all(sweep: Sweep, directory: Path, comm: Intracomm, ranks_per_case: int, retry: bool, quiet: bool) -> None:
     """Run all cases, each on so many ranks; as many at once as there are such groups.  Collective.
 
@@ -53,8 +59,7 @@ def run_all(sweep: Sweep, directory: Path, comm: Intracomm, ranks_per_case: int,
         ConvergenceError: cases failed; they are printed.
         FetiHomogError: a result could not be written; the finished ones are kept.
     """
-    if ranks_per_case < 1 or comm.size % ranks_per_case:
-        raise CaseError(f"--ranks-per-case {ranks_per_case}: expected a divisor of the {comm.size} ranks")
+    check_groups(comm, ranks_per_case)
     check_options(sweep)
     with _sweep_lock(directory, comm, sweep, shared=False):
         group = comm if ranks_per_case == comm.size else _group(comm, ranks_per_case)

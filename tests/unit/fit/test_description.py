@@ -79,3 +79,19 @@ def test_tests_are_changes_of_one_case(tmp_path):
     assert [case.cell.fibre_fraction for case in cases] == [0.3, 0.5]
     assert all(case.materials["fibre"].young == 77.0 and case.output.sensitivities for case in cases)
     assert [fit.rows_of(test) for test in (0, 1)] == [slice(0, 1), slice(1, 2)]
+
+
+@pytest.mark.parametrize(
+    ("table", "lines"),
+    [
+        ("E11, S33\n0.01, 1.0\n",
+         ["[measured] curve: expected an analysis of type path", '[measured] curve: plane = "strain" has no S33']),
+        (f"E11, S11\n{'1' * 200_000}, 1.0\n", ["field larger than field limit (131072)"]),
+    ],
+)  # fmt: skip
+def test_curves_have_their_faults(tmp_path, table, lines):
+    (tmp_path / "curve.csv").write_text(table)
+    text = BASE + UNKNOWN + '[measured]\ncurve = {file = "curve.csv", std = 0.1}\n'
+    with pytest.raises(CaseError) as error:
+        parse(tomllib.loads(text), tmp_path)
+    assert all(any(line in fault for fault in error.value.faults) for line in lines)
