@@ -66,7 +66,8 @@ def pieces(setting: Setting) -> Compared:
     document, rng = dict(setting.drawn.document), setting.rng
     document["cell"] = document["cell"] | {"bodies": str(rng.choice(["torus", "plane"]))}
     document["decomposition"] = {"subdomains": int(rng.integers(2, MOST_SUBDOMAINS + 1))}
-    return setting.compared(setting.solved(document))
+    # Stresses are recovered piece by piece.
+    return setting.compared(setting.solved(document), but="mesh_error")
 
 
 def influence_columns(setting: Setting) -> Compared:

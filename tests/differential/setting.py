@@ -48,9 +48,9 @@ class Setting:
         result = run(self.drawn.parsed(document), self.comm, **keys)
         return json.loads(json.dumps(result.document, default=lambda array: array.tolist()))
 
-    def compared(self, other: Any) -> Compared:
-        """Return the result of the same case, found otherwise, against the base."""
-        found, note = apart(self.base, other), ""
+    def compared(self, other: Any, but: str = "") -> Compared:
+        """Return the result of the same case, found otherwise, against the base, `but` numbers of a name."""
+        found, note = [(off, path) for off, path in apart(self.base, other) if not but or but not in path], ""
         if self.drawn.analysis == "path":
             points, note = paths_apart(self.base, other, self.files)
             found += points
