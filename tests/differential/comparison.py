@@ -18,8 +18,8 @@ LEFT_OUT = {
     "remarks", "states", "resumed", "result_h5", "timings", "memory", "checksum", "path", "peak",
     "envelope",
 }  # fmt: skip
-# Numbers of the solver, or of pieces; a ratio of two others.
-LEFT_OUT_WITHIN = {"iterations", "nodes", "dissipation_ratio"}
+# Numbers of the solver, or of pieces; a ratio of two others; which point is the peak, as above.
+LEFT_OUT_WITHIN = {"iterations", "nodes", "dissipation_ratio", "mark"}
 ENERGIES = {"stored", "stored_in_springs", "work", "dissipated", "dissipated_strain_controlled", "fracture_energy"}
 RATES = {"G", "G_I", "G_II"}
 DIRECTIONS = {"angle", "bond_angle", "psi"}
