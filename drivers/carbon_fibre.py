@@ -1,9 +1,9 @@
-"""Transverse and shear moduli of a carbon fibre from plies: what no test of the fibre itself gives.
+"""Transverse and shear moduli of a carbon fibre from plies, which no test of the fibre itself gives.
 
     mpirun -n 2 .venv/bin/python drivers/carbon_fibre.py --out results/carbon_fibre
 
 Plies of AS4/3501-6 at three fibre fractions: the constants at 0.6 are those of the exact solution of the hexagonal
-arrangement, the others those of finer cells.  The fit knows the epoxy and the fibre's constants along its axis, and
+arrangement, the others those of finer cells.  The epoxy and the fibre's constants along its axis are given; the fit
 returns E_transverse, nu_transverse and G_axial with their intervals, beside those from which the plies were made.
 """
 

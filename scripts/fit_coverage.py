@@ -1,4 +1,4 @@
-"""How often the intervals of fits cover the truth: fits of the four composites to their constants with noise.
+"""Count how often the intervals of fits cover the truth, of the four composites to their constants with noise.
 
     .venv/bin/python scripts/fit_coverage.py --trials 200
 

@@ -141,12 +141,12 @@ class AnalysisContext:
 
     @property
     def recovers_again(self) -> bool:
-        """Whether displacements inside bodies are asked for more than once, so that factors of interiors pay."""
+        """True if displacements inside bodies are asked for more than once, so that factors of interiors pay."""
         return self.states.has_place or self.needs_sensitivities or self.case.analysis.type == "angle"
 
     @property
     def needs_sensitivities(self) -> bool:
-        """Whether derivatives are asked for, or by uncertain constants."""
+        """True if the case asks for derivatives, or has uncertain constants."""
         return self.case.output.sensitivities or bool(self.case.uncertainty.std)
 
     def bonds(self, opening: float | None) -> BondState:

@@ -69,11 +69,13 @@ def follow(context: AnalysisContext, path: LoadPath, law: BondLaw) -> dict[str, 
             if not _goes_on(context, path, point, number + 1):
                 break
     context.checkpoint.flush()
-    if last is not None and last.state.converged:
-        _checked(context, last, f"{_label(path, len(entries) - 1)}, confirmed")
-    states = _kept(context, path, law, entries, last)
-    if not entries:
-        return {"path": (), "resumed": known} | states
+    if last is None:
+        return {"path": (), "resumed": known}
+    states: dict[str, Any] = {}
+    if law.has_tips or context.states.has_place:
+        states = _kept(context, path, law, entries, last)
+    else:
+        _checked(context, last, _label(path, len(entries) - 1))
     document = _document(context, entries)
     for number, words in marks(document).items():
         entries[number]["mark"] = words
@@ -209,14 +211,12 @@ def _kept(
     path: LoadPath,
     law: BondLaw,
     entries: Sequence[dict[str, Any]],
-    last: Point | None,
+    last: Point,
 ) -> dict[str, Any]:
     """Tips and fields of the points that are kept, from the checkpoint, in which the last one may not be.
 
     `states`, the numbers of those whose fields are recorded.
     """
-    if last is None or not (law.has_tips or context.states.has_place):
-        return {}
     legs = len(context.case.targets) if path.method == "events" else 0
     numbers = kept(entries, context.case.output.states, legs, marks(_document(context, entries)))
     tips = TipRecorder(context.cell, context.loads.interfaces, law) if law.has_tips else None

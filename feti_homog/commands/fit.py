@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from feti_homog.api import folder
+from feti_homog.commands.sweep import add_case_options
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
@@ -24,14 +25,7 @@ def add(actions: argparse._SubParsersAction[Any]) -> None:
     parser = actions.add_parser("fit", help="fit constants of cases to measured values", description=HELP)
     parser.add_argument("case", type=Path, metavar="FIT.toml", help="a case file with unknown and measured constants")
     parser.add_argument("--out", type=folder, metavar="DIR", required=True, help="folder of the fit")
-    parser.add_argument("--retry", action="store_true", help="compute failed cases again")
-    parser.add_argument(
-        "--ranks-per-case",
-        type=int,
-        metavar="R",
-        help="run as many cases at once as there are groups of R ranks (by default one, on all ranks)",
-    )
-    parser.add_argument("--quiet", action="store_true", help="print errors only")
+    add_case_options(parser)
     parser.set_defaults(action=_fit)
 
 

@@ -29,13 +29,8 @@ def add(actions: argparse._SubParsersAction[Any]) -> None:
     _add_collect(actions)
 
 
-def _add_sweep(actions: argparse._SubParsersAction[Any]) -> None:
-    parser = actions.add_parser("sweep", help="run the cases of a file with [sweep]", description=SWEEP_HELP)
-    parser.add_argument("case", type=Path, metavar="CASE.toml", help="a case file with a section [sweep]")
-    parser.add_argument("--out", type=folder, metavar="DIR", help="folder of the sweep, in which each case has its own")
-    one = parser.add_mutually_exclusive_group()
-    one.add_argument("--list", action="store_true", help="print the cases, with --out also their status; run none")
-    one.add_argument("--index", type=int, metavar="K", help="run case K alone, counted from 1, as a job array does")
+def add_case_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of commands that run many cases."""
     parser.add_argument("--retry", action="store_true", help="compute failed cases again")
     parser.add_argument(
         "--ranks-per-case",
@@ -44,6 +39,16 @@ def _add_sweep(actions: argparse._SubParsersAction[Any]) -> None:
         help="run as many cases at once as there are groups of R ranks (by default one, on all ranks)",
     )
     parser.add_argument("--quiet", action="store_true", help="print errors and failed cases only")
+
+
+def _add_sweep(actions: argparse._SubParsersAction[Any]) -> None:
+    parser = actions.add_parser("sweep", help="run the cases of a file with [sweep]", description=SWEEP_HELP)
+    parser.add_argument("case", type=Path, metavar="CASE.toml", help="a case file with a section [sweep]")
+    parser.add_argument("--out", type=folder, metavar="DIR", help="folder of the sweep, in which each case has its own")
+    one = parser.add_mutually_exclusive_group()
+    one.add_argument("--list", action="store_true", help="print the cases, with --out also their status; run none")
+    one.add_argument("--index", type=int, metavar="K", help="run case K alone, counted from 1, as a job array does")
+    add_case_options(parser)
     parser.set_defaults(action=_sweep)
 
 

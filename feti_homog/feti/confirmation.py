@@ -30,6 +30,7 @@ class InfluenceSolutions:
     ) -> None:
         self._comm, self._inverse, self._operator, self._natural, self._jumps = comm, inverse, operator, natural, jumps
         self._granted = self._left = 0
+        self._expected: Float | None = None
         self._residual, self._squares = 0.0, np.zeros((2, 0, 0))
 
     def solutions(self, strains: Float, d: Float) -> list[DualSolution] | None:
@@ -38,15 +39,20 @@ class InfluenceSolutions:
         It always is where bodies are free, and for loads of which the active rows see so little that it may be
         rounding.  Collective.
         """
-        if not self._left or self._natural.unconstrained_modes.shape[1]:
+        self._expected = None
+        if self._natural.unconstrained_modes.shape[1] or not self._granted:
             return None
         seen, torn = np.einsum("ki,nij,kj->nk", strains, self._squares, strains)
         if not (seen > LEAST_UNCONFIRMED_JUMP**2 * torn).all():
             return None
+        lam, jumps = self._inverse.answer(d, strains.T)
+        if not self._left:
+            self._expected = lam
+            return None
         self._left -= 1
         reason, C = int(PETSc.KSP.ConvergedReason.CONVERGED_RTOL), self._operator.compliance
-        rows = zip(strains, *(x.T.copy() for x in self._inverse.answer(d, strains.T)), strict=True)
-        return [DualSolution(E, lam, jump, None, 0, reason, self._residual, C) for E, lam, jump in rows]
+        rows = zip(strains, lam.T.copy(), jumps.T.copy(), strict=True)
+        return [DualSolution(E, x, jump, None, 0, reason, self._residual, C) for E, x, jump in rows]
 
     def record(self, solutions: list[DualSolution], d: Float) -> None:
         """Record solutions that F lambda confirmed, or that iterations had to improve; none of loads that are unseen.
@@ -54,27 +60,28 @@ class InfluenceSolutions:
         Collective.
 
         Raises:
-            ConvergenceError: solves were spared since the last, and the columns are off by more than checks pass.
+            ConvergenceError: what the columns would have given, as in the solves before, is off by more than checks
+                pass.
         """
-        spared = self._granted - self._left
+        if solutions and self._expected is not None:
+            off = self._error(self._expected, solutions)
+            if not off <= MOST_UNCONFIRMED_ERROR:
+                raise ConvergenceError(
+                    f"influence columns: multipliers of the last {self._granted} solves: {off:.1e} off"
+                )
         confirmed = bool(solutions) and all(each.iterations == 0 and each.reason > 0 for each in solutions)
         self._granted = min(2 * self._granted + 1, MOST_UNCONFIRMED) if confirmed else 0
         self._left, self._residual = self._granted, max((each.residual for each in solutions), default=0.0)
-        if spared and solutions and not confirmed and (off := self._error(solutions, d)) > MOST_UNCONFIRMED_ERROR:
-            raise ConvergenceError(
-                f"influence columns: multipliers of the last {spared} solves may be off by {off:.1e}"
-            )
         if confirmed:
             seen = self._jumps.projected(d, self._jumps.norms(d))
             self._squares = allreduce_sum(self._comm, np.stack([seen.T @ seen, d.T @ d]))
 
-    def _error(self, solutions: list[DualSolution], d: Float) -> float:
-        """Return how far the columns are off multipliers that iterations have found, relative to the largest.
+    def _error(self, expected: Float, solutions: list[DualSolution]) -> float:
+        """Return how far multipliers (owned rows, k) are off those found, relative to the largest of each load.
 
         Collective.
         """
         lam = np.stack([each.lam for each in solutions], axis=1)
-        by_columns = self._inverse.answer(d, np.stack([each.strain for each in solutions], axis=1))[0]
-        parts = np.abs([by_columns - lam, lam]).max(axis=1, initial=0.0)
+        parts = np.abs([expected - lam, lam]).max(axis=1, initial=0.0)
         self._comm.Allreduce(MPI.IN_PLACE, parts, MPI.MAX)
         return float((parts[0] / np.where(parts[1] > 0.0, parts[1], 1.0)).max())

@@ -73,7 +73,7 @@ class Fit:
         return [datum for datum in self.data if datum.test == test]
 
     def rows_of(self, test: int) -> slice:
-        """Where the data of a test stand among those of all."""
+        """Return the place of the data of a test among all."""
         first = next(k for k, datum in enumerate(self.data) if datum.test == test)
         return slice(first, first + len(self.data_of(test)))
 

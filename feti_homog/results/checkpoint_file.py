@@ -45,7 +45,7 @@ def read(path: Path) -> tuple[Arrays, str, int]:
             return {name: table[()] for name, table in file.items()}, signature, found
     except CaseError:
         raise
-    except Exception as error:  # h5py may say anything
+    except Exception as error:  # h5py may raise anything
         raise CaseError(f"{path} is no readable event of a path: {error}") from error
 
 

@@ -97,7 +97,7 @@ PATHS = {
 
 @pytest.mark.parametrize("name", PATHS)
 def test_paths_are_those_of_the_twin(comm, name):
-    """The same bonds break in the same order at the same loads, with the same energies."""
+    """Bonds break in one order at the same loads, with the same energies."""
     cell, phases, interface, waypoints = PATHS[name]
     case = {"cell": cell, "phases": phases, "plane": "strain", "path": {"waypoints": waypoints}}
     twin, legs = LoadedTwin(comm, **case, interface=interface), len(waypoints)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from unit.mesh.faulty_meshes import grid
 
 from feti_homog import Case, run
 from feti_homog.errors import ConvergenceError
+from feti_homog.feti.preconditioners.followed_response import FollowedResponse
 from feti_homog.parallel.mpi_errors import on_root
 from feti_homog.verify.certificate import verify
 
@@ -114,6 +116,20 @@ def test_a_path_goes_on_where_it_was_ended(comm, shared_path):
         assert (found.broke, found.softened) == (expected.broke, expected.softened)
         np.testing.assert_allclose(found.stress, expected.stress, atol=1e-12)
         np.testing.assert_allclose(found.damaged_length, expected.damaged_length)
+
+
+def test_a_wrong_answer_does_not_outlive_the_next_confirmation(comm):
+    """Multipliers that follow softening bonds get an error at every tooth, which F lambda alone would never see."""
+    case = {"cell": {"mesh_size": 0.3}, "phases": EPOXY_GLASS, "plane": "strain", "petsc": INFLUENCE}
+    case |= {"interface": BILINEAR, "path": {"waypoints": [{"E11": 0.03}]}}
+    soften = FollowedResponse.soften
+
+    def distorted(self, *arguments):
+        soften(self, *arguments)
+        self.answer = self.answer * (1.0 + 1e-3)
+
+    with mock.patch.object(FollowedResponse, "soften", distorted), pytest.raises(ConvergenceError, match="columns"):
+        solved(comm, **case)
 
 
 def test_increments_count_bonds_that_soften_once(comm, shared_path):

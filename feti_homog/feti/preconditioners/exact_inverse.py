@@ -10,8 +10,8 @@ A spring whose compliance grew by dC is one of C, whose jump dC lam is prescribe
     N = (Gamma_CC + D)^-1,  lam_C = D c on such rows,  D = dC^-1 there, and 0 where bonds left.
 
 A bond that breaks costs two columns and two borders of N, a face that closes or opens one border; bonds that soften
-cost their columns of what `followed_response` keeps up, until N is wanted again; no factor is made anew.  After as many
-changes as an option says, the cell as it stands becomes the reference, but for what softened.
+cost their columns of what `followed_response` keeps up, until N is wanted again; no factor is made anew.  After more
+changes than an option allows, the cell as it stands becomes the reference, but for what softened.
 """
 
 from __future__ import annotations
@@ -160,7 +160,7 @@ class ExactInverse(Preconditioner):
         answer = self._response(self._answer, d)
         if self._followed is None:
             self._followed = FollowedResponse(self.comm, self._first, self._jump_operator.global_rows, answer)
-        self._followed.renew(answer)
+        self._followed.answer = answer
         return scale_rows(self._active, answer @ E)
 
     def answer(self, d: Float, E: Float) -> tuple[Float, Float]:

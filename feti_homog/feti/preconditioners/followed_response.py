@@ -13,8 +13,7 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.errors import ConvergenceError
-from feti_homog.feti.thresholds import FOLLOWED_COLUMNS, INVERSE_ERROR, WAITING_COLUMNS
+from feti_homog.feti.thresholds import FOLLOWED_COLUMNS, WAITING_COLUMNS
 from feti_homog.parallel.distributed_arrays import gather_rows
 from feti_homog.typing import Float, Int
 
@@ -36,19 +35,6 @@ class FollowedResponse:
         self._waiting = np.zeros((len(answer), WAITING_COLUMNS), order="F")
         self._factors = np.zeros((0, WAITING_COLUMNS))
         self._count = 0
-
-    def renew(self, answer: Float) -> None:
-        """Take an answer that was found anew.  Collective.
-
-        Raises:
-            ConvergenceError: the one that was followed is another.
-        """
-        parts = np.abs([answer - self.answer, answer]).max(axis=1, initial=0.0)
-        self._comm.Allreduce(MPI.IN_PLACE, parts, MPI.MAX)
-        off = float((parts[0] / np.where(parts[1] > 0.0, parts[1], 1.0)).max(initial=0.0))
-        if not off <= INVERSE_ERROR:
-            raise ConvergenceError(f"influence columns: what followed softening bonds is off by {off:.1e}")
-        self.answer = answer
 
     def lacking(self, rows: Int) -> Int:
         """Return which of the global rows have no column."""

@@ -42,7 +42,7 @@ class StuckError(NotCarriedError):
 
 @dataclass(frozen=True)
 class Prescribed:
-    """What is prescribed.
+    """Loads, and slips of nodes that stick.
 
     Attributes:
         by_stress: (v,) which of the loads are given by what works on them.
@@ -73,19 +73,6 @@ class CoulombFaces:
         self.size = np.where(size > 0.0, size, 1.0)
         self.S = stiffness / np.outer(self.size, self.size)
         self._last: tuple[bytes, StatusSystem] | None = None
-
-    @classmethod
-    def of_compliance(cls, compliance: Float, loads: Float, friction: Float, gap: Float) -> CoulombFaces:
-        """Return faces with the jumps d E - F f, d (2n, v) `loads`, F (2n, 2n) and initial gaps (n,).
-
-        The gap is one more load, the last one, of the value 1; the stiffness of the loads themselves is that of d.
-        """
-        apart = np.zeros((len(compliance), 1))
-        apart[::2, 0] = gap
-        K = np.linalg.inv(compliance)
-        b = K @ np.hstack([loads, apart])
-        d = np.hstack([loads, apart])
-        return cls(np.block([[K, -b], [-b.T, d.T @ b]]), friction)
 
     @property
     def nodes(self) -> int:

@@ -54,7 +54,7 @@ def sliding_events(
 
 @dataclass(frozen=True)
 class Standing:
-    """Where a path is: the statuses (n,) of the faces and scaled x (m,) of `CoulombFaces`, with its averages."""
+    """Position of a path: the statuses (n,) of the faces and scaled x (m,) of `CoulombFaces`, with its averages."""
 
     status: Status
     x: Float
@@ -78,7 +78,7 @@ class SlidingLeg:
         leg: int,
         begin: PathState,
     ) -> None:
-        """Stand where `begin` says.  Collective."""
+        """Stand at `begin`.  Collective."""
         self.cell, self.sliding, self.law, self.end = cell, sliding, law, waypoints[leg]
         self.leg, self.legs = leg, len(waypoints)
         self.origin = begin.last if begin.position == 0.0 else begin.origin
@@ -86,6 +86,7 @@ class SlidingLeg:
         self._share, self._bonds = begin.position, begin.bonds
         status, x = sliding.begin(begin.bonds, begin.last.strain)
         self._here = self._standing(status, x)
+        self._found: tuple[Standing, Equilibrium] | None = None
         self._reported, self._energies, self._first = begin.position, NO_ENERGIES, begin.position == 0.0
         self._after_break(begin)
 
@@ -193,11 +194,14 @@ class SlidingLeg:
         self._here, self._bonds, self._first = after, self.sliding.bonds(begin.bonds, status, there), True
 
     def _state(self) -> Equilibrium:
-        """Return the state here.  Collective."""
-        return self.sliding.equilibrium(self.start.after(self._share, self.end), self._bonds, self._here.x)
+        """Return the state here, which is found once.  Collective."""
+        if self._found is None or self._found[0] is not self._here:
+            load = self.start.after(self._share, self.end)
+            self._found = self._here, self.sliding.equilibrium(load, self._bonds, self._here.x)
+        return self._found[1]
 
     def _path_state(self) -> PathState:
-        """From the state here on."""
+        """Return the beginning of the way from here on."""
         lam = Multipliers([self.sliding.multipliers(self._here.x)])
         return PathState(self.leg, self._share, self._bonds, lam, self.origin, self._here.mean)
 

@@ -32,7 +32,7 @@ def test_values_without_noise_return_the_truth():
 
 
 def test_intervals_cover_the_truth_as_often_as_they_claim():
-    """Of 2000 samples with noise, 95 +- 1.5 % for each unknown; the residuals have the claimed distribution."""
+    """Cover 95 +- 1.5 % of 2000 samples with noise for each unknown; residuals have the claimed distribution."""
     noise = np.random.default_rng(7).normal(0.0, 0.01, (2000, len(TIMES)))
     hits, chances = np.zeros(2), []
     for row in noise:
@@ -44,7 +44,7 @@ def test_intervals_cover_the_truth_as_often_as_they_claim():
 
 
 def test_directions_without_data_are_named_and_not_followed():
-    """Of x0 + x1 and an idle x2 only the sum is known: the start's difference stays, no interval is claimed."""
+    """Fit x0 + x1 beside an idle x2: only the sum is known, the start's difference stays, no interval is claimed."""
     A = np.outer(TIMES + 1.0, [1.0, 1.0, 0.0])
     bounds = (np.full(3, -10.0), np.full(3, 10.0))
     found = fitted(

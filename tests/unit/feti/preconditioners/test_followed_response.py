@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 from mpi4py import MPI
 
-from feti_homog.errors import ConvergenceError
 from feti_homog.feti.preconditioners.followed_response import FollowedResponse
 
 
-def test_it_follows_and_refuses_another_answer():
-    """U = (F + C)^-1 d after more compliance on three rows; an answer that is off by more than rounding raises."""
+def test_answers_follow_bonds_that_soften():
+    """U = (F + C)^-1 d after more compliance on three rows."""
     rng, more = np.random.default_rng(3), np.array([0.4, 0.1, 2.0])
     A = rng.normal(size=(9, 9))
     F, d = A @ A.T + np.eye(9), rng.normal(size=(9, 3))
@@ -21,6 +19,3 @@ def test_it_follows_and_refuses_another_answer():
     followed.soften(rows, more)
     expected = np.linalg.solve(F + softer, d)
     np.testing.assert_allclose(followed.answer, expected, rtol=1e-12, atol=1e-12)
-    followed.renew(expected)
-    with pytest.raises(ConvergenceError, match="off by"):
-        followed.renew(expected * (1.0 + 1e-6))

@@ -47,12 +47,21 @@ def admissible(compliance, load, friction, gap, slip):
     return found
 
 
+def faces_of(compliance, load, friction, gap):
+    """Faces with the jumps d E - F f, d (2n, 1) `load`; the initial gaps (n,) are one more load, of the value 1."""
+    apart = np.zeros_like(load)
+    apart[::2].flat = gap
+    d = np.hstack([load, apart])
+    K = np.linalg.inv(compliance)
+    return CoulombFaces(np.block([[K, -K @ d], [-d.T @ K, d.T @ K @ d]]), friction)
+
+
 @pytest.mark.parametrize("most_friction", [0.4, 3.0])
 def test_statuses_are_those_of_brute_force_or_none_are_found(most_friction):
     rng, stuck = np.random.default_rng(7), 0
     for _ in range(120):
         compliance, load, friction, gap, slip = random_faces(rng, most_friction)
-        faces, n = CoulombFaces.of_compliance(compliance, load, friction, gap), len(friction)
+        faces, n = faces_of(compliance, load, friction, gap), len(friction)
         given = Prescribed(BY_STRAIN, faces.size[2 * n :], slip * faces.size[1 : 2 * n : 2])
         start, first = np.zeros(2 * n + 2), np.zeros(n, np.int8)
         expected = admissible(compliance, load, friction, gap, slip)
