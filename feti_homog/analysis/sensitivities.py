@@ -63,10 +63,17 @@ def propagated(case: Case, document: Mapping[str, Any]) -> dict[str, Any]:
         raise CaseError(*(f"[uncertainty] {name}: the stiffness does not depend on it" for name in idle))
     J = found.derivatives[:, [found.parameters.index(name) for name in std]]
     sizes = np.array([*std.values()])
-    parts = J * (J @ (np.outer(sizes, sizes) * case.uncertainty.matrix()))
+    A = J * sizes  # changes of the constants by one standard deviation of each
+    scale = np.abs(A).max(axis=1, initial=np.finfo(float).tiny)  # so that no square over- or underflows
+    A = A / scale[:, None]
+    parts = A * (A @ case.uncertainty.matrix())
     variance = np.maximum(parts.sum(axis=1), 0.0)
     shares = np.divide(parts, variance[:, None], out=np.zeros_like(parts), where=variance[:, None] > 0)
     own = UncertainConstants(
-        parameters=tuple(std), parameter_std=sizes, constants=found.constants, std=np.sqrt(variance), shares=shares
+        parameters=tuple(std),
+        parameter_std=sizes,
+        constants=found.constants,
+        std=scale * np.sqrt(variance),
+        shares=shares,
     )
     return {"uncertainty": own}

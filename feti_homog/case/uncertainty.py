@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from feti_homog.case.document import TomlPath
-from feti_homog.schema.values import is_number
+from feti_homog.schema.values import is_number, magnitudes_in_words
 from feti_homog.schema.wording import dotted_key, toml_value
 from feti_homog.typing import Float
 
 UNCERTAINTY, CORRELATION = "uncertainty", "correlation"
+SECTIONS = ("material", "interface")
 ROUNDING = 1e-12
 EXPECTED = "expected {mean, std} or {mean, cv}, numbers, std and cv above 0"
 PLACES = "expected a constant of [material.PHASE], or a stiffness of [interface]"
@@ -47,13 +48,13 @@ def read_uncertainty(document: dict[str, Any], faults: list[str]) -> Uncertainty
         faults.append(f"{UNCERTAINTY} = {toml_value(table)}: expected a section [{UNCERTAINTY}]")
         return Uncertainty({})
     pairs = table.get(CORRELATION, [])
-    std = dict(_leaves({name: value for name, value in table.items() if name != CORRELATION}))
-    for section in ("material", "interface"):
+    given = [*_leaves({name: value for name, value in table.items() if name != CORRELATION})]
+    for section in SECTIONS:
         if section in document:
-            document[section] = _means(document[section], (section,), std, faults)
-    faults += _deviation_faults(document, std)
+            document[section] = _means(document[section], (section,), given, faults)
+    std = dict(given)
     named = {".".join(path): value for path, value in std.items()}
-    faults += _pair_faults(pairs, named)
+    faults += [*_deviation_faults(document, given), *_pair_faults(pairs, named)]
     if faults:
         return Uncertainty({})
     found = Uncertainty(named, tuple((first, second, float(value)) for first, second, value in pairs))
@@ -62,40 +63,50 @@ def read_uncertainty(document: dict[str, Any], faults: list[str]) -> Uncertainty
     return found
 
 
-def _deviation_faults(document: Mapping[str, Any], std: Mapping[TomlPath, Any]) -> Iterator[str]:
+def _deviation_faults(document: Mapping[str, Any], given: Sequence[tuple[TomlPath, Any]]) -> Iterator[str]:
     """Yield what is wrong with standard deviations and their places."""
-    for path, value in std.items():
+    paths = [path for path, _ in given]
+    for path, value in dict(given).items():
         name = dotted_key(path)
+        if paths.count(path) > 1:
+            yield f"[{UNCERTAINTY}] {name}: its standard deviation is given twice"
         if not is_number(value) or value <= 0:
-            yield f"[{UNCERTAINTY}] {name} = {toml_value(value)}: expected a standard deviation above 0"
+            words = f"expected a standard deviation above 0{magnitudes_in_words(value)}"
+            yield f"[{UNCERTAINTY}] {name} = {toml_value(value)}: {words}"
         elif not _is_constant(document, path):
             yield f"[{UNCERTAINTY}] {name}: {PLACES} whose value is a number"
     analysis = document.get("analysis")
-    if std and isinstance(analysis, dict) and analysis.get("type") != "stiffness":
+    if given and isinstance(analysis, dict) and analysis.get("type") != "stiffness":
         yield f'[{UNCERTAINTY}]: belongs to [analysis] type = "stiffness"'
 
 
 def _pair_faults(pairs: Any, named: Mapping[str, Any]) -> Iterator[str]:
     """Yield what is wrong with pairs of correlated constants."""
     words = f"expected [KEY, KEY, VALUE] of two uncertain constants, {' and '.join(named)}, from -1 to 1"
+    known = set[frozenset[str]]()
     for pair in pairs if isinstance(pairs, list) else [pairs]:
         if not _is_pair(pair, named):
             yield f"[{UNCERTAINTY}] {CORRELATION} = {toml_value(pair)}: {words}"
+        elif (names := frozenset(pair[:2])) in known:
+            yield f"[{UNCERTAINTY}] {CORRELATION} = {toml_value(pair)}: this pair is given twice"
+        else:
+            known.add(names)
 
 
-def _means(value: Any, path: TomlPath, std: dict[TomlPath, Any], faults: list[str]) -> Any:
-    """Return a value with the means of uncertain numbers, whose deviations are added to `std`."""
+def _means(value: Any, path: TomlPath, given: list[tuple[TomlPath, Any]], faults: list[str]) -> Any:
+    """Return a value with the means of uncertain numbers, whose deviations are added to those given."""
     if isinstance(value, list):
-        return [_means(item, (*path, str(k)), std, faults) for k, item in enumerate(value, start=1)]
+        numbers = [()] if len(value) == 1 else [(str(k + 1),) for k in range(len(value))]
+        return [_means(item, (*path, *number), given, faults) for item, number in zip(value, numbers, strict=True)]
     if not isinstance(value, dict):
         return value
     if "mean" not in value:
-        return {name: _means(item, (*path, name), std, faults) for name, item in value.items()}
+        return {name: _means(item, (*path, name), given, faults) for name, item in value.items()}
     deviation = _deviation(value)
     if deviation is None:
         faults.append(f"[{dotted_key(path[:-1])}] {path[-1]} = {toml_value(value)}: {EXPECTED}")
     else:
-        std[path] = deviation
+        given.append((path, deviation))
     return value["mean"]
 
 
@@ -120,6 +131,7 @@ def _is_constant(document: Mapping[str, Any], path: TomlPath) -> bool:
     """Return whether the place has a number by which there are derivatives."""
     found: Any = document
     for name in path:
+        found = found[0] if isinstance(found, list) and len(found) == 1 else found
         if isinstance(found, list):  # sections of one name, from 1
             found = {str(number): each for number, each in enumerate(found, start=1)}
         found = found.get(name) if isinstance(found, dict) else None

@@ -44,12 +44,17 @@ def _run(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 def _add_check(actions: argparse._SubParsersAction[Any]) -> None:
     parser = actions.add_parser("check", help="validate a case file, mesh its cell and describe the run")
-    parser.add_argument("case", type=Path, metavar="CASE.toml")
+    parser.add_argument("case", type=Path, metavar="CASE.toml", help="a case, a sweep, or a fit")
     parser.set_defaults(action=_check)
 
 
 def _check(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    from feti_homog.parallel.mpi_errors import on_root_only
+    from feti_homog.case.document import read_document
+    from feti_homog.case.fit_sections import FIT_SECTIONS
+    from feti_homog.fit import description as fits
+    from feti_homog.parallel.mpi_errors import on_root, on_root_only
     from feti_homog.sweep import description
 
-    on_root_only(comm, print_product, description.of_file(arguments.case, comm))
+    document = on_root(comm, read_document, arguments.case)  # once: it may be a pipe
+    kind = fits if document.keys() & {*FIT_SECTIONS} else description
+    on_root_only(comm, print_product, kind.of_document(document, arguments.case.parent, comm))

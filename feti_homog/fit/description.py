@@ -2,33 +2,34 @@
 
 from __future__ import annotations
 
-import csv
 import hashlib
-import io
 import json
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from feti_homog.case.case import Case
 from feti_homog.case.document import TomlPath, read_document, to_document
-from feti_homog.case.fit_sections import CURVE, MEASURED, TEST, UNKNOWN, Measured, MeasuredCurve, Unknown
+from feti_homog.case.fit_sections import CURVE, MEASURED, TEST, UNKNOWN, Unknown
+from feti_homog.case.mixed_load import TEMPERATURE
 from feti_homog.case.sections import SWEEP
 from feti_homog.errors import CaseError
 from feti_homog.fit.predictions import Datum, available
+from feti_homog.fit.reading import FitReader
 from feti_homog.materials.plane_state import PLANE_STATES
-from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, voigt_names
-from feti_homog.runtime import input_files
-from feti_homog.schema.keys import TableReader, keys_of
-from feti_homog.schema.values import is_number
-from feti_homog.schema.wording import dotted_key, suggestion, toml_key, toml_value
-from feti_homog.sweep import plan
+from feti_homog.materials.voigt import voigt_names
+from feti_homog.parallel.mpi_errors import on_root
+from feti_homog.results.path_curves import SAME_LOAD
+from feti_homog.schema.wording import suggestion, toml_key
+from feti_homog.sweep import description, plan
 from feti_homog.sweep.plan import Sweep
 from feti_homog.sweep.points import Assignment
 
+if TYPE_CHECKING:
+    from mpi4py.MPI import Intracomm
+
 DIGITS = 12  # of a value of an unknown, so that a repeated fit makes the same cases
-MOST_ROWS = 10_000
 SILENT = {"fields": False, "pictures": False, "report": False}
 
 
@@ -125,6 +126,18 @@ def parse(values: Mapping[str, Any], folder: Path) -> Fit:
     return fit
 
 
+def of_document(document: Mapping[str, Any], folder: Path, comm: Intracomm) -> str:
+    """Describe a fit, and its first case at the start; empty except on rank 0.  Collective.
+
+    Raises:
+        CaseError, MeshError: the document is faulty, or the cell of its first case.
+    """
+    fit = on_root(comm, parse, document, folder)
+    sweep = on_root(comm, fit.at, [each.start for each in fit.unknowns.values()])
+    counts = f"{len(fit.unknowns)} unknowns, {len(fit.data)} measured values of {len(fit.tests)} tests"
+    return description.first_of(sweep, f"fit        {counts}; the first at the start:", comm)
+
+
 def _case_faults(fit: Fit) -> Iterator[str]:
     """Yield what is wrong with the cases at the start and at the bounds, and with the names of the data."""
     start = [each.start for each in fit.unknowns.values()]
@@ -158,127 +171,37 @@ def _name_faults(place: str, case: Case, data: Sequence[Datum]) -> Iterator[str]
 
 def _curve_faults(place: str, case: Case, points: Sequence[Datum]) -> Iterator[str]:
     """Yield what the analysis of a test does not give of the points of a measured curve."""
-    if points and case.analysis.type != "path":
-        yield f"{place}{CURVE}: expected an analysis of type path"
-    known = voigt_names(6 if PLANE_STATES[case.analysis.plane].is_spatial else 3)
-    for name in sorted({name for each in points for name in (each.strain_name, each.name)}.difference(*known)):
+    if not points:
+        return
+    state = PLANE_STATES[case.analysis.plane]
+    known = voigt_names(6 if state.is_spatial else 3)
+    unknown = sorted({name for each in points for name in (each.strain_name, each.name)}.difference(*known))
+    for name in unknown:
         yield f'{place}{CURVE}: plane = "{case.analysis.plane}" has no {name}'
+    if case.analysis.type != "path" or len(case.targets) != 1:
+        yield f"{place}{CURVE}: expected an analysis of type path, of one leg"
+    elif not unknown and (found := _rising(case.targets[0], state.components)) is not None:
+        yield from (f"{place}{CURVE}: {fault}" for fault in _strain_faults(points, *found))
 
 
-@dataclass
-class FitReader:
-    """Reads the tables of a fit and gathers what is wrong with them, a line each."""
-
-    folder: Path
-    faults: list[str] = field(default_factory=list)
-
-    def unknowns(self, table: object) -> dict[TomlPath, Unknown]:
-        """Return the unknowns by key."""
-        if not isinstance(table, dict) or not table:
-            self.faults.append(f"[{UNKNOWN}]: expected a table of SECTION.KEY = {{start, lower, upper}}")
-            return {}
-        found = {}
-        for path, value in leaves(table, keys_of(Unknown)):
-            name = dotted_key(path)
-            if not isinstance(value, dict):
-                words = f"[{UNKNOWN}] {name} = {toml_value(value)}: expected a table {{start, lower, upper}}"
-                self.faults.append(words)
-            elif (unknown := self._read(Unknown, value, UNKNOWN, f"{name}.")) is not None:
-                found[path] = unknown
-                if not unknown.lower < unknown.upper or not unknown.lower <= unknown.start <= unknown.upper:
-                    words = f"lower = {unknown.lower:g}, start = {unknown.start:g}, upper = {unknown.upper:g}"
-                    self.faults.append(f"[{UNKNOWN}] {name}: {words}: expected lower <= start <= upper, lower < upper")
-        return found
-
-    def tests(self, measured: object, tests: object, unknowns: set[TomlPath]) -> tuple[list[Assignment], list[Datum]]:
-        """Return the changes of each test and the data of all."""
-        if (measured is None) == (tests is None):
-            self.faults.append(f"expected [{MEASURED}] for one test or [[{TEST}]] for each of several, with measured")
-            return [], []
-        rows = [{MEASURED: measured}] if tests is None else tests
-        if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
-            self.faults.append(f"{TEST} = {toml_value(rows)}: expected sections [[{TEST}]]")
-            return [], []
-        assignments, data = list[Assignment](), list[Datum]()
-        for number, row in enumerate(rows):
-            place = MEASURED if tests is None else f"[{TEST}]] {number + 1}, [{MEASURED}"
-            data += self._data(row.get(MEASURED), number, place)
-            own = dict(leaves({name: value for name, value in row.items() if name != MEASURED}, ()))
-            assignments.append(own)
-            for path in own.keys() & unknowns:
-                self.faults.append(f"[[{TEST}]] {number + 1}, {dotted_key(path)}: it is an unknown of [{UNKNOWN}]")
-        return assignments, data
-
-    def _data(self, table: object, test: int, place: str) -> list[Datum]:
-        """Return the data of one test."""
-        if not isinstance(table, dict) or not table:
-            self.faults.append(f"[{place}]: expected a table of NAME = {{value, std}}")
-            return []
-        found = []
-        for path, value in leaves(table, {*keys_of(Measured), *keys_of(MeasuredCurve)}):
-            name = ".".join(path)
-            if path == (CURVE,):
-                found += self._curve(value, test, place)
-            elif not isinstance(value, dict):
-                self.faults.append(f"[{place}] {name} = {toml_value(value)}: expected a table {{value, std}}")
-            elif (own := self._read(Measured, value, place, f"{name}.")) is not None:
-                found.append(Datum(test, name, own.value, own.std))
-        return found
-
-    def _curve(self, value: object, test: int, place: str) -> list[Datum]:
-        """Return the points of a measured curve."""
-        if not isinstance(value, dict):
-            self.faults.append(f"[{place}] {CURVE} = {toml_value(value)}: expected a table {{file, std}}")
-            return []
-        own = self._read(MeasuredCurve, value, place, f"{CURVE}.")
-        if own is None:
-            return []
-        path = self.folder / own.file
-        try:
-            names, rows = _curve_rows(path)
-        except (OSError, ValueError, csv.Error) as error:
-            words = error.strerror if isinstance(error, OSError) else error
-            self.faults.append(f"[{place}] {CURVE}.file = {toml_value(str(own.file))}: {words}")
-            return []
-        return [Datum(test, names[1], stress, own.std, strain, names[0]) for strain, stress in rows]
-
-    def _read(self, kind: type[Any], table: object, section: str, prefix: str) -> Any:
-        reader = TableReader()
-        found = reader.read(kind, table, section, prefix)
-        self.faults += reader.faults
-        return found
+def _strain_faults(points: Sequence[Datum], rising: str, end: float, is_strain: bool) -> Iterator[str]:
+    """Yield what is wrong with strains of a curve beside what `_rising` returns."""
+    if rising != points[0].strain_name:
+        yield f"expected the strain that rises along the path, {rising}"
+    elif any((each.strain or 0.0) * end < 0 for each in points):
+        yield f"expected strains of the sign of the path, which ends at {end:g}"
+    elif is_strain and (most := max(abs(each.strain or 0.0) for each in points)) > abs(end) * (1 + SAME_LOAD):
+        yield f"a strain of {most:g} is beyond the end of the path at {abs(end):g}"
 
 
-def leaves(table: Mapping[str, Any], keys: Collection[str], above: TomlPath = ()) -> Iterator[tuple[TomlPath, Any]]:
-    """Yield the paths and values of a nested table; a table with one of the keys is a value, and so is an empty one."""
-    for name, value in table.items():
-        path = (*above, *name.split("."))
-        if isinstance(value, dict) and value and not value.keys() & set(keys):
-            yield from leaves(value, keys, path)
-        else:
-            yield path, value
+def _rising(target: Mapping[str, float], components: Sequence[tuple[str, str]]) -> tuple[str, float, bool] | None:
+    """Return the strain that leads along one leg, the load of its component, and whether that is the strain.
 
-
-def _curve_rows(path: Path) -> tuple[tuple[str, str], list[tuple[float, float]]]:
-    """Return the names of strain and stress, and the rows, of a table of a curve. Raises OSError, ValueError."""
-    reader = csv.DictReader(io.StringIO(input_files.read(path).decode("utf-8-sig")), skipinitialspace=True)
-    reader.fieldnames = named = [word.strip() for word in reader.fieldnames or ()]
-    strains, stresses = ([n for n in named if n in known] for known in (SPATIAL_STRAINS, SPATIAL_STRESSES))
-    if len(strains) != 1 or len(stresses) != 1:
-        raise ValueError(f"{path}: expected one column of a strain, as E11, and one of a stress, as S11")
-    names = strains[0], stresses[0]
-    rows = [_numbers(f"{path}, line {line}", row, names) for line, row in enumerate(reader, start=2)]
-    if not 0 < len(rows) <= MOST_ROWS:
-        raise ValueError(f"{path}: {len(rows)} rows; expected at least one and at most {MOST_ROWS}")
-    return names, rows
-
-
-def _numbers(place: str, row: Mapping[str, Any], names: tuple[str, str]) -> tuple[float, float]:
-    """Return strain and stress of a row. Raises ValueError."""
-    try:
-        found = float(row[names[0]]), float(row[names[1]])
-    except (TypeError, ValueError):
-        raise ValueError(f"{place}: expected two numbers") from None
-    if not all(map(is_number, found)):
-        raise ValueError(f"{place}: expected finite numbers")
-    return found
+    The load is 0 where a temperature beside it decides the sign; None if the strain follows from the answer alone.
+    """
+    given = [(strain, name, target[name]) for strain, stress in components for name in (strain, stress)
+             if target.get(name)]  # fmt: skip
+    if given and all(name == strain for strain, name, _ in given):
+        strain, _, end = max(given, key=lambda each: abs(each[2]))
+        return strain, end, True
+    return (given[0][0], 0.0 if target.get(TEMPERATURE) else given[0][2], False) if len(given) == 1 else None

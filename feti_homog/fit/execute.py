@@ -22,7 +22,7 @@ from feti_homog.fit.estimation import Estimates
 from feti_homog.fit.predictions import exact_derivatives, predicted
 from feti_homog.parallel.mpi_errors import on_root, on_root_only
 from feti_homog.results import output_folder
-from feti_homog.runtime.standard_streams import say
+from feti_homog.runtime.standard_streams import complain, say
 from feti_homog.sweep import execute, store
 from feti_homog.sweep.plan import Sweep
 from feti_homog.typing import Float
@@ -38,17 +38,18 @@ def run(fit: Fit, directory: Path, comm: Intracomm, ranks_per_case: int, retry: 
     """Run a fit, or go on with it, and return the content of fit.json on every rank.  Collective.
 
     Raises:
-        CaseError: the folder is of another fit or holds files of others, or a test has not what was measured.
+        CaseError: the folder is of another fit, holds files of others, or another run writes there; a test has not what
+            was measured.
         ConvergenceError: a case failed, or there is no minimum, or unknowns that the data do not determine; in the
             latter cases the files are written.
     """
     execute.check_groups(comm, ranks_per_case)
     on_root(comm, output_folder.usable, directory)
     digest = on_root(comm, fit.digest)
-    on_root(comm, files.begin, directory, digest)
-    evaluations = Evaluations(fit, directory, comm, ranks_per_case, retry, quiet)
-    estimates = evaluations.estimate()
-    document = on_root(comm, files.write, directory, digest, fit, estimates)
+    with output_folder.held(directory, comm, lambda line: complain(line) if comm.rank == 0 else None):
+        on_root(comm, files.begin, directory, digest)
+        estimates = Evaluations(fit, directory, comm, ranks_per_case, retry, quiet).estimate()
+        document = on_root(comm, files.write, directory, digest, fit, estimates)
     if comm.rank == 0 and not quiet:
         say(files.text(document))
     if document["faults"]:

@@ -95,7 +95,7 @@ def content(fit: Fit, estimates: Estimates) -> dict[str, Any]:
         "correlation": [[_finite(value) for value in row] for row in found.correlation],
         "singular_values": found.singular_values.tolist(),
         "directions": found.directions.tolist(),
-        "sum_of_squares": float(found.residuals @ found.residuals),
+        "sum_of_squares": _finite(float(found.residuals @ found.residuals)),
         "chance": found.chance,
         "measured": data,
     }
@@ -115,7 +115,9 @@ def text(document: Mapping[str, Any]) -> str:
     rows = [[words, *(each[n] for n in HEAD[3:])] for words, each in zip(data, document["measured"], strict=True)]
     tables.append(Table("Measured", columns, rows, title_in_head=True))
     chance = "" if document["chance"] is None else f", as large or larger with a chance of {document['chance']:.2g}"
-    last = f"Sum of squares {document['sum_of_squares']:.4g}{chance}; {document['evaluations']} evaluations"
+    squares = document["sum_of_squares"]
+    total = "beyond all numbers" if squares is None else f"{squares:.4g}"
+    last = f"Sum of squares {total}{chance}; {document['evaluations']} evaluations"
     return "\n\n".join(["", *("\n".join(table.lines) for table in tables), last])
 
 

@@ -76,9 +76,10 @@ def predicted(document: Document, data: Sequence[Datum]) -> Float:
 
 def exact_derivatives(document: Document, data: Sequence[Datum], name: str) -> Float | None:
     """(m,) derivatives of the values by an unknown; None where the result does not give them."""
+    sections = path_curves.interface_sections(document)
+    name = name.replace("interface.1.", "interface.") if len(sections) == 1 else name
     if "sensitivities" in document:
         return _of_stiffness(document["sensitivities"], data, name)
-    sections = path_curves.interface_sections(document)
     is_scaling = name == TOUGHNESS and len(sections) == 1 and path_curves.scales_with_toughness(document)
     return _by_toughness(document, data, float(sections[0]["toughness"])) if is_scaling else None
 

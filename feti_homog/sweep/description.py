@@ -5,14 +5,13 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from mpi4py import MPI
 
 from feti_homog.case import case as cases
 from feti_homog.case import element_sizes
 from feti_homog.case.case import Case
-from feti_homog.case.document import read_document
 from feti_homog.case.phase_names import COATING
 from feti_homog.case.sections import SWEEP
 from feti_homog.errors import CaseError
@@ -124,23 +123,31 @@ def _mix_lines(case: Case, summary: CellSummary) -> list[str]:
     return [f"mix        {', '.join(f'{len(r)} of {name}, mean radius {r.mean():.6g}' for name, r in own)}"]
 
 
-def of_file(path: Path, comm: Intracomm) -> str:
+def of_document(document: dict[str, Any], folder: Path, comm: Intracomm) -> str:
     """Describe the run: the case, or the cases of a sweep and the first one; empty except on rank 0.  Collective.
 
     Raises:
-        CaseError, MeshError: the file is faulty, or the cell of its first case.
+        CaseError, MeshError: the document is faulty, or the cell of its first case.
     """
-    document = on_root(comm, read_document, path)  # once: it may be a pipe
-    if SWEEP in document:
-        sweep = on_root(comm, plan.expand, document, path.parent)
-        check_options(sweep)
-        case, points = sweep.cases[0], len({entry.point for entry in sweep.entries})
-        words = f"sweep      {len(sweep.cases)} cases, {points} points, all of them valid; the first:\n"
-    else:
-        case, words = on_root(comm, cases.parse, document, path.parent), ""
+    if SWEEP not in document:
+        return with_options(on_root(comm, cases.parse, document, folder), comm)
+    sweep = on_root(comm, plan.expand, document, folder)
+    points = len({entry.point for entry in sweep.entries})
+    words = f"sweep      {len(sweep.cases)} cases, {points} points, all of them valid; the first:"
+    return first_of(sweep, words, comm)
+
+
+def first_of(sweep: Sweep, words: str, comm: Intracomm) -> str:
+    """Return a line and the description of the first case.  Collective.  Raises as `describe`."""
+    check_options(sweep)
+    text = with_options(sweep.cases[0], comm)
+    return f"{words}\n{text}" if comm.rank == 0 else ""
+
+
+def with_options(case: Case, comm: Intracomm) -> str:
+    """Describe a case under its own options.  Collective.  Raises as `describe`."""
     with case_options(case.petsc):
-        text = describe(case, comm)
-    return f"{words}{text}" if comm.rank == 0 else ""
+        return describe(case, comm)
 
 
 def check_options(sweep: Sweep) -> None:

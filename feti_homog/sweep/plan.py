@@ -184,6 +184,8 @@ def _with_values(base: Mapping[str, Any], point: Assignment, faults: list[str], 
             if table is None:
                 faults.append(f"[{section}] {dotted_key(path)}: {toml_value(name)} is no section")
                 return document
+        if isinstance(table, list) and len(table) == 1 and isinstance(table[0], dict):
+            table = table[0]
         if isinstance(table, list):
             faults.append(f"[{section}] {dotted_key(path)}: {_several(path, table)}")
             return document

@@ -34,6 +34,12 @@ def test_means_stay_in_the_case_and_deviations_beside_them():
     assert dict(Case.parse(section).uncertainty.std) == pytest.approx(dict(case.uncertainty.std))
 
 
+def test_the_one_of_several_sections_has_no_number():
+    section = "[[interface]]\nnormal_stiffness = {mean = 50.0, std = 5.0}\ntangential_stiffness = 20.0\n"
+    case = Case.parse(tomllib.loads(changed(end=section)))
+    assert dict(case.uncertainty.std) == {"interface.normal_stiffness": 5.0} and Case.parse(case.resolved()) == case
+
+
 @pytest.mark.parametrize(
     ("edits", "end", "line"),
     [
@@ -52,6 +58,12 @@ def test_means_stay_in_the_case_and_deviations_beside_them():
         ([], "[uncertainty]\nmaterial.fibre.young = 0.0\n",
          "[uncertainty] material.fibre.young = 0.0: expected a standard"),
         ([], PAIR, "[uncertainty] correlation = "),
+        (UNCERTAIN, PAIR.replace("]]", '], ["material.fibre.young", "material.matrix.young", -0.4]]'),
+         '[uncertainty] correlation = ["material.fibre.young", "material.matrix.young", -0.4]: this pair'),
+        (UNCERTAIN, "[uncertainty]\nmaterial.fibre.young = 3.0\n",
+         "[uncertainty] material.fibre.young: its standard deviation is given twice"),
+        ([], "[uncertainty]\nmaterial.matrix.young = 1e-198\n",
+         "[uncertainty] material.matrix.young = 1e-198: expected a standard deviation above 0; numbers other than 0 "),
         ([("young = 88.0", "young = {mean = 88.0, std = 1.0}"), ('"stiffness"', '"envelope"')], "",
          '[uncertainty]: belongs to [analysis] type = "stiffness"'),
     ],

@@ -48,6 +48,8 @@ def faults(text: str, folder: Path = Path()) -> tuple[str, ...]:
         (f"{UNKNOWN}[measured]\nC11 = 3.0\n", "[measured] C11 = 3.0: expected a table {value, std}"),
         (f"{UNKNOWN}[measured]\nC11 = {{value = 3.0, std = 0.0}}\n",
          "[measured] C11.std = 0.0: expected a number above 0"),
+        (f"{UNKNOWN}[measured]\nC11 = {{value = -3.0, std = 1e-100}}\n",
+         "[measured] C11.std = 1e-100: expected at least 1e-12 of -3"),
         (f"{UNKNOWN}[measured]\nE_axial = {{value = 3.0, std = 0.1}}\n",
          "[measured] E_axial: the analysis does not give it; expected one of C11, C12, C13, C22, C23, C33, E1, E2, "
          "nu12, nu21, G12"),
@@ -82,16 +84,29 @@ def test_tests_are_changes_of_one_case(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("table", "lines"),
+    ("load", "table", "line"),
     [
-        ("E11, S33\n0.01, 1.0\n",
-         ["[measured] curve: expected an analysis of type path", '[measured] curve: plane = "strain" has no S33']),
-        (f"E11, S11\n{'1' * 200_000}, 1.0\n", ["field larger than field limit (131072)"]),
+        ("strain = [0.1, 0.0, 0.0]", "E11, S33\n0.01, 1.0\n", '[measured] curve: plane = "strain" has no S33'),
+        ("strain = [0.1, 0.0, 0.0]", f"E11, S11\n{'1' * 200_000}, 1.0\n", "field larger than field limit (131072)"),
+        ("strain = [0.1, -0.2, 0.0]", "E11, S11\n0.01, 1.0\n",
+         "[measured] curve: expected the strain that rises along the path, E22"),
+        ("strain = [0.1, 0.0, 0.0]", "E11, S11\n0.0, 0.0\n-0.01, 1.0\n",
+         "[measured] curve: expected strains of the sign of the path, which ends at 0.1"),
+        ("strain = [-0.1, 0.0, 0.0]", "E11, S11\n-0.01, 1.0\n-0.11, 2.0\n",
+         "[measured] curve: a strain of 0.11 is beyond the end of the path at 0.1"),
+        ("waypoints = [{S11 = -1.0, S22 = 0.0, S12 = 0.0}]", "E11, S11\n0.01, 1.0\n",
+         "[measured] curve: expected strains of the sign of the path, which ends at -1"),
+        ("waypoints = [{S11 = 1.0}, {S11 = 0.0}]", "E11, S11\n0.01, 1.0\n",
+         "[measured] curve: expected an analysis of type path, of one leg"),
+        (None, "E11, S11\n0.01, 1.0\n", "[measured] curve: expected an analysis of type path, of one leg"),
     ],
 )  # fmt: skip
-def test_curves_have_their_faults(tmp_path, table, lines):
+def test_curves_have_their_faults(tmp_path, load, table, line):
+    """All of them before anything is computed."""
     (tmp_path / "curve.csv").write_text(table)
-    text = BASE + UNKNOWN + '[measured]\ncurve = {file = "curve.csv", std = 0.1}\n'
-    with pytest.raises(CaseError) as error:
-        parse(tomllib.loads(text), tmp_path)
-    assert all(any(line in fault for fault in error.value.faults) for line in lines)
+    unknown, end = UNKNOWN, '[measured]\ncurve = {file = "curve.csv", std = 0.1}\n'
+    if load is not None:
+        end += PATH.partition("[path]")[0] + f"[path]\n{load}\n"
+    text = (BASE if load is None else BASE.replace('"stiffness"', '"path"')) + unknown + end
+    found = faults(text, tmp_path)
+    assert len(found) == 1 and line in found[0], found

@@ -1,0 +1,55 @@
+"""`feti-homog check` and `fit` of a file: one at a time in a folder, and kill -9 at any moment takes no evaluation."""
+
+from __future__ import annotations
+
+import json
+
+from support.command_line import command_line
+from support.hooks import KILL, WAIT, Hook, HookedJob, hooked
+
+COMMIT = "feti_homog.results.atomic:commit"
+FIT = """
+[cell]
+geometry = "square"
+fibre_fraction = 0.4
+mesh_size = 0.5
+[material]
+matrix = {young = 3.0, poisson = 0.35}
+fibre = {young = 70.0, poisson = 0.2}
+[analysis]
+type = "stiffness"
+plane = "strain"
+[unknown]
+material.matrix.young = {start = 2.5, lower = 1.0, upper = 5.0}
+[measured]
+C11 = {value = 9.0, std = 0.1}
+"""
+
+
+def test_a_fit_that_is_killed_goes_on(tmp_path):
+    """It waits before the second result, while another is refused, is killed there, and again before fit.json."""
+    path, out = tmp_path / "fit.toml", tmp_path / "out"
+    path.write_text(FIT)
+    words = ("fit", path, "--out", out)
+    checked = command_line(0, "check", path)
+    assert checked.stdout.startswith(
+        "fit        1 unknowns, 1 measured values of 1 tests; the first at the start:\ncase "
+    )
+    assert checked.returncode == 0 and checked.stdout.endswith("the case is valid\n") and not out.exists()
+    second = "args[1].name == 'result.json' and args[1].parts[-3] == 'evaluation-0002'"
+    with HookedJob(0, [Hook(COMMIT, WAIT, when=second)], *words) as job:
+        assert job.told() == "0 here"
+        refused = command_line(0, *words)
+        assert refused.returncode == 2 and "another run writes its results there" in refused.stderr
+        assert f"process {job.process.pid}" in refused.stderr
+        job.killed()
+    results = {each: each.stat().st_mtime_ns for each in out.glob("evaluation-*/case-*/result.json")}
+    assert len(results) == 1 and json.loads((out / "fit.json").read_text())["status"] == "running"
+    job = hooked(0, [Hook(COMMIT, KILL, when="args[1].name == 'fit.json'")], *words, "--quiet")
+    assert job.returncode not in (0, 2, 3) and json.loads((out / "fit.json").read_text())["status"] == "running"
+    job = command_line(0, *words)
+    assert job.returncode == 0, job.stderr
+    document = json.loads((out / "fit.json").read_text())
+    found = {each: each.stat().st_mtime_ns for each in out.glob("evaluation-*/case-*/result.json")}
+    assert results.items() <= found.items() and len(found) == document["evaluations"]
+    assert document["status"] == "done" and not (out / "result.lock").exists()
