@@ -143,8 +143,8 @@ def _points(
 def _sliding_cell(context: AnalysisContext) -> SlidingCell:
     """Return the faces of the case with the friction of its interfaces.  Collective; raises as `SlidingCell`."""
     coefficients = np.array([interface.friction for interface in context.case.interfaces])
-    plane = context.plane.interface
-    return SlidingCell(plane, coefficients[plane.nodes.pair])
+    cell = context.loads.interfaces
+    return SlidingCell(cell, coefficients[cell.nodes.pair])
 
 
 def _tell(context: AnalysisContext, shown: EventProgress, name: str, responses: Sequence[Response]) -> None:

@@ -17,7 +17,6 @@ from feti_homog.case.selectors import (
     BY_STRENGTH,
     BY_TABLE,
     GENERALIZED,
-    IN_THE_PLANE,
     PATH_ANALYSIS,
     SOFTENING,
 )
@@ -89,10 +88,10 @@ class InterfaceSection:
     friction: float = key(
         real(least=0.0),
         "Coulomb's coefficient mu of debonded faces: they stick while |t_t| < mu |t_n|, and slide at that traction. "
-        "The load is controlled from the first leg on, without snap-back. Cells too large for influence columns are "
-        "refused.",
+        "The load is controlled from the first leg on, without snap-back. Along the fibres, in generalized plane "
+        "strain, debonded faces slide without a force. Cells too large for influence columns are refused.",
         default=0.0,
-        only=(PATH_ANALYSIS, BY_EVENTS, IN_THE_PLANE),
+        only=(PATH_ANALYSIS, BY_EVENTS),
     )
     debonded: tuple[Arc, ...] = key(
         ARCS,

@@ -59,13 +59,20 @@ def test_paths_are_those_of_a_slow_twin(comm, waypoints, springs):
         assert point.friction_heat == pytest.approx(expected[k].heat, abs=1e-7 * most * 0.01)
 
 
-@pytest.mark.parametrize("law", [{}, SOFTENING], ids=["strength", "softening"])
-def test_breaks_with_friction_obey_every_law_resumed_too(comm, shared_path, law):
+@pytest.mark.parametrize(
+    ("plane", "law"),
+    [("strain", {}), ("strain", SOFTENING), ("generalized", SOFTENING)],
+    ids=["strength", "softening", "softening along fibres too"],
+)
+def test_breaks_with_friction_obey_every_law_resumed_too(comm, shared_path, plane, law):
     interface = {"normal_strength": 0.05, "tangential_strength": 0.05, "friction": 0.3} | law
     interface |= {"debonded": [{"fibre": 1, "angle": 360.0}, {"fibre": 2, "angle": 90.0}]}
     cell = {"geometry": "random", "fibres": 3, "seed": 3, "fibre_fraction": 0.35, "mesh_size": 0.15}
     path = {"waypoints": [{"S11": -0.05}, {"gamma12": 0.03}, {"gamma12": -0.02}, {"S11": 0.02}]}
-    asked = document(cell, EPOXY_GLASS, "strain", interface, path=path) | {"decomposition": PIECES}
+    if plane == "generalized":
+        cold = {"temperature": -200.0, "E33": 0.0}
+        path = {"waypoints": [cold, cold | {"gamma13": 0.02, "gamma12": 0.02}, {"S23": 0.005, "gamma12": -0.04}]}
+    asked = document(cell, EPOXY_GLASS, plane, interface, path=path) | {"decomposition": PIECES}
     asked["output"] = {"pictures": False, "states": 6}
     short = asked | {"path": path | {"max_events": 25}}
     with pytest.raises(ConvergenceError):

@@ -1,10 +1,12 @@
 """Coulomb friction on debonded faces by two slow methods: implicit increments, and rates from change to change.
 
-z = (q, e): of each interface node the gap and the slip u_matrix - u_fibre of its faces, and the macroscopic loads.  The
-bodies and springs store z.A z / 2; (A z)_n = p is the pressure and -(A z)_t = f the shear force on the fibre.  On
-debonded nodes
+z = (q, a, e): of each interface node the gap and the slip u_matrix - u_fibre of its faces, in generalized plane strain
+also the slips along the fibres, and the macroscopic loads.  The bodies and springs store z.A z / 2; (A z)_n = p is the
+pressure and -(A z)_t = f the shear force on the fibre.  On debonded nodes
 
     gap >= 0, p >= 0, gap p = 0;   |f| <= mu p;   f d slip >= 0, and d slip = 0 where |f| < mu p.
+
+Along the fibres debonded faces slide without a force.
 """
 
 from __future__ import annotations
@@ -33,6 +35,7 @@ class State:
     pressure: np.ndarray
     shear: np.ndarray
     status: np.ndarray
+    axial: np.ndarray  # (k,) or (0,) force along the fibre
 
     def start_of(self, load):
         """Return the load of the state in the kinds of another one."""
@@ -48,34 +51,44 @@ class NoEquilibriumError(ArithmeticError):
 
 
 class RubbingFaces:
-    """The nodes of a cell: `A` (2k + m, 2k + m) as above, which are `bonded` (k,), coefficients of `friction`."""
+    """The nodes of a cell: `A` of z as above, which are `bonded` (k,), coefficients of `friction`.
 
-    def __init__(self, A, bonded, friction, area=1.0):
-        self.k, self.m, self.area = len(bonded), len(A) - 2 * len(bonded), area
+    `d` is 2, or 3 with slips along the fibres.
+    """
+
+    def __init__(self, A, bonded, friction, area=1.0, d=2):
+        self.k, self.m, self.area = len(bonded), len(A) - d * len(bonded), area
         self.unit = np.abs(np.diag(A)).max()
         # Springs of nothing hold fibres that nothing touches.
-        self.A = A / self.unit + 1e-13 * np.diag(np.arange(len(A)) < 2 * self.k)
+        self.A = A / self.unit + 1e-13 * np.diag(np.arange(len(A)) < d * self.k)
         self.n, self.t = 2 * np.arange(self.k), 2 * np.arange(self.k) + 1
-        self.e = np.arange(2 * self.k, len(A))
+        self.a, self.e = np.split(np.arange(2 * self.k, len(A)), [(d - 2) * self.k])
         self.bonded, self.mu = np.array(bonded, bool), np.broadcast_to(friction, self.k).astype(float)
 
     @classmethod
     def of(cls, cell, bonded, friction):
-        """Return those of a `CondensedCell` in a plane state; faces of springs rub behind these."""
+        """Return those of a `CondensedCell`; faces of springs rub behind these."""
         A, n = cell.A, cell.n
         if not cell.glued:
             K = np.diag(cell.springs.ravel())
             gives = np.linalg.inv(A[:n, :n] + K)
             top = np.hstack([K - K @ gives @ K, K @ gives @ A[:n, n:]])
             A = np.vstack([top, np.hstack([top[:, n:].T, A[n:, n:] - A[n:, :n] @ gives @ A[:n, n:]])])
-        return cls((A + A.T) / 2, bonded, friction, cell.area)
+        jumps = np.arange(n).reshape(cell.k, cell.d)
+        order = np.r_[jumps[:, :2].ravel(), jumps[:, 2:].ravel(), n : len(A)]
+        return cls((A + A.T)[np.ix_(order, order)] / 2, bonded, friction, cell.area, cell.d)
 
     @property
     def at_rest(self):
         """The state without a load."""
         zero = np.zeros(self.k)
         status = np.where(self.bonded, BONDED, STICK)
-        return State(np.zeros(self.m), np.zeros(self.m), zero, zero, zero, zero, status)
+        return State(np.zeros(self.m), np.zeros(self.m), zero, zero, zero, zero, status, np.zeros(len(self.a)))
+
+    @property
+    def tied(self):
+        """(k,) or (0,) nodes that do not slip along the fibres."""
+        return self.bonded[: len(self.a)]
 
     def linear(self, status, slip, load):
         """Return the states (s,), or their rates, of given statuses (s, k), the slip (k,) of the stuck and a load."""
@@ -86,6 +99,7 @@ class RubbingFaces:
         M[:, self.t] += (SIGN[status] * self.mu)[:, :, None] * self.A[self.n]
         M[:, self.n] = np.where(closed[:, :, None], unit[self.n], M[:, self.n])
         M[:, self.t] = np.where(held[:, :, None], unit[self.t], M[:, self.t])
+        M[:, self.a[self.tied]] = unit[self.a[self.tied]]
         M[:, self.e[~load.by_stress]] = unit[self.e[~load.by_stress]]
         b = np.zeros((len(status), len(self.A)))
         b[:, self.t] = np.where(held, slip, 0.0)
@@ -96,7 +110,8 @@ class RubbingFaces:
 
     def _state(self, z, status):
         r = self.unit * (self.A @ z)
-        return State(z[self.e], r[self.e] / self.area, z[self.n], z[self.t], r[self.n], -r[self.t], status)
+        own = z[self.n], z[self.t], r[self.n], -r[self.t], status, -r[self.a]
+        return State(z[self.e], r[self.e] / self.area, *own)
 
     def increment(self, before, load, most=500):
         """Return the state after one implicit step: problems of given friction bounds, until the pressures stay."""
@@ -130,7 +145,7 @@ class RubbingFaces:
     def _given_bounds(self, bound, before, load):
         """min z.A z / 2 + sum bound |slip - slip before|, gap >= 0, by Clarabel: as good as its tolerances."""
         free = np.ones(len(self.A), bool)
-        free[self.n[self.bonded]] = free[self.t[self.bonded]] = False
+        free[self.n[self.bonded]] = free[self.t[self.bonded]] = free[self.a[self.tied]] = False
         free[self.e] = load.by_stress
         own = ~self.bonded
         n, t = (np.searchsorted(np.flatnonzero(free), x[own]) for x in (self.n, self.t))

@@ -79,7 +79,7 @@ class FrictionPath:
         """(k,) shares of what breaks the bonds."""
         if self.law is None:
             return np.zeros(self.faces.k)
-        force = np.column_stack([-state.pressure, state.shear])
+        force = np.column_stack([-state.pressure, state.shear, *state.axial.reshape(-1, self.faces.k)])
         return self.law.used(self.cell, SimpleNamespace(force=force), self.faces.bonded)
 
     def _break_between(self, after, low, high):

@@ -57,12 +57,12 @@ class CoupledInterfaces:
 
     def linear(self, load: Load, bonds: BondState, start: Multipliers) -> CoupledSolution:
         """Return the dual problems with the states as they are. Collective."""
-        triples = zip(self.problems, self._parts(load), start, strict=True)
+        triples = zip(self.problems, self.parts(load), start, strict=True)
         return CoupledSolution(tuple(each.linear(own, bonds, lam) for each, own, lam in triples))
 
     def equilibrium(self, load: Load, bonds: BondState, start: Multipliers) -> Equilibrium:
         """Return the state under a load, with `bonds` a first guess of who is in contact. Collective."""
-        loads = self._parts(load)
+        loads = self.parts(load)
         state = self.plane.equilibrium(loads[0], bonds, start.plane)
         for axial, along, lam in zip(self.problems[1:], loads[1:], start[1:], strict=True):
             state = replace(state, axial=axial.equilibrium(along, state.bonds, lam))
@@ -75,7 +75,7 @@ class CoupledInterfaces:
         axial = next((each.completed(own) for each, own in pairs), None)
         return replace(self.plane.completed(plane), axial=axial)
 
-    def _parts(self, load: Load) -> list[Load]:
+    def parts(self, load: Load) -> list[Load]:
         """Return the load of each problem."""
         return load.parts([len(each.solver.problem.loads) for each in self.problems])
 

@@ -1,10 +1,7 @@
 """The debonded faces of a cell, condensed to dense arrays: what rank 0 decides, and multipliers of all ranks.
 
-With H the inverse of the dual operator of the bonded cell, prescribed jumps g on the rows D of debonded nodes leave
-
-    lam = H (d E - g),      |UC| Sigma = L E - b^T g,      b = (H d)_D,
-
-L the bonded stiffness times the area: the matrix S of `coulomb_faces` is [[H_DD, -b], [-b^T, L]].
+The matrix S of `coulomb_faces` is that of `CondensedProblem` in the plane.  In generalized plane strain the strains
+along the fibres, to which faces that slide freely along them answer, are loads of their own behind it.
 """
 
 from __future__ import annotations
@@ -14,16 +11,16 @@ from functools import cached_property
 
 import numpy as np
 from mpi4py import MPI
+from scipy.linalg import block_diag
 
-from feti_homog.errors import CaseError
 from feti_homog.feti.dual_solution import DualSolution
-from feti_homog.interface.contact.contact_problem import ContactProblem
+from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, Equilibrium, Status
+from feti_homog.interface.friction.condensed_problem import CondensedProblem, FreeFaces
 from feti_homog.interface.friction.coulomb_faces import CoulombFaces
 from feti_homog.interface.friction.status_system import OPEN_FACE, STICK
-from feti_homog.interface.loads.load import Load
-from feti_homog.parallel.distributed_arrays import allreduce_sum, gather_rows
-from feti_homog.typing import Float, Int
+from feti_homog.interface.loads.load import Load, Macroscopic, Multipliers
+from feti_homog.typing import Float
 
 
 class SlidingCell:
@@ -36,46 +33,40 @@ class SlidingCell:
         faces: of these nodes, on every rank.
     """
 
-    def __init__(self, interface: ContactProblem, friction: Float) -> None:
-        """Find the response of the bonded cell to its loads.  Collective.
-
-        Raises:
-            CaseError: the solver has no inverse of the dual operator.
-        """
-        self.interface, self.friction = interface, friction
-        self.solver = interface.solver
-        if self.solver.exact_inverse is None:
-            raise CaseError("[interface] friction: needs -feti_pc_type influence, with which this cell may not fit")
-        self._inverse = self.solver.exact_inverse
-        self._first = self.solver.jump_operator.owned[0]
-        loads = np.eye(len(self.solver.problem.loads))
-        self._response = self._inverse.multipliers(self.solver.d, loads)
-        bonded = self.solver.torn_stiffness + allreduce_sum(self.solver.comm, self.solver.d.T @ self._response)
-        self._bonded = (bonded + bonded.T) / 2
+    def __init__(self, cell: CoupledInterfaces, friction: Float) -> None:
+        """Find the response of the bonded cell to its loads.  Collective; raises as `CondensedProblem`."""
+        self.cell, self.interface, self.friction = cell, cell.plane, friction
+        self.solver = self.interface.solver
+        self._plane, *self._axial = (CondensedProblem(each) for each in cell.problems)
+        self._loads = len(self.solver.problem.loads)
 
     def take(self, bonds: BondState) -> None:
         """Have the faces of the debonded nodes, and of damaged bonds, which are on springs.  Collective."""
-        comm, row = self.solver.comm, self.interface.nodes.row
-        pulled = replace(bonds, pressed=np.zeros(len(row), bool))
-        more = (self.interface.compliance(pulled) - self.solver.intact_compliance)[row[:, None] + np.arange(2)]
-        self._damaged = (bonds.status == BONDED) & (more > 0.0).any(axis=1)
+        comm, row, first = self.solver.comm, self.interface.nodes.row, self._plane.first
+        more = np.hstack([self._gained(each, bonds) for each in (self._plane, *self._axial)])
+        self._damaged = (bonds.status == BONDED) & (more[:, :2] > 0.0).any(axis=1)
         self._own = np.flatnonzero((bonds.status != BONDED) | self._damaged)
         springs = np.divide(1.0, more, out=np.zeros_like(more), where=(more > 0.0) & self._damaged[:, None])
         friction = np.where(self._damaged, 0.0, self.friction)
-        own = np.column_stack([self._first + row, friction, springs])[self._own]
-        rows, friction, *both = np.concatenate(comm.allgather(own)).T
-        order = np.argsort(rows)
-        self.rows, self.springs = rows[order].astype(np.int64), np.stack(both, axis=1)[order].ravel()
-        self._place = np.searchsorted(self.rows, self._first + row[self._own])
-        pairs = self._pairs
-        self._columns, K = self._inverse.columns(pairs)
-        b = gather_rows(comm, self._response, self._first, pairs)
-        self.faces = CoulombFaces(np.block([[K + np.diag(self.springs), -b], [-b.T, self._bonded]]), friction[order])
+        along = [each.first + each.interface.nodes.row for each in self._axial]
+        own = np.column_stack([first + row, friction, *along, springs])[self._own]
+        whole = np.concatenate(comm.allgather(own))
+        whole = whole[np.argsort(whole[:, 0])]
+        self.rows, self.springs = whole[:, 0].astype(np.int64), whole[:, -more.shape[1] :][:, :2].ravel()
+        self._place = np.searchsorted(self.rows, first + row[self._own])
+        K, b, L = self._plane.take((self.rows[:, None] + np.arange(2)).ravel(), self.springs)
+        self._along = [FreeFaces(each, whole[:, 2].astype(np.int64), whole[:, -1]) for each in self._axial]
+        L = block_diag(L, *(each.stiffness for each in self._along))
+        b = np.pad(b, [(0, 0), (0, len(L) - self._loads)])
+        self.faces = CoulombFaces(np.block([[K, -b], [-b.T, L]]), whole[:, 1])
 
-    @property
-    def _pairs(self) -> Int:
-        """(2n,) global rows of the debonded nodes."""
-        return np.asarray((self.rows[:, None] + np.arange(2)).ravel())
+    @staticmethod
+    def _gained(problem: CondensedProblem, bonds: BondState) -> Float:
+        """(k, c) compliance that damage adds to the springs of a problem, if all bonds are pulled."""
+        interface = problem.interface
+        pulled = replace(bonds, pressed=np.zeros(len(bonds.status), bool))
+        more = interface.compliance(pulled) - problem.solver.intact_compliance
+        return np.asarray(more[interface.nodes.row[:, None] + np.arange(problem.solver.jump_operator.components)])
 
     @cached_property
     def area(self) -> float:
@@ -112,10 +103,29 @@ class SlidingCell:
         jump = (x / self.faces.size)[: 2 * len(self.rows)]
         return float(self.springs @ jump**2) / (2.0 * self.area)
 
-    def multipliers(self, x: Float) -> Float:
-        """(owned rows,) lam of scaled x."""
+    def multipliers(self, x: Float) -> Multipliers:
+        """(owned rows,) lam of scaled x in each problem."""
+        return Multipliers(each.multipliers(*own) for each, own in self._parts(x))
+
+    def traction(self, x: Float) -> Float:
+        """(k, 2) or (k, 3) traction of scaled x at the nodes of this rank, also along the fibre."""
+        pairs = zip(self.cell.problems, self.multipliers(x), strict=True)
+        rows = [lam[p.nodes.row[:, None] + np.arange(p.solver.jump_operator.components)] for p, lam in pairs]
+        return np.asarray(np.hstack(rows) / self.interface.nodes.length[:, None])
+
+    def _parts(self, x: Float) -> list[tuple[CondensedProblem, tuple[Float, Float]]]:
+        """Return each problem with its jumps and strains of scaled x."""
         plain, last = x / self.faces.size, 2 * len(self.rows)
-        return np.asarray(self._response @ plain[last:] - self._columns @ plain[:last])
+        plane, along = np.split(plain[last:], [self._loads])
+        return [
+            (self._plane, (plain[:last], plane)),
+            *((each.problem, (each.jump(along), along)) for each in self._along),
+        ]
+
+    def released_along(self, before: Macroscopic, after: Macroscopic) -> float:
+        """Return the energy per area that a break at constant load loses of the axial problem."""
+        parts = (Macroscopic(each.strain[self._loads :], each.stress[self._loads :]) for each in (before, after))
+        return next(parts).released_to(next(parts))
 
     def strain(self, x: Float) -> Float:
         """(v,) E of scaled x."""
@@ -130,30 +140,16 @@ class SlidingCell:
         size = self.faces.size[2 * len(self.rows) :]
         return np.where(load.by_stress, self.area * load.values / size, load.values * size)
 
-    def solution(self, bonds: BondState, x: Float) -> DualSolution:
-        """Return the multipliers, and the jumps that they leave by the dual operator itself.  Collective."""
-        solver, lam, strain = self.solver, self.multipliers(x), self.strain(x)
-        left = solver.d @ strain - solver.operator.apply(lam)
-        opened, last = np.zeros(len(lam)), 2 * len(self.rows)
-        pairs = self._pairs
-        mine = (pairs >= self._first) & (pairs < self._first + len(lam))
-        opened[pairs[mine] - self._first] = (x / self.faces.size)[:last][mine]
-        alpha = np.zeros(solver.natural.kernel_dimension)
-        if len(alpha):
-            alpha -= solver.natural.amplitudes(left - opened)
-            left = left + solver.natural.G @ alpha
-        norms = allreduce_sum(solver.comm, np.array([(left - opened) @ (left - opened), left @ left]))
-        torn = solver.d @ strain
-        size = np.sqrt(max(norms[1], allreduce_sum(solver.comm, np.array([torn @ torn]))[0]))
-        residual = float(np.sqrt(norms[0]) / (size or 1.0))
-        C = self.interface.compliance(bonds)
-        return DualSolution(strain, lam, left - (C - solver.intact_compliance) * lam, alpha, 0, 2, residual, C)
-
     def equilibrium(self, load: Load, bonds: BondState, x: Float) -> Equilibrium:
         """Return the state of scaled x, with its certificate.  Collective."""
-        solution = self.solution(bonds, x)
-        certificate = self.interface.certificate(bonds, solution) | {"kkt_friction": self._excess(bonds, solution)}
-        return Equilibrium(load, bonds, solution, 0, 1, 0, certificate)
+        loads, states = self.cell.parts(load), list[Equilibrium]()
+        for own, (problem, (jump, strain)) in zip(loads, self._parts(x), strict=True):
+            solution = problem.solution(bonds, jump, strain)
+            certificate = problem.interface.certificate(bonds, solution)
+            states.append(Equilibrium(own, bonds, solution, 0, 1, 0, certificate))
+        plane, *axial = states
+        excess = {"kkt_friction": self._excess(bonds, plane.solution)}
+        return replace(plane, certificate=plane.certificate | excess, axial=next(iter(axial), None))
 
     def _excess(self, bonds: BondState, solution: DualSolution) -> float:
         """Return how far shear on debonded faces is beyond mu p, or off s mu p, relative to the largest traction.

@@ -12,7 +12,7 @@ from feti_homog.interface.contact.states import Equilibrium, Status
 from feti_homog.interface.friction.coulomb_faces import Prescribed, StuckError
 from feti_homog.interface.friction.sliding_cell import SlidingCell
 from feti_homog.interface.laws.bond_law import BondLaw
-from feti_homog.interface.loads.load import Load, Macroscopic, Multipliers
+from feti_homog.interface.loads.load import Load, Macroscopic
 from feti_homog.interface.path.next_change import first_break_between
 from feti_homog.interface.path.path_points import (
     NO_ENERGIES,
@@ -117,7 +117,7 @@ class SlidingLeg:
         if change >= rest - SAME_LOAD:
             change = np.inf
         whole = x + min(rest, change) * rate
-        tractions = (self._traction(each) for each in (x, whole))
+        tractions = (self.sliding.traction(each) for each in (x, whole))
         bonds = self.sliding.bonds(self._bonds, status, x)
         breaks = first_break_between(cell, self.law, bonds, *tractions)
         way = min(breaks, 1.0) * min(rest, change)
@@ -136,12 +136,6 @@ class SlidingLeg:
         """Return what is prescribed at a share of the leg, with the slips of scaled x."""
         load = self.start.after(share, self.end)
         return Prescribed(load.by_stress, self.sliding.given(load), x[1 : 2 * len(self.sliding.rows) : 2])
-
-    def _traction(self, x: Float) -> Float:
-        """(k, 2) of scaled x at the nodes of this rank."""
-        nodes = self.cell.nodes
-        lam = self.sliding.multipliers(x)
-        return np.asarray(lam[nodes.row[:, None] + np.arange(2)] / nodes.length[:, None])
 
     def _standing(self, status: Status, x: Float) -> Standing:
         return Standing(status, x, Macroscopic(self.sliding.strain(x), self.sliding.stress(x)))
@@ -183,13 +177,13 @@ class SlidingLeg:
         if begin.broken is None:
             return
         status, x = self.sliding.begin(begin.bonds, begin.last.strain)
-        self._here, faces = self._standing(status, x), self.sliding.faces
+        self._here, faces = Standing(status, x, begin.last), self.sliding.faces
         given = self._given(self._share, x)
         status, there = on_root(self.cell.comm, faces.search, status, faces.all_allowed(), given, x)
         lost, heat = (own / self.sliding.area for own in faces.losses(status, x, there))
         after = self._standing(status, there)
         # Springs of the bonds that soften do not keep what they were stretched by before.
-        lost += begin.stretched - self.sliding.stretched(x)
+        lost += begin.stretched - self.sliding.stretched(x) + self.sliding.released_along(begin.last, after.mean)
         self._add(after, lost - heat, heat, begin.broken)
         self._here, self._bonds, self._first = after, self.sliding.bonds(begin.bonds, status, there), True
 
@@ -202,7 +196,7 @@ class SlidingLeg:
 
     def _path_state(self) -> PathState:
         """Return the beginning of the way from here on."""
-        lam = Multipliers([self.sliding.multipliers(self._here.x)])
+        lam = self.sliding.multipliers(self._here.x)
         return PathState(self.leg, self._share, self._bonds, lam, self.origin, self._here.mean)
 
     def _point(self, broke: int, softened: int, after: PathState) -> Point:

@@ -1,0 +1,96 @@
+"""A problem of a cell, in the plane or along the fibres, condensed to jumps of some interface rows.
+
+With H the inverse of the dual operator of the bonded cell, prescribed jumps g on rows D leave
+
+    lam = H (d E - g),      |UC| Sigma = L E - b^T g,      b = (H d)_D,
+
+L the bonded stiffness times the area: the cell stores x.S x / 2 of x = (g, E), S = [[H_DD, -b], [-b^T, L]].
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from feti_homog.errors import CaseError
+from feti_homog.feti.dual_solution import DualSolution
+from feti_homog.interface.contact.contact_problem import ContactProblem
+from feti_homog.interface.contact.states import BondState
+from feti_homog.parallel.distributed_arrays import allreduce_sum, gather_rows
+from feti_homog.typing import Float, Int
+
+# Share of the largest stiffness of a row that holds what nothing else does; a step of refinement removes it.
+HELD = 1e-9
+
+
+class CondensedProblem:
+    """One problem with the rows that `take` was last given.
+
+    Attributes:
+        interface: its contact problem.
+        rows: (n,) global rows D.
+        first: global number of the first row of this rank.
+    """
+
+    def __init__(self, interface: ContactProblem) -> None:
+        """Find the response of the bonded cell to its loads.  Collective.
+
+        Raises:
+            CaseError: the solver has no inverse of the dual operator.
+        """
+        self.interface, self.solver = interface, interface.solver
+        if self.solver.exact_inverse is None:
+            raise CaseError("[interface] friction: needs -feti_pc_type influence, with which this cell may not fit")
+        self._inverse, self.first = self.solver.exact_inverse, self.solver.jump_operator.owned[0]
+        self._response = self._inverse.multipliers(self.solver.d, np.eye(len(self.solver.problem.loads)))
+        bonded = self.solver.torn_stiffness + allreduce_sum(self.solver.comm, self.solver.d.T @ self._response)
+        self._bonded = (bonded + bonded.T) / 2
+
+    def take(self, rows: Int, springs: Float) -> tuple[Float, Float, Float]:
+        """Return H_DD (n, n) with springs (n,) beside it, b (n, v) and L (v, v) of the same rows.  Collective."""
+        self.rows = rows
+        self._columns, K = self._inverse.columns(rows)
+        return K + np.diag(springs), gather_rows(self.solver.comm, self._response, self.first, rows), self._bonded
+
+    def multipliers(self, jump: Float, strain: Float) -> Float:
+        """(owned rows,) lam of jumps (n,) and strains (v,)."""
+        return np.asarray(self._response @ strain - self._columns @ jump)
+
+    def solution(self, bonds: BondState, jump: Float, strain: Float) -> DualSolution:
+        """Return the multipliers, and the jumps that they leave by the dual operator itself.  Collective."""
+        solver, lam = self.solver, self.multipliers(jump, strain)
+        torn = solver.d @ strain
+        left, opened = torn - solver.operator.apply(lam), np.zeros(len(lam))
+        mine = (self.rows >= self.first) & (self.rows < self.first + len(lam))
+        opened[self.rows[mine] - self.first] = jump[mine]
+        alpha = np.zeros(solver.natural.kernel_dimension)
+        if len(alpha):
+            alpha -= solver.natural.amplitudes(left - opened)
+            left = left + solver.natural.G @ alpha
+        sums = np.array([(left - opened) @ (left - opened), left @ left, torn @ torn])
+        off, *sizes = np.sqrt(allreduce_sum(solver.comm, sums))
+        C = self.interface.compliance(bonds)
+        left = left - (C - solver.intact_compliance) * lam
+        return DualSolution(strain, lam, left, alpha, 0, 2, float(off / (max(sizes) or 1.0)), C)
+
+
+class FreeFaces:
+    """The axial problem where debonded faces slide along the fibres without a force: g = K^-1 b E, K g = b E.
+
+    Attributes:
+        problem: the axial one.
+        stiffness: (v, v) L - b^T K^-1 b, what works on its strains.
+    """
+
+    def __init__(self, problem: CondensedProblem, rows: Int, springs: Float) -> None:
+        """Take rows (n,) with springs (n,), 0 of faces that nothing ties.  Collective."""
+        self.problem = problem
+        K, b, L = problem.take(rows, springs)
+        held = K + HELD * np.abs(K.diagonal()).max(initial=0.0) * np.eye(len(K))
+        self._jumps = np.linalg.solve(held, b)
+        self._jumps += np.linalg.solve(held, b - K @ self._jumps)
+        loose = L - b.T @ self._jumps
+        self.stiffness = (loose + loose.T) / 2
+
+    def jump(self, strain: Float) -> Float:
+        """(n,) g under strains (v,)."""
+        return np.asarray(self._jumps @ strain)
