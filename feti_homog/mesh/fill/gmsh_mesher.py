@@ -75,7 +75,8 @@ def begin(
     scale = arrangement_scale(cell, arrangement)
     if isinstance(arrangement.outlines, Discs):
         cell_of_discs = UnmeshedCell.of(arrangement, sizes, marks, scale, policy)
-        refuse_many(cell_of_discs.bare.field.at, arrangement.size, most)
+        field = cell_of_discs.bare.field
+        refuse_many(field.at, field.least, arrangement.size, most)
         return cell_of_discs
     if isinstance(arrangement.outlines, Ellipses):
         from feti_homog.mesh.outline import elliptic_outline  # discs, the common case, do without

@@ -53,7 +53,7 @@ def mesh_outlines(arrangement: Arrangement, sizes: MeshSizes, scale: float) -> C
         MeshError: it would have too many elements.
     """
     least, size_at = _sizes_at(arrangement, sizes)
-    refuse_many(size_at, arrangement.size)
+    refuse_many(size_at, least, arrangement.size)
     with gmsh_session() as gmsh:
         number = _add_surfaces(gmsh, arrangement)
         _match_sides(gmsh, arrangement)

@@ -48,7 +48,7 @@ def outline(
     outer = np.concatenate([border, ends[away & ~sparse[which]]])
     tips = _tips(arrangement, inner, marks, numbering.vertices)
     field = size_field(arrangement, inner, sizes, outer, sharp, tips)
-    refuse_many(field.at, size)
+    refuse_many(field.at, field.least, size)
     find = partial(_ellipse_at, ellipses)
     curves = [side_curves(axis, places[axis], find, around, size, field, numbering, WHOLE) for axis in (0, 1)]
     arcs = _EllipticArcs.of(ellipses[which], start, stop, sizes.interface)

@@ -84,14 +84,17 @@ class ElementEstimate:
         return count + 2 * self.interfaces / (TRIANGLE_AREA * MAX_GROWTH * cell.interface_size)
 
 
-def refuse_many(size_at: Callable[[Float], Float], period: Float, most: int = MAX_TRIANGLES) -> None:
+def refuse_many(size_at: Callable[[Float], Float], least: float, period: Float, most: int = MAX_TRIANGLES) -> None:
     """Refuse a cell of the periods (2,) with elements of the sizes h at positions (n, 2), int dA / (A h^2) of them.
 
-    The sizes contain narrow gaps and thin coatings, where `ElementEstimate` has the numbers of the case alone.
+    The sizes contain narrow gaps and thin coatings, where `ElementEstimate` has the numbers of the case alone. Where
+    `least`, which no h is below, bounds the number by `most`, they are not summed.
 
     Raises:
         MeshError: they are more than `most`.
     """
+    if period.prod() <= most * TRIANGLE_AREA * least**2:
+        return
     share = (np.arange(POSITIONS) + 0.5) / POSITIONS
     places = np.stack(np.meshgrid(share, share), axis=-1).reshape(-1, 2) * period
     count = float((1 / size_at(places) ** 2).mean() * period.prod() / TRIANGLE_AREA)

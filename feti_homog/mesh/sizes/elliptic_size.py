@@ -71,7 +71,7 @@ def size_field(
         distance, nearest = on_curves.query(places)
         return np.asarray(np.minimum(beside[nearest] + MAX_GROWTH * distance, at_tips))
 
-    return SizeField(base, graded)
+    return SizeField(base, graded, min(sizes.tip, float(beside.min())))
 
 
 def _in_mesh_order(arrangement: Arrangement, ellipses: Ellipses, disc: Int) -> tuple[Ellipses, Int]:

@@ -27,6 +27,7 @@ class SourcedSize:
 
     Attributes:
         largest: size anywhere.
+        least: no size is below it.
     """
 
     def __init__(self, sources: Sequence[Source], size: Float, largest: float, chunk: int = CHUNK) -> None:
@@ -37,6 +38,7 @@ class SourcedSize:
         self._places = wrap(places, size)
         # Where the tree finds no more, it gives the source behind the last: an infinite one.
         self._lengths, self._growths = np.append(lengths, np.inf), np.append(growths, MAX_GROWTH)
+        self.least = min(largest, float(self._lengths.min()))
         self._tree = cKDTree(self._places, boxsize=size)
 
     def __call__(self, points: Float) -> Float:

@@ -179,10 +179,21 @@ class MeshSizes:
 
 @dataclass(frozen=True)
 class SizeField:
-    """The size of edges on the lines of a cell: the smaller of two sizes, of which the second grows along lines."""
+    """The size of edges on the lines of a cell: the smaller of two sizes, of which the second grows along lines.
+
+    Attributes:
+        base, graded: these sizes.
+        least_graded: the second is nowhere below it.
+    """
 
     base: SourcedSize
     graded: Callable[[Float], Float] | None = None
+    least_graded: float = np.inf
+
+    @property
+    def least(self) -> float:
+        """Size below which there is none."""
+        return min(self.base.least, self.least_graded)
 
     @property
     def step(self) -> float:
@@ -211,7 +222,8 @@ def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips
     base = line_size(arrangement, sizes.largest, vertices)
     if not sizes.are_graded(arrangement):
         return SizeField(base)
-    return SizeField(base, _FromLines.of(arrangement, sizes, tips))
+    lines = _FromLines.of(arrangement, sizes, tips)
+    return SizeField(base, lines, min(sizes.tip, float(lines.caps.min())))
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,12 @@ import pytest
 from scipy.special import ellipe
 from unit.mesh.test_table_ellipses import cell_of, table
 
+from feti_homog.errors import MeshError
 from feti_homog.fibres.arrange import arrange
 from feti_homog.fibres.outlines.ellipses import Ellipses
 from feti_homog.mesh.fill.gmsh_mesher import generate
-from feti_homog.mesh.sizes.element_estimate import ElementEstimate
+from feti_homog.mesh.sizes.element_estimate import ElementEstimate, refuse_many
+from feti_homog.mesh.sizes.graded_size import MeshSizes, size_field
 
 
 @pytest.mark.parametrize("ratio", [1.5, 4.0, 16.0])
@@ -25,3 +27,17 @@ def test_perimeters_are_elliptic_integrals():
     b = np.array([1.0, 0.5, 0.1, 0.05])
     found = Ellipses.of(np.zeros((4, 2)), np.ones(4), b, np.array([0.0, 10.0, 200.0, 90.0])).perimeters
     assert found == pytest.approx(4 * ellipe(1 - b**2), rel=1e-4)
+
+
+@pytest.mark.parametrize("coating", [0.0, 0.02])
+def test_no_size_is_below_the_least(coating):
+    rows = [{"x": 0.3, "y": 0.4, "radius": 0.25, "coating": coating}, {"x": 0.8, "y": 0.5, "radius": 0.2}]
+    arrangement = arrange(cell_of(table(rows)))
+    for sizes in (MeshSizes(0.1, 0.1, 0.1), MeshSizes(0.1, 0.03, 1e-3)):
+        field = size_field(arrangement, sizes, np.zeros((1, 2)), np.array([[0.55, 0.4]]))
+        places = np.random.default_rng(1).random((20_000, 2)) * arrangement.size
+        # Tips and narrow passages are points.
+        assert field.least <= field.at(places).min() < 10 * field.least
+        refuse_many(lambda _: pytest.fail("sizes are summed"), field.least, arrangement.size, 10**9)
+        with pytest.raises(MeshError, match="elements before refine"):
+            refuse_many(field.at, field.least, arrangement.size, 100)
