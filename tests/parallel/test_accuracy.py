@@ -15,7 +15,7 @@ from support.cases import FIBRE, MATRIX
 
 from feti_homog import Case, run
 
-pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
+pytestmark = [pytest.mark.parallel, pytest.mark.one_rank]
 
 COMPOSITE = {"matrix": MATRIX, "fibre": FIBRE}
 EPOXY, GLASS = {"young": 3.5, "poisson": 0.35}, {"young": 72.0, "poisson": 0.22}

@@ -20,7 +20,7 @@ from support.spatial_cells import solved
 
 from feti_homog.materials.spatial_constants import transversely_isotropic_part
 
-pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
+pytestmark = [pytest.mark.parallel, pytest.mark.one_rank]
 
 MATRIX, FIBRE = {"young": 3.0, "poisson": 0.35}, {"young": 70.0, "poisson": 0.22}
 COATINGS = {"soft": {"young": 0.4, "poisson": 0.4}, "stiff": {"young": 25.0, "poisson": 0.3}}

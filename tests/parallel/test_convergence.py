@@ -34,6 +34,7 @@ def ladder(geometry, plane, order):
     return [solve(make_case(plane=plane, **cell), MPI.COMM_WORLD)[1] for cell in cells]
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("order", LADDERS)
 @CELLS
 def test_every_entry_reaches_the_reference(geometry, plane, order):
@@ -41,6 +42,7 @@ def test_every_entry_reaches_the_reference(geometry, plane, order):
     assert errors.max() <= LADDERS[order][1], errors
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("order", LADDERS)
 @CELLS
 def test_errors_fall_with_twice_the_order_of_the_elements(geometry, plane, order):
@@ -58,6 +60,7 @@ def rubber_errors(comm, poisson, refinements, mesh_size):
     return np.abs([L[[0, 0, 2], [0, 1, 2]] for L in found] / np.array(NEARLY_INCOMPRESSIBLE[poisson].value) - 1)
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("poisson", NEARLY_INCOMPRESSIBLE)
 def test_errors_of_nearly_incompressible_cells_fall_as_those_of_others(comm, poisson):
     bulk, _, shear = rubber_errors(comm, poisson, (0, 1, 2), 0.12).T
@@ -65,10 +68,12 @@ def test_errors_of_nearly_incompressible_cells_fall_as_those_of_others(comm, poi
     assert shear[-1] < 3e-5 and bulk[-1] < 3e-7
 
 
+@pytest.mark.one_rank
 def test_a_nearly_incompressible_cell_reaches_the_reference(comm):
     assert rubber_errors(comm, 0.49999, [2], 0.045).max() < 1e-6
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("order", LADDERS)
 def test_hexagonal_cell_is_transversely_isotropic(order):
     L = ladder("hexagonal", "strain", order)[-1]
@@ -76,6 +81,7 @@ def test_hexagonal_cell_is_transversely_isotropic(order):
     assert abs(L[0, 0] - L[1, 1]) < LADDERS[order][1] * L[0, 0]
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("young", [200.0, 1e-4], ids=["stiff", "nearly void"])
 def test_dilute_slopes_are_the_closed_form(comm, young):
     fibre = {"young": young, "poisson": 0.222}
@@ -123,6 +129,7 @@ def test_laminate_is_exact(comm, shared_path, phases, across, order):
     assert relative_error(found, laminate(L, [0.75, 0.25], across)) < 1e-10
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("fraction", [0.1, 0.4, 0.75])
 @pytest.mark.parametrize("geometry", ["square", "hexagonal"])
 def test_moduli_lie_within_hashin_shtrikman(comm, geometry, fraction):

@@ -93,6 +93,7 @@ def interface_lengths(folder):
         return np.bincount(file["interface/fibre"][:] - 1, file["interface/length"][:])
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize(("order", "least"), [(1, 1.9), (2, 3.5)])
 def test_stiffness_converges_to_that_of_another_mesh(comm, order, least):
     """By about h^2 and h^4: both are refined towards the same ellipse."""

@@ -57,6 +57,7 @@ def rates(comm, strain, opening, bond, **case):
     return point.tips, (energies[0] - energies[1]) / (2 * np.radians(STEP) * RADIUS)
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize(
     ("bond", "strain"),
     [
@@ -74,6 +75,7 @@ def test_the_total_is_what_the_energy_loses(comm, bond, strain):
     parallel_assert(comm, np.abs(tips.G_I + tips.G_II - tips.G).max() < 1e-12)
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize(
     ("case", "error"),
     [
@@ -90,6 +92,7 @@ def test_so_it_is_on_other_meshes_and_of_other_phases(comm, case, error):
     parallel_assert(comm, abs(tips.G.sum() * radius / RADIUS / expected - 1) < error)
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("strain", [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.3, -0.5, 0.4]])
 def test_elastic_bonds_release_the_energy_of_the_spring_at_the_tip(comm, strain):
     tips, expected = rates(comm, strain, 120.0, SPRINGS, tip_size=2e-4)
@@ -98,6 +101,7 @@ def test_elastic_bonds_release_the_energy_of_the_spring_at_the_tip(comm, strain)
         parallel_assert(comm, bool((tips.G_I == 0.0).all() and (tips.psi == 90.0).all()))
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize(("bond", "strain"), [(FREE, [1.0, 0.0, 0.0]), (TOUCHING, [-1.0, 0.0, 0.0])])
 def test_the_energy_lost_edge_by_edge_is_the_integral_of_the_rate(comm, bond, strain):
     """On one mesh, in analyses whose arcs differ by one or two edges of one size at each tip.
@@ -129,6 +133,7 @@ def test_energy_release_rates_are_of_degree_two_and_symmetric(comm):
     parallel_assert(comm, np.abs(twice.tips.psi - point.tips.psi).max() < 1e-3)
 
 
+@pytest.mark.one_rank
 def test_modes_do_not_depend_on_the_mesh(comm):
     """They belong to a length of R / 1000, if the elements are smaller."""
     angles = []
@@ -181,7 +186,7 @@ def test_fibres_that_are_not_round_have_no_tips(comm, shared_path):
     comm.barrier()
 
 
-@pytest.mark.few_ranks
+@pytest.mark.one_rank
 def test_one_fibre_in_a_large_matrix_has_the_published_rates(comm):
     """In a cell 40 radii wide, whose strain is that of the matrix under uniaxial stress."""
     young, poisson, widths = 3.5, 0.4, 40
@@ -231,6 +236,7 @@ def test_beside_a_void_rates_are_those_beside_a_fibre_that_nothing_holds(comm, s
     assert relative_error(found.tips.G, expected.tips.G[np.array(expected.tips.fibre) == 1]) < 1e-7
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize("coating", [0.3, 0.02])
 def test_rates_of_coated_fibres_are_those_of_fibres_of_one_material(comm, coating):
     """Of the same outer radius, on another mesh; the fibre within the coating is bonded to it."""
@@ -245,6 +251,7 @@ def test_rates_of_coated_fibres_are_those_of_fibres_of_one_material(comm, coatin
 INNER, OUTER = ["fibre", "coating"], ["coating", "matrix"]
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize(
     ("growing", "order", "bond", "error"),
     [(OUTER, 2, FREE, 2e-3), (INNER, 2, TOUCHING, 2e-3), (INNER, 1, TOUCHING, 6e-3)],

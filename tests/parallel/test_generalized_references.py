@@ -11,7 +11,7 @@ from reference.spatial_forms import axial_shear_modulus, stiffness_of_constants
 from support.generalized_phases import ALUMINIUM, BORON, CARBON, CARBON_EPOXY
 from support.spatial_cells import EPOXY, GLASS, solved
 
-pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
+pytestmark = [pytest.mark.parallel, pytest.mark.one_rank]
 
 PHASES = {
     "boron/aluminium": (ALUMINIUM, BORON),

@@ -88,6 +88,7 @@ def test_voids_soften_and_their_cells_are_certified(comm, shared_path, plane):
     comm.barrier()
 
 
+@pytest.mark.few_ranks
 def test_fibres_debond_beside_voids_to_the_end(comm, shared_path):
     random = {"geometry": "random", "fibres": 3, "fibre_fraction": 0.3, "seed": 4, "mesh_size": 0.15, "voids": 0.05}
     sections = {

@@ -78,6 +78,7 @@ def test_free_fibres_are_straight_between_points(torn, case, waypoints):
     assert solves < 10 * len(points)
 
 
+@pytest.mark.few_ranks
 def test_partly_free_and_breaking_fibres_are_straight_between_points(comm):
     cell = torn_cells.tear(comm, **THREE)
     fibre = cell.solver.jump_operator.nodes.fibre

@@ -71,6 +71,7 @@ def test_a_sharp_square_is_that_of_a_users_mesh(comm, shared_path):
     assert relative_error(found, expected) < 1e-3
 
 
+@pytest.mark.one_rank
 @pytest.mark.parametrize(("order", "rate"), [(1, 1.8), (2, 3.3)])
 def test_stiffness_converges_under_refinement(comm, order, rate):
     """The refined edges follow straight sides and arcs exactly."""
@@ -90,6 +91,7 @@ def test_turned_cells_have_turned_stiffnesses(comm):
     assert relative_error(other[[1, 0, 2]][:, [1, 0, 2]] * np.outer([1, 1, -1], [1, 1, -1]), one) < 1e-4
 
 
+@pytest.mark.few_ranks
 def test_polygons_debond_and_are_certified(comm, shared_path):
     sections = {
         "analysis": {"type": "path", "plane": "strain"},

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from support.ranks import PIECES
-from support.verified_results import document
+from support.verified_results import CARBON, MATRIX, WARM, document
 
 from feti_homog import Case, run
+from feti_homog.parallel.mpi_errors import on_root
 
-pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks, pytest.mark.usefixtures("shared_interfaces")]
+pytestmark = [pytest.mark.parallel, pytest.mark.usefixtures("shared_interfaces")]
 
 # What the solver took, and what is left of its errors.
 OF_THE_RUN = {"version", "solver", "timings", "memory", "checks", "iterations"}
@@ -41,7 +42,8 @@ def assert_alike(comm, kind, **more):
     if comm.size == 1:
         pytest.skip("one rank is alone")
     case = document(kind) | {"decomposition": PIECES, "petsc": {"feti_ksp_rtol": 1e-11}} | more
-    found, alone = (by_name(run(Case.parse(case), each).document) for each in (comm, MPI.COMM_SELF))
+    found = by_name(run(Case.parse(case), comm).document)
+    alone = on_root(comm, lambda: by_name(run(Case.parse(case), MPI.COMM_SELF).document))
     assert found.keys() == alone.keys()
     for name, expected in alone.items():
         if all(isinstance(value, float) for value in expected):
@@ -86,3 +88,12 @@ def test_bonds_that_cooling_alone_breaks(comm):
 
 def test_one_load_with_contact(comm):
     assert_alike(comm, "load with contact")
+
+
+def test_elements_that_an_accuracy_asks_for_and_their_tips(comm):
+    assert_alike(comm, "overlap", cell={"geometry": "square", "fibre_fraction": 0.4, "accuracy": 3e-2})
+
+
+def test_coated_fibres_in_space(comm):
+    cell = {"geometry": "hexagonal", "fibre_fraction": 0.3, "coating": 0.2, "mesh_size": 0.2, "order": 2}
+    assert_alike(comm, "spatial", cell=cell, material={"matrix": WARM, "coating": MATRIX, "fibre": CARBON})

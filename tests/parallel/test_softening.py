@@ -84,6 +84,7 @@ def test_paths_are_those_of_brute_force(comm, name):
     _check_the_energy_book(result.path)
 
 
+@pytest.mark.one_rank
 def test_teeth_converge_to_the_law(comm):
     """So tough an interface holds without snap-back: the law itself is followed by small steps of the strain."""
     tough = BILINEAR | {"normal_toughness": 4e-4, "tangential_toughness": 8e-4}

@@ -67,6 +67,7 @@ def test_groups_of_ranks_compute_every_case_once(comm, shared_path):
     parallel_assert(comm, times == {p: p.stat().st_mtime_ns for p in shared_path.glob("out/case-*/result.json")})
 
 
+@pytest.mark.one_rank
 def test_mean_of_random_cells_is_isotropic_and_within_the_bounds(comm, shared_path):
     """Between the bounds, and isotropic within its confidence interval: a small one of README's 30 realisations."""
     case = RANDOM.replace("fibres = 3", "fibres = 8").replace("mesh_size = 0.3", "mesh_size = 0.2")
