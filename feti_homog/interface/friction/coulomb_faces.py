@@ -20,7 +20,15 @@ import numpy as np
 from feti_homog.errors import NotCarriedError
 from feti_homog.interface.contact.states import Status
 from feti_homog.interface.friction.lemke import complementary, first_guess
-from feti_homog.interface.friction.status_system import BACKWARD, FORWARD, OPEN_FACE, STICK, StatusSystem
+from feti_homog.interface.friction.status_solver import StatusSolver
+from feti_homog.interface.friction.status_system import (
+    BACKWARD,
+    FORWARD,
+    OPEN_FACE,
+    STICK,
+    free_rows,
+    residual,
+)
 from feti_homog.typing import Bool, Float
 
 # Forces and jumps below this share of the largest are rounding; both are scaled by the stiffness of a node.
@@ -62,6 +70,7 @@ class CoulombFaces:
         friction: (n,) mu.
         S: (m, m) the scaled stiffness, of 1 on the diagonal of a node, and `size` (m,): S_ij size_i size_j is that of
             the cell.
+        solver: of systems with it.
     """
 
     def __init__(self, stiffness: Float, friction: Float) -> None:
@@ -72,7 +81,7 @@ class CoulombFaces:
         size = np.sqrt(np.concatenate([nodes, np.maximum(diagonal[2 * n :], 0.0)]))
         self.size = np.where(size > 0.0, size, 1.0)
         self.S = stiffness / np.outer(self.size, self.size)
-        self._last: tuple[bytes, StatusSystem] | None = None
+        self.solver = StatusSolver(self.S)
 
     @property
     def nodes(self) -> int:
@@ -81,23 +90,20 @@ class CoulombFaces:
 
     def forces(self, x: Float) -> tuple[Float, Float]:
         """(n,) scaled normal and tangential forces."""
-        f = -(self.S[: 2 * self.nodes] @ x)
+        f = -self.solver.product(x)[: 2 * self.nodes]
         return f[::2], f[1::2]
 
     def linear(self, status: Status, given: Prescribed, start: Float) -> Float:
         """(m,) scaled x with these statuses; what nothing determines stays as it is at the start (m,)."""
-        return self._system(status, given.by_stress).solve(*self._prescribed(status, given, start))
+        return self.solver.solve(*self._free(status, given.by_stress), *self._prescribed(status, given, start))
+
+    def _free(self, status: Status, by_stress: Bool) -> tuple[Bool, Float]:
+        """Return `free_rows` of statuses."""
+        return free_rows(status, self.friction, by_stress)
 
     def settled(self, status: Status, given: Prescribed, x: Float) -> Float:
         """(m,) scaled x without the rounding of the way to it; a free motion, which rounding would drive, keeps it."""
-        return self.linear(status, given, x) if self._system(status, given.by_stress).sign else x
-
-    def _system(self, status: Status, by_stress: Bool) -> StatusSystem:
-        """Return the system of these statuses; the last one is kept."""
-        key = status.tobytes() + by_stress.tobytes()
-        if self._last is None or self._last[0] != key:
-            self._last = key, StatusSystem(self.S, self.friction, status, by_stress)
-        return self._last[1]
+        return self.linear(status, given, x) if self.solver.sign(*self._free(status, given.by_stress)) else x
 
     def _prescribed(self, status: Status, given: Prescribed, start: Float) -> tuple[Float, Float]:
         """(m,) x with what is prescribed, and (m,) S x on the rows of loads."""
@@ -110,11 +116,11 @@ class CoulombFaces:
 
     def _noise(self, x: Float, slip: Float) -> float:
         """Return the scaled force, and jump, that is rounding where the loads of x and a slip (n,) act."""
-        n, nodes = self.nodes, self.S[: 2 * self.nodes]
-        by_loads = np.abs(nodes[:, 2 * n :] @ x[2 * n :]).max(initial=0.0)
-        return NOISE * float(
-            max(by_loads, np.abs(nodes[:, 1 : 2 * n : 2] @ slip).max(initial=0.0) if slip.any() else 0.0)
-        )
+        last = 2 * self.nodes
+        by_loads = np.abs(self.S[:last, last:] @ x[last:]).max(initial=0.0)
+        slips = np.zeros(len(x))
+        slips[1:last:2] = slip
+        return NOISE * float(max(by_loads, np.abs((self.S @ slips)[:last]).max(initial=0.0) if slip.any() else 0.0))
 
     def search(self, status: Status, allowed: Bool, given: Prescribed, start: Float) -> tuple[Status, Float]:
         """Return statuses (n,) and scaled x that are admissible, from a first guess.
@@ -145,9 +151,10 @@ class CoulombFaces:
 
     def _is_balanced(self, status: Status, given: Prescribed, start: Float, x: Float) -> bool:
         """Return False if a free motion, such as the turning of a fibre that slides all around, has a force on it."""
-        left = self._system(status, given.by_stress).unbalanced(x, self._prescribed(status, given, start)[1])
+        rows = self._prescribed(status, given, start)[1]
+        left = residual(self.solver.product(x), rows, *self._free(status, given.by_stress))
         by_loads = np.abs(self.S[:, 2 * self.nodes :] @ x[2 * self.nodes :]).max(initial=0.0)
-        return bool(left <= UNBALANCED * max(by_loads, self._noise(x, given.slip) / NOISE))
+        return bool(np.abs(left).max(initial=0.0) <= UNBALANCED * max(by_loads, self._noise(x, given.slip) / NOISE))
 
     def _improved(self, status: Status, allowed: Bool, slip: Float, x: Float) -> Status:
         """(n,) the statuses that the signs of forces and jumps call for."""
@@ -199,7 +206,7 @@ class CoulombFaces:
         given, status = Prescribed(by_stress, rate, np.zeros(self.nodes)), self._known(status)
         allowed = self._at_limits(status, x)
         status, v = self.search(status, allowed, given, np.zeros(len(x)))
-        if self._system(status, by_stress).sign < 0:
+        if self.solver.sign(*self._free(status, by_stress)) < 0:
             raise StuckError(INDEFINITE)
         return status, v
 
@@ -220,7 +227,7 @@ class CoulombFaces:
 
         Slips that an unloaded cell keeps leave forces of rounding.
         """
-        summed = float((np.abs(self.S[: 2 * self.nodes]) @ np.abs(x)).max(initial=0.0))
+        summed = float((self.solver.absolute @ np.abs(x))[: 2 * self.nodes].max(initial=0.0))
         largest = float(np.abs(self.forces(x)).max(initial=0.0))
         return max(self._noise(x, np.zeros(self.nodes)), NOISE * largest, ROUNDED_SUM * summed)
 
@@ -249,7 +256,7 @@ class CoulombFaces:
         implicit step.
         """
         last, step = 2 * self.nodes, after - before
-        forces = -(self.S[:last] @ (before + after)) / 2
+        forces = -(self.solver.product(before) + self.solver.product(after))[:last] / 2
         sliding = np.abs(status) == 1
         heat = (self.forces(after)[1] * step[1:last:2])[sliding].sum()
         return float(forces @ step[:last]), float(heat)

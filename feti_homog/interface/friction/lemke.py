@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from feti_homog.interface.contact.states import Status
-from feti_homog.interface.friction.status_system import BACKWARD, FORWARD, OPEN_FACE, STICK, StatusSystem
+from feti_homog.interface.friction.status_system import BACKWARD, FORWARD, OPEN_FACE, STICK, StatusSystem, free_rows
 from feti_homog.typing import Bool, Float, Int
 
 # Pivots below this are rounding, relative to the largest entry of their column.
@@ -37,7 +37,7 @@ def complementary(
     """
     n, m = len(friction), len(S)
     base = first_guess(friction, allowed)
-    system = StatusSystem(S, friction, base, by_stress)
+    system = StatusSystem(S, *free_rows(base, friction, by_stress))
     # Faces without friction have no unknown parts of their slip.
     entry, sign, kind = _unknowns(allowed & (base == STICK)[:, None] | allowed & _touching(allowed, base))
     columns = np.zeros((m, 1 + len(entry)))

@@ -20,7 +20,7 @@ from feti_homog.interface.friction.condensed_problem import CondensedProblem, Fr
 from feti_homog.interface.friction.coulomb_faces import CoulombFaces
 from feti_homog.interface.friction.status_system import OPEN_FACE, STICK
 from feti_homog.interface.loads.load import Load, Macroscopic, Multipliers
-from feti_homog.typing import Float
+from feti_homog.typing import Float, Int
 
 
 class SlidingCell:
@@ -39,6 +39,8 @@ class SlidingCell:
         self.solver = self.interface.solver
         self._plane, *self._axial = (CondensedProblem(each) for each in cell.problems)
         self._loads = len(self.solver.problem.loads)
+        self.rows, self.springs = np.zeros(0, np.int64), np.zeros(0)
+        self.faces = CoulombFaces(np.zeros((0, 0)), np.zeros(0))
 
     def take(self, bonds: BondState) -> None:
         """Have the faces of the debonded nodes, and of damaged bonds, which are on springs.  Collective."""
@@ -52,6 +54,7 @@ class SlidingCell:
         own = np.column_stack([first + row, friction, *along, springs])[self._own]
         whole = np.concatenate(comm.allgather(own))
         whole = whole[np.argsort(whole[:, 0])]
+        faces, before, held = self.faces, self.rows, self.springs
         self.rows, self.springs = whole[:, 0].astype(np.int64), whole[:, -more.shape[1] :][:, :2].ravel()
         self._place = np.searchsorted(self.rows, first + row[self._own])
         K, b, L = self._plane.take((self.rows[:, None] + np.arange(2)).ravel(), self.springs)
@@ -59,6 +62,17 @@ class SlidingCell:
         L = block_diag(L, *(each.stiffness for each in self._along))
         b = np.pad(b, [(0, 0), (0, len(L) - self._loads)])
         self.faces = CoulombFaces(np.block([[K, -b], [-b.T, L]]), whole[:, 1])
+        old = self._places_of(before, held)
+        if old is not None:
+            self.faces.solver.follow(faces.solver, old, old[2 * len(before) + self._loads :])
+
+    def _places_of(self, rows: Int, springs: Float) -> Int | None:
+        """Return where entries of x of other faces stand now; None if some are not there, or on other springs."""
+        if not len(rows) or not np.isin(rows, self.rows).all():
+            return None
+        pairs = (2 * np.searchsorted(self.rows, rows)[:, None] + np.arange(2)).ravel()
+        loads = np.arange(2 * len(self.rows), len(self.faces.S))
+        return np.concatenate([pairs, loads]) if (self.springs[pairs] == springs).all() else None
 
     @staticmethod
     def _gained(problem: CondensedProblem, bonds: BondState) -> Float:
@@ -133,7 +147,8 @@ class SlidingCell:
 
     def stress(self, x: Float) -> Float:
         """(v,) Sigma of scaled x."""
-        return np.asarray(((self.faces.S @ x) * self.faces.size)[2 * len(self.rows) :] / self.area)
+        last = 2 * len(self.rows)
+        return np.asarray((self.faces.solver.product(x) * self.faces.size)[last:] / self.area)
 
     def given(self, load: Load) -> Float:
         """(v,) scaled values of a load."""

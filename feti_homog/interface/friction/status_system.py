@@ -18,6 +18,22 @@ LEAST_PIVOT = 1e-6
 REFINEMENTS = 3
 
 
+def free_rows(status: Status, friction: Float, by_stress: Bool) -> tuple[Bool, Float]:
+    """(m,) which entries of x are unknown, and (m,) s mu of sliding nodes at their slips, 0 elsewhere."""
+    free = np.concatenate([np.stack([status == OPEN_FACE, status != STICK], axis=1).ravel(), by_stress])
+    slope = np.zeros(len(free))
+    slope[1 : 2 * len(status) : 2] = np.where(np.abs(status) == 1, status * friction, 0.0)
+    return free, slope
+
+
+def residual(y: Float, given: Float, free: Bool, slope: Float) -> Float:
+    """(m,) what y = S x (m,) leaves of the rows `given` (m,) that are free, 0 of others."""
+    sliding = np.flatnonzero(slope)
+    left = given - y
+    left[sliding] -= slope[sliding] * y[sliding - 1]
+    return np.where(free, left, 0.0)
+
+
 class StatusSystem:
     """S x = 0 on the rows that are free, with x given on the others, factored.
 
@@ -28,13 +44,13 @@ class StatusSystem:
         sign: of the determinant; 0 where a motion is free.
     """
 
-    def __init__(self, S: Float, friction: Float, status: Status, by_stress: Bool) -> None:
-        """`S` (m, m) with 2n rows of normal and tangential jumps first, then those of the loads."""
-        self.free = np.concatenate([np.stack([status == OPEN_FACE, status != STICK], axis=1).ravel(), by_stress])
-        sliding = np.flatnonzero(np.abs(status) == 1)
+    def __init__(self, S: Float, free: Bool, slope: Float) -> None:
+        """`S` (m, m) of `CoulombFaces`; what is free, and the slopes, as of `free_rows`."""
+        self.free = free
+        sliding = np.flatnonzero(slope)
         place = np.cumsum(self.free) - 1
         self._rows = S[self.free]
-        self._rows[place[2 * sliding + 1]] += (status * friction)[sliding, None] * S[2 * sliding]
+        self._rows[place[sliding]] += slope[sliding, None] * S[sliding - 1]
         A = self._rows[:, self.free]
         A.ravel()[:: len(A) + 1] += HELD
         self._factor = lu_factor(A, overwrite_a=True, check_finite=False) if len(A) else None
@@ -49,10 +65,6 @@ class StatusSystem:
             return 0
         swaps = int((pivots != np.arange(len(pivots))).sum())
         return int(np.prod(np.sign(lu.diagonal()))) * (-1 if swaps % 2 else 1)
-
-    def unbalanced(self, x: Float, given: Float) -> float:
-        """Return the largest force that x leaves on the rows that are free, as a torque that nothing resists."""
-        return float(np.abs(given[self.free] - self._rows @ x).max(initial=0.0))
 
     def solve(self, x: Float, given: Float) -> Float:
         """(m,) or (m, k) x with the rows `given`, (m,) or (m, k), from a start that has the entries that are not free.

@@ -48,8 +48,7 @@ def _path_lines(document: Document, label: str, toughness: str) -> list[list[str
 
 def _load_lines(document: Document, label: str, toughness: str) -> list[list[str]]:
     tips = point_tables.tip_table(document["load"].get("tips"), toughness)
-    changes = [*sensitivity_tables.sensitivities(document), *sensitivity_tables.uncertainty(document)]
-    return [point_tables.load_lines(document, label), *(table.lines for table in [*tips, *changes])]
+    return [point_tables.load_lines(document, label), *(table.lines for table in tips)]
 
 
 def _envelope_lines(document: Document, label: str, toughness: str) -> list[list[str]]:
@@ -96,8 +95,7 @@ def _path_tables(document: Document, label: str, most: int) -> list[Table]:
 
 
 def _load_tables(document: Document, label: str, most: int) -> list[Table]:
-    changes = [*sensitivity_tables.sensitivities(document), *sensitivity_tables.uncertainty(document)]
-    return [point_tables.load_table(document, label), *changes]
+    return [point_tables.load_table(document, label)]
 
 
 def _envelope_tables(document: Document, label: str, most: int) -> list[Table]:

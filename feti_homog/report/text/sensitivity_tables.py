@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from feti_homog.report.text.stiffness_tables import SHORT, UNKNOWN
@@ -14,7 +14,6 @@ SHOWN = {
     True: ("E_axial", "E_transverse", "nu_axial", "nu_transverse", "G_axial", "G_transverse", "expansion.3",
            "expansion.1"),
 }  # fmt: skip
-MOST = 9  # of other constants
 Document = Mapping[str, Any]
 
 
@@ -22,8 +21,8 @@ def sensitivities(document: Document) -> list[Table]:
     """Elasticities d ln c / d ln p of constants c by parameters p, and derivatives dc / dp; none if not asked for."""
     if (found := document.get("sensitivities")) is None:
         return []
-    constants, width = found["constants"], max(map(len, found["parameters"]), default=0) + 4
-    at = [constants.index(name) for name in _shown(constants)]
+    constants, width = found["constants"], max(map(len, found["parameters"])) + 4
+    at = [constants.index(name) for name in SHOWN["E3" in constants] if name in constants]
     slopes, shares = list[list[Any]](), list[list[Any]]()
     for j, (name, value) in enumerate(zip(found["parameters"], found["parameter_values"], strict=True)):
         row = [found["derivatives"][k][j] for k in at]
@@ -32,7 +31,6 @@ def sensitivities(document: Document) -> list[Table]:
             [name, *(_share(slope * value, found["constant_values"][k]) for slope, k in zip(row, at, strict=True))]
         )
     words = "Elasticities, the relative change of a constant by that of a parameter"
-    words += "; contact at fixed status" * bool(found.get("at_fixed_status"))
     return [
         Table(title, [Column("", -width), *(Column(SHORT.get(constants[k], constants[k]), 12, form) for k in at)], rows)
         for title, form, rows in ((words, ".4f", shares), ("Derivatives by the same parameters", ".3g", slopes))
@@ -57,14 +55,9 @@ def uncertainty(document: Document) -> list[Table]:
             *(100 * share for share in found["shares"][k]),
         ]
         for k, name in enumerate(names)
-        if name in _shown(names) and found["std"][k] > 0
+        if name in SHOWN["E3" in names] and (found["std"][k] > 0)
     ]
     return [Table("Scatter by uncertain constants (std), and their shares of the variance (%)", columns, rows)]
-
-
-def _shown(names: Sequence[str]) -> list[str]:
-    """Return the constants of tables; of a load, and of secants of a cell in space, the first ones."""
-    return [name for name in SHOWN["E3" in names] if name in names] if "E1" in names else list(names[:MOST])
 
 
 def _share(change: float, size: float) -> float | str:

@@ -1,0 +1,88 @@
+"""Solutions of the linear systems of debonded faces, by what is kept up from statuses to neighbouring ones."""
+
+from __future__ import annotations
+
+from collections import deque
+from functools import cached_property
+
+import numpy as np
+
+from feti_homog.interface.friction.followed_statuses import FollowedStatuses
+from feti_homog.interface.friction.status_system import StatusSystem
+from feti_homog.typing import Bool, Float, Int
+
+# Arrays whose products are kept.
+PRODUCTS = 6
+# Factorizations that cost as much as to begin with what is followed.
+FACTORIZATIONS = 12
+
+
+class StatusSolver:
+    """Systems with the matrix S (m, m) of `CoulombFaces`; rows as of `free_rows`.
+
+    Where motions are free, or too many digits were lost, a system is factored.
+    """
+
+    def __init__(self, S: Float) -> None:
+        self.S = S
+        self._followed: FollowedStatuses | None = None
+        self._last: tuple[bytes, StatusSystem] | None = None
+        self._factored = 0
+        self._products: deque[tuple[Float, Float]] = deque(maxlen=PRODUCTS)
+
+    def follow(self, before: StatusSolver, old: Int, other: Int) -> None:
+        """Go on from a solver whose entries stand at the places `old` (m',) here, with the same S.
+
+        Between the places `other` S may be another one, if these entries are coupled with none but each other.
+        """
+        if before._followed is not None:
+            self._followed = before._followed
+            self._followed.grow(self.S, old, other)
+
+    @cached_property
+    def absolute(self) -> Float:
+        """(m, m) |S_ij|."""
+        return np.abs(self.S)
+
+    def product(self, x: Float) -> Float:
+        """(m,) S x of an array that does not change; the last ones are kept."""
+        for known, y in self._products:
+            if known is x:
+                return y
+        self._products.append((x, self.S @ x))
+        return self._products[-1][1]
+
+    def solve(self, free: Bool, slope: Float, x: Float, given: Float) -> Float:
+        """(m,) x with the rows `given` (m,), from a start that has the entries that are not free.
+
+        What nothing determines stays as it was at the start.
+        """
+        followed = self._turned(free, slope)
+        if followed is None:
+            return self._system(free, slope).solve(x, given)
+        found = followed.solve(x, given)
+        if found is None:
+            self._followed, self._factored = None, 0
+            return self._system(free, slope).solve(x, given)
+        self._products.append(found)
+        return found[0]
+
+    def sign(self, free: Bool, slope: Float) -> int:
+        """Return that of the determinant, 0 where motions are free."""
+        return (self._turned(free, slope) or self._system(free, slope)).sign
+
+    def _turned(self, free: Bool, slope: Float) -> FollowedStatuses | None:
+        """Return the response with these rows; None where motions are free, or while it does not pay yet."""
+        if self._followed is None:
+            if self._factored < FACTORIZATIONS:
+                return None
+            self._followed = FollowedStatuses(self.S)
+        return self._followed if self._followed.turn(free, slope) else None
+
+    def _system(self, free: Bool, slope: Float) -> StatusSystem:
+        """Return the factored system of these rows; the last one is kept."""
+        key = free.tobytes() + slope.tobytes()
+        if self._last is None or self._last[0] != key:
+            self._last = key, StatusSystem(self.S, free, slope)
+            self._factored += 1
+        return self._last[1]

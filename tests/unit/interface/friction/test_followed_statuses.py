@@ -1,0 +1,57 @@
+"""Responses that are kept up from statuses to statuses, against systems that are factored for each of them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from feti_homog.interface.friction.followed_statuses import FollowedStatuses
+from feti_homog.interface.friction.status_system import BACKWARD, FORWARD, OPEN_FACE, STICK, StatusSystem, free_rows
+
+
+def scaled(rng, m):
+    B = rng.normal(size=(m + 4, m))
+    S = B.T @ B
+    return S / np.sqrt(np.outer(S.diagonal(), S.diagonal()))
+
+
+def assert_solves(followed, S, friction, status, by_stress, rng):
+    free, slope = free_rows(status, friction, by_stress)
+    assert followed.turn(free, slope)
+    system = StatusSystem(S, free, slope)
+    for start, given in ((np.where(free, 0.0, rng.normal(size=len(S))), rng.normal(size=len(S))), (0.0 * S[0], S[0])):
+        x, y = followed.solve(start, np.where(free, given, 0.0))
+        expected = system.solve(start, np.where(free, given, 0.0))
+        np.testing.assert_allclose(x, expected, atol=1e-10 * max(1.0, np.abs(expected).max()))
+        np.testing.assert_allclose(y, S @ x, atol=1e-13 * np.abs(x).max() * len(S))
+    assert followed.sign == system.sign
+
+
+def test_statuses_are_followed_and_nodes_come_in_any_order():
+    rng = np.random.default_rng(1)
+    n, kinds = 30, np.array([STICK, FORWARD, OPEN_FACE, BACKWARD], np.int8)
+    S, by_stress = scaled(rng, 2 * n + 3), np.array([False, True, False])
+    friction, arrival = rng.uniform(0.0, 0.4, n), rng.permutation(n)
+    own, followed = np.zeros(0, np.int64), None
+    for count in (2, 3, 7, 8, 20, n):
+        nodes, before = np.sort(arrival[:count]), own
+        own = np.concatenate([(2 * nodes[:, None] + np.arange(2)).ravel(), 2 * n + np.arange(3)])
+        part = S[own[:, None], own]
+        if followed is None:
+            followed = FollowedStatuses(part)
+        else:
+            followed.grow(part, np.searchsorted(own, before), np.zeros(0, np.int64))
+        status = rng.choice(kinds, count)
+        for _ in range(8):
+            assert_solves(followed, part, friction[nodes], status, by_stress, rng)
+            status = status.copy()
+            status[rng.integers(0, count, 2)] = rng.choice(kinds, 2)
+
+
+def test_free_motions_are_refused_and_left_again():
+    """A node whose slip has no stiffness."""
+    S = np.diag([1.0, 0.0, 1.0, 1.0, 1.0])
+    S[0, 4] = S[4, 0] = 0.5
+    followed, friction, by_strain = FollowedStatuses(S), np.full(2, 0.1), np.zeros(1, bool)
+    assert not followed.turn(*free_rows(np.array([OPEN_FACE, STICK], np.int8), friction, by_strain))
+    status = np.array([STICK, FORWARD], np.int8)
+    assert_solves(followed, S, friction, status, by_strain, np.random.default_rng(0))
