@@ -58,9 +58,9 @@ def energy_error(L, exact):
 
 @cache
 def fine(name):
-    """By quadratic elements of another coarse mesh that is several times as fine, split twice."""
+    """By quadratic elements of another coarse mesh that is several times as fine, split once."""
     cell, phases, plane = CELLS[name]
-    mesh = {"mesh_size": 0.06, "refine": 2, "order": 2}
+    mesh = {"mesh_size": 0.06, "refine": 1, "order": 2}
     return stiffness(cell | mesh, phases, plane).effective_stiffness
 
 
@@ -105,7 +105,7 @@ def test_elastic_interfaces_against_their_series(key, order):
     assert energy_error(found, cubic(*ELASTIC[key].value)) < ACCURACIES[order]
 
 
-@pytest.mark.parametrize(("order", "accuracy"), [(1, 2e-2), (2, 2e-3)])
+@pytest.mark.parametrize(("order", "accuracy"), [(1, 5e-2), (2, 2e-3)])
 def test_a_debonded_arc(order, accuracy):
     """The default of the size at its tips keeps the balance."""
     C11, C22, C12, C33 = ARC_OF_120_DEGREES_FINE.value[:4]

@@ -11,7 +11,7 @@ from support.ranks import parallel_assert
 from feti_homog import Case, run
 from feti_homog.verify.certificate import verify
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
 MATRIX, FIBRE = (3.0, 0.35), (70.0, 0.2)
 TIGHT = {"feti_ksp_rtol": 1e-8}

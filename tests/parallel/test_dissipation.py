@@ -19,7 +19,7 @@ from feti_homog.interface.loads.load import Load
 from feti_homog.interface.path.path_following import events, increments
 from feti_homog.interface.path.path_points import unloaded
 
-pytestmark = [pytest.mark.parallel, pytest.mark.usefixtures("shared_interfaces")]
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks, pytest.mark.usefixtures("shared_interfaces")]
 
 EXACT = 1e-9
 TIGHT = {"petsc": {"feti_pc_type": "influence", "feti_ksp_rtol": 1e-11}, "decomposition": PIECES}

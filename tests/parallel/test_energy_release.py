@@ -263,7 +263,7 @@ def test_each_interface_of_a_coated_fibre_releases_what_the_energy_loses(comm, g
     cell = {
         "fibre_fraction": np.pi * radius**2,
         "coating": coating,
-        "mesh_size": 0.05,
+        "mesh_size": {1: 0.05, 2: 0.08}[order],
         "order": order,
         "refine": 3 - order,
     }

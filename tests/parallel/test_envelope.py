@@ -21,7 +21,7 @@ from feti_homog.report.plots import response_curves
 from feti_homog.results import result_json
 from feti_homog.verify.certificate import verify
 
-pytestmark = [pytest.mark.parallel, pytest.mark.usefixtures("shared_interfaces")]
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks, pytest.mark.usefixtures("shared_interfaces")]
 
 BONDS = {"max": MAX, "quadratic": QUADRATIC, "energy": ENERGY}
 RANDOM = {

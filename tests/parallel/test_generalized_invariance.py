@@ -12,7 +12,7 @@ from support.ranks import parallel_assert
 from support.spatial_cells import EPOXY, GLASS, error, solved
 from unit.mesh.faulty_meshes import MshFile, grid
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
 EXACT = 1e-9
 PHASES = {"matrix": WOOD, "fibre": CRYSTAL}

@@ -26,7 +26,7 @@ from support.generalized_phases import CARBON, CRYSTAL, WOOD
 from support.spatial_cells import EPOXY, GLASS, error, solved
 from unit.mesh.faulty_meshes import FIBRE, MATRIX, N, grid
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
 EXACT = 1e-9
 MESHES = Path(__file__).parents[2] / "meshes"

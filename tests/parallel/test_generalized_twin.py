@@ -13,7 +13,7 @@ from support.generalized_phases import CARBON, CRYSTAL, WOOD
 from support.random_cells import random_cell
 from support.spatial_cells import Twin, error, solved
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
 TIGHT = 1e-9
 MESHES = Path(__file__).parents[2] / "meshes"

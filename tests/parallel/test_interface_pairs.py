@@ -56,6 +56,7 @@ def meshes(comm, shared_path):
 
 
 @pytest.mark.parallel
+@pytest.mark.few_ranks
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize(
     "between, plain, ring", [(OUTER, "plain", GLASS), (INNER, "core", EPOXY)], ids=["outer", "inner"]
@@ -73,6 +74,7 @@ def test_one_of_two_interfaces_breaks_as_if_it_were_alone(comm, meshes, law, bet
 
 
 @pytest.mark.parallel
+@pytest.mark.few_ranks
 @pytest.mark.parametrize("laws", [("strength", {"normal_strength": 0.05}), ("energy", {"toughness": 3e-4})], ids=str)
 def test_both_interfaces_break_as_their_files_certify(comm, meshes, laws):
     law, other = LAWS[laws[0]], LAWS[laws[0]] | SPRINGS | laws[1]
@@ -85,6 +87,7 @@ def test_both_interfaces_break_as_their_files_certify(comm, meshes, laws):
 
 
 @pytest.mark.parallel
+@pytest.mark.few_ranks
 def test_equal_laws_of_two_pairs_are_one_law(comm, shared_path):
     """Two kinds of fibre, of one material."""
     mesh = grid(lambda x, y: 0.25 < x < 0.5 and y < 0.75)
@@ -101,6 +104,7 @@ def test_equal_laws_of_two_pairs_are_one_law(comm, shared_path):
 
 
 @pytest.mark.parallel
+@pytest.mark.few_ranks
 def test_springs_of_a_laminate_are_in_series(comm, shared_path):
     """1 / C11 = sum of c / M and of 1 / (k_n W), M = lambda + 2 mu: four interfaces of two stiffnesses, exact."""
     mesh = grid(lambda x, y: 0.25 < x < 0.75)
@@ -123,6 +127,7 @@ def test_springs_of_a_laminate_are_in_series(comm, shared_path):
 
 
 @pytest.mark.parallel
+@pytest.mark.few_ranks
 def test_an_envelope_of_two_interfaces_tells_which_breaks_first(comm, shared_path):
     """Its onset is the lesser of the two of one interface each."""
     cell = {"geometry": "square", "fibre_fraction": 0.3, "coating": 0.2, "mesh_size": 0.12}

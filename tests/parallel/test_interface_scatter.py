@@ -61,6 +61,7 @@ def weibull(shape, seed, n=3):
 
 
 @pytest.mark.parallel
+@pytest.mark.few_ranks
 @pytest.mark.parametrize(
     "law, column, analysis",
     [

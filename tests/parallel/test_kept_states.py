@@ -18,7 +18,7 @@ from feti_homog.parallel.mpi_errors import on_root
 from feti_homog.results import field_file
 from feti_homog.verify.certificate import verify
 
-pytestmark = [pytest.mark.parallel, pytest.mark.usefixtures("shared_interfaces")]
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks, pytest.mark.usefixtures("shared_interfaces")]
 
 EXACT = 1e-12
 PATHS: dict[str, dict[str, Any]] = {
@@ -108,7 +108,6 @@ def whole(tmp_path_factory):
 
 @pytest.mark.parametrize("states", STATES)
 @pytest.mark.parametrize("kind", PATHS)
-@pytest.mark.few_ranks
 def test_kept_states_are_those_of_a_run_that_keeps_all(comm, shared_path, whole, kind, states):
     result = run(case(kind, states), comm, out=shared_path)
     assert len(result.states) == states if states != "peaks" else 2 <= len(result.states) < len(result.path)

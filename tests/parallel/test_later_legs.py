@@ -17,7 +17,7 @@ from feti_homog.interface.loads.load import Load
 from feti_homog.interface.path.path_following import events
 from feti_homog.interface.path.path_points import unloaded
 
-pytestmark = [pytest.mark.parallel, pytest.mark.usefixtures("shared_interfaces")]
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks, pytest.mark.usefixtures("shared_interfaces")]
 
 STRAIGHT = 1e-7
 FREE = {
@@ -29,11 +29,11 @@ FREE = {
 }
 THREE = {"geometry": "random", "fibres": 3, "min_gap": 0.1, "seed": 4, "mesh_size": 0.2, "decomposition": PIECES}
 # Through zero, beside it, and from squeezed fibres to others with room.
-WAYPOINTS = [
-    [[0.05, 0.05, 0.0], [-0.05, -0.05, 0.0]],
-    [[0.05, 0.05, 0.0], [-0.05, 0.02, 0.03], [0.02, -0.06, 0.01], [0.05, 0.05, -0.1]],
-    [[-0.05, -0.04, 0.0], [0.05, 0.05, 1e-4], [-0.05, -0.04, 0.0]],
-]
+WAYPOINTS = {
+    "through zero": [[0.05, 0.05, 0.0], [-0.05, -0.05, 0.0]],
+    "beside zero": [[0.05, 0.05, 0.0], [-0.05, 0.02, 0.03], [0.02, -0.06, 0.01], [0.05, 0.05, -0.1]],
+    "squeezed first": [[-0.05, -0.04, 0.0], [0.05, 0.05, 1e-4], [-0.05, -0.04, 0.0]],
+}
 NEVER = MaxStrength(np.inf, np.inf)
 
 
@@ -64,10 +64,13 @@ def largest_bend(interface, points, legs):
     return bend
 
 
-@pytest.mark.parametrize("waypoints", WAYPOINTS, ids=["through zero", "beside zero", "squeezed first"])
-@pytest.mark.parametrize("case", FREE)
-def test_free_fibres_are_straight_between_points(torn, case, waypoints):
-    cell = torn(**FREE[case])
+# All legs of one cell, and each beside another cell.
+LEGS = [*(("square", legs) for legs in WAYPOINTS), *zip(list(FREE)[1:], WAYPOINTS, strict=True)]
+
+
+@pytest.mark.parametrize(("case", "legs"), LEGS)
+def test_free_fibres_are_straight_between_points(torn, case, legs):
+    cell, waypoints = torn(**FREE[case]), WAYPOINTS[legs]
     interface, begin = interface_with(cell, True)
     solves = cell.solver.solves
     points = list(events(CoupledInterfaces(interface), NEVER, strains(np.array(waypoints)), begin))
@@ -78,7 +81,6 @@ def test_free_fibres_are_straight_between_points(torn, case, waypoints):
     assert solves < 10 * len(points)
 
 
-@pytest.mark.few_ranks
 def test_partly_free_and_breaking_fibres_are_straight_between_points(comm):
     cell = torn_cells.tear(comm, **THREE)
     fibre = cell.solver.jump_operator.nodes.fibre
@@ -104,7 +106,9 @@ def test_a_fibre_that_breaks_bond_by_bond_takes_few_solves(comm):
 def test_a_free_fibre_is_squeezed_where_the_strain_is_zero(torn):
     cell = torn(**FREE["square"])
     interface, begin = interface_with(cell, True)
-    tension, turn, pressed = events(CoupledInterfaces(interface), NEVER, strains(np.array(WAYPOINTS[0])), begin)
+    tension, turn, pressed = events(
+        CoupledInterfaces(interface), NEVER, strains(np.array(WAYPOINTS["through zero"])), begin
+    )
     assert [tension.load_factor, pressed.load_factor] == [0.5, 1.0]
     assert abs(turn.load_factor - 0.75) < 1e-9 and np.abs(turn.state.solution.strain).max() < 1e-9
     # On both sides the response is proportional to the strain, with the stiffnesses of a void and of a contact.

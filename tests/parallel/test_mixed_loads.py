@@ -10,7 +10,7 @@ from unit.mesh.faulty_meshes import grid, node
 
 from feti_homog.errors import ConvergenceError
 
-pytestmark = [pytest.mark.parallel, pytest.mark.usefixtures("shared_interfaces")]
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks, pytest.mark.usefixtures("shared_interfaces")]
 
 TWIN, EXACT = 1e-8, 1e-9
 ARCS = {"debonded": [{"fibre": "all", "centre": 20.0, "angle": 80.0}]}

@@ -9,7 +9,7 @@ from unit.mesh.faulty_meshes import grid
 
 from feti_homog.errors import ConvergenceError
 
-pytestmark = [pytest.mark.parallel, pytest.mark.usefixtures("shared_interfaces")]
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks, pytest.mark.usefixtures("shared_interfaces")]
 
 EXACT = 1e-9
 SQUARE, HEXAGONAL, CURVED = {}, {"geometry": "hexagonal"}, {"order": 2, "mesh_size": 0.3}

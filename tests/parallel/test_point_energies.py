@@ -27,7 +27,7 @@ from feti_homog.interface.path.path_following import events
 from feti_homog.interface.path.path_points import unloaded
 from feti_homog.parallel.mpi_errors import on_root
 
-pytestmark = [pytest.mark.parallel, pytest.mark.usefixtures("shared_interfaces")]
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks, pytest.mark.usefixtures("shared_interfaces")]
 
 EXACT = 1e-9
 PHASES = {"matrix": {"young": 2790.0, "poisson": 0.33}, "fibre": {"young": 70800.0, "poisson": 0.22}}
@@ -156,7 +156,6 @@ def test_a_laminate_loses_all_that_it_stores_at_once(comm, shared_path, growth):
 TOLERANCES = {"released": 0.02, "springs": 0.03}
 
 
-@pytest.mark.few_ranks
 @pytest.mark.parametrize("growth", TOLERANCES)
 def test_along_the_snap_back_toughness_times_length_is_dissipated_on_fine_meshes(comm, growth):
     """Growth by the energy that is released dissipates little more on any; by springs it takes fine elements."""

@@ -95,5 +95,15 @@ def test_elements_that_an_accuracy_asks_for_and_their_tips(comm):
 
 
 def test_coated_fibres_in_space(comm):
+    """Their derivatives too."""
     cell = {"geometry": "hexagonal", "fibre_fraction": 0.3, "coating": 0.2, "mesh_size": 0.2, "order": 2}
-    assert_alike(comm, "spatial", cell=cell, material={"matrix": WARM, "coating": MATRIX, "fibre": CARBON})
+    material = {"matrix": WARM, "coating": MATRIX, "fibre": CARBON}
+    assert_alike(comm, "spatial", cell=cell, material=material, output={"sensitivities": True})
+
+
+def test_a_path_in_space_by_steps(comm):
+    assert_alike(comm, "cooled by steps")
+
+
+def test_bonds_that_soften(comm):
+    assert_alike(comm, "softening")

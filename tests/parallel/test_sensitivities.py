@@ -11,7 +11,7 @@ from support.cases import FIBRE, MATRIX
 from feti_homog import Case, CaseError, run
 from feti_homog.runtime.records import plain
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
 CARBON = {
     "E_axial": 230.0, "E_transverse": 15.0, "nu_axial": 0.2, "nu_transverse": 0.07, "G_axial": 24.0,

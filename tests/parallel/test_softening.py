@@ -18,7 +18,7 @@ from feti_homog.feti.preconditioners.followed_response import FollowedResponse
 from feti_homog.parallel.mpi_errors import on_root
 from feti_homog.verify.certificate import verify
 
-pytestmark = [pytest.mark.parallel, pytest.mark.usefixtures("shared_interfaces")]
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks, pytest.mark.usefixtures("shared_interfaces")]
 
 BILINEAR = {
     "law": "bilinear",

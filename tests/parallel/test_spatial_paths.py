@@ -12,7 +12,7 @@ from unit.mesh.faulty_meshes import MshFile, grid
 
 from feti_homog import Case, run
 
-pytestmark = [pytest.mark.parallel, pytest.mark.usefixtures("shared_interfaces")]
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks, pytest.mark.usefixtures("shared_interfaces")]
 
 EXACT = 1e-9
 SQUARE, HEXAGONAL = {}, {"geometry": "hexagonal"}

@@ -17,7 +17,7 @@ from feti_homog.homogenization.averaging import Homogenization
 from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN
 from feti_homog.interface.loads.load import Load
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
 UNIT = np.eye(3)
 

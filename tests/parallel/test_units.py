@@ -9,7 +9,7 @@ from support.ranks import parallel_assert
 
 from feti_homog import Case, run
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 
 # Powers of four, of which also the root changes no digit: 1.4e-20 and 7.4e19.
 EXACT_UNITS = [Units(stress=4.0**-33), Units(stress=4.0**33)]

@@ -14,7 +14,7 @@ from feti_homog import run
 from feti_homog.case import case as cases
 from feti_homog.verify.certificate import verify
 
-pytestmark = pytest.mark.parallel
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 STRENGTHS = {"normal_strength": 5.0, "tangential_strength": 5.0}
 RANDOM = {"geometry": "random", "fibres": 4, "fibre_fraction": 0.35, "min_gap": 0.2, "seed": 2}
 

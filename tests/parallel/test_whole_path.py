@@ -18,7 +18,7 @@ from feti_homog.interface.path.path_following import events
 from feti_homog.interface.path.path_points import unloaded
 from feti_homog.parallel.mpi_errors import on_root
 
-pytestmark = [pytest.mark.parallel, pytest.mark.usefixtures("shared_interfaces")]
+pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks, pytest.mark.usefixtures("shared_interfaces")]
 
 SPRINGS, TOUGHNESS, SENSITIVITY = (30.0, 12.0), 1e-4, 0.3
 FOUR = {
@@ -36,7 +36,6 @@ FOUR = {
 STRAIN = np.array([1.0, 0.1, 0.05])
 
 
-@pytest.mark.few_ranks
 @pytest.mark.parametrize("growth", ["released", "springs"])
 def test_whole_paths_are_those_of_brute_force(comm, built, growth):
     expected = None
