@@ -13,7 +13,7 @@ import numpy as np
 
 from feti_homog.case.phase_names import MATRIX, PHASE, VOID
 from feti_homog.case.section_values import FIBRE_CELLS, NUMBERS
-from feti_homog.case.table_columns import Column, misspelt, number_of, understood
+from feti_homog.case.table_columns import Column, are_units, misspelt, number_of, understood
 from feti_homog.errors import CaseError
 from feti_homog.fibres.outlines.outlines import Columns, Outlines
 from feti_homog.fibres.outlines.shapes import REPLACING, outlines_of
@@ -27,6 +27,12 @@ SIZES = ("width", "height", "left", "bottom")
 """What comment lines may say of the cell: its size, and the coordinates of its lower left corner."""
 OF_FIBRES = ("coating", "inner_radius")
 MAX_BYTES = 1 << 26
+EMPTY = " \t\r,;"
+"""What a line without cells has, as Excel writes them below a table."""
+SEPARATOR = re.compile(r"sep=[,;\t]?")
+"""Excel's first line for other programs."""
+UNITS_OF_EXCEL = bytes.maketrans(b"\xb5\xb0\xb2", b"uo2")
+"""Micro, degree and square where it does not write UTF-8."""
 SIZE = re.compile(r"\b(width|height|left|bottom)\s*[=:]\s*([^\s;=]+?)(?=,?\s|,?$|;|,[a-z])")
 
 
@@ -123,7 +129,7 @@ def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
     for number, line in enumerate(_text(path).splitlines(), 1):
         contents, _, comment = line.partition("#")
         _read_sizes(comment, number, sizes, faults)
-        if contents.strip():
+        if contents.strip(EMPTY) and not (SEPARATOR.fullmatch(contents.strip()) and not lines):
             lines.append((number, contents))
     if not lines:
         raise CaseError(*faults.lines, f"{name}: no rows; expected a line of names such as x, y, radius, then fibres")
@@ -132,7 +138,8 @@ def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
     read, others = understood(words, COLUMNS)
     _check_names(words, read, others, lines[0][0], faults)
     faults.throw()
-    rows = dict(_split(lines[1:] if columns is None else lines, read, len(words), delimiter, faults))
+    below = lines if columns is not None else lines[2 if _has_units(lines, delimiter) else 1 :]
+    rows = dict(_split(below, read, len(words), delimiter, faults))
     remarks = (f"[cell] {name}: not read: {', '.join(map(toml_value, others))}",) if others else ()
     return replace(_table(name, rows, {column.name for column in read}, sizes, faults), remarks=remarks)
 
@@ -168,11 +175,22 @@ class _Faults:
 
 def _text(path: Path) -> str:
     try:
-        return input_files.read(path, MAX_BYTES).decode("utf-8-sig")
+        content = input_files.read(path, MAX_BYTES)
     except OSError as error:
         raise CaseError(f"{path.name}: cannot be read: {error.strerror}") from error
+    try:
+        return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise CaseError(f"{path.name}: expected text in UTF-8; it has other bytes at {error.start}") from error
+        place = error.start
+    try:
+        return content.translate(UNITS_OF_EXCEL).decode()
+    except UnicodeDecodeError as error:
+        raise CaseError(f"{path.name}: expected text in UTF-8; it has other bytes at {place}") from error
+
+
+def _has_units(lines: Sequence[tuple[int, str]], delimiter: str | None) -> bool:
+    """Return whether a line of units follows that of names."""
+    return len(lines) > 1 and are_units([_bare(word) for word in lines[1][1].split(delimiter)])
 
 
 def _bare(word: str) -> str:

@@ -8,7 +8,12 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-UNIT = re.compile(r"\s*(\[[^]]*\]|\([^)]*\)|/\s*[^/]+)\s*$")
+UNITS = "nm|um|µm|μm|mm|cm|m|px|pixels?|deg|degrees?"
+UNIT = re.compile(rf"\s*(\[[^]]*\]|\([^)]*\)|/\s*[^/]+|_({UNITS}))\s*$", re.IGNORECASE)
+ROW_UNIT = re.compile(rf"[\[(]?({UNITS}|°|-)[\])]?", re.IGNORECASE)
+"""What a cell of a line of units has."""
+CENTRES = ("{}c", "{}_c", "c{}", "center_{}", "centre_{}", "centroid_{}", "{}_center", "{}_centre")
+EQUIVALENT_DIAMETERS = ("equivdiameter", "equivalent_diameter", "equivalent_diameter_area")
 
 
 def _radius_of_area(area: float) -> float:
@@ -29,14 +34,14 @@ def _turned(value: float) -> float:
 
 
 # Other names of columns, those before first, and what makes the column of their values. Major and Minor are ImageJ's
-# axes of ellipses, whose areas are of no more use.
+# axes of ellipses, whose areas are of no more use; MATLAB counts coordinates from 1, scikit-image rows of pixels from 0.
 OTHERS: tuple[tuple[tuple[str, ...], str, Callable[[float], float]], ...] = (
-    (("xm", "xc", "x_c", "cx", "center_x", "centre_x", "centroid_x", "x_center", "x_centre"), "x", _same),
-    (("ym", "yc", "y_c", "cy", "center_y", "centre_y", "centroid_y", "y_center", "y_centre"), "y", _same),
-    (("major",), "a", _half),
-    (("minor",), "b", _half),
-    (("r", "rad"), "radius", _same),
-    (("diameter", "diam", "d"), "radius", _half),
+    (("xm", *(word.format("x") for word in CENTRES), "centroid_1", "centroid-1"), "x", _same),
+    (("ym", *(word.format("y") for word in CENTRES), "centroid_2", "centroid-0"), "y", _same),
+    (("major", "majoraxislength"), "a", _half),
+    (("minor", "minoraxislength"), "b", _half),
+    (("r", "rad", "fibre_radius", "fiber_radius", "radii"), "radius", _same),
+    (("diameter", "diam", "d", "fibre_diameter", "fiber_diameter", *EQUIVALENT_DIAMETERS), "radius", _half),
     (("area",), "radius", _radius_of_area),
     (("material", "type"), "phase", _same),
 )
@@ -68,7 +73,9 @@ def _bare(word: str) -> str:
 def understood(words: Sequence[str], known: Sequence[str]) -> tuple[list[Column], list[str]]:
     """Return the columns of a line of names that are among those `known`, in any case, and the other words."""
     bare = list(map(_bare, words))
-    values = {"angle": _turned} if "major" in bare else {}
+    if "majoraxislength" in bare:  # MATLAB's; the orientations of others are in radians, or of another axis
+        bare = ["angle" if name == "orientation" else name for name in bare]
+    values = {"angle": _turned} if {"major", "majoraxislength"} & set(bare) else {}
     columns = [Column(place, name, values.get(name, _same)) for place, name in enumerate(bare) if name in known]
     for others, name, value in OTHERS:
         given = {column.name for column in columns}
@@ -76,6 +83,11 @@ def understood(words: Sequence[str], known: Sequence[str]) -> tuple[list[Column]
             columns += [Column(bare.index(other), name, value) for other in others if other in bare][:1]
     read = {column.place for column in columns}
     return columns, [word for place, word in enumerate(words) if place not in read]
+
+
+def are_units(words: Sequence[str]) -> bool:
+    """Return whether a line has units alone, which some programs write below the names."""
+    return bool(set(words) - {"", "-"}) and all(ROW_UNIT.fullmatch(word) for word in words if word)
 
 
 def misspelt(word: str, missing: Sequence[str]) -> str:

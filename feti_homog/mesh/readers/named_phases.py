@@ -7,11 +7,16 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
+
 from feti_homog.case.phase_names import PHASE
 from feti_homog.errors import MeshError
+from feti_homog.mesh.coarse_mesh import areas
 from feti_homog.mesh.readers.mesh_checks import DEBONDED, RawMesh, first_of
 from feti_homog.schema.wording import toml_key, toml_value
 
+NUMBER = re.compile("number [0-9]+")
+"""Groups that have no other name."""
 Selectors = Mapping[str, tuple[str | int, ...]]
 
 
@@ -59,15 +64,34 @@ def _key(name: str | int) -> str:
 
 def unknown_phases(mesh: RawMesh) -> list[str]:
     """Physical surfaces whose name is not a phase, and a missing matrix."""
-    names = [name for group in mesh.groups for name in group]
+    names = list(dict.fromkeys(name for group in mesh.groups for name in group))
+    has_matrix = "matrix" in names
     known = 'expected "matrix", "fibre", "glass", ... of letters, digits, _ and -, "fibre:2", not "void"'
     strange = [name for name in names if not PHASE.fullmatch(name)]
-    faults = [f'{mesh.container} "{name}" is not a phase: {known}' for name in dict.fromkeys(strange)]
-    if "matrix" not in names:
+    # Without a matrix all groups are named anew, and numbers need no further word.
+    faults = [
+        f'{mesh.container} "{name}" is not a phase: {known}'
+        for name in strange
+        if has_matrix or not NUMBER.fullmatch(name)
+    ]
+    if not has_matrix:
         faults.append(f'no {mesh.container} is named "matrix"')
     if faults:
-        faults[-1] += f"; {known_names(mesh)}, of which [cell.phases] says the phases, as by matrix = {_first(mesh)}"
+        faults[-1] += f"; {known_names(mesh)}{_way_out(mesh)}"
     return faults
+
+
+def _way_out(mesh: RawMesh) -> str:
+    """Return the line of a case file that names the first groups, and their shares of the area."""
+    with np.errstate(all="ignore"):  # coordinates are judged later
+        sizes = np.bincount(mesh.group, np.abs(areas(mesh.points[:, :2], mesh.triangles)), len(mesh.groups))
+        percent = 100 * sizes / sizes.sum()
+    named = {_as_selected(names[0]): share for names, share in zip(mesh.groups, percent, strict=True) if names}
+    if not named:
+        return ""
+    entries = ", ".join(f"{phase} = {own}" for phase, own in zip(("matrix", "fibre"), named, strict=False))
+    shares = first_of((f"{own}: {share:.3g} %" for own, share in named.items()), len(named), 20)
+    return f". If {next(iter(named))} is the matrix, add to [cell]: phases = {{{entries}}}. Shares of the area: {shares}"
 
 
 def known_names(mesh: RawMesh, of_curves: bool = False) -> str:
@@ -81,10 +105,6 @@ def _names(mesh: RawMesh, of_curves: bool) -> list[str]:
     return list(dict.fromkeys(named))
 
 
-def _first(mesh: RawMesh) -> str:
-    return next((_as_selected(name) for own in mesh.groups for name in own), '"NAME"')
-
-
 def _as_selected(name: str) -> str:
     """Return the name or number of a group as a case file has it."""
-    return name.removeprefix("number ") if re.fullmatch("number [0-9]+", name) else toml_value(name)
+    return name.removeprefix("number ") if NUMBER.fullmatch(name) else toml_value(name)

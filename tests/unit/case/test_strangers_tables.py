@@ -23,8 +23,16 @@ TABLES = {
     "regionprops": "label,centroid_x,centroid_y,area,eccentricity\n1,2,2,3.14159265,0\n2,5,4,4.52389342,0\n",
     "microscope": "Type,Center_X (um),Center_Y (um),Radius (um),Time\nfibre,2,2,1,12:00\nfibre,5,4,1.2,12:01\n",
     "capitals": "X,Y,R,ID\n2,2,1,F1\n5,4,1.2,F2\n",
+    "Excel for others": "sep=;\nx;y;d\n2,0;2,0;2,0\n5,0;4,0;2,4\n;;\n",
+    "units below": "x,y,diameter\num,um,um\n2,2,2\n5,4,2.4\n",
+    "units by strokes": "fiber_id,center_x_um,center_y_um,fiber_diameter_um\n1,2,2,2\n2,5,4,2.4\n",
+    "MATLAB's regionprops": "Centroid_1,Centroid_2,EquivDiameter\n2,2,2\n5,4,2.4\n",
+    "scikit-image": "label,centroid-0,centroid-1,equivalent_diameter_area\n1,2,2,2\n2,4,5,2.4\n",
     "own": "x,y,radius,phase\n2,2,1,fibre\n5,4,1.2,\n",
 }
+WHOLLY_READ = (
+    "own", "NumPy", "MATLAB", "units after a stroke", "Excel for others", "units below", "MATLAB's regionprops",
+)  # fmt: skip
 
 
 def case(path, text, **cell):
@@ -49,7 +57,7 @@ def test_a_strangers_table_is_read_as_it_is(tmp_path, writer):
     read = case(tmp_path / "t.csv", SIZE + TABLES[writer])
     is_expected(read.cell.table)
     assert len(table_arrangement(read.cell).radii) == 2
-    assert bool(read.remarks()) == (writer not in ("own", "NumPy", "MATLAB", "units after a stroke"))
+    assert bool(read.remarks()) == (writer not in WHOLLY_READ)
 
 
 @pytest.mark.parametrize("name", ["t.txt", "t.dat", "t.csv"])
@@ -61,8 +69,14 @@ def test_a_table_without_names_is_read_by_those_of_the_case(tmp_path, name, mark
         case(tmp_path / name, text)
 
 
-def test_angles_of_imagej_are_those_of_pictures_whose_y_points_down(tmp_path):
-    (tmp_path / "t.csv").write_text("X,Y,Major,Minor,Angle\n2,2,2,1,30\n")
+def test_excels_units_need_no_utf_8(tmp_path):
+    (tmp_path / "t.csv").write_bytes((SIZE + "x;y;Radius (µm)\r\n2,0;2,0;1,0\r\n5;4;1,2\r\n").encode("cp1252"))
+    is_expected(read_table(tmp_path / "t.csv"))
+
+
+@pytest.mark.parametrize("names", ["X,Y,Major,Minor,Angle", "X,Y,MajorAxisLength,MinorAxisLength,Orientation"])
+def test_angles_of_imagej_are_those_of_pictures_whose_y_points_down(tmp_path, names):
+    (tmp_path / "t.csv").write_text(f"{names}\n2,2,2,1,30\n")
     columns = read_table(tmp_path / "t.csv").columns
     assert [columns[name][0] for name in ("a", "b", "angle")] == [1.0, 0.5, -30.0]
 

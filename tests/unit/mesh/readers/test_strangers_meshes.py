@@ -171,8 +171,9 @@ def test_refused_names_are_listed_with_the_way_out(tmp_path):
     with pytest.raises(MeshError) as error:
         read(tmp_path / "a.msh")
     assert error.value.faults[-1].endswith(
-        'no physical surface is named "matrix"; the file has "Epoxy resin", "E-Glass", 1, 2, of which [cell.phases] '
-        'says the phases, as by matrix = "Epoxy resin"'
+        'no physical surface is named "matrix"; the file has "Epoxy resin", "E-Glass", 1, 2. If "Epoxy resin" is the '
+        'matrix, add to [cell]: phases = {matrix = "Epoxy resin", fibre = "E-Glass"}. Shares of the area: '
+        '"Epoxy resin": 75 %, "E-Glass": 25 %'
     )
     with pytest.raises(
         MeshError, match=r'\[cell.phases\] fibre = "Glas": no elements of that name; the file has "Epox'
