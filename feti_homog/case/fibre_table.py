@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from feti_homog.case import table_text
 from feti_homog.case.phase_names import MATRIX, PHASE, VOID
 from feti_homog.case.section_values import FIBRE_CELLS, NUMBERS
 from feti_homog.case.table_columns import Column, are_units, misspelt, number_of, understood
 from feti_homog.errors import CaseError
 from feti_homog.fibres.outlines.outlines import Columns, Outlines
 from feti_homog.fibres.outlines.shapes import REPLACING, outlines_of
-from feti_homog.runtime import input_files
 from feti_homog.schema.values import is_number
 from feti_homog.schema.wording import suggestion, toml_value
 from feti_homog.typing import Bool, Float, Int
@@ -26,13 +26,6 @@ COLUMNS = (*list(NUMBERS)[:3], "phase", *list(NUMBERS)[3:])
 SIZES = ("width", "height", "left", "bottom")
 """What comment lines may say of the cell: its size, and the coordinates of its lower left corner."""
 OF_FIBRES = ("coating", "inner_radius")
-MAX_BYTES = 1 << 26
-EMPTY = " \t\r,;"
-"""What a line without cells has, as Excel writes them below a table."""
-SEPARATOR = re.compile(r"sep=[,;\t]?")
-"""Excel's first line for other programs."""
-UNITS_OF_EXCEL = bytes.maketrans(b"\xb5\xb0\xb2", b"uo2")
-"""Micro, degree and square where it does not write UTF-8."""
 SIZE = re.compile(r"\b(width|height|left|bottom)\s*[=:]\s*([^\s;=]+?)(?=,?\s|,?$|;|,[a-z])")
 
 
@@ -125,11 +118,10 @@ def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
     """
     name, faults = path.name, _Faults(path.name)
     sizes: dict[str, float] = {}
-    lines = []
-    for number, line in enumerate(_text(path).splitlines(), 1):
-        contents, _, comment = line.partition("#")
+    lines = list[tuple[int, str]]()
+    for number, contents, comment in table_text.lines(path):
         _read_sizes(comment, number, sizes, faults)
-        if contents.strip(EMPTY) and not (SEPARATOR.fullmatch(contents.strip()) and not lines):
+        if contents:
             lines.append((number, contents))
     if not lines:
         raise CaseError(*faults.lines, f"{name}: no rows; expected a line of names such as x, y, radius, then fibres")
@@ -138,7 +130,7 @@ def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
     read, others = understood(words, COLUMNS)
     _check_names(words, read, others, lines[0][0], faults)
     faults.throw()
-    below = lines if columns is not None else lines[2 if _has_units(lines, delimiter) else 1 :]
+    below = _without_units(lines[1:], delimiter) if columns is None else lines
     rows = dict(_split(below, read, len(words), delimiter, faults))
     remarks = (f"[cell] {name}: not read: {', '.join(map(toml_value, others))}",) if others else ()
     return replace(_table(name, rows, {column.name for column in read}, sizes, faults), remarks=remarks)
@@ -173,24 +165,10 @@ class _Faults:
             raise CaseError(*self.lines)
 
 
-def _text(path: Path) -> str:
-    try:
-        content = input_files.read(path, MAX_BYTES)
-    except OSError as error:
-        raise CaseError(f"{path.name}: cannot be read: {error.strerror}") from error
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        place = error.start
-    try:
-        return content.translate(UNITS_OF_EXCEL).decode()
-    except UnicodeDecodeError as error:
-        raise CaseError(f"{path.name}: expected text in UTF-8; it has other bytes at {place}") from error
-
-
-def _has_units(lines: Sequence[tuple[int, str]], delimiter: str | None) -> bool:
-    """Return whether a line of units follows that of names."""
-    return len(lines) > 1 and are_units([_bare(word) for word in lines[1][1].split(delimiter)])
+def _without_units(lines: list[tuple[int, str]], delimiter: str | None) -> list[tuple[int, str]]:
+    """Return the lines below that of names, without one of units."""
+    has_units = lines and are_units([_bare(word) for word in lines[0][1].split(delimiter)])
+    return lines[1:] if has_units else lines
 
 
 def _bare(word: str) -> str:

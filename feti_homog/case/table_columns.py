@@ -12,6 +12,9 @@ UNITS = "nm|um|µm|μm|mm|cm|m|px|pixels?|deg|degrees?"
 UNIT = re.compile(rf"\s*(\[[^]]*\]|\([^)]*\)|/\s*[^/]+|_({UNITS}))\s*$", re.IGNORECASE)
 ROW_UNIT = re.compile(rf"[\[(]?({UNITS}|°|-)[\])]?", re.IGNORECASE)
 """What a cell of a line of units has."""
+MATLABS_AXIS = "majoraxislength"
+AXES_OF_PICTURES = {"major", MATLABS_AXIS}
+"""Of tables whose angles are those of pictures, where y points down."""
 CENTRES = ("{}c", "{}_c", "c{}", "center_{}", "centre_{}", "centroid_{}", "{}_center", "{}_centre")
 EQUIVALENT_DIAMETERS = ("equivdiameter", "equivalent_diameter", "equivalent_diameter_area")
 
@@ -34,11 +37,11 @@ def _turned(value: float) -> float:
 
 
 # Other names of columns, those before first, and what makes the column of their values. Major and Minor are ImageJ's
-# axes of ellipses, whose areas are of no more use; MATLAB counts coordinates from 1, scikit-image rows of pixels from 0.
+# axes of ellipses, whose areas are of no more use; MATLAB's Centroid_1 is x, centroid-0 of scikit-image its row, y.
 OTHERS: tuple[tuple[tuple[str, ...], str, Callable[[float], float]], ...] = (
     (("xm", *(word.format("x") for word in CENTRES), "centroid_1", "centroid-1"), "x", _same),
     (("ym", *(word.format("y") for word in CENTRES), "centroid_2", "centroid-0"), "y", _same),
-    (("major", "majoraxislength"), "a", _half),
+    (("major", MATLABS_AXIS), "a", _half),
     (("minor", "minoraxislength"), "b", _half),
     (("r", "rad", "fibre_radius", "fiber_radius", "radii"), "radius", _same),
     (("diameter", "diam", "d", "fibre_diameter", "fiber_diameter", *EQUIVALENT_DIAMETERS), "radius", _half),
@@ -70,12 +73,16 @@ def _bare(word: str) -> str:
     return UNIT.sub("", word).strip().lower()
 
 
+def _bare_names(words: Sequence[str]) -> list[str]:
+    """Return bare names; MATLAB's orientation is an angle, those of others are in radians, or of another axis."""
+    bare = list(map(_bare, words))
+    return ["angle" if name == "orientation" else name for name in bare] if MATLABS_AXIS in bare else bare
+
+
 def understood(words: Sequence[str], known: Sequence[str]) -> tuple[list[Column], list[str]]:
     """Return the columns of a line of names that are among those `known`, in any case, and the other words."""
-    bare = list(map(_bare, words))
-    if "majoraxislength" in bare:  # MATLAB's; the orientations of others are in radians, or of another axis
-        bare = ["angle" if name == "orientation" else name for name in bare]
-    values = {"angle": _turned} if {"major", "majoraxislength"} & set(bare) else {}
+    bare = _bare_names(words)
+    values = {"angle": _turned} if AXES_OF_PICTURES & set(bare) else {}
     columns = [Column(place, name, values.get(name, _same)) for place, name in enumerate(bare) if name in known]
     for others, name, value in OTHERS:
         given = {column.name for column in columns}

@@ -218,10 +218,17 @@ def stable_compliance(material: Orthotropic | TransverselyIsotropic, plane: str)
     absent = [name for name in NEEDED[type(material)].get(plane, ()) if getattr(material, name) is None]
     if absent:
         needs = "needs it" if len(absent) == 1 else "needs them"
-        raise ValueError(f"{', '.join(absent)}: missing; {state.title} {needs}")
+        raise ValueError(f"{', '.join(absent)}: missing; {state.title} {needs}{_of_data_sheets(material)}")
     if not state.is_sheet and not is_positive_definite(compliance[:3, :3]):
         raise ValueError(_limit_in_space(material))
     return compliance
+
+
+def _of_data_sheets(material: Orthotropic | TransverselyIsotropic) -> str:
+    """Return the way out of constants of a fibre whose axis 1 is its own, which is x3 of the cell."""
+    if isinstance(material, TransverselyIsotropic):
+        return ""
+    return "; axis 3 is along the fibres: with constants of a data sheet give E_axial, E_transverse, nu_axial, ..."
 
 
 def known_compliance(material: Orthotropic | TransverselyIsotropic) -> Float:

@@ -13,6 +13,7 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = {
     **dict.fromkeys(("e", "youngs_modulus", "young_modulus", "modulus"), ("young", "E1")),
     **dict.fromkeys(("nu", "v", "poisson_ratio", "poissons_ratio"), ("poisson", "nu12")),
     **dict.fromkeys(("g", "shear_modulus"), ("G12", "G_axial")),
+    **dict.fromkeys(("nu23", "nut"), ("nu_transverse",)),
     **dict.fromkeys(("alpha", "cte", "thermal_expansion"), ("expansion",)),
     **dict.fromkeys(("strength", "bond_strength", "tensile_strength"), ("normal_strength", "tangential_strength")),
     "shear_strength": ("tangential_strength",),
@@ -26,6 +27,10 @@ ABSENT = {
     "strength": "phases do not break; bonds do, see normal_strength and tangential_strength in [interface]",
     "g": "it follows from young and poisson",
 }
+# What a key takes the place of, by the key and how it follows.
+IN_PLACE = dict.fromkeys(
+    ("g_transverse", "g23", "gt"), ("nu_transverse", "give nu_transverse = E_transverse / (2 G_transverse) - 1")
+)
 
 
 def toml_value(value: object) -> str:
@@ -65,6 +70,9 @@ def suggestion(name: str, known: Iterable[str], owners: Mapping[str, str]) -> st
     meant = [key for key in SYNONYMS.get(name.lower(), ()) if key in known]
     if meant:
         return f"did you mean {' or '.join(meant)}?"
+    key, words = IN_PLACE.get(name.lower(), ("", ""))
+    if key in known:
+        return words
     if name.lower() in ABSENT:
         return ABSENT[name.lower()]
     if name in owners:

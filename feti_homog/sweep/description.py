@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from mpi4py import MPI
 
 from feti_homog.case import case as cases
@@ -75,7 +76,7 @@ def _described(
             if (asked := element_sizes.asked(case.cell))
             else []
         ),
-        *([f"fibres     {summary.fibres}, numbered from 1"] if case.interface else []),
+        *_fibres_lines(case, summary),
         *_mix_lines(case, summary),
         *_match_lines(case, summary),
         f"tearing    {summary.bodies} bodies, {summary.subdomains} subdomains, {multipliers} multipliers",
@@ -105,6 +106,19 @@ def _plan(case: Case, summary: CellSummary, multipliers: int, applications: int,
         applications, summary.subdomains > summary.bodies, dense, dense, multipliers, COATING in case.materials
     )
     return solver_plan.choose(sizes, options)
+
+
+def _fibres_lines(case: Case, summary: CellSummary) -> list[str]:
+    """Return how many fibres interfaces or a table have; of discs and ellipses their mean radius and fraction."""
+    if case.interface is None and case.cell.table is None:
+        return []
+    radii = np.sqrt(np.abs(np.linalg.det(summary.frames[summary.fibre_bodies])))
+    is_hollow = case.cell.table is not None and bool((case.cell.table.inner_radius > 0).any())
+    sizes = ""
+    if len(radii) and np.isfinite(radii).all() and not is_hollow:
+        fraction = np.pi * (radii**2).sum() / (summary.width * summary.height)
+        sizes = f", mean radius {radii.mean():.4g}, fraction {fraction:.4f}"
+    return [f"fibres     {summary.fibres}, numbered from 1{sizes}"]
 
 
 def _match_lines(case: Case, summary: CellSummary) -> list[str]:

@@ -91,7 +91,8 @@ def _way_out(mesh: RawMesh) -> str:
         return ""
     entries = ", ".join(f"{phase} = {own}" for phase, own in zip(("matrix", "fibre"), named, strict=False))
     shares = first_of((f"{own}: {share:.3g} %" for own, share in named.items()), len(named), 20)
-    return f". If {next(iter(named))} is the matrix, add to [cell]: phases = {{{entries}}}. Shares of the area: {shares}"
+    first = next(iter(named))
+    return f". If {first} is the matrix, add to [cell]: phases = {{{entries}}}. Shares of the area: {shares}"
 
 
 def known_names(mesh: RawMesh, of_curves: bool = False) -> str:

@@ -151,6 +151,10 @@ FAULTY_MATERIALS: dict[str, tuple[str, tuple[str, ...]]] = {
         fibre("E_transverse = 14.0\n", "stress"),
         ("[material.fibre] nu_transverse: missing; expected a number above -1 and below 1",),
     ),
+    "shear_across_a_fibre": (
+        fibre(TRANSVERSE + AXIAL + "G_axial = 15.0\nG_transverse = 7.0\n", "generalized"),
+        ("G_transverse = 7.0: unknown key; give nu_transverse = E_transverse / (2 G_transverse) - 1",),
+    ),
     "transverse_no_axial": (
         fibre(TRANSVERSE),
         ("[material.fibre] E_axial, nu_axial: missing; plane strain needs them",),

@@ -197,7 +197,7 @@ FAULTS = {
         "$Entities: 1 numbers should",
     ),
     "no group": (FILE_4, "element 1 at (0.333333333, 0.333333333): not in any physical surface"),
-    "no name": (FILE_2, 'no physical surface is named "matrix"; the file has 1. If 1 is the matrix, add to [cell]: phases'),
+    "no name": (FILE_2, 'no physical surface is named "matrix"; the file has 1. If 1 is the matrix, add'),
 }
 
 
