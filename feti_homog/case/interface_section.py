@@ -88,10 +88,20 @@ class InterfaceSection:
     friction: float = key(
         real(least=0.0),
         "Coulomb's coefficient mu of debonded faces: they stick while |t_t| < mu |t_n|, and slide at that traction. "
-        "The load is controlled from the first leg on, without snap-back. Along the fibres, in generalized plane "
-        "strain, debonded faces slide without a force. Cells too large for influence columns are refused.",
+        "The load is controlled from the first leg on, without snap-back. Cells too large for influence columns are "
+        "refused.",
         default=0.0,
         only=(PATH_ANALYSIS, BY_EVENTS),
+    )
+    axial_friction: str = key(
+        choice("free", "prevented"),
+        'Slip along the fibre of debonded faces with friction: "free": they bear no shear along it, as without '
+        'friction; "prevented": while they touch they bear any, and keep their slip along it. The default is the one '
+        "that never bears more than Coulomb's law lets them, and without shear along the fibres, as under cooling and "
+        "transverse loads, both are the same. The cone of both shears is round, so no path would be straight between "
+        "changes of status: it is not offered.",
+        default="free",
+        only=(PATH_ANALYSIS, BY_EVENTS, GENERALIZED),
     )
     debonded: tuple[Arc, ...] = key(
         ARCS,
@@ -250,6 +260,11 @@ class InterfaceSection:
         default=None,
         default_words="the matrix and all others",
     )
+
+    @property
+    def is_tied(self) -> bool:
+        """Return whether debonded faces that touch do not slip along the fibres."""
+        return self.friction > 0.0 and self.axial_friction == "prevented"
 
 
 def interface_tables(document: Mapping[str, Any]) -> list[Any]:

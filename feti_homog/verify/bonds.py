@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -45,8 +45,19 @@ def law_at(files: ResultFiles, nodes: AnyInt | Bool | slice = slice(None), damag
 
 def friction_at(files: ResultFiles) -> Float:
     """(k,) coefficient of friction of the interface nodes."""
-    own = [float(section.get("friction", 0.0)) for section in files.interfaces or [{}]]
-    found: Float = np.array(own)[np.minimum(files.interface.pair, len(own) - 1)]
+    return _of_pairs(files, [float(section.get("friction", 0.0)) for section in files.interfaces or [{}]])
+
+
+def tied_at(files: ResultFiles) -> Bool:
+    """(k,) nodes whose faces do not slip along the fibres while they touch."""
+    sections = files.interfaces or [{}]
+    tied = [section.get("axial_friction") == "prevented" and section["friction"] > 0.0 for section in sections]
+    return _of_pairs(files, tied) > 0.0
+
+
+def _of_pairs(files: ResultFiles, values: Sequence[float]) -> Float:
+    """(k,) the value of the section of each interface node."""
+    found: Float = np.array(values, float)[np.minimum(files.interface.pair, len(values) - 1)]
     return found
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from feti_homog.typing import Float, Int
-from feti_homog.verify.bonds import friction_at, law_at
+from feti_homog.verify.bonds import friction_at, law_at, tied_at
 from feti_homog.verify.constitutive_law import out_of_plane
 from feti_homog.verify.discrete_cell import ROUNDED_TERMS, DiscreteCell
 from feti_homog.verify.elements import PLACES, ElementFields
@@ -39,7 +39,8 @@ def _check_contact(findings: Findings, cell: DiscreteCell, state: State) -> None
     at = f"{state.name}, interface node {{}}".format
     debonded, closed = state.status != BONDED, state.status == CLOSED
     gap = (state.jump - law_at(cell.files, damage=state.damage).jumps(state.traction))[:, 0]
-    normal, shear = state.traction[:, 0], np.abs(state.traction[:, 1:]).max(axis=1)
+    normal, shear = state.traction[:, 0], np.abs(state.traction[:, 1:])
+    shear = np.where(tied_at(cell.files) & closed, shear[:, 0], shear.max(axis=1))
     friction = friction_at(cell.files) * np.maximum(-normal, 0.0)
     length, imposed, least = cell.files.interface.length, cell.imposed(state), cell.least_stress(state)
     pull, force = max(float(np.abs(state.traction).max()), least), np.abs(normal) * length

@@ -61,8 +61,8 @@ def test_paths_are_those_of_a_slow_twin(comm, waypoints, springs):
 
 @pytest.mark.parametrize(
     ("plane", "law"),
-    [("strain", {}), ("strain", SOFTENING), ("generalized", SOFTENING)],
-    ids=["strength", "softening", "softening along fibres too"],
+    [("strain", {}), ("strain", SOFTENING), ("generalized", SOFTENING | {"axial_friction": "prevented"})],
+    ids=["strength", "softening", "tied along fibres"],
 )
 def test_breaks_with_friction_obey_every_law_resumed_too(comm, shared_path, plane, law):
     interface = {"normal_strength": 0.05, "tangential_strength": 0.05, "friction": 0.3} | law

@@ -113,6 +113,15 @@ PATHS = {
         STRENGTHS | {"friction": 0.4, "axial_strength": 0.03},
         [COLD, COLD | {"S22": -0.02, "gamma13": 0.004}, COLD | {"gamma12": 0.03, "S23": 0.002}, {"gamma12": -0.02}],
     ),
+    "generalized, tied along the fibres": (
+        {},
+        EPOXY_GLASS,
+        STRENGTHS | {"friction": 0.4, "axial_strength": 0.04, "axial_friction": "prevented"},
+        [
+            *(COLD | {"gamma12": 0.02}, COLD | {"gamma13": 0.02, "gamma12": 0.02}),
+            *(COLD | {"S11": 0.05, "gamma13": 0.01}, COLD | {"S11": -0.05, "gamma13": -0.01}),
+        ],
+    ),
     "generalized, on springs": (
         {"geometry": "hexagonal"},
         EPOXY_GLASS,
@@ -132,6 +141,7 @@ def test_paths_are_those_of_the_twin(comm, name):
 
     def followed():
         faces = RubbingFaces.of(twin.cell, twin.bonded, interface["friction"])
+        faces.tied = "axial_friction" in interface
         return FrictionPath(faces, twin.cell, twin._law).follow(twin.loads)
 
     every = on_root(comm, followed)

@@ -6,7 +6,7 @@ pressure and -(A z)_t = f the shear force on the fibre.  On debonded nodes
 
     gap >= 0, p >= 0, gap p = 0;   |f| <= mu p;   f d slip >= 0, and d slip = 0 where |f| < mu p.
 
-Along the fibres debonded faces slide without a force.
+Along the fibres debonded faces slide without a force, or are `tied`: they keep their slip while they touch.
 """
 
 from __future__ import annotations
@@ -36,6 +36,7 @@ class State:
     shear: np.ndarray
     status: np.ndarray
     axial: np.ndarray  # (k,) or (0,) force along the fibre
+    along: np.ndarray  # and slip along it
 
     def start_of(self, load):
         """Return the load of the state in the kinds of another one."""
@@ -43,7 +44,8 @@ class State:
 
     def stored(self, area):
         """Return z.A z / 2 per area."""
-        return self.stress @ self.strain / 2 + (self.pressure @ self.gap - self.shear @ self.slip) / 2 / area
+        on_jumps = self.pressure @ self.gap - self.shear @ self.slip - self.axial @ self.along
+        return self.stress @ self.strain / 2 + on_jumps / 2 / area
 
 
 class NoEquilibriumError(ArithmeticError):
@@ -55,6 +57,8 @@ class RubbingFaces:
 
     `d` is 2, or 3 with slips along the fibres.
     """
+
+    tied = False  # debonded faces along the fibres
 
     def __init__(self, A, bonded, friction, area=1.0, d=2):
         self.k, self.m, self.area = len(bonded), len(A) - d * len(bonded), area
@@ -83,15 +87,16 @@ class RubbingFaces:
         """The state without a load."""
         zero = np.zeros(self.k)
         status = np.where(self.bonded, BONDED, STICK)
-        return State(np.zeros(self.m), np.zeros(self.m), zero, zero, zero, zero, status, np.zeros(len(self.a)))
+        along = np.zeros(len(self.a))
+        return State(np.zeros(self.m), np.zeros(self.m), zero, zero, zero, zero, status, along, along)
 
-    @property
-    def tied(self):
-        """(k,) or (0,) nodes that do not slip along the fibres."""
-        return self.bonded[: len(self.a)]
+    def holds(self, status):
+        """(..., k) or (..., 0) nodes that do not slip along the fibres."""
+        held = (status == BONDED) | (self.tied & (status != OPEN))
+        return held[..., : len(self.a)]
 
-    def linear(self, status, slip, load):
-        """Return the states (s,), or their rates, of given statuses (s, k), the slip (k,) of the stuck and a load."""
+    def linear(self, status, load, before=None):
+        """Return the states (s,) of given statuses (s, k) and a load, or their rates if there is no state `before`."""
         status = np.atleast_2d(status)
         closed, held = status != OPEN, (status == STICK) | (status == BONDED)
         unit = np.eye(len(self.A))
@@ -99,10 +104,12 @@ class RubbingFaces:
         M[:, self.t] += (SIGN[status] * self.mu)[:, :, None] * self.A[self.n]
         M[:, self.n] = np.where(closed[:, :, None], unit[self.n], M[:, self.n])
         M[:, self.t] = np.where(held[:, :, None], unit[self.t], M[:, self.t])
-        M[:, self.a[self.tied]] = unit[self.a[self.tied]]
+        M[:, self.a] = np.where(self.holds(status)[:, :, None], unit[self.a], M[:, self.a])
         M[:, self.e[~load.by_stress]] = unit[self.e[~load.by_stress]]
         b = np.zeros((len(status), len(self.A)))
-        b[:, self.t] = np.where(held, slip, 0.0)
+        if before is not None:
+            b[:, self.t] = np.where(held, before.slip, 0.0)
+            b[:, self.a] = np.where(self.holds(status), before.along, 0.0)
         b[:, self.e] = np.where(load.by_stress, load.values * self.area / self.unit, load.values)
         z = np.linalg.solve(M, b[:, :, None])
         z += np.linalg.solve(M, b[:, :, None] - M @ z)
@@ -110,7 +117,7 @@ class RubbingFaces:
 
     def _state(self, z, status):
         r = self.unit * (self.A @ z)
-        own = z[self.n], z[self.t], r[self.n], -r[self.t], status, -r[self.a]
+        own = z[self.n], z[self.t], r[self.n], -r[self.t], status, -r[self.a], z[self.a]
         return State(z[self.e], r[self.e] / self.area, *own)
 
     def increment(self, before, load, most=500):
@@ -127,7 +134,7 @@ class RubbingFaces:
             raise NoEquilibriumError(f"pressures change after {most} problems")
         status = found.status
         for _ in range(10):
-            (exact,) = self.linear(status, before.slip, load)
+            (exact,) = self.linear(status, load, before)
             if self.violation(exact, before) <= EXACT:
                 return exact
             status = self._corrected(exact, before)
@@ -145,7 +152,7 @@ class RubbingFaces:
     def _given_bounds(self, bound, before, load):
         """min z.A z / 2 + sum bound |slip - slip before|, gap >= 0, by Clarabel: as good as its tolerances."""
         free = np.ones(len(self.A), bool)
-        free[self.n[self.bonded]] = free[self.t[self.bonded]] = free[self.a[self.tied]] = False
+        free[self.n[self.bonded]] = free[self.t[self.bonded]] = free[self.a[self.holds(self.at_rest.status)]] = False
         free[self.e] = load.by_stress
         own = ~self.bonded
         n, t = (np.searchsorted(np.flatnonzero(free), x[own]) for x in (self.n, self.t))

@@ -61,8 +61,10 @@ class FrictionPath:
                 raise NoEquilibriumError(f"statuses change for ever at {(leg + s) / legs}")
 
             def after(share, rate=rate):
-                return self.faces.linear(rate.status, self.state.slip, start.towards(load, share))[0]
+                return self.faces.linear(rate.status, start.towards(load, share), self.state)[0]
 
+            if self.faces.tied:  # what opens lets go of its shear along the fibres
+                self._lose(after(s), 0.0)
             there = 1.0 if step >= 1.0 - s else s + step
             broken = self.used(after(there)).max() > 1.0
             s = self._break_between(after, s, there) if broken else there
@@ -99,9 +101,13 @@ class FrictionPath:
         before = self.state
         self.faces.bonded = self.faces.bonded & ~which
         after = self.faces.increment(before, load)
+        self._lose(after, after.shear @ (after.slip - before.slip) / self.faces.area)
+
+    def _lose(self, after, heat):
+        """Go to a state at the same load with some heat; the rest of what is not stored is lost."""
+        before = self.state
         work = (after.stress + before.stress) @ (after.strain - before.strain) / 2
         lost = work - after.stored(self.faces.area) + before.stored(self.faces.area)
-        heat = after.shear @ (after.slip - before.slip) / self.faces.area
         self.work, self.heat, self.dissipated = self.work + work, self.heat + heat, self.dissipated + lost - heat
         self._stand(after)
 
@@ -161,7 +167,7 @@ class FrictionPath:
         if now is not None:
             tried = tried[np.argsort((tried != now).sum(axis=1), kind="stable")]
         for some in np.array_split(tried, max(1, len(tried) // 256)):
-            for rate in self.faces.linear(some, np.zeros(self.faces.k), way):
+            for rate in self.faces.linear(some, way):
                 if not self.wrong(rate, choices).any():
                     yield rate
 
@@ -181,7 +187,7 @@ class FrictionPath:
         """Return the rate found by exchanging wrong statuses; None if that does not end soon."""
         status = status.copy()
         for _ in range(60):
-            (rate,) = self.faces.linear(status, np.zeros(self.faces.k), way)
+            (rate,) = self.faces.linear(status, way)
             wrong = np.flatnonzero(self.wrong(rate, choices))
             if not len(wrong):
                 return rate

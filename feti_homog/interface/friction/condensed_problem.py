@@ -73,24 +73,30 @@ class CondensedProblem:
         return DualSolution(strain, lam, left, alpha, 0, 2, float(off / (max(sizes) or 1.0)), C)
 
 
-class FreeFaces:
-    """The axial problem where debonded faces slide along the fibres without a force: g = K^-1 b E, K g = b E.
+class AxialFaces:
+    """The axial problem, a few rows and columns of the matrix S of `coulomb_faces` behind those of the plane.
+
+    Where no face is tied along the fibres the jumps g = K^-1 b E are eliminated, K g = b E.
 
     Attributes:
         problem: the axial one.
-        stiffness: (v, v) L - b^T K^-1 b, what works on its strains.
+        stiffness: (v, v) of its strains, L - b^T K^-1 b; or (v + n, v + n) of strains and jumps.
     """
 
-    def __init__(self, problem: CondensedProblem, rows: Int, springs: Float) -> None:
+    def __init__(self, problem: CondensedProblem, rows: Int, springs: Float, is_tied: bool) -> None:
         """Take rows (n,) with springs (n,), 0 of faces that nothing ties.  Collective."""
         self.problem = problem
         K, b, L = problem.take(rows, springs)
+        if is_tied:
+            self._jumps, self.stiffness = None, np.block([[L, -b.T], [-b, K]])
+            return
         held = K + HELD * np.abs(K.diagonal()).max(initial=0.0) * np.eye(len(K))
         self._jumps = np.linalg.solve(held, b)
         self._jumps += np.linalg.solve(held, b - K @ self._jumps)
         loose = L - b.T @ self._jumps
         self.stiffness = (loose + loose.T) / 2
 
-    def jump(self, strain: Float) -> Float:
-        """(n,) g under strains (v,)."""
-        return np.asarray(self._jumps @ strain)
+    def parts(self, y: Float) -> tuple[Float, Float]:
+        """Return jumps (n,) and strains (v,) of y, strains or strains and jumps."""
+        strain, jump = np.split(y, [len(self.problem.solver.problem.loads)])
+        return (jump if self._jumps is None else self._jumps @ strain), strain

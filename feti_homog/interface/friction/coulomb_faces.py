@@ -9,6 +9,9 @@ pressure p = -f_n
 A node is apart (f = 0), sticks (g_n = 0, g_t as it was), or slides (g_n = 0, f_t = s mu p).  Springs between the faces
 of a node are part of S, and f the force beside theirs: a damaged bond is a node without friction on springs of
 1 / (C - C_0), apart while it is pulled.
+
+Jumps along the fibres may stand behind the loads: those of `tied` nodes stay while these touch, the others bear no
+force.  No status depends on them.
 """
 
 from __future__ import annotations
@@ -40,6 +43,7 @@ ROUNDED_SUM = 1e-13
 # Block pivots without progress, after which one node at random changes at a time: with friction a fixed order may come
 # back to where it was.  And solves after which Lemke's method takes over.
 BLOCK_PIVOTS, LEAST_SOLVES, SOLVES_PER_NODE = 11, 50, 4
+NOTHING = np.zeros(0, bool)
 SEARCHED = "friction: no admissible statuses of the faces were found"
 INDEFINITE = "friction: the sliding faces resist no more (an indefinite pivot)"
 
@@ -68,15 +72,19 @@ class CoulombFaces:
 
     Attributes:
         friction: (n,) mu.
+        tied: (n,) which nodes do not slip along the fibres while they touch; (0,) where x has no such jumps.
         S: (m, m) the scaled stiffness, of 1 on the diagonal of a node, and `size` (m,): S_ij size_i size_j is that of
             the cell.
         solver: of systems with it.
     """
 
-    def __init__(self, stiffness: Float, friction: Float) -> None:
-        """`stiffness` (2n + v, 2n + v) of normal and tangential jumps of each node, then of the loads."""
+    def __init__(self, stiffness: Float, friction: Float, tied: Bool = NOTHING) -> None:
+        """`stiffness` (m, m) of normal and tangential jumps of each node, then of the v loads, then along the fibres.
+
+        m is 2n + v, with jumps along the fibres 3n + v.
+        """
         n, diagonal = len(friction), stiffness.diagonal()
-        self.friction = friction
+        self.friction, self.tied = friction, tied
         nodes = np.repeat(diagonal[: 2 * n].reshape(n, 2).max(axis=1, initial=0.0), 2)
         size = np.sqrt(np.concatenate([nodes, np.maximum(diagonal[2 * n :], 0.0)]))
         self.size = np.where(size > 0.0, size, 1.0)
@@ -87,6 +95,11 @@ class CoulombFaces:
     def nodes(self) -> int:
         """n."""
         return len(self.friction)
+
+    @property
+    def loads(self) -> slice:
+        """Place of the loads in x."""
+        return slice(2 * self.nodes, len(self.S) - len(self.tied))
 
     def forces(self, x: Float) -> tuple[Float, Float]:
         """(n,) scaled normal and tangential forces."""
@@ -99,7 +112,11 @@ class CoulombFaces:
 
     def _free(self, status: Status, by_stress: Bool) -> tuple[Bool, Float]:
         """Return `free_rows` of statuses."""
-        return free_rows(status, self.friction, by_stress)
+        return free_rows(status, self.friction, self._given_by_force(status, by_stress))
+
+    def _given_by_force(self, status: Status, by_stress: Bool) -> Bool:
+        """(m - 2n,) which of the loads, and of the jumps along the fibres, are given by what works on them."""
+        return np.concatenate([by_stress, ~self.tied | (status == OPEN_FACE)]) if len(self.tied) else by_stress
 
     def settled(self, status: Status, given: Prescribed, x: Float) -> Float:
         """(m,) scaled x without the rounding of the way to it; a free motion, which rounding would drive, keeps it."""
@@ -107,11 +124,11 @@ class CoulombFaces:
 
     def _prescribed(self, status: Status, given: Prescribed, start: Float) -> tuple[Float, Float]:
         """(m,) x with what is prescribed, and (m,) S x on the rows of loads."""
-        last, x, rows = 2 * self.nodes, start.copy(), np.zeros(len(start))
+        last, loads, x, rows = 2 * self.nodes, self.loads, start.copy(), np.zeros(len(start))
         x[:last:2] = np.where(status == OPEN_FACE, x[:last:2], 0.0)
         x[1:last:2] = np.where(status == STICK, given.slip, x[1:last:2])
-        x[last:] = np.where(given.by_stress, x[last:], given.values)
-        rows[last:] = given.values
+        x[loads] = np.where(given.by_stress, x[loads], given.values)
+        rows[loads] = given.values
         return x, rows
 
     def _noise(self, x: Float, slip: Float) -> float:
@@ -176,8 +193,10 @@ class CoulombFaces:
 
     def _complementary(self, allowed: Bool, given: Prescribed, start: Float) -> tuple[Status, Float]:
         """Return the same by Lemke's method."""
-        x, rows = self._prescribed(first_guess(self.friction, allowed), given, start)
-        found = complementary(self.S, self.friction, allowed, given.by_stress, x, rows)
+        guess = first_guess(self.friction, allowed)
+        x, rows = self._prescribed(guess, given, start)
+        by_force = self._given_by_force(guess, given.by_stress)
+        found = complementary(self.S, self.friction, allowed, by_force, x, rows)
         if found is not None:
             x = self.linear(found, given, start)
             is_right = (self._improved(found, allowed, given.slip, x) == found).all()
@@ -256,7 +275,8 @@ class CoulombFaces:
         implicit step.
         """
         last, step = 2 * self.nodes, after - before
-        forces = -(self.solver.product(before) + self.solver.product(after))[:last] / 2
+        forces = -(self.solver.product(before) + self.solver.product(after)) / 2
+        forces[self.loads] = 0.0
         sliding = np.abs(status) == 1
         heat = (self.forces(after)[1] * step[1:last:2])[sliding].sum()
-        return float(forces @ step[:last]), float(heat)
+        return float(forces @ step), float(heat)

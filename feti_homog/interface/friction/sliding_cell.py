@@ -1,7 +1,7 @@
 """The debonded faces of a cell, condensed to dense arrays: what rank 0 decides, and multipliers of all ranks.
 
-The matrix S of `coulomb_faces` is that of `CondensedProblem` in the plane.  In generalized plane strain the strains
-along the fibres, to which faces that slide freely along them answer, are loads of their own behind it.
+The matrix S of `coulomb_faces` is that of `CondensedProblem` in the plane, and behind it in generalized plane strain
+that of `AxialFaces`.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from scipy.linalg import block_diag
 from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, Equilibrium, Status
-from feti_homog.interface.friction.condensed_problem import CondensedProblem, FreeFaces
-from feti_homog.interface.friction.coulomb_faces import CoulombFaces
+from feti_homog.interface.friction.condensed_problem import AxialFaces, CondensedProblem
+from feti_homog.interface.friction.coulomb_faces import NOTHING, CoulombFaces
 from feti_homog.interface.friction.status_system import OPEN_FACE, STICK
 from feti_homog.interface.loads.load import Load, Macroscopic, Multipliers
-from feti_homog.typing import Float, Int
+from feti_homog.typing import Bool, Float, Int
 
 
 class SlidingCell:
@@ -29,17 +29,18 @@ class SlidingCell:
     Attributes:
         interface: the contact problem of the plane.
         friction: (k,) mu of the nodes of this rank.
+        tied: (k,) which of them do not slip along the fibres while they touch; None where none of any rank is.
         rows: (n,) global normal rows of the debonded nodes, rising.
         faces: of these nodes, on every rank.
     """
 
-    def __init__(self, cell: CoupledInterfaces, friction: Float) -> None:
+    def __init__(self, cell: CoupledInterfaces, friction: Float, tied: Bool | None = None) -> None:
         """Find the response of the bonded cell to its loads.  Collective; raises as `CondensedProblem`."""
-        self.cell, self.interface, self.friction = cell, cell.plane, friction
+        self.cell, self.interface, self.friction, self.tied = cell, cell.plane, friction, tied
         self.solver = self.interface.solver
         self._plane, *self._axial = (CondensedProblem(each) for each in cell.problems)
         self._loads = len(self.solver.problem.loads)
-        self.rows, self.springs = np.zeros(0, np.int64), np.zeros(0)
+        self.rows, self.springs = np.zeros(0, np.int64), (np.zeros(0), np.zeros(0))
         self.faces = CoulombFaces(np.zeros((0, 0)), np.zeros(0))
 
     def take(self, bonds: BondState) -> None:
@@ -51,28 +52,35 @@ class SlidingCell:
         springs = np.divide(1.0, more, out=np.zeros_like(more), where=(more > 0.0) & self._damaged[:, None])
         friction = np.where(self._damaged, 0.0, self.friction)
         along = [each.first + each.interface.nodes.row for each in self._axial]
-        own = np.column_stack([first + row, friction, *along, springs])[self._own]
+        tied = np.zeros(len(row), bool) if self.tied is None else self.tied & ~self._damaged
+        own = np.column_stack([first + row, friction, tied, *along, springs])[self._own]
         whole = np.concatenate(comm.allgather(own))
         whole = whole[np.argsort(whole[:, 0])]
         faces, before, held = self.faces, self.rows, self.springs
-        self.rows, self.springs = whole[:, 0].astype(np.int64), whole[:, -more.shape[1] :][:, :2].ravel()
+        self.rows, springs = whole[:, 0].astype(np.int64), whole[:, -more.shape[1] :]
+        self.springs = springs[:, :2].ravel(), springs[: 0 if self.tied is None else None, -1]
         self._place = np.searchsorted(self.rows, first + row[self._own])
-        K, b, L = self._plane.take((self.rows[:, None] + np.arange(2)).ravel(), self.springs)
-        self._along = [FreeFaces(each, whole[:, 2].astype(np.int64), whole[:, -1]) for each in self._axial]
-        L = block_diag(L, *(each.stiffness for each in self._along))
-        b = np.pad(b, [(0, 0), (0, len(L) - self._loads)])
-        self.faces = CoulombFaces(np.block([[K, -b], [-b.T, L]]), whole[:, 1])
+        K, b, L = self._plane.take((self.rows[:, None] + np.arange(2)).ravel(), self.springs[0])
+        nodes, has_jumps = whole[:, 3].astype(np.int64), self.tied is not None
+        self._along = [AxialFaces(each, nodes, springs[:, 2], has_jumps) for each in self._axial]
+        S = block_diag(L, *(each.stiffness for each in self._along))
+        b = np.pad(b, [(0, 0), (0, len(S) - self._loads)])
+        tied = whole[:, 2] > 0.0 if has_jumps else NOTHING
+        self.faces = CoulombFaces(np.block([[K, -b], [-b.T, S]]), whole[:, 1], tied)
         old = self._places_of(before, held)
         if old is not None:
-            self.faces.solver.follow(faces.solver, old, old[2 * len(before) + self._loads :])
+            others = slice(0) if has_jumps else slice(2 * len(before) + self._loads, None)
+            self.faces.solver.follow(faces.solver, old, old[others])
 
-    def _places_of(self, rows: Int, springs: Float) -> Int | None:
+    def _places_of(self, rows: Int, springs: tuple[Float, Float]) -> Int | None:
         """Return where entries of x of other faces stand now; None if some are not there, or on other springs."""
         if not len(rows) or not np.isin(rows, self.rows).all():
             return None
-        pairs = (2 * np.searchsorted(self.rows, rows)[:, None] + np.arange(2)).ravel()
-        loads = np.arange(2 * len(self.rows), len(self.faces.S))
-        return np.concatenate([pairs, loads]) if (self.springs[pairs] == springs).all() else None
+        nodes, loads = np.searchsorted(self.rows, rows), self.faces.loads
+        pairs, along = (2 * nodes[:, None] + np.arange(2)).ravel(), nodes[: len(springs[1])]
+        if (self.springs[0][pairs] != springs[0]).any() or (self.springs[1][along] != springs[1]).any():
+            return None
+        return np.asarray(np.concatenate([pairs, np.arange(loads.start, loads.stop), loads.stop + along]))
 
     @staticmethod
     def _gained(problem: CondensedProblem, bonds: BondState) -> Float:
@@ -93,18 +101,25 @@ class SlidingCell:
         Without a history the faces just touch.
         """
         self.take(bonds)
-        jump = np.zeros((len(bonds.status), 2)) if bonds.gap_and_slip is None else bonds.gap_and_slip
+        jump = np.zeros((len(bonds.status), self._jumps)) if bonds.gap_and_slip is None else bonds.gap_and_slip
         apart = np.where(self._damaged, ~bonds.pressed, bonds.status == OPEN)
-        own = np.column_stack([jump, np.where(apart, OPEN_FACE, bonds.sliding_signs)])[self._own]
+        own = np.column_stack([np.where(apart, OPEN_FACE, bonds.sliding_signs), jump])[self._own]
         whole = np.concatenate(self.solver.comm.allgather(np.column_stack([self._place, own])))
         whole = whole[np.argsort(whole[:, 0])]
-        status: Status = whole[:, 3].astype(np.int8)
-        return status, np.concatenate([whole[:, 1:3].ravel(), strain]) * self.faces.size
+        status: Status = whole[:, 1].astype(np.int8)
+        return status, np.concatenate([whole[:, 2:4].ravel(), strain, whole[:, 4:].ravel()]) * self.faces.size
+
+    @property
+    def _jumps(self) -> int:
+        """Number of jumps of a node that x has."""
+        return 2 if self.tied is None else 3
 
     def bonds(self, before: BondState, status: Status, x: Float) -> BondState:
         """Return the state of the nodes of this rank with statuses (n,) and scaled x of the faces."""
-        own, jump = status[self._place], np.zeros((len(before.status), 2))
-        jump[self._own] = (x / self.faces.size)[: 2 * len(status)].reshape(-1, 2)[self._place]
+        own, jump = status[self._place], np.zeros((len(before.status), self._jumps))
+        plane, along = self._jumps_of(x)
+        whole = np.hstack([plane.reshape(-1, 2), along.reshape(len(status), self._jumps - 2)])
+        jump[self._own] = whole[self._place]
         nodes, sliding = before.status.copy(), np.zeros(len(before.status), np.int8)
         holds, pressed = self._damaged[self._own], before.pressed.copy()
         nodes[self._own] = np.where(holds, BONDED, np.where(own == OPEN_FACE, OPEN, CLOSED))
@@ -114,8 +129,13 @@ class SlidingCell:
 
     def stretched(self, x: Float) -> float:
         """Return the energy per area of the springs in scaled x by which damaged bonds have become softer."""
-        jump = (x / self.faces.size)[: 2 * len(self.rows)]
-        return float(self.springs @ jump**2) / (2.0 * self.area)
+        pairs = zip(self.springs, self._jumps_of(x), strict=True)
+        return float(sum(springs @ jump**2 for springs, jump in pairs)) / (2.0 * self.area)
+
+    def _jumps_of(self, x: Float) -> tuple[Float, Float]:
+        """(2n,) jumps in the plane and (n,) or (0,) along the fibres of scaled x."""
+        loads, plain = self.faces.loads, x / self.faces.size
+        return plain[: loads.start], plain[loads.stop :]
 
     def multipliers(self, x: Float) -> Multipliers:
         """(owned rows,) lam of scaled x in each problem."""
@@ -129,30 +149,27 @@ class SlidingCell:
 
     def _parts(self, x: Float) -> list[tuple[CondensedProblem, tuple[Float, Float]]]:
         """Return each problem with its jumps and strains of scaled x."""
-        plain, last = x / self.faces.size, 2 * len(self.rows)
-        plane, along = np.split(plain[last:], [self._loads])
-        return [
-            (self._plane, (plain[:last], plane)),
-            *((each.problem, (each.jump(along), along)) for each in self._along),
-        ]
+        jump, plane, along = np.split(x / self.faces.size, 2 * len(self.rows) + np.array([0, self._loads]))
+        return [(self._plane, (jump, plane)), *((each.problem, each.parts(along)) for each in self._along)]
 
     def released_along(self, before: Macroscopic, after: Macroscopic) -> float:
-        """Return the energy per area that a break at constant load loses of the axial problem."""
+        """Return the energy per area that a break at constant load loses along fibres, if x has no jumps there."""
+        if self.tied is not None:
+            return 0.0
         parts = (Macroscopic(each.strain[self._loads :], each.stress[self._loads :]) for each in (before, after))
         return next(parts).released_to(next(parts))
 
     def strain(self, x: Float) -> Float:
         """(v,) E of scaled x."""
-        return np.asarray((x / self.faces.size)[2 * len(self.rows) :])
+        return np.asarray((x / self.faces.size)[self.faces.loads])
 
     def stress(self, x: Float) -> Float:
         """(v,) Sigma of scaled x."""
-        last = 2 * len(self.rows)
-        return np.asarray((self.faces.solver.product(x) * self.faces.size)[last:] / self.area)
+        return np.asarray((self.faces.solver.product(x) * self.faces.size)[self.faces.loads] / self.area)
 
     def given(self, load: Load) -> Float:
         """(v,) scaled values of a load."""
-        size = self.faces.size[2 * len(self.rows) :]
+        size = self.faces.size[self.faces.loads]
         return np.where(load.by_stress, self.area * load.values / size, load.values * size)
 
     def equilibrium(self, load: Load, bonds: BondState, x: Float) -> Equilibrium:

@@ -122,6 +122,7 @@ class SlidingLeg:
         breaks = first_break_between(cell, self.law, bonds, *tractions)
         way = min(breaks, 1.0) * min(rest, change)
         there = x + way * rate
+        self._let_go(status, x)
         self._go(status, x, np.where(np.abs(there) > CANCELLED * np.abs(x), there, 0.0))
         at_end = breaks > 1.0 and change >= rest
         self._share = 1.0 if at_end else self._share + way
@@ -139,6 +140,13 @@ class SlidingLeg:
 
     def _standing(self, status: Status, x: Float) -> Standing:
         return Standing(status, x, Macroscopic(self.sliding.strain(x), self.sliding.stress(x)))
+
+    def _let_go(self, status: Status, x: Float) -> None:
+        """Go to x with these statuses at the same load: faces that opened bear no shear along the fibres any more."""
+        if len(self.sliding.faces.tied):
+            lost, _ = self.sliding.faces.losses(status, self._here.x, x)
+            self._add(self._standing(status, x), lost / self.sliding.area, 0.0)
+            self._here = self._standing(status, x)
 
     def _go(self, status: Status, x: Float, there: Float) -> None:
         """Go straight from x to `there`, with these statuses."""
