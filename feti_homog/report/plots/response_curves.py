@@ -13,6 +13,7 @@ from matplotlib.ticker import MaxNLocator, MultipleLocator
 
 from feti_homog.materials.voigt import STRESSES, voigt_names
 from feti_homog.report.plots import envelope_plot
+from feti_homog.report.plots.free_places import free_offsets
 from feti_homog.report.plots.interface_marks import BONDED, CLOSED, OPEN, STATE_COLOURS, STATE_NAMES
 from feti_homog.report.plots.plot_helpers import bond_limits, interfaces_of, plain, save, strain_symbols, unit_label
 from feti_homog.report.text.analyses import reported
@@ -102,10 +103,10 @@ def _path(document: Document) -> Figure:
     kept = kept_points.kept_points(document)
     numbers = [kept[state] for state in kept_points.landmark_states(document, NUMBERED_POINTS, len(kept))]
     curve = np.stack([strain, stress[:, component]], axis=1)
-    _number_points(upper, (middle, lower), curve, numbers, INK[component])
     _mark_peak(upper, document, INK[component])
     for axes in (upper, middle, lower):
         _finish(axes)
+    _number_points(upper, (middle, lower), curve, numbers, INK[component])
     _damaged_length(lower, document, style)
     return figure
 
@@ -184,10 +185,9 @@ def _number_points(upper: Axes, below: Sequence[Axes], curve: Array, numbers: Se
     style: dict[str, Any] = {"color": "0.3", "fontsize": 7, "ha": "center", "va": "center"}
     pointer: dict[str, Any] = {"arrowstyle": "-", "color": "0.3", "linewidth": 0.5, "shrinkA": 0, "shrinkB": 2}
     span, level = max(len(curve) - 1, 1), 0
+    for number, offset in zip(numbers, free_offsets(upper, curve[numbers]), strict=True):
+        upper.annotate(str(number), curve[number], offset, textcoords="offset points", arrowprops=pointer, **style)
     for place, number in enumerate(numbers):
-        # Above the curve, where it hides none, and each row of numbers at another height.
-        upper.annotate(str(number), curve[number], (-6, 16 + 9 * (place % 2)), textcoords="offset points",
-                       arrowprops=pointer, **style)  # fmt: skip
         for axes in below:
             axes.axvline(number, color="0.7", linewidth=0.7, linestyle=":", zorder=0)
         level = level + 1 if place and number - numbers[place - 1] < NEAR * span else 0
