@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from textwrap import wrap
 
 from feti_homog.report.cards.effective_material import EffectiveMaterial
@@ -27,10 +28,15 @@ def comments(material: EffectiveMaterial, mark: str) -> list[str]:
     if material.expansion is None:
         paragraphs.append("No thermal expansion: not every phase of the case gives one.")
     if material.errors:
-        errors = ", ".join(f"{name} {error:.1e}" for name, error in material.errors.items())
-        paragraphs.append(f"Estimated errors by the mesh: {errors}.")
+        paragraphs.append(f"Estimated errors by the mesh: {_listed(material.errors)}.")
+    if material.scatter:
+        paragraphs.append(f"Standard deviations by uncertain constants of the phases: {_listed(material.scatter)}.")
     lines = (line for words in paragraphs for line in wrap(_ascii(words), LONGEST))
     return [f"{mark} {line}" for line in lines]
+
+
+def _listed(values: Mapping[str, float]) -> str:
+    return ", ".join(f"{name} {value:.1e}" for name, value in values.items())
 
 
 def number(value: float, width: int = 24) -> str:

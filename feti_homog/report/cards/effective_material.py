@@ -47,6 +47,7 @@ class EffectiveMaterial:
             positive definite.
         expansion: (6,) strains per unit of temperature in the same order, or None.
         errors: estimated errors of `constants` and of alpha1, alpha2, alpha3 by the mesh, of those that are known.
+        scatter: their standard deviations by uncertain constants of the case, of those that are known.
     """
 
     name: str
@@ -56,6 +57,7 @@ class EffectiveMaterial:
     compliance: Float
     expansion: Float | None
     errors: Mapping[str, float]
+    scatter: Mapping[str, float]
 
     @property
     def is_orthotropic(self) -> bool:
@@ -108,7 +110,7 @@ def in_axes_of_the_cell(document: Mapping[str, Any]) -> EffectiveMaterial:
         symmetry = f"Orthotropic; {words} are left out."
         compliance = np.where(COUPLINGS, 0.0, compliance)
         expansion = None if expansion is None else expansion * [1, 1, 1, 0, 0, 0]
-    return _material(document, symmetry, compliance, expansion, material_axes.errors(document))
+    return _material(document, symmetry, compliance, expansion, material_axes.errors(document), material_axes.scatter(document))
 
 
 def nearest_transversely_isotropic(document: Mapping[str, Any]) -> EffectiveMaterial:
@@ -134,7 +136,9 @@ def nearest_transversely_isotropic(document: Mapping[str, Any]) -> EffectiveMate
     symmetry = f"The nearest transversely isotropic material, at a relative distance of {given['deviation']:.2g}."
     known = (document.get("mesh_error") or {}).get("constants", {})
     errors = {name: float(known[own]) for name, own in ABOUT_THE_FIBRE.items() if own in known}
-    return _material(document, symmetry, compliance, expansion, errors)
+    of_phases = material_axes.standard_deviations(document)
+    scatter = {name: of_phases[own] for name, own in ABOUT_THE_FIBRE.items() if own in of_phases}
+    return _material(document, symmetry, compliance, expansion, errors, scatter)
 
 
 def _material(
@@ -143,6 +147,7 @@ def _material(
     compliance: Float,
     expansion: Float | None,
     errors: Mapping[str, float],
+    scatter: Mapping[str, float],
 ) -> EffectiveMaterial:
     return EffectiveMaterial(
         name=document["case"]["name"],
@@ -152,6 +157,7 @@ def _material(
         compliance=(compliance + compliance.T) / 2.0,
         expansion=expansion,
         errors=errors,
+        scatter=scatter,
     )
 
 

@@ -48,6 +48,20 @@ def errors(document: Document) -> dict[str, float]:
     return {name: found[name] for names in ROWS for name in names if name in found}
 
 
+def scatter(document: Document) -> dict[str, float]:
+    """Return the standard deviations of the constants by uncertain constants of the case, of those that are known."""
+    known = standard_deviations(document)
+    places = IN_THE_CELL | {name: f"expansion.{place + 1}" for name, place in EXPANSIONS.items()}
+    found = {name: known[own] for name, own in places.items() if own in known}
+    return {name: found[name] for names in ROWS for name in names if name in found}
+
+
+def standard_deviations(document: Document) -> dict[str, float]:
+    """Return those of all constants of the cell, in its axes, that uncertain constants of the case cause."""
+    known = document.get("uncertainty") or {"constants": (), "std": ()}
+    return dict(zip(known["constants"], map(float, known["std"]), strict=True))
+
+
 def table(document: Document, label: str) -> list[Table]:
     """Return the constants as a table; `label` is the unit of stresses in brackets, or empty."""
     found, off = constants(document), errors(document)
@@ -63,4 +77,5 @@ def lines(document: Document, label: str) -> list[str]:
         value, error = value_and_error(number, off.get(name), ".7g")
         words[name] = f"{name:<6}{value:>13}{beside(error)}"
     rows = ("    ".join(words[name] for name in names if name in words).rstrip() for names in ROWS)
-    return [f"{TITLE}{label}", *(f"  {row}" for row in rows if row)] if found else []
+    title = f"{TITLE}{label}{'; +- error of the mesh' if off else ''}"
+    return [title, *(f"  {row}" for row in rows if row)] if found else []

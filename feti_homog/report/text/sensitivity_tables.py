@@ -14,6 +14,8 @@ SHOWN = {
     True: ("E_axial", "E_transverse", "nu_axial", "nu_transverse", "G_axial", "G_transverse", "expansion.3",
            "expansion.1"),
 }  # fmt: skip
+# Of expansions in the axes of the cell, x3 along the fibres.
+SHORT_NAMES = SHORT | {"expansion.3": "exp. axial", "expansion.1": "exp. x1"}
 Document = Mapping[str, Any]
 
 
@@ -32,7 +34,7 @@ def sensitivities(document: Document) -> list[Table]:
         )
     words = "Elasticities, the relative change of a constant by that of a parameter"
     return [
-        Table(title, [Column("", -width), *(Column(SHORT.get(constants[k], constants[k]), 12, form) for k in at)], rows)
+        Table(title, [Column("", -width), *(Column(SHORT_NAMES.get(constants[k], constants[k]), 12, form) for k in at)], rows)
         for title, form, rows in ((words, ".4f", shares), ("Derivatives by the same parameters", ".3g", slopes))
     ]
 
@@ -42,22 +44,30 @@ def uncertainty(document: Document) -> list[Table]:
     if (found := document.get("uncertainty")) is None:
         return []
     names, values = found["constants"], document["sensitivities"]["constant_values"]
-    errors = (document.get("mesh_error") or {}).get("constants", {})
+    errors = _mesh_errors(document)
     inputs = [name.removeprefix("material.") for name in found["parameters"]]
     columns = [Column("", -16), Column("value"), Column("+- phases"), Column("+- mesh")]
     columns += [Column(name, max(12, len(name) + 2), ".1f") for name in inputs]
     rows = [
         [
-            SHORT.get(name, name),
+            SHORT_NAMES.get(name, name),
             values[k],
             found["std"][k],
             errors.get(name, UNKNOWN),
             *(100 * share for share in found["shares"][k]),
         ]
-        for k, name in enumerate(names)
-        if name in SHOWN["E3" in names] and (found["std"][k] > 0)
+        for k, name in ((names.index(name), name) for name in SHOWN["E3" in names] if name in names)
+        if found["std"][k] > 0
     ]
     return [Table("Scatter by uncertain constants (std), and their shares of the variance (%)", columns, rows)]
+
+
+def _mesh_errors(document: Document) -> dict[str, float]:
+    """Return the estimated errors of constants by the mesh, of expansions by their places, too."""
+    known = document.get("mesh_error") or {}
+    expansions = known.get("thermal_expansion")
+    along = {} if expansions is None else {f"expansion.{k + 1}": float(error) for k, error in enumerate(expansions)}
+    return known.get("constants", {}) | along
 
 
 def _share(change: float, size: float) -> float | str:

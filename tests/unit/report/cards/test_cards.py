@@ -124,6 +124,18 @@ def test_comments_have_the_errors_of_the_mesh_in_the_axes_of_the_card(form):
     assert "by the mesh: E1 2.5e-01, G23 5.0e-01." in words
 
 
+@pytest.mark.parametrize("form", ["abaqus", "ansys", "moose"])
+def test_comments_have_the_scatter_by_uncertain_phases_in_the_axes_of_the_card(form):
+    names = ["E1", "E3", "nu12", "nu13", "G23", "expansion.3", "E_axial", "G_transverse"]
+    found = {"constants": names, "std": [0.5, 0.25, 0.01, 0.9, 0.03, 1e-8, 0.7, 0.8]}
+    words = " ".join(FORMATS[form](in_axes_of_the_cell(document(DISTINCT, uncertainty=found))).split())
+    marks = "**" if form == "abaqus" else "!" if form == "ansys" else "#"
+    words = words.replace(f" {marks} ", " ")
+    assert "of the phases: E1 2.5e-01, E2 5.0e-01, G13 3.0e-02, nu23 1.0e-02, alpha1 1.0e-08." in words
+    words = " ".join(FORMATS[form](nearest_transversely_isotropic(document(DISTINCT, uncertainty=found))).split())
+    assert "of the phases: E1 7.0e-01, G23 8.0e-01." in words.replace(f" {marks} ", " ")
+
+
 @pytest.mark.parametrize(
     "value", [215.33468712345678, -1.0993681512345678e-05, 1e-300, 123456789012345678.0, 0.1, -0.0]
 )
