@@ -110,7 +110,8 @@ def in_axes_of_the_cell(document: Mapping[str, Any]) -> EffectiveMaterial:
         symmetry = f"Orthotropic; {words} are left out."
         compliance = np.where(COUPLINGS, 0.0, compliance)
         expansion = None if expansion is None else expansion * [1, 1, 1, 0, 0, 0]
-    return _material(document, symmetry, compliance, expansion, material_axes.errors(document), material_axes.scatter(document))
+    errors, scatter = material_axes.errors(document), material_axes.scatter(document)
+    return _material(document, symmetry, compliance, expansion, errors, scatter)
 
 
 def nearest_transversely_isotropic(document: Mapping[str, Any]) -> EffectiveMaterial:

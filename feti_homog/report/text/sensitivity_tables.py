@@ -33,8 +33,9 @@ def sensitivities(document: Document) -> list[Table]:
             [name, *(_share(slope * value, found["constant_values"][k]) for slope, k in zip(row, at, strict=True))]
         )
     words = "Elasticities, the relative change of a constant by that of a parameter"
+    names = [SHORT_NAMES.get(constants[k], constants[k]) for k in at]
     return [
-        Table(title, [Column("", -width), *(Column(SHORT_NAMES.get(constants[k], constants[k]), 12, form) for k in at)], rows)
+        Table(title, [Column("", -width), *(Column(name, 12, form) for name in names)], rows)
         for title, form, rows in ((words, ".4f", shares), ("Derivatives by the same parameters", ".3g", slopes))
     ]
 
