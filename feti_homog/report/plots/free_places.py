@@ -20,7 +20,7 @@ def free_offsets(axes: Axes, points: Array) -> list[tuple[int, int]]:
     The limits of the axes are final afterwards.
     """
     axes.set_ylim(axes.get_ylim())
-    to_print = POINTS_PER_INCH / axes.get_figure(root=True).dpi
+    to_print = POINTS_PER_INCH / axes.figure.dpi
     taken = np.vstack([_samples(line.get_transform().transform(line.get_xydata())) for line in axes.lines]) * to_print
     corners = axes.get_window_extent().get_points() * to_print
     chosen = []

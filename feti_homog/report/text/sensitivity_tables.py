@@ -65,10 +65,10 @@ def uncertainty(document: Document) -> list[Table]:
 
 def _mesh_errors(document: Document) -> dict[str, float]:
     """Return the estimated errors of constants by the mesh, of expansions by their places, too."""
-    known = document.get("mesh_error") or {}
+    known: Document = document.get("mesh_error") or {}
     expansions = known.get("thermal_expansion")
     along = {} if expansions is None else {f"expansion.{k + 1}": float(error) for k, error in enumerate(expansions)}
-    return known.get("constants", {}) | along
+    return {**known.get("constants", {}), **along}
 
 
 def _share(change: float, size: float) -> float | str:
