@@ -32,7 +32,7 @@ def assert_refused(job, expected, out):
     assert not out.exists() and not job.stdout
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [0, 2])
 @pytest.mark.parametrize("name", CASES)
 def test_faulty_cases_end_with_2_and_write_nothing(tmp_path, name, ranks):
     content, expected = FAULTY_CASES[name]
@@ -41,7 +41,7 @@ def test_faulty_cases_end_with_2_and_write_nothing(tmp_path, name, ranks):
     assert_refused(job, expected, tmp_path / "results")
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [0, 2])
 @pytest.mark.parametrize("name", ["hanging", "not periodic, right", "tangled", "no matrix"])
 def test_faulty_meshes_end_with_2_and_write_nothing(tmp_path, name, ranks):
     write, message = FAULTY_MESHES[name]
@@ -54,19 +54,19 @@ def test_faulty_meshes_end_with_2_and_write_nothing(tmp_path, name, ranks):
 
 
 @pytest.mark.parametrize(
-    ("option", "message"),
+    ("options", "messages"),
     [
-        (["-feti_ksp_rtoll", "1e-3"], "-feti_ksp_rtoll"),
-        (["-feti_foo"], "-feti_foo: unknown option"),
-        (["-feti_ksp_rtol", "2.0"], "-feti_ksp_rtol 2.0: expected a number above 0 and below 1"),
-        (["-feti_pc_typ", "none"], "-feti_pc_typ"),
-        (["-feti_pc_type", "jacobi"], "-feti_pc_type jacobi: expected one of auto, none, lumped, dirichlet, influence"),
+        (["-feti_ksp_rtoll", "1e-3", "-feti_pc_typ", "none"], ["-feti_ksp_rtoll", "-feti_pc_typ"]),
+        (["-feti_foo"], ["-feti_foo: unknown option"]),
+        (
+            ["-feti_ksp_rtol", "2.0", "-feti_pc_type", "jacobi"],
+            ["-feti_ksp_rtol 2.0: expected a number above 0 and below 1", "-feti_pc_type jacobi: expected one of auto"],
+        ),
     ],
 )
-@pytest.mark.parametrize("ranks", [1, 2])
-def test_mistyped_options_end_with_2(tmp_path, ranks, option, message):
-    job = command_line(ranks, "run", case_file(tmp_path), "--out", tmp_path / "results", "--quiet", *option)
-    assert_refused(job, [message], tmp_path / "results")
+def test_mistyped_options_end_with_2(tmp_path, options, messages):
+    job = command_line(2, "run", case_file(tmp_path), "--out", tmp_path / "results", "--quiet", *options)
+    assert_refused(job, messages, tmp_path / "results")
 
 
 def test_mistyped_options_of_the_case_end_with_2(tmp_path):
@@ -75,7 +75,7 @@ def test_mistyped_options_of_the_case_end_with_2(tmp_path):
     assert_refused(job, ["feti_ksp_rtoll"], tmp_path / "results")
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("ranks", [0, 2])
 def test_a_file_in_the_place_of_the_folder_is_left_alone(tmp_path, ranks):
     out = tmp_path / "results"
     out.write_text("mine")
