@@ -1,9 +1,11 @@
-"""Records of the cell, its fibres, the solver and the checks in result.json; `result.Result` has them."""
+"""Records of the cell, its fibres, the solver, the checks and the sensitivities in result.json."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+
+import numpy as np
 
 from feti_homog.materials.bounds import Bounds
 from feti_homog.runtime.records import DEGREES, LENGTH, STRESS, described, plain
@@ -104,6 +106,29 @@ class StiffnessBounds:
     voigt: Float = described("upper bound of the stiffness: uniform strain", STRESS, "(3, 3)")
     reuss: Float = described("lower bound of the stiffness: uniform stress", STRESS, "(3, 3)")
     hashin_shtrikman: Bounds | None = described("bounds of isotropic composites; null if a phase is not isotropic")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sensitivities:
+    """Derivatives of the n constants of a cell by the p constants of its phases and interfaces, at fixed geometry."""
+
+    parameters: tuple[str, ...] = described("constants of the case, such as `material.fibre.young`")
+    parameter_values: Float = described("their values, each in its unit", "", "(p,)")
+    constants: tuple[str, ...] = described(
+        "entries `C11`, ... of the stiffness, moduli and ratios `E1`, ..., `thermal_stress.1`, ..., `expansion.1`, "
+        "...; of a load strains and stresses that it does not give, and `stored`"
+    )
+    constant_values: Float = described("their values, each in its unit", "", "(n,)")
+    derivatives: Float = described("of each constant by each parameter", "", "(n, p)")
+    at_fixed_status: bool = described(
+        "whether faces touch without tension: derivatives hold as long as no node opens or closes", default=False
+    )
+
+    @property
+    def elasticities(self) -> Float:
+        """(n, p) d ln constant / d ln parameter; NaN of constants that are 0."""
+        values = np.where(self.constant_values == 0.0, np.nan, self.constant_values)
+        return np.asarray(self.derivatives * self.parameter_values / values[:, None])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -8,13 +8,14 @@ from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.mesh_errors import state_error
 from feti_homog.analysis.registry import Analysis
 from feti_homog.analysis.result_records import LoadPoint
+from feti_homog.analysis.sensitivities import load_sensitivities, propagated
 from feti_homog.analysis.tip_records import IN_PLANE_LOADS
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
     """`load`: the state under the load, with what is debonded from the start, open or in contact.
 
-    `tips` of its arcs if only strains of the plane are there.
+    `tips` of its arcs if only strains of the plane are there; `sensitivities` and `uncertainty` if the case asks.
     """
     cell, (target,) = context.loads.interfaces, context.case.targets
     bonds = context.bonds(None)
@@ -29,7 +30,10 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     only_in_plane = not any(strain for name, strain in others.items() if name not in IN_PLANE_LOADS)
     if context.case.interface is not None and only_in_plane:
         point["tips"] = context.tips.of(responses[:1], ["strain"])
-    return {"load": LoadPoint(**point)}
+    document: dict[str, Any] = {"load": LoadPoint(**point)}
+    if context.needs_sensitivities:
+        document |= load_sensitivities(context, context.loads.load(target), responses)
+    return document | (propagated(context.case, document) if context.case.uncertainty.std else {})
 
 
 ANALYSIS = Analysis(run, table=True)

@@ -14,6 +14,7 @@ from feti_homog.analysis.cell_records import (
     CellInfo,
     Checks,
     FibreInfo,
+    Sensitivities,
     SolverInfo,
     StiffnessBounds,
     UncertainConstants,
@@ -26,7 +27,6 @@ from feti_homog.analysis.result_records import (
     MeshError,
     PathPoint,
     Peak,
-    Sensitivities,
     TipRates,
 )
 from feti_homog.materials.bounds import Moduli

@@ -9,8 +9,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-
 from feti_homog.materials.voigt import (
     SPATIAL_STIFFNESSES,
     SPATIAL_STRAINS,
@@ -56,25 +54,6 @@ class MeshError:
         "errors of moduli and constants, each in its unit", entries={"NAME": "that of one, as of `E1`"}
     )
     energy: float = described("relative error of the strain energy, the largest under any strain")
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Sensitivities:
-    """Derivatives of the n constants of a cell by the p constants of its phases and interfaces, at fixed geometry."""
-
-    parameters: tuple[str, ...] = described("constants of the case, such as `material.fibre.young`")
-    parameter_values: Float = described("their values, each in its unit", "", "(p,)")
-    constants: tuple[str, ...] = described(
-        "entries `C11`, ... of the stiffness, moduli and ratios `E1`, ..., `thermal_stress.1`, ..., `expansion.1`, ..."
-    )
-    constant_values: Float = described("their values, each in its unit", "", "(n,)")
-    derivatives: Float = described("of each constant by each parameter, at no further solve", "", "(n, p)")
-
-    @property
-    def elasticities(self) -> Float:
-        """(n, p) d ln constant / d ln parameter; NaN of constants that are 0."""
-        values = np.where(self.constant_values == 0.0, np.nan, self.constant_values)
-        return np.asarray(self.derivatives * self.parameter_values / values[:, None])
 
 
 @dataclass(frozen=True, eq=False)  # arrays have no single answer to "equal"

@@ -9,7 +9,6 @@ from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.mesh_errors import mesh_error, unit_errors
 from feti_homog.analysis.registry import Analysis
 from feti_homog.analysis.sensitivities import propagated, sensitivities
-from feti_homog.errors import CaseError
 from feti_homog.homogenization.averaging import asymmetry
 
 if TYPE_CHECKING:
@@ -28,14 +27,12 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     bonds = context.bonds(None)
     starts = context.loads.zero_multipliers()
     one_sided = context.plane.interface.contact and context.plane.counts(bonds.status)["open"] > 0
-    if one_sided and context.needs_sensitivities:
-        raise CaseError("[output] sensitivities: contact of debonded faces is not linear; expected contact = false")
     columns, responses = context.unit_responses("", bonds, starts, 1.0)
     errors, responses = unit_errors(context, responses)
     errors_of_minus: list[EnergyErrors] = []
     context.record_unit_states(responses, 1.0, "", 0)
     document: dict[str, Any] = {"effective_stiffness": columns.pop("stiffness")} | columns
-    under, loads = list(responses), list(context.loads.names)
+    under, loads, first = list(responses), list(context.loads.names), responses
     if one_sided:
         minus, responses = context.unit_responses("", bonds, starts, -1.0)
         errors_of_minus, responses = unit_errors(context, responses)
@@ -48,7 +45,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     if context.case.interface is not None:
         document["tips"] = context.tips.of(under, loads)
     document |= constants(context.cell, document)
-    document |= sensitivities(context, document, responses) if context.needs_sensitivities else {}
+    document |= sensitivities(context, document, first, one_sided) if context.needs_sensitivities else {}
     document |= propagated(context.case, document) if context.case.uncertainty.std else {}
     return document | mesh_error(context, document, errors, errors_of_minus)
 

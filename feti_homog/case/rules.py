@@ -26,6 +26,7 @@ from feti_homog.case.selectors import (
     IN_THE_PLANE,
     PLANE,
 )
+from feti_homog.case.uncertainty import DIFFERENTIABLE
 from feti_homog.materials import plane_state
 from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS, STRESSES
 from feti_homog.schema.keys import Condition, Selector, keys_of
@@ -139,8 +140,8 @@ def _files() -> Iterator[Rule]:
 
 def _output() -> Iterator[Rule]:
     """Yield what some analyses cannot give."""
-    others = ANALYSIS_TYPE.among(*(name for name in _values(ANALYSIS_TYPE) if name != "stiffness"))
-    line = 'belongs to [analysis] type = "stiffness"'
+    others = ANALYSIS_TYPE.among(*(name for name in _values(ANALYSIS_TYPE) if name not in DIFFERENTIABLE))
+    line = f"belongs to [analysis] type = {' or '.join(map(toml_value, DIFFERENTIABLE))}"
     yield refused(("output", "sensitivities"), {"type": "boolean", "enum": [True]}, line, others)
 
 

@@ -166,8 +166,9 @@ class Output:
     sensitivities: bool = key(
         boolean,
         "Derivatives of every constant of the cell by every constant of its phases and elastic interfaces, and a "
-        'picture of them, at no further solve, in [analysis] type = "stiffness". Debonded faces must have '
-        "contact = false.",
+        'picture of them, in [analysis] type = "stiffness" and "load". Bonded cells need no further solve. With '
+        "contact they are those at fixed status, for which every load takes as many solves more as there are unit "
+        "loads. Faces with friction have none.",
         default=False,
     )
     pictures: bool = key(boolean, "Draw the PNG files; without fields, the curves alone.", default=True)

@@ -15,6 +15,8 @@ from feti_homog.typing import Float
 
 UNCERTAINTY, CORRELATION = "uncertainty", "correlation"
 SECTIONS = ("material", "interface")
+DIFFERENTIABLE = ("stiffness", "load")
+"""Types of analyses that have derivatives."""
 ROUNDING = 1e-12
 EXPECTED = "expected {mean, std} or {mean, cv}, numbers, std and cv above 0"
 PLACES = "expected a constant of [material.PHASE], or a stiffness of [interface]"
@@ -76,8 +78,8 @@ def _deviation_faults(document: Mapping[str, Any], given: Sequence[tuple[TomlPat
         elif not _is_constant(document, path):
             yield f"[{UNCERTAINTY}] {name}: {PLACES} whose value is a number"
     analysis = document.get("analysis")
-    if given and isinstance(analysis, dict) and analysis.get("type") != "stiffness":
-        yield f'[{UNCERTAINTY}]: belongs to [analysis] type = "stiffness"'
+    if given and isinstance(analysis, dict) and analysis.get("type") not in DIFFERENTIABLE:
+        yield f"[{UNCERTAINTY}]: belongs to [analysis] type = {' or '.join(map(toml_value, DIFFERENTIABLE))}"
 
 
 def _pair_faults(pairs: Any, named: Mapping[str, Any]) -> Iterator[str]:

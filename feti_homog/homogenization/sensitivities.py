@@ -5,7 +5,7 @@ With e_i the strains of the unit load i, its other uniform loads behind, the sti
     |UC| C_ij = sum_phases A : int e_i (x) e_j + sum_rows [u]_i k [u]_j,
 
 and since its fields make it stationary, dC_ij is the same with dA and dk: exact for the discrete cell.  Bodies need
-the integrals alone, once per phase.
+the integrals alone, once per phase.  With faces in contact the cell is linear as long as none opens or closes.
 """
 
 from __future__ import annotations

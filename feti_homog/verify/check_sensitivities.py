@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.typing import Float
+from feti_homog.verify.check_fields import BONDED, CLOSED
 from feti_homog.verify.check_spatial import about_fibres, engineering_constants
 from feti_homog.verify.check_summary import moduli
 from feti_homog.verify.constitutive_law import expansions, mixed_phases, plane_stiffnesses, spatial_stiffnesses
@@ -33,8 +34,46 @@ def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
     findings.record("tables", relative(values - own, np.abs(own)), lambda k: f"sensitivities, {names[k]}")
     sizes = np.array([_size(name, value) for name, value in zip(names, own, strict=True)])
     direction = sizes * np.resize(WEIGHTS, len(own))
+    moved = [_moved(cell, names, own + sign * STEP * direction) for sign in (1, -1)]
     states = list(cell.files.states())
-    ends = [_energies(cell, states, _moved(cell, names, own + sign * STEP * direction)) for sign in (1, -1)]
+    if told.get("at_fixed_status") or "load" in cell.files.document:
+        _check_energies(findings, cell, states, moved, direction)
+    else:
+        _check_constants(findings, cell, states, moved, direction)
+
+
+def _check_energies(
+    findings: Findings, cell: DiscreteCell, states: Sequence[State], cases: Sequence[Case], direction: Float
+) -> None:
+    """Check the derivatives of the energies of states with contact, which are stationary, too.
+
+    Those are the diagonal of the secants, and what is stored under given strains.  The others would need fields of
+    other loads at the same status, which no file has.
+    """
+    told, load = cell.files.document["sensitivities"], cell.files.document["case"].get("load")
+    if load is None:
+        strains, _ = _in_order(states[: len(states) // 2])  # those under minus the unit loads follow
+        found = {f"C{k + 1}{k + 1}": (state, 1.0) for k, state in enumerate(strains)}
+    else:
+        found = {"stored": (states[0], 0.5)} if {"stored"} == {n for n in told["constants"] if n[0] not in "S"} else {}
+    for name, (state, share) in found.items():
+        if state.temperature:
+            continue
+        above, below = (float(_energies(cell, [state], case)[0, 0]) for case in cases)
+        k = told["constants"].index(name)
+        terms, value = np.array(told["derivatives"][k]) * direction, told["constant_values"][k]
+        expected, scale = share * (above - below) / (2 * STEP), max(float(np.abs(terms).max()), abs(value))
+        findings.record("sensitivities", relative(np.array(terms.sum() - expected), scale), name)
+        here = share * float(_energies(cell, [state], cell.files.case)[0, 0])
+        findings.record("moduli", abs(value - here) / max(abs(here), 1e-300), f"sensitivities, {name}")
+
+
+def _check_constants(
+    findings: Findings, cell: DiscreteCell, states: Sequence[State], cases: Sequence[Case], direction: Float
+) -> None:
+    """Check the derivatives of all constants of a linear cell."""
+    told = cell.files.document["sensitivities"]
+    ends = [_energies(cell, states, case) for case in cases]
     slope = (ends[0] - ends[1]) / (2 * STEP)
     document = cell.files.document
     C, heat = np.array(document["effective_stiffness"]), document.get("thermal_stress")
@@ -117,11 +156,12 @@ def _springs(cell: DiscreteCell, case: Mapping[str, Any], first: State, second: 
     for number, section in enumerate(sections if isinstance(sections, list) else [sections]):
         around = section.get("tangential_stiffness")
         stiffnesses = section.get("normal_stiffness"), around, section.get("axial_stiffness") or around
-        bonded = (rows.pair == number) & (first.status == 0)
         for k, stiffness in zip(range(first.jump.shape[1]), stiffnesses, strict=False):
             if stiffness is not None and np.isfinite(float(stiffness)):
+                # Closed faces press on what is left of their springs.
+                holds = (rows.pair == number) & ((first.status == BONDED) | ((first.status == CLOSED) & (k == 0)))
                 own = rows.length * first.jump[:, k] * second.jump[:, k]
-                found += float(stiffness) * float(own[bonded].sum())
+                found += float(stiffness) * float(own[holds].sum())
     return found
 
 

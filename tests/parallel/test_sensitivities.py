@@ -107,17 +107,50 @@ def test_stiffness_is_homogeneous_of_degree_one_in_those_of_all_phases(comm, nam
     np.testing.assert_allclose(total[moduli], found.constant_values[moduli], rtol=1e-10, atol=1e-10 * largest)
 
 
-def test_one_sided_contact_has_none(comm):
-    case = copy.deepcopy(CASES["debonded"])
-    del case["interface"]["contact"]
-    with pytest.raises(CaseError, match="sensitivities: contact of debonded faces is not linear"):
-        run(Case.parse(case), comm)
+WARM = {"matrix": EPOXY, "fibre": CARBON}
+TOUCHING = {"contact": True, "debonded": ARC}
+LOADS = {
+    "secants": document(PLAIN | {"order": 2}, "strain", {"matrix": MATRIX, "fibre": FIBRE}, TOUCHING),
+    "secants in space": document(PLAIN | {"order": 1}, "generalized", WARM, SPRINGS | TOUCHING),
+    "strains": document(PLAIN | {"order": 1}, "strain", {"matrix": MATRIX, "fibre": FIBRE}, SPRINGS | TOUCHING)
+    | {"analysis": {"type": "load", "plane": "strain"}, "load": {"to": {"E11": 0.01, "E22": -0.02, "gamma12": 0.005}}},
+    "stresses and a temperature": document(PLAIN | {"order": 1}, "generalized", WARM, TOUCHING)
+    | {"analysis": {"type": "load", "plane": "generalized"},
+       "load": {"to": {"S11": -0.1, "E22": 0.02, "S33": 0.2, "gamma23": 0.01, "temperature": -50.0}}},
+}  # fmt: skip
 
 
-def test_only_a_stiffness_has_them():
+@pytest.mark.parametrize("name", LOADS)
+def test_derivatives_with_contact_are_those_at_fixed_status(comm, name):
+    """Against central differences so small that no node opens or closes; faces of every load touch somewhere."""
+    case = LOADS[name]
+    whole = run(Case.parse(case), comm)
+    found = whole.sensitivities
+    assert found.at_fixed_status
+    if whole.load is not None:
+        values = dict(zip(found.constants, found.constant_values, strict=True))
+        assert whole.load.closed > 0 and values["stored"] == pytest.approx(whole.load.stored, rel=1e-9)
+    at = found.parameter_values
+    direction, h = np.resize([1.0, -0.7, 0.5, 0.9, -0.8], len(at)) * at, 1e-4
+    ends = [run(Case.parse(moved(case, found.parameters, at + s * h * direction)), comm) for s in (1, -1)]
+    expected = (ends[0].sensitivities.constant_values - ends[1].sensitivities.constant_values) / (2 * h)
+    kinds = {n[0] for n in found.constants}
+    largest = {k: max(abs(v) for n, v in zip(found.constants, found.constant_values, strict=True) if n[0] == k)
+               for k in kinds}  # fmt: skip
+    scale = np.array([largest[n[0]] for n in found.constants])
+    assert (np.abs(found.derivatives @ direction - expected) < 1e-6 * scale).all()
+
+
+def test_friction_has_none():
+    case = copy.deepcopy(LOADS["strains"])
+    case["interface"]["friction"] = 0.3
+    with pytest.raises(CaseError, match=r"\[output\] sensitivities: expected friction = 0"):
+        Case.parse(case)
+
+
+def test_only_a_stiffness_and_a_load_have_them():
     case = copy.deepcopy(CASES["voids"])
-    case["analysis"]["type"] = "load"
-    case["load"] = {"to": {"E11": 0.01, "E22": 0.0, "gamma12": 0.0}}
+    case["analysis"]["type"] = "envelope"
     with pytest.raises(CaseError, match=r"\[output\] sensitivities = true: belongs to .*stiffness"):
         Case.parse(case)
 

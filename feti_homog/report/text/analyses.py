@@ -48,7 +48,8 @@ def _path_lines(document: Document, label: str, toughness: str) -> list[list[str
 
 def _load_lines(document: Document, label: str, toughness: str) -> list[list[str]]:
     tips = point_tables.tip_table(document["load"].get("tips"), toughness)
-    return [point_tables.load_lines(document, label), *(table.lines for table in tips)]
+    changes = [*sensitivity_tables.sensitivities(document), *sensitivity_tables.uncertainty(document)]
+    return [point_tables.load_lines(document, label), *(table.lines for table in [*tips, *changes])]
 
 
 def _envelope_lines(document: Document, label: str, toughness: str) -> list[list[str]]:
@@ -95,7 +96,8 @@ def _path_tables(document: Document, label: str, most: int) -> list[Table]:
 
 
 def _load_tables(document: Document, label: str, most: int) -> list[Table]:
-    return [point_tables.load_table(document, label)]
+    changes = [*sensitivity_tables.sensitivities(document), *sensitivity_tables.uncertainty(document)]
+    return [point_tables.load_table(document, label), *changes]
 
 
 def _envelope_tables(document: Document, label: str, most: int) -> list[Table]:

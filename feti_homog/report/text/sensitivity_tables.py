@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from feti_homog.report.text.stiffness_tables import SHORT, UNKNOWN
@@ -16,6 +16,7 @@ SHOWN = {
 }  # fmt: skip
 # Of expansions in the axes of the cell, x3 along the fibres.
 SHORT_NAMES = SHORT | {"expansion.3": "exp. axial", "expansion.1": "exp. x1"}
+MOST = 9  # of other constants
 Document = Mapping[str, Any]
 
 
@@ -23,8 +24,8 @@ def sensitivities(document: Document) -> list[Table]:
     """Elasticities d ln c / d ln p of constants c by parameters p, and derivatives dc / dp; none if not asked for."""
     if (found := document.get("sensitivities")) is None:
         return []
-    constants, width = found["constants"], max(map(len, found["parameters"])) + 4
-    at = [constants.index(name) for name in SHOWN["E3" in constants] if name in constants]
+    constants, width = found["constants"], max(map(len, found["parameters"]), default=0) + 4
+    at = [constants.index(name) for name in _shown(constants)]
     slopes, shares = list[list[Any]](), list[list[Any]]()
     for j, (name, value) in enumerate(zip(found["parameters"], found["parameter_values"], strict=True)):
         row = [found["derivatives"][k][j] for k in at]
@@ -33,6 +34,7 @@ def sensitivities(document: Document) -> list[Table]:
             [name, *(_share(slope * value, found["constant_values"][k]) for slope, k in zip(row, at, strict=True))]
         )
     words = "Elasticities, the relative change of a constant by that of a parameter"
+    words += "; contact at fixed status" * bool(found.get("at_fixed_status"))
     names = [SHORT_NAMES.get(constants[k], constants[k]) for k in at]
     return [
         Table(title, [Column("", -width), *(Column(name, 12, form) for name in names)], rows)
@@ -57,7 +59,7 @@ def uncertainty(document: Document) -> list[Table]:
             errors.get(name, UNKNOWN),
             *(100 * share for share in found["shares"][k]),
         ]
-        for k, name in ((names.index(name), name) for name in SHOWN["E3" in names] if name in names)
+        for k, name in ((names.index(name), name) for name in _shown(names))
         if found["std"][k] > 0
     ]
     return [Table("Scatter by uncertain constants (std), and their shares of the variance (%)", columns, rows)]
@@ -69,6 +71,11 @@ def _mesh_errors(document: Document) -> dict[str, float]:
     expansions = known.get("thermal_expansion")
     along = {} if expansions is None else {f"expansion.{k + 1}": float(error) for k, error in enumerate(expansions)}
     return {**known.get("constants", {}), **along}
+
+
+def _shown(names: Sequence[str]) -> list[str]:
+    """Return the constants of tables; of a load, and of secants of a cell in space, the first ones."""
+    return [name for name in SHOWN["E3" in names] if name in names] if "E1" in names else list(names[:MOST])
 
 
 def _share(change: float, size: float) -> float | str:

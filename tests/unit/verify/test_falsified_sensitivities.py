@@ -12,6 +12,7 @@ from feti_homog import Case, run
 from feti_homog.verify.certificate import verify
 
 SIZING = {"young": 120.0, "poisson": 0.25, "expansion": 3e-5}
+TOUCHING = {"contact": True, "debonded": [{"fibre": "all", "centre": 20.0, "angle": 90.0}]}
 CASES = {
     "space": ("generalized", SQUARE | {"order": 2}, {"matrix": WARM, "fibre": CARBON}, SPRINGS),
     "pairs": (
@@ -21,6 +22,8 @@ CASES = {
         [SPRINGS | {"between": ["coating", "matrix"]}, SPRINGS | {"between": ["fibre", "coating"]}],
     ),
     "strain": ("strain", SQUARE | {"order": 2}, {"matrix": MATRIX, "fibre": TURNED}, None),
+    "contact": ("generalized", SQUARE, {"matrix": WARM, "fibre": CARBON}, SPRINGS | TOUCHING),
+    "load": ("strain", SQUARE, {"matrix": MATRIX, "fibre": FIBRE}, TOUCHING),
     "stress": ("stress", SQUARE, {"matrix": {"stiffness": [[10, 2, 0], [2, 8, 0], [0, 0, 3]]}, "fibre": FIBRE}, None),
 }
 
@@ -35,6 +38,8 @@ def test_sensitivities_are_verified(tmp_path, kind):
         "output": {"sensitivities": True, "pictures": False, "mesh_error": False},
         "petsc": {"feti_ksp_rtol": 1e-10},
     } | ({} if interface is None else {"interface": interface})
+    if kind == "load":
+        case["analysis"]["type"], case["load"] = "load", {"to": {"E11": -0.01, "E22": 0.02, "gamma12": 0.0}}
     run(Case.parse(case), MPI.COMM_SELF, out=tmp_path / "own")
     certificate = verify(tmp_path / "own")
     assert certificate.holds, certificate.text
@@ -43,7 +48,7 @@ def test_sensitivities_are_verified(tmp_path, kind):
     def edit(document, _):
         told = document["sensitivities"]
         rows = np.abs(np.array(told["derivatives"]) * told["parameter_values"])
-        k = told["constants"].index("E1")
+        k = next(k for k, name in enumerate(told["constants"]) if name in ("stored", "E1", "C22"))
         told["derivatives"][k][int(rows[k].argmax())] *= 1 + 1e-3
 
     assert broken(falsified(tmp_path / "own", tmp_path / "copy", edit)) == {"files", "sensitivities"}
