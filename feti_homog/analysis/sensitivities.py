@@ -142,32 +142,23 @@ def _at_status(
 
 
 def propagated(case: Case, document: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the entry `uncertainty` of `Result`: standard deviations of first order, and their shares.
-
-    With the derivatives J of the constants by the uncertain ones, of covariance V, the variances are those of J V J^T;
-    the share of a constant is J_k (V J^T)_k, so that shares of correlated constants may be negative.
+    """Return the entry `uncertainty` of `Result`, as `Uncertainty.propagated`.
 
     Raises:
-        CaseError: the stiffness does not depend on an uncertain constant.
+        CaseError: the answer does not depend on an uncertain constant.
     """
     found: Sensitivities = document["sensitivities"]
     std = case.uncertainty.std
     idle = [name for name in std if name not in found.parameters]
     if idle:
-        raise CaseError(*(f"[uncertainty] {name}: the stiffness does not depend on it" for name in idle))
+        raise CaseError(*(f"[uncertainty] {name}: the {case.analysis.type} does not depend on it" for name in idle))
     J = found.derivatives[:, [found.parameters.index(name) for name in std]]
-    sizes = np.array([*std.values()])
-    A = J * sizes  # changes of the constants by one standard deviation of each
-    scale = np.abs(A).max(axis=1, initial=np.finfo(float).tiny)  # so that no square over- or underflows
-    A = A / scale[:, None]
-    parts = A * (A @ case.uncertainty.matrix())
-    variance = np.maximum(parts.sum(axis=1), 0.0)
-    shares = np.divide(parts, variance[:, None], out=np.zeros_like(parts), where=variance[:, None] > 0)
+    deviation, shares = case.uncertainty.propagated(J)
     own = UncertainConstants(
         parameters=tuple(std),
-        parameter_std=sizes,
+        parameter_std=np.array([*std.values()]),
         constants=found.constants,
-        std=scale * np.sqrt(variance),
+        std=deviation,
         shares=shares,
     )
     return {"uncertainty": own}

@@ -173,7 +173,10 @@ def _uncertainty_table() -> TableReference:
     std = KeyRow(UNCERTAINTY, place, "SECTION.KEY", "a number above 0", "that of the key", "", "", words)
     accepts = "a list of [KEY, KEY, VALUE], values from -1 to 1"
     pairs = KeyRow(UNCERTAINTY, place, CORRELATION, accepts, "", "", "", "Correlation of pairs of these constants.")
-    meaning = "scatter of constants, which a stiffness passes on to all constants of the cell, of first order."
+    meaning = (
+        "scatter of constants, which a stiffness or a load passes on to all its results, of first order. "
+        "`feti-homog uncertainty` does so for any number of a case, also of sizes, strengths and loads."
+    )
     return TableReference(UNCERTAINTY, place, meaning, (std, pairs))
 
 

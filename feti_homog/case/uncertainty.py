@@ -19,7 +19,10 @@ DIFFERENTIABLE = ("stiffness", "load")
 """Types of analyses that have derivatives."""
 ROUNDING = 1e-12
 EXPECTED = "expected {mean, std} or {mean, cv}, numbers, std and cv above 0"
-PLACES = "expected a constant of [material.PHASE], or a stiffness of [interface]"
+PLACES = (
+    "expected a constant of [material.PHASE], or a stiffness of [interface]; of any number `feti-homog uncertainty` "
+    "finds the scatter"
+)
 
 
 @dataclass(frozen=True)
@@ -37,26 +40,44 @@ class Uncertainty:
             found[i, j] = found[j, i] = value
         return found
 
+    def propagated(self, J: Float) -> tuple[Float, Float]:
+        """(n,) standard deviations of first order of n results of derivatives J (n, p), and the shares (n, p) of each.
+
+        The variances are those of J V J^T; the share of a constant is J_k (V J^T)_k, which may be negative.
+        """
+        A = J * np.array([*self.std.values()])  # changes by one standard deviation of each
+        scale = np.abs(A).max(axis=1, initial=np.finfo(float).tiny)  # so that no square over- or underflows
+        A = A / scale[:, None]
+        parts = A * (A @ self.matrix())
+        variance = np.maximum(parts.sum(axis=1), 0.0)
+        shares = np.divide(parts, variance[:, None], out=np.zeros_like(parts), where=variance[:, None] > 0)
+        return scale * np.sqrt(variance), shares
+
     def to_table(self) -> dict[str, Any]:
         """Return the section [uncertainty] of a case whose constants are their means; empty of none."""
         pairs = {CORRELATION: [list(pair) for pair in self.correlation]} if self.correlation else {}
         return {**self.std, **pairs}
 
 
-def read_uncertainty(document: dict[str, Any], faults: list[str]) -> Uncertainty:
-    """Take the uncertainties out of a document, in which means are left."""
+def read_uncertainty(document: dict[str, Any], faults: list[str], anywhere: bool = False) -> Uncertainty:
+    """Take the uncertainties out of a document, in which means are left: of constants, or of numbers `anywhere`."""
     table = document.pop(UNCERTAINTY, {})
     if not isinstance(table, dict):
         faults.append(f"{UNCERTAINTY} = {toml_value(table)}: expected a section [{UNCERTAINTY}]")
         return Uncertainty({})
-    pairs = table.get(CORRELATION, [])
     given = [*_leaves({name: value for name, value in table.items() if name != CORRELATION})]
-    for section in SECTIONS:
-        if section in document:
-            document[section] = _means(document[section], (section,), given, faults)
-    std = dict(given)
-    named = {".".join(path): value for path, value in std.items()}
-    faults += [*_deviation_faults(document, given), *_pair_faults(pairs, named)]
+    for section in [name for name in document if anywhere or name in SECTIONS]:
+        document[section] = _means(document[section], (section,), given, faults)
+    return _checked(document, given, table.get(CORRELATION, []), faults, anywhere)
+
+
+def _checked(
+    document: Mapping[str, Any], given: Sequence[tuple[TomlPath, Any]], pairs: Any, faults: list[str], anywhere: bool
+) -> Uncertainty:
+    """Return the uncertainties of standard deviations and correlated pairs; empty, with faults, of faulty ones."""
+    named = {".".join(path): value for path, value in dict(given).items()}
+    faults += [*_deviation_faults(document, given, anywhere), *_pair_faults(pairs, named)]
+    faults += [] if anywhere or not given else _analysis_faults(document)
     if faults:
         return Uncertainty({})
     found = Uncertainty(named, tuple((first, second, float(value)) for first, second, value in pairs))
@@ -65,21 +86,35 @@ def read_uncertainty(document: dict[str, Any], faults: list[str]) -> Uncertainty
     return found
 
 
-def _deviation_faults(document: Mapping[str, Any], given: Sequence[tuple[TomlPath, Any]]) -> Iterator[str]:
+def _deviation_faults(
+    document: Mapping[str, Any], given: Sequence[tuple[TomlPath, Any]], anywhere: bool
+) -> Iterator[str]:
     """Yield what is wrong with standard deviations and their places."""
     paths = [path for path, _ in given]
     for path, value in dict(given).items():
-        name = dotted_key(path)
+        name = f"[{UNCERTAINTY}] {dotted_key(path)}"
         if paths.count(path) > 1:
-            yield f"[{UNCERTAINTY}] {name}: its standard deviation is given twice"
+            yield f"{name}: its standard deviation is given twice"
         if not is_number(value) or value <= 0:
             words = f"expected a standard deviation above 0{magnitudes_in_words(value)}"
-            yield f"[{UNCERTAINTY}] {name} = {toml_value(value)}: {words}"
-        elif not _is_constant(document, path):
-            yield f"[{UNCERTAINTY}] {name}: {PLACES} whose value is a number"
+            yield f"{name} = {toml_value(value)}: {words}"
+        elif number_at(document, path) is None:
+            yield f"{name}: expected a key of the case whose value is a number"
+        elif not anywhere and not _is_constant(path):
+            yield f"{name}: {PLACES}"
+
+
+def _is_constant(path: TomlPath) -> bool:
+    """Return whether there are derivatives by the key."""
+    return path[0] == "material" or (path[0] == "interface" and path[-1].endswith("_stiffness"))
+
+
+def _analysis_faults(document: Mapping[str, Any]) -> list[str]:
+    """List the fault of an analysis without derivatives."""
     analysis = document.get("analysis")
-    if given and isinstance(analysis, dict) and analysis.get("type") not in DIFFERENTIABLE:
-        yield f"[{UNCERTAINTY}]: belongs to [analysis] type = {' or '.join(map(toml_value, DIFFERENTIABLE))}"
+    if not isinstance(analysis, dict) or analysis.get("type") in DIFFERENTIABLE:
+        return []
+    return [f"[{UNCERTAINTY}]: belongs to [analysis] type = {' or '.join(map(toml_value, DIFFERENTIABLE))}"]
 
 
 def _pair_faults(pairs: Any, named: Mapping[str, Any]) -> Iterator[str]:
@@ -129,16 +164,15 @@ def _leaves(table: Mapping[str, Any], above: TomlPath = ()) -> Iterator[tuple[To
             yield path, value
 
 
-def _is_constant(document: Mapping[str, Any], path: TomlPath) -> bool:
-    """Return whether the place has a number by which there are derivatives."""
+def number_at(document: Mapping[str, Any], path: TomlPath) -> float | None:
+    """Return the number at a place, None if there is none; the one of several sections of a name has no number."""
     found: Any = document
     for name in path:
         found = found[0] if isinstance(found, list) and len(found) == 1 else found
         if isinstance(found, list):  # sections of one name, from 1
             found = {str(number): each for number, each in enumerate(found, start=1)}
         found = found.get(name) if isinstance(found, dict) else None
-    is_of_derivative = path[0] == "material" or (path[0] == "interface" and path[-1].endswith("_stiffness"))
-    return is_of_derivative and is_number(found)
+    return float(found) if is_number(found) else None
 
 
 def _is_pair(pair: Any, named: Mapping[str, Any]) -> bool:

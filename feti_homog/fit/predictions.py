@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from feti_homog.case.bond_laws import DEFAULT, LAWS
 from feti_homog.case.case import Case
 from feti_homog.errors import CaseError
 from feti_homog.materials.derivatives import composite_constants
 from feti_homog.materials.laws import expansion
 from feti_homog.materials.plane_state import PLANE_STATES
 from feti_homog.materials.voigt import voigt_names
+from feti_homog.report.text.point_tables import STATES
 from feti_homog.results import path_curves
 from feti_homog.results.path_curves import Document
 from feti_homog.sweep.report.outputs import outputs
 from feti_homog.typing import Float
 
-TOUGHNESS = "interface.toughness"
+TOUGHNESS = "toughness"
 OF_PATHS = ("onset", "peak", "end")
 
 
@@ -61,6 +64,15 @@ def available(case: Case) -> list[str]:
     return []
 
 
+def responses(document: Document) -> dict[str, float]:
+    """Return the numbers of a result whose scatter is of interest: constants, or those of its loads and onsets."""
+    found, kind = _values(document), document["case"]["analysis"]["type"]
+    if kind == "stiffness" or "sensitivities" in document:
+        return found
+    starts = ("onset_", "peak_") if kind == "path" else (f"{kind}_",)
+    return {name: found[name] for name in found if name.startswith(starts) and not name.endswith(STATES)}
+
+
 def predicted(document: Document, data: Sequence[Datum]) -> Float:
     """(m,) values of a result in place of the data.
 
@@ -80,8 +92,25 @@ def exact_derivatives(document: Document, data: Sequence[Datum], name: str) -> F
     name = name.replace("interface.1.", "interface.") if len(sections) == 1 else name
     if "sensitivities" in document:
         return _of_stiffness(document["sensitivities"], data, name)
-    is_scaling = name == TOUGHNESS and len(sections) == 1 and path_curves.scales_with_toughness(document)
-    return _by_toughness(document, data, float(sections[0]["toughness"])) if is_scaling else None
+    key = name.removeprefix("interface.")
+    exponent = _exponent(document, key) if name != key else None
+    return None if exponent is None else _by_scaling(document, data, exponent / float(sections[0][key]))
+
+
+def _exponent(document: Document, key: str) -> float | None:
+    """Return the degree in which loads at which bonds break are homogeneous in a key of the one interface.
+
+    It is 1/2 in the toughness of springs that it does not change, and 1 in the only strength; None of others.
+    """
+    sections, kind = path_curves.interface_sections(document), document["case"]["analysis"]["type"]
+    is_scaled = kind == "envelope" or (kind == "path" and path_curves.is_proportional(document))
+    if len(sections) != 1 or not is_scaled:
+        return None
+    law = LAWS[sections[0].get("criterion", DEFAULT)]
+    if key == TOUGHNESS and key in law.keys and not law.softens:
+        return 0.5
+    strengths = [each for each in law.limits if math.isfinite(float(sections[0].get(each) or "inf"))]
+    return 1.0 if strengths == [key] else None
 
 
 def _values(document: Document) -> dict[str, float]:
@@ -106,21 +135,23 @@ def _of_stiffness(own: Mapping[str, Any], data: Sequence[Datum], name: str) -> F
     return np.zeros(len(data)) if is_idle else None
 
 
-def _by_toughness(document: Document, data: Sequence[Datum], toughness: float) -> Float | None:
-    """Return the derivatives along S(E; s^2 G) = s S(E / s; G), of what does not depend on the end of the load."""
-    found, last = _values(document), document["path"][-1]["stress"]
-    of_stress = dict(zip(voigt_names(len(last))[1], last, strict=True))
+def _by_scaling(document: Document, data: Sequence[Datum], share: float) -> Float | None:
+    """Return the derivatives along S(E; s R) = s S(E / s; R), of what does not depend on the end of the load."""
+    found, points = _values(document), document.get("path")
+    of_stress = (
+        dict(zip(voigt_names(len(points[-1]["stress"]))[1], points[-1]["stress"], strict=True)) if points else {}
+    )
     derivatives = []
     for each in data:
         if each.strain is not None:
             value, slope = _on_curve(document, each)
-            derivatives.append((value - abs(each.strain) * slope) / (2 * toughness))
+            derivatives.append((value - abs(each.strain) * slope) * share)
             continue
         place, _, component = each.name.partition("_")
         is_peak = place == "peak" and (component not in of_stress or found[each.name] != of_stress[component])
-        if not (place == "onset" or is_peak):
+        if not (place in ("onset", "envelope") or is_peak):
             return None
-        derivatives.append(found[each.name] / (2 * toughness))
+        derivatives.append(found[each.name] * share)
     return np.array(derivatives)
 
 

@@ -25,7 +25,7 @@ def sensitivities(document: Document) -> list[Table]:
     if (found := document.get("sensitivities")) is None:
         return []
     constants, width = found["constants"], max(map(len, found["parameters"]), default=0) + 4
-    at = [constants.index(name) for name in _shown(constants)]
+    at = [constants.index(name) for name in shown(constants)]
     slopes, shares = list[list[Any]](), list[list[Any]]()
     for j, (name, value) in enumerate(zip(found["parameters"], found["parameter_values"], strict=True)):
         row = [found["derivatives"][k][j] for k in at]
@@ -59,7 +59,7 @@ def uncertainty(document: Document) -> list[Table]:
             errors.get(name, UNKNOWN),
             *(100 * share for share in found["shares"][k]),
         ]
-        for k, name in ((names.index(name), name) for name in _shown(names))
+        for k, name in ((names.index(name), name) for name in shown(names))
         if found["std"][k] > 0
     ]
     return [Table("Scatter by uncertain constants (std), and their shares of the variance (%)", columns, rows)]
@@ -73,7 +73,7 @@ def _mesh_errors(document: Document) -> dict[str, float]:
     return {**known.get("constants", {}), **along}
 
 
-def _shown(names: Sequence[str]) -> list[str]:
+def shown(names: Sequence[str]) -> list[str]:
     """Return the constants of tables; of a load, and of secants of a cell in space, the first ones."""
     return [name for name in SHOWN["E3" in names] if name in names] if "E1" in names else list(names[:MOST])
 

@@ -54,7 +54,7 @@ def test_the_one_of_several_sections_has_no_number():
         ([], "[uncertainty]\ncell.fibre_fraction = 0.01\n",
          "[uncertainty] cell.fibre_fraction: expected a constant of"),
         ([], "[uncertainty]\nmaterial.fibre.yuong = 1.0\n",
-         "[uncertainty] material.fibre.yuong: expected a constant of"),
+         "[uncertainty] material.fibre.yuong: expected a key of the case"),
         ([], "[uncertainty]\nmaterial.fibre.young = 0.0\n",
          "[uncertainty] material.fibre.young = 0.0: expected a standard"),
         ([], PAIR, "[uncertainty] correlation = "),

@@ -1,0 +1,90 @@
+"""Scatter by uncertain numbers: closed forms beside differences of runs, and the scatter between random cells."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from feti_homog import CaseError
+from feti_homog.fit import scatter
+from feti_homog.parallel.mpi_errors import on_root
+
+pytestmark = pytest.mark.parallel
+MATERIAL = {
+    "matrix": {"young": {"mean": 3.0, "cv": 0.01}, "poisson": 0.35},
+    "fibre": {"young": {"mean": 70.0, "cv": 0.01}, "poisson": 0.2},
+}
+
+
+def test_onsets_do_not_depend_on_the_unit_of_stress(comm, shared_path):
+    """The sum of p df / dp over all stiffnesses, by differences, and the strength, closed, is zero for a strain."""
+    case = {
+        "cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.4, "order": 1},
+        "material": MATERIAL,
+        "analysis": {"type": "envelope", "plane": "strain"},
+        "envelope": {"plane": ["E11", "E22"], "directions": 4},
+        "interface": {
+            "normal_stiffness": {"mean": 100.0, "cv": 0.01}, "tangential_stiffness": {"mean": 50.0, "cv": 0.01},
+            "normal_strength": {"mean": 0.05, "cv": 0.1}, "contact": False,
+        },
+    }  # fmt: skip
+    study = scatter.parse(case, Path())
+    found = scatter.run(study, shared_path / "out", comm, comm.size, False, True)
+    assert [each["by"] for each in found["parameters"]] == ["differences"] * 4 + ["derivatives"]
+    means = np.array([each["mean"] for each in found["parameters"]])
+    for each in found["results"]:
+        terms = means * each["derivatives"]
+        assert terms[-1] == pytest.approx(each["value"]) and abs(terms.sum()) < 1e-3 * each["value"]
+        assert each["std_inputs"] == pytest.approx(np.linalg.norm(terms * ([0.01] * 4 + [0.1])))
+    stamps = {path: path.stat().st_mtime_ns for path in shared_path.glob("out/*/case-*/result.json")}
+    assert len(stamps) == 9 and scatter.run(study, shared_path / "out", comm, comm.size, False, True) == found
+    assert stamps == {path: path.stat().st_mtime_ns for path in stamps}
+
+
+def test_random_cells_have_the_scatter_of_inputs_and_that_between_them(comm, shared_path):
+    """Without differences: the derivatives are means over the realisations."""
+    case = {
+        "cell": {"geometry": "random", "fibres": 2, "fibre_fraction": 0.3, "mesh_size": 0.3, "seed": 1},
+        "material": MATERIAL,
+        "analysis": {"type": "stiffness", "plane": "strain"},
+        "sweep": {"realisations": 2},
+        "uncertainty": {"correlation": [["material.matrix.young", "material.fibre.young", 0.5]]},
+    }
+    found = scatter.run(scatter.parse(case, Path()), shared_path / "out", comm, comm.size, False, True)
+    assert not (shared_path / "out" / "differences").exists() and found["cells"] == 2
+    texts = on_root(comm, lambda: [p.read_text() for p in sorted(shared_path.glob("out/means/case-*/result.json"))])
+    cells = [json.loads(each)["sensitivities"] for each in texts]
+    J = np.mean([each["derivatives"] for each in cells], axis=0)
+    young = [cells[0]["parameters"].index(f"material.{phase}.young") for phase in ("matrix", "fibre")]
+    changes = J[:, young] * [0.03, 0.7]
+    values = np.array([each["constant_values"] for each in cells])
+    for k, each in enumerate(found["results"]):
+        inputs = np.sqrt((changes[k] ** 2).sum() + changes[k].prod())
+        between = abs(values[0, k] - values[1, k]) / np.sqrt(2)
+        assert each["std_inputs"] == pytest.approx(inputs) and each["std_cells"] == pytest.approx(between)
+        assert each["std"] == pytest.approx(np.hypot(inputs, between)) and sum(each["shares"]) == pytest.approx(1.0)
+    assert "+- cells" in scatter.text(found)
+
+
+@pytest.mark.parametrize(
+    ("changes", "line"),
+    [
+        ({}, "expected KEY = {mean, std} in place of some number"),
+        ({"uncertainty": {"cell": {"geometry": 0.1}}}, "[uncertainty] cell.geometry: expected a key of the case"),
+        ({"uncertainty": {"cell": {"fibre_fraction": 0.01}}, "sweep": {"cell": {"fibre_fraction": [0.1, 0.2]}}},
+         "[sweep]: expected realisations alone"),
+    ],
+)  # fmt: skip
+def test_faults_have_their_line(changes, line):
+    phases = {"matrix": {"young": 3.0, "poisson": 0.3}, "fibre": {"young": 70.0, "poisson": 0.2}}
+    case = {
+        "cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.4},
+        "material": phases,
+        "analysis": {"type": "stiffness", "plane": "strain"},
+    }
+    with pytest.raises(CaseError) as error:
+        scatter.parse(case | changes, Path())
+    assert error.value.faults[0].startswith(line), error.value.faults
