@@ -3,8 +3,8 @@
 About linear in the degrees of freedom, for bodies are cut into pieces of one size.  The constants are those that
 `.venv/bin/python scripts/measure_cost.py` prints, on a 2-core machine; those of setup, subdomains and applications were
 fitted later to the processor time of 9 stiffnesses of 700 to 130 000 degrees of freedom beside other programs.  Times
-of stiffnesses are within a factor of 1.5; those of paths depend on how many bonds break, so that a job's time limit
-should leave room.
+of stiffnesses are within a factor of 1.5; those of paths lie between few events and as many as bonds have teeth, so
+that a job's time limit should leave room.
 """
 
 from __future__ import annotations
@@ -38,8 +38,13 @@ BASE_BYTES, DOF_BYTES, COLUMN_BYTES = 1.8e8, 1.5e3, 2.0e4
 # besides; of the mesh for each node and element, and of the interface's nodes.
 STATE_BYTES, AXIAL_BYTES = np.array([16, 36, 138]), np.array([8, 16, 16])
 MESH_BYTES, CORNER_BYTES = np.array([16, 16, 80]), 8
-# Seconds to make and write the fields of a state, for each element.
+# Seconds to make and write the fields of a state, for each element; of a point of a path, whose displacements follow
+# from its checkpoint, and for which errors of the mesh are estimated: in any case, and for each element.
 STATE_SECONDS = 6e-7
+POINT_SECONDS, POINT_ELEMENT_SECONDS = 3.4e-2, 2.5e-6
+# Seconds of an event of a path: in any case, for each degree of freedom on every rank, and for each of a rank
+# (`scripts/scaling events`). Later events of a large cell take up to three times as long.
+EVENT_SECONDS, EVENT_DOF_SECONDS, EVENT_RANK_DOF_SECONDS = 2.4e-3, 1.3e-7, 3.3e-7
 # Degrees of freedom of a rank; with fewer, its waiting for others takes more than it saves.
 DOFS_OF_A_RANK = 50_000
 # Typical numbers, by which a case is estimated and its operators are chosen.
@@ -127,19 +132,28 @@ def fields_line(case: Case, nodes: int, elements: int, interface_nodes: int, ran
     assert isinstance(count, int)
     noun = "state" if count == 1 else "states"
     words = f"{'at most ' if case.section.is_followed else ''}{count} {noun} of {_size(state)}"
-    seconds = _rounded(count * elements * STATE_SECONDS / ranks)
-    return f"fields     {words}, {_size(mesh + count * state)} in result.h5, {seconds}"
+    of_each = elements / ranks * STATE_SECONDS
+    if case.section.is_followed:
+        of_each = POINT_SECONDS + elements / ranks * POINT_ELEMENT_SECONDS
+    return f"fields     {words}, {_size(mesh + count * state)} in result.h5, {_rounded(count * of_each)}"
 
 
-def events_lines(case: Case, multipliers: int, teeth: int) -> list[str]:
-    """Return how many events a path may have, in a line as `estimate_lines`; none of another analysis.
+def events_lines(case: Case, multipliers: int, teeth: int, nodes: Sequence[int], seconds: float) -> list[str]:
+    """Return how many events a path may have and how long all of them take, in a line as `estimate_lines`.
 
-    At most as many as bonds, times the teeth of each; nodes on cuts of bodies are counted with them.
+    None of another analysis. There are at most as many events as bonds, times the teeth of each; nodes on cuts of
+    bodies are counted with them. `nodes` are those of each rank, `seconds` the estimate for few events.
     """
     if not case.section.is_followed:
         return []
     words = f"up to about {multipliers // 2} bonds break" + (f" in {teeth} teeth each" if teeth > 1 else "")
-    return [f"events     {words}; the estimate is that of {SOLVES_OF_A_PATH} solves, and grows with what breaks"]
+    dofs = 2.0 * sum(nodes)
+    event = EVENT_SECONDS + dofs * (EVENT_DOF_SECONDS + EVENT_RANK_DOF_SECONDS / len(nodes))
+    longest = _rounded(seconds + multipliers // 2 * teeth * event)
+    return [
+        f"events     {words}, {1e3 * event:.2g} ms or more for each: "
+        f"from {_rounded(seconds)} for few to {longest} or more for all"
+    ]
 
 
 def estimate_lines(found: Estimate, n_ranks: int) -> list[str]:
@@ -164,5 +178,5 @@ def _size(size: float) -> str:
 def _rounded(seconds: float) -> str:
     """Return a time in words, to two digits."""
     if seconds < 120:
-        return f"{seconds:.2g} s"
+        return f"{seconds:.2g} s" if seconds < 100 else f"{seconds:.0f} s"
     return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"

@@ -86,7 +86,7 @@ def _described(
             for rank, (count, n) in enumerate(zip(own, nodes, strict=True))
         ),
         *cost_model.estimate_lines(taken, len(loads)),
-        *cost_model.events_lines(case, multipliers, teeth_of(case)),
+        *cost_model.events_lines(case, multipliers, teeth_of(case), nodes, taken.seconds),
         *(
             [cost_model.fields_line(case, sum(nodes), elements, multipliers // 2, len(loads))]
             if case.output.fields

@@ -102,6 +102,17 @@ def test_paths_name_their_bonds_and_teeth():
     document = {"cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.1}, "material": material,
                 "analysis": {"type": "path", "plane": "strain"}, "path": {"strain": [0.01, 0, 0]}}  # fmt: skip
     toothed, brittle = (Case.parse(document | {"interface": own}) for own in (law, {"normal_strength": 1.0}))
-    assert "up to about 24 bonds break in 7 teeth each;" in cost_model.events_lines(toothed, 48, teeth_of(toothed))[0]
-    assert "up to about 24 bonds break;" in cost_model.events_lines(brittle, 48, teeth_of(brittle))[0]
-    assert cost_model.events_lines(make_case(), 48, 1) == []
+    lines = [cost_model.events_lines(own, 48, teeth_of(own), (1000, 1000), 2.0) for own in (toothed, brittle)]
+    assert (
+        "up to about 24 bonds break in 7 teeth each, 3.6 ms or more for each: from 2 s for few to 2.6 s" in lines[0][0]
+    )
+    assert "up to about 24 bonds break, 3.6 ms or more for each: from 2 s for few to 2.1 s or more" in lines[1][0]
+    assert "to 110 s or more" in cost_model.events_lines(toothed, 48, 640, (1000, 1000), 55.0)[0]
+    assert cost_model.events_lines(make_case(), 48, 1, (1000,), 2.0) == []
+
+
+def test_points_of_a_path_take_longer_than_unit_strains():
+    case = make_case(plane="generalized")
+    path = replace(case, analysis=replace(case.analysis, type="path"), path=LoadPath(to={"E11": 1.0}))
+    assert cost_model.fields_line(path, 50_000, 60_000, 3000, 1).endswith(" 3.7 s")
+    assert cost_model.fields_line(path, 50_000, 60_000, 3000, 2).endswith(" 2.2 s")
