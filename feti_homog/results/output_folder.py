@@ -32,7 +32,7 @@ LONGEST = "case_minus_temperature.png"  # of a run's files the one of the longes
 RESULT_FILE = re.compile(
     r"report\.html|events\.log|result\.(json|h5|xdmf)|interface\.xdmf"
     r"|(angle|path|load|envelope)\.csv|path\.gif"
-    r"|(cell|partition|mesh_error|sensitivities|interface|load|envelope|(angle|path)(_states)?)\.png"
+    r"|(cell|partition|mesh_error|sensitivities|energy|interface|load|envelope|(angle|path)(_states)?)\.png"
     r"|(cell|interface)(_\d{4,}\.vtu|\.pvd|\.vtkhdf)"
     rf"|case_(minus_)?({'|'.join(SPATIAL_STRAINS)}|temperature)\.png|state_\d+\.png"
 )

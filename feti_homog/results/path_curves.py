@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from feti_homog.typing import Float
 SAME_LOAD = 1e-9  # load factors that differ by less, relatively, are one
 # Of the largest component: what the solver leaves of zero is less, and what would not be seen beside it.
 ZERO, FAINT = 1e-7, 1e-4
+PLACES_BEFORE = 16  # at which energies are known before the first point
 
 Point = Mapping[str, Any]
 Document = Mapping[str, Any]
@@ -128,6 +129,51 @@ def scales_with_toughness(document: Document) -> bool:
     laws = [LAWS.get(section.get("criterion", DEFAULT)) for section in interface_sections(document)]
     by_energy = [law is not None and "toughness" in law.keys and not law.softens for law in laws]
     return bool(document.get("path")) and bool(laws) and all(by_energy)
+
+
+class Energies(NamedTuple):
+    """Parts of the work of the loads per area along a path, at r places from the unloaded cell on.
+
+    Attributes:
+        place: (r,) share of the load on each leg and the number of those before, or `by_legs` is false where the load
+            falls, and they are numbers of points, of which the first is 1.
+        words: what these are.
+        parts: by name those that are not zero, (r,) each, in the order in which they are stacked.
+        work: (r,) their sum, but for rounding.
+    """
+
+    place: Float
+    by_legs: bool
+    words: str
+    parts: dict[str, Float]
+    work: Float
+
+
+def energies(document: Document) -> Energies | None:
+    """Return the energies of a path; None of other results, and of those of older versions, which have them not."""
+    points = document.get("path") or [{}]
+    if "work" not in points[0]:
+        return None
+
+    # Up to the first point all is linear.
+    before = np.linspace(0.0, 1.0, PLACES_BEFORE, endpoint=False)
+
+    def column(name: str, power: int = 2) -> Float:
+        values = [float(point.get(name) or 0.0) for point in points]
+        return np.append(values[0] * before**power, values)
+
+    stored, springs, lost = (column(name) for name in ("stored", "stored_in_springs", "dissipated"))
+    fracture = np.minimum(column("fracture_energy"), lost)
+    rest = "lost in breaks beyond it" if fracture.any() else "lost in breaks"
+    parts = {"stored in the bodies": stored - springs, "stored in springs": springs, "fracture energy": fracture}
+    parts |= {rest: lost - fracture, "heat of friction": column("friction_heat")}
+    shown = {name: values for name, values in parts.items() if np.abs(values).max() > ZERO * np.abs(stored).max()}
+    place, by_legs = column("load_factor", 1) * legs(document), True
+    words = "leg of the path" if legs(document) > 1 else "share of the load"
+    if (np.diff(place) < 0.0).any():
+        place, by_legs = np.append(before, np.arange(1.0, len(points) + 1.0)), False
+        words = "number of the point, in the order of the path"
+    return Energies(place, by_legs, words, shown, column("work"))
 
 
 def load_controlled(points: Sequence[Point]) -> Float:

@@ -10,6 +10,7 @@ from bokeh.models import ColumnDataSource, HoverTool
 from bokeh.plotting import figure
 
 from feti_homog.materials.voigt import STRESSES, voigt_names
+from feti_homog.report.plots.energy_picture import AREAS
 from feti_homog.report.plots.interface_marks import BONDED, CLOSED, OPEN, STATE_COLOURS, STATE_NAMES
 from feti_homog.report.plots.response_curves import INK
 from feti_homog.report.text.analyses import reported
@@ -67,7 +68,21 @@ def _path(document: Document, unit: str) -> dict[str, Any]:
         third.x_range = second.x_range
         _draw(third, number, {"damaged": np.array([sum(point["damaged_length"]) for point in points])}, number)
         found["damaged"] = _finished(third)
-    return found
+    return found | _energies(document, unit)
+
+
+def _energies(document: Document, unit: str) -> dict[str, Any]:
+    """Return the energies along a path, stacked, with the work of the loads."""
+    stack = path_curves.energies(document)
+    if stack is None:
+        return {}
+    drawn, names = _figure("Energies along the path", stack.words, f"energy per area ({unit})"), list(stack.parts)
+    source = ColumnDataSource({"x": stack.place, "work": stack.work, **stack.parts})
+    drawn.varea_stack(names, x="x", source=source, color=[AREAS[name] for name in names], legend_label=names)
+    line = drawn.line("x", "work", source=source, color="#262626", line_width=1.5, legend_label="work of the loads")
+    tooltips = [(name, f"@{{{name}}}{{0.000000}}") for name in ("work", *names)]
+    drawn.add_tools(HoverTool(renderers=[line], tooltips=tooltips, mode="vline"))
+    return {"energy": _finished(drawn)}
 
 
 def _angle(document: Document, unit: str) -> dict[str, Any]:

@@ -20,6 +20,7 @@ from feti_homog.materials.voigt import voigt_names
 from feti_homog.report.plots import (
     cell_picture,
     deformed_panels,
+    energy_picture,
     mesh_error_picture,
     response_curves,
     sensitivities_picture,
@@ -72,7 +73,7 @@ def plot(directory: Path) -> list[Path]:
     - of each load case case_E11.png, case_minus_E11.png, ... (unit strains), case_temperature.png or state_K.png;
       that of the temperature expands freely if its expansion is known, else it is held;
     - sensitivities.png, if the case asks for them;
-    - of `angle` angle.png and angle_states.png, of `path` path.png, path_states.png and path.gif;
+    - of `angle` angle.png and angle_states.png, of `path` path.png, path_states.png, path.gif and energy.png;
     - of `load` load.png, of `envelope` envelope.png;
     - interface.png, if some interface is debonded.
 
@@ -88,8 +89,9 @@ def plot(directory: Path) -> list[Path]:
     with mpl.rc_context(STYLE):
         try:
             paths = _pictures(directory, document) if _output(document).get("fields", True) else []
-            if (changes := sensitivities_picture.figure(document)) is not None:
-                paths.append(save(changes, directory / "sensitivities.png"))
+            for name, picture in (("sensitivities", sensitivities_picture), ("energy", energy_picture)):
+                if (made := picture.figure(document)) is not None:
+                    paths.append(save(made, directory / f"{name}.png"))
             return paths + response_curves.plot(directory, document)
         except OSError as error:
             raise FetiHomogError(f"cannot draw {directory / field_file.NAME}: {error.strerror or error}") from error

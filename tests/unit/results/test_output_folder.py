@@ -48,6 +48,7 @@ def test_files_of_an_earlier_result_are_removed_and_nothing_else(tmp_path):
         "mesh_error.png",
         "partition.png",
         "sensitivities.png",
+        "energy.png",
         "state_3.png",
         "interface.png",
         "case_minus_gamma12.png",

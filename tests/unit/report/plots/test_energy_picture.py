@@ -1,0 +1,70 @@
+"""The stack of energies along a path, in energy.png and on the page."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from feti_homog.report.html import curves
+from feti_homog.report.plots import energy_picture
+
+ENERGIES = {
+    "work": [4.0, 9.0, 8.0],
+    "stored": [4.0, 6.0, 3.5],
+    "stored_in_springs": [1.0, 2.0, 1.5],
+    "dissipated": [0.0, 2.0, 2.0],
+    "friction_heat": [0.0, 1.0, 2.5],
+}
+PARTS = {"stored in the bodies": [3.0, 4.0, 2.0], "stored in springs": [1.0, 2.0, 1.5]}
+HEAT = {"heat of friction": [0.0, 1.0, 2.5]}
+LOST = {"lost in breaks": [0.0, 2.0, 2.0]}
+SPLIT = {"fracture energy": [0.0, 1.5, 2.0], "lost in breaks beyond it": [0.0, 0.5, 0.0]}
+
+
+def path(loads: list[float], **energies: list[float]) -> dict[str, Any]:
+    """Return the document of a path of two legs with three points."""
+    whole = {"strain": [[0.01, 0, 0]] * 3, "stress": [[1, 0, 0]] * 3, "broke": [0] * 3}
+    whole |= {"bonded": [0] * 3, "open": [0] * 3, "closed": [0] * 3, "load_factor": loads} | energies
+    points = [{name: values[k] for name, values in whole.items()} for k in range(3)]
+    section = {"waypoints": [[0.01, 0, 0], [0, 0, 0]], "method": "events"}
+    case = {"analysis": {"type": "path", "plane": "strain"}, "path": section, "output": {"stress_unit": "MPa"}}
+    return {"case": case, "path": points}
+
+
+@pytest.mark.parametrize(
+    ("fracture", "parts"),
+    [({}, PARTS | LOST | HEAT), ({"fracture_energy": [0.0, 1.5, 2.5]}, PARTS | SPLIT | HEAT)],
+    ids=["strength", "toughness"],
+)
+def test_parts_are_stacked_to_the_work(fracture: dict[str, list[float]], parts: dict[str, list[float]]) -> None:
+    document = path([0.25, 0.5, 1.0], **ENERGIES, **fracture)
+    figure = energy_picture.figure(document)
+    assert figure is not None
+    (axes,) = figure.axes
+    top = np.zeros(3)
+    for area, (name, values) in zip(axes.collections, parts.items(), strict=True):
+        corners, top = area.get_paths()[0].vertices, top + values
+        assert area.get_label() == name
+        assert all(
+            any(np.allclose(corner, own) for corner in corners) for own in zip([0.5, 1.0, 2.0], top, strict=True)
+        )
+    work = axes.lines[0]
+    np.testing.assert_allclose(top, ENERGIES["work"])
+    np.testing.assert_allclose(np.interp([0.25, 0.5, 1.0, 2.0], *work.get_data()), [1.0, *top])
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("leg of the path", "energy per area (MPa)")
+    page = curves.figures(document)["energy"].renderers
+    data = page[0].data_source.data
+    assert {name: list(data[name][-3:]) for name in parts} == parts and list(data["work"][-3:]) == ENERGIES["work"]
+
+
+def test_a_load_that_falls_leaves_numbers_of_points() -> None:
+    figure = energy_picture.figure(path([0.5, 0.25, 1.0], **ENERGIES))
+    assert figure is not None
+    place = figure.axes[0].lines[0].get_xdata()
+    assert list(place[-3:]) == [1.0, 2.0, 3.0] and "number" in figure.axes[0].get_xlabel()
+
+
+def test_results_without_energies_have_no_stack() -> None:
+    assert energy_picture.figure(path([0.5, 0.6, 1.0])) is None and "energy" not in curves.figures(path([0.5, 0.6, 1]))
