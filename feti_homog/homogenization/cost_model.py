@@ -43,7 +43,7 @@ MESH_BYTES, CORNER_BYTES = np.array([16, 16, 80]), 8
 STATE_SECONDS = 6e-7
 POINT_SECONDS, POINT_ELEMENT_SECONDS = 3.4e-2, 2.5e-6
 # Seconds of an event of a path: in any case, for each degree of freedom on every rank, and for each of a rank
-# (`scripts/scaling events`). Later events of a large cell take up to three times as long.
+# (`scripts/scaling events`). Later events of a large cell take up to four times as long.
 EVENT_SECONDS, EVENT_DOF_SECONDS, EVENT_RANK_DOF_SECONDS = 2.4e-3, 1.3e-7, 3.3e-7
 # Degrees of freedom of a rank; with fewer, its waiting for others takes more than it saves.
 DOFS_OF_A_RANK = 50_000

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from feti_homog.report.text.stiffness_tables import beside, value_and_error
+from feti_homog.report.text.stiffness_tables import beside, value_and_error, value_beside_error
 from feti_homog.report.text.table import Column, Table
 
 TITLE = "Material axes: 1 along the fibres (x3 of the cell), 2 and 3 across (x1, x2)"
@@ -65,7 +65,7 @@ def standard_deviations(document: Document) -> dict[str, float]:
 def table(document: Document, label: str) -> list[Table]:
     """Return the constants as a table; `label` is the unit of stresses in brackets, or empty."""
     found, off = constants(document), errors(document)
-    rows = [[name, value, *([off[name]] if name in off else [])] for name, value in found.items()]
+    rows = [[name, *value_beside_error(value, off.get(name))] for name, value in found.items()]
     columns = [Column("", -28), Column("computed"), *([Column("mesh error", 12, ".1e")] if off else [])]
     return [Table(f"{TITLE}{label}", columns, rows)] if found else []
 

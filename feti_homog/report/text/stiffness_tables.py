@@ -83,6 +83,11 @@ def value_and_error(value: float, error: float | None, form: str) -> tuple[str, 
     return f"{value:.{decimals}f}", f"{error:.{decimals}f}"
 
 
+def value_beside_error(value: float, error: float | None) -> list[str]:
+    """Return both for two columns, one without an error."""
+    return [text for text in value_and_error(value, error, ".7g") if text]
+
+
 def beside(error: str) -> str:
     """Return an error as it stands behind its value."""
     return f" +- {error:<9}" if error else ""
@@ -118,12 +123,8 @@ def _rounded(numbers: Sequence[float]) -> list[float]:
 def moduli(document: Document, unit: str) -> list[Table]:
     """Engineering moduli of the plane state, each with its unit."""
     values, errors = document.get("moduli") or {}, _errors(document).get("constants", {})
-    rows = [[with_unit(name, unit), value, *_listed(errors, name)] for name, value in values.items()]
+    rows = [[with_unit(name, unit), *value_beside_error(value, errors.get(name))] for name, value in values.items()]
     return [Table("Engineering moduli", [NAMES, Column("computed"), *_column(errors)], rows)] if rows else []
-
-
-def _listed(errors: Document, name: str) -> list[float]:
-    return [errors[name]] if name in errors else []
 
 
 def _column(errors: Document) -> list[Column]:
@@ -166,7 +167,7 @@ def constants(document: Document, label: str) -> list[Table]:
     found, errors = list[Table](), _errors(document).get("constants", {})
     if (values := document.get("constants")) is not None:
         columns = [NAMES, Column("computed"), *_column(errors)]
-        rows = [[name, value, *_listed(errors, name)] for name, value in values.items()]
+        rows = [[name, *value_beside_error(value, errors.get(name))] for name, value in values.items()]
         found.append(Table(f"Engineering constants in the axes of the cell{label}", columns, rows))
     if (across := document.get("transverse_moduli")) is not None:
         ends = ("least", "largest")

@@ -13,6 +13,8 @@ STRESSES = ("young", "E1", "E2", "E3", "E_axial", "E_transverse", "G12", "G13", 
            "dissipated", "dissipated_strain_controlled", "work", "load_stored")  # fmt: skip
 MODULI = re.compile(r"(C\d\d|S\d\d|bulk|shear)(_\w+)?|anisotropy_\w+|\w+_(C|S)\d\d")
 FIXED = {"angle": "degrees", "centre": "degrees", "values": "degrees", "memory": "bytes"}
+ERROR = ".1e"
+SAME_IN_HTML = re.compile(rf"\.\d+f|{re.escape(ERROR)}")
 NOISE = 1e-12  # what the solver leaves of a zero
 
 
@@ -91,8 +93,9 @@ class Table:
 
     @property
     def cells(self) -> list[list[str]]:
-        """The rows as texts, numbers with seven digits."""
-        return [[number(v, "d" if isinstance(v, int) else ".7g") for v in map(without_noise, row)] for row in self.rows]
+        """The rows as texts, numbers with the decimals of their columns, or else with seven digits."""
+        forms = [column.form if SAME_IN_HTML.fullmatch(column.form) else ".7g" for column in self.columns]
+        return [[_cell(value, form) for value, form in zip(row, forms, strict=False)] for row in self.rows]
 
     @property
     def html(self) -> str:
@@ -115,6 +118,13 @@ def number(value: Any, form: str) -> str:
 def without_noise(value: Any, size: float = 1.0) -> Any:
     """Return the value; zero in place of a number that is what the solver leaves of zero beside `size`."""
     return 0.0 if isinstance(value, float) and abs(value) <= NOISE * size else value
+
+
+def _cell(value: Any, form: str) -> str:
+    """Return an entry for HTML: zero in place of noise, but errors as they are, small ones too."""
+    if isinstance(value, int):
+        return number(value, "d")
+    return number(value if form == ERROR else without_noise(value), form)
 
 
 def _row(cells: Iterable[str], scope: str, tag: str) -> str:
