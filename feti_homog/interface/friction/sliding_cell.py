@@ -17,7 +17,8 @@ from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, Equilibrium, Status
 from feti_homog.interface.friction.condensed_problem import AxialFaces, CondensedProblem
-from feti_homog.interface.friction.coulomb_faces import NOTHING, CoulombFaces
+from feti_homog.interface.friction.coulomb_faces import CoulombFaces
+from feti_homog.interface.friction.face_system import NOTHING
 from feti_homog.interface.friction.status_system import OPEN_FACE, STICK
 from feti_homog.interface.loads.load import Load, Macroscopic, Multipliers
 from feti_homog.typing import Bool, Float, Int

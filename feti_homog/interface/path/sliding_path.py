@@ -9,7 +9,8 @@ import numpy as np
 
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import Equilibrium, Status
-from feti_homog.interface.friction.coulomb_faces import Prescribed, StuckError
+from feti_homog.interface.friction.coulomb_faces import StuckError
+from feti_homog.interface.friction.face_system import Prescribed
 from feti_homog.interface.friction.sliding_cell import SlidingCell
 from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.loads.load import Load, Macroscopic

@@ -10,8 +10,10 @@ from reference.condensed_cell import MixedLoad
 from reference.friction import RubbingFaces
 from reference.friction_path import FrictionPath
 
-from feti_homog.interface.friction.coulomb_faces import CoulombFaces, Prescribed, StuckError
+from feti_homog.interface.friction.coulomb_faces import CoulombFaces
+from feti_homog.interface.friction.face_system import Prescribed
 from feti_homog.interface.friction.lemke import lemke
+from feti_homog.interface.friction.status_search import StatusSearch
 from feti_homog.interface.friction.status_system import BACKWARD, FORWARD, OPEN_FACE, STICK
 
 BY_STRAIN = np.zeros(2, bool)
@@ -19,7 +21,10 @@ BY_STRAIN = np.zeros(2, bool)
 
 def random_faces(rng, most_friction):
     """Return compliance, loads, friction, gaps and slips of up to three nodes."""
-    n = int(rng.integers(1, 4))
+    return random_nodes(rng, int(rng.integers(1, 4)), most_friction)
+
+
+def random_nodes(rng, n, most_friction):
     root = rng.standard_normal((2 * n, 2 * n + int(rng.integers(0, 3))))
     gap, slip = (own * (rng.random() < 0.5) for own in (0.3 * rng.random(n), 0.2 * rng.standard_normal(n)))
     return root @ root.T, rng.standard_normal((2 * n, 1)), rng.uniform(0.0, most_friction, n), gap, slip
@@ -56,24 +61,43 @@ def faces_of(compliance, load, friction, gap):
     return CoulombFaces(np.block([[K, -K @ d], [-d.T @ K, d.T @ K @ d]]), friction)
 
 
+def prescribed(compliance, load, friction, gap, slip):
+    """Return faces of random nodes and what is prescribed."""
+    faces, n = faces_of(compliance, load, friction, gap), len(friction)
+    return faces, Prescribed(BY_STRAIN, faces.size[2 * n :], slip * faces.size[1 : 2 * n : 2])
+
+
+def assert_is_one_of(expected, faces, x, load):
+    last = 2 * faces.nodes
+    assert min(np.abs(x[:last] / faces.size[:last] - g).max() / np.abs(load).max() for g in expected) < 1e-7
+
+
 @pytest.mark.parametrize("most_friction", [0.4, 3.0])
-def test_statuses_are_those_of_brute_force_or_none_are_found(most_friction):
-    rng, stuck = np.random.default_rng(7), 0
+def test_statuses_are_those_of_brute_force(most_friction):
+    rng = np.random.default_rng(7)
     for _ in range(120):
-        compliance, load, friction, gap, slip = random_faces(rng, most_friction)
-        faces, n = faces_of(compliance, load, friction, gap), len(friction)
-        given = Prescribed(BY_STRAIN, faces.size[2 * n :], slip * faces.size[1 : 2 * n : 2])
-        start, first = np.zeros(2 * n + 2), np.zeros(n, np.int8)
-        expected = admissible(compliance, load, friction, gap, slip)
-        try:
-            _, x = faces.search(first, faces.all_allowed(), given, start)
-        except StuckError:
-            stuck += 1
-            continue
-        off = [np.abs(x[: 2 * n] / faces.size[: 2 * n] - g).max() / np.abs(load).max() for g in expected]
-        assert min(off) < 1e-7
-    # At 3 the method of Lemke may end on rays where there is a solution.
-    assert stuck <= (0 if most_friction < 1.0 else 2)
+        nodes = random_faces(rng, most_friction)
+        faces, given = prescribed(*nodes)
+        first, start = np.zeros(faces.nodes, np.int8), np.zeros(len(faces.S))
+        _, x = faces.search(first, faces.all_allowed(), given, start)
+        assert_is_one_of(admissible(*nodes), faces, x, nodes[1])
+
+
+def test_each_search_finds_statuses_or_none():
+    """Of 40 states of three nodes with mu up to 6; trial of all statuses finds some where there are any."""
+    rng, found = np.random.default_rng(12), {"by_pivots": 0, "by_continuation": 0, "by_rays": 0, "by_trial": 0}
+    for _ in range(40):
+        nodes = random_nodes(rng, 3, 6.0)
+        faces, given = prescribed(*nodes)
+        search = StatusSearch(faces, faces.all_allowed(), given, np.zeros(len(faces.S)))
+        expected, first = admissible(*nodes), np.zeros(3, np.int8)
+        for name in found:
+            arguments = {"by_pivots": (first, 60), "by_rays": ()}.get(name, (first,))
+            answer = getattr(search, name)(*arguments)
+            if answer is not None:
+                found[name] += 1
+                assert_is_one_of(expected, faces, answer[1], nodes[1])
+    assert found["by_trial"] == found["by_continuation"] == 40 > found["by_pivots"] and found["by_rays"] > 20, found
 
 
 def follow(faces, area, loads):

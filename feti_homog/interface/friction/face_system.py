@@ -1,0 +1,104 @@
+"""The linear response of debonded faces with given statuses; see `coulomb_faces`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from feti_homog.interface.contact.states import Status
+from feti_homog.interface.friction.status_solver import StatusSolver
+from feti_homog.interface.friction.status_system import OPEN_FACE, STICK, free_rows
+from feti_homog.typing import Bool, Float
+
+# Forces and jumps below this share of the largest are rounding; both are scaled by the stiffness of a node.
+NOISE = 1e-10
+NOTHING = np.zeros(0, bool)
+
+
+@dataclass(frozen=True)
+class Prescribed:
+    """Loads, and slips of nodes that stick.
+
+    Attributes:
+        by_stress: (v,) which of the loads are given by what works on them.
+        values: (v,) strains, or (S x)_E of the others.
+        slip: (n,) slip of nodes that stick.
+    """
+
+    by_stress: Bool
+    values: Float
+    slip: Float
+
+
+class FaceSystem:
+    """Debonded faces, and what their statuses make of loads.
+
+    Attributes:
+        friction: (n,) mu.
+        tied: (n,) which nodes do not slip along the fibres while they touch; (0,) where x has no such jumps.
+        S: (m, m) the scaled stiffness, of 1 on the diagonal of a node, and `size` (m,): S_ij size_i size_j is that of
+            the cell.
+        solver: of systems with it.
+    """
+
+    def __init__(self, stiffness: Float, friction: Float, tied: Bool = NOTHING) -> None:
+        """`stiffness` (m, m) of normal and tangential jumps of each node, then of the v loads, then along the fibres.
+
+        m is 2n + v, with jumps along the fibres 3n + v.
+        """
+        n, diagonal = len(friction), stiffness.diagonal()
+        self.friction, self.tied = friction, tied
+        nodes = np.repeat(diagonal[: 2 * n].reshape(n, 2).max(axis=1, initial=0.0), 2)
+        size = np.sqrt(np.concatenate([nodes, np.maximum(diagonal[2 * n :], 0.0)]))
+        self.size = np.where(size > 0.0, size, 1.0)
+        self.S = stiffness / np.outer(self.size, self.size)
+        self.solver = StatusSolver(self.S)
+
+    @property
+    def nodes(self) -> int:
+        """n."""
+        return len(self.friction)
+
+    @property
+    def loads(self) -> slice:
+        """Place of the loads in x."""
+        return slice(2 * self.nodes, len(self.S) - len(self.tied))
+
+    def forces(self, x: Float) -> tuple[Float, Float]:
+        """(n,) scaled normal and tangential forces."""
+        f = -self.solver.product(x)[: 2 * self.nodes]
+        return f[::2], f[1::2]
+
+    def linear(self, status: Status, given: Prescribed, start: Float) -> Float:
+        """(m,) scaled x with these statuses; what nothing determines stays as it is at the start (m,)."""
+        return self.solver.solve(*self.free(status, given.by_stress), *self.prescribed(status, given, start))
+
+    def free(self, status: Status, by_stress: Bool) -> tuple[Bool, Float]:
+        """Return `free_rows` of statuses."""
+        return free_rows(status, self.friction, self._given_by_force(status, by_stress))
+
+    def _given_by_force(self, status: Status, by_stress: Bool) -> Bool:
+        """(m - 2n,) which of the loads, and of the jumps along the fibres, are given by what works on them."""
+        return np.concatenate([by_stress, ~self.tied | (status == OPEN_FACE)]) if len(self.tied) else by_stress
+
+    def settled(self, status: Status, given: Prescribed, x: Float) -> Float:
+        """(m,) scaled x without the rounding of the way to it; a free motion, which rounding would drive, keeps it."""
+        return self.linear(status, given, x) if self.solver.sign(*self.free(status, given.by_stress)) else x
+
+    def prescribed(self, status: Status, given: Prescribed, start: Float) -> tuple[Float, Float]:
+        """(m,) x with what is prescribed, and (m,) S x on the rows of loads."""
+        last, loads, x, rows = 2 * self.nodes, self.loads, start.copy(), np.zeros(len(start))
+        x[:last:2] = np.where(status == OPEN_FACE, x[:last:2], 0.0)
+        x[1:last:2] = np.where(status == STICK, given.slip, x[1:last:2])
+        x[loads] = np.where(given.by_stress, x[loads], given.values)
+        rows[loads] = given.values
+        return x, rows
+
+    def noise(self, x: Float, slip: Float) -> float:
+        """Return the scaled force, and jump, that is rounding where the loads of x and a slip (n,) act."""
+        last = 2 * self.nodes
+        by_loads = np.abs(self.S[:last, last:] @ x[last:]).max(initial=0.0)
+        slips = np.zeros(len(x))
+        slips[1:last:2] = slip
+        return NOISE * float(max(by_loads, np.abs((self.S @ slips)[:last]).max(initial=0.0) if slip.any() else 0.0))

@@ -1,0 +1,139 @@
+"""Search of admissible statuses of debonded faces under what is prescribed.
+
+Pivots change all wrong statuses at once while their number falls, and nearly always come to an end.  If they do not,
+all sets of statuses are tried where these are few; the coefficients are raised from where pivots find statuses; and
+Lemke's method has the last word in small problems.
+"""
+
+from __future__ import annotations
+
+from copy import copy
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from feti_homog.interface.contact.states import Status
+from feti_homog.interface.friction.face_system import NOISE, FaceSystem, Prescribed
+from feti_homog.interface.friction.lemke import complementary, first_guess
+from feti_homog.interface.friction.status_system import BACKWARD, FORWARD, OPEN_FACE, STICK, residual
+from feti_homog.typing import Bool, Float
+
+# Share of the forces of the loads that may be left on a free motion.
+UNBALANCED = 1e-7
+# Pivots of blocks without progress, after which one node at random changes at a time: with friction a fixed order may
+# come back to where it was.  And solves after which other searches take over; those of a step of the continuation.
+BLOCK_PIVOTS, LEAST_SOLVES, SOLVES_PER_NODE, SOLVES_OF_A_STEP = 11, 50, 4, 50
+# Sets of statuses that are tried one after the other, the least step of mu, and statuses that all nodes together may
+# have in Lemke's tableau.
+MOST_TRIED, LEAST_STEP, MOST_OF_LEMKE = 256.0, 1.0 / 256.0, 500
+STATUSES = np.array([STICK, FORWARD, OPEN_FACE, BACKWARD], np.int8)
+Found = tuple[Status, Float] | None
+
+
+@dataclass(frozen=True)
+class StatusSearch:
+    """Search for statuses (n,) and scaled x (m,) that are admissible; each method returns None if it finds none.
+
+    Attributes:
+        allowed: (n, 4) statuses that a node may have, in the columns [STICK, FORWARD, OPEN_FACE, BACKWARD]; conditions
+            between a status and one that is not allowed do not count.
+        start: (m,) where x stays if nothing determines it.
+    """
+
+    faces: FaceSystem
+    allowed: Bool
+    given: Prescribed
+    start: Float
+
+    def run(self, status: Status) -> Found:
+        """Return what is found from a first guess by one method after the other."""
+        found = self.by_pivots(status, LEAST_SOLVES + SOLVES_PER_NODE * self.faces.nodes)
+        return found or self.by_trial(status) or self.by_continuation(status) or self.by_rays()
+
+    def by_pivots(self, status: Status, solves: int) -> Found:
+        """Return what changes of all wrong statuses at once lead to, or of one at random where they lead nowhere."""
+        fewest, left, random = self.faces.nodes + 1, 0, np.random.default_rng(0)
+        for _ in range(solves):
+            x = self.faces.linear(status, self.given, self.start)
+            better = self._improved(status, x)
+            wrong = np.flatnonzero(better != status)
+            if not len(wrong):
+                return (status, x) if self._is_balanced(status, x) else None
+            left -= 1
+            if len(wrong) < fewest:
+                fewest, left = len(wrong), BLOCK_PIVOTS
+            chosen = wrong if left > 0 else random.choice(wrong, 1)
+            status = status.copy()
+            status[chosen] = better[chosen]
+        return None
+
+    def by_trial(self, status: Status) -> Found:
+        """Return the admissible statuses that differ least from a guess, if there are few to try."""
+        several = np.flatnonzero(self.allowed.sum(axis=1) > 1)
+        if self.allowed[several].sum(axis=1).astype(float).prod() > MOST_TRIED:
+            return None
+        choices = np.array(list(product(*(STATUSES[own] for own in self.allowed[several]))), np.int8)
+        for choice in choices[np.argsort((choices != status[several]).sum(axis=1), kind="stable")]:
+            tried = status.copy()
+            tried[several] = choice
+            if (found := self._checked(tried)) is not None:
+                return found
+        return None
+
+    def by_continuation(self, status: Status) -> Found:
+        """Return what pivots find with a share of mu that rises to 1, from where they found something last."""
+        share, step, faces = 0.0, 0.5, copy(self.faces)
+        search = replace(self, faces=faces)
+        while step >= LEAST_STEP:
+            faces.friction = min(share + step, 1.0) * self.faces.friction
+            found = search.by_pivots(status, SOLVES_OF_A_STEP)
+            if found is None:
+                step /= 2.0
+            elif share + step >= 1.0:
+                return found
+            else:
+                share, status = share + step, found[0]
+        return None
+
+    def by_rays(self) -> Found:
+        """Return what Lemke's method finds."""
+        faces, guess = self.faces, first_guess(self.faces.friction, self.allowed)
+        if self.allowed.sum() > MOST_OF_LEMKE:
+            return None
+        free = faces.free(guess, self.given.by_stress)[0][2 * faces.nodes :]
+        x, rows = faces.prescribed(guess, self.given, self.start)
+        found = complementary(faces.S, faces.friction, self.allowed, free, x, rows)
+        return None if found is None else self._checked(found)
+
+    def _checked(self, status: Status) -> Found:
+        """Return statuses with their x if they are admissible."""
+        x = self.faces.linear(status, self.given, self.start)
+        return (status, x) if (self._improved(status, x) == status).all() and self._is_balanced(status, x) else None
+
+    def _is_balanced(self, status: Status, x: Float) -> bool:
+        """Return False if a free motion, such as the turning of a fibre that slides all around, has a force on it."""
+        faces, given, last = self.faces, self.given, 2 * self.faces.nodes
+        rows = faces.prescribed(status, given, self.start)[1]
+        left = residual(faces.solver.product(x), rows, *faces.free(status, given.by_stress))
+        by_loads = np.abs(faces.S[:, last:] @ x[last:]).max(initial=0.0)
+        return bool(np.abs(left).max(initial=0.0) <= UNBALANCED * max(by_loads, faces.noise(x, given.slip) / NOISE))
+
+    def _improved(self, status: Status, x: Float) -> Status:
+        """(n,) the statuses that the signs of forces and jumps call for."""
+        faces, allowed, slip, last = self.faces, self.allowed, self.given.slip, 2 * self.faces.nodes
+        normal, tangential = faces.forces(x)
+        noise, gap, moved = faces.noise(x, slip), x[:last:2], x[1:last:2] - slip
+        better, closed = status.copy(), status != OPEN_FACE
+        limit = -faces.friction * normal
+        pulled = closed & (normal > noise) & allowed[:, OPEN_FACE]
+        for sign in (FORWARD, BACKWARD):
+            over = (status == STICK) & (sign * tangential - limit > noise) & allowed[:, sign]
+            back = (status == sign) & (sign * moved < -noise) & allowed[:, STICK]
+            better[over] = sign
+            better[back] = STICK
+        touches = ~closed & (gap < -noise) & allowed[:, FORWARD]
+        way = np.where(np.abs(moved) > noise, np.sign(moved), STICK)
+        better[touches] = np.where(faces.friction > 0.0, way, FORWARD)[touches]
+        better[pulled] = OPEN_FACE
+        return better
