@@ -145,7 +145,9 @@ class FetiSolver:
     @cached_property
     def _torn_displacement(self) -> Float:
         """(boundary dofs, v) K+ (-Q), of the torn cell under the unit loads."""
-        return self.interface_operators.apply_flexibility(-self.loads)
+        operators, u = self.interface_operators, self.interface_operators.apply_flexibility(-self.loads)
+        parts = zip(self.subdomains, operators.dofs, operators.slices, strict=True)
+        return np.concatenate([u[:0], *(s.without_rounding(u[own], dofs) for s, dofs, own in parts)])
 
     @cached_property
     def d(self) -> Float:

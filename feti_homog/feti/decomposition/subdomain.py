@@ -95,6 +95,20 @@ class Subdomain:
         voids = np.einsum("ck,ikm->cim", void_integrals(self.submesh, self.mesh), np.eye(m)[self.problem.voigt])
         return np.asarray(bodies + voids.reshape(-1, m)[dofs])
 
+    def without_rounding(self, answers: Float, dofs: Int) -> Float:
+        """(k, v) the answers -K+ Q of `dofs` (k,), with -E x in place of a body's own.
+
+        A body that can turn, beside no voids, answers to a strain E by -E x and a rigid-body motion.  K+ leaves
+        rounding of the body's own stiffness, which may be far above all forces on it.
+        """
+        if self.R.shape[1] < 3 or self.submesh.at_void.any():
+            return answers
+        strains, R = self.problem.strains, self.R[dofs]
+        gradients = (self.problem.gradient(unit) for unit in np.eye(strains))
+        affine = np.stack([(self.positions @ own.T).ravel()[dofs] for own in gradients], axis=1)
+        rigid = R @ np.linalg.lstsq(R, answers[:, :strains] + affine, rcond=None)[0]
+        return np.hstack([rigid - affine, answers[:, strains:]])
+
     @property
     def n_dofs(self) -> int:
         """cn."""
