@@ -105,3 +105,22 @@ def test_thin_coatings_obey_every_law(comm, shared_path, thickness):
     run(Case.parse(document, Path()), out=shared_path / "result", comm=comm)
     certificate = verify(shared_path / "result") if comm.rank == 0 else None
     parallel_assert(comm, certificate is None or certificate.holds, certificate and certificate.text)
+
+
+def test_stiff_coatings_that_float_are_in_equilibrium(comm, shared_path):
+    """Of 1e5 times the stiffness around them, free or rubbing: forces are balanced beside their own rounding."""
+    whole, young = {"debonded": [{"fibre": 1, "angle": 360.0}]}, {"matrix": 1.0, "fibre": 9.0, "coating": 1e5}
+    document = {
+        "cell": {"geometry": "square", "fibre_fraction": 0.3, "mesh_size": 0.15, "coating": 0.1},
+        "material": {name: {"young": E, "poisson": 0.3} for name, E in young.items()},
+        "analysis": {"type": "path", "plane": "strain"},
+        "interface": [
+            {"between": ["coating", "matrix"], "friction": 0.3} | whole,
+            {"between": ["fibre", "coating"]} | whole,
+        ],
+        "path": {"waypoints": [{"E11": -0.01, "E22": -0.004}, {"gamma12": 0.02}]},
+        "output": {"pictures": False, "states": "all"},
+    }
+    run(Case.parse(document), comm, out=shared_path / "out")
+    certificate = verify(shared_path / "out") if comm.rank == 0 else None
+    parallel_assert(comm, certificate is None or certificate.holds, certificate and certificate.text)

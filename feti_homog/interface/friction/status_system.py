@@ -52,7 +52,7 @@ class StatusSystem:
         self._rows = S[self.free]
         self._rows[place[sliding]] += slope[sliding, None] * S[sliding - 1]
         A = self._rows[:, self.free]
-        A.ravel()[:: len(A) + 1] += HELD
+        A[np.diag_indices(len(A))] += HELD
         self._factor = lu_factor(A, overwrite_a=True, check_finite=False) if len(A) else None
 
     @property

@@ -55,3 +55,18 @@ def test_free_motions_are_refused_and_left_again():
     assert not followed.turn(*free_rows(np.array([OPEN_FACE, STICK], np.int8), friction, by_strain))
     status = np.array([STICK, FORWARD], np.int8)
     assert_solves(followed, S, friction, status, by_strain, np.random.default_rng(0))
+
+
+def test_what_nothing_determines_stays_as_it_was():
+    """Three rigid motions of open nodes, of which forces say nothing."""
+    rng = np.random.default_rng(4)
+    motions = np.linalg.qr(rng.normal(size=(12, 3)))[0]
+    P = np.eye(12) - motions @ motions.T
+    S = np.zeros((13, 13))
+    S[:12, :12], S[12, 12] = P @ scaled(rng, 12) @ P, 1.0
+    S[:12, 12] = S[12, :12] = 0.1 * P[0]
+    free, slope = free_rows(np.full(6, OPEN_FACE, np.int8), np.full(6, 0.3), np.zeros(1, bool))
+    start = rng.normal(size=13)
+    x = StatusSystem(S, free, slope).solve(start, np.zeros(13))
+    np.testing.assert_allclose((S @ x)[:12], 0.0, atol=1e-12)
+    np.testing.assert_allclose(motions.T @ x[:12], motions.T @ start[:12], atol=1e-5)
