@@ -136,7 +136,7 @@ class Energies(NamedTuple):
 
     Attributes:
         place: (r,) share of the load on each leg and the number of those before, or `by_legs` is false where the load
-            falls, and they are numbers of points, of which the first is 1.
+            falls, and they are numbers of points, those before the first below 0.
         words: what these are.
         parts: by name those that are not zero, (r,) each, in the order in which they are stacked.
         work: (r,) their sum, but for rounding.
@@ -171,7 +171,7 @@ def energies(document: Document) -> Energies | None:
     place, by_legs = column("load_factor", 1) * legs(document), True
     words = "leg of the path" if legs(document) > 1 else "share of the load"
     if (np.diff(place) < 0.0).any():
-        place, by_legs = np.append(before, np.arange(1.0, len(points) + 1.0)), False
+        place, by_legs = np.append(before - 1.0, np.arange(float(len(points)))), False
         words = "number of the point, in the order of the path"
     return Energies(place, by_legs, words, shown, column("work"))
 

@@ -44,6 +44,7 @@ Document = Mapping[str, Any]
 MAX_PANELS = 6
 MAX_FRAMES, FRAME_TIME = 24, 250  # of the animation; milliseconds
 FRAME_LIMIT, PANEL_LIMIT, STATE_LIMIT = 8000, 30_000, 60_000  # triangles in a frame, a panel, a picture of one state
+MOST_COLUMNS = 3
 INCHES, BAR = 8.0, 0.55  # of all panels of a row, and of the colour bar in each
 LOADS_IN_PANEL, LINE = 2, 0.15  # in a line of its title; inches of a line
 
@@ -208,8 +209,7 @@ def _side_by_side(file: Any, numbers: Sequence[int], document: Document, scale: 
     cell = DeformedCell.of(file, numbers, document, scale, PANEL_LIMIT)
     places = [cell.moved(number) for number in numbers]
     size = np.subtract(*_corners(places)[::-1])
-    rows = max(1, round(math.sqrt(0.7 * len(numbers) * size[0] / size[1])))
-    columns = -(-len(numbers) // rows)
+    rows, columns = _grid(len(numbers), size[0] / size[1])
     panel = (INCHES - BAR) / columns
     title = 0.2 + LINE * (1 + max(cell.lines(number) for number in numbers))
     figure = Figure(figsize=(INCHES, rows * (panel * size[1] / size[0] + title) + 0.7), layout="constrained")
@@ -227,6 +227,14 @@ def _side_by_side(file: Any, numbers: Sequence[int], document: Document, scale: 
     if handles:
         figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
     return figure
+
+
+def _grid(panels: int, ratio: float) -> tuple[int, int]:
+    """Return rows and columns of panels of this ratio of width to height: about as wide as high, few places empty."""
+    wanted = math.sqrt(0.7 * panels * ratio)
+    grids = [(rows, -(-panels // rows)) for rows in {max(1, math.floor(wanted)), math.ceil(wanted)}]
+    grids = [grid for grid in grids if grid[1] <= MOST_COLUMNS] or grids
+    return min(grids, key=lambda grid: (grid[0] * grid[1] - panels, abs(grid[0] - wanted)))
 
 
 def _animation(file: Any, numbers: Sequence[int], document: Document, scale: float, path: Path) -> Path:

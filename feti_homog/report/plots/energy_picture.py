@@ -34,7 +34,7 @@ def figure(document: Mapping[str, Any]) -> Figure | None:
     axes.plot(stack.place, stack.work, color="0.15", linewidth=1.2, label="work of the loads")
     for leg in range(1, path_curves.legs(document)) if stack.by_legs else ():
         axes.axvline(leg, color="0.6", linewidth=0.6, linestyle=":")
-    axes.set_xlim(0.0, stack.place[-1])
+    axes.set_xlim(stack.place[0], stack.place[-1])
     axes.set_ylim(bottom=min(0.0, float(stack.work.min())))
     axes.set_xlabel(stack.words)
     axes.set_ylabel(f"energy per area {unit_label(case['output'].get('stress_unit', '')) or '(unit of the moduli)'}")

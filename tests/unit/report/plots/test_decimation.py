@@ -109,3 +109,12 @@ def test_no_triangle_of_a_magnified_state_turns_over(tmp_path: Path) -> None:
         displacement = drawn_displacement(file["state/0"], drawn)
     assert LEAST_AREA <= area_ratio(displacement, drawn, scale) < 0.9
     assert area_ratio(displacement, drawn, plot_helpers.magnification(np.abs(waves).max(), 1.0)) < 0
+
+
+@pytest.mark.parametrize(
+    ("panels", "ratio", "grid"),
+    [(1, 1.0, (1, 1)), (3, 1.0, (1, 3)), (3, 1.1, (1, 3)), (4, 1.0, (2, 2)), (6, 1.0, (2, 3)), (5, 1.0, (2, 3)),
+     (3, 2.0, (3, 1)), (6, 0.58, (2, 3))],
+)  # fmt: skip
+def test_panels_leave_few_places_empty(panels, ratio, grid):
+    assert deformed_panels._grid(panels, ratio) == grid

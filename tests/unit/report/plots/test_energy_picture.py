@@ -63,7 +63,7 @@ def test_a_load_that_falls_leaves_numbers_of_points() -> None:
     figure = energy_picture.figure(path([0.5, 0.25, 1.0], **ENERGIES))
     assert figure is not None
     place = figure.axes[0].lines[0].get_xdata()
-    assert list(place[-3:]) == [1.0, 2.0, 3.0] and "number" in figure.axes[0].get_xlabel()
+    assert list(place[-3:]) == [0.0, 1.0, 2.0] and place[0] == -1.0 and "number" in figure.axes[0].get_xlabel()
 
 
 def test_results_without_energies_have_no_stack() -> None:
