@@ -12,7 +12,7 @@ import numpy as np
 
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.criteria import criterion_of
-from feti_homog.analysis.path_events import Work, restored, stored
+from feti_homog.analysis.path_events import Work, holding, restored, stored
 from feti_homog.analysis.registry import Analysis
 from feti_homog.analysis.result_records import PathPoint, Peak
 from feti_homog.analysis.tip_records import TipRecorder
@@ -96,12 +96,12 @@ def _known(context: AnalysisContext) -> int:
     """
     if context.resume:
         known = context.checkpoint.count()
-        context.progress.say(
-            f"  {known} events are taken from the checkpoint"
-            if known
-            else "  there is no checkpoint: the path begins at its beginning"
-        )
-        return known
+        if (held := holding(context, known)) < known:
+            context.progress.say(f"  event {held} of the checkpoint does not hold: it and all after it are found again")
+            context.checkpoint.keep(held)
+        words = f"{held} events are taken from the checkpoint"
+        context.progress.say(f"  {words if known else 'there is no checkpoint: the path begins at its beginning'}")
+        return held
     if dropped := context.checkpoint.clear():
         context.progress.say(f"  {dropped} events of an earlier run are dropped; --resume would have gone on from them")
     return 0

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from feti_homog.analysis.context import AnalysisContext
 from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
@@ -95,6 +96,26 @@ def restored(event: Arrays, cell: CoupledInterfaces) -> tuple[Point, tuple[Energ
     own = len(NO_ENERGIES)
     point = Point(load_factor, scale, state, broke, softened, Energies(*energies[:own]), event["used"], after)
     return point, (Energies(*energies[own : 2 * own]), energies[2 * own])
+
+
+def holding(context: AnalysisContext, known: int) -> int:
+    """Return how many of the known events of the checkpoint hold.
+
+    Those after the last that F lambda confirmed are confirmed here, up to one whose checks fail.  Collective.
+    """
+    cell, first = context.loads.interfaces, known
+    while first and not _is_confirmed(restored(context.checkpoint.read(first - 1), cell)[0]):
+        first -= 1
+    for number in range(first, known):
+        point, _ = restored(context.checkpoint.read(number), cell)
+        for response in context.loads.responses(cell.completed(point.state), point.scale):
+            if any(not error <= context.checks.tolerance(law) for law, error in response.checks.items()):
+                return number
+    return known
+
+
+def _is_confirmed(point: Point) -> bool:
+    return all(state.solution.alpha is not None for state in point.state.problems)
 
 
 def _taken_apart(state: Equilibrium, kernel: int) -> tuple[dict[str, Any], Arrays]:

@@ -144,13 +144,16 @@ LEAST_UNCONFIRMED_JUMP = 1e-6
 INFLUENCE_CHUNK = 32
 # Changed rows after which the cell as it stands is factored in place of them: the default of `-feti_influence_columns`
 # (`scripts/benchmark_path --to-the-end`).
-INFLUENCE_COLUMNS = 400
+INFLUENCE_COLUMNS = 800
 # Influence columns that each rank finds together at least, with those of bonds near the one that breaks: fewer and
 # larger batches, but columns that may not be needed (`scripts/benchmark_path --to-the-end`).
-INFLUENCE_BATCH = 32
-# Rows that soften at once up to which their columns are followed; columns that are followed at most, 8 bytes an owned
-# row each; changes that wait before all of these follow.
-MOST_SOFTENED, FOLLOWED_COLUMNS, WAITING_COLUMNS = 16, 400, 32
+INFLUENCE_BATCH = 64
+# Rows that change at once up to which their columns are followed; columns that are followed at most, 8 bytes an owned
+# row each; changes that wait before all of these follow (`scripts/benchmark_path --to-the-end`).
+MOST_FOLLOWED, FOLLOWED_COLUMNS, WAITING_COLUMNS = 16, 1200, 32
+# Least singular value of the rows that turn, relative to their stiffness, with which columns are followed: they lose as
+# many digits.
+LEAST_FOLLOWED_PIVOT = 1e-6
 # Stiffness of a fibre over that of what is around it, as the diagonals of K have them, above which influence columns
 # take the forces of the latter: those of the fibre lose as many digits as this has.
 STIFF_FIBRES = 1e3

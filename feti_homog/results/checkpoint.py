@@ -86,6 +86,10 @@ class Checkpoint:
         """Write the events that wait.  Raises as `write`."""
         on_root(self.comm, self._flush)
 
+    def keep(self, count: int) -> None:
+        """Forget the events from number `count` on.  Raises as `write`."""
+        on_root(self.comm, self._keep, count)
+
     def _clear(self) -> int:
         files = self._files()
         # Whatever another run left there.
@@ -149,6 +153,18 @@ class Checkpoint:
         atomic.replace(self._file(start), lambda part: checkpoint_file.write(part, together, self.signature, start))
         self._starts.append(start + len(events))
         self._waiting = []
+
+    def _keep(self, count: int) -> None:
+        start = self._starts[bisect.bisect_right(self._starts, count) - 1]
+        kept = [self._read_event(number) for number in range(start, count)]
+        with atomic.file_errors("remove", self.folder):
+            # The last first: what a killed run leaves has no gaps.
+            for path in reversed(self._files()):
+                if path > self._file(start) or (path == self._file(start) and not kept):
+                    path.unlink()
+        self._starts = [*(first for first in self._starts if first < start), start]
+        self._waiting, self._read = kept, (-1, {})
+        self._flush()
 
 
 class NoCheckpoint(Checkpoint):

@@ -16,6 +16,7 @@ from feti_homog import Case, run
 from feti_homog.errors import ConvergenceError
 from feti_homog.feti.preconditioners.followed_response import FollowedResponse
 from feti_homog.parallel.mpi_errors import on_root
+from feti_homog.results import checkpoint_file
 from feti_homog.verify.certificate import verify
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks, pytest.mark.usefixtures("shared_interfaces")]
@@ -103,16 +104,34 @@ def test_teeth_converge_to_the_law(comm):
     assert errors[-1] < 0.02
 
 
-def test_a_path_goes_on_where_it_was_ended(comm, shared_path):
-    """The checkpoint carries the damage: the rest of the path is that of a run without a break."""
+def falsify(folder):
+    """Scale multipliers of the last of the teeth, which F lambda did not confirm; returns the number of its event."""
+    file = max(path for path in folder.glob("*.h5") if checkpoint_file.events_in(path) > 1)
+    events, signature, first = checkpoint_file.read(file)
+    last = int(np.flatnonzero(events["path"][:, 5] > 0)[-1])
+    assert np.isnan(events["alpha"][last]).all() and last > 0
+    events["lam"][last] *= 1.0 + 1e-3
+    checkpoint_file.write(file, events, signature, first)
+    return first + last
+
+
+@pytest.mark.parametrize("falsified", [False, True])
+def test_a_path_goes_on_where_it_was_ended(comm, shared_path, falsified):
+    """The checkpoint carries the damage: the rest of the path is that of a run without a break.
+
+    An event that does not hold is found again, and so are those after it.
+    """
     written = document({}, EPOXY_GLASS, "strain", BILINEAR, INFLUENCE, path={"waypoints": PATHS["cycle"][2]})
     whole = run(Case.parse(written), comm).path
-    written["path"]["max_events"] = len(whole) // 2
+    known = len(whole) // 2
+    written["path"]["max_events"] = known
     with pytest.raises(ConvergenceError, match="max_events"):
         run(Case.parse(written), comm, out=shared_path / "out")
+    if falsified:
+        known = on_root(comm, falsify, shared_path / "out" / "checkpoint")
     del written["path"]["max_events"]
     result = run(Case.parse(written), comm, out=shared_path / "out", resume=True)
-    assert result.resumed == len(whole) // 2 and len(result.path) == len(whole)
+    assert result.resumed == known and len(result.path) == len(whole)
     for found, expected in zip(result.path, whole, strict=True):
         assert (found.broke, found.softened) == (expected.broke, expected.softened)
         np.testing.assert_allclose(found.stress, expected.stress, atol=1e-12)

@@ -28,7 +28,7 @@ class NaturalCoarseSpace:
         kernel_dimension: kernel modes of all subdomains, m.
         owned_modes: where those of this rank's subdomains are among the m.
         R: (boundary dofs, own modes) kernels on the boundaries.
-        G: (owned rows, m); `G_active` is 0 in inactive rows.
+        G: (owned rows, m).
         body: (m,) body that each mode moves.
         pinned_body: the body with the pinned class, -1 if there is none.
         unconstrained_modes: (m, z) orthonormal amplitudes of the motions that no active row resists, sparse.
@@ -62,7 +62,7 @@ class NaturalCoarseSpace:
         owned = jump_operator.owned[1] - jump_operator.owned[0]
         columns = np.arange(first, first + modes)
         self.G = assemble_owned_rows(comm, operators.B @ self.R, jump_operator.rows, columns, (owned, modes))
-        self.G_active, self.factorizations = self.G, 0
+        self.factorizations, self._active = 0, np.ones(owned)
         self._diagonal = allreduce_sum(comm, np.asarray(self.G.power(2).sum(axis=0)).ravel())
         self.unconstrained_modes = csc_matrix((self.kernel_dimension, 0))
         self._reaching = np.union1d(self.G.indices, columns).astype(np.int64)
@@ -75,9 +75,13 @@ class NaturalCoarseSpace:
         G^T G is factored when next wanted.  Motions that no active row resists, of a fibre that nothing holds, get a
         stiffness: G^T G + s Z Z^T.
         """
-        self.G_active = (diags(active) @ self.G).tocsr()
+        self._active, self._is_factored = active, False
         self.unconstrained_modes = self._null_space(self._gram.entries(active))
-        self._is_factored = False
+
+    @property
+    def G_active(self) -> csr_matrix:
+        """G, 0 in inactive rows."""
+        return (diags(self._active) @ self.G).tocsr()
 
     def factor(self) -> None:
         """Factor G^T G of the active rows.  Collective."""
@@ -126,10 +130,14 @@ class NaturalCoarseSpace:
             eigenvalues, vectors = np.linalg.eigh(padded[places])
             tolerance = UNCONSTRAINED_EIGENVALUE * self._diagonal[members].max(axis=1, keepdims=True)
             which, mode = np.nonzero(eigenvalues <= tolerance)
+            if not len(which):
+                continue
             rows.append(members[which].ravel())
             numbers.append(np.repeat(columns + np.arange(len(which)), members.shape[1]))
             values.append(vectors[which, :, mode].ravel())
             columns += len(which)
+        if not columns:
+            return csc_matrix((self.kernel_dimension, 0))
         entry = np.concatenate(values), (np.concatenate(rows), np.concatenate(numbers))
         Z = csc_matrix(entry, shape=(self.kernel_dimension, columns))
         Z.eliminate_zeros()

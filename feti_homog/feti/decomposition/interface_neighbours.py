@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from mpi4py import MPI
-from scipy.sparse import coo_matrix, csr_matrix
+from scipy.sparse import coo_matrix, csr_matrix, identity
 
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.subdomain import Subdomain
@@ -40,6 +40,19 @@ class InterfaceNeighbours:
         a, b = np.divmod(np.intersect1d(_once(outer), _once(inner)), n)
         entries = np.ones(2 * len(a)), (np.concatenate([a, b]), np.concatenate([b, a]))
         self.adjacency: csr_matrix = coo_matrix(entries, shape=(n, n)).tocsr()
+        self._components = jump_operator.components
+        self._reached = self.adjacency + identity(n, format="csr")
+
+    def rows_near(self, rows: Int, choose: Callable[[Int], Int], enough: int) -> Int:
+        """Return global rows and those near them along the interfaces that `choose` returns, until they are enough."""
+        bonds = np.unique(np.searchsorted(self.rows, rows, side="right") - 1)
+        while True:
+            near = (self.rows[bonds][:, None] + np.arange(self._components)).ravel()
+            near = np.union1d(rows, choose(near))
+            reached = np.unique(self._reached[bonds].indices)
+            if len(near) >= enough or len(reached) == len(bonds):
+                return near
+            bonds = reached
 
     def _node_numbers(self, jump_operator: JumpOperator) -> Int:
         """(fine nodes of this rank,) number of the interface node that each is a copy of, or -1."""

@@ -9,17 +9,18 @@ A spring whose compliance grew by dC is one of C, whose jump dC lam is prescribe
 
     N = (Gamma_CC + D)^-1,  lam_C = D c on such rows,  D = dC^-1 there, and 0 where bonds left.
 
-A bond that breaks costs two columns and two borders of N, a face that closes or opens one border; bonds that soften
-cost their columns of what `followed_response` keeps up, until N is wanted again; no factor is made anew.  After more
-changes than an option allows, the cell as it stands becomes the reference, but for what softened.
+A bond that breaks or softens and a face that closes or opens cost their columns of what `followed_response` keeps up.
+N follows them, by borders, when new columns or a confirmation want it; no factor is made anew.  After more changes
+than an option allows, the cell as it stands becomes the reference, but for what softened.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
-from scipy.sparse import identity
 
 from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
@@ -35,7 +36,7 @@ from feti_homog.feti.preconditioners.reference_cell import (
     stiffness_of_rows,
 )
 from feti_homog.feti.preconditioners.scaled import Preconditioner
-from feti_homog.feti.thresholds import INFLUENCE_BATCH, INFLUENCE_COLUMNS, MOST_SOFTENED, NORM_MARGIN
+from feti_homog.feti.thresholds import FOLLOWED_COLUMNS, INFLUENCE_BATCH, INFLUENCE_COLUMNS, MOST_FOLLOWED, NORM_MARGIN
 from feti_homog.parallel.distributed_arrays import gather_rows, scale_rows
 from feti_homog.typing import Float, Int
 
@@ -73,7 +74,6 @@ class ExactInverse(Preconditioner):
         self._BD = one_sided_jumps(comm, jump_operator, operators)
         self._ties = BodyTies(comm, jump_operator)
         self.neighbours = InterfaceNeighbours(comm, jump_operator, operators.subdomains)
-        self._adjacency = self.neighbours.adjacency + identity(self.neighbours.adjacency.shape[0], format="csr")
         self._batch = INFLUENCE_BATCH * comm.size
         # Columns without which the reference cell is not the one at hand.
         self.factorizations = self._tied = 0
@@ -100,32 +100,39 @@ class ExactInverse(Preconditioner):
 
     def activate(self, active: Float) -> None:
         """Restrict to the rows where `active` is 1.  Collective."""
-        if self._followed is not None:
-            more = self._next - self._more
-            changed = np.flatnonzero((more != 0.0) & (active > 0.0))
-            is_other = bool((active != self._active).any() or (more[changed] < 0.0).any())
-            own = (is_other, self._first + changed, more[changed])
-            others, rows, gained = zip(*self.comm.allgather(own), strict=True)
-            self._follow(any(others), np.concatenate(rows), np.concatenate(gained))
+        if self._followed is not None and not self._follow(self._followed, active):
+            self._followed = None
         self._active, self._more, self._is_behind = active, self._next, True
 
-    def _follow(self, is_other: bool, rows: Int, more: Float) -> None:
-        """Keep what is followed up with the rows that soften, or drop it if something else changes.  Collective."""
-        if is_other or self._followed is None or len(rows) > MOST_SOFTENED:
-            self._followed = None
-            return
-        lacking = self._followed.lacking(rows)
-        if len(lacking):
-            self._catch_up()
-            self._find(lacking)
-            at, unit = self._columns.positions(lacking), np.zeros((self._rows, len(lacking)))
-            mine = np.flatnonzero((lacking >= self._first) & (lacking < self._first + self._rows))
-            unit[lacking[mine] - self._first, mine] = 1.0
-            self._followed.add(lacking, self._response(self._columns.owned[:, at], unit))
-        if len(self._followed.lacking(rows)):
-            self._followed = None  # the columns of all were too many
-        else:
-            self._followed.soften(rows, more)
+    def _follow(self, followed: FollowedResponse, active: Float) -> bool:
+        """Keep what is followed up with the rows that soften, leave or come, if it can be.  Collective."""
+        gained = self._next * active - self._more * self._active
+        turned = self._active - active
+        own = np.flatnonzero((turned != 0.0) | (gained != 0.0))
+        numbers = np.stack([turned, gained, self.stiffness[self._first :][: self._rows]], axis=1)[own]
+        parts = zip(*self.comm.allgather((self._first + own, numbers)), strict=True)
+        rows, numbers = (np.concatenate(part) for part in parts)
+        if len(rows) > MOST_FOLLOWED:
+            return False
+        if len(lacking := followed.lacking(rows)) and not self._add_followed(followed, lacking):
+            return False
+        return followed.follow(rows, *numbers.T)
+
+    def _add_followed(self, followed: FollowedResponse, lacking: Int) -> bool:
+        """Find the columns of the present response at rows and near them; False if there are none.  Collective."""
+        self._catch_up()
+        if len(self._dependent):
+            return False  # a body is free
+        rows = self._with_near(lacking, followed.lacking)
+        rows = rows if len(rows) <= FOLLOWED_COLUMNS else lacking
+        self._columns.add(rows)
+        at, unit = self._columns.positions(rows), np.zeros((self._rows, len(rows)))
+        both = np.stack([self._active, self.reference.active], axis=1)
+        turned = -np.diff(gather_rows(self.comm, both, self._first, rows)).ravel()
+        mine = np.flatnonzero((rows >= self._first) & (rows < self._first + self._rows))
+        unit[rows[mine] - self._first, mine] = turned[mine]
+        followed.add(rows, self._response(np.where(turned == 0.0, self._columns.owned[:, at], unit)))
+        return True
 
     def _catch_up(self) -> None:
         """Let the reference cell and N be those of the present state.  Collective."""
@@ -147,33 +154,36 @@ class ExactInverse(Preconditioner):
         """H r for r (owned rows,) or (owned rows, k); 0 on inactive rows.  Collective."""
         self._catch_up()
         y = self.reference.respond(scale_rows(self.reference.active, r))
-        return scale_rows(self._active, self._response(y, r))
+        return scale_rows(self._active, self._response(y + scale_rows(1.0 - self.reference.active, r)))
 
     def multipliers(self, d: Float, E: Float) -> Float:
         """H d E for d (owned rows, v), the same at every call, and E (v, k).
 
         The solution for the loads E, but for rounding; the reference cell answers to d once.  Collective.
         """
-        self._catch_up()
-        if self._answer is None:
-            self._answer = self.reference.respond(scale_rows(self.reference.active, d))
-        answer = self._response(self._answer, d)
-        if self._followed is None:
-            self._followed = FollowedResponse(self.comm, self._first, self._jump_operator.global_rows, answer)
-        self._followed.answer = answer
-        return scale_rows(self._active, answer @ E)
+        return scale_rows(self._active, self._whole_answer(d) @ E)
 
     def answer(self, d: Float, E: Float) -> tuple[Float, Float]:
         """Multipliers H d E and jumps on inactive rows, (owned rows, k), with arguments as of `multipliers`.
 
-        While bonds only soften they are those of before with updates. Collective.
+        They are those of before with updates, where these can be followed. Collective.
         """
-        if self._followed is None:
-            self.multipliers(d, E)
-        assert self._followed is not None
-        whole = self._followed.answer @ E
+        answer = self._whole_answer(d) if self._followed is None else self._followed.answer
+        whole = answer @ E
         lam = scale_rows(self._active, whole)
         return lam, whole - lam
+
+    def _whole_answer(self, d: Float) -> Float:
+        """(owned rows, v) U, from which updates go on.  Collective."""
+        self._catch_up()
+        if self._answer is None:
+            y = self.reference.respond(scale_rows(self.reference.active, d))
+            self._answer = y + scale_rows(1.0 - self.reference.active, d)
+        answer = self._response(self._answer)
+        if self._followed is None:
+            self._followed = FollowedResponse(self.comm, self._first, self._jump_operator.global_rows, answer)
+        self._followed.answer = answer
+        return answer
 
     def inverse_blocks(self, pairs: Int) -> Float:
         """(m, 2, 2) diagonal blocks of H, for the same pairs (m, 2) of active global rows on every rank.  Collective.
@@ -228,24 +238,15 @@ class ExactInverse(Preconditioner):
         self._rounding = self.reference.force_of_rigid_motions(self.stiffness[self._first :][: self._rows])
 
     def _find(self, rows: Int) -> None:
-        """Find the columns that these rows lack.  Collective.
-
-        With few also those of bonds near them, which break next, for columns are cheaper together.
-        """
+        """Find the columns of the reference cell that these rows lack, and some near them.  Collective."""
         rows = rows[self._columns.positions(rows) < 0]
-        if not len(rows):
-            return
-        normal = self.neighbours.rows
-        bonds = np.unique(np.searchsorted(normal, rows, side="right") - 1)
+        if len(rows):
+            self._columns.add(self._with_near(rows, lambda near: near[self._columns.positions(near) < 0]))
+
+    def _with_near(self, rows: Int, lacking: Callable[[Int], Int]) -> Int:
+        """Return rows and active ones near them, which break next: columns are cheaper together.  Collective."""
         active = np.concatenate(self.comm.allgather(self._active)) > 0
-        while True:
-            beside = (normal[bonds][:, None] + np.arange(self._jump_operator.components)).ravel()
-            beside = np.union1d(rows, beside[active[beside] & (self._columns.positions(beside) < 0)])
-            reached = np.unique(self._adjacency[bonds].indices)
-            if len(beside) >= self._batch or len(reached) == len(bonds):
-                break
-            bonds = reached
-        self._columns.add(beside)
+        return self.neighbours.rows_near(rows, lambda near: lacking(near[active[near]]), self._batch)
 
     def _update_inverse(self, changed: Int) -> None:
         """Let N be that of the columns `changed`, made anew where updates have lost too many digits.  Collective."""
@@ -277,23 +278,22 @@ class ExactInverse(Preconditioner):
         inverse.append(M, size, left_out, 1, D)
         self._dependent = np.setdiff1d(changed, inverse.members)
 
-    def _response(self, y: Float, g: Float) -> Float:
-        """(owned rows,) or (owned rows, k) H g on active rows, and what of g is left on others; y = Gamma g_A.
+    def _response(self, z: Float) -> Float:
+        """(owned rows,) or (owned rows, k) H g on active rows, and what of g is left on others; z = Gamma g_A + g_R.
 
         Collective."""
-        members = self._inverse.members
-        outside = 1.0 - self.reference.active
-        z = y + scale_rows(outside, g)
+        members, z = self._inverse.members, z.copy()
         if len(members):
             rows = self._columns.rows[members]
             c = self._inverse.solve(gather_rows(self.comm, z, self._first, rows))
-            whole = np.zeros((len(self._columns.rows), *y.shape[1:]))
+            whole = np.zeros((len(self._columns.rows), *z.shape[1:]))
             whole[members] = c
             z -= self._columns.owned @ whole
             mine = np.flatnonzero((rows >= self._first) & (rows < self._first + self._rows))
             own = rows[mine] - self._first
             # A row that left opens by c, one that came bears -c.  Nothing cancels in D c, however soft the spring.
             stretched = self._inverse.added[mine]
-            factor = np.where(outside[own] > 0, -1.0, np.where(stretched > 0, stretched, 1.0))
+            outside = self.reference.active[own] == 0.0
+            factor = np.where(outside, -1.0, np.where(stretched > 0, stretched, 1.0))
             z[own] = scale_rows(factor, c[mine])
         return z

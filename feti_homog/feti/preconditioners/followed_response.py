@@ -1,11 +1,18 @@
-"""The answer of a cell to its unit loads, and columns of its response to jumps, followed while bonds soften.
+"""The answer of a cell to its unit loads, and columns of its response, followed while bonds soften, break and close.
 
-Both are principal pivot transforms: multipliers on active rows, jumps on the others.  With dC more compliance on the
-rows I of bonds that hold, the answer U and the response Gamma become
+U has multipliers on active rows and on the others the jumps that are left; Gamma is the response, multipliers and
+jumps, to jumps of active rows and forces on the others.  Both are principal pivot transforms.  With dC more
+compliance on the rows I of bonds that hold they become
 
-    U <- U - Gamma_:I B U_I,  Gamma <- Gamma - Gamma_:I B Gamma_I:,  B = (dC^-1 + Gamma_II)^-1.
+    U <- U - Gamma_:I B U_I,  Gamma <- Gamma - Gamma_:I B Gamma_I:,  B = (dC^-1 + Gamma_II)^-1,
 
-The rows I need one column each; changes of the other columns that are kept wait until there are many.
+and where the rows I leave (s = 1) or come to be active (s = -1), with B = Gamma_II^-1,
+
+    U_I <- s B U_I,  Gamma_I: <- s B Gamma_I:,  Gamma_:I <- Gamma_:I B s,  Gamma_II <- -s B s,
+
+all others as above.  Springs of rows that are not active have C_0: Gamma_II gives up what they gained where they
+leave, and takes it where they come.  The rows I need one column each; changes of the other columns that are kept wait
+until there are many.
 """
 
 from __future__ import annotations
@@ -13,7 +20,7 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.feti.thresholds import FOLLOWED_COLUMNS, WAITING_COLUMNS
+from feti_homog.feti.thresholds import FOLLOWED_COLUMNS, LEAST_FOLLOWED_PIVOT, WAITING_COLUMNS
 from feti_homog.parallel.distributed_arrays import gather_rows
 from feti_homog.typing import Float, Int
 
@@ -30,10 +37,11 @@ class FollowedResponse:
         self._comm, self._first, self.answer = comm, first, answer
         self._slot = np.full(global_rows, -1)
         self._rows: Int = np.zeros(0, np.int64)
-        self._columns = np.zeros((len(answer), 0), order="F")
-        # Gamma_:I of the changes that wait, and Gamma_KI B of the rows K that have columns.
+        # Memory is taken when columns come.
+        self._buffer = np.zeros((len(answer), FOLLOWED_COLUMNS), order="F")
+        # What is taken off at changes that wait, and its factors in the columns of the rows K that are kept.
         self._waiting = np.zeros((len(answer), WAITING_COLUMNS), order="F")
-        self._factors = np.zeros((0, WAITING_COLUMNS))
+        self._factors = np.zeros((FOLLOWED_COLUMNS, WAITING_COLUMNS))
         self._count = 0
 
     def lacking(self, rows: Int) -> Int:
@@ -45,28 +53,80 @@ class FollowedResponse:
         self._apply_waiting()
         if len(self._rows) + len(rows) > FOLLOWED_COLUMNS:
             self._slot[self._rows] = -1
-            self._rows, self._columns = self._rows[:0], self._columns[:, :0]
-        self._slot[rows] = len(self._rows) + np.arange(len(rows))
+            self._rows = self._rows[:0]
+        old, new = len(self._rows), len(self._rows) + len(rows)
+        self._slot[rows] = np.arange(old, new)
         self._rows = np.concatenate([self._rows, rows])
-        self._columns = np.asfortranarray(np.hstack([self._columns, columns]))
-        self._factors = np.zeros((len(self._rows), WAITING_COLUMNS))
+        self._buffer[:, old:new] = columns
+
+    def follow(self, rows: Int, turned: Float, gained: Float, stiffness: Float) -> bool:
+        """Let the global rows (k,) leave (`turned` is 1), come (-1) or soften (0), their springs gain compliance (k,).
+
+        `stiffness` (k,) of the rows is the most that Gamma_II can be.  False where columns are lacking or lose too many
+        digits; then this is of no state.  Collective.
+        """
+        soft, moves = turned == 0.0, turned != 0.0
+        if len(self.lacking(rows)) or (gained[soft] < 0.0).any():
+            return False
+        if soft.any():
+            self.soften(rows[soft], gained[soft])
+        size = np.where(turned > 0.0, stiffness, 1.0 / stiffness)
+        return not moves.any() or self._exchange(*(x[moves] for x in (rows, turned, gained, size)))
 
     def soften(self, rows: Int, more: Float) -> None:
         """Let springs of the global rows (k,), which have columns, gain compliance (k,).  Collective."""
-        if self._count + len(rows) > WAITING_COLUMNS:
-            self._apply_waiting()
-        k, n, at = len(rows), self._count, self._slot[rows]
-        columns = self._columns[:, at] - self._waiting[:, :n] @ self._factors[at, :n].T
-        everywhere = np.concatenate([rows, self._rows])
-        values = gather_rows(self._comm, np.hstack([columns, self.answer]), self._first, everywhere)
+        self._make_room(len(rows))
+        columns, values = self._present(rows)
+        k = len(rows)
         # One rank's rounding is that of all.
         B = self._comm.bcast(np.linalg.inv(np.diag(1.0 / more) + (values[:k, :k] + values[:k, :k].T) / 2))
-        self.answer = self.answer - columns @ (B @ values[:k, k:])
-        self._waiting[:, n : n + k], self._factors[:, n : n + k] = columns, values[k:, :k] @ B
+        self._change(columns, B, values)
+
+    def _exchange(self, rows: Int, sign: Float, gained: Float, size: Float) -> bool:
+        """Let rows leave (sign 1) or come (-1); False where their block is nearly singular, as where bodies come free.
+
+        `size` (k,) is what the diagonal of sign Gamma_II may be.  Collective.
+        """
+        self._make_room(len(rows))
+        columns, values = self._present(rows)
+        k, at = len(rows), self._slot[rows]
+        block = (values[:k, :k] + values[:k, :k].T) / 2 - np.diag(np.where(sign < 0.0, gained, 0.0))
+        root = np.sqrt(np.maximum(size, np.abs(block.diagonal())))
+        is_regular = np.linalg.svd(block / np.outer(root, root), compute_uv=False).min() > LEAST_FOLLOWED_PIVOT
+        B = self._comm.bcast(np.linalg.inv(block) if is_regular else None)
+        if B is None:
+            return False
+        mine = np.flatnonzero((rows >= self._first) & (rows < self._first + len(columns)))
+        own = rows[mine] - self._first
+        theirs = columns @ (B * sign)
+        theirs[own] = -(sign[:, None] * B * sign + np.diag(np.where(sign > 0.0, gained, 0.0)))[mine]
+        # So that the rows themselves become s B U_I and s B Gamma_I:, too.
+        taken = columns.copy()
+        taken[own] = (block - np.diag(sign))[mine]
+        self._change(taken, B, values)
+        self._buffer[:, at], self._factors[at] = theirs, 0.0
+        return True
+
+    def _present(self, rows: Int) -> tuple[Float, Float]:
+        """(owned rows, k) columns, and (k + all columns, k + v) rows of them and of U on every rank.  Collective."""
+        n, at = self._count, self._slot[rows]
+        columns = self._buffer[:, at] - self._waiting[:, :n] @ self._factors[at, :n].T
+        everywhere = np.concatenate([rows, self._rows])
+        return columns, gather_rows(self._comm, np.hstack([columns, self.answer]), self._first, everywhere)
+
+    def _change(self, taken: Float, B: Float, values: Float) -> None:
+        """Take `taken` B times the rows I off the answer, and later off all columns."""
+        n, k = self._count, len(B)
+        self.answer = self.answer - taken @ (B @ values[:k, k:])
+        self._waiting[:, n : n + k], self._factors[: len(self._rows), n : n + k] = taken, values[k:, :k] @ B
         self._count += k
 
+    def _make_room(self, k: int) -> None:
+        if self._count + k > WAITING_COLUMNS:
+            self._apply_waiting()
+
     def _apply_waiting(self) -> None:
-        n = self._count
+        n, k = self._count, len(self._rows)
         if n:
-            self._columns -= self._waiting[:, :n] @ self._factors[:, :n].T
+            self._buffer[:, :k] -= self._waiting[:, :n] @ self._factors[:k, :n].T
         self._count = 0

@@ -56,6 +56,25 @@ def test_light_events_are_written_together(tmp_path):
     assert resumed.count() == last + 1 and resumed.clear() == last + 1
 
 
+@pytest.mark.parametrize("count", [0, 2, 3, 5, 7, 8])
+def test_events_are_forgotten_from_one_on(tmp_path, count):
+    """Files of three, one, and four events; a kept part of a file is written, and others go on from it."""
+    checkpoint = Checkpoint(tmp_path, MPI.COMM_SELF, "this run")
+
+    def write(number):
+        event = {"path": [0.1 * number, 1.0]}, {"lam": np.arange(5.0) * number, "jump": np.zeros(0)}
+        checkpoint.write(number, *event, light=number not in (2, 3, 7))
+
+    for number in range(8):
+        write(number)
+    checkpoint.keep(count)
+    assert Checkpoint(tmp_path, MPI.COMM_SELF, "this run").count() == count
+    for number in range(count, 8):
+        assert same(map(checkpoint.read, range(number)))
+        write(number)
+    assert checkpoint.count() == 8 and same(map(checkpoint.read, range(8)))
+
+
 def test_the_checkpoint_of_another_run_is_refused(tmp_path):
     written(tmp_path)
     with pytest.raises(CaseError, match=r"--resume: .*000000\.h5 is of another run: expected that; found this run"):
