@@ -47,7 +47,7 @@ def _ratios(axes: Axes, rows: Rows) -> None:
     axes.set_xlabel("(computed - measured) / std")
     axes.set_title("measured / computed")
     if len(np.unique(tests)) > 1:
-        axes.legend(frameon=False)
+        axes.legend(frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
 def _curves(axes: Axes, rows: Rows) -> None:
