@@ -104,12 +104,20 @@ def run_main(comm: Comm, main: Callable[[], int]) -> int:
 
 def end_job(comm: Comm, error: BaseException) -> NoReturn:
     """Tell of an error that one rank has met alone, and end the processes of all."""
-    if isinstance(error, FetiHomogError):
-        complain(_told(error))
-        abort(comm, error.exit_code)
+    told = _without_memory(comm, error) if isinstance(error, MemoryError) else error
+    if isinstance(told, FetiHomogError):
+        complain(_told(told))
+        abort(comm, told.exit_code)
     text = "".join(traceback.format_exception(error))
     complain(f"rank {comm.rank} of {comm.size}:\n{text}")
     abort(comm, EXIT_DEFECT)
+
+
+def _without_memory(comm: Comm, error: MemoryError) -> FetiHomogError:
+    """Return the error in a line for the user."""
+    words = f": {error}" if str(error) else ""
+    hint = "`feti-homog check` estimates what a case needs, and more ranks share it"
+    return FetiHomogError(f"rank {comm.rank} of {comm.size} has no memory left{words}; {hint}")
 
 
 def abort(comm: Comm, exit_code: int) -> NoReturn:
@@ -166,4 +174,6 @@ def _portable(comm: Comm, error: Exception | None) -> Exception | None:
     """Return the exception as it is sent to other ranks: a defect as its traceback, for it may not be picklable."""
     if error is None or isinstance(error, FetiHomogError):
         return error
+    if isinstance(error, MemoryError):
+        return _without_memory(comm, error)
     return RemoteError(f"on rank {comm.rank}:\n{''.join(traceback.format_exception(error))}")

@@ -238,6 +238,17 @@ def test_types_are_known_not_asked_for():
     assert not [place(*at) for at in calls if isinstance(at[1].func, ast.Name) and at[1].func.id == "hasattr"]
 
 
+def test_no_result_depends_on_the_clock_of_the_day():
+    """It jumps: limits of time and durations are of clocks that only advance, owners of locks of ticks since boot."""
+    of_the_day = {"time.time", "time.time_ns", "time.localtime", "time.gmtime", "time.strftime", "time.ctime"}
+    names = [(path, node) for path in sources("feti_homog") for node in nodes(path, ast.Attribute)]
+    found = [place(*at) for at in names if at[1].attr.startswith(("st_mtime", "st_ctime", "st_atime", "getmtime"))]
+    found += [
+        place(*at) for at in names if ast.unparse(at[1]) in of_the_day or at[1].attr in ("now", "utcnow", "today")
+    ]
+    assert not found
+
+
 def test_defaults_are_immutable():
     """No list, dictionary, set or comprehension that all calls of a function would share."""
     mutable = (ast.List, ast.Dict, ast.Set, ast.ListComp, ast.DictComp, ast.SetComp)
