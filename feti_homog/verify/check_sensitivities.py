@@ -40,6 +40,30 @@ def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
         _check_energies(findings, cell, states, moved, direction)
     else:
         _check_constants(findings, cell, states, moved, direction)
+    if "uncertainty" in cell.files.document:
+        _check_uncertainty(findings, cell.files.document)
+
+
+def _check_uncertainty(findings: Findings, document: Mapping[str, Any]) -> None:
+    """Check the scatter sqrt(a.R a) of constants, of changes a by one standard deviation of each, and its shares."""
+    told, known = document["uncertainty"], document["sensitivities"]
+    given = {name: float(std) for name, std in document["case"]["uncertainty"].items() if name != "correlation"}
+    names = told["parameters"]
+    R = np.eye(len(names))
+    for first, second, value in document["case"]["uncertainty"].get("correlation", []):
+        i, j = names.index(first), names.index(second)
+        R[i, j] = R[j, i] = value
+    own = np.array([given[name] for name in names])
+    findings.record("tables", relative(np.array(told["parameter_std"]) - own, own), lambda k: f"uncertain {names[k]}")
+    for k, name in enumerate(told["constants"]):
+        row = np.array(known["derivatives"][known["constants"].index(name)])
+        a = np.array([row[known["parameters"].index(each)] for each in names]) * own
+        variance, most = float(a @ R @ a), float(np.abs(a).max())
+        std = max(variance, 0.0) ** 0.5
+        findings.record("sensitivities", abs(told["std"][k] - std) / (most or 1.0), f"scatter of {name}")
+        if variance > NOISE**2 * most**2:
+            off = np.array(told["shares"][k]) - a * (R @ a) / variance
+            findings.record("sensitivities", float(np.abs(off).max()), f"shares of {name}")
 
 
 def _check_energies(

@@ -52,3 +52,27 @@ def test_sensitivities_are_verified(tmp_path, kind):
         told["derivatives"][k][int(rows[k].argmax())] *= 1 + 1e-3
 
     assert broken(falsified(tmp_path / "own", tmp_path / "copy", edit)) == {"files", "sensitivities"}
+
+
+@pytest.mark.parametrize("key", ["std", "shares"])
+def test_scatter_is_verified(tmp_path, key):
+    scatter = {"material.matrix.young": 0.1, "material.fibre.young": 2.0}
+    pair = ["material.matrix.young", "material.fibre.young", -0.4]
+    case = {
+        "cell": SQUARE | {"mesh_size": 0.4},
+        "material": {"matrix": MATRIX, "fibre": FIBRE},
+        "analysis": {"type": "stiffness", "plane": "strain"},
+        "output": {"pictures": False, "mesh_error": False},
+        "uncertainty": {**scatter, "correlation": [pair]},
+        "petsc": {"feti_ksp_rtol": 1e-10},
+    }
+    run(Case.parse(case), MPI.COMM_SELF, out=tmp_path / "own")
+    certificate = verify(tmp_path / "own")
+    assert certificate.holds, certificate.text
+
+    def edit(document, _):
+        value = np.array(document["uncertainty"][key])
+        value[0] *= 1 + 1e-3
+        document["uncertainty"][key] = value.tolist()
+
+    assert broken(falsified(tmp_path / "own", tmp_path / "copy", edit)) == {"files", "sensitivities"}
