@@ -53,7 +53,8 @@ def follow(context: AnalysisContext, path: LoadPath, law: BondLaw) -> dict[str, 
     with EventProgress(context.progress, BARS[path.method], context.events) as shown:
         for number, (point, energies) in enumerate(_points(context, path, law, known)):
             responses = context.loads.responses(point.state, point.scale, brief=True)
-            source = "" if energies is None else ", from the checkpoint"
+            place = f"at {point.load_factor:.6f}, {responses[0].leading}"
+            place += "" if energies is None else ", from the checkpoint"
             if energies is not None:
                 work.resume_from(*energies, point)
             else:
@@ -62,7 +63,7 @@ def follow(context: AnalysisContext, path: LoadPath, law: BondLaw) -> dict[str, 
                     # Teeth are many and found again at once.
                     event = stored(point, work, context.loads.interfaces)
                     context.checkpoint.write(number, *event, light=point.broke == 0 < point.softened)
-            _tell(context, shown, f"{_label(path, number)} at {point.load_factor:.6f}{source}", responses)
+            _tell(context, shown, f"{_label(path, number)} {place}", responses)
             entries.append(_entry(context, law, point, responses, work))
             shown.advance(point.load_factor, f"{len(entries)} {path.method}, {_counts(entries[-1])}")
             last = point

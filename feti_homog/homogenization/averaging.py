@@ -18,6 +18,7 @@ from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, Equilibrium, Status
 from feti_homog.interface.loads.load import Load
+from feti_homog.materials.voigt import STRAINS, STRESSES
 from feti_homog.parallel.distributed_arrays import allreduce_sum
 from feti_homog.typing import Float
 
@@ -59,6 +60,12 @@ class Response:
     counts: dict[str, int]
     damage: Float
     shares: Float | None = None
+
+    @property
+    def leading(self) -> str:
+        """The largest strain of the plane and its stress, in words."""
+        k = int(np.abs(self.strain[: len(STRAINS)]).argmax())
+        return f"{STRAINS[k]} {self.strain[k]:.4g}, {STRESSES[k]} {self.stress[k]:.4g}"
 
     @property
     def debonded(self) -> int:
