@@ -36,11 +36,13 @@ def assert_runs(tmp_path, ranks, words, stiffness):
 
 
 @pytest.mark.parametrize(
-    "others",
-    [[], ["-feti_dual_operator", "implicit"], ["-feti_pc_type", "influence"], ["-feti_coarse_space", "natural"]],
-    ids=["default", "implicit", "influence", "natural"],
+    ("ranks", "others"),
+    [
+        *((ranks, others) for ranks in (1, 2) for others in ([], ["-feti_dual_operator", "implicit"])),
+        (2, ["-feti_pc_type", "influence"]),
+        (2, ["-feti_coarse_space", "natural"]),
+    ],
 )
-@pytest.mark.parametrize("ranks", [1, 2])
 def test_a_petsc_without_cholmod(tmp_path, stiffness, ranks, others):
     """Every factorization by MUMPS, whichever of them the run makes; it writes fields, which need the interiors."""
     assert_runs(tmp_path, ranks, [*WITHOUT_CHOLMOD, *others], stiffness)

@@ -24,23 +24,24 @@ sys.exit(cli.main(sys.argv[1:]))
 """
 
 
-@pytest.mark.parametrize("damage", ["truncated", "garbage", "foreign"])
-def test_a_corrupt_result_is_computed_again(tmp_path, damage):
-    out, path = tmp_path / "out", sweep_file(tmp_path, TWO)
+def test_corrupt_results_are_computed_again(tmp_path):
+    """Of a file that is cut, of one that is none, and of another case's."""
+    out, path = tmp_path / "out", sweep_file(tmp_path, "cell.fibre_fraction = [0.2, 0.25, 0.3, 0.35]\n")
     swept(out, path)
-    result = out / "case-0002/result.json"
-    content = {
-        "truncated": result.read_bytes()[:500], "garbage": os.urandom(500),
-        "foreign": (out / "case-0001/result.json").read_bytes(),
-    }[damage]  # fmt: skip
-    result.write_bytes(content)
+    file = [out / f"case-{number:04}/result.json" for number in range(1, 5)]
+    damaged = {file[1]: file[1].read_bytes()[:500], file[2]: os.urandom(500), file[3]: file[0].read_bytes()}
+    for result, content in damaged.items():
+        result.write_bytes(content)
     job = collected(out)
-    assert "1 done, 1 damaged" in job.stdout and "case-0002/result.json is" in job.stdout
-    assert [row["status"] for row in rows(out)][:2] == ["done", "damaged"]
-    job = swept(out, path)
-    assert "case-0002: " in job.stdout and "set aside, the case is computed again" in job.stdout
-    assert (out / "case-0002/result.json.damaged").read_bytes() == content
-    assert "2 done" in collected(out).stdout
+    assert "1 done, 3 damaged" in job.stdout
+    assert [row["status"] for row in rows(out)] == ["done", "damaged", "damaged", "damaged"]
+    again = swept(out, path)
+    for result, content in damaged.items():
+        assert f"{result.parent.name}/result.json is" in job.stdout
+        assert f"{result.parent.name}: " in again.stdout
+        assert result.with_name("result.json.damaged").read_bytes() == content
+    assert again.stdout.count("set aside, the case is computed again") == 3
+    assert "4 done" in collected(out).stdout
 
 
 def test_a_damaged_list_of_cases_is_told(tmp_path):
