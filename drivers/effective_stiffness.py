@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from figures import EQUATION_38, add_output_options, computed, written
+from figures import EQUATION_38, INK, STYLE, add_output_options, computed, written
 from mpi4py.MPI import Intracomm
 
 from feti_homog import Case, launch
@@ -64,18 +64,19 @@ def stiffness(arguments: argparse.Namespace, comm: Intracomm, geometry: str, pla
 
 def draw(fractions: Sequence[float], sweep: Sequence[Any], path: Path) -> Path:
     """Return the entries over the fibre fraction."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    import matplotlib
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(5, 3.5), layout="constrained")
-    FigureCanvasAgg(figure)
-    axes = figure.subplots()
-    for name, (i, j) in ENTRIES.items():
-        axes.plot(fractions, [L[i, j] for L in sweep], "o-", label=name)
-    axes.set(xlabel="fibre fraction", ylabel="effective stiffness (GPa)", ylim=(0, None))
-    axes.set_title("hexagonal cell, plane strain")
-    axes.legend(frameon=False)
-    figure.savefig(path, dpi=150)
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(5, 3.5), layout="constrained")
+        axes = figure.subplots()
+        for (name, (i, j)), ink in zip(ENTRIES.items(), INK, strict=False):
+            axes.plot(fractions, [L[i, j] for L in sweep], "o-", color=ink, label=f"$C_{{{name[1:]}}}$")
+        axes.set(xlabel="fibre fraction", ylabel="effective stiffness (GPa)", ylim=(0, None))
+        axes.grid(color="0.92", linewidth=0.6)
+        axes.set_title("hexagonal cell, plane strain")
+        axes.legend(frameon=False)
+        figure.savefig(path)
     return path
 
 

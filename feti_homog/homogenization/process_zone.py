@@ -65,9 +65,17 @@ def warnings(case: Case, width: float, edge: float) -> list[str]:
     if case.cell.refine:
         found += f" after refine = {case.cell.refine}"
     symbols, share = ("E' G / N^2", "a third") if softens else ("E' G_Ic / sigma_c^2", "half")
-    wanted = f"the process zone is {symbols} = {length:.3g} long, elements should be at most {share} of that"
+    strength = "" if softens else f" for sigma_c = sqrt(2 k_n G_Ic) = {_opening_strength(case):.3g}"
+    wanted = f"the process zone is {symbols} = {length:.3g} long{strength}, elements should be at most {share} of that"
     law = f'[interface] law = "{case.interfaces[0].criterion}"'
     return [f"{law}: {found}; {wanted}: set {_remedies(case, width, edge, resolved * length)}", *others]
+
+
+def _opening_strength(case: Case) -> float:
+    """Return the traction at which the bonds of the shortest process zone break in pure opening, by energy."""
+    bonds = [bond for bond in case.interfaces if bond.toughness and bond.normal_stiffness]
+    stiffest = max(bonds, key=lambda bond: bond.normal_stiffness)
+    return math.sqrt(2.0 * stiffest.normal_stiffness * (stiffest.toughness or 0.0))
 
 
 def _of_paths(case: Case) -> list[str]:
