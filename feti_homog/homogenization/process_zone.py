@@ -73,9 +73,9 @@ def warnings(case: Case, width: float, edge: float) -> list[str]:
 
 def _opening_strength(case: Case) -> float:
     """Return the traction at which the bonds of the shortest process zone break in pure opening, by energy."""
-    bonds = [bond for bond in case.interfaces if bond.toughness and bond.normal_stiffness]
-    stiffest = max(bonds, key=lambda bond: bond.normal_stiffness)
-    return math.sqrt(2.0 * stiffest.normal_stiffness * (stiffest.toughness or 0.0))
+    pairs = [(bond.normal_stiffness or 0.0, bond.toughness or 0.0) for bond in case.interfaces]
+    stiffness, toughness = max(pair for pair in pairs if all(pair))
+    return math.sqrt(2.0 * stiffness * toughness)
 
 
 def _of_paths(case: Case) -> list[str]:
