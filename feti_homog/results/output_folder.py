@@ -62,6 +62,8 @@ def usable(directory: Path) -> None:
             raise CaseError(f"--out {directory}: expected a folder that can be written to; {there} cannot")
     except OSError as error:
         raise CaseError(f"--out {directory}: cannot be used: {error.strerror}") from error
+    if (directory / LOCK).is_symlink():  # whose file elsewhere would get the name of the holder
+        raise CaseError(f"--out {directory}: {LOCK} is a link there; move it away or choose another folder")
     if (who := holder(directory / LOCK)) is not None:
         raise _busy(directory, who)
 

@@ -76,7 +76,7 @@ class Lock:
 
     def _take(self) -> None:
         try:
-            self._file = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o666)
+            self._file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666)
             self._try_until(time.monotonic() + self.timeout)
             if not self.shared:
                 with contextlib.suppress(OSError):  # it holds on a full disk too, without the name of its holder

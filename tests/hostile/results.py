@@ -141,6 +141,7 @@ OUTS: dict[str, tuple[str, Mapping[str, Content], str]] = {
     "a null character": ("@/a\0b", {}, "null character"),
     "nothing": ("", {}, "no name of a folder"),
     "results of others": ("@/out", MINE, "no run of this program wrote result.json"),
+    "a lock elsewhere": ("@/out", {"mine": "mine", "out/result.lock": link_to("../mine")}, "result.lock is a link"),
     "a checkpoint elsewhere": ("@/out", {"out/checkpoint": link_to("/etc")}, "checkpoint is a link"),
 }
 

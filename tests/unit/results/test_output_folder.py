@@ -12,6 +12,7 @@ from mpi4py import MPI
 
 from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.results import output_folder
+from feti_homog.runtime.file_locks import Lock
 
 
 def test_folders_that_stay_empty_are_removed(tmp_path):
@@ -83,3 +84,15 @@ def test_other_failures_of_the_lock_are_errors(tmp_path, monkeypatch):
     monkeypatch.setattr(fcntl, "flock", flock)
     with pytest.raises(FetiHomogError, match="cannot lock"), output_folder.held(tmp_path, MPI.COMM_SELF, print):
         pass
+
+
+def test_a_lock_that_is_a_link_is_not_followed(tmp_path):
+    mine, out = tmp_path / "mine", tmp_path / "out"
+    mine.write_text("mine")
+    out.mkdir()
+    (out / output_folder.LOCK).symlink_to(mine)
+    with pytest.raises(CaseError, match=r"result\.lock is a link there"):
+        output_folder.usable(out)
+    with pytest.raises(FetiHomogError, match="cannot lock"), Lock(out / output_folder.LOCK):
+        pass
+    assert mine.read_text() == "mine"
