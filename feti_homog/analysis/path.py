@@ -144,8 +144,8 @@ def _points(
 def _sliding_cell(context: AnalysisContext) -> SlidingCell:
     """Return the faces of the case with the friction of its interfaces.  Collective; raises as `SlidingCell`."""
     cell, pair = context.loads.interfaces, context.loads.interfaces.nodes.pair
-    friction, tied = np.array([(each.friction, each.is_tied) for each in context.case.interfaces]).T
-    return SlidingCell(cell, friction[pair], tied[pair] > 0.0 if tied.any() else None)
+    friction, of_damage, tied = np.array([each.rubbing for each in context.case.interfaces]).T
+    return SlidingCell(cell, friction[pair], of_damage[pair], tied[pair] > 0.0 if tied.any() else None)
 
 
 def _tell(context: AnalysisContext, shown: EventProgress, name: str, responses: Sequence[Response]) -> None:

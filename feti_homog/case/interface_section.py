@@ -93,6 +93,13 @@ class InterfaceSection:
         default=0.0,
         only=(PATH_ANALYSIS, BY_EVENTS),
     )
+    friction_on_damage: bool = key(
+        boolean,
+        "true: friction acts on the damaged share of bonds that hold, too, with the whole of their pressure. false: on "
+        "broken bonds alone.",
+        default=False,
+        only=(PATH_ANALYSIS, BY_EVENTS, SOFTENING),
+    )
     axial_friction: str = key(
         choice("free", "prevented"),
         'Slip along the fibre of debonded faces with friction: "free": they bear no shear along it, as without '
@@ -262,9 +269,10 @@ class InterfaceSection:
     )
 
     @property
-    def is_tied(self) -> bool:
-        """Return whether debonded faces that touch do not slip along the fibres."""
-        return self.friction > 0.0 and self.axial_friction == "prevented"
+    def rubbing(self) -> tuple[float, float, bool]:
+        """Coefficients of debonded faces and of damaged shares; whether faces that touch are tied along the fibres."""
+        tied = self.friction > 0.0 and self.axial_friction == "prevented"
+        return self.friction, self.friction * self.friction_on_damage, tied
 
 
 def interface_tables(document: Mapping[str, Any]) -> list[Any]:

@@ -16,6 +16,7 @@ from feti_homog.errors import ConvergenceError
 from feti_homog.feti.operators.node_blocks import NodeBlocks
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.contact.contact_problem import ContactProblem
+from feti_homog.interface.contact.rubbing_bonds import energy_beside_springs, slipped
 from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, Equilibrium, Status
 from feti_homog.interface.loads.load import Load
 from feti_homog.materials.voigt import STRAINS, STRESSES
@@ -132,7 +133,7 @@ class Homogenization:
         strain, u = state.solution.strain, solver.boundary_displacement(state.solution)
         stress, star, energy = self._averages(strain, u)
         springs = state.solution.compliance * state.solution.lam
-        active = self.interface.active(state.status)
+        active = self.interface.active(state.status) * (slipped(self.interface, state) == 0.0)
         opened = state.solution.jump * (1 - active) + springs
         opening = allreduce_sum(self.cell.comm, self._strain_of_jumps.T @ opened)
         energy += self._stretched(state)
@@ -151,9 +152,10 @@ class Homogenization:
         return self._scaled(state, scale, stress, energy, u, checks)
 
     def _stretched(self, state: Equilibrium) -> float:
-        """Return lam C lam per area, twice what springs store.  Collective."""
+        """Return lam C lam per area, twice what springs store; also of bonds that rub.  Collective."""
         springs = state.solution.compliance * state.solution.lam
-        return float(self.cell.comm.allreduce(float(state.solution.lam @ springs))) / self.cell.summary.area
+        twice = float(state.solution.lam @ springs) + energy_beside_springs(self.interface, state)
+        return float(self.cell.comm.allreduce(twice)) / self.cell.summary.area
 
     def _scaled(
         self, state: Equilibrium, scale: float, stress: Float, energy: float, u: Float, checks: dict[str, float]
@@ -173,7 +175,7 @@ class Homogenization:
         """
         if state.bonds.gap_and_slip is None:
             return 0.0
-        own = float(state.solution.lam @ state.solution.jump)
+        own = float(state.solution.lam @ state.solution.jump) - energy_beside_springs(self.interface, state)
         return float(self.cell.comm.allreduce(own)) / self.cell.summary.area
 
     def _unmet_stress(self, state: Equilibrium, stress: Float) -> float:

@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import dijkstra
 from feti_homog.typing import AnyInt, Bool, Float, Int
 from feti_homog.verify.bond_laws.law import BondLaw, law_of
 from feti_homog.verify.cell_tables import Mesh
-from feti_homog.verify.reading import ResultFiles
+from feti_homog.verify.reading import ResultFiles, State
 from feti_homog.verify.torus import TornSides
 
 COATING = "coating"
@@ -48,6 +48,12 @@ def friction_at(files: ResultFiles) -> Float:
     return _of_pairs(files, [float(section.get("friction", 0.0)) for section in files.interfaces or [{}]])
 
 
+def friction_of_damage_at(files: ResultFiles) -> Float:
+    """(k,) coefficient of friction of the damaged share of bonds that hold."""
+    on = [float(section.get("friction_on_damage", False)) for section in files.interfaces or [{}]]
+    return _of_pairs(files, on) * friction_at(files)
+
+
 def tied_at(files: ResultFiles) -> Bool:
     """(k,) nodes whose faces do not slip along the fibres while they touch."""
     sections = files.interfaces or [{}]
@@ -59,6 +65,34 @@ def _of_pairs(files: ResultFiles, values: Sequence[float]) -> Float:
     """(k,) the value of the section of each interface node."""
     found: Float = np.array(values, float)[np.minimum(files.interface.pair, len(values) - 1)]
     return found
+
+
+def rubbing_force(files: ResultFiles, state: State) -> Float:
+    """(k,) shear on the damaged share of bonds that hold, where friction acts on it; 0 of others.
+
+    The slip is C_0 traction + g, the force is traction - g / (C - C_0).
+    """
+    unit, none = np.ones_like(state.traction), np.zeros(len(state.damage))
+    intact, whole = (law_at(files, damage=own).jumps(unit)[:, 1] for own in (none, state.damage))
+    own = (state.status == 0) & (whole > intact) & (friction_of_damage_at(files) > 0.0)
+    g = state.jump[:, 1] - intact * state.traction[:, 1]
+    return np.where(own, state.traction[:, 1] - g / np.where(own, whole - intact, 1.0), 0.0)
+
+
+def held_traction(files: ResultFiles, state: State) -> Float:
+    """(k, c) tractions; of damaged bonds without that on their damaged share."""
+    held = state.traction.copy()
+    held[:, 1] -= state.damage * rubbing_force(files, state)
+    return held
+
+
+def energy_of_springs(files: ResultFiles, state: State) -> float:
+    """Return what all springs store: of bonds that rub (1 - d) K s^2 / 2 and f^2 / (2 K) of the share d."""
+    held, force = held_traction(files, state), rubbing_force(files, state)
+    law = law_at(files, damage=state.damage)
+    intact = law_at(files, damage=np.zeros(len(force))).jumps(np.ones_like(held))[:, 1]
+    twice = (held * law.jumps(held)).sum(axis=1) + state.damage * intact * force**2
+    return float(twice @ files.interface.length) / 2
 
 
 def _number(section: Mapping[str, Any], name: str) -> float:

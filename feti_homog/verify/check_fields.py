@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from feti_homog.typing import Float, Int
-from feti_homog.verify.bonds import friction_at, law_at, tied_at
+from feti_homog.typing import Bool, Float, Int
+from feti_homog.verify.bonds import friction_at, friction_of_damage_at, law_at, rubbing_force, tied_at
 from feti_homog.verify.constitutive_law import out_of_plane
 from feti_homog.verify.discrete_cell import ROUNDED_TERMS, DiscreteCell
 from feti_homog.verify.elements import PLACES, ElementFields
@@ -26,15 +26,27 @@ def check_interface_state(findings: Findings, cell: DiscreteCell, state: State) 
     off = np.abs(state.damage.clip(np.where(state.status == BONDED, 0.0, 1.0), most) - state.damage)
     findings.record("bond", off, f"{state.name}, damage of node {{}}".format)
     slack = state.jump - law_at(cell.files, damage=state.damage).jumps(state.traction)
+    rubs = (friction_of_damage_at(cell.files) > 0.0) & (state.status == BONDED) & (state.damage > 0.0)
+    slack[rubs, 1] = 0.0
     findings.record("bond", relative(np.where(state.status != OPEN, np.abs(slack[:, 0]), 0.0), largest), at)
     findings.record(
         "bond", relative(np.where(state.status == BONDED, np.abs(slack[:, 1:]).max(axis=1), 0.0), largest), at
     )
     if (state.status != BONDED).any():
-        _check_contact(findings, cell, state)
+        _check_contact(findings, cell, state, rubs)
+    if rubs.any():
+        _check_rubbing_bonds(findings, cell, state, rubs)
 
 
-def _check_contact(findings: Findings, cell: DiscreteCell, state: State) -> None:
+def _check_rubbing_bonds(findings: Findings, cell: DiscreteCell, state: State, rubs: Bool) -> None:
+    """Check that the shear on the damaged share of bonds is within mu p, and s mu p where it slides."""
+    force, pull = rubbing_force(cell.files, state), max(float(np.abs(state.traction).max()), cell.least_stress(state))
+    limit = friction_of_damage_at(cell.files) * np.maximum(-state.traction[:, 0], 0.0)
+    off = np.where(state.sliding != 0, np.abs(state.sliding * force - limit), np.maximum(np.abs(force) - limit, 0.0))
+    findings.record("sliding", relative(np.where(rubs, off, 0.0), pull), f"{state.name}, bond {{}}".format)
+
+
+def _check_contact(findings: Findings, cell: DiscreteCell, state: State, rubs: Bool) -> None:
     """gap >= 0, traction <= 0, gap traction = 0, and no other force on debonded faces than friction."""
     at = f"{state.name}, interface node {{}}".format
     debonded, closed = state.status != BONDED, state.status == CLOSED
@@ -50,8 +62,8 @@ def _check_contact(findings: Findings, cell: DiscreteCell, state: State) -> None
     findings.record("free faces", relative(free, pull), at)
     if friction.any():
         opposed = state.sliding * state.traction[:, 1] - friction
-        findings.record("sliding", relative(np.where(state.sliding != 0, opposed, 0.0), pull), at)
-        findings.record("sliding", np.where(closed, 0.0, np.abs(state.sliding)), at)
+        findings.record("sliding", relative(np.where((state.sliding != 0) & closed, opposed, 0.0), pull), at)
+        findings.record("sliding", np.where(closed | rubs, 0.0, np.abs(state.sliding)), at)
     if cell.files.contact:
         findings.record("penetration", relative(np.where(debonded, np.maximum(-gap, 0.0), 0.0), imposed), at)
         findings.record("tension", relative(np.where(closed, np.maximum(normal, 0.0), 0.0), pull), at)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.typing import AnyInt, Bool, Float
-from feti_homog.verify.bonds import law_at
+from feti_homog.verify.bonds import energy_of_springs, held_traction, law_at
 from feti_homog.verify.check_fields import BONDED, CLOSED, OPEN
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.elements import ElementFields
@@ -80,15 +80,15 @@ class StateNumbers:
         """Return those of a state of a cell."""
         law = law_at(cell.files, damage=state.damage)
         released = tips(cell, state.status) & law.grows_by_release
-        used = np.where(state.status == BONDED, law.utilisation(state.traction), 0.0)
+        held = held_traction(cell.files, state)
+        used = np.where(state.status == BONDED, law.utilisation(held), 0.0)
         used[released] = np.nan
-        stretched = state.traction * law.jumps(state.traction) * cell.files.interface.length[:, None]
-        in_springs = float(stretched.sum()) / (2 * cell.area)
+        in_springs = energy_of_springs(cell.files, state) / cell.area
         heat = _heat(cell, state)
         energies = fields.energy / (2 * cell.area) + state.temperature * heat / 2 + in_springs, in_springs
         means = state.strain, state.mean_stress
         return cls(
-            state.name, state.load_factor, state.point, *means, *energies, state.traction, state.status,
+            state.name, state.load_factor, state.point, *means, *energies, held, state.status,
             state.damage, released,
             used, state.temperature, heat, _expanding(cell, fields),
         )  # fmt: skip

@@ -61,7 +61,11 @@ def test_paths_are_those_of_a_slow_twin(comm, waypoints, springs):
 
 @pytest.mark.parametrize(
     ("plane", "law"),
-    [("strain", {}), ("strain", SOFTENING), ("generalized", SOFTENING | {"axial_friction": "prevented"})],
+    [
+        ("strain", {}),
+        ("strain", SOFTENING),
+        ("generalized", SOFTENING | {"axial_friction": "prevented", "friction_on_damage": True}),
+    ],
     ids=["strength", "softening", "tied along fibres"],
 )
 def test_breaks_with_friction_obey_every_law_resumed_too(comm, shared_path, plane, law):

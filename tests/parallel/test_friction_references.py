@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from reference.closed_forms import first_slip, lame, rubbing_laminate
+from reference.closed_forms import first_slip, lame, rubbing_bond, rubbing_laminate
 from reference.friction import RubbingFaces
 from reference.friction_path import FrictionPath
-from support.loaded_twins import EPOXY_GLASS, LoadedTwin, is_end, solved
+from support.loaded_twins import EPOXY_GLASS, LoadedTwin, document, is_end, solved
+from support.ranks import parallel_assert
 from unit.mesh.faulty_meshes import grid
 
+from feti_homog import Case, run
 from feti_homog.parallel.mpi_errors import on_root
+from feti_homog.verify.certificate import verify
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 WHOLE = {"debonded": [{"fibre": "all", "angle": 360.0}]}
@@ -38,6 +41,39 @@ def test_a_laminate_closes_its_parallelogram(comm, shared_path):
     stress, heat = rubbing_laminate(across, shear, 0.3, -0.01, shears)
     np.testing.assert_allclose([p.stress[2] for p in points], stress, atol=1e-10 * stress.max())
     np.testing.assert_allclose([p.friction_heat for p in points], heat, atol=1e-10 * heat.max())
+
+
+def test_bonds_of_a_laminate_rub_with_their_damaged_share(comm, shared_path):
+    """The first of two teeth, cycles, and where the second breaks them: stress, heat and certificate."""
+    if comm.rank == 0:
+        grid(lambda x, y: 0.25 < x < 0.5).write(shared_path / "strip.msh")
+    comm.barrier()
+    phases = ({"young": 2.0, "poisson": 0.299}, {"young": 5.0, "poisson": 0.222})
+    compliance = np.array([0.75, 0.25]) @ (1.0 / np.array([lame(phase)[1] for phase in phases]))
+    K, first, rho = 2.0, 0.01, 4.0
+    kinds = ("normal", "tangential")
+    law = {f"{kind}_{what}": value for kind in kinds for what, value in (
+        ("stiffness", K), ("strength", K * first), ("toughness", rho * K * first**2 / 2),
+    )}  # fmt: skip
+    interface = law | {"law": "bilinear", "teeth": 2, "friction": 0.3, "friction_on_damage": True}
+    damage = rho * (rho**0.5 - 1) / (rho**0.5 * (rho - 1))
+    shears = [0.0, *[0.06, -0.05] * 3, 0.15]
+    case = {"cell": {"geometry": "mesh", "file": "strip.msh"}, "phases": phases, "plane": "strain"}
+    path = {"waypoints": [[-0.01, 0.0, gamma] for gamma in shears]}
+    asked = document(**case, interface=interface, path=path)
+    asked["output"] = {"pictures": False, "states": "all"}
+    path = run(Case.parse(asked, shared_path), comm, out=shared_path / "out").path
+    *points, last = at_ends(path, len(shears))
+    bound = -0.3 * last.stress[0]
+    stress, heat = rubbing_bond(compliance, 2.0, K, damage, bound, shears[:-1])
+    np.testing.assert_allclose([p.stress[2] for p in points], stress, atol=1e-10 * stress.max())
+    np.testing.assert_allclose([p.friction_heat for p in points], heat, atol=1e-10 * heat.max())
+    assert points[-1].damaged_length[0] > 0.0 and heat[-1] > 2 * heat[1] > 0.0
+    slip, (broken,) = first * rho**0.75, [p for p in path if p.broke]
+    held = compliance * ((1 - damage) * K * slip + damage * bound)
+    assert broken.strain[2] == pytest.approx(held + 2 * slip, rel=1e-9) and last.stress[2] == pytest.approx(bound)
+    certificate = verify(shared_path / "out") if comm.rank == 0 else None
+    parallel_assert(comm, certificate is None or certificate.holds, certificate and certificate.text)
 
 
 @pytest.mark.slow

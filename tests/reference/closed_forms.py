@@ -122,3 +122,21 @@ def rubbing_laminate(across, shear, friction, strain, shears):
         heat += most * abs(elastic - stress) / shear
         found.append((stress, heat))
     return np.array(found).T
+
+
+def rubbing_bond(compliance, faces, stiffness, damage, bound, shears):
+    """Shear stress and heat at shears from zero, of a laminate with so many faces per length, with bonds that rub.
+
+    Each bears (1 - d) K s + d f, f = K (s - s_i) within the bound mu p; `compliance` is that of the layers.
+    """
+    stress, heat, slipped, K, d = [], [0.0], 0.0, stiffness, damage
+    for shear in shears:
+        s = (shear + compliance * d * K * slipped) / (compliance * K + faces)
+        f = K * (s - slipped)
+        if abs(f) > bound:
+            f = np.sign(f) * bound
+            s = (shear - compliance * d * f) / (compliance * (1 - d) * K + faces)
+        heat.append(heat[-1] + faces * d * f * (s - f / K - slipped))
+        slipped = s - f / K
+        stress.append((1 - d) * K * s + d * f)
+    return np.array(stress), np.array(heat[1:])

@@ -29,15 +29,18 @@ class SlidingCell:
 
     Attributes:
         interface: the contact problem of the plane.
-        friction: (k,) mu of the nodes of this rank.
+        friction, friction_of_damage: (k,) mu of the nodes of this rank; of the damaged share of bonds that hold.
         tied: (k,) which of them do not slip along the fibres while they touch; None where none of any rank is.
         rows: (n,) global normal rows of the debonded nodes, rising.
         faces: of these nodes, on every rank.
     """
 
-    def __init__(self, cell: CoupledInterfaces, friction: Float, tied: Bool | None = None) -> None:
+    def __init__(
+        self, cell: CoupledInterfaces, friction: Float, friction_of_damage: Float, tied: Bool | None = None
+    ) -> None:
         """Find the response of the bonded cell to its loads.  Collective; raises as `CondensedProblem`."""
-        self.cell, self.interface, self.friction, self.tied = cell, cell.plane, friction, tied
+        self.cell, self.interface, self.tied = cell, cell.plane, tied
+        self.friction, self.friction_of_damage = friction, friction_of_damage
         self.solver = self.interface.solver
         self._plane, *self._axial = (CondensedProblem(each) for each in cell.problems)
         self._loads = len(self.solver.problem.loads)
@@ -48,10 +51,11 @@ class SlidingCell:
         """Have the faces of the debonded nodes, and of damaged bonds, which are on springs.  Collective."""
         comm, row, first = self.solver.comm, self.interface.nodes.row, self._plane.first
         more = np.hstack([self._gained(each, bonds) for each in (self._plane, *self._axial)])
+        self._more = more[:, 1]
         self._damaged = (bonds.status == BONDED) & (more[:, :2] > 0.0).any(axis=1)
         self._own = np.flatnonzero((bonds.status != BONDED) | self._damaged)
         springs = np.divide(1.0, more, out=np.zeros_like(more), where=(more > 0.0) & self._damaged[:, None])
-        friction = np.where(self._damaged, 0.0, self.friction)
+        friction = np.where(self._damaged, self.friction_of_damage, self.friction)
         along = [each.first + each.interface.nodes.row for each in self._axial]
         tied = np.zeros(len(row), bool) if self.tied is None else self.tied & ~self._damaged
         own = np.column_stack([first + row, friction, tied, *along, springs])[self._own]
@@ -124,7 +128,8 @@ class SlidingCell:
         nodes, sliding = before.status.copy(), np.zeros(len(before.status), np.int8)
         holds, pressed = self._damaged[self._own], before.pressed.copy()
         nodes[self._own] = np.where(holds, BONDED, np.where(own == OPEN_FACE, OPEN, CLOSED))
-        sliding[self._own] = np.where((own == OPEN_FACE) | holds, STICK, own)
+        rubs = (self.faces.friction[self._place] > 0.0) | ~holds
+        sliding[self._own] = np.where((own != OPEN_FACE) & rubs, own, STICK)
         pressed[self._own] = np.where(holds, own != OPEN_FACE, pressed[self._own])
         return replace(before, status=nodes, pressed=pressed, gap_and_slip=jump, sliding=sliding)
 
@@ -143,10 +148,17 @@ class SlidingCell:
         return Multipliers(each.multipliers(*own) for each, own in self._parts(x))
 
     def traction(self, x: Float) -> Float:
-        """(k, 2) or (k, 3) traction of scaled x at the nodes of this rank, also along the fibre."""
+        """(k, 2) or (k, 3) traction of scaled x at the nodes of this rank, also along the fibre.
+
+        Of damaged bonds it is that of the share that holds.
+        """
         pairs = zip(self.cell.problems, self.multipliers(x), strict=True)
         rows = [lam[p.nodes.row[:, None] + np.arange(p.solver.jump_operator.components)] for p, lam in pairs]
-        return np.asarray(np.hstack(rows) / self.interface.nodes.length[:, None])
+        force, slip = np.hstack(rows), self._jumps_of(x)[0][1::2][self._place]
+        damaged = self._damaged[self._own]
+        node, C = self._own[damaged], self.solver.intact_compliance[self.interface.nodes.row[self._own[damaged]] + 1]
+        force[node, 1] = (C * force[node, 1] + slip[damaged]) / (C + self._more[node])
+        return np.asarray(force / self.interface.nodes.length[:, None])
 
     def _parts(self, x: Float) -> list[tuple[CondensedProblem, tuple[Float, Float]]]:
         """Return each problem with its jumps and strains of scaled x."""
@@ -190,10 +202,13 @@ class SlidingCell:
         Collective.
         """
         normal, shear = self.interface.traction(solution).T
-        limit, scales = self.friction * np.maximum(-normal, 0.0), self.interface.scales
+        slipped, damaged = -solution.jump[self.interface.nodes.row + 1], self._damaged
+        shear[damaged] = (slipped / self.interface.nodes.length)[damaged] / self._more[damaged]
+        friction = np.where(damaged, self.friction_of_damage, self.friction)
+        limit, scales = friction * np.maximum(-normal, 0.0), self.interface.scales
         largest = scales.over_interface(np.maximum(np.abs(normal), np.abs(shear)))
         largest = np.maximum(largest, scales.bond_stress(self.interface.acting(bonds, solution.strain)))
         sliding = bonds.sliding_signs
         off = np.where(sliding == 0, np.maximum(np.abs(shear) - limit, 0.0), np.abs(sliding * shear - limit))
-        off = np.where(bonds.status == BONDED, 0.0, off) / np.where(largest > 0.0, largest, 1.0)
+        off = np.where((bonds.status == BONDED) & ~damaged, 0.0, off) / np.where(largest > 0.0, largest, 1.0)
         return float(self.solver.comm.allreduce(off.max(initial=0.0), MPI.MAX))

@@ -9,6 +9,7 @@ import numpy as np
 from mpi4py import MPI
 
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
+from feti_homog.interface.contact.rubbing_bonds import held_traction
 from feti_homog.interface.contact.states import BONDED, BondState, Equilibrium
 from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.loads.load import Macroscopic, Multipliers
@@ -117,7 +118,7 @@ def unloaded(cell: CoupledInterfaces, bonds: BondState) -> PathState:
 
 def break_bonds(cell: CoupledInterfaces, law: BondLaw, which: Bool, state: Equilibrium) -> Break:
     """Break the bonds `which` (k,) in the modes of an equilibrium, whatever its size.  Collective."""
-    traction = cell.traction(state.solutions)
+    traction = held_traction(cell, state)
     history, parts = law.after(state.bonds, which, traction)
     status = cell.plane.debond(state.status, parts, state.multipliers.plane)
     energy = _fracture_energy(cell, law, which, state.bonds, traction)
@@ -141,7 +142,7 @@ def most_utilised(cell: CoupledInterfaces, law: BondLaw, state: Equilibrium) -> 
     The largest of all, and which (k,) have it. Collective, rank 0 decides.
     """
     comm = cell.comm
-    used = law.utilisation(cell, state.bonds)(cell.traction(state.solutions))
+    used = law.utilisation(cell, state.bonds)(held_traction(cell, state))
     used = np.where(state.status == BONDED, used, 0.0)
     largest = comm.bcast(comm.reduce(used.max(initial=0.0), MPI.MAX))
     return used, float(largest), (used >= largest * (1.0 - UTILISATION_TIE)) & (used > 0.0)
