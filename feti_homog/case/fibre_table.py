@@ -108,8 +108,8 @@ class FibreTable:
 def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
     """Return the table in a text file, which is not judged as a whole: fibres may overlap.
 
-    A line of names comes first, unless `columns` has them: x, y, radius (or a, b), and phase, coating, angle if
-    there are any, or names that `understood` knows; then a line for each fibre. Columns are parted by commas,
+    A line of names comes first, in whose place `columns` has them: x, y, radius (or a, b), and phase, coating, angle
+    if there are any, or names that `understood` knows; then a line for each fibre. Columns are parted by commas,
     semicolons, tabs or else by spaces; without commas between columns, decimals may have them. What follows "#" is
     a comment; "# width = 120, height = 80" tells the size of the cell, and "left" and "bottom" where it begins.
 
@@ -130,8 +130,7 @@ def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
     read, others = understood(words, COLUMNS)
     _check_names(words, read, others, lines[0][0], faults)
     faults.throw()
-    below = _without_units(lines[1:], delimiter) if columns is None else lines
-    rows = dict(_split(below, read, len(words), delimiter, faults))
+    rows = dict(_split(_below_names(lines, columns is None, delimiter), read, len(words), delimiter, faults))
     remarks = (f"[cell] {name}: not read: {', '.join(map(toml_value, others))}",) if others else ()
     return replace(_table(name, rows, {column.name for column in read}, sizes, faults), remarks=remarks)
 
@@ -165,10 +164,12 @@ class _Faults:
             raise CaseError(*self.lines)
 
 
-def _without_units(lines: list[tuple[int, str]], delimiter: str | None) -> list[tuple[int, str]]:
-    """Return the lines below that of names, without one of units."""
-    has_units = lines and are_units([_bare(word) for word in lines[0][1].split(delimiter)])
-    return lines[1:] if has_units else lines
+def _below_names(lines: list[tuple[int, str]], has_names: bool, delimiter: str | None) -> list[tuple[int, str]]:
+    """Return the lines of fibres: without the first if it has names, or no numbers, and without a next one of units."""
+    first, *others = [[_bare(word) for word in line.split(delimiter)] for _, line in lines[:2]]
+    if not has_names and any(number_of(word, delimiter) is not None for word in first):
+        return lines
+    return lines[2 if others and are_units(others[0]) else 1 :]
 
 
 def _bare(word: str) -> str:

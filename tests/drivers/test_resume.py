@@ -179,8 +179,6 @@ def test_a_path_killed_again_and_again_ends_as_one_left_in_peace(tmp_path, refer
     assert f"{last} events are taken from the checkpoint" in job.stdout and found["resumed"] == last
     log = (out / "events.log").read_text().splitlines()
     assert [", from the checkpoint: " in line for line in log[1:]] == [n < last for n in range(len(found["path"]))]
-    for line, point in zip(log[1:], found["path"], strict=True):
-        assert f", E11 {point['strain'][0]:.4g}, S11 {point['stress'][0]:.4g}" in line
     assert found["states"] == expected["states"]
     assert_same_curve(found["path"], expected["path"])
     # A finished event costs no solve: those left took at least one each, and no more than in the whole run.

@@ -14,6 +14,7 @@ from support.ranks import PIECES, parallel_assert
 
 from feti_homog import Case, run
 from feti_homog.errors import ConvergenceError
+from feti_homog.materials.voigt import STRAINS, STRESSES
 from feti_homog.parallel.mpi_errors import on_root
 from feti_homog.results import field_file
 from feti_homog.verify.certificate import verify
@@ -89,7 +90,11 @@ def assert_kept_of(folder: Path, whole: Path) -> None:
         for value, wanted in [*tips, *((point[name], expected[name]) for name in numbers_of)]:
             # After an interruption influence columns are found in another order, which changes rounding.
             assert value == pytest.approx(wanted, rel=1e-9, abs=EXACT)
-    assert len((folder / "events.log").read_text().splitlines()) == 1 + len(curves[0])
+    log = (folder / "events.log").read_text().splitlines()[1:]
+    for line, point in zip(log, curves[0], strict=True):
+        k = int(np.abs(point["strain"]).argmax())
+        reached = f"{STRAINS[k]} {point['strain'][k]:.4g}, {STRESSES[k]} {point['stress'][k]:.4g}"
+        assert f", {reached}" in line
 
 
 @pytest.fixture(scope="module")

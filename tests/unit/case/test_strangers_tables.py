@@ -69,6 +69,14 @@ def test_a_table_without_names_is_read_by_those_of_the_case(tmp_path, name, mark
         case(tmp_path / name, text)
 
 
+@pytest.mark.parametrize("names", ["Var1,Var2,Var3", "Durchmesser,Rechtswert,Hochwert", "d,x,y\num,um,um"])
+def test_names_of_the_case_take_the_place_of_those_of_the_table(tmp_path, names):
+    text = f"{SIZE}{names}\n2,2,2\n2.4,5,4\n"
+    is_expected(case(tmp_path / "t.csv", text, columns=["d", "x", "y"]).cell.table)
+    with pytest.raises(CaseError, match=r'row 2: x = "here": expected a number'):
+        case(tmp_path / "t.csv", f"{SIZE}2,here,2\n2.4,5,4\n", columns=["d", "x", "y"])
+
+
 def test_excels_units_need_no_utf_8(tmp_path):
     (tmp_path / "t.csv").write_bytes((SIZE + "x;y;Radius (µm)\r\n2,0;2,0;1,0\r\n5;4;1,2\r\n").encode("cp1252"))
     is_expected(read_table(tmp_path / "t.csv"))
