@@ -251,8 +251,7 @@ class Cell:
     )
     columns: tuple[str, ...] | None = key(
         NAMES_OF_COLUMNS,
-        "Names of the columns of a table without a line of names, or in its place; others than those of file are not "
-        "read.",
+        "Names of the columns of a table, in place of a line of names; others than those of file are not read.",
         default=None,
         only=TABLE,
         default_words="the first line of the table",
