@@ -1,6 +1,6 @@
 """Measures how good the estimated errors of the mesh are: true error / estimate, on one rank.
 
-    .venv/bin/python scripts/measure_mesh_error.py [--only WORDS] [--nested]
+    .venv/bin/python scripts/measure_mesh_error.py [--only WORDS] [--refine N] [--nested]
 
 For each cell, each order of elements and each of three refinements the least and the largest ratio over the entries of
 the stiffness that are above 1e-3 of its largest; then over all cells how many lie between 0.5 and 2.  Exact values are
@@ -118,11 +118,12 @@ def solved(document: dict[str, Any], **mesh: Any) -> tuple[Float, Float]:
     return result.effective_stiffness, result.mesh_error.effective_stiffness
 
 
-def ratios(document: dict[str, Any], exact: Float, order: int, size: float, nested: bool) -> Float:
+def ratios(document: dict[str, Any], exact: Float, order: int, size: float, arguments: argparse.Namespace) -> Float:
     """Ratios of true errors to their estimates, of the entries that matter."""
-    found, estimate = solved(document, mesh_size=size, order=order, refine=int(nested))
-    if nested:
-        estimate = np.abs(solved(document, mesh_size=size, order=order)[0] - found) / (4**order - 1)
+    mesh = {"mesh_size": size * 2**arguments.refine, "order": order}
+    found, estimate = solved(document, **mesh, refine=arguments.refine)
+    if arguments.nested:
+        estimate = np.abs(solved(document, **mesh, refine=arguments.refine - 1)[0] - found) / (4**order - 1)
     matters = np.abs(exact) > 1e-3 * np.abs(exact).max()
     return np.asarray(np.abs(found - exact)[matters] / estimate[matters])
 
@@ -131,13 +132,14 @@ def main() -> None:
     """One line a cell and order."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--only", default="", metavar="WORDS", help="cells whose names begin so")
-    parser.add_argument("--nested", action="store_true", help="the nested coarser level in place of recovered stresses")
+    parser.add_argument("--refine", type=int, default=1, help="halvings of coarser meshes; 0 of none")
+    parser.add_argument("--nested", action="store_true", help="the solved coarser level in place of recovered stresses")
     arguments = parser.parse_args()
     of_all: dict[int, list[float]] = {order: [] for order in SIZES}
     for name, document, known in (each for each in spectral() + twins() if each[0].startswith(arguments.only)):
         exact = solved(document, **EXACT)[0] if known is None else known
         for order, sizes in SIZES.items():
-            found = [ratios(document, exact, order, size, arguments.nested) for size in sizes]
+            found = [ratios(document, exact, order, size, arguments) for size in sizes]
             of_all[order] += np.concatenate(found).tolist()
             words = ", ".join(f"{own.min():.2f} to {own.max():.2f}" for own in found)
             print(f"{name:26} order {order}: {words}", flush=True)

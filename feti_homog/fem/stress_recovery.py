@@ -9,7 +9,7 @@ reaches across an interface, where stresses jump.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -21,7 +21,7 @@ from feti_homog.fem.assembly import ELEMENTS_AT_ONCE
 from feti_homog.fem.problem import Problem
 from feti_homog.fem.shape_functions import barycentric, gradients, shape_functions
 from feti_homog.mesh.refinement import FineMesh
-from feti_homog.typing import Bool, Float, Int
+from feti_homog.typing import Bool, Float, Int, Int32
 
 # Weight of the elements around the neighbours of a vertex on the boundary, whose own are few, by the order of elements:
 # of `scripts/measure_mesh_error.py` over all its cells.
@@ -58,8 +58,8 @@ class RecoveredStress:
     """
 
     points: Float
-    triangles: Int
-    node_class: Int
+    triangles: Int32
+    node_class: Int32
     L: Float
     problem: Problem
     u: Float
@@ -68,15 +68,10 @@ class RecoveredStress:
 
     @classmethod
     def on(
-        cls, meshes: Sequence[FineMesh], L: Float, problem: Problem, u: Float, loads: Float, is_mixed: bool = False
+        cls, mesh: FineMesh, L: Float, problem: Problem, u: Float, loads: Float, is_mixed: bool = False
     ) -> RecoveredStress:
-        """On some meshes, one after the other; arguments as the attributes."""
-        nodes = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
-        classes = np.cumsum([0, *(mesh.n_classes for mesh in meshes)])
-        triangles = [mesh.triangles + first for mesh, first in zip(meshes, nodes, strict=False)]
-        node_class = [mesh.node_class + first for mesh, first in zip(meshes, classes, strict=False)]
-        points = np.concatenate([mesh.points for mesh in meshes])
-        return cls(points, np.concatenate(triangles), np.concatenate(node_class), L, problem, u, loads, is_mixed)
+        """On a mesh, of which several may be joined; arguments as the attributes."""
+        return cls(mesh.points, mesh.triangles, mesh.node_class, L, problem, u, loads, is_mixed)
 
     @property
     def order(self) -> int:

@@ -30,8 +30,8 @@ MESH_SECONDS = 2.7e-5
 SETUP_SECONDS, SUBDOMAIN_SECONDS = 5.7e-6, 1.2e-2
 # Seconds for each degree of freedom in one application of operator and preconditioner.
 APPLY_SECONDS = 5.5e-8
-# Seconds for each degree of freedom to estimate the errors of the mesh: of factoring the interiors, above all.
-ERROR_SECONDS = 5.0e-6
+# Seconds for each degree of freedom to estimate the errors of the mesh, of cells that are refined.
+ERROR_SECONDS = 1.3e-6
 # Bytes of a rank without degrees of freedom, for each of these, and for each multiplier that has influence columns.
 BASE_BYTES, DOF_BYTES, COLUMN_BYTES = 1.8e8, 1.5e3, 2.0e4
 # Bytes of result.h5: of a state for each node, element and interface node in the plane, and what is along the fibres

@@ -11,12 +11,16 @@ from feti_homog.fem.arc_error import ArcSides, arc_energy
 from feti_homog.fem.stress_recovery import RecoveredStress
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.homogenization.averaging import Response
+from feti_homog.homogenization.nested_interiors import groups, nested_interiors
 from feti_homog.homogenization.unit_cell import TornCell
+from feti_homog.mesh.refinement import FineMesh, joined
 from feti_homog.parallel.distributed_arrays import allreduce_sum
 from feti_homog.typing import Float
 
-# Subdomains of so many elements at once: few enough for the processor's cache, many enough for NumPy.
-ELEMENTS_AT_ONCE = 1 << 13
+Displacements = Iterator[tuple[list[Subdomain], FineMesh, Float]]
+# Errors of elements and of arcs over those of the mesh that is refined once less, by the order of elements: of
+# `scripts/measure_mesh_error.py`.
+NESTED = {1: (0.26, 0.27), 2: (1 / 15, 1 / 14)}
 # The two parts may cancel; what is left of both at least, `scripts/measure_mesh_error.py`.
 LEAST_SHARE = 0.05
 # The same of pairs of states whose faces touch at different places, for which the energy is not bilinear.
@@ -64,44 +68,59 @@ class EnergyErrors:
 
 
 def energy_errors(
-    cell: TornCell, responses: Sequence[Response], contact: bool = False, keep: bool = True
+    cell: TornCell,
+    responses: Sequence[Response],
+    contact: bool = False,
+    keep: bool = True,
+    nested: bool | None = None,
 ) -> EnergyErrors:
     """Return the estimates of responses of one problem, a few subdomains at a time.  Collective.
 
-    `keep` what states of the cell need later: the factors of interiors, and `shares`.
+    `keep` what states of the cell need later: the factors of interiors, and `shares`.  `nested` from the mesh that is
+    refined once less, by default where `is_nested`.
     """
     k, area = len(responses), cell.summary.area
+    nested = is_nested(cell, responses) if nested is None else nested
+    of_elements, of_arcs = NESTED[cell.lattice.order] if nested else (1.0, 1.0)
+    lattice = cell.lattice.coarser() if nested else cell.lattice
     found, shares = np.zeros((2, k, k)), [np.zeros((0, k))]
-    for members, stress in _recovered(cell, responses, keep):
+    for members, stress in _recovered(cell, responses, keep, nested):
         total, each = stress.difference(keep)
-        found += total, arc_energy(stress, ArcSides.of(stress, [s.submesh for s in members], cell.lattice))
-        shares.append(each / area)
+        arcs = arc_energy(stress, ArcSides.of(stress, [s.submesh for s in members], lattice))
+        found += of_elements * total, of_arcs * arcs
+        shares.append(np.repeat(of_elements * each / 4, 4, axis=0) if nested else each)
     elements, arcs = allreduce_sum(cell.comm, found) / area
-    return EnergyErrors(elements, arcs, np.concatenate(shares), contact)
+    return EnergyErrors(elements, arcs, np.concatenate(shares) / area, contact)
+
+
+def is_nested(cell: TornCell, responses: Sequence[Response]) -> bool:
+    """Return whether the mesh refined once less tells the error: not of quadratic elements at tips of debonded arcs."""
+    lattice = cell.lattice
+    return lattice.intervals > lattice.order and not (lattice.order == 2 and any(r.debonded for r in responses))
 
 
 def _recovered(
-    cell: TornCell, responses: Sequence[Response], keep: bool
+    cell: TornCell, responses: Sequence[Response], keep: bool, nested: bool
 ) -> Iterator[tuple[list[Subdomain], RecoveredStress]]:
     """Yield some of this rank's subdomains after the other, those of each group of one phase, and their stresses."""
     u = np.stack([response.u for response in responses], axis=1)
     loads = np.stack([response.strain for response in responses], axis=1)
-    for group in _groups(cell.subdomains):
+    for members, mesh, own in (_nested if nested else _whole)(cell, u, loads, keep):
+        first = members[0]
+        yield members, RecoveredStress.on(mesh, first.L, first.problem, own, loads, first.is_mixed)
+
+
+def _nested(cell: TornCell, u: Float, loads: Float, keep: bool) -> Displacements:
+    """Yield subdomains, their mesh that is refined once less, and their displacements (classes, c, k) on it."""
+    fresh = nested_interiors(cell.solver.interface_operators, cell.lattice)
+    for interior in cell.nested_interiors if keep else fresh:
+        yield interior.members, interior.mesh, interior.displacement(u, loads)
+
+
+def _whole(cell: TornCell, u: Float, loads: Float, keep: bool) -> Displacements:
+    """Yield the same on the mesh itself."""
+    for group in groups(cell.subdomains, cell.lattice):
         members = [cell.subdomains[place] for place in group]
         own = np.concatenate([cell.solver.extended(place, u, loads, keep) for place in group])
-        first, meshes = members[0], [s.mesh for s in members]
-        own = own.reshape(-1, first.problem.components, len(responses))
-        yield members, RecoveredStress.on(meshes, first.L, first.problem, own, loads, first.is_mixed)
-
-
-def _groups(subdomains: Sequence[Subdomain]) -> Iterator[list[int]]:
-    """Yield the places of subdomains that follow each other, of one phase, and of ELEMENTS_AT_ONCE elements at most."""
-    group, elements = list[int](), 0
-    for place, s in enumerate(subdomains):
-        elements += len(s.mesh.triangles)
-        if group and (elements > ELEMENTS_AT_ONCE or s.submesh.phase != subdomains[group[0]].submesh.phase):
-            yield group
-            group, elements = [], len(s.mesh.triangles)
-        group.append(place)
-    if group:
-        yield group
+        own = own.reshape(-1, members[0].problem.components, u.shape[1])
+        yield members, joined([s.mesh for s in members]), own

@@ -25,6 +25,7 @@ from feti_homog.homogenization.domain_partition import (
     RankShare,
     distribute,
 )
+from feti_homog.homogenization.nested_interiors import NestedInterior, nested_interiors
 from feti_homog.homogenization.tile_tearing import can_be_torn_by_tiles, tear_by_tiles
 from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.tips import debonded_arcs
@@ -96,6 +97,11 @@ class TornCell:
         """(k,) directions in degrees of this rank's interface nodes about the centres of their fibres."""
         nodes = self.solver.jump_operator.nodes
         return debonded_arcs.angles(nodes.points, nodes.fibre, self.summary.centres, self.summary.period)
+
+    @cached_property
+    def nested_interiors(self) -> list[NestedInterior]:
+        """The interiors of this rank's subdomains on the mesh that is refined once less."""
+        return list(nested_interiors(self.solver.interface_operators, self.lattice))
 
     def debonded(self, opening: float | None) -> Bool:
         """(k,) which of this rank's interface nodes are debonded from the start: none without an [interface].

@@ -7,6 +7,7 @@ torus and among subdomains) is arithmetic on coarse numbers.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,6 +56,17 @@ class ReferenceLattice:
     def order(self) -> int:
         """Order of the elements: 1 or 2."""
         return 1 if self.triangles.shape[1] == 3 else 2
+
+    def coarser(self) -> ReferenceLattice:
+        """Return the lattice of one halving less; there has to be one."""
+        return ReferenceLattice.of(int(self.intervals // self.order).bit_length() - 2, self.order)
+
+    def within(self, finer: ReferenceLattice) -> Int:
+        """(q,) its nodes among those of a lattice of more halvings."""
+        number = np.empty((finer.intervals + 1,) * 2, np.int64)
+        number[finer.nodes[:, 1], finer.nodes[:, 2]] = np.arange(len(finer.nodes))
+        _, i, j = (finer.intervals // self.intervals * self.nodes).T
+        return np.asarray(number[i, j])
 
     def number(self, vertices: Int, edges: Int, backwards: Bool, n_vertices: int, n_edges: int) -> Int:
         """(t, q) node numbers: vertices first, then M - 1 nodes an edge along its direction, then interiors."""
@@ -108,6 +120,20 @@ def refine(submesh: Submesh, lattice: ReferenceLattice) -> FineMesh:
     c = n_classes + n_edges * inner + n - len(submesh.points) - len(submesh.edges) * inner
     curved = (submesh.turns[edges] > 0).any(axis=1)
     return FineMesh(points, plane, curved, node_class, c, lattice)
+
+
+def joined(meshes: Sequence[FineMesh]) -> FineMesh:
+    """Return meshes of one lattice as one, one after the other, with no node in common."""
+    nodes = np.cumsum([0, *(len(mesh.points) for mesh in meshes)])
+    classes = np.cumsum([0, *(mesh.n_classes for mesh in meshes)])
+    return FineMesh(
+        np.concatenate([mesh.points for mesh in meshes]),
+        np.concatenate([mesh.nodes + first for mesh, first in zip(meshes, nodes, strict=False)]),
+        np.concatenate([mesh.curved for mesh in meshes]),
+        np.concatenate([mesh.node_class + first for mesh, first in zip(meshes, classes, strict=False)]),
+        int(classes[-1]),
+        meshes[0].lattice,
+    )
 
 
 def edge_node(n_classes: int, edge: Int, position: Int, lattice: ReferenceLattice) -> Int:

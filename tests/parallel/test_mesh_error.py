@@ -22,6 +22,7 @@ ALL_ROUND = {"contact": False, "debonded": [{"fibre": "all", "centre": 0.0, "ang
 GLASS = {"young": 73.0, "poisson": 0.22, "expansion": 5.0e-6}
 EPOXY = {"young": 3.45, "poisson": 0.35, "expansion": 54.0e-6}
 SIZES = {1: 0.05, 2: 0.1}
+VOIDS = {"geometry": "random", "fibres": 2, "fibre_fraction": 0.2, "voids": 0.1, "mesh_size": 0.25}
 ASKED = {
     "cell": {"geometry": "square", "fibre_fraction": 0.4, "accuracy": 1e-3, "order": 1},
     "material": {"matrix": MATRIX, "fibre": FIBRE},
@@ -120,7 +121,7 @@ def test_sides_lack_what_the_mesh_does(comm, order):
     cell, *_ = solve(make_case(order=order, refine=1), comm)
     lacking = {"matrix": 0.0, "fibre": 0.0}
     for s in cell.subdomains:
-        body = RecoveredStress.on([s.mesh], s.L, s.problem, np.zeros((s.mesh.n_classes, 2, 1)), np.zeros((3, 1)))
+        body = RecoveredStress.on(s.mesh, s.L, s.problem, np.zeros((s.mesh.n_classes, 2, 1)), np.zeros((3, 1)))
         lacking[s.submesh.phase] += ArcSides.of(body, [s.submesh], cell.lattice).area.sum()
     lacking, meshed = ({phase: comm.allreduce(area) for phase, area in lacking.items()}, cell.areas())
     assert lacking["fibre"] == pytest.approx(0.4 * cell.summary.area - meshed["fibre"], rel=1e-6)
@@ -135,7 +136,7 @@ def test_displacements_of_the_order_of_elements_are_recovered(comm, order):
     for s in (s for s in cell.subdomains if s.submesh.phase == "fibre"):
         x, y = s.positions.T
         u = np.stack([x + 2 * y, x - y] if order == 1 else [x * x + 2 * x * y, x * y - y * y], axis=1)
-        body = RecoveredStress.on([s.mesh], s.L, s.problem, u[..., None], np.zeros((3, 1)))
+        body = RecoveredStress.on(s.mesh, s.L, s.problem, u[..., None], np.zeros((3, 1)))
         energy, shares = body.difference()
         assert energy[0, 0] == pytest.approx(shares.sum())
         # Curved elements on the arc have no quadratic displacements.
@@ -147,13 +148,17 @@ def test_displacements_of_the_order_of_elements_are_recovered(comm, order):
     cell.destroy()
 
 
-def test_without_states_nothing_is_kept_and_errors_are_the_same(comm):
-    cell, _, responses = solve(make_case(order=2, mesh_size=0.2), comm)
+@pytest.mark.parametrize("refine", [0, 1])
+def test_without_states_nothing_is_kept_and_errors_are_the_same(comm, refine):
+    cell, _, responses = solve(make_case(order=2, mesh_size=0.2, refine=refine), comm)
     kept = cell.solver.interface_operators.interiors
     lean = energy_errors(cell, responses, keep=False)
-    assert not kept and not len(lean.shares)
+    assert not kept and "nested_interiors" not in vars(cell) and not len(lean.shares)
     whole = energy_errors(cell, responses)
-    assert len(kept) == len(cell.subdomains)
+    if refine:
+        assert not kept and sum(len(each.members) for each in cell.nested_interiors) == len(cell.subdomains)
+    else:
+        assert len(kept) == len(cell.subdomains)
     np.testing.assert_allclose(lean.elements, whole.elements, rtol=1e-9, atol=1e-12 * whole.elements.max())
     np.testing.assert_allclose(lean.arcs, whole.arcs, rtol=1e-9, atol=1e-12 * np.abs(whole.arcs).max())
     shares = comm.allreduce(whole.shares.sum(axis=0))
@@ -161,9 +166,51 @@ def test_without_states_nothing_is_kept_and_errors_are_the_same(comm):
     cell.destroy()
 
 
+@pytest.mark.parametrize(("order", "refine"), [(1, 1), (1, 2), (2, 1)])
+def test_the_mesh_refined_once_less_tells_nearly_the_same_errors(comm, order, refine):
+    cell, _, responses = solve(make_case(order=order, mesh_size=SIZES[order] * 2**refine, refine=refine), comm)
+    nested, whole = (energy_errors(cell, responses, nested=own) for own in (True, False))
+    for part, rtol in (("elements", 0.2), ("arcs", 0.1)):
+        found, expected = (np.diag(getattr(each, part)) for each in (nested, whole))
+        np.testing.assert_allclose(found, expected, rtol=rtol)
+    assert nested.shares.shape == whole.shares.shape
+    parents = (comm.allgather(each.shares[:, 0].reshape(-1, 4).sum(axis=1)) for each in (nested, whole))
+    assert np.corrcoef(*map(np.concatenate, parents))[0, 1] > 0.5
+    np.testing.assert_array_equal(energy_errors(cell, responses).elements, nested.elements)
+    cell.destroy()
+
+
+@pytest.mark.parametrize(
+    "own",
+    [
+        {"order": 1, "refine": 2, "mesh_size": 0.2},
+        {"order": 2, "refine": 1, "mesh_size": 0.2},
+        VOIDS | {"order": 1, "refine": 2},
+        {"order": 2, "refine": 1, "mesh_size": 0.2, "matrix": {"young": 88.0, "poisson": 0.4999}},
+    ],
+    ids=["linear", "quadratic", "voids", "mixed"],
+)
+def test_bodies_on_the_coarser_mesh_displace_as_on_the_finer(comm, own):
+    cell, _, responses = solve(make_case(**own, decomposition={"subdomains": 8}), comm)
+    u, loads = (np.stack([getattr(each, name) for each in responses], axis=1) for name in ("u", "strain"))
+    k, nested = len(responses), cell.lattice.coarser().within(cell.lattice)
+    fine = iter(cell.solver.extended(place, u, loads) for place in range(len(cell.subdomains)))
+    largest = 0.0
+    for interior in cell.nested_interiors:
+        coarse, first = interior.displacement(u, loads), 0
+        for s in interior.members:
+            there = next(fine).reshape(-1, 2, k)[s.mesh.node_class[s.mesh.nodes[:, nested]]]
+            triangles = interior.mesh.nodes[first : first + len(there)]
+            first += len(there)
+            largest = max(largest, np.abs(coarse[interior.mesh.node_class[triangles]] - there).max())
+    assert largest < 0.02 * np.abs(u).max()
+    assert next(fine, None) is None
+    cell.destroy()
+
+
 def test_what_the_elements_have_of_it_is_a_field_of_every_state(comm):
     materials = {"matrix": MATRIX, "fibre": FIBRE}
-    document = {"cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.1, "order": 2}}
+    document = {"cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.2, "order": 2, "refine": 1}}
     document |= {"material": materials, "analysis": {"type": "stiffness", "plane": "stress"}}
     found = run(Case.parse(document), comm, fields=True)
     for k, state in enumerate(found.fields.states):
