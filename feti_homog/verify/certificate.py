@@ -17,6 +17,7 @@ from feti_homog.verify.bonds import COATING
 from feti_homog.verify.check_fields import check_derived, check_fields, check_interface_state
 from feti_homog.verify.check_loads import StateNumbers, check_load
 from feti_homog.verify.check_mesh import check_arcs, check_interface, check_mesh
+from feti_homog.verify.check_mesh_error import check_mesh_error
 from feti_homog.verify.check_path import check_envelope, check_path
 from feti_homog.verify.check_points import check_points
 from feti_homog.verify.check_sensitivities import check_sensitivities
@@ -141,6 +142,7 @@ def _verified(files: ResultFiles, directory: Path) -> Certificate:
         fields = cell.elements.fields(state.displacement, terms, state.along, cell.free_strains(state))
         check_fields(findings, cell, state, fields)
         check_derived(findings, cell, state)
+        check_mesh_error(findings, cell, state)
         check_interface_state(findings, cell, state)
         states.append(StateNumbers.of(cell, state, fields))
     check_load(findings, cell, states)

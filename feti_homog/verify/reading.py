@@ -48,6 +48,7 @@ class State:
         status: (k,) 0 bonded, 1 closed, 2 open.
         damage: (k,) 0 intact to 1 broken, also of bonds that break at once.
         sliding: (k,) sign of the growing slip of closed nodes that slide.
+        mesh_error: (m,) shares of the estimated error, of the energy of the cell; NaN of none.
         derived: the tables of `DERIVED` or `SPATIAL_DERIVED`, which follow from those above.
         temperature: its change.
     """
@@ -65,6 +66,7 @@ class State:
     status: AnyInt
     damage: Float
     sliding: AnyInt
+    mesh_error: Float
     derived: Mapping[str, Float]
     temperature: float = 0.0
 
@@ -138,6 +140,8 @@ class ResultFiles:
         known = "damage" in group
         arrays["damage"] = self._table(number, "damage", (k,)) if known else (arrays["status"] != 0).astype(float)
         slides = "sliding" in group
+        # Nor those of before errors of the mesh were estimated.
+        arrays["mesh_error"] = self._table(number, "mesh_error", (m,)) if "mesh_error" in group else np.full(m, np.nan)
         arrays["sliding"] = self._table(number, "sliding", (k,)) if slides else np.zeros(k, np.int8)
         strain, mean = (np.array(group.attrs[name], float) for name in ("strain", "stress"))
         v = 6 if self.is_spatial else 3

@@ -67,12 +67,18 @@ def case_of_fields(_, file):
     file.attrs["case"] = str(file.attrs["case"]).replace("0.299", "0.2991")
 
 
+def errors_of_the_mesh(_, file):
+    table = file["state/1/mesh_error"]
+    table[()] = 3 * table[()]
+
+
 def delete_state(_, file):
     del file[f"state/{len(file['state']) - 1}"]
 
 
 FALSE = {
     "one stress": ("bonded", scale("stress"), {"stress", "stress 33"}),
+    "errors of the mesh": ("plane", errors_of_the_mesh, {"mesh error"}),
     "one stress of a path": ("path", scale("stress", state=7), {"stress", "stress 33"}),
     "a stress out of the plane": ("bonded", scale("stress_33"), {"stress 33"}),
     "a vector of traction": ("bonded", scale("traction_vector"), {"vectors"}),
