@@ -136,13 +136,10 @@ class ResultFiles:
         )
         if self.is_spatial:
             arrays |= self._spatial(number, arrays)
-        # Results of before there were laws that soften, or friction, have no damage and nothing that slides.
-        known = "damage" in group
-        arrays["damage"] = self._table(number, "damage", (k,)) if known else (arrays["status"] != 0).astype(float)
-        slides = "sliding" in group
-        # Nor those of before errors of the mesh were estimated.
-        arrays["mesh_error"] = self._table(number, "mesh_error", (m,)) if "mesh_error" in group else np.full(m, np.nan)
-        arrays["sliding"] = self._table(number, "sliding", (k,)) if slides else np.zeros(k, np.int8)
+        # Older results have no damage, nothing that slides, and no estimated errors.
+        missing = (arrays["status"] != 0).astype(float), np.zeros(k, np.int8), np.full(m, np.nan)
+        for name, old in zip(("damage", "sliding", "mesh_error"), missing, strict=True):
+            arrays[name] = self._table(number, name, old.shape) if name in group else old
         strain, mean = (np.array(group.attrs[name], float) for name in ("strain", "stress"))
         v = 6 if self.is_spatial else 3
         _expect(
