@@ -165,10 +165,10 @@ class Output:
     )
     sensitivities: bool = key(
         boolean,
-        "Derivatives of every constant of the cell by every constant of its phases and elastic interfaces, and a "
-        'picture of them, in [analysis] type = "stiffness" and "load". Bonded cells need no further solve. With '
-        "contact they are those at fixed status, for which every load takes as many solves more as there are unit "
-        "loads. Faces with friction have none.",
+        "Derivatives of every constant of the cell by every constant of its phases and elastic interfaces, and by the "
+        "fraction of a bonded square or hexagonal pattern, and a picture of them, in [analysis] type = "
+        '"stiffness" and "load". Bonded cells need no further solve. With contact they are those at fixed status, for '
+        "which every load takes as many solves more as there are unit loads. Faces with friction have none.",
         default=False,
     )
     pictures: bool = key(boolean, "Draw the PNG files; without fields, the curves alone.", default=True)

@@ -10,7 +10,7 @@ the integrals alone, once per phase.  With faces in contact the cell is linear a
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,12 +22,14 @@ from feti_homog.fem.assembly import ELEMENTS_AT_ONCE
 from feti_homog.fem.problem import Problem
 from feti_homog.fem.shape_functions import gradients
 from feti_homog.feti.decomposition.subdomain import Subdomain
-from feti_homog.homogenization import phase_laws
+from feti_homog.homogenization import phase_laws, shape_derivative
 from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.materials.derivatives import law_changes
 from feti_homog.parallel.distributed_arrays import allreduce_sum
 from feti_homog.typing import Float
+
+GROWTH = 1e-5  # of radii
 
 
 @dataclass(frozen=True)
@@ -65,11 +67,30 @@ def derivatives(cells: Sequence[TornCell], responses: Sequence[Sequence[Response
             for own, here in zip(springs, places, strict=False)
         )
         found.append(Derivative(name, value, energies))
-    return found
+    return [*found, *_by_fraction(cells, responses)]
 
 
-def _grams(cell: TornCell, responses: Sequence[Response]) -> dict[str, Float]:
-    """(v, k, v, k) int e_i (x) e_j over the bodies of each material under k unit loads.  Collective."""
+def _by_fraction(cells: Sequence[TornCell], responses: Sequence[Sequence[Response]]) -> Iterator[Derivative]:
+    """Yield the derivative by the fraction of a pattern of equal fibres, whose nodes move.  Collective."""
+    laws: tuple[Callable[[Case, str], Float], ...] = (phase_laws.plane_law, phase_laws.axial_law)
+    for f in shape_derivative.fractions(cells[0].case):
+        triples = zip(cells, responses, laws, strict=False)
+        changes = [_change(cell, own, law) / (2 * f * cell.summary.area) for cell, own, law in triples]
+        yield Derivative("cell.fibre_fraction", f, tuple(changes))
+
+
+def _change(cell: TornCell, responses: Sequence[Response], law: Callable[[Case, str], Float]) -> Float:
+    """(k, k) derivative of the energies of unit loads by ln R of all fibres.  Collective."""
+    above, below = (_grams(cell, responses, growth) for growth in (GROWTH, -GROWTH))
+    parts = [np.einsum("ab,aibj->ij", law(cell.case, phase), above[phase] - below[phase]) for phase in above]
+    return np.asarray(np.sum(parts, axis=0) / (2 * GROWTH))
+
+
+def _grams(cell: TornCell, responses: Sequence[Response], growth: float = 0.0) -> dict[str, Float]:
+    """(v, k, v, k) int e_i (x) e_j over the bodies of each material under k unit loads, where fibres grow.
+
+    Collective.
+    """
     problem, loads = cell.solver.problem, np.stack([response.strain for response in responses], axis=1)
     u = np.stack([r.scale * cell.solver.displacement(r.state.solution) for r in responses], axis=1)
     m, (v, k) = problem.strains, loads.shape
@@ -80,12 +101,14 @@ def _grams(cell: TornCell, responses: Sequence[Response]) -> dict[str, Float]:
     sums = {material: np.zeros((m * k + 1,) * 2) for material in materials}
     for s, offset in zip(cell.subdomains, cell.offsets, strict=False):
         own = u[offset : offset + s.n_dofs].reshape(-1, problem.components, k)
-        sums[provider(s.submesh.phase, cell.case.materials)] += _products(s, own, loads[:m])
+        points = s.mesh.points
+        points = points + growth * shape_derivative.velocity(points, cell.summary) if growth else points
+        sums[provider(s.submesh.phase, cell.case.materials)] += _products(s, points, own, loads[:m])
     return {name: (whole.T @ allreduce_sum(cell.comm, own) @ whole).reshape(v, k, v, k) for name, own in sums.items()}
 
 
-def _products(subdomain: Subdomain, u: Float, loads: Float) -> Float:
-    """(mk + 1, mk + 1) int f f^T, f the strains of the displacements u (n, c, k) and the loads (m, k), and 1.
+def _products(subdomain: Subdomain, places: Float, u: Float, loads: Float) -> Float:
+    """(mk + 1, mk + 1) int f f^T, f the strains of displacements u (n, c, k) at places (n, 2), and the loads (m, k).
 
     In mixed elements the energy is stationary for the bubble too, and the pressure lambda Pi div u: the products of 11
     and 22 are such that an isotropic dA has d lambda (Pi div u)^2.
@@ -95,7 +118,7 @@ def _products(subdomain: Subdomain, u: Float, loads: Float) -> Float:
     found = np.zeros((m * k + 1,) * 2)
     for first in range(0, len(mesh.triangles), ELEMENTS_AT_ONCE):
         nodes = mesh.triangles[first : first + ELEMENTS_AT_ONCE]
-        points, own = mesh.points[nodes], u[mesh.node_class[nodes]]
+        points, own = places[nodes], u[mesh.node_class[nodes]]
         if subdomain.is_mixed:
             elements = bubble.Elements.of(points, subdomain.L)
             own, w = elements.with_bubble(own), elements.weights

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from feti_homog.typing import Float
+from feti_homog.verify.cell_tables import Mesh
 from feti_homog.verify.check_fields import BONDED, CLOSED
 from feti_homog.verify.check_spatial import about_fibres, engineering_constants
 from feti_homog.verify.check_summary import moduli
@@ -21,6 +23,7 @@ from feti_homog.verify.reading import State
 STEP = 1e-6
 # Constants beside the largest of their kind below which they are noise.
 NOISE = 1e-3
+SAME = 1e-8  # of a radius
 WEIGHTS = (1.0, -0.7, 0.5, 0.9, -0.8)
 ORDER = [0, 1, 5, 2, 4, 3]  # of the unit strains of space among their states, a temperature left out
 Case = dict[str, Any]
@@ -151,10 +154,12 @@ def _moved(cell: DiscreteCell, names: Sequence[str], values: Float) -> Case:
 def _energies(cell: DiscreteCell, states: Sequence[State], case: Mapping[str, Any]) -> Float:
     """(v, v) or (6, 7) energies of pairs of the fields of unit loads, of which the first is a strain, in this case."""
     files, phases = cell.files, cell.files.phases
+    growth = float(np.log(case["cell"].get("fibre_fraction", 1.0) / files.case["cell"].get("fibre_fraction", 1.0))) / 2
+    mesh, states = _grown(cell, growth, states) if growth else (files.mesh, states)
     stiffnesses = (spatial_stiffnesses if files.is_spatial else plane_stiffnesses)(case, phases)
     free = expansions(case, phases) if files.is_spatial else None
     # Elements stay what they are where constants that are alike change apart.
-    elements = Elements(files.mesh, stiffnesses, mixed_phases(files.case, phases))
+    elements = Elements(mesh, stiffnesses, mixed_phases(files.case, phases))
     strains, heated = _in_order(states)
     columns = []
     for state in (*strains, *heated):
@@ -164,6 +169,28 @@ def _energies(cell: DiscreteCell, states: Sequence[State], case: Mapping[str, An
         column = [float((other.displacement * fields.force).sum()) + other.along * out for other in strains]
         columns.append(np.array(column) + [_springs(cell, case, other, state) for other in strains])
     return np.asarray(np.stack(columns, axis=1) / cell.area)
+
+
+def _grown(cell: DiscreteCell, growth: float, states: Sequence[State]) -> tuple[Mesh, list[State]]:
+    """Return the mesh where all radii have grown by this share, and the states at the same u - E x.
+
+    Nodes around a fibre move as its circle does, less and less to nothing halfway to the next fibre.
+    """
+    files, x = cell.files, cell.files.mesh.points
+    fibres, images = files.fibres, np.array([[i, j] for i in (-1, 0, 1) for j in (-1, 0, 1)]) * files.size
+    V = np.zeros_like(x)
+    for c, R in zip(fibres.centre, fibres.radius, strict=True):
+        gaps = np.linalg.norm(fibres.centre[:, None] + images - c, axis=2) - fibres.radius[:, None] - R
+        half = np.partition(gaps.ravel(), 1)[1] / 2  # the least is that to itself, -2 R
+        d = (x - c + files.size / 2) % files.size - files.size / 2
+        r = np.hypot(*d.T)
+        V += d * np.where(r < R * (1 + SAME), 1.0, R / np.maximum(r, R) * np.maximum(1 - (r - R) / half, 0.0))[:, None]
+    terms = np.column_stack([x, np.ones(len(x))])
+    found = []
+    for state in states:
+        H = np.linalg.lstsq(terms, state.displacement - state.fluctuation, rcond=None)[0][:2]
+        found.append(replace(state, displacement=state.displacement + growth * V @ H))
+    return replace(files.mesh, points=x + growth * V), found
 
 
 def _in_order(states: Sequence[State]) -> tuple[list[State], list[State]]:

@@ -107,6 +107,23 @@ def test_stiffness_is_homogeneous_of_degree_one_in_those_of_all_phases(comm, nam
     np.testing.assert_allclose(total[moduli], found.constant_values[moduli], rtol=1e-10, atol=1e-10 * largest)
 
 
+@pytest.mark.parametrize(("geometry", "plane", "order"), [("hexagonal", "generalized", 2), ("square", "stress", 1)])
+def test_derivatives_by_the_fraction_are_those_of_finer_meshes(comm, geometry, plane, order):
+    """Quadratic elements to 1e-3 of the differences of four cells, linear ones as far as their stiffness is right."""
+
+    def found(fraction):
+        cell = {"geometry": geometry, "fibre_fraction": fraction, "mesh_size": 0.15, "refine": 1, "order": order}
+        return run(Case.parse(document(cell, plane, {"matrix": EPOXY, "fibre": CARBON})), comm).sensitivities
+
+    low, below, above, high = (found(0.5 + change).constant_values for change in (-0.01, -0.005, 0.005, 0.01))
+    own = found(0.5)
+    expected = (4 * (above - below) / 0.01 - (high - low) / 0.02) / 3
+    kinds = [name[0] for name in own.constants]
+    scale = np.array([max(abs(expected[k]) for k in range(len(kinds)) if kinds[k] == kind) for kind in kinds])
+    error = np.abs(own.derivatives[:, own.parameters.index("cell.fibre_fraction")] - expected) / scale
+    assert error.max() < (1e-3 if order == 2 else 3e-2)
+
+
 WARM = {"matrix": EPOXY, "fibre": CARBON}
 TOUCHING = {"contact": True, "debonded": ARC}
 LOADS = {
