@@ -285,9 +285,8 @@ FAULTY_BONDINGS: dict[str, tuple[str, tuple[str, ...]]] = {
         of_type("path", PATH, "centre = 3"),
         ("[path] centre = 3: unknown key; it belongs to an arc of [interface] debonded",),
     ),
-    # several at once
     "many_of_interface": (
-        debonded("{fibre = 0, angle = 400}, {fibres = 1, angle = 10}", "normal_strength = -1", "mu = 0.3"),
+        debonded("{fibre = 0, angle = 400}, {fibres = 1, angle = 10}", "normal_strength = -1", "mu = 0.3", "cone = 8"),
         (
             "[interface] debonded[0].fibre = 0: ",
             "[interface] debonded[0].angle = 400: ",
@@ -295,6 +294,7 @@ FAULTY_BONDINGS: dict[str, tuple[str, tuple[str, ...]]] = {
             "[interface] debonded[1].fibre: missing; ",
             "[interface] normal_strength = -1: ",
             "[interface] mu = 0.3: unknown key; did you mean friction?",
+            "[interface] cone = 8: unknown key; Coulomb's cone of both shears is round, so no path is straight",
         ),
     ),
 }
