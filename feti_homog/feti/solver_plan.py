@@ -11,6 +11,11 @@ from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 
 PRECONDITIONERS = ("auto", "none", "lumped", "dirichlet", "influence")
 COARSE_SPACES = ("auto", "natural", "adaptive")
+WITHOUT_INVERSE = (
+    f"[interface] friction: needs influence columns, which are taken up to {DEFAULTS.assembled_schur_dofs} degrees of "
+    "freedom on shared nodes unless -feti_pc_type asks for others; -feti_pc_type influence has them in any cell"
+)
+"""The words by which a cell with friction is refused."""
 
 
 @dataclass(frozen=True)

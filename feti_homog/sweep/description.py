@@ -100,12 +100,19 @@ def _described(
 
 
 def _plan(case: Case, summary: CellSummary, multipliers: int, applications: int, options: SolverOptions) -> SolverPlan:
-    """Plan of the plane problem, if its operators are of the kind asked for; pieces are dense by default."""
+    """Plan of the plane problem, if its operators are of the kind asked for; pieces are dense by default.
+
+    Raises:
+        CaseError: as `solver_plan.choose`; or with friction there are no influence columns.
+    """
     dense = options.operator != "implicit"
     sizes = ProblemSizes(
         applications, summary.subdomains > summary.bodies, dense, dense, multipliers, COATING in case.materials
     )
-    return solver_plan.choose(sizes, options)
+    found = solver_plan.choose(sizes, options)
+    if case.has_friction and found.preconditioner != "influence":
+        raise CaseError(solver_plan.WITHOUT_INVERSE)
+    return found
 
 
 def _fibres_lines(case: Case, summary: CellSummary) -> list[str]:

@@ -7,7 +7,7 @@ import tomllib
 import pytest
 from support.base_case import changed
 
-from feti_homog.case.case import Case
+from feti_homog import Case, CaseError, run
 from feti_homog.homogenization.unit_cell import tear
 from feti_homog.petsc.options import case_options
 from feti_homog.runtime.progress import Progress
@@ -39,3 +39,13 @@ def test_the_solver_is_the_one_that_is_told(comm, name):
     assert ("influence columns" in line) == (cell.solver.exact_inverse is not None)
     assert ("adaptive coarse space" in line) == (cell.solver.adaptive is not None)
     cell.destroy()
+
+
+@pytest.mark.parametrize("option", ['feti_pc_type = "lumped"', 'feti_dual_operator = "implicit"'])
+def test_friction_without_influence_columns_is_refused_by_both(comm, option):
+    case = Case.parse(tomllib.loads(changed(*PATH, end=f"{STRENGTH}friction = 0.3\n[petsc]\n{option}\n")))
+    with pytest.raises(CaseError) as of_run:
+        run(case, comm)
+    with pytest.raises(CaseError) as of_check, case_options(case.petsc):
+        describe(case, comm)
+    assert of_run.value.faults == of_check.value.faults

@@ -13,6 +13,7 @@ import numpy as np
 
 from feti_homog.errors import CaseError
 from feti_homog.feti.dual_solution import DualSolution
+from feti_homog.feti.solver_plan import WITHOUT_INVERSE
 from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.states import BondState
 from feti_homog.parallel.distributed_arrays import allreduce_sum, gather_rows
@@ -39,7 +40,7 @@ class CondensedProblem:
         """
         self.interface, self.solver = interface, interface.solver
         if self.solver.exact_inverse is None:
-            raise CaseError("[interface] friction: needs -feti_pc_type influence, with which this cell may not fit")
+            raise CaseError(WITHOUT_INVERSE)
         self._inverse, self.first = self.solver.exact_inverse, self.solver.jump_operator.owned[0]
         self._response = self._inverse.multipliers(self.solver.d, np.eye(len(self.solver.problem.loads)))
         bonded = self.solver.torn_stiffness + allreduce_sum(self.solver.comm, self.solver.d.T @ self._response)
