@@ -1,10 +1,41 @@
-"""The drivers of friction run, draw, and meet what Coulomb's law requires."""
+"""The drivers of friction run, draw, and meet what Coulomb's law requires; a cycle that is killed goes on."""
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
+from support.command_line import command_line
 from support.drivers import column, driven
+from support.hooks import WAIT, Hook, HookedJob
+
+CYCLES = """\
+[cell]
+geometry = "square"
+fibre_fraction = 0.4
+mesh_size = 0.15
+refine = 0
+[material.matrix]
+young = 100.0
+poisson = 0.4
+[material.fibre]
+young = 500.0
+poisson = 0.2
+[analysis]
+type = "path"
+plane = "strain"
+[interface]
+normal_strength = 4.0
+tangential_strength = 3.0
+friction = 0.3
+debonded = [{fibre = "all", centre = 30.0, angle = 200.0}]
+[path]
+waypoints = [[-0.05, 0.0, 0.0], [-0.05, 0.0, 0.15], [-0.05, 0.0, -0.15], [-0.05, 0.0, 0.15]]
+[output]
+pictures = false
+fields = false
+"""
 
 
 def test_loops_scale_with_the_pressure(tmp_path):
@@ -24,3 +55,21 @@ def test_friction_carries_shear_under_pressure(tmp_path):
     assert [row["friction"] for row in rows] == ["0.0", "0.0", "0.4", "0.4"]
     end, heat = column(rows, "S12 at end"), column(rows, "heat")
     assert end[2] > end[0] and np.abs(heat[:2]).max() == 0.0 < heat[2]
+
+
+def test_a_path_killed_in_the_middle_of_a_cycle_goes_on_as_it_was(tmp_path):
+    """Between two changes of statuses of the second half-cycle, with a history of slips."""
+    (tmp_path / "case.toml").write_text(CYCLES)
+    words = ("run", tmp_path / "case.toml", "--out")
+    assert command_line(1, *words, tmp_path / "whole").returncode == 0
+    kept = Hook("feti_homog.results.atomic:commit", WAIT, when="args[1].name == '000039.h5'", after=True)
+    with HookedJob(1, [kept], *words, tmp_path / "out") as job:
+        assert job.told() == "0 here"
+        job.killed()
+    assert command_line(1, *words, tmp_path / "out", "--resume").returncode == 0
+    found, whole = (json.loads((tmp_path / name / "result.json").read_text()) for name in ("out", "whole"))
+    last = whole["path"][found["resumed"] - 1]
+    assert found["resumed"] == 40 and 0.5 < last["load_factor"] < 0.75 and last["broke"] == 0
+    for key in ("load_factor", "stress", "strain", "friction_heat", "work", "broke", "open"):
+        a, b = (np.array([point[key] for point in of["path"]], float) for of in (found, whole))
+        np.testing.assert_allclose(a, b, atol=1e-9 * np.abs(b).max(), err_msg=key)

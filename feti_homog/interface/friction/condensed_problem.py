@@ -45,16 +45,24 @@ class CondensedProblem:
         self._response = self._inverse.multipliers(self.solver.d, np.eye(len(self.solver.problem.loads)))
         bonded = self.solver.torn_stiffness + allreduce_sum(self.solver.comm, self.solver.d.T @ self._response)
         self._bonded = (bonded + bonded.T) / 2
+        self._some: tuple[Int, Float] | None = None
 
     def take(self, rows: Int, springs: Float) -> tuple[Float, Float, Float]:
         """Return H_DD (n, n) with springs (n,) beside it, b (n, v) and L (v, v) of the same rows.  Collective."""
-        self.rows = rows
+        self.rows, self._some = rows, None
         self._columns, K = self._inverse.columns(rows)
-        return K + np.diag(springs), gather_rows(self.solver.comm, self._response, self.first, rows), self._bonded
+        K[np.diag_indices(len(K))] += springs
+        return K, gather_rows(self.solver.comm, self._response, self.first, rows), self._bonded
 
     def multipliers(self, jump: Float, strain: Float) -> Float:
         """(owned rows,) lam of jumps (n,) and strains (v,)."""
         return np.asarray(self._response @ strain - self._columns @ jump)
+
+    def some_multipliers(self, own: Int, jump: Float, strain: Float) -> Float:
+        """(k, c) the same at the places `own` (k, c) among the owned rows; their columns are kept for this array."""
+        if self._some is None or self._some[0] is not own:
+            self._some = own, self._columns[own.ravel()]
+        return self._response[own] @ strain - (self._some[1] @ jump).reshape(own.shape)
 
     def solution(self, bonds: BondState, jump: Float, strain: Float) -> DualSolution:
         """Return the multipliers, and the jumps that they leave by the dual operator itself.  Collective."""

@@ -82,9 +82,12 @@ class FaceSystem:
         """(m - 2n,) which of the loads, and of the jumps along the fibres, are given by what works on them."""
         return np.concatenate([by_stress, ~self.tied | (status == OPEN_FACE)]) if len(self.tied) else by_stress
 
-    def settled(self, status: Status, given: Prescribed, x: Float) -> Float:
-        """(m,) scaled x without the rounding of the way to it; a free motion, which rounding would drive, keeps it."""
-        return self.linear(status, given, x) if self.solver.sign(*self.free(status, given.by_stress)) else x
+    def settled(self, status: Status, given: Prescribed, x: Float) -> tuple[Status, Float]:
+        """Return the statuses, and x (m,) without the rounding of the way to it.
+
+        Where a motion is free, which rounding would drive, x is as it was.
+        """
+        return status, self.linear(status, given, x) if self.solver.sign(*self.free(status, given.by_stress)) else x
 
     def prescribed(self, status: Status, given: Prescribed, start: Float) -> tuple[Float, Float]:
         """(m,) x with what is prescribed, and (m,) S x on the rows of loads."""

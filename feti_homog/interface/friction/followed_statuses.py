@@ -21,7 +21,7 @@ MOST_CHANGES = 32
 FEW = 8
 # Residual, relative to the largest force, that is rounding; that is too much after refinement; the least force beside
 # the largest jump; steps of refinement.
-ROUNDED, TOO_MUCH, LEAST_FORCE, REFINEMENTS = 1e-14, 1e-10, 1e-2, 3
+ROUNDED, TOO_MUCH, LEAST_FORCE, REFINEMENTS = 1e-13, 1e-10, 1e-2, 3
 
 
 class FollowedStatuses:

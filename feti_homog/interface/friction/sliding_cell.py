@@ -54,6 +54,10 @@ class SlidingCell:
         self._more = more[:, 1]
         self._damaged = (bonds.status == BONDED) & (more[:, :2] > 0.0).any(axis=1)
         self._own = np.flatnonzero((bonds.status != BONDED) | self._damaged)
+        self._held = np.flatnonzero(bonds.status == BONDED)
+        problems = (self._plane, *self._axial)
+        rows = [(each.interface.nodes.row[self._held], each.solver.jump_operator.components) for each in problems]
+        self._held_rows = [own[:, None] + np.arange(components) for own, components in rows]
         springs = np.divide(1.0, more, out=np.zeros_like(more), where=(more > 0.0) & self._damaged[:, None])
         friction = np.where(self._damaged, self.friction_of_damage, self.friction)
         along = [each.first + each.interface.nodes.row for each in self._axial]
@@ -148,14 +152,14 @@ class SlidingCell:
         return Multipliers(each.multipliers(*own) for each, own in self._parts(x))
 
     def traction(self, x: Float) -> Float:
-        """(k, 2) or (k, 3) traction of scaled x at the nodes of this rank, also along the fibre.
+        """(k, 2) or (k, 3) traction of scaled x at the bonds of this rank, also along the fibre; 0 where they broke.
 
         Of damaged bonds it is that of the share that holds.
         """
-        pairs = zip(self.cell.problems, self.multipliers(x), strict=True)
-        rows = [lam[p.nodes.row[:, None] + np.arange(p.solver.jump_operator.components)] for p, lam in pairs]
-        force, slip = np.hstack(rows), self._jumps_of(x)[0][1::2][self._place]
-        damaged = self._damaged[self._own]
+        force = np.zeros((len(self.friction), sum(rows.shape[1] for rows in self._held_rows)))
+        parts = zip(self._held_rows, self._parts(x), strict=True)
+        force[self._held] = np.hstack([problem.some_multipliers(rows, *own) for rows, (problem, own) in parts])
+        damaged, slip = self._damaged[self._own], self._jumps_of(x)[0][1::2][self._place]
         node, C = self._own[damaged], self.solver.intact_compliance[self.interface.nodes.row[self._own[damaged]] + 1]
         force[node, 1] = (C * force[node, 1] + slip[damaged]) / (C + self._more[node])
         return np.asarray(force / self.interface.nodes.length[:, None])

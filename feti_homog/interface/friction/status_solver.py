@@ -49,8 +49,12 @@ class StatusSolver:
         for known, y in self._products:
             if known is x:
                 return y
-        self._products.append((x, self.S @ x))
-        return self._products[-1][1]
+        return self.keep(x, self.S @ x)
+
+    def keep(self, x: Float, y: Float) -> Float:
+        """Return y, after keeping it as the product of x."""
+        self._products.append((x, y))
+        return y
 
     def solve(self, free: Bool, slope: Float, x: Float, given: Float) -> Float:
         """(m,) x with the rows `given` (m,), from a start that has the entries that are not free.
@@ -64,7 +68,7 @@ class StatusSolver:
         if found is None:
             self._followed, self._factored = None, 0
             return self._system(free, slope).solve(x, given)
-        self._products.append(found)
+        self.keep(*found)
         return found[0]
 
     def sign(self, free: Bool, slope: Float) -> int:

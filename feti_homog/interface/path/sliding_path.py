@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -108,12 +109,24 @@ class SlidingLeg:
         """Return the statuses with which the state goes on, and the rate of x.  Collective, decided on rank 0."""
         velocity = self.sliding.given(self.end) - self.sliding.given(self.start)
         here, faces = self._here, self.sliding.faces
-        return on_root(self.cell.comm, faces.rates, here.status, here.x, self.end.by_stress, velocity)
+        return self._on_root(faces.rates, here.status, here.x, self.end.by_stress, velocity)
+
+    def _on_root(self, find: Callable[..., tuple[Status, Float]], *arguments: Any) -> tuple[Status, Float]:
+        """Return the statuses and the array that rank 0 finds, whose product every rank keeps.  Collective."""
+        solver = self.sliding.faces.solver
+
+        def found() -> tuple[Status, Float, Float]:
+            status, x = find(*arguments)
+            return status, x, solver.product(x)
+
+        status, x, product = on_root(self.cell.comm, found)
+        solver.keep(x, product)
+        return status, x
 
     def _advance(self, status: Status, rate: Float) -> Iterator[Point]:
         """Go on along the rates up to the next change, and past it."""
         here, faces, cell = self._here, self.sliding.faces, self.cell
-        x = on_root(cell.comm, faces.settled, status, self._given(self._share, here.x), here.x)
+        status, x = self._on_root(faces.settled, status, self._given(self._share, here.x), here.x)
         change, rest = cell.comm.bcast(faces.next_change(status, x, rate)), 1.0 - self._share
         if change >= rest - SAME_LOAD:
             change = np.inf
@@ -123,8 +136,12 @@ class SlidingLeg:
         breaks = first_break_between(cell, self.law, bonds, *tractions)
         way = min(breaks, 1.0) * min(rest, change)
         there = x + way * rate
+        rounded = (there != 0.0) & (np.abs(there) <= CANCELLED * np.abs(x))
+        there[rounded] = 0.0
+        if not rounded.any():
+            faces.solver.keep(there, faces.solver.product(x) + way * faces.solver.product(rate))
         self._let_go(status, x)
-        self._go(status, x, np.where(np.abs(there) > CANCELLED * np.abs(x), there, 0.0))
+        self._go(status, x, there)
         at_end = breaks > 1.0 and change >= rest
         self._share = 1.0 if at_end else self._share + way
         if breaks <= 1.0:
@@ -188,7 +205,7 @@ class SlidingLeg:
         status, x = self.sliding.begin(begin.bonds, begin.last.strain)
         self._here, faces = Standing(status, x, begin.last), self.sliding.faces
         given = self._given(self._share, x)
-        status, there = on_root(self.cell.comm, faces.search, status, faces.all_allowed(), given, x)
+        status, there = self._on_root(faces.search, status, faces.all_allowed(), given, x)
         lost, heat = (own / self.sliding.area for own in faces.losses(status, x, there))
         after = self._standing(status, there)
         # Springs of the bonds that soften do not keep what they were stretched by before.
