@@ -12,8 +12,8 @@ from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import WebDriverWait
 
 KINDS = ("path", "angle", "stiffness")
-CURVES = {"path": 3, "angle": 2, "stiffness": 1}
-LINES = {"path": [6, 3, 3], "angle": [4, 3], "stiffness": [1]}
+CURVES = {"path": 4, "angle": 2, "stiffness": 1}
+LINES = {"path": [6, 3, 3, 1], "angle": [4, 3], "stiffness": [1]}
 CANVASES = """
 const found = [];
 const look = (node) => {
