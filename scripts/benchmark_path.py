@@ -9,9 +9,10 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from collections.abc import Callable
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import petsc4py
@@ -24,7 +25,7 @@ from mpi4py import MPI  # noqa: E402
 
 from feti_homog.case import case as cases  # noqa: E402
 from feti_homog.homogenization.averaging import Homogenization  # noqa: E402
-from feti_homog.homogenization.unit_cell import tear  # noqa: E402
+from feti_homog.homogenization.unit_cell import TornCell, tear  # noqa: E402
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces  # noqa: E402
 from feti_homog.interface.contact.states import BONDED, BondState  # noqa: E402
 from feti_homog.interface.laws.strength import MaxStrength  # noqa: E402
@@ -39,6 +40,43 @@ STRAIN = [0.2, 0.0, 0.0]
 STRENGTH = 10.0
 
 
+PEER_RUNS = 3  # the median of so many
+
+
+class Measured(NamedTuple):
+    """A path: the torn cell, dofs when glued, and seconds.
+
+    Of the set-up, of each event, and of the peer's factorization and solve.
+    """
+
+    cell: TornCell
+    stiffness: float
+    glued: int
+    setup: float
+    events: list[float]
+    iterations: list[int]
+    solves: list[int]
+    peer: tuple[float, float]
+    memory: int
+
+    @property
+    def ratios(self) -> tuple[float, float]:
+        """The peer's seconds over those of an event, of the mean and of the worst."""
+        return sum(self.peer) / float(np.mean(self.events)), sum(self.peer) / max(self.events)
+
+
+class Row(NamedTuple):
+    """A whole path of a table, and what is asked of it: the peer over a mean event, and seconds of the worst."""
+
+    fibres: int
+    refine: int
+    ratio: float
+    worst: float
+
+
+TABLES = {"paths": (Row(30, 1, 20.0, 0.1), Row(50, 2, 60.0, 0.3))}
+
+
 def main() -> None:
     """Print a table of times and ratios."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -48,37 +86,70 @@ def main() -> None:
     parser.add_argument("--events", type=int, default=50)
     parser.add_argument("--to-the-end", action="store_true", help="all events of the path")
     parser.add_argument("--operator", choices=["auto", "implicit", "explicit"], default="auto")
+    parser.add_argument("--cpu", action="store_true", help="processor time, for machines with other work")
+    parser.add_argument("--table", choices=list(TABLES), help="whole paths beside what is asked of them")
+    parser.add_argument("--repeat", type=int, default=3, help="runs of each row of a table, in turns")
     arguments = parser.parse_args()
-    comm = MPI.COMM_WORLD
-    if comm.size > 1:
+    if MPI.COMM_WORLD.size > 1:
         parser.error("the peer is sequential: start this on one rank")
-    case = cases.parse(document(arguments), Path())
-    with case_options(case.petsc):
-        start = time.perf_counter()
-        cell = tear(case, comm, Progress(comm, quiet=False))
-        homogenization = Homogenization(cell, contact=True)
-        stiffness = homogenization.interface.solver.torn_stiffness
-        setup = time.perf_counter() - start
-        seconds, iterations, solves = run_events(homogenization, None if arguments.to_the_end else arguments.events)
-    peak = process_memory.peak()
-    K, Q = glued(cell)
-    factor, solve = factor_and_solve(K, Q[:, :1])
-    peer = factor + solve
-    mean = float(np.mean(seconds))
-    print(f"degrees of freedom          {len(cell.solver.Q)} torn, {K.shape[0]} glued")
-    print(f"torn stiffness C11          {stiffness[0, 0] / cell.summary.area:.6g}")
-    print(f"set-up                      {setup:8.2f} s, {setup / peer:6.2f} of the peer")
+    if arguments.table:
+        print_table(arguments)
+        return
+    measured = measure(arguments)
+    cell, (factor, solve), (ratio, worst) = measured.cell, measured.peer, measured.ratios
+    peer, count = factor + solve, len(measured.events)
+    print(f"degrees of freedom          {len(cell.solver.Q)} torn, {measured.glued} glued")
+    print(f"torn stiffness C11          {measured.stiffness / cell.summary.area:.6g}")
+    print(f"set-up                      {measured.setup:8.2f} s, {measured.setup / peer:6.2f} of the peer")
     print(f"monolithic factor and solve {peer:8.2f} s  (factor {factor:.2f}, solve {solve:.3f})")
-    print(f"an event, mean of {len(seconds):4d}      {mean:8.3f} s, 1/{peer / mean:.1f} of the peer")
-    print(f"an event, worst             {max(seconds):8.3f} s, 1/{peer / max(seconds):.1f} of the peer")
-    print(f"dual problems an event      {np.mean(solves):8.1f}, Krylov iterations an event {np.mean(iterations):.1f}")
+    print(f"an event, mean of {count:4d}      {np.mean(measured.events):8.3f} s, 1/{ratio:.1f} of the peer")
+    print(f"an event, worst             {max(measured.events):8.3f} s, 1/{worst:.1f} of the peer")
+    problems, iterations = np.mean(measured.solves), np.mean(measured.iterations)
+    print(f"dual problems an event      {problems:8.1f}, Krylov iterations an event {iterations:.1f}")
     made, coarse = len(cell.subdomains), cell.solver.natural.factorizations
     print(f"factorizations              {made} of subdomains in all, {coarse} of the coarse problem")
     if cell.solver.exact_inverse is not None:
         print(f"reference cells factored    {cell.solver.exact_inverse.factorizations}")
-    print(f"all events with set-up      {setup + sum(seconds):8.1f} s, the peer {peer * len(seconds):.1f} s")
-    print(f"memory at most              {peak / 2**30:8.2f} GiB, before the peer")
+    print(f"all events with set-up      {measured.setup + sum(measured.events):8.1f} s, the peer {peer * count:.1f} s")
+    print(f"memory at most              {measured.memory / 2**30:8.2f} GiB, before the peer")
     cell.solver.destroy()
+
+
+def print_table(arguments: argparse.Namespace) -> None:
+    """Print the medians of whole paths, repeated in turns, beside what is asked of them."""
+    rows, found = TABLES[arguments.table], list[list[Measured]]()
+    for _ in range(arguments.repeat):
+        found.append([])
+        for row in rows:
+            own = {"fibres": row.fibres, "refine": row.refine, "mesh_size": 0.03, "to_the_end": True}
+            found[-1].append(measure(argparse.Namespace(**vars(arguments) | own)))
+            found[-1][-1].cell.solver.destroy()
+    print("dofs     events  factor and solve s  mean event ms  peer / mean  asked  worst s  asked")
+    for row, runs in zip(rows, zip(*found, strict=True), strict=True):
+        peer, mean, ratio, worst = np.median(
+            [[sum(run.peer), np.mean(run.events), run.ratios[0], max(run.events)] for run in runs], axis=0
+        )
+        numbers = f"{peer:20.3f}{1e3 * mean:15.1f}{ratio:13.1f}{row.ratio:7.0f}{worst:9.3f}{row.worst:7.1f}"
+        print(f"{runs[0].glued:<9}{len(runs[0].events):6d}{numbers}")
+
+
+def measure(arguments: argparse.Namespace) -> Measured:
+    """Follow a path and factor the same cell, glued."""
+    comm, clock = MPI.COMM_WORLD, time.process_time if arguments.cpu else time.perf_counter
+    case = cases.parse(document(arguments), Path())
+    with case_options(case.petsc):
+        start = clock()
+        cell = tear(case, comm, Progress(comm, quiet=bool(arguments.table)))
+        homogenization = Homogenization(cell, contact=True)
+        stiffness = homogenization.interface.solver.torn_stiffness
+        setup = clock() - start
+        count = None if arguments.to_the_end else arguments.events
+        seconds, iterations, solves = run_events(homogenization, count, clock)
+    memory = process_memory.peak()
+    K, Q = glued(cell)
+    factor, solve = np.median([factor_and_solve(K, Q[:, :1], clock) for _ in range(PEER_RUNS)], axis=0)
+    peer = float(factor), float(solve)
+    return Measured(cell, stiffness[0, 0], K.shape[0], setup, seconds, iterations, solves, peer, memory)
 
 
 def document(arguments: argparse.Namespace) -> dict[str, Any]:
@@ -96,7 +167,9 @@ def document(arguments: argparse.Namespace) -> dict[str, Any]:
     }
 
 
-def run_events(homogenization: Homogenization, count: int | None) -> tuple[list[float], list[int], list[int]]:
+def run_events(
+    homogenization: Homogenization, count: int | None, clock: Callable[[], float] = time.perf_counter
+) -> tuple[list[float], list[int], list[int]]:
     """Seconds, Krylov iterations and dual problems of each of the first `count` events, of all if None."""
     interface = homogenization.interface
     bonded = np.full(len(interface.nodes.row), BONDED, np.int8)
@@ -107,10 +180,10 @@ def run_events(homogenization: Homogenization, count: int | None) -> tuple[list[
         unloaded(CoupledInterfaces(interface), BondState.without_memory(bonded)),
     )
     seconds, iterations, solves = [], [], []
-    start = time.perf_counter()
+    start = clock()
     for point in islice(found, count):
         homogenization.interface.solver.stress_integral(point.state.solution)
-        now = time.perf_counter()
+        now = clock()
         seconds.append(now - start)
         iterations.append(point.state.iterations)
         solves.append(point.state.solves)
