@@ -144,7 +144,7 @@ LEAST_UNCONFIRMED_JUMP = 1e-6
 INFLUENCE_CHUNK = 32
 # Changed rows after which the cell as it stands is factored in place of them: the default of `-feti_influence_columns`
 # (`scripts/benchmark_path --to-the-end`).
-INFLUENCE_COLUMNS = 800
+INFLUENCE_COLUMNS = 400
 # Influence columns that each rank finds together at least, with those of bonds near the one that breaks: fewer and
 # larger batches, but columns that may not be needed (`scripts/benchmark_path --to-the-end`).
 INFLUENCE_BATCH = 64

@@ -65,8 +65,8 @@ class ExactInverse(Preconditioner):
             CaseError: the option has no such value.
         """
         self.comm, self._jump_operator, self._operators = comm, jump_operator, operators
-        self._first = jump_operator.owned[0]
-        self._rows = jump_operator.owned[1] - self._first
+        self._first, end = jump_operator.owned
+        self._rows = end - self._first
         self._most_columns = PETSc.Options("feti_").getInt("influence_columns", INFLUENCE_COLUMNS)
         if self._most_columns < 1:
             raise CaseError(f"-feti_influence_columns {self._most_columns}: expected a whole number above 0")
@@ -89,9 +89,9 @@ class ExactInverse(Preconditioner):
     def rounding(self) -> float:
         """Return the largest force, relative to `stiffness`, that jumps of rigid-body motions of size 1 make.
 
-        Bodies of the reference cell that follow leave none: it is a relative error of H.  Collective.
-        """
-        self._catch_up()
+        Bodies of the reference cell that follow leave none: it is a relative error of H.  Collective."""
+        if self._followed is None:
+            self._catch_up()
         return self._rounding
 
     def soften(self, more: Float) -> None:
@@ -107,8 +107,7 @@ class ExactInverse(Preconditioner):
     def _follow(self, followed: FollowedResponse, active: Float) -> bool:
         """Keep what is followed up with the rows that soften, leave or come, if it can be.  Collective."""
         gained = self._next * active - self._more * self._active
-        turned = self._active - active
-        own = np.flatnonzero((turned != 0.0) | (gained != 0.0))
+        own = np.flatnonzero(((turned := self._active - active) != 0.0) | (gained != 0.0))
         numbers = np.stack([turned, gained, self.stiffness[self._first :][: self._rows]], axis=1)[own]
         parts = zip(*self.comm.allgather((self._first + own, numbers)), strict=True)
         rows, numbers = (np.concatenate(part) for part in parts)
@@ -124,7 +123,7 @@ class ExactInverse(Preconditioner):
         if len(self._dependent):
             return False  # a body is free
         rows = self._with_near(lacking, followed.lacking)
-        rows = rows if len(rows) <= FOLLOWED_COLUMNS else lacking
+        rows = rows if followed.has_room(rows) or len(rows) <= FOLLOWED_COLUMNS // 2 else lacking
         self._columns.add(rows)
         at, unit = self._columns.positions(rows), np.zeros((self._rows, len(rows)))
         both = np.stack([self._active, self.reference.active], axis=1)
@@ -190,6 +189,10 @@ class ExactInverse(Preconditioner):
 
         Rows that leave together change the multipliers of their own by all of them, and open by H_ii^-1 lam_i.
         """
+        if (followed := self._followed) is not None:
+            lacking = followed.lacking(np.unique(pairs))
+            if not len(lacking) or (followed.has_room(lacking) and self._add_followed(followed, lacking)):
+                return followed.blocks(pairs)
         self._catch_up()
         self._find(pairs.ravel())
         at, members = self._columns.positions(pairs.ravel()), self._inverse.members
@@ -279,9 +282,7 @@ class ExactInverse(Preconditioner):
         self._dependent = np.setdiff1d(changed, inverse.members)
 
     def _response(self, z: Float) -> Float:
-        """(owned rows,) or (owned rows, k) H g on active rows, and what of g is left on others; z = Gamma g_A + g_R.
-
-        Collective."""
+        """(owned rows,[ k]) H g on active rows, what of g is left on others; z = Gamma g_A + g_R.  Collective."""
         members, z = self._inverse.members, z.copy()
         if len(members):
             rows = self._columns.rows[members]

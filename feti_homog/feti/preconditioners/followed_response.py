@@ -21,7 +21,7 @@ import numpy as np
 from mpi4py import MPI
 
 from feti_homog.feti.thresholds import FOLLOWED_COLUMNS, LEAST_FOLLOWED_PIVOT, WAITING_COLUMNS
-from feti_homog.parallel.distributed_arrays import gather_rows
+from feti_homog.parallel.distributed_arrays import allreduce_sum, gather_rows
 from feti_homog.typing import Float, Int
 
 
@@ -48,10 +48,27 @@ class FollowedResponse:
         """Return which of the global rows have no column."""
         return rows[self._slot[rows] < 0]
 
+    def has_room(self, rows: Int) -> bool:
+        """Return whether columns of so many more rows leave the others in place."""
+        return len(self._rows) + len(rows) <= FOLLOWED_COLUMNS
+
+    def blocks(self, pairs: Int) -> Float:
+        """(m, 2, 2) diagonal blocks of Gamma at the pairs (m, 2) of global rows, which have columns.  Collective.
+
+        A pair is on one rank.
+        """
+        own, at, n = pairs - self._first, self._slot[pairs], self._count
+        mine = ((own >= 0) & (own < len(self._buffer))).all(axis=1)
+        own, at = own[mine], at[mine]
+        blocks = np.zeros((len(pairs), 2, 2))
+        blocks[mine] = self._buffer[own[:, :, None], at[:, None, :]]
+        blocks[mine] -= self._waiting[own, :n] @ self._factors[at, :n].transpose(0, 2, 1)
+        return allreduce_sum(self._comm, blocks)
+
     def add(self, rows: Int, columns: Float) -> None:
         """Take the columns (owned rows, k) of these global rows (k,) in; all others go if they are too many."""
         self._apply_waiting()
-        if len(self._rows) + len(rows) > FOLLOWED_COLUMNS:
+        if not self.has_room(rows):
             self._slot[self._rows] = -1
             self._rows = self._rows[:0]
         old, new = len(self._rows), len(self._rows) + len(rows)

@@ -54,6 +54,9 @@ def test_answers_and_columns_follow_all_changes():
         active, more = active_after, more_after
         U, Gamma = response(F, d, active, more)
         np.testing.assert_allclose(followed.answer, U, atol=1e-12 * np.abs(U).max())
+        blocks = Gamma.reshape(N // 2, 2, N // 2, 2)[np.arange(N // 2), :, np.arange(N // 2)]
+        found = followed.blocks(np.arange(N).reshape(-1, 2))
+        np.testing.assert_allclose(found, blocks, atol=1e-12 * np.abs(Gamma).max())
         np.testing.assert_allclose(followed._present(np.arange(N))[0], Gamma, atol=1e-12 * np.abs(Gamma).max())
 
 
