@@ -8,7 +8,6 @@ from feti_homog.analysis.constants import constants
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.mesh_errors import mesh_error, unit_errors
 from feti_homog.analysis.registry import Analysis
-from feti_homog.analysis.sensitivities import propagated, sensitivities
 from feti_homog.homogenization.averaging import asymmetry
 
 if TYPE_CHECKING:
@@ -45,8 +44,11 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     if context.case.interface is not None:
         document["tips"] = context.tips.of(under, loads)
     document |= constants(context.cell, document)
-    document |= sensitivities(context, document, first, one_sided) if context.needs_sensitivities else {}
-    document |= propagated(context.case, document) if context.case.uncertainty.std else {}
+    if context.needs_sensitivities:
+        from feti_homog.analysis.sensitivities import propagated, sensitivities  # few runs ask for them
+
+        document |= sensitivities(context, document, first, one_sided)
+        document |= propagated(context.case, document) if context.case.uncertainty.std else {}
     return document | mesh_error(context, document, errors, errors_of_minus)
 
 
