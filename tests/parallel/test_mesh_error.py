@@ -11,10 +11,10 @@ from reference.references import ARC_OF_120_DEGREES_FINE, AXIAL_SHEAR, BONDED, E
 from support.cases import FIBRE, MATRIX, make_case, solve
 
 from feti_homog import Case, run
-from feti_homog.analysis.mesh_errors import note_accuracy
+from feti_homog.analysis.mesh_errors import mesh_error, note_accuracy
 from feti_homog.fem.arc_error import ArcSides
 from feti_homog.fem.stress_recovery import RecoveredStress
-from feti_homog.homogenization.mesh_error import energy_errors
+from feti_homog.homogenization.mesh_error import EnergyErrors, energy_errors
 
 pytestmark = pytest.mark.parallel
 
@@ -252,6 +252,19 @@ def test_what_is_outside_its_bounds_within_its_error_is_remarked(comm):
     value, (_, upper) = found.moduli.bulk, found.bounds.hashin_shtrikman.bulk
     assert value > upper
     assert any(f"bulk = {value:.6g} is outside its bounds" in remark for remark in found.remarks)
+
+
+@pytest.mark.parametrize(("size", "is_fault"), [(1e-3, True), (0.1, False)])
+def test_what_is_outside_its_bounds_by_more_than_its_error_is_a_fault(size, is_fault):
+    faults, notes = [], []
+    case = Case.parse(ASKED | {"cell": {"geometry": "square", "fibre_fraction": 0.4}})
+    context = SimpleNamespace(case=case, notes=notes, checks=SimpleNamespace(faults=faults))
+    bounds = SimpleNamespace(hashin_shtrikman=SimpleNamespace(bulk=(1.0, 1.95), shear=(0.4, 0.5)))
+    secants = {"effective_stiffness": cubic(2.5, 1.5, 0.5), "moduli": None, "bounds": bounds}
+    mesh_error(context, secants, [EnergyErrors(size * np.eye(3), np.zeros((3, 3)), np.zeros((0, 3)), False)], [])
+    (words,) = faults if is_fault else notes
+    assert not (notes if is_fault else faults)
+    assert words.startswith("bulk = 2 is outside its bounds, 1 and 1.95, by 5.0e-02")
 
 
 def test_more_error_than_asked_for_is_remarked_with_a_mesh_that_would_do(comm):
