@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import qmc
 
 from feti_homog.case.document import TomlPath
 from feti_homog.case.sections import AXIS_EXPECTED, MAX_CASES, RANGE_KEYS, SECTIONS, SWEEP, TOP_LEVEL, SweepSection
@@ -93,6 +92,8 @@ def _samples(axes: Sequence[Axis], settings: SweepSection) -> list[list[Assignme
     if not axes or settings.samples is None:
         return []
     if settings.sampling == "latin":
+        from scipy.stats import qmc  # which takes most of a second, and few sweeps need it
+
         shares = qmc.LatinHypercube(len(axes), seed=settings.seed).random(settings.samples)
     else:
         shares = np.random.default_rng(settings.seed).random((settings.samples, len(axes)))
