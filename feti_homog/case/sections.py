@@ -128,7 +128,7 @@ class Angle(AnalysisSection):
 
 @dataclass(frozen=True, kw_only=True)
 class Decomposition:
-    """Into how many subdomains the bodies are cut. Give one of the two keys, or neither."""
+    """Into which subdomains the cell is cut. Give one of the first two keys, or neither."""
 
     subdomains: int | None = key(
         integer(least=1, most=1_000_000),
@@ -141,6 +141,13 @@ class Decomposition:
         "Bodies are cut such that no subdomain has many more unknowns than this.",
         default=None,
         default_words="automatic",
+    )
+    cut: str = key(
+        choice("auto", "bodies"),
+        "What is cut: bodies one by one; or what is faster, which in cells up to 400 000 unknowns in which nothing can "
+        "part is the whole cell, across its materials, unless one of the other keys is given, or fields, sensitivities "
+        "or uncertainty are asked for.",
+        default="auto",
     )
 
 

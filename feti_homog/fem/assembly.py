@@ -1,4 +1,4 @@
-"""Assembly of one body of uniform material: stiffness, load of the unit strains, averages.
+"""Assembly of one subdomain: stiffness, load of the unit strains, averages.
 
 Engineering shears; degrees of freedom are (node, displacement), node-major.  Elements
 are summed triangle by coarse triangle first: a refined one is an element of its own, `MacroElement`, and affine ones
@@ -19,7 +19,7 @@ from feti_homog.fem import bubble
 from feti_homog.fem.problem import PLANE, Problem
 from feti_homog.fem.shape_functions import gradients
 from feti_homog.mesh.refinement import FineMesh, ReferenceLattice
-from feti_homog.typing import Float, Int, Int32
+from feti_homog.typing import Bool, Float, Int, Int32
 
 # Elements that are integrated at once: bounds the memory of their gradients, about 100 MB of quadratic ones.
 ELEMENTS_AT_ONCE = 1 << 16
@@ -27,38 +27,62 @@ ELEMENTS_AT_ONCE = 1 << 16
 
 @dataclass(frozen=True)
 class Assembly:
-    """Contribution of a body of area |Omega| made of the material L.
+    """Contribution of a subdomain of area |Omega| made of materials L.
 
     Attributes:
         K: (dofs, dofs) stiffness, Eq. (28), force per length.
         Q: (dofs, v) int B^T L, so that the load of the macroscopic strain E is f = -Q E, Eq. (29), and the
             integral of the stress is |Omega| L E + Q^T u*.
-        area: |Omega|.
+        slopes: (classes, 2) int dN/dx.
+        areas: (materials,) of which |Omega| is the sum.
     """
 
     K: csr_matrix
     Q: Float
-    area: float
+    slopes: Float
+    areas: Float
+
+    @property
+    def area(self) -> float:
+        """|Omega|."""
+        return float(self.areas.sum())
 
 
-def assemble(mesh: FineMesh, L: Float, problem: Problem = PLANE, is_mixed: bool = False) -> Assembly:
-    """Assemble the subdomain `mesh` of the stiffness L (v, v).
+def assemble(
+    mesh: FineMesh, laws: Float, problem: Problem = PLANE, is_mixed: bool = False, material: Int | None = None
+) -> Assembly:
+    """Assemble the subdomain `mesh` of the stiffness L (v, v), or of several.
 
     Its first rows and columns are those of the strains that displacements make, the others of uniform ones.  Quadratic
     elements of a stiffness that is isotropic in the plane may be mixed: with a bubble and a pressure (`fem.bubble`).
+
+    Args:
+        laws: L (v, v), or (materials, v, v) with the `material` (t,) of each coarse triangle.
     """
-    macro, tensor, c = MacroElement.of(mesh.lattice), _tensor(L, problem), problem.components
+    macro, c, classes, n = (
+        MacroElement.of(mesh.lattice),
+        problem.components,
+        mesh.node_class[mesh.nodes],
+        mesh.n_classes,
+    )
     couples, loads = np.empty((len(mesh.nodes), len(macro.rows), c * c)), np.empty((*mesh.nodes.shape, 2))
-    area = 0.0
-    for part in _parts(mesh):
-        integrate = _curved if mesh.curved[part[0]] else _affine
-        couples[part], loads[part], own = integrate(macro, mesh, part, tensor, L if is_mixed else None)
-        area += own
-    classes, n = mesh.node_class[mesh.nodes], mesh.n_classes
-    load = np.stack([np.bincount(classes.ravel(), loads[..., k].ravel(), n) for k in range(2)], axis=1)
-    # sum_k int dN/dx_k L[(i,k), :]
-    Q = np.einsum("ck,ikv->civ", load, L[problem.voigt]).reshape(-1, L.shape[1])
-    return Assembly(_sparse(couples, classes[:, macro.rows], classes[:, macro.columns], n), Q, area)
+    stiffnesses = laws.reshape(-1, *laws.shape[-2:])
+    Q, slopes, areas = np.zeros((c * n, laws.shape[-1])), np.zeros((n, 2)), np.zeros(len(stiffnesses))
+    for number, L in enumerate(stiffnesses):
+        members, tensor = (
+            np.ones(len(mesh.nodes), bool) if material is None else material == number,
+            _tensor(L, problem),
+        )
+        for part in _parts(mesh, members):
+            integrate = _curved if mesh.curved[part[0]] else _affine
+            couples[part], loads[part], area = integrate(macro, mesh, part, tensor, L if is_mixed else None)
+            areas[number] += area
+        nodes = classes[members].ravel()
+        own = np.stack([np.bincount(nodes, loads[members, :, k].ravel(), n) for k in range(2)], axis=1)
+        # sum_k int dN/dx_k L[(i,k), :]
+        Q += np.einsum("ck,ikv->civ", own, L[problem.voigt]).reshape(Q.shape)
+        slopes += own
+    return Assembly(_sparse(couples, classes[:, macro.rows], classes[:, macro.columns], n), Q, slopes, areas)
 
 
 def element_gradients(points: Float, triangles: Int32) -> Iterator[tuple[slice, Float, Float]]:
@@ -82,12 +106,12 @@ def element_strain(
     return strain, area
 
 
-def _parts(mesh: FineMesh) -> Iterator[Int]:
-    """Coarse triangles, affine and curved ones apart, in groups that keep memory bounded."""
+def _parts(mesh: FineMesh, members: Bool) -> Iterator[Int]:
+    """Yield the coarse triangles `members` (t,), affine and curved ones apart, in groups that keep memory bounded."""
     most = max(1, ELEMENTS_AT_ONCE // len(mesh.lattice.triangles))
-    for kind in (~mesh.curved, mesh.curved):
-        members = np.flatnonzero(kind)
-        yield from (members[first : first + most] for first in range(0, len(members), most))
+    for kind in (members & ~mesh.curved, members & mesh.curved):
+        those = np.flatnonzero(kind)
+        yield from (those[first : first + most] for first in range(0, len(those), most))
 
 
 def _affine(

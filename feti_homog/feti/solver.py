@@ -132,10 +132,10 @@ class FetiSolver:
         """(local dofs, v) unit loads, f = -Q E."""
         return np.concatenate([np.zeros((0, len(self.problem.loads))), *(s.Q for s in self.subdomains)])
 
-    @cached_property
+    @property
     def condensed(self) -> CondensedLoads:
-        """The unit loads on the boundaries, with the answer of the interiors to what works there, beside voids."""
-        return CondensedLoads.of(self.subdomains, self.interface_operators.dofs, len(self.problem.loads))
+        """The unit loads on the boundaries, with the answer of the interiors to what works there."""
+        return self.interface_operators.condensed
 
     @property
     def loads(self) -> Float:
@@ -240,8 +240,8 @@ class FetiSolver:
 
     def extended(self, place: int, u: Float, loads: Float, keep: bool = True) -> Float:
         """(dofs, k) u* of one subdomain, of u (boundary dofs, k) on all boundaries under the loads (v, k)."""
-        own = self.interface_operators.extend(place, u[self.interface_operators.slices[place]], keep)
-        return own + self.condensed.inner[place] @ loads if place in self.condensed.inner else own
+        operators = self.interface_operators
+        return operators.extend(place, u[operators.slices[place]], loads, keep)
 
     def destroy(self) -> None:
         """Free the Krylov methods and the coarse factor, after the last solve; collective.

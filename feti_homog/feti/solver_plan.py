@@ -127,9 +127,14 @@ def choose(sizes: ProblemSizes, options: SolverOptions, thresholds: Thresholds =
         pays = options.coarse_space != "adaptive" and _influence_pays(sizes, thresholds)
         preconditioner = "influence" if pays else "dirichlet"
     can_balance = sizes.all_searchable and preconditioner == "dirichlet"
-    if options.coarse_space == "adaptive" and not can_balance:
-        raise CaseError("-feti_coarse_space adaptive: needs -feti_pc_type dirichlet, -feti_dual_operator not implicit")
+    _check_adaptive(sizes, options, can_balance)
     return SolverPlan(preconditioner, can_balance and options.want_soft_modes(sizes.bodies_are_cut))
+
+
+def _check_adaptive(sizes: ProblemSizes, options: SolverOptions, can_balance: bool) -> None:
+    """Raise CaseError if a cell with multipliers cannot have the adaptive coarse space that is asked for."""
+    if options.coarse_space == "adaptive" and sizes.shared_dofs and not can_balance:
+        raise CaseError("-feti_coarse_space adaptive: needs -feti_pc_type dirichlet, -feti_dual_operator not implicit")
 
 
 def _influence_pays(sizes: ProblemSizes, thresholds: Thresholds) -> bool:

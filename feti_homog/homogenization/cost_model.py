@@ -62,14 +62,14 @@ class Estimate:
     ranks: int
 
 
-def applications(case: Case, problem: Problem) -> int:
-    """About how many times the analysis applies the dual operator of a problem."""
+def applications(case: Case, problem: Problem, across: bool = False) -> int:
+    """About how many times the analysis applies the dual operator of a problem; of pieces `across` materials or not."""
     # A mesh may have a curve "debonded"; along the fibres nothing touches.
     may_open = bool(case.arcs) or case.cell.has_own_mesh or case.section.is_followed
     contact = case.interface is not None and case.interface.contact and may_open and problem != AXIAL
     many = case.section.is_followed or _asks_for_tips(case)
     solves = SOLVES_OF_A_PATH if many else case.section.solves(len(problem.loads), contact)
-    return _iterations(case) * solves * (SOLVES_OF_A_CONTACT if contact else 1)
+    return _iterations(case, across) * solves * (SOLVES_OF_A_CONTACT if contact else 1)
 
 
 def has_errors(case: Case) -> bool:
@@ -77,9 +77,9 @@ def has_errors(case: Case) -> bool:
     return case.output.mesh_error and (case.output.fields or not case.section.is_followed)
 
 
-def _iterations(case: Case) -> int:
+def _iterations(case: Case, across: bool) -> int:
     """About those of a solve by a preconditioner."""
-    return ITERATIONS_WITH_COATINGS if COATING in case.materials else ITERATIONS_OF_A_SOLVE
+    return ITERATIONS_WITH_COATINGS if COATING in case.materials and not across else ITERATIONS_OF_A_SOLVE
 
 
 def _asks_for_tips(case: Case) -> bool:

@@ -8,11 +8,17 @@ import numpy as np
 
 from feti_homog.case.case import Case
 from feti_homog.errors import CaseError
-from feti_homog.feti.decomposition.partition import decompose, pieces_for_count, pieces_for_size
+from feti_homog.feti.decomposition.partition import decompose
 from feti_homog.fibres.outlines.ellipses import Ellipses
 from feti_homog.homogenization import arc_selection, cell_remarks, process_zone
 from feti_homog.homogenization.arc_selection import InterfaceNodes
 from feti_homog.homogenization.cell_remarks import mesh_remarks, subdomain_remarks, table_remarks
+from feti_homog.homogenization.partition_policy import (
+    DEFAULT_POLICY,
+    PartitionPolicy,
+    can_be_cut_across,
+    wanted_pieces,
+)
 from feti_homog.interface.tips import debonded_arcs
 from feti_homog.interface.tips.debonded_arcs import MovedTips
 from feti_homog.mesh.coarse_mesh import CoarseMesh
@@ -21,42 +27,9 @@ from feti_homog.mesh.mesh_fibres import coating_thickness, fibre_circles, fibre_
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.mesh.submesh import SubdomainTable, SubmeshesOfRank, cut_for_ranks, pinned_class
-from feti_homog.mesh.tiles.tiles import DEFAULT_TILES, TilePolicy
 from feti_homog.typing import Bool, Float, Int
 
 ROUNDING = 1e-9  # of coordinates, relative to the cell
-
-
-@dataclass(frozen=True)
-class PartitionPolicy:
-    """Into how many pieces the mesh and bodies are cut by default; sizes in degrees of freedom after refinement.
-
-    Attributes:
-        piece_dofs: of a piece; with smaller pieces the coarse problem takes longer, with larger ones the factors and
-            the dense matrices do.
-        piece_boundary_dofs: of a piece on the boundary to other bodies, at most; for pieces of narrow bodies.
-        cut_factor: a bonded body is cut if it is larger than a piece by this factor, or its boundary to other bodies is
-            than that of a piece.
-        even_cut_factor, even_share: instead of `cut_factor`, this one for bodies that are no more than this share of
-            the load of a rank, for they can be distributed evenly as they are.
-        breakable_boundary_dofs: where bonds may break, a body is cut only if its boundary has more: the cell is solved
-            so often then that whole bodies pay as long as dense matrices of their boundaries are small.
-        tiles: of the coarse mesh.
-
-    `scripts/benchmark scripts/cases/benchmark_1m.toml --tools feti` times the bonded ones, and `scripts/benchmark_path`
-    the last.
-    """
-
-    piece_dofs: int = 2200
-    piece_boundary_dofs: int = 500
-    cut_factor: float = 2.5
-    even_cut_factor: float = 16.0
-    even_share: float = 1 / 16
-    breakable_boundary_dofs: int = 2500
-    tiles: TilePolicy = DEFAULT_TILES
-
-
-DEFAULT_POLICY = PartitionPolicy()
 
 
 @dataclass(frozen=True)
@@ -78,6 +51,8 @@ class CellSummary:
         voids: how many there are.
         match_distance: how far the fibres are from the table that they match, see `neighbour_match`; None without one.
         remarks: how the cell differs from what the case may lead to expect, a line each.
+        across: whether subdomains are pieces across materials.
+        interface_nodes: how many there are of interfaces, where `across` has no multipliers there.
     """
 
     width: float
@@ -98,6 +73,13 @@ class CellSummary:
     voids: int
     match_distance: float | None
     remarks: tuple[str, ...]
+    across: bool = False
+    interface_nodes: int | None = None
+
+    @property
+    def is_cut(self) -> bool:
+        """Whether there are subdomains that are not whole bodies, and more than one."""
+        return self.subdomains > (1 if self.across else self.bodies)
 
     @property
     def fibres(self) -> int:
@@ -176,11 +158,14 @@ def distribute(
     if faults:
         raise CaseError(*faults)
     parts = torus.constituent if case.cell.bodies == "torus" else torus.plane_parts()
+    bodies, triangles = int(parts.max()) + 1, len(mesh.triangles)
     wanted = wanted_pieces(case, np.bincount(parts), _outer_edges(torus, parts), lattice, n_ranks, policy)
+    across = can_be_cut_across(case) and policy.across_pieces(len(mesh.triangles) * lattice.intervals**2, n_ranks)
+    if across:
+        parts, wanted = np.zeros_like(parts), np.array([across])
     decomposition = decompose(torus, parts, wanted, n_ranks)
     subdomain, rank = decomposition.subdomain, decomposition.rank
-    table = SubdomainTable.of(torus, subdomain, rank)
-    bodies, triangles = int(parts.max()) + 1, len(mesh.triangles)
+    table = SubdomainTable.of(torus, subdomain, rank, across > 0)
     summary = CellSummary(
         width=mesh.width,
         height=mesh.height,
@@ -204,6 +189,8 @@ def distribute(
             *mesh_remarks(case, torus, pairs),
             *subdomain_remarks(case, bodies, len(rank), triangles),
         ),
+        across=across > 0,
+        interface_nodes=_interface_nodes(torus, pairs, lattice) if across else None,
     )
     shares = cut_for_ranks(torus, subdomain, table, n_ranks, pinned_class(torus))
     return [RankShare(summary, table, pairs, own) for own in shares]
@@ -219,44 +206,19 @@ def match_distance(case: Case, width: float, height: float, centres: Float, radi
     return distance_of(window, width, height, centres, radii)
 
 
-def wanted_pieces(
-    case: Case,
-    load: Int,
-    edges: Int,
-    lattice: ReferenceLattice,
-    n_ranks: int,
-    policy: PartitionPolicy = DEFAULT_POLICY,
-) -> Int:
-    """(b,) wanted pieces of each body: what the case says, else what the policy says; at least one for each rank.
-
-    Args:
-        load: (b,) coarse triangles of each body.
-        edges: (b,) coarse edges that each body shares with others.
-    """
-    # A coarse triangle brings about M^2 / 2 nodes.
-    dofs_of_triangle = lattice.intervals**2
-    if case.decomposition.max_dofs is not None:
-        return pieces_for_size(load, dofs_of_triangle, case.decomposition.max_dofs)
-    if case.decomposition.subdomains is not None:
-        return pieces_for_count(load, case.decomposition.subdomains)
-    all_dofs = int(load.sum()) * dofs_of_triangle
-    boundary = edges * 2 * lattice.intervals
-    if case.interface is None:
-        evenly_shared = min(policy.even_cut_factor * policy.piece_dofs, policy.even_share * all_dofs / n_ranks)
-        largest = max(policy.cut_factor * policy.piece_dofs, evenly_shared)
-        to_cut = (load * dofs_of_triangle > largest) | (boundary > policy.cut_factor * policy.piece_boundary_dofs)
-    else:
-        to_cut = boundary > policy.breakable_boundary_dofs
-    by_size = pieces_for_size(load, dofs_of_triangle, policy.piece_dofs)
-    by_boundary = np.minimum(-(-boundary // policy.piece_boundary_dofs), load)
-    pieces = np.where(to_cut, np.maximum(by_size, by_boundary), 1)
-    return pieces if pieces.sum() >= n_ranks else pieces_for_count(load, n_ranks)
-
-
 def in_cell(points: Float, period: Float) -> Float:
     """Return the images of points (k, 2) in [0, period); those that rounding puts at its end are at 0."""
     inside = np.mod(points, period)
     return np.where(inside > (1 - ROUNDING) * period, 0.0, inside)
+
+
+def _interface_nodes(torus: Torus, pairs: Int, lattice: ReferenceLattice) -> int:
+    """Return the number of nodes at which two bodies could part if they had an interface."""
+    left, right, edge = torus.sides
+    between = edge[pairs[torus.mesh.phase[left], torus.mesh.phase[right]] >= 0]
+    plane = np.unique(torus.torus_edge, return_index=True)[1][between]
+    ends = np.unique(torus.node_class[torus.edges[plane]])
+    return len(between) * (lattice.intervals - 1) + int((~torus.never_part[ends]).sum())
 
 
 def _outer_edges(torus: Torus, parts: Int) -> Int:

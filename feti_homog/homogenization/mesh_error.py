@@ -12,12 +12,14 @@ from feti_homog.fem.stress_recovery import RecoveredStress
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.nested_interiors import groups, nested_interiors
+from feti_homog.homogenization.uniform_parts import UniformPart
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.mesh.refinement import FineMesh, joined
 from feti_homog.parallel.distributed_arrays import allreduce_sum
 from feti_homog.typing import Float
 
-Displacements = Iterator[tuple[list[Subdomain], FineMesh, Float]]
+Members = list[Subdomain] | list[UniformPart]
+Displacements = Iterator[tuple[Members, FineMesh, Float]]
 # Errors of elements and of arcs over those of the mesh that is refined once less, by the order of elements: of
 # `scripts/measure_mesh_error.py`.
 NESTED = {1: (0.26, 0.27), 2: (1 / 15, 1 / 14)}
@@ -96,12 +98,14 @@ def energy_errors(
 def is_nested(cell: TornCell, responses: Sequence[Response]) -> bool:
     """Return whether the mesh refined once less tells the error: not of quadratic elements at tips of debonded arcs."""
     lattice = cell.lattice
+    if cell.summary.across:
+        return False  # interiors are factored anyway
     return lattice.intervals > lattice.order and not (lattice.order == 2 and any(r.debonded for r in responses))
 
 
 def _recovered(
     cell: TornCell, responses: Sequence[Response], keep: bool, nested: bool
-) -> Iterator[tuple[list[Subdomain], RecoveredStress]]:
+) -> Iterator[tuple[Members, RecoveredStress]]:
     """Yield some of this rank's subdomains after the other, those of each group of one phase, and their stresses."""
     u = np.stack([response.u for response in responses], axis=1)
     loads = np.stack([response.strain for response in responses], axis=1)
@@ -119,8 +123,13 @@ def _nested(cell: TornCell, u: Float, loads: Float, keep: bool) -> Displacements
 
 def _whole(cell: TornCell, u: Float, loads: Float, keep: bool) -> Displacements:
     """Yield the same on the mesh itself."""
-    for group in groups(cell.subdomains, cell.lattice):
-        members = [cell.subdomains[place] for place in group]
-        own = np.concatenate([cell.solver.extended(place, u, loads, keep) for place in group])
+    place, extended = -1, np.zeros(0)
+    for group in groups(cell.parts, cell.lattice):
+        members, each = [cell.parts[k] for k in group], list[Float]()
+        for part in members:
+            if part.place != place:
+                place, extended = part.place, cell.solver.extended(part.place, u, loads, keep)
+            each.append(extended[part.dofs])
+        own = np.concatenate(each)
         own = own.reshape(-1, members[0].problem.components, u.shape[1])
         yield members, joined([s.mesh for s in members]), own

@@ -14,6 +14,7 @@ from feti_homog.fem.assembly import assemble
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.operators.implicit import Interior
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
+from feti_homog.homogenization.uniform_parts import UniformPart
 from feti_homog.mesh.refinement import FineMesh, ReferenceLattice, joined, refine
 from feti_homog.typing import Float, Int
 
@@ -78,7 +79,7 @@ def nested_interiors(boundary: InterfaceOperators, lattice: ReferenceLattice) ->
         yield NestedInterior.of(group, boundary, coarser, nested)
 
 
-def groups(subdomains: Sequence[Subdomain], lattice: ReferenceLattice) -> Iterator[list[int]]:
+def groups(subdomains: Sequence[Subdomain | UniformPart], lattice: ReferenceLattice) -> Iterator[list[int]]:
     """Yield the places of subdomains that follow each other, of one phase, and of ELEMENTS_AT_ONCE elements at most."""
     group, elements = list[int](), 0
     for place, s in enumerate(subdomains):

@@ -18,14 +18,8 @@ from feti_homog.feti.decomposition.partition import assign_ranks, cut_into_piece
 from feti_homog.homogenization import cell_remarks
 from feti_homog.homogenization.cell_remarks import subdomain_remarks, table_remarks
 from feti_homog.homogenization.coarse_meshes import deal_tiles, fill_own
-from feti_homog.homogenization.domain_partition import (
-    CellSummary,
-    PartitionPolicy,
-    RankShare,
-    in_cell,
-    match_distance,
-    wanted_pieces,
-)
+from feti_homog.homogenization.domain_partition import CellSummary, RankShare, in_cell, match_distance
+from feti_homog.homogenization.partition_policy import PartitionPolicy, wanted_pieces
 from feti_homog.mesh.coarse_mesh import representatives
 from feti_homog.mesh.fill.unmeshed_cell import NodedCell
 from feti_homog.mesh.outline.curves import MATRIX

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from mpi4py import MPI
@@ -18,21 +18,17 @@ from feti_homog.feti.solver import FetiSolver
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.homogenization import bonds, cost_model, phase_laws
 from feti_homog.homogenization.coarse_meshes import fill_tiles, place_nodes
-from feti_homog.homogenization.domain_partition import (
-    DEFAULT_POLICY,
-    CellSummary,
-    PartitionPolicy,
-    RankShare,
-    distribute,
-)
+from feti_homog.homogenization.domain_partition import CellSummary, RankShare, distribute
 from feti_homog.homogenization.nested_interiors import NestedInterior, nested_interiors
+from feti_homog.homogenization.partition_policy import DEFAULT_POLICY, PartitionPolicy
 from feti_homog.homogenization.tile_tearing import can_be_torn_by_tiles, tear_by_tiles
+from feti_homog.homogenization.uniform_parts import UniformPart, parts_of
 from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.tips import debonded_arcs
 from feti_homog.mesh.coarse_mesh import CoarseMesh
 from feti_homog.mesh.fill.unmeshed_cell import NodedCell
 from feti_homog.mesh.refinement import ReferenceLattice
-from feti_homog.mesh.submesh import SubmeshesOfRank
+from feti_homog.mesh.submesh import Submesh, SubmeshesOfRank
 from feti_homog.parallel.distributed_arrays import scatter
 from feti_homog.parallel.mpi_errors import agree, on_root_only
 from feti_homog.runtime.progress import Progress
@@ -64,6 +60,12 @@ class TornCell:
     def offsets(self) -> Int:
         """Return where each subdomain begins in this rank's vectors of degrees of freedom."""
         return np.cumsum([0, *(len(s.Q) for s in self.subdomains)])
+
+    @cached_property
+    def parts(self) -> list[UniformPart]:
+        """The parts of this rank's subdomains that lie in one body each."""
+        summary = self.summary
+        return list(parts_of(self.subdomains, [summary.phases[k] for k in summary.constituent_phase.tolist()]))
 
     @cached_property
     def class_nodes(self) -> Int:
@@ -120,7 +122,8 @@ class TornCell:
         """Meshed area of each phase; collective."""
         local = dict.fromkeys(self.summary.phases, 0.0)
         for s in self.subdomains:
-            local[s.submesh.phase] += s.area
+            for phase, area in zip(_phases(self.summary, s.submesh), s.areas.tolist(), strict=True):
+                local[phase] += area
         return {phase: self.comm.allreduce(area) for phase, area in local.items()}
 
     def fractions(self) -> dict[str, float]:
@@ -154,7 +157,7 @@ def tear(
     summary, shared, lattice, subdomains = assemble_subdomains(case, comm, progress, policy)
     problem = phase_laws.plane_problem(case)
     with progress.stage("factor") as words:
-        applications, springs = cost_model.applications(case, problem), bonds.springs(case)
+        applications, springs = cost_model.applications(case, problem, summary.across), bonds.springs(case)
         solver = FetiSolver(comm, shared, subdomains, lattice, applications, thresholds, springs, problem)
         multipliers, dimension = solver.jump_operator.global_rows, solver.coarse_dimension
         words.append(f"{multipliers} multipliers, coarse dimension {dimension}")
@@ -162,18 +165,21 @@ def tear(
     if len(phase_laws.problems(case)) == 1:
         return cell
     with progress.stage("assemble") as words:
-        own = agree(comm, assemble_axial, case, subdomains)
+        own = agree(comm, assemble_axial, case, summary, subdomains)
         words.append(f"{comm.allreduce(sum(s.n_dofs for s in own))} degrees of freedom along the fibres")
     with progress.stage("axial"):
-        applications, springs = cost_model.applications(case, AXIAL), bonds.axial_springs(case)
+        applications, springs = cost_model.applications(case, AXIAL, summary.across), bonds.axial_springs(case)
         solver = FetiSolver(comm, shared, own, lattice, applications, thresholds, springs, AXIAL)
     return replace(cell, axial=TornCell(comm, case, summary, lattice, own, solver))
 
 
-def assemble_axial(case: Case, subdomains: Sequence[Subdomain]) -> list[Subdomain]:
+def assemble_axial(case: Case, summary: CellSummary, subdomains: Sequence[Subdomain]) -> list[Subdomain]:
     """Return the subdomains of this rank with the displacement along the fibres, on the meshes that they have."""
+    law = partial(phase_laws.axial_law, case)
     return [
-        Subdomain.on(s.submesh, s.mesh, phase_laws.axial_law(case, s.submesh.phase), AXIAL, **_flags(s.submesh.phase))
+        Subdomain.on(
+            s.submesh, s.mesh, _laws(summary, s.submesh, law), AXIAL, s.material, is_thin=s.is_thin, is_outer=s.is_outer
+        )
         for s in subdomains
     ]
 
@@ -195,7 +201,7 @@ def assemble_subdomains(
     for line in summary.remarks:
         progress.say(f"remark: {line}")
     with progress.stage("assemble") as words:
-        subdomains = agree(comm, _assemble, case, own.submeshes, lattice)
+        subdomains = agree(comm, _assemble, case, summary, own.submeshes, lattice)
         dofs = comm.allreduce(sum(s.n_dofs for s in subdomains))
         meshed = comm.allreduce(sum(s.area for s in subdomains))
         if summary.voids:
@@ -214,18 +220,39 @@ def cut(case: Case, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: Part
     return scatter(comm, on_root_only(comm, distribute, case, mesh, lattice, comm.size, policy) or [])
 
 
-def _assemble(case: Case, submeshes: SubmeshesOfRank, lattice: ReferenceLattice) -> list[Subdomain]:
+def _assemble(
+    case: Case, summary: CellSummary, submeshes: SubmeshesOfRank, lattice: ReferenceLattice
+) -> list[Subdomain]:
     """Return the subdomains of this rank, refined and assembled."""
-    problem = phase_laws.plane_problem(case)
+    problem, law = phase_laws.plane_problem(case), partial(phase_laws.plane_law, case)
     return [
-        Subdomain.build(
-            s, lattice, phase_laws.plane_law(case, s.phase), problem, is_mixed=phase_laws.is_mixed(case, s.phase),
-            **_flags(s.phase),
-        )
+        Subdomain.build(s, lattice, _laws(summary, s, law), problem, _material(summary, s), **_flags(case, s.phase))
         for s in submeshes.cut()
-    ]  # fmt: skip
+    ]
 
 
-def _flags(phase: str) -> dict[str, bool]:
-    """Return the flags of a subdomain of this phase for the dual solver."""
-    return {"is_thin": phase == COATING, "is_outer": phase == MATRIX}
+def _laws(summary: CellSummary, submesh: Submesh, law: Callable[[str], Float]) -> Float:
+    """Return the stiffnesses of a subdomain by the `law` of each phase, as `assemble` is given them."""
+    laws = np.stack([law(phase) for phase in _phases(summary, submesh)])
+    return np.asarray(laws[0] if submesh.phase else laws)
+
+
+def _material(summary: CellSummary, submesh: Submesh) -> Int | None:
+    """(t,) which of the laws each coarse triangle has, None of one material."""
+    if submesh.phase:
+        return None
+    return np.asarray(np.unique(summary.constituent_phase[submesh.constituent], return_inverse=True)[1])
+
+
+def _phases(summary: CellSummary, submesh: Submesh) -> list[str]:
+    """Return the names of the phases of a subdomain, in their order."""
+    if submesh.phase:
+        return [submesh.phase]
+    return [summary.phases[k] for k in np.unique(summary.constituent_phase[submesh.constituent]).tolist()]
+
+
+def _flags(case: Case, phase: str) -> dict[str, bool]:
+    """Return the flags of a subdomain of this phase; of one across materials, whose elements are all of a kind."""
+    if not phase:
+        return {"is_mixed": all(phase_laws.is_mixed(case, name) for name in case.materials)}
+    return {"is_thin": phase == COATING, "is_outer": phase == MATRIX, "is_mixed": phase_laws.is_mixed(case, phase)}

@@ -20,8 +20,9 @@ class Submesh:
 
     Attributes:
         index: number of the subdomain.
-        body: constituent that it is a piece of.
-        phase: name of the material phase.
+        body: constituent that it is a piece of; 0 of a piece across materials.
+        phase: name of the material phase; empty of a piece across materials.
+        constituent: (t,) that each triangle is in.
         points: (v, 2) vertices, in plane position.
         triangles: (t, 3) vertices, counter-clockwise.
         triangle_edges: (t, 3) edge from vertex k to vertex k + 1 (mod 3).
@@ -43,6 +44,7 @@ class Submesh:
     index: int
     body: int
     phase: str
+    constituent: Int
     points: Float
     triangles: Int
     triangle_edges: Int
@@ -66,22 +68,25 @@ class SubdomainTable:
     """Data of the s subdomains of all, known to every rank.
 
     Attributes:
-        body: (s,) constituent that each is a piece of.
+        body: (s,) constituent that each is a piece of; 0 of pieces across materials.
         rank: (s,) that has it.
         nesting: (constituents,) places from the outermost to the innermost, as `Torus.nesting`.
         phase: (constituents,) number of the material phase of each.
+        across: whether pieces are across materials.
     """
 
     body: Int
     rank: Int
     nesting: Int
     phase: Int
+    across: bool = False
 
     @classmethod
-    def of(cls, torus: Torus, subdomain: Int, rank: Int) -> SubdomainTable:
+    def of(cls, torus: Torus, subdomain: Int, rank: Int, across: bool = False) -> SubdomainTable:
         """Make the table of a whole cell whose triangles are in these subdomains (m,), numbered from 0 without gaps."""
         first = np.unique(subdomain, return_index=True)[1]
-        return cls(torus.constituent[first], rank, torus.nesting, torus.constituent_phase)
+        body = np.zeros(len(first), np.int64) if across else torus.constituent[first]
+        return cls(body, rank, torus.nesting, torus.constituent_phase, across)
 
 
 def cut(torus: Torus, subdomain: Int) -> Iterator[Submesh]:
@@ -137,7 +142,7 @@ def cut_for_ranks(
             member=member,
             index=index,
             body=body,
-            phase=tuple(torus.mesh.phases[k] for k in table.phase[body].tolist()),
+            phase=tuple("" if table.across else torus.mesh.phases[k] for k in table.phase[body].tolist()),
         )
 
 
@@ -158,6 +163,7 @@ def part(submesh: Submesh, members: Int) -> Submesh:
     pinned_here = np.flatnonzero(classes == submesh.pinned)
     return replace(
         submesh,
+        constituent=submesh.constituent[members],
         points=submesh.points[vertices],
         triangles=triangles.reshape(-1, 3),
         triangle_edges=triangle_edges.reshape(-1, 3),
@@ -222,6 +228,7 @@ def _submesh(torus: Torus, members: Int, pinned: int) -> Submesh:
         index=0,
         body=0,
         phase="",
+        constituent=torus.constituent[members],
         points=mesh.points[vertices],
         triangles=triangles,
         triangle_edges=triangle_edges,
@@ -262,6 +269,7 @@ def _joined_meshes(meshes: list[Submesh]) -> Submesh:
     pinned = [np.searchsorted(class_keys, mesh.class_keys[mesh.pinned]) for mesh in meshes if mesh.pinned >= 0]
     return replace(
         meshes[0],
+        constituent=_all(meshes, "constituent"),
         points=_all(meshes, "points"),
         triangles=_numbers(meshes, "triangles", "points"),
         triangle_edges=_numbers(meshes, "triangle_edges", "edges"),

@@ -22,7 +22,8 @@ from feti_homog.feti.factory import database_options
 from feti_homog.feti.solver_plan import ProblemSizes, SolverOptions, SolverPlan
 from feti_homog.homogenization import cost_model, phase_laws, process_zone
 from feti_homog.homogenization.bonds import teeth_of
-from feti_homog.homogenization.domain_partition import DEFAULT_POLICY, CellSummary
+from feti_homog.homogenization.domain_partition import CellSummary
+from feti_homog.homogenization.partition_policy import BY_COST
 from feti_homog.homogenization.unit_cell import cut
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.parallel.mpi_errors import on_root, on_root_only
@@ -40,7 +41,7 @@ def describe(case: Case, comm: MPI.Intracomm) -> str:
     Raises as `tear`.
     """
     lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
-    own = cut(case, lattice, comm, DEFAULT_POLICY)
+    own = cut(case, lattice, comm, BY_COST)
     constraints = share_entities(comm, own.submeshes, own.table, own.pairs, lattice).constraints
     options = database_options()
     loads = comm.gather((len(own.submeshes.index), len(own.submeshes.member)))
@@ -59,7 +60,10 @@ def _described(
     own = [subdomains for subdomains, _ in loads]
     nodes = [triangles * lattice.intervals**2 // 2 for _, triangles in loads]
     elements = summary.coarse_triangles * len(lattice.triangles)
-    problems = {problem.components: cost_model.applications(case, problem) for problem in phase_laws.problems(case)}
+    problems = {
+        problem.components: cost_model.applications(case, problem, summary.across)
+        for problem in phase_laws.problems(case)
+    }
     plan = _plan(case, summary, multipliers, max(problems.values()), options)
     columns = multipliers if plan.preconditioner == "influence" else 0
     errors = cost_model.has_errors(case)
@@ -107,7 +111,7 @@ def _plan(case: Case, summary: CellSummary, multipliers: int, applications: int,
     """
     dense = options.operator != "implicit"
     sizes = ProblemSizes(
-        applications, summary.subdomains > summary.bodies, dense, dense, multipliers, COATING in case.materials
+        applications, summary.is_cut, dense, dense, multipliers, COATING in case.materials and not summary.across
     )
     found = solver_plan.choose(sizes, options)
     if case.has_friction and found.preconditioner != "influence":

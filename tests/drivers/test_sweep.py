@@ -13,7 +13,7 @@ from matplotlib.image import imread
 from support.command_line import command_line
 from support.hooks import WAIT, Hook, HookedJob
 from support.jobs import PATIENCE, ROOT, launched
-from support.sweep_files import CASE, FAILING, FAILING_POINTS, RANDOM, means, rows, sweep_file
+from support.sweep_files import BY_BODIES, CASE, FAILING, FAILING_POINTS, RANDOM, means, rows, sweep_file
 from support.sweep_runs import TWO, collected, contents, results, swept
 
 TWELVE = "cell.fibre_fraction = {from = 0.1, to = 0.4, count = 6}\nmaterial.fibre.young = [150.0, 200.0]\n"
@@ -120,7 +120,7 @@ def test_failed_cases_are_kept_and_told(tmp_path, ranks):
 
 
 def test_cases_without_convergence_are_computed_again_by_retry_only(tmp_path):
-    out, path = tmp_path / "out", sweep_file(tmp_path, TWO)
+    out, path = tmp_path / "out", sweep_file(tmp_path, TWO, CASE + BY_BODIES)
     job = swept(out, path, "-feti_ksp_max_it", "2", code=3)
     assert job.stdout.count("no convergence after 2 iterations") >= 2
     collected(out)

@@ -18,7 +18,7 @@ from feti_homog.feti.operators.implicit import ImplicitInterfaceOperator
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.homogenization import unit_cell
-from feti_homog.homogenization.domain_partition import PartitionPolicy, wanted_pieces
+from feti_homog.homogenization.partition_policy import PartitionPolicy, wanted_pieces
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.runtime.progress import Progress
 

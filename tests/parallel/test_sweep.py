@@ -10,7 +10,7 @@ import pytest
 from mpi4py import MPI
 from reference.references import BONDED
 from support.ranks import parallel_assert
-from support.sweep_files import CASE, RANDOM
+from support.sweep_files import BY_BODIES, CASE, RANDOM
 
 from feti_homog import run
 from feti_homog.errors import ConvergenceError
@@ -82,7 +82,7 @@ def test_mean_of_random_cells_is_isotropic_and_within_the_bounds(comm, shared_pa
 
 
 def test_failed_cases_end_the_sweep_as_one_error(comm, shared_path):
-    case = CASE + "[petsc]\nfeti_ksp_max_it = 2\n"
+    case = CASE + BY_BODIES + "[petsc]\nfeti_ksp_max_it = 2\n"
     with pytest.raises(ConvergenceError, match="2 of 2 cases failed"):
         swept(comm, shared_path, "cell.fibre_fraction = [0.2, 0.3]\n", case, ranks_per_case=1)
     table = on_root(comm, collect.read, shared_path / "out")

@@ -17,7 +17,8 @@ from support.whole_meshes import coarse_mesh
 from feti_homog.case import case as cases
 from feti_homog.errors import MeshError
 from feti_homog.homogenization import coarse_meshes
-from feti_homog.homogenization.domain_partition import PartitionPolicy, distribute
+from feti_homog.homogenization.domain_partition import distribute
+from feti_homog.homogenization.partition_policy import PartitionPolicy
 from feti_homog.homogenization.tile_tearing import can_be_torn_by_tiles, tear_by_tiles
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BONDED

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from support.jobs import ROOT
 from support.one_node_slurm import Job, wait
-from support.sweep_files import CASE, FAILING, FAILING_POINTS, rows, sweep_file
+from support.sweep_files import BY_BODIES, CASE, FAILING, FAILING_POINTS, rows, sweep_file
 
 SCRIPTS = ROOT / "scripts/slurm"
 DONE, FAILED = Job("COMPLETED", 0), Job("FAILED", 3)
@@ -121,7 +121,7 @@ def test_an_array_goes_on_past_a_failed_case_and_is_collected(slurm, elsewhere):
 
 
 def test_cases_without_convergence_are_done_after_a_retry(slurm, elsewhere):
-    sweep_file(elsewhere, "cell.fibre_fraction = [0.2, 0.3]\n")
+    sweep_file(elsewhere, "cell.fibre_fraction = [0.2, 0.3]\n", CASE + BY_BODIES)
     array, collect = submitted(slurm, elsewhere, "submit_sweep", "sweep.toml", "out", "--", "-feti_ksp_max_it", "2")
     assert slurm.ended(collect) == [DONE] and slurm.jobs(array) == [FAILED, FAILED]
     array, collect = submitted(slurm, elsewhere, "submit_sweep", "sweep.toml", "out", "--retry")

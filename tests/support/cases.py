@@ -13,7 +13,7 @@ from feti_homog.analysis import stiffness
 from feti_homog.analysis.context import AnalysisContext, CellLoads
 from feti_homog.case import case as cases
 from feti_homog.feti.thresholds import DEFAULTS
-from feti_homog.homogenization.domain_partition import DEFAULT_POLICY
+from feti_homog.homogenization.partition_policy import DEFAULT_POLICY
 from feti_homog.homogenization.unit_cell import tear
 from feti_homog.petsc.options import case_options
 from feti_homog.runtime.progress import Progress
@@ -21,7 +21,9 @@ from feti_homog.runtime.progress import Progress
 MATRIX, FIBRE = {"young": 88.0, "poisson": 0.299}, {"young": 200.0, "poisson": 0.222}
 
 
-def make_case(*, matrix=MATRIX, fibre=FIBRE, plane="strain", petsc=None, decomposition=None, folder=".", **cell):
+def make_case(
+    *, matrix=MATRIX, fibre=FIBRE, plane="strain", petsc=None, decomposition=None, output=None, folder=".", **cell
+):
     """Return a case of the given cell, tight enough (1e-10) for comparisons."""
     circular = {} if cell.get("geometry") == "mesh" else {"fibre_fraction": 0.4, "mesh_size": 0.15}
     document = {
@@ -30,6 +32,7 @@ def make_case(*, matrix=MATRIX, fibre=FIBRE, plane="strain", petsc=None, decompo
         "analysis": {"type": "stiffness", "plane": plane},
         "petsc": {"feti_ksp_rtol": 1e-10} | (petsc or {}),
         "decomposition": decomposition or {},
+        "output": output or {},
     }
     return cases.parse(document, Path(folder))
 
@@ -59,7 +62,7 @@ def solve(case, comm, thresholds=DEFAULTS, policy=DEFAULT_POLICY):
 
 def monolithic_stiffness(cell):
     """L^ef of the same refined mesh by one monolithic solve, on every rank."""
-    parts = cell.comm.gather([(s.mesh.points, s.mesh.triangles, s.L, s.is_mixed) for s in cell.subdomains])
+    parts = cell.comm.gather([(p.mesh.points, p.mesh.triangles, p.L, p.is_mixed) for p in cell.parts])
     result = None
     if cell.comm.rank == 0:
         own = [part for parts_of_rank in parts for part in parts_of_rank]

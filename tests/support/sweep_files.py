@@ -9,6 +9,7 @@ from support.base_case import BASE
 
 QUIET = '[output]\nfields = false\npictures = false\nstress_unit = "GPa"\n'
 CASE = BASE.replace("mesh_size = 0.05", "mesh_size = 0.3") + QUIET
+BY_BODIES = '[decomposition]\ncut = "bodies"\n'  # with multipliers, so that a solve may fail
 RANDOM_CELL = 'geometry = "random"\nfibres = 3\nfibre_fraction = 0.4\nmesh_size = 0.3'
 RANDOM = CASE.replace('geometry = "hexagonal"\nfibre_fraction = 0.4\nmesh_size = 0.3', RANDOM_CELL)
 

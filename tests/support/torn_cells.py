@@ -12,7 +12,7 @@ from feti_homog.case import sections
 from feti_homog.feti.thresholds import DEFAULTS
 from feti_homog.fibres.arrange import arrange
 from feti_homog.homogenization import unit_cell
-from feti_homog.homogenization.domain_partition import DEFAULT_POLICY
+from feti_homog.homogenization.partition_policy import DEFAULT_POLICY
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.states import BONDED, OPEN, BondState

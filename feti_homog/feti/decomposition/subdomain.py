@@ -21,7 +21,7 @@ from feti_homog.typing import Float, Int
 
 @dataclass(eq=False)
 class Subdomain:
-    """A body or a piece of it, with n node classes of c displacements each, and kernel dimension k.
+    """A piece of a body, or of several bonded ones, with n classes of c displacements each, and kernel dimension k.
 
     All but K stays as it is made.  K is by far the largest: the one that `build` makes stays until the first call of
     `take_stiffness`, whose caller then owns it.  Later calls assemble it anew.
@@ -30,9 +30,11 @@ class Subdomain:
         submesh: the coarse share.
         mesh: the refined mesh.
         problem: the displacements of the problem.
-        L: (v, v) stiffness of the material, see `assemble`.
+        L: (v, v) stiffness of the material, see `assemble`; the mean over the area if there are several.
+        laws, material: those that `assemble` is given; the first is (1, v, v), the second None, of one material.
         Q: (cn, v) load of the unit strains: f = -Q E.
-        area: of the subdomain.
+        slopes: (n, 2) int dN/dx, 0 of the pinned class.
+        areas: (materials,) of each material.
         R: (cn, k) orthonormal kernel of K: translations, and a rotation in the plane if the piece can turn,
             less what the pinned class stops.
         positions: (n, 2) unwrapped positions of the classes.
@@ -45,8 +47,11 @@ class Subdomain:
     mesh: FineMesh
     problem: Problem
     L: Float
+    laws: Float
+    material: Int | None
     Q: Float
-    area: float
+    slopes: Float
+    areas: Float
     R: Float
     positions: Float
     _built_stiffness: csr_matrix | None = field(repr=False)
@@ -56,31 +61,49 @@ class Subdomain:
 
     @classmethod
     def build(
-        cls, submesh: Submesh, lattice: ReferenceLattice, L: Float, problem: Problem = PLANE, **flags: bool
+        cls,
+        submesh: Submesh,
+        lattice: ReferenceLattice,
+        laws: Float,
+        problem: Problem = PLANE,
+        material: Int | None = None,
+        **flags: bool,
     ) -> Subdomain:
         """Refine and assemble, without communication; `flags` are `is_thin`, `is_outer` and `is_mixed`.
+
+        Of one material or several: `laws` and `material` as of `assemble`.
 
         Raises:
             MeshError: an element is inverted, or the rigid-body modes are not in the kernel of K.
         """
         mesh = refine(submesh, lattice)
         _check_corners(submesh, mesh)
-        return cls.on(submesh, mesh, L, problem, **flags)
+        return cls.on(submesh, mesh, laws, problem, material, **flags)
 
     @classmethod
-    def on(cls, submesh: Submesh, mesh: FineMesh, L: Float, problem: Problem, **flags: bool) -> Subdomain:
+    def on(
+        cls,
+        submesh: Submesh,
+        mesh: FineMesh,
+        laws: Float,
+        problem: Problem,
+        material: Int | None = None,
+        **flags: bool,
+    ) -> Subdomain:
         """Assemble on a refined mesh, without communication.  Arguments and errors as of `build`."""
-        body = assemble(mesh, L, problem, flags.get("is_mixed", False))
+        body = assemble(mesh, laws, problem, flags.get("is_mixed", False), material)
         shift, closes = unwrap(submesh)
         positions = np.empty((mesh.n_classes, 2))
         positions[mesh.node_class[mesh.nodes]] = mesh.points[mesh.nodes] + shift[:, None]
         R = kernel(problem, positions, closes, submesh.pinned)
         K = _pinned(body.K, problem, submesh.pinned)
         _check_kernel(submesh, K, R)
-        Q = body.Q
+        Q, slopes = body.Q, body.slopes
         if submesh.pinned >= 0:
-            Q[problem.dofs(np.array([submesh.pinned]))] = 0.0
-        return cls(submesh, mesh, problem, L, Q, body.area, R, positions, K, **flags)
+            Q[problem.dofs(np.array([submesh.pinned]))], slopes[submesh.pinned] = 0.0, 0.0
+        laws = laws.reshape(-1, *laws.shape[-2:])
+        L = np.einsum("k,kij->ij", body.areas / body.area, laws) if len(laws) > 1 else laws[0]
+        return cls(submesh, mesh, problem, L, laws, material, Q, slopes, body.areas, R, positions, K, **flags)
 
     def mean_strain(self, dofs: Int) -> Float:
         """(k, m) whose transpose times the displacements u of `dofs` (k,) is their share in int eps*.
@@ -88,12 +111,20 @@ class Subdomain:
         The integral is over the subdomain and what lies of voids beside it, int_Omega eps* + int u (x) n ds, n outward
         from the voids; 0 at voids.
         """
-        m = self.problem.strains
-        bodies = np.linalg.solve(self.L[:m, :m], self.Q[dofs, :m].T).T
-        if not self.submesh.at_void.any():
-            return np.asarray(bodies)
-        voids = np.einsum("ck,ikm->cim", void_integrals(self.submesh, self.mesh), np.eye(m)[self.problem.voigt])
-        return np.asarray(bodies + voids.reshape(-1, m)[dofs])
+        m, slopes = self.problem.strains, self.slopes
+        if self.submesh.at_void.any():
+            slopes = slopes + void_integrals(self.submesh, self.mesh)
+        return np.asarray(np.einsum("ck,ikm->cim", slopes, np.eye(m)[self.problem.voigt]).reshape(-1, m)[dofs])
+
+    @property
+    def area(self) -> float:
+        """Area of the subdomain."""
+        return float(self.areas.sum())
+
+    @property
+    def loads_inside(self) -> bool:
+        """Whether the unit loads act on nodes that are not shared: at voids, and where materials meet."""
+        return self.material is not None or bool(self.submesh.at_void.any())
 
     def without_rounding(self, answers: Float, dofs: Int) -> Float:
         """(k, v) the answers -K+ Q of `dofs` (k,), with -E x in place of a body's own.
@@ -118,9 +149,10 @@ class Subdomain:
     def compressible_share(self) -> float:
         """Share of the diagonal of K in the scaling D: that of a phase with the same mu and lambda <= 2 mu.
 
+        1 of several materials, none of which is nearly incompressible.
         A boundary that keeps the volume is as stiff as mu says, but single nodes of mixed elements are as lambda.
         """
-        if not self.is_mixed:
+        if not self.is_mixed or self.material is not None:
             return 1.0
         first, shear = lame(self.L)
         return (min(first, SCALED_LAME * shear) + 3 * shear) / (first + 3 * shear)
@@ -132,7 +164,8 @@ class Subdomain:
 
     def assemble_stiffness(self) -> csr_matrix:
         """(cn, cn) K, Eq. (28), the pinned class (15) eliminated by a unit row scaled like the others."""
-        return _pinned(assemble(self.mesh, self.L, self.problem, self.is_mixed).K, self.problem, self.submesh.pinned)
+        body = assemble(self.mesh, self.laws, self.problem, self.is_mixed, self.material)
+        return _pinned(body.K, self.problem, self.submesh.pinned)
 
     def fixing(self, K: csr_matrix, candidates: Int) -> tuple[Int, Float]:
         """Degrees of freedom and dense block rho Rf Rf^T that make K + block an SPD matrix.
@@ -182,7 +215,8 @@ def kernel(problem: Problem, positions: Float, rotates: bool, pinned: int) -> Fl
 def label(submesh: Submesh) -> str:
     """Return the subdomain in messages."""
     x, y = submesh.points[0]
-    return f"subdomain {submesh.index} ({submesh.phase}) near ({x:.6g}, {y:.6g})"
+    kind = f" ({submesh.phase})" if submesh.phase else ""
+    return f"subdomain {submesh.index}{kind} near ({x:.6g}, {y:.6g})"
 
 
 def _pinned(K: csr_matrix, problem: Problem, pinned: int) -> csr_matrix:
@@ -214,7 +248,8 @@ def _check_corners(submesh: Submesh, mesh: FineMesh) -> None:
     inverted = np.flatnonzero(~(doubled > 0))
     if len(inverted):
         x, y = mesh.points[triangles[inverted[0]]].mean(axis=0)
+        kind = f" of {submesh.phase}" if submesh.phase else ""
         raise MeshError(
-            f"[cell] refine, order: {len(inverted)} refined elements of {submesh.phase} are inverted, the first "
+            f"[cell] refine, order: {len(inverted)} refined elements{kind} are inverted, the first "
             f"near ({x:.6g}, {y:.6g}); expected a mesh fine enough for its curved interfaces"
         )

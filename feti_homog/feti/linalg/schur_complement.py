@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from petsc4py import PETSc
-from scipy.sparse import csr_matrix
+from scipy.sparse import bmat, csr_matrix
 
 from feti_homog.feti.linalg.sparse_direct import check_factor, mumps_error, power_of_two
 from feti_homog.petsc import c_functions
@@ -35,6 +35,19 @@ def schur_complement(matrix: csr_matrix, rows: Int) -> Float:
         matrix.data /= scale
     schur /= scale
     return schur
+
+
+def schur_complement_with_loads(matrix: csr_matrix, rows: Int, loads: Float) -> tuple[Float, Float, Float]:
+    """Return S (n, n) as `schur_complement`, and the loads Q (dofs, v) condensed to the `rows` by the same elimination.
+
+    They are q = Q_b - K_bi K_ii^-1 Q_i and -Q_i^T K_ii^-1 Q_i, for the columns of Q border the matrix.
+    """
+    v, n = loads.shape[1], len(rows)
+    corner = csr_matrix((np.zeros(v), np.arange(v), np.arange(v + 1)), shape=(v, v))  # MUMPS expects a diagonal
+    Q = csr_matrix(loads)
+    bordered = bmat([[matrix, Q], [Q.T, corner]], format="csr")
+    all_of_it = schur_complement(bordered, np.r_[rows, matrix.shape[0] + np.arange(v)])
+    return np.asfortranarray(all_of_it[:n, :n]), all_of_it[:n, n:].copy(), all_of_it[n:, n:].copy()
 
 
 def _by_mumps(matrix: csr_matrix, rows: Int) -> Float:

@@ -13,13 +13,14 @@ from scipy.sparse import csr_matrix
 
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.linalg.dense_cholesky import full_from_lower, invert_upper
-from feti_homog.feti.linalg.schur_complement import schur_complement
+from feti_homog.feti.linalg.schur_complement import schur_complement, schur_complement_with_loads
+from feti_homog.feti.operators.implicit import CondensedLoads
 from feti_homog.feti.thresholds import DENSE_COLUMNS_ONE_BY_ONE, ILL_CONDITIONED, INCOMPRESSIBLE_SHARE
 from feti_homog.typing import Float, Int
 
 
 class ExplicitInterfaceOperator:
-    """S and S+ of one subdomain on its n boundary dofs.
+    """S and S+ of one subdomain on its n boundary dofs, and its unit loads there, `condensed`.
 
     With the fixing nodes on the boundary, the inverse of S + rho Rf Rf^T is the boundary part of K+.
     """
@@ -35,7 +36,13 @@ class ExplicitInterfaceOperator:
         fixed, self._term = subdomain.fixing(K, np.unique(subdomain.problem.nodes(dofs)))
         self._fixed = np.searchsorted(dofs, fixed)
         self.n = len(dofs)
-        both = schur_complement(K, dofs)
+        s, q, C = subdomain, subdomain.Q[dofs], subdomain.area * subdomain.L
+        if s.loads_inside:
+            both, q, condensed = schur_complement_with_loads(K, dofs, s.Q)
+            C = C + condensed
+        else:
+            both = schur_complement(K, dofs)
+        self.condensed = CondensedLoads(q, C)
         self._schur_diagonal = both.diagonal().copy()
         # S stays below the diagonal; the inverse of the regularised S comes above it.
         both[np.ix_(self._fixed, self._fixed)] += np.triu(self._term)

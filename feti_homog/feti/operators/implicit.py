@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -13,6 +13,24 @@ from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
 from feti_homog.feti.thresholds import SPARSE_COLUMNS_AT_ONCE
 from feti_homog.typing import Float, Int
+
+
+@dataclass(frozen=True)
+class CondensedLoads:
+    """The v unit loads condensed to the n boundary dofs of subdomains.
+
+    Loads vanish inside pieces of one material but for nodes at voids.  With K_ii u_i = -Q_i E - K_ib u_b the stress
+    integral is C E + q^T u_b and the forces on the boundary are S u_b + q E, of
+
+        q = Q_b - K_bi K_ii^-1 Q_i,  C = |Omega| L - Q_i^T K_ii^-1 Q_i.
+
+    Attributes:
+        boundary: (n, v) q.
+        stiffness: (v, v) C, or the sum.
+    """
+
+    boundary: Float
+    stiffness: Float
 
 
 class ImplicitInterfaceOperator:
@@ -26,12 +44,25 @@ class ImplicitInterfaceOperator:
         # A single subdomain has no boundary: any of its nodes can be fixed.
         own = subdomain.problem.nodes(dofs)
         nodes = np.unique(own) if len(dofs) else np.arange(subdomain.mesh.n_classes)
+        if not len(dofs) and not subdomain.R.shape[1]:
+            self.interior = Interior(K, dofs)  # all of it, and no forces come from outside
+            return
         self._solver = DirectSolver(subdomain.regularised(K, nodes), "feti_sub_")
 
     @cached_property
     def interior(self) -> Interior:
         """The interior, factored when first asked for; for that K is assembled again."""
         return Interior(self._subdomain.take_stiffness(), self.dofs)
+
+    @cached_property
+    def condensed(self) -> CondensedLoads:
+        """The loads, which need the interior where they act inside."""
+        s, interior = self._subdomain, self.interior if self._subdomain.loads_inside else None
+        if interior is None:
+            return CondensedLoads(s.Q[self.dofs], s.area * s.L)
+        inside = s.Q[interior.dofs]
+        u = interior.solve(-inside)
+        return CondensedLoads(s.Q[self.dofs] + interior.coupling @ u, s.area * s.L + inside.T @ u)
 
     def apply_schur(self, x: Float, out: Float | None = None) -> Float:
         """S x = K_bb x - K_bi K_ii^-1 K_ib x for x (n,) or (n, k), into `out` if it is given."""
@@ -70,9 +101,13 @@ class Interior:
         """(n, inner dofs) K_bi."""
         return self._Kib.T.tocsr()
 
-    def extend(self, x: Float) -> Float:
-        """-K_ii^-1 K_ib x: the interior in equilibrium with boundary displacements x (n,) or (n, k)."""
-        return self.solve(-self._Kib @ x)
+    def extend(self, x: Float, load: Float | None = None) -> Float:
+        """-K_ii^-1 (K_ib x + q): the interior in equilibrium with boundary displacements x (n,) or (n, k).
+
+        The `load` q (inner dofs,) or (inner dofs, k) acts on it if there is one.
+        """
+        forces = self._Kib @ x
+        return self.solve(-forces if load is None else -forces - load)
 
     def solve(self, forces: Float) -> Float:
         """K_ii^-1 f for forces (inner dofs,) or (inner dofs, k) while the boundary is held."""
@@ -87,6 +122,8 @@ def _by_columns(apply: Callable[[Float], Float], x: Float, out: Float | None) ->
     """`apply` to at most SPARSE_COLUMNS_AT_ONCE columns of x (n, k) at a time, or to x (n,)."""
     if out is None:
         out = np.empty_like(x)
+    if not len(x):
+        return out
     if x.size <= SPARSE_COLUMNS_AT_ONCE * len(x):
         out[:] = apply(x)
         return out
@@ -94,39 +131,3 @@ def _by_columns(apply: Callable[[Float], Float], x: Float, out: Float | None) ->
         some = slice(first, first + SPARSE_COLUMNS_AT_ONCE)
         out[:, some] = apply(x[:, some])
     return out
-
-
-@dataclass(frozen=True)
-class CondensedLoads:
-    """The v unit loads condensed to the boundaries of this rank's subdomains.
-
-    Loads vanish inside uniform bodies but for nodes at voids.  With K_ii u_i = -Q_i E - K_ib u_b the stress integral is
-    C E + q^T u_b and the forces on the boundary are S u_b + q E, of
-
-        q = Q_b - K_bi K_ii^-1 Q_i,  C = |Omega| L - Q_i^T K_ii^-1 Q_i.
-
-    Attributes:
-        boundary: (boundary dofs, v) q.
-        stiffness: (v, v) sum of C.
-        inner: of the subdomains beside voids, by their places, (their dofs, v) -K_ii^-1 Q_i, 0 on the boundary.
-    """
-
-    boundary: Float
-    stiffness: Float
-    inner: dict[int, Float]
-
-    @classmethod
-    def of(cls, subdomains: Sequence[Subdomain], dofs: Sequence[Int], loads: int) -> CondensedLoads:
-        """Condense to the `dofs` of each subdomain; interiors beside voids are factored for it and not kept."""
-        boundary, stiffness = [np.zeros((0, loads))], np.zeros((loads, loads))
-        inner: dict[int, Float] = {}
-        for place, (s, own) in enumerate(zip(subdomains, dofs, strict=True)):
-            q, C = s.Q[own], s.area * s.L
-            if s.submesh.at_void.any():
-                u = inner[place] = np.zeros(s.Q.shape)
-                interior = Interior(s.assemble_stiffness(), own)
-                u[interior.dofs] = interior.solve(-s.Q[interior.dofs])
-                q, C = q + interior.coupling @ u[interior.dofs], C + s.Q.T @ u
-            boundary.append(q)
-            stiffness += C
-        return cls(np.concatenate(boundary), stiffness, inner)

@@ -17,7 +17,7 @@ from feti_homog.feti.decomposition.shared_entities import SharedEntities
 from feti_homog.feti.decomposition.subdomain import Subdomain, label
 from feti_homog.feti.operators.choice import SubdomainSize, choose
 from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
-from feti_homog.feti.operators.implicit import ImplicitInterfaceOperator, Interior
+from feti_homog.feti.operators.implicit import CondensedLoads, ImplicitInterfaceOperator, Interior
 from feti_homog.feti.operators.with_springs import BoundaryOperator, WithSprings, compliance_root
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.parallel.distributed_arrays import scale_rows
@@ -174,6 +174,14 @@ class InterfaceOperators:
         blocks = [s.take_stiffness()[d][:, d] for s, d in zip(self.subdomains, self.dofs, strict=True)]
         return csr_matrix(block_diag(blocks or [csr_matrix((0, 0))]))
 
+    @cached_property
+    def condensed(self) -> CondensedLoads:
+        """The unit loads on all boundaries, and the sum of the stiffnesses."""
+        v = self.subdomains[0].Q.shape[1] if self.subdomains else 0
+        each = [operator.condensed for operator in self.operators]
+        boundary = np.concatenate([np.zeros((0, v)), *(own.boundary for own in each)])
+        return CondensedLoads(boundary, sum((own.stiffness for own in each), np.zeros((v, v))))
+
     def _interior(self, place: int, keep: bool) -> Interior:
         """Return the factored interior of the subdomain at a place, kept for other loads if that is asked for."""
         operator = self.operators[place]
@@ -186,14 +194,15 @@ class InterfaceOperators:
             self.interiors[place] = interior
         return interior
 
-    def extend(self, place: int, x: Float, keep: bool = True) -> Float:
-        """(dofs, k) displacements of one subdomain that are x (n_s, k) on its boundary, and inside in equilibrium.
+    def extend(self, place: int, x: Float, loads: Float | None = None, keep: bool = True) -> Float:
+        """(dofs, k) displacements of one subdomain under loads (v, k), if there are any, x (n_s, k) on its boundary.
 
         The first call factors the interior, each one if it is not to be kept.
         """
-        interior = self._interior(place, keep)
-        u = np.empty((self.subdomains[place].n_dofs, *x.shape[1:]))
-        u[self.dofs[place]], u[interior.dofs] = x, interior.extend(x)
+        interior, s = self._interior(place, keep), self.subdomains[place]
+        u = np.empty((s.n_dofs, *x.shape[1:]))
+        inside = s.Q[interior.dofs] @ loads if loads is not None and s.loads_inside else None
+        u[self.dofs[place]], u[interior.dofs] = x, interior.extend(x, inside)
         return u
 
 

@@ -44,9 +44,9 @@ class LoadScales:
     @cached_property
     def _phases(self) -> tuple[Float, Float]:
         """Shares (n,) and stiffnesses (n, v, v) of all subdomains.  Collective."""
-        parts = self._solver.comm.allgather([(s.area, s.L) for s in self._solver.subdomains])
-        areas, stiffnesses = zip(*(part for own in parts for part in own), strict=True)
-        return np.array(areas) / sum(areas), np.stack(stiffnesses)
+        parts = self._solver.comm.allgather([(s.areas, s.laws) for s in self._solver.subdomains])
+        areas, stiffnesses = (np.concatenate(own) for own in zip(*(part for own in parts for part in own), strict=True))
+        return areas / areas.sum(), stiffnesses
 
     @cached_property
     def roots(self) -> Float:

@@ -20,7 +20,7 @@ def test_only_ranks_that_all_come_destroy_the_solver(monkeypatch, error, destroy
     """After a defect, which may be one rank's own, the others would not come to the collective call."""
     calls = []
     cell = SimpleNamespace(destroy=lambda: calls.append("destroy"))
-    monkeypatch.setattr(runner, "tear", lambda case, comm, progress: cell)
+    monkeypatch.setattr(runner, "tear", lambda case, comm, progress, policy: cell)
     comm = MPI.COMM_SELF
     try:
         with runner._torn(make_case(fibre_fraction=0.4, mesh_size=0.3), comm, Progress(comm, quiet=True)):
@@ -34,7 +34,7 @@ def test_only_ranks_that_all_come_destroy_the_solver(monkeypatch, error, destroy
 def test_the_folder_is_held_before_the_work_begins(tmp_path, monkeypatch):
     held = []
 
-    def no_tear(case, comm, progress):
+    def no_tear(case, comm, progress, policy):
         held.append(output_folder.holder(tmp_path / "out" / output_folder.LOCK))
         raise CaseError("refused")
 

@@ -184,7 +184,12 @@ def documents(draw: st.DrawFn) -> dict[str, Any]:
         )
     if analysis in ("angle", "envelope") or draw(st.booleans()):
         document["interface"] = interface
-    sizes = [{}, {"subdomains": draw(st.integers(1, 1_000_000))}, {"max_dofs": draw(st.integers(100, 10**9))}]
+    sizes = [
+        {},
+        {"cut": "bodies"},
+        {"subdomains": draw(st.integers(1, 1_000_000))},
+        {"max_dofs": draw(st.integers(100, 10**9))},
+    ]
     rest = {
         "name": LABELS,
         "decomposition": st.sampled_from(sizes),

@@ -7,7 +7,7 @@ import pytest
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix, diags, identity, kron
 
-from feti_homog.feti.linalg.schur_complement import schur_complement
+from feti_homog.feti.linalg.schur_complement import schur_complement, schur_complement_with_loads
 
 
 def laplacian(n: int) -> csr_matrix:
@@ -22,6 +22,17 @@ def test_it_is_that_of_dense_algebra():
     D = A.toarray()
     expected = D[np.ix_(rows, rows)] - D[np.ix_(rows, rest)] @ np.linalg.solve(D[np.ix_(rest, rest)], D[rest][:, rows])
     np.testing.assert_allclose(schur_complement(A, rows), expected, atol=1e-12)
+
+
+def test_loads_are_condensed_with_it():
+    A, rows = laplacian(12), np.arange(0, 144, 7)
+    rest, loads = np.setdiff1d(np.arange(144), rows), np.random.default_rng(1).normal(size=(144, 3))
+    D = A.toarray()
+    inside = np.linalg.solve(D[np.ix_(rest, rest)], loads[rest])
+    S, q, C = schur_complement_with_loads(A, rows, loads)
+    np.testing.assert_allclose(S, schur_complement(A, rows), atol=1e-12)
+    np.testing.assert_allclose(q, loads[rows] - D[np.ix_(rows, rest)] @ inside, atol=1e-12)
+    np.testing.assert_allclose(C, -loads[rest].T @ inside, atol=1e-12)
 
 
 def test_a_failure_of_mumps_is_told():

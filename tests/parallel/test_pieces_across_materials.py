@@ -1,0 +1,69 @@
+"""Cells cut across their materials against the monolithic solve, and against whole runs of the same cells by bodies."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from support.cases import FIBRE, MATRIX, make_case, monolithic_stiffness, relative_error, solve
+
+from feti_homog import Case, run
+from feti_homog.homogenization.partition_policy import PartitionPolicy
+from feti_homog.runtime.records import plain
+
+pytestmark = pytest.mark.parallel
+RANDOM = {
+    "geometry": "random", "fibres": 4, "fibre_fraction": 0.4, "min_gap": 0.1, "mesh_size": 0.1,
+    "output": {"fields": False},
+}  # fmt: skip
+CELLS = {
+    "linear": {"refine": 1},
+    "quadratic": {"order": 2},
+    "voids": {"voids": 0.1, "fibre_fraction": 0.2},
+    "stiff": {"matrix": {"young": 1.0, "poisson": 0.3}, "fibre": {"young": 1e5, "poisson": 0.2}},
+}
+SOFT = {"young": 20.0, "poisson": 0.3}
+POLICIES = {
+    "whole": PartitionPolicy(across_dofs=10**9, whole_dofs=10**9),
+    "pieces": PartitionPolicy(across_dofs=10**9, whole_dofs=0, across_piece_dofs=400),
+}
+
+
+@pytest.mark.parametrize("policy", POLICIES.values(), ids=POLICIES)
+@pytest.mark.parametrize("cell", CELLS.values(), ids=CELLS)
+def test_stiffness_is_the_monolithic_one(comm, cell, policy):
+    torn, L, responses = solve(make_case(**RANDOM | cell), comm, policy=policy)
+    assert torn.summary.across and (torn.summary.subdomains == comm.size or not policy.whole_dofs)
+    assert relative_error(L, monolithic_stiffness(torn)) < 1e-8
+    assert max(max(r.checks.values()) for r in responses) < 1e-7
+    assert all(r.state.iterations < 40 for r in responses)
+
+
+def document(cut):
+    """Return a coated cell in generalized plane strain that asks for all that is summed up phase by phase."""
+    expansion = {"expansion": 5e-5}
+    return {
+        "cell": {"geometry": "random", "fibres": 3, "fibre_fraction": 0.3, "mesh_size": 0.15, "coating": 0.2},
+        "material": {"matrix": MATRIX | expansion, "fibre": FIBRE | expansion, "coating": SOFT | expansion},
+        "analysis": {"type": "stiffness", "plane": "generalized"},
+        "output": {"fields": False},
+        "decomposition": {"cut": cut},
+        "petsc": {"feti_ksp_rtol": 1e-12},
+    }  # fmt: skip
+
+
+def test_runs_give_what_they_give_by_bodies(comm):
+    across, bodies = (plain(run(Case.parse(document(cut)), comm)) for cut in ("auto", "bodies"))
+    assert across["solver"]["subdomains"] == comm.size < bodies["solver"]["subdomains"]
+    assert across["solver"]["interface_nodes"] == bodies["solver"]["interface_nodes"] > 0
+    for name in ("fractions", "elements", "area"):
+        assert across["cell"][name] == pytest.approx(bodies["cell"][name], rel=1e-12)
+    for name in ("effective_stiffness", "thermal_expansion"):
+        np.testing.assert_allclose(across[name], bodies[name], atol=1e-9 * np.abs(bodies[name]).max())
+    # Stresses are recovered within pieces, and of bodies from a coarser mesh.
+    assert across["mesh_error"]["energy"] == pytest.approx(bodies["mesh_error"]["energy"], rel=0.3)
+
+
+def test_fields_that_are_asked_for_are_those_of_bodies(comm):
+    result = run(Case.parse(document("auto")), comm, fields=True)
+    assert result.solver.subdomains > comm.size
+    assert comm.allreduce(len(result.fields.interface.points)) == result.solver.interface_nodes > 0
