@@ -18,6 +18,7 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
+import benchmark_small
 from benchmark_report import Row, compare, notes, plot, table, write
 from peers import PEERS
 
@@ -31,6 +32,8 @@ def main() -> int:
     """Run the tools in turns; print and write what they took."""
     parser = _parser()
     arguments = parser.parse_args()
+    if arguments.table:
+        return benchmark_small.compare(arguments, run)
     if not arguments.case.is_file():
         parser.error(f"{arguments.case}: no such file")
     plane = cases.load(arguments.case).analysis.plane
@@ -52,10 +55,13 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("case", type=Path, nargs="?", default=HERE / "cases/benchmark.toml", metavar="CASE.toml")
     parser.add_argument("--tools", default=TOOLS, type=_tools, help=f"of feti, {', '.join(PEERS)}; default {TOOLS}")
+    parser.add_argument("--table", choices=["small"], help="small cells against direct solvers: medians, and no other")
     parser.add_argument("--ranks", type=int, default=2)
     parser.add_argument("--loads", type=int, choices=(1, 2, 3), help="unit strains to solve for; all by default")
     parser.add_argument("--rtol", type=float, default=1e-8)
-    parser.add_argument("--repeat", type=int, default=1, help="the fastest of so many runs of each tool counts")
+    parser.add_argument(
+        "--repeat", type=int, default=1, help="runs of each tool: the fastest counts, in a table the median"
+    )
     parser.add_argument("--timeout", type=float, default=300.0, metavar="S", help="seconds that a run may take")
     parser.add_argument("--out", type=Path, default=Path("results"), metavar="DIR")
     return parser

@@ -29,6 +29,7 @@ from feti_homog.analysis.context import AnalysisContext  # noqa: E402
 from feti_homog.case import case as cases  # noqa: E402
 from feti_homog.case.case import Case  # noqa: E402
 from feti_homog.homogenization import phase_laws, unit_cell  # noqa: E402
+from feti_homog.homogenization.partition_policy import BY_COST  # noqa: E402
 from feti_homog.parallel.mpi_errors import agree, run_main  # noqa: E402
 from feti_homog.petsc.options import case_options  # noqa: E402
 from feti_homog.runtime import process_memory  # noqa: E402
@@ -51,7 +52,10 @@ def main() -> int:
     arguments = parser.parse_args()
     progress = Progress(MPI.COMM_WORLD, quiet=True)
     case = cases.load(arguments.case)
-    case = dataclasses.replace(case, interfaces=(), analysis=dataclasses.replace(case.analysis, plane=arguments.plane))
+    case = dataclasses.replace(
+        case, interfaces=(), analysis=dataclasses.replace(case.analysis, plane=arguments.plane),
+        output=dataclasses.replace(case.output, fields=False),
+    )  # fmt: skip
     if arguments.tool == "feti":
         report = feti(case, progress, arguments.loads, arguments.rtol)
     else:
@@ -66,7 +70,7 @@ def feti(case: Case, progress: Progress, loads: int | None, rtol: float) -> dict
     """Time this program."""
     comm = progress.comm
     with case_options(case.petsc | {"feti_ksp_rtol": rtol}):
-        cell = unit_cell.tear(case, comm, progress)
+        cell = unit_cell.tear(case, comm, progress, policy=BY_COST)
         progress.seconds["set-up"] = progress.seconds.pop("factor") + progress.seconds.pop("axial", 0.0)
         with progress.stage("set-up"):
             context = AnalysisContext.of(cell, progress)
@@ -87,7 +91,7 @@ def feti(case: Case, progress: Progress, loads: int | None, rtol: float) -> dict
 def peer(tool: Peer, case: Case, progress: Progress, loads: int | None, rtol: float) -> dict[str, Any]:
     """One of the others, whose second problem begins when the first one is done and its matrices are gone."""
     comm = progress.comm
-    plan, _, lattice, subdomains = unit_cell.assemble_subdomains(case, comm, progress)
+    plan, _, lattice, subdomains = unit_cell.assemble_subdomains(case, comm, progress, BY_COST)
     with progress.stage("glue"):
         nodes = Nodes.of(comm, subdomains, lattice)
     meshed, dofs = list(subdomains), 0
@@ -95,7 +99,7 @@ def peer(tool: Peer, case: Case, progress: Progress, loads: int | None, rtol: fl
     for problem in ("plane", "axial")[: len(phase_laws.problems(case))]:
         if problem == "axial":
             with progress.stage("assemble"):
-                subdomains = agree(comm, unit_cell.assemble_axial, case, meshed)
+                subdomains = agree(comm, unit_cell.assemble_axial, case, plan, meshed)
         with progress.stage("glue"):
             cell = glue(comm, subdomains, nodes)
             A = _operator(tool, cell)

@@ -31,7 +31,7 @@ from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace  # noqa: E402
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace  # noqa: E402
 from feti_homog.feti.decomposition.jump_operator import JumpOperator  # noqa: E402
 from feti_homog.homogenization import coarse_meshes  # noqa: E402
-from feti_homog.homogenization.domain_partition import DEFAULT_POLICY  # noqa: E402
+from feti_homog.homogenization.partition_policy import DEFAULT_POLICY  # noqa: E402
 from feti_homog.homogenization.tile_tearing import summary_of, tiled_cell, tiles_to_fill  # noqa: E402
 from feti_homog.homogenization.unit_cell import TornCell, tear  # noqa: E402
 from feti_homog.mesh.fill.unmeshed_cell import UnmeshedCell  # noqa: E402
