@@ -117,9 +117,12 @@ class FollowedResponse:
         own = rows[mine] - self._first
         theirs = columns @ (B * sign)
         theirs[own] = -(sign[:, None] * B * sign + np.diag(np.where(sign > 0.0, gained, 0.0)))[mine]
-        # So that the rows themselves become s B U_I and s B Gamma_I:, too.
+        # The rows themselves become s B U_I and s B Gamma_I:, from nothing: of what they were, differences lose digits
+        # where a stiffness is far from 1.
+        self.answer = self.answer.copy()
+        self.answer[own], self._buffer[own], self._waiting[own, : self._count] = 0.0, 0.0, 0.0
         taken = columns.copy()
-        taken[own] = (block - np.diag(sign))[mine]
+        taken[own] = -np.diag(sign)[mine]
         self._change(taken, B, values)
         self._buffer[:, at], self._factors[at] = theirs, 0.0
         return True
