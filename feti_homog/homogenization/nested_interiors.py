@@ -63,7 +63,7 @@ class NestedInterior:
     def displacement(self, u: Float, loads: Float) -> Float:
         """(classes, c, k) u* of u (boundary dofs, k) on all boundaries under the loads (v, k)."""
         problem = self.members[0].problem
-        on_boundary = np.where(self.place[:, None] == PINNED, 0.0, u[self.place])
+        on_boundary = np.vstack([u, np.zeros((1, u.shape[1]))])[self.place]  # PINNED is the last row
         found = np.empty((len(self.known) + len(self.interior.dofs), u.shape[1]))
         found[self.known], found[self.interior.dofs] = on_boundary, self.interior.extend(on_boundary)
         if self.loads is not None:
