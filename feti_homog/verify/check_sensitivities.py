@@ -92,7 +92,7 @@ def _check_energies(
         expected, scale = share * (above - below) / (2 * STEP), max(float(np.abs(terms).max()), abs(value))
         findings.record("sensitivities", relative(np.array(terms.sum() - expected), scale), name)
         here = share * float(_energies(cell, [state], cell.files.case)[0, 0])
-        findings.record("moduli", abs(value - here) / max(abs(here), 1e-300), f"sensitivities, {name}")
+        findings.record("constants", abs(value - here) / max(abs(here), 1e-300), name)
 
 
 def _check_constants(

@@ -36,7 +36,7 @@ def test_sensitivities_are_verified(tmp_path, kind):
         "material": materials,
         "analysis": {"type": "stiffness", "plane": plane},
         "output": {"sensitivities": True, "pictures": False, "mesh_error": False},
-        "petsc": {"feti_ksp_rtol": 1e-10},
+        "petsc": {} if kind == "contact" else {"feti_ksp_rtol": 1e-10},  # fields are as good as the solver
     } | ({} if interface is None else {"interface": interface})
     if kind == "load":
         case["analysis"]["type"], case["load"] = "load", {"to": {"E11": -0.01, "E22": 0.02, "gamma12": 0.0}}
