@@ -231,20 +231,9 @@ def _relations(sections: Mapping[str, Any], document: Mapping[str, Any], selecte
         faults += coating_faults(sections["cell"], document["material"])
     if angle is not None and angle.strain is not None and not any(angle.strain):
         faults.append("[angle] strain: expected a strain other than zero")
-    faults += _history_faults(sections)
     if envelope is not None and envelope.temperature is not None:
         faults += missing_expansions(sections["materials"], "[envelope] temperature")
     return faults
-
-
-def _history_faults(sections: Mapping[str, Any]) -> list[str]:
-    """Faults of derivatives that are asked for where faces rub, whose state depends on its history."""
-    if not any(interface.friction for interface in sections["interfaces"] or ()):
-        return []
-    asked = {f"[{UNCERTAINTY}]": sections["uncertainty"].std, "[output] sensitivities": sections["output"]}
-    if sections["output"] is not None:
-        asked["[output] sensitivities"] = sections["output"].sensitivities
-    return [f"{name}: expected friction = 0: what rubs has no derivatives" for name, found in asked.items() if found]
 
 
 def _selected(document: Mapping[str, Any]) -> Selected:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -13,7 +14,7 @@ from feti_homog.schema.values import is_number, magnitudes_in_words
 from feti_homog.schema.wording import dotted_key, toml_value
 from feti_homog.typing import Float
 
-UNCERTAINTY, CORRELATION = "uncertainty", "correlation"
+UNCERTAINTY, CORRELATION, STIFFNESS = "uncertainty", "correlation", "stiffness"
 SECTIONS = ("material", "interface")
 DIFFERENTIABLE = ("stiffness", "load")
 """Types of analyses that have derivatives."""
@@ -143,8 +144,21 @@ def _means(value: Any, path: TomlPath, given: list[tuple[TomlPath, Any]], faults
     if deviation is None:
         faults.append(f"[{dotted_key(path[:-1])}] {path[-1]} = {toml_value(value)}: {EXPECTED}")
     else:
-        given.append((path, deviation))
+        entry = (_named(path), deviation)
+        # A pair of entries of a symmetric stiffness is one number.
+        given += [entry] if entry[0] == path or entry not in given else []
     return value["mean"]
+
+
+def _named(path: TomlPath) -> TomlPath:
+    """Return the path of a row and a column of a stiffness by the name of the entry, as of its derivatives."""
+    return (*path[:-2], "C" + "".join(sorted(path[-2:]))) if path[-3:-2] == (STIFFNESS,) else path
+
+
+def _in_lists(path: TomlPath) -> TomlPath:
+    """Return the path of an entry Cij of a stiffness with its row and column."""
+    found = re.fullmatch(r"C([1-6])([1-6])", path[-1]) if path[-2:-1] == (STIFFNESS,) else None
+    return path if found is None else (*path[:-1], *found.groups())
 
 
 def _deviation(value: Mapping[str, Any]) -> float | None:
@@ -166,13 +180,34 @@ def _leaves(table: Mapping[str, Any], above: TomlPath = ()) -> Iterator[tuple[To
 
 def number_at(document: Mapping[str, Any], path: TomlPath) -> float | None:
     """Return the number at a place, None if there is none; the one of several sections of a name has no number."""
+    found = _at(document, _in_lists(path))
+    return float(found) if is_number(found) else None
+
+
+def with_number(document: Mapping[str, Any], path: TomlPath, value: float) -> tuple[TomlPath, Any]:
+    """Return the key of a number and another value of it; of one in a list the key and value of the list."""
+    whole = _in_lists(path)
+    for k in range(1, len(whole)):
+        found = _at(document, whole[:k])
+        if isinstance(found, list) and not any(isinstance(each, dict) for each in found):
+            numbers = np.array(found, float)
+            place = tuple(int(name) - 1 for name in whole[k:])
+            place = (0,) * (numbers.ndim - len(place)) + place  # the one of several has no number
+            numbers[place] = value
+            if whole[k - 1] == STIFFNESS:
+                numbers[place[::-1]] = value
+            return whole[:k], numbers.tolist()
+    return path, value
+
+
+def _at(document: Mapping[str, Any], path: TomlPath) -> Any:
     found: Any = document
     for name in path:
         found = found[0] if isinstance(found, list) and len(found) == 1 else found
         if isinstance(found, list):  # sections of one name, from 1
             found = {str(number): each for number, each in enumerate(found, start=1)}
         found = found.get(name) if isinstance(found, dict) else None
-    return float(found) if is_number(found) else None
+    return found
 
 
 def _is_pair(pair: Any, named: Mapping[str, Any]) -> bool:

@@ -82,8 +82,12 @@ def predicted(document: Document, data: Sequence[Datum]) -> Float:
     found = _values(document)
     missing = [datum for datum in data if datum.strain is None and datum.name not in found]
     if missing:
-        raise CaseError(*(f"[measured] {each.name}: this path has no such value" for each in missing))
+        raise CaseError(*(f"[measured] {each.name}: this result has no such value{_reason(each)}" for each in missing))
     return np.array([found[each.name] if each.strain is None else _on_curve(document, each)[0] for each in data])
+
+
+def _reason(datum: Datum) -> str:
+    return "; no bond breaks" if datum.name.startswith("onset_") else ""
 
 
 def exact_derivatives(document: Document, data: Sequence[Datum], name: str) -> Float | None:
@@ -102,15 +106,22 @@ def _exponent(document: Document, key: str) -> float | None:
 
     It is 1/2 in the toughness of springs that it does not change, and 1 in the only strength; None of others.
     """
-    sections, kind = path_curves.interface_sections(document), document["case"]["analysis"]["type"]
-    is_scaled = kind == "envelope" or (kind == "path" and path_curves.is_proportional(document))
-    if len(sections) != 1 or not is_scaled:
+    sections = path_curves.interface_sections(document)
+    if len(sections) != 1 or not _is_homogeneous(document):
         return None
     law = LAWS[sections[0].get("criterion", DEFAULT)]
     if key == TOUGHNESS and key in law.keys and not law.softens:
         return 0.5
     strengths = [each for each in law.limits if math.isfinite(float(sections[0].get(each) or "inf"))]
     return 1.0 if strengths == [key] else None
+
+
+def _is_homogeneous(document: Document) -> bool:
+    """Return whether all loads up to the onset grow alike; a temperature that comes before them does not."""
+    case = document["case"]
+    if case["analysis"]["type"] == "envelope":
+        return case["envelope"].get("temperature") is None
+    return case["analysis"]["type"] == "path" and path_curves.is_proportional(document)
 
 
 def _values(document: Document) -> dict[str, float]:
@@ -125,30 +136,26 @@ def _values(document: Document) -> dict[str, float]:
 
 
 def _of_stiffness(own: Mapping[str, Any], data: Sequence[Datum], name: str) -> Float | None:
-    """Return the derivatives of constants: zero by strengths and what else a stiffness does not depend on."""
+    """Return the derivatives of constants: zero by strengths, and by expansions in a plane; None of what is unknown."""
     if name in own["parameters"]:
         values = np.array(own["derivatives"])[:, own["parameters"].index(name)]
         column = dict(zip(own["constants"], values, strict=True))
         return np.array([column[each.name] for each in data])
-    section = name.partition(".")[0]
-    is_idle = section == "material" or (section == "interface" and name.endswith(("strength", "toughness")))
+    section, idle = name.partition(".")[0], ("strength", "toughness")
+    is_idle = ".expansion" in name if section == "material" else section == "interface" and name.endswith(idle)
     return np.zeros(len(data)) if is_idle else None
 
 
 def _by_scaling(document: Document, data: Sequence[Datum], share: float) -> Float | None:
     """Return the derivatives along S(E; s R) = s S(E / s; R), of what does not depend on the end of the load."""
-    found, points = _values(document), document.get("path")
-    of_stress = (
-        dict(zip(voigt_names(len(points[-1]["stress"]))[1], points[-1]["stress"], strict=True)) if points else {}
-    )
-    derivatives = []
+    found, derivatives = _values(document), []
     for each in data:
         if each.strain is not None:
             value, slope = _on_curve(document, each)
             derivatives.append((value - abs(each.strain) * slope) * share)
             continue
         place, _, component = each.name.partition("_")
-        is_peak = place == "peak" and (component not in of_stress or found[each.name] != of_stress[component])
+        is_peak = place == "peak" and found[each.name] != found[f"end_{component}"]
         if not (place in ("onset", "envelope") or is_peak):
             return None
         derivatives.append(found[each.name] * share)

@@ -19,7 +19,15 @@ import numpy as np
 
 from feti_homog.case.document import TomlPath, read_document, to_document
 from feti_homog.case.sections import SWEEP
-from feti_homog.case.uncertainty import DIFFERENTIABLE, SECTIONS, UNCERTAINTY, Uncertainty, number_at, read_uncertainty
+from feti_homog.case.uncertainty import (
+    DIFFERENTIABLE,
+    SECTIONS,
+    UNCERTAINTY,
+    Uncertainty,
+    number_at,
+    read_uncertainty,
+    with_number,
+)
 from feti_homog.errors import CaseError
 from feti_homog.fit.predictions import Datum, exact_derivatives, responses
 from feti_homog.parallel.mpi_errors import on_root, on_root_only
@@ -62,8 +70,9 @@ class Study:
 
     def beside(self, names: Sequence[str]) -> Sweep:
         """Return the cases with each of these numbers less and more by its standard deviation."""
-        ends = [(name, sign * self.uncertainty.std[name]) for name in names for sign in (-1, 1)]
-        return self.cases([{_path(name): self.means[name] + change} for name, change in ends], mesh_error=False)
+        ends = [(name, self.means[name] + sign * self.uncertainty.std[name]) for name in names for sign in (-1, 1)]
+        points = [dict([with_number(self.document, _path(name), end)]) for name, end in ends]
+        return self.cases(points, mesh_error=False)
 
 
 def load(path: Path) -> Study:
@@ -86,7 +95,7 @@ def parse(values: Mapping[str, Any], folder: Path) -> Study:
     output |= SILENT
     case = plan.checked("case", plan.case_documents(document, [{}], None, []), folder).cases[0]
     places = {name.partition(".")[0] for name in uncertainty.std}
-    if case.analysis.type in DIFFERENTIABLE and not case.has_friction and places & {*SECTIONS}:
+    if case.analysis.type in DIFFERENTIABLE and (places & {*SECTIONS} or "cell.fibre_fraction" in uncertainty.std):
         output["sensitivities"] = True
     means = {name: number_at(document, _path(name)) or 0.0 for name in uncertainty.std}
     return Study(document, folder, uncertainty, means, realisations)

@@ -136,29 +136,30 @@ def _angles(points: Sequence[Document], numbers: Sequence[int]) -> dict[str, flo
 
 
 def _path(document: Document) -> dict[str, float]:
-    """Return the first break, the largest stresses with the leading strain at the peak, and the end."""
+    """Return the first break or softening if any, the largest stresses, the leading strain at the peak, and the end."""
     points = document.get("path")
     if not points:
         return {}
     stress = np.array([point["stress"] for point in points])
-    strains, stresses = voigt_names(stress.shape[1])
+    stresses = voigt_names(stress.shape[1])[1]
     peak = stress[np.abs(stress).argmax(axis=0), range(len(stresses))]
-    found = {"onset_load_factor": points[0]["load_factor"]}
+    onset = next((point for point in points if point["broke"] or point.get("softened")), None)
+    found = {} if onset is None else {"onset_load_factor": onset["load_factor"]} | _at_point("onset", onset)
+    found |= _at_point("end", points[-1])
     found |= {name: points[-1][name] for name in ("dissipated", "work")}
-    for place, values in (("onset", stress[0]), ("peak", peak), ("end", stress[-1])):
-        found |= {f"{place}_{name}": value for name, value in zip(stresses, values.tolist(), strict=True)}
-    for place, point in (("onset", points[0]), ("end", points[-1])):
-        found |= {f"{place}_{name}": value for name, value in zip(strains, point["strain"], strict=True)}
+    found |= {f"peak_{name}": value for name, value in zip(stresses, peak.tolist(), strict=True)}
     summit = peak_of(document)
     found |= {f"peak_{summit[f'{kind}_name']}": summit[kind] for kind in ("stress", "strain")}
     return found | {f"end_{state}": points[-1][state] for state in point_tables.STATES}
+
+
+def _at_point(place: str, point: Document) -> dict[str, float]:
+    names = zip(voigt_names(len(point["strain"])), (point["strain"], point["stress"]), strict=True)
+    return {f"{place}_{name}": value for keys, found in names for name, value in zip(keys, found, strict=True)}
 
 
 def _load(point: Document | None) -> dict[str, float]:
     """Strains, stresses and energy of the equilibrium under one load, and the interface nodes."""
     if point is None:
         return {}
-    names = zip(voigt_names(len(point["strain"])), (point["strain"], point["stress"]), strict=True)
-    values = {name: value for keys, found in names for name, value in zip(keys, found, strict=True)}
-    values |= {name: point[name] for name in ("stored", *point_tables.STATES)}
-    return {f"load_{name}": value for name, value in values.items()}
+    return _at_point("load", point) | {f"load_{name}": point[name] for name in ("stored", *point_tables.STATES)}

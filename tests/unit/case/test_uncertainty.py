@@ -11,6 +11,7 @@ from support.base_case import changed
 
 from feti_homog.case.case import Case
 from feti_homog.case.json_schema import json_schema
+from feti_homog.case.uncertainty import number_at, with_number
 from feti_homog.errors import CaseError
 
 UNCERTAIN = (
@@ -38,6 +39,23 @@ def test_the_one_of_several_sections_has_no_number():
     section = "[[interface]]\nnormal_stiffness = {mean = 50.0, std = 5.0}\ntangential_stiffness = 20.0\n"
     case = Case.parse(tomllib.loads(changed(end=section)))
     assert dict(case.uncertainty.std) == {"interface.normal_stiffness": 5.0} and Case.parse(case.resolved()) == case
+
+
+def test_entries_of_lists_have_the_names_of_their_derivatives():
+    """Both entries beside the diagonal of a stiffness are one number."""
+    pair = {"mean": 2.0, "std": 0.2}
+    document = tomllib.loads(changed())
+    document["material"]["matrix"] = {
+        "stiffness": [[{"mean": 10.0, "cv": 0.1}, pair, 0.0], [pair, 8.0, 0.0], [0.0, 0.0, 3.0]]
+    }
+    case = Case.parse(document)
+    assert dict(case.uncertainty.std) == {"material.matrix.stiffness.C11": 1.0, "material.matrix.stiffness.C12": 0.2}
+    assert Case.parse(case.resolved()) == case
+    document = case.resolved() | {"path": {"waypoints": [[1.0, 2.0, 3.0]]}}
+    stiffness = ("material", "matrix", "stiffness")
+    assert number_at(document, (*stiffness, "C12")) == 2.0
+    assert with_number(document, (*stiffness, "C12"), 5.0) == (stiffness, [[10, 5, 0], [5, 8, 0], [0, 0, 3]])
+    assert with_number(document, ("path", "waypoints", "2"), 5.0) == (("path", "waypoints"), [[1, 5, 3]])
 
 
 @pytest.mark.parametrize(

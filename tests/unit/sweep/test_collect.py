@@ -112,6 +112,10 @@ def test_columns_of_a_path_are_its_first_point_its_peaks_and_its_end():
     assert [found[f"peak_{name}"] for name in ("S22", "S12")] == pytest.approx([5.0 / 3, 0.5])
     assert (found["onset_E11"], found["end_E11"]) == pytest.approx((0.02, 0.2))
     assert [found[f"end_{state}"] for state in ("bonded", "open", "closed")] == [5.0, 3.0, 2.0]
+    path["path"] = [point | {"broke": 0} for point in path["path"]]
+    assert {*found} - {*outputs(path)} == {name for name in found if name.startswith("onset_")}
+    path["path"][1]["softened"] = 1
+    assert outputs(path)["onset_S11"] == 2.0
 
 
 def test_columns_of_bounds_are_the_lower_and_the_upper():
