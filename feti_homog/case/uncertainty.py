@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -101,11 +102,11 @@ def _deviation_faults(
             yield f"{name} = {toml_value(value)}: {words}"
         elif number_at(document, path) is None:
             yield f"{name}: expected a key of the case whose value is a number"
-        elif not anywhere and not _is_constant(path):
+        elif not anywhere and not is_constant(path):
             yield f"{name}: {PLACES}"
 
 
-def _is_constant(path: TomlPath) -> bool:
+def is_constant(path: TomlPath) -> bool:
     """Return whether there are derivatives by the key."""
     return path[0] == "material" or (path[0] == "interface" and path[-1].endswith("_stiffness"))
 
@@ -141,7 +142,9 @@ def _means(value: Any, path: TomlPath, given: list[tuple[TomlPath, Any]], faults
     if "mean" not in value:
         return {name: _means(item, (*path, name), given, faults) for name, item in value.items()}
     deviation = _deviation(value)
-    if deviation is None:
+    if len(path) == 1:
+        faults.append(f"{path[0]} = {toml_value(value)}: expected no number")
+    elif deviation is None:
         faults.append(f"[{dotted_key(path[:-1])}] {path[-1]} = {toml_value(value)}: {EXPECTED}")
     else:
         entry = (_named(path), deviation)
@@ -190,18 +193,17 @@ def with_number(document: Mapping[str, Any], path: TomlPath, value: float) -> tu
     for k in range(1, len(whole)):
         found = _at(document, whole[:k])
         if isinstance(found, list) and not any(isinstance(each, dict) for each in found):
-            numbers = np.array(found, float)
-            place = tuple(int(name) - 1 for name in whole[k:])
-            place = (0,) * (numbers.ndim - len(place)) + place  # the one of several has no number
-            numbers[place] = value
-            if whole[k - 1] == STIFFNESS:
-                numbers[place[::-1]] = value
-            return whole[:k], numbers.tolist()
+            changed, place = copy.deepcopy(found), whole[k:]
+            for *above, last in (place, place[::-1]) if whole[k - 1] == STIFFNESS else (place,):
+                numbers = _at(changed, tuple(above))
+                numbers = numbers[0] if len(numbers) == 1 and isinstance(numbers[0], list) else numbers
+                numbers[int(last) - 1] = value
+            return whole[:k], changed
     return path, value
 
 
-def _at(document: Mapping[str, Any], path: TomlPath) -> Any:
-    found: Any = document
+def _at(document: Any, path: TomlPath) -> Any:
+    found = document
     for name in path:
         found = found[0] if isinstance(found, list) and len(found) == 1 else found
         if isinstance(found, list):  # sections of one name, from 1

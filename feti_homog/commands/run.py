@@ -44,7 +44,7 @@ def _run(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 def _add_check(actions: argparse._SubParsersAction[Any]) -> None:
     parser = actions.add_parser("check", help="validate a case file, mesh its cell and describe the run")
-    parser.add_argument("case", type=Path, metavar="CASE.toml", help="a case, a sweep, or a fit")
+    parser.add_argument("case", type=Path, metavar="CASE.toml", help="a file of run, sweep, fit or uncertainty")
     parser.set_defaults(action=_check)
 
 
@@ -52,9 +52,11 @@ def _check(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.case.document import read_document
     from feti_homog.case.fit_sections import FIT_SECTIONS
     from feti_homog.fit import description as fits
+    from feti_homog.fit import scatter
     from feti_homog.parallel.mpi_errors import on_root, on_root_only
     from feti_homog.sweep import description
 
     document = on_root(comm, read_document, arguments.case)  # once: it may be a pipe
-    kind = fits if document.keys() & {*FIT_SECTIONS} else description
-    on_root_only(comm, print_product, kind.of_document(document, arguments.case.parent, comm))
+    describe = scatter.of_document if on_root(comm, scatter.is_study, document) else description.of_document
+    describe = fits.of_document if document.keys() & {*FIT_SECTIONS} else describe
+    on_root_only(comm, print_product, describe(document, arguments.case.parent, comm))

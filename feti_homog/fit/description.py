@@ -90,12 +90,16 @@ class Fit:
 
 
 def _is_linear(case: plan.CaseDocument) -> bool:
-    """Return whether a case has exact derivatives: a stiffness without contact of debonded faces."""
-    analysis, interfaces = case.document.get("analysis"), case.document.get("interface", [])
-    sections = interfaces if isinstance(interfaces, list) else [interfaces]
-    touching = [each for each in sections if isinstance(each, dict) and each.get("debonded")]
+    """Return whether a case has exact derivatives: a stiffness without contact of debonded faces.
+
+    Lines of a user's mesh may be debonded, too.
+    """
+    analysis, cell, interfaces = (case.document.get(name) for name in ("analysis", "cell", "interface"))
+    sections = [each for each in (interfaces if isinstance(interfaces, list) else [interfaces]) if each]
+    is_mesh = isinstance(cell, dict) and cell.get("geometry") == "mesh"
+    touching = [each for each in sections if is_mesh or (isinstance(each, dict) and each.get("debonded"))]
     is_stiffness = isinstance(analysis, dict) and analysis.get("type") == "stiffness"
-    return is_stiffness and all(each.get("contact") is False for each in touching)
+    return is_stiffness and all(isinstance(each, dict) and each.get("contact") is False for each in touching)
 
 
 def load(path: Path) -> Fit:

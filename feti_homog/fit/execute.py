@@ -47,7 +47,7 @@ def run(fit: Fit, directory: Path, comm: Intracomm, ranks_per_case: int, retry: 
     on_root(comm, output_folder.usable, directory)
     digest = on_root(comm, fit.digest)
     with output_folder.held(directory, comm, lambda line: complain(line) if comm.rank == 0 else None):
-        on_root(comm, files.begin, directory, digest)
+        on_root(comm, files.begin, directory / files.NAME, digest)
         estimates = Evaluations(fit, directory, comm, ranks_per_case, retry, quiet).estimate()
         document = on_root(comm, files.write, directory, digest, fit, estimates)
     if comm.rank == 0 and not quiet:

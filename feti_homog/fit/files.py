@@ -25,28 +25,32 @@ FIRST, LEAST_SHARE = Column("", -38), 0.01
 HEAD = ("test", "name", "strain", "value", "std", "computed", "residual")
 
 
-def begin(directory: Path, digest: str) -> None:
-    """Make the folder of a fit, or find that it is that.  On one rank.
+def begin(path: Path, digest: str, own: re.Pattern[str] = OWN, kind: str = "fit") -> None:
+    """Make the folder of a fit with its file `path`, or find that it is that.  On one rank.
+
+    Args:
+        own: names of what a fit writes there.
+        kind: word for it.
 
     Raises:
         CaseError: the folder is that of another fit, or has files of others under names of a fit.
         FetiHomogError: it cannot be written.
     """
-    path = directory / NAME
+    directory = path.parent
     if path.exists():
         try:
             known = seals.loads(input_files.read(path).decode("utf-8"))
         except (OSError, ValueError) as error:
-            raise CaseError(f"{path} is no readable fit: {error}; move it away") from error
+            raise CaseError(f"{path} is no readable {kind}: {error}; move it away") from error
         if known.get("digest") != digest:
-            raise CaseError(f"--out {directory} holds another fit; choose another folder")
+            raise CaseError(f"--out {directory} holds another {kind}; choose another folder")
         return
     with atomic.write_errors(directory):
         directory.mkdir(parents=True, exist_ok=True)
-        foreign = [each.name for each in sorted(directory.iterdir()) if OWN.fullmatch(each.name)]
+        foreign = [each.name for each in sorted(directory.iterdir()) if own.fullmatch(each.name)]
     if foreign:
         raise CaseError(
-            f"--out {directory}: no fit of this program wrote {foreign[0]}, and this one would replace it; "
+            f"--out {directory}: no {kind} of this program wrote {foreign[0]}, and this one would replace it; "
             "move it away or choose another folder"
         )
     atomic.replace_text(path, seals.dumps({"version": __version__, "digest": digest, "status": "running"}))

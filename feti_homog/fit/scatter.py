@@ -1,7 +1,7 @@
 """Scatter of a result by uncertain numbers of its case, beside that between random cells and the error of the mesh.
 
 Derivatives are those of results where they have exact ones; else differences of whole runs, one standard deviation less
-and more, of the same random cells.
+and more.  Random cells of one seed may have other arrangements then: their slopes have a standard error over the cells.
 
 DIR/means                     as of a sweep: the case, of random cells each realisation
 DIR/differences               the same with each such number less and more
@@ -10,7 +10,10 @@ DIR/uncertainty.json
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import hashlib
+import json
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,19 +27,21 @@ from feti_homog.case.uncertainty import (
     SECTIONS,
     UNCERTAINTY,
     Uncertainty,
+    is_constant,
     number_at,
     read_uncertainty,
     with_number,
 )
 from feti_homog.errors import CaseError
+from feti_homog.fit.files import begin
 from feti_homog.fit.predictions import Datum, exact_derivatives, responses
+from feti_homog.fit.scatter_table import text
 from feti_homog.parallel.mpi_errors import on_root, on_root_only
-from feti_homog.report.text.sensitivity_tables import shown
-from feti_homog.report.text.table import Column, Table
+from feti_homog.report.text.sensitivity_tables import mesh_errors
 from feti_homog.results import atomic, output_folder, seals
 from feti_homog.runtime.standard_streams import complain, say
 from feti_homog.schema.wording import toml_value
-from feti_homog.sweep import execute, plan, store
+from feti_homog.sweep import description, execute, plan, store
 from feti_homog.sweep.plan import Sweep
 from feti_homog.sweep.points import Assignment, read_points
 from feti_homog.typing import Float
@@ -46,6 +51,7 @@ if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
 
 NAME = "uncertainty.json"
+OWN = re.compile(r"uncertainty\.json|means|differences")
 SILENT = {"fields": False, "pictures": False, "report": False}
 
 
@@ -74,6 +80,23 @@ class Study:
         points = [dict([with_number(self.document, _path(name), end)]) for name, end in ends]
         return self.cases(points, mesh_error=False)
 
+    def faults_beside(self) -> Iterator[str]:
+        """Yield the faults of cases that may be run beside the means."""
+        is_exact = bool(self.document["output"].get("sensitivities"))
+        for name, std in self.uncertainty.std.items():
+            if is_exact and name.partition(".")[0] in SECTIONS:
+                continue
+            try:
+                self.beside([name])
+            except CaseError as error:
+                place = f"[{UNCERTAINTY}] {name} = {self.means[name]:g} +- {std:g}"
+                yield from (f"{place}: {fault}" for fault in error.faults)
+
+    def digest(self) -> str:
+        """Short name of the study: the same for the same cases and uncertain numbers."""
+        content = [[entry.identity for entry in self.cases([{}]).entries], self.uncertainty.to_table()]
+        return hashlib.sha256(json.dumps(content).encode()).hexdigest()[:16]
+
 
 def load(path: Path) -> Study:
     """Return the study of a file. Raises CaseError with its faults."""
@@ -98,7 +121,30 @@ def parse(values: Mapping[str, Any], folder: Path) -> Study:
     if case.analysis.type in DIFFERENTIABLE and (places & {*SECTIONS} or "cell.fibre_fraction" in uncertainty.std):
         output["sensitivities"] = True
     means = {name: number_at(document, _path(name)) or 0.0 for name in uncertainty.std}
-    return Study(document, folder, uncertainty, means, realisations)
+    study = Study(document, folder, uncertainty, means, realisations)
+    if faults := [*study.faults_beside()]:
+        raise CaseError(*faults)
+    return study
+
+
+def is_study(values: Mapping[str, Any]) -> bool:
+    """Return whether a document has uncertain numbers that `feti-homog run` does not take."""
+    document = to_document(values)
+    uncertainty, analysis = read_uncertainty(document, [], anywhere=True), document.get("analysis")
+    kind = analysis.get("type") if isinstance(analysis, dict) else None
+    is_special = kind not in DIFFERENTIABLE or not all(is_constant(_path(name)) for name in uncertainty.std)
+    return bool(uncertainty.std) and is_special
+
+
+def of_document(document: Mapping[str, Any], folder: Path, comm: Intracomm) -> str:
+    """Describe a study, and its first case at the means; empty except on rank 0.  Collective.
+
+    Raises:
+        CaseError, MeshError: the document is faulty, or the cell of its first case.
+    """
+    study = on_root(comm, parse, document, folder)
+    words = f"scatter    {len(study.means)} uncertain numbers, for `feti-homog uncertainty`; the case at their means:"
+    return description.first_of(on_root(comm, study.cases, [{}]), words, comm)
 
 
 def _realisations(table: object, faults: list[str]) -> int | None:
@@ -121,13 +167,15 @@ def run(study: Study, directory: Path, comm: Intracomm, group: int, retry: bool,
     """
     execute.check_groups(comm, group)
     on_root(comm, output_folder.usable, directory)
-    options = comm, group, retry
+    options, digest = (comm, group, retry), on_root(comm, study.digest)
     with output_folder.held(directory, comm, lambda line: complain(line) if comm.rank == 0 else None):
+        on_root(comm, begin, directory / NAME, digest, OWN, "study of scatter")
         found = _results(on_root(comm, study.cases, [{}]), directory / "means", *options)
         missing = on_root(comm, _inexact, study, found)
         beside = on_root(comm, study.beside, missing) if missing else None
         others = [] if beside is None else _results(beside, directory / "differences", *options)
-        document = on_root(comm, _content, study, found, missing, others)
+        document = {"version": __version__, "digest": digest, "status": "done"}
+        document |= on_root(comm, _content, study, found, missing, others)
         on_root_only(comm, atomic.replace_text, directory / NAME, seals.dumps(document))
     if comm.rank == 0 and not quiet:
         say(text(document))
@@ -163,17 +211,16 @@ def _derivatives(
     others: Sequence[Mapping[str, Any]],
     data: Sequence[Datum],
 ) -> Float:
-    """(n, p) derivatives of n results by p numbers, means over the cells."""
-    found = list[Float]()
-    ends = _table(others, data).reshape(len(documents), len(missing), 2, len(data)).mean(axis=0)
+    """(r, n, p) derivatives of n results by p numbers, of r cells."""
+    found = list[Any]()
+    ends = _table(others, data).reshape(len(documents), len(missing), 2, len(data))
     for name, std in study.uncertainty.std.items():
         if name in missing:
-            below, above = ends[missing.index(name)]
+            below, above = np.moveaxis(ends[:, missing.index(name)], 1, 0)
             found.append((above - below) / (2 * std))
         else:
-            own = [exact_derivatives(each, data, name) for each in documents]
-            found.append(np.mean([each for each in own if each is not None], axis=0))
-    return np.array(found).T
+            found.append([exact_derivatives(each, data, name) for each in documents])
+    return np.moveaxis(np.array(found, float), 0, 2)
 
 
 def _content(
@@ -185,11 +232,12 @@ def _content(
     """Return what is written."""
     data, uncertainty, count = _data([*documents, *others]), study.uncertainty, len(documents)
     values = _table(documents, data)
-    J = _derivatives(study, documents, missing, others, data)
+    slopes = _derivatives(study, documents, missing, others, data)
+    J = slopes.mean(axis=0)
+    errors = slopes.std(axis=0, ddof=1) / count**0.5 if count > 1 else None
     deviations, shares = uncertainty.propagated(J)
     between = values.std(axis=0, ddof=1) if count > 1 else np.zeros(len(data))
     return {
-        "version": __version__,
         "name": str(study.document.get("name", "case")),
         "parameters": [
             {"name": name, "mean": study.means[name], "std": std,
@@ -202,7 +250,8 @@ def _content(
             {"name": each.name, "value": float(values[:, k].mean()), "std_inputs": float(deviations[k]),
              "std_cells": float(between[k]) if count > 1 else None,
              "std": float(np.hypot(deviations[k], between[k])), "mesh_error": _mesh_error(documents, each.name),
-             "derivatives": J[k].tolist(), "shares": shares[k].tolist()}
+             "derivatives": J[k].tolist(), "derivative_errors": None if errors is None else errors[k].tolist(),
+             "shares": shares[k].tolist()}
             for k, each in enumerate(data)
         ],
     }  # fmt: skip
@@ -210,33 +259,8 @@ def _content(
 
 def _mesh_error(documents: Sequence[Mapping[str, Any]], name: str) -> float | None:
     """Return the mean estimated error of a constant; None where it is not known."""
-    found = [(each.get("mesh_error") or {}).get("constants", {}).get(name) for each in documents]
-    return None if None in found else float(np.mean(found))
-
-
-def text(document: Mapping[str, Any]) -> str:
-    """Return the table for a terminal: results with their scatter, and each input's share of it."""
-    inputs, of_cells = document["parameters"], {"+- cells": "std_cells", "+- both": "std"}
-    labels = [each["name"].removeprefix("material.") for each in inputs]
-    heads = {"value": "value", "+- inputs": "std_inputs", **(of_cells if document["cells"] > 1 else {})}
-    heads["+- mesh"] = "mesh_error"
-    columns = [Column("", -20), *map(Column, heads), *(Column(n, max(12, len(n) + 2), ".1f") for n in labels)]
-    rows = _rows(document, [*heads.values()])
-    title = "Scatter by uncertain numbers (std), and their shares of its variance (%)"
-    differing = ", ".join(each["name"] for each in inputs if each["by"] == "differences")
-    last = f"By differences of runs: {differing or 'none'}"
-    return "\n".join(["", *Table(title, columns, rows).lines, last])
-
-
-def _rows(document: Mapping[str, Any], keys: Sequence[str]) -> list[list[Any]]:
-    """Return the rows of results that scatter."""
-    names = [each["name"] for each in document["results"]]
-    kept = {*(shown(names) if "C11" in names else names)}
-    return [
-        [each["name"], *("-" if each[key] is None else each[key] for key in keys), *(100 * s for s in each["shares"])]
-        for each in document["results"]
-        if each["std"] > 0 and each["name"] in kept
-    ]
+    found = [mesh_errors(each).get(name) for each in documents]
+    return None if None in found else float(np.mean(np.array(found, float)))
 
 
 def _table(documents: Sequence[Mapping[str, Any]], data: Sequence[Datum]) -> Float:

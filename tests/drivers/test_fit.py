@@ -1,4 +1,4 @@
-"""`feti-homog check` and `fit` of a file: one at a time in a folder, and kill -9 at any moment takes no evaluation."""
+"""`feti-homog check`, `fit` and `uncertainty`: one at a time in a folder; kill -9 at any moment takes no evaluation."""
 
 from __future__ import annotations
 
@@ -53,3 +53,20 @@ def test_a_fit_that_is_killed_goes_on(tmp_path):
     found = {each: each.stat().st_mtime_ns for each in out.glob("evaluation-*/case-*/result.json")}
     assert results.items() <= found.items() and len(found) == document["evaluations"]
     assert document["status"] == "done" and not (out / "result.lock").exists()
+
+
+def test_a_study_of_scatter_that_is_killed_goes_on(tmp_path):
+    """On two ranks, a case on each; a file of its name that is of others stays."""
+    path, out = tmp_path / "case.toml", tmp_path / "out"
+    path.write_text(FIT.partition("[unknown]")[0].replace("0.4", "{mean = 0.4, std = 0.02}"))
+    words = ("uncertainty", path, "--out", out, "--ranks-per-case", "1")
+    checked = command_line(0, "check", path)
+    assert checked.returncode == 0 and checked.stdout.startswith("scatter    1 uncertain numbers"), checked.stderr
+    job = hooked(2, [Hook(COMMIT, KILL, when="args[1].parts[-2] == 'case-0001'")], *words)
+    assert job.returncode not in (0, 2, 3) and json.loads((out / "uncertainty.json").read_text())["status"] == "running"
+    job = command_line(2, *words)
+    assert job.returncode == 0 and "By differences of runs: none" in job.stdout, job.stderr
+    assert json.loads((out / "uncertainty.json").read_text())["status"] == "done"
+    (out / "uncertainty.json").write_text("{}")
+    job = command_line(0, *words)
+    assert job.returncode == 2 and (out / "uncertainty.json").read_text() == "{}"

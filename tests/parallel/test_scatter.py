@@ -78,7 +78,15 @@ def test_random_cells_have_the_scatter_of_inputs_and_that_between_them(comm, sha
         between = abs(values[0, k] - values[1, k]) / np.sqrt(2)
         assert each["std_inputs"] == pytest.approx(inputs) and each["std_cells"] == pytest.approx(between)
         assert each["std"] == pytest.approx(np.hypot(inputs, between)) and sum(each["shares"]) == pytest.approx(1.0)
-    assert "+- cells" in scatter.text(found)
+        errors = np.abs(np.diff([own["derivatives"][k] for own in cells], axis=0))[0, young] / 2
+        assert each["derivative_errors"] == pytest.approx(errors, abs=1e-9) and each["mesh_error"] > 0
+    text = scatter.text(found)
+    assert "+- cells" in text and "Standard error" not in text
+    found["results"][0]["derivative_errors"] = [0.51 * abs(each) for each in found["results"][0]["derivatives"]]
+    assert "half of the slope by material.fibre.young: C11" in scatter.text(found)
+    ours = scatter.parse(case | {"uncertainty": {"material.fibre.poisson": 0.01}}, Path())
+    with pytest.raises(CaseError, match="holds another study of scatter"):
+        scatter.run(ours, shared_path / "out", comm, comm.size, False, True)
 
 
 @pytest.mark.parametrize(
@@ -88,6 +96,9 @@ def test_random_cells_have_the_scatter_of_inputs_and_that_between_them(comm, sha
         ({"uncertainty": {"cell": {"geometry": 0.1}}}, "[uncertainty] cell.geometry: expected a key of the case"),
         ({"uncertainty": {"cell": {"fibre_fraction": 0.01}}, "sweep": {"cell": {"fibre_fraction": [0.1, 0.2]}}},
          "[sweep]: expected realisations alone"),
+        ({"name": {"mean": 1.0, "std": 0.1}}, "name = {mean = 1.0, std = 0.1}: expected no number"),
+        ({"uncertainty": {"cell": {"fibre_fraction": 0.4}}},
+         "[uncertainty] cell.fibre_fraction = 0.4 +- 0.4: case-0001: [cell] fibre_fraction = 0.0"),
     ],
 )  # fmt: skip
 def test_faults_have_their_line(changes, line):

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from feti_homog.report.text.stiffness_tables import SHORT, UNKNOWN
 from feti_homog.report.text.table import Column, Table, without_noise
 
@@ -47,7 +49,7 @@ def uncertainty(document: Document) -> list[Table]:
     if (found := document.get("uncertainty")) is None:
         return []
     names, values = found["constants"], document["sensitivities"]["constant_values"]
-    errors = _mesh_errors(document)
+    errors = mesh_errors(document)
     inputs = [name.removeprefix("material.") for name in found["parameters"]]
     columns = [Column("", -16), Column("value"), Column("+- phases"), Column("+- mesh")]
     columns += [Column(name, max(12, len(name) + 2), ".1f") for name in inputs]
@@ -65,12 +67,13 @@ def uncertainty(document: Document) -> list[Table]:
     return [Table("Scatter by uncertain constants (std), and their shares of the variance (%)", columns, rows)]
 
 
-def _mesh_errors(document: Document) -> dict[str, float]:
-    """Return the estimated errors of constants by the mesh, of expansions by their places, too."""
+def mesh_errors(document: Document) -> dict[str, float]:
+    """Return the estimated errors of constants by the mesh, of entries and expansions by their places, too."""
     known: Document = document.get("mesh_error") or {}
-    expansions = known.get("thermal_expansion")
-    along = {} if expansions is None else {f"expansion.{k + 1}": float(error) for k, error in enumerate(expansions)}
-    return {**known.get("constants", {}), **along}
+    entries = np.ndenumerate(np.array(known.get("effective_stiffness", [])))
+    along = enumerate(known.get("thermal_expansion", ()))
+    named = {f"C{i + 1}{j + 1}": float(error) for (i, j), error in entries}
+    return named | {**known.get("constants", {})} | {f"expansion.{k + 1}": float(error) for k, error in along}
 
 
 def shown(names: Sequence[str]) -> list[str]:
