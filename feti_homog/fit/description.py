@@ -90,16 +90,18 @@ class Fit:
 
 
 def _is_linear(case: plan.CaseDocument) -> bool:
-    """Return whether a case has exact derivatives: a stiffness without contact of debonded faces.
-
-    Lines of a user's mesh may be debonded, too.
-    """
-    analysis, cell, interfaces = (case.document.get(name) for name in ("analysis", "cell", "interface"))
-    sections = [each for each in (interfaces if isinstance(interfaces, list) else [interfaces]) if each]
-    is_mesh = isinstance(cell, dict) and cell.get("geometry") == "mesh"
-    touching = [each for each in sections if is_mesh or (isinstance(each, dict) and each.get("debonded"))]
+    """Return whether a case has exact derivatives: a stiffness without contact of debonded faces."""
+    analysis = case.document.get("analysis")
     is_stiffness = isinstance(analysis, dict) and analysis.get("type") == "stiffness"
-    return is_stiffness and all(isinstance(each, dict) and each.get("contact") is False for each in touching)
+    return is_stiffness and not _may_touch(case.document)
+
+
+def _may_touch(document: Mapping[str, Any]) -> bool:
+    """Return whether faces in contact may be debonded from the start: arcs, or lines of a user's mesh."""
+    cell, given = document.get("cell"), document.get("interface", [])
+    is_mesh = isinstance(cell, dict) and cell.get("geometry") == "mesh"
+    sections = [each for each in (given if isinstance(given, list) else [given]) if isinstance(each, dict)]
+    return any(each.get("contact") is not False for each in sections if is_mesh or each.get("debonded"))
 
 
 def load(path: Path) -> Fit:
