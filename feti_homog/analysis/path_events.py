@@ -16,7 +16,8 @@ from feti_homog.interface.loads.load import Load, Macroscopic
 from feti_homog.interface.path.path_points import NO_ENERGIES, Energies, PathState, Point
 from feti_homog.results.checkpoint_file import Arrays
 
-KKT_LAWS = ("kkt_complementarity", "kkt_penetration", "kkt_tension")
+# Conditions of contact; the last is known only with friction.
+KKT_LAWS = ("kkt_complementarity", "kkt_penetration", "kkt_tension", "kkt_friction")
 # Behind the names of what belongs to each problem.
 SUFFIXES = ("", "_axial")
 
@@ -127,7 +128,7 @@ def _taken_apart(state: Equilibrium, kernel: int) -> tuple[dict[str, Any], Array
         "strain": solution.strain,
         "alpha": np.full(kernel, np.nan) if solution.alpha is None else solution.alpha,
         "residual": solution.residual,
-        "certificate": [state.certificate[law] for law in KKT_LAWS],
+        "certificate": [state.certificate.get(law, np.nan) for law in KKT_LAWS],
     }
     return whole, {"lam": solution.lam, "jump": solution.jump} | _bonds_apart(state.bonds, "")
 
@@ -136,7 +137,8 @@ def _put_together(event: Arrays, interface: ContactProblem, suffix: str) -> Equi
     """Rebuild the equilibrium from the parts of `_taken_apart`."""
     strain, lam, jump, alpha = (event[f"{name}{suffix}"] for name in ("strain", "lam", "jump", "alpha"))
     iterations, solves, free_motions, last, reason = event[f"numbers{suffix}"].tolist()
-    certificate = dict(zip(KKT_LAWS, event[f"certificate{suffix}"].tolist(), strict=True))
+    errors = zip(KKT_LAWS, event[f"certificate{suffix}"].tolist(), strict=True)
+    certificate = {law: error for law, error in errors if not np.isnan(error)}
     values, by_stress = event[f"load{suffix}"]
     load = Load(values, by_stress.astype(bool))
     bonds = _bonds_together(event, suffix)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 from reference.friction import RubbingFaces
@@ -88,15 +90,19 @@ def test_breaks_with_friction_obey_every_law_resumed_too(comm, shared_path, plan
 
 
 def test_an_unloaded_cell_keeps_slips_and_resumes_between_changes(comm, shared_path):
-    """Certified at no stress; resumed, the path has the points of the whole one."""
+    """Certified at no stress; resumed, the path has the points of the whole one, and from known points its checks."""
     waypoints = [{"E11": -0.01, "E22": -0.01}, {"gamma12": 0.06}, {"gamma12": -0.06}]
     waypoints += [{"S11": 0.0, "S22": 0.0, "S12": 0.0}]
     interface, path = WHOLE | {"friction": 0.3}, {"waypoints": [*waypoints, {"S11": 0.02}]}
     asked = document({"mesh_size": 0.2}, EPOXY_GLASS, "strain", interface, path=path)
     asked["output"] = {"pictures": False, "states": "all"}
     whole = run(Case.parse(asked), comm).path
-    with pytest.raises(ConvergenceError):
-        run(Case.parse(asked | {"path": path | {"max_events": 7}}), comm, out=shared_path / "out")
+    short, checks = Case.parse(asked | {"path": path | {"max_events": 7}}), []
+    for resume in (False, True):
+        with pytest.raises(ConvergenceError):
+            run(short, comm, out=shared_path / "out", resume=resume)
+        checks.append(on_root(comm, lambda: json.loads((shared_path / "out" / "result.json").read_text())["checks"]))
+    assert checks[1] == checks[0] and "kkt_friction" in checks[0]
     found = run(Case.parse(asked), comm, out=shared_path / "out", resume=True).path
     np.testing.assert_allclose([p.load_factor for p in found], [p.load_factor for p in whole], atol=1e-9)
     assert found[-1].friction_heat > 0.0

@@ -116,6 +116,7 @@ def test_generalized_plane_strain_has_the_numbers_of_plane_strain_in_the_plane(c
 
 OPENED = [[-0.01, -0.004, 0.01], [0.01, 0.01, -0.02]]
 COLD = {"temperature": -300.0, "E33": 0.0}
+AROUND, SHEARS = {"E11": -0.01, "E22": -0.01, "E33": 0.0}, {"gamma13": 0.03, "gamma23": 0.02}
 STRENGTHS = {"normal_strength": 0.03, "tangential_strength": 0.035}
 PATHS = {
     # Of the first rates one set of statuses balances all but the turning of the fibre.
@@ -156,6 +157,27 @@ PATHS = {
         [
             *(COLD | {"gamma12": 0.02}, COLD | {"gamma13": 0.02, "gamma12": 0.02}),
             *(COLD | {"S11": 0.05, "gamma13": 0.01}, COLD | {"S11": -0.05, "gamma13": -0.01}),
+        ],
+    ),
+    # The fibre comes free, and no face bears its shear any more.
+    "generalized, tied faces that all open": (
+        {},
+        EPOXY_GLASS,
+        WHOLE | {"friction": 0.3, "axial_friction": "prevented"},
+        [
+            *(AROUND, AROUND | {"gamma12": 0.02}, AROUND | SHEARS),
+            *(SHEARS | {"E11": 0.03, "E22": 0.03, "E33": 0.0},),
+        ],
+    ),
+    # What opening faces let go of breaks a bond.
+    "generalized, tied faces that let go": (
+        {},
+        EPOXY_GLASS,
+        {"normal_strength": 1e9, "tangential_strength": 1e9, "axial_strength": 0.15, "axial_friction": "prevented"}
+        | {"friction": 0.3, "debonded": [{"fibre": 1, "angle": 200.0}]},
+        [
+            *(AROUND, AROUND | SHEARS, {"E11": 0.1, "E22": 0.1, "E33": 0.0, "gamma13": 0.0, "gamma23": 0.0}),
+            *(AROUND, AROUND | {"gamma12": 0.02}),
         ],
     ),
     "generalized, on springs": (

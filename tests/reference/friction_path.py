@@ -65,17 +65,24 @@ class FrictionPath:
 
             if self.faces.tied:  # what opens lets go of its shear along the fibres
                 self._lose(after(s), 0.0)
+                if (which := self._overloaded(1.0 + TOGETHER)).any():
+                    self._break_all(which, start.towards(load, s), (leg + s) / legs)
+                    continue
             there = 1.0 if step >= 1.0 - s else s + step
             broken = self.used(after(there)).max() > 1.0
             s = self._break_between(after, s, there) if broken else there
             self._book(after(s))
-            self._report((leg + s) / legs, self._overloaded(1.0 - TIE) if broken else np.zeros(self.faces.k, bool))
-            while broken and (which := self.points[-1].broke).any():
-                self._break(which, start.towards(load, s))
-                if (which := self._overloaded(1.0 + TOGETHER)).any():
-                    self._report((leg + s) / legs, which)
-                else:
-                    break
+            which = self._overloaded(1.0 - TIE) if broken else np.zeros(self.faces.k, bool)
+            self._break_all(which, start.towards(load, s), (leg + s) / legs)
+
+    def _break_all(self, which, load, load_factor):
+        """Report the state here, break bonds (k,) there, and those that this overloads, a point each."""
+        self._report(load_factor, which)
+        while which.any():
+            self._break(which, load)
+            which = self._overloaded(1.0 + TOGETHER)
+            if which.any():
+                self._report(load_factor, which)
 
     def used(self, state):
         """(k,) shares of what breaks the bonds."""

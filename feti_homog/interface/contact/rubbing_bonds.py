@@ -11,17 +11,18 @@ import numpy as np
 
 from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.contact.states import BONDED, OPEN, Equilibrium
+from feti_homog.interface.contact.states import BONDED, Equilibrium
 from feti_homog.typing import Float
 
 
 def slipped(interface: ContactProblem, state: Equilibrium) -> Float:
-    """(owned rows,) r of damaged bonds, 0 elsewhere, and on paths without friction."""
-    if state.bonds.gap_and_slip is None:
-        return np.zeros(interface.solver.rows)
-    bonded = interface.active(np.where(state.status == BONDED, BONDED, OPEN).astype(np.int8)) > 0.0
-    damaged = bonded & (state.solution.compliance > interface.solver.intact_compliance)
-    return np.where(damaged, state.solution.jump, 0.0)
+    """(owned rows,) r of the tangential rows of damaged bonds, 0 elsewhere, and on paths without friction."""
+    r = np.zeros(interface.solver.rows)
+    if state.bonds.gap_and_slip is not None and interface.solver.jump_operator.components > 1:
+        rows = interface.nodes.row[state.status == BONDED] + 1
+        rows = rows[state.solution.compliance[rows] > interface.solver.intact_compliance[rows]]
+        r[rows] = state.solution.jump[rows]
+    return r
 
 
 def energy_beside_springs(interface: ContactProblem, state: Equilibrium) -> float:

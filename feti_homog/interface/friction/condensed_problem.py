@@ -10,17 +10,16 @@ L the bonded stiffness times the area: the cell stores x.S x / 2 of x = (g, E), 
 from __future__ import annotations
 
 import numpy as np
+from scipy.linalg import lu_factor, lu_solve
 
 from feti_homog.errors import CaseError
 from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.feti.solver_plan import WITHOUT_INVERSE
 from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.states import BondState
+from feti_homog.interface.friction.status_system import HELD, REFINEMENTS
 from feti_homog.parallel.distributed_arrays import allreduce_sum, gather_rows
 from feti_homog.typing import Float, Int
-
-# Share of the largest stiffness of a row that holds what nothing else does; a step of refinement removes it.
-HELD = 1e-9
 
 
 class CondensedProblem:
@@ -85,7 +84,8 @@ class CondensedProblem:
 class AxialFaces:
     """The axial problem, a few rows and columns of the matrix S of `coulomb_faces` behind those of the plane.
 
-    Where no face is tied along the fibres the jumps g = K^-1 b E are eliminated, K g = b E.
+    Where no face is tied along the fibres the jumps g = K^-1 b E are eliminated, K g = b E.  What nothing holds is held
+    by a share of its own row: a share of the largest would measure by the stiffest spring.
 
     Attributes:
         problem: the axial one.
@@ -99,9 +99,10 @@ class AxialFaces:
         if is_tied:
             self._jumps, self.stiffness = None, np.block([[L, -b.T], [-b, K]])
             return
-        held = K + HELD * np.abs(K.diagonal()).max(initial=0.0) * np.eye(len(K))
-        self._jumps = np.linalg.solve(held, b)
-        self._jumps += np.linalg.solve(held, b - K @ self._jumps)
+        held = lu_factor(K + HELD * np.diag(K.diagonal()))
+        self._jumps = np.zeros_like(b)
+        for _ in range(1 + REFINEMENTS):
+            self._jumps += lu_solve(held, b - K @ self._jumps)
         loose = L - b.T @ self._jumps
         self.stiffness = (loose + loose.T) / 2
 

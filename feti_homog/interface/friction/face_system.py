@@ -85,9 +85,16 @@ class FaceSystem:
     def settled(self, status: Status, given: Prescribed, x: Float) -> tuple[Status, Float]:
         """Return the statuses, and x (m,) without the rounding of the way to it.
 
-        Where a motion is free, which rounding would drive, x is as it was.
+        Where a motion is free, which rounding would drive, x is as it was, but for what S does not couple with the
+        jumps in the plane: there faces that opened let go of their shear along the fibres.
         """
-        return status, self.linear(status, given, x) if self.solver.sign(*self.free(status, given.by_stress)) else x
+        free, last = self.free(status, given.by_stress), 2 * self.nodes
+        if self.solver.sign(*free):
+            return status, self.linear(status, given, x)
+        if not len(self.tied):
+            return status, x
+        alone = ~self.S[:last].any(axis=0)
+        return status, np.where(alone, self.linear(status, given, x), x)
 
     def prescribed(self, status: Status, given: Prescribed, start: Float) -> tuple[Float, Float]:
         """(m,) x with what is prescribed, and (m,) S x on the rows of loads."""

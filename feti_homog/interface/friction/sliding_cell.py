@@ -132,7 +132,7 @@ class SlidingCell:
         nodes, sliding = before.status.copy(), np.zeros(len(before.status), np.int8)
         holds, pressed = self._damaged[self._own], before.pressed.copy()
         nodes[self._own] = np.where(holds, BONDED, np.where(own == OPEN_FACE, OPEN, CLOSED))
-        rubs = (self.faces.friction[self._place] > 0.0) | ~holds
+        rubs = self.faces.friction[self._place] > 0.0
         sliding[self._own] = np.where((own != OPEN_FACE) & rubs, own, STICK)
         pressed[self._own] = np.where(holds, own != OPEN_FACE, pressed[self._own])
         return replace(before, status=nodes, pressed=pressed, gap_and_slip=jump, sliding=sliding)

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.contact.states import Equilibrium, Status
+from feti_homog.interface.contact.states import BondState, Equilibrium, Status
 from feti_homog.interface.friction.coulomb_faces import StuckError
 from feti_homog.interface.friction.face_system import Prescribed
 from feti_homog.interface.friction.sliding_cell import SlidingCell
+from feti_homog.interface.friction.status_system import OPEN_FACE
 from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.loads.load import Load, Macroscopic
 from feti_homog.interface.path.next_change import first_break_between
@@ -141,6 +142,10 @@ class SlidingLeg:
         if not rounded.any():
             faces.solver.keep(there, faces.solver.product(x) + way * faces.solver.product(rate))
         self._let_go(status, x)
+        if self._opened_tied(here.status, status) and self._most_used(bonds) > 1.0 + UTILISATION_TIE:
+            yield from self._break()
+            yield from self._break_overloaded()
+            return
         self._go(status, x, there)
         at_end = breaks > 1.0 and change >= rest
         self._share = 1.0 if at_end else self._share + way
@@ -165,6 +170,16 @@ class SlidingLeg:
             lost, _ = self.sliding.faces.losses(status, self._here.x, x)
             self._add(self._standing(status, x), lost / self.sliding.area, 0.0)
             self._here = self._standing(status, x)
+
+    def _opened_tied(self, before: Status, status: Status) -> bool:
+        """Return whether tied faces opened, whose shear along the fibres went to bonds."""
+        tied, opened = self.sliding.faces.tied, (status == OPEN_FACE) & (before != OPEN_FACE)
+        return bool((tied & opened[: len(tied)]).any())
+
+    def _most_used(self, bonds: BondState) -> float:
+        """Stand with these bonds, and return the largest share of their strength that they use.  Collective."""
+        self._bonds = bonds
+        return most_utilised(self.cell, self.law, self._state())[1]
 
     def _go(self, status: Status, x: Float, there: Float) -> None:
         """Go straight from x to `there`, with these statuses."""

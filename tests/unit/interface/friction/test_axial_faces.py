@@ -1,0 +1,38 @@
+"""Jumps along the fibres that nothing ties are eliminated exactly, whatever the springs of others."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from feti_homog.interface.contact.rubbing_bonds import slipped
+from feti_homog.interface.contact.states import BONDED, OPEN, BondState
+from feti_homog.interface.friction.condensed_problem import AxialFaces
+
+
+@pytest.mark.parametrize("stiff", [1.0, 1e8, 1e12])
+def test_free_faces_are_not_held_by_the_springs_of_others(stiff):
+    """Four rows, the first two on springs, and a fifth kept by nothing."""
+    A, b = np.random.default_rng(0).normal(size=(6, 4)), np.random.default_rng(1).normal(size=(4, 2))
+    H, springs = A.T @ A, stiff * np.array([1.0, 3.0, 0.0, 0.0])
+    L = 10.0 * np.eye(2)
+    problem = SimpleNamespace(take=lambda rows, own: (H + np.diag(own), b, L))
+    found = AxialFaces(problem, np.arange(4), springs, is_tied=False).stiffness
+    soft = H[2:, 2:] - H[2:, :2] @ np.linalg.solve(H[:2, :2] + np.diag(springs[:2]), H[:2, 2:])
+    held = np.linalg.solve(H[:2, :2] + np.diag(springs[:2]), b[:2])
+    rest = b[2:] - H[2:, :2] @ held
+    np.testing.assert_allclose(found, L - b[:2].T @ held - rest.T @ np.linalg.solve(soft, rest), rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize(("components", "known"), [(2, [0, 0, 0, 7, 0, 0]), (1, [0, 0, 0, 0, 0, 0])])
+def test_damaged_bonds_slip_by_their_tangential_rows_alone(components, known):
+    """An intact bond, a damaged one and an open face: what others of their rows open is left to the check of jumps."""
+    solver = SimpleNamespace(rows=6, intact_compliance=np.ones(6), jump_operator=SimpleNamespace(components=components))
+    interface = SimpleNamespace(solver=solver, nodes=SimpleNamespace(row=np.array([0, 2, 4])))
+    bonds = BondState.without_memory(np.array([BONDED, BONDED, OPEN], np.int8))
+    bonds = BondState(bonds.status, bonds.history, bonds.pressed, gap_and_slip=np.zeros((3, 2)))
+    solution = SimpleNamespace(jump=np.arange(4.0, 10.0), compliance=np.array([1.0, 1.0, 5.0, 5.0, 1.0, 1.0]))
+    state = SimpleNamespace(bonds=bonds, status=bonds.status, solution=solution)
+    np.testing.assert_array_equal(slipped(interface, state), known)
