@@ -52,6 +52,7 @@ class JumpOperator:
     """B of this rank's subdomains and the layout of the multipliers.
 
     Attributes:
+        problem: the displacements and the unit loads, which ranks without subdomains know from here.
         components: rows of a vector constraint.
         B: (local rows, local dofs) signed, rotated entries; a local row is one that a local dof takes part in.
         rows: global number of each local row.
@@ -77,7 +78,7 @@ class JumpOperator:
         problem: Problem = PLANE,
     ) -> None:
         layout = ConstraintLayout(shared, subdomains, lattice, problem.components)
-        self.components = layout.components
+        self.problem, self.components = problem, layout.components
         self.shared, self._first, self._count = shared, layout.first, layout.count
         elsewhere = np.bincount(np.repeat(np.arange(len(shared.key)), shared.copies), layout.base < 0, len(shared.key))
         self.is_shared_row = np.repeat(elsewhere > 0, layout.count)

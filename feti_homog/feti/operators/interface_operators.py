@@ -83,7 +83,7 @@ class InterfaceOperators:
         `compliance` (local rows,) is that of the springs of the interfaces, None where no rank has any.  Nothing is
         communicated: a rank may fail alone.
         """
-        self.subdomains = subdomains
+        self.subdomains, self._loads = subdomains, len(jump_operator.problem.loads)
         self.dofs = _constrained_dofs(jump_operator.B, subdomains)
         self.offsets = np.cumsum([0, *(len(d) for d in self.dofs)])
         first = np.cumsum([0, *(s.n_dofs for s in subdomains)])
@@ -177,7 +177,7 @@ class InterfaceOperators:
     @cached_property
     def condensed(self) -> CondensedLoads:
         """The unit loads on all boundaries, and the sum of the stiffnesses."""
-        v = self.subdomains[0].Q.shape[1] if self.subdomains else 0
+        v = self._loads
         each = [operator.condensed for operator in self.operators]
         boundary = np.concatenate([np.zeros((0, v)), *(own.boundary for own in each)])
         return CondensedLoads(boundary, sum((own.stiffness for own in each), np.zeros((v, v))))
