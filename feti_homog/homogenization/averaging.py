@@ -190,6 +190,8 @@ class Homogenization:
 
     def counts(self, status: Status) -> dict[str, int]:
         """Interface nodes in each state; collective."""
+        if self.cell.summary.across:  # no multiplier is there, and nothing can part
+            return {"bonded": self.cell.summary.interface_nodes or 0, "open": 0, "closed": 0}
         numbers = np.array([(status == kind).sum() for kind in (BONDED, OPEN, CLOSED)])
         sums = self.cell.comm.allreduce(numbers)
         return dict(zip(("bonded", "open", "closed"), sums.tolist(), strict=True))

@@ -16,6 +16,9 @@ from feti_homog.typing import Int
 
 # Poisson's ratio up to which single nodes of mixed elements are hardly stiffer than mu says (`SCALED_LAME`).
 MOST_POISSON = 0.45
+# Ratio of stiffnesses up to which subdomains may have several phases: above, rounding in their dense matrices costs
+# accuracy (4e-7 at 1e6) and then convergence.
+MOST_CONTRAST = 1e4
 
 
 @dataclass(frozen=True)
@@ -74,7 +77,7 @@ def can_be_cut_across(case: Case) -> bool:
     """Return whether subdomains may reach across materials: nothing parts, and the case leaves the cut to the program.
 
     Fields have the forces between bodies, derivatives are of bodies, and so is the scaling of jumps in nearly
-    incompressible phases.
+    incompressible phases and between phases of very different stiffness.
     """
     asked, output = case.decomposition, case.output
     of_bodies = output.fields, output.sensitivities, case.uncertainty.std, case.interfaces
@@ -87,7 +90,14 @@ def can_be_cut_across(case: Case) -> bool:
         return False
     kinds = {phase_laws.is_mixed(case, phase) for phase in case.materials}
     ratios = (isotropic_ratio(material) or 0.0 for material in case.materials.values())
-    return len(kinds) == 1 and max(ratios) <= MOST_POISSON
+    return len(kinds) == 1 and max(ratios) <= MOST_POISSON and _contrast(case) <= MOST_CONTRAST
+
+
+def _contrast(case: Case) -> float:
+    """Return the largest ratio of the largest entries of two phases' stiffnesses to strains, in any problem."""
+    law_kinds = (phase_laws.plane_law, phase_laws.axial_law)[: len(phase_laws.problems(case))]
+    sizes = np.array([[np.abs(law(case, phase)[:4, :4]).max() for phase in case.materials] for law in law_kinds])
+    return float((sizes.max(axis=1) / sizes.min(axis=1)).max())
 
 
 def wanted_pieces(

@@ -19,7 +19,7 @@ CELLS = {
     "linear": {"refine": 1},
     "quadratic": {"order": 2},
     "voids": {"voids": 0.1, "fibre_fraction": 0.2},
-    "stiff": {"matrix": {"young": 1.0, "poisson": 0.3}, "fibre": {"young": 1e5, "poisson": 0.2}},
+    "stiff": {"matrix": {"young": 1.0, "poisson": 0.3}, "fibre": {"young": 1e4, "poisson": 0.2}},
 }
 SOFT = {"young": 20.0, "poisson": 0.3}
 POLICIES = {
@@ -61,6 +61,23 @@ def test_runs_give_what_they_give_by_bodies(comm):
         np.testing.assert_allclose(across[name], bodies[name], atol=1e-9 * np.abs(bodies[name]).max())
     # Stresses are recovered within pieces, and of bodies from a coarser mesh.
     assert across["mesh_error"]["energy"] == pytest.approx(bodies["mesh_error"]["energy"], rel=0.3)
+
+
+def test_load_counts_the_bonds_that_it_counts_by_bodies(comm):
+    load = {"analysis": {"type": "load", "plane": "generalized"}, "load": {"to": {"E11": 0.01}}}
+    across, bodies = (run(Case.parse(document(cut) | load), comm) for cut in ("auto", "bodies"))
+    assert across.solver.subdomains == comm.size
+    counts = [(r.load.bonded, r.load.open, r.load.closed) for r in (across, bodies)]
+    assert counts[0] == counts[1] and counts[0][0] > 0
+
+
+@pytest.mark.parametrize("young", [1e8, 1e-10])
+def test_phases_of_very_different_stiffness_stay_apart(comm, young):
+    materials = {"matrix": {"young": 1.0, "poisson": 0.3}, "fibre": {"young": young, "poisson": 0.2}}
+    torn, L, responses = solve(make_case(**RANDOM | materials), comm, policy=POLICIES["pieces"])
+    assert not torn.summary.across and all(r.state.iterations < 40 for r in responses)
+    # At 1e8 rounding in the monolithic factor is 1e-8.
+    assert relative_error(L, monolithic_stiffness(torn)) < 1e-7
 
 
 def test_fields_that_are_asked_for_are_those_of_bodies(comm):

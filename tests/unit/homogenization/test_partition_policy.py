@@ -20,6 +20,8 @@ WITHOUT_FIELDS = {"output": {"fields": False}}
         ({"decomposition": {"subdomains": 9}}, False),
         ({"decomposition": {"max_dofs": 900}}, False),
         ({"bodies": "plane"}, False),
+        ({"fibre": {"young": 1e5, "poisson": 0.3}, "matrix": {"young": 1.0, "poisson": 0.3}}, False),
+        ({"fibre": {"young": 9e3, "poisson": 0.3}, "matrix": {"young": 1.0, "poisson": 0.3}}, True),
         ({"order": 2, "matrix": {"young": 1.0, "poisson": 0.49}, "element": "mixed"}, False),
     ],
 )
