@@ -156,8 +156,7 @@ def _verified(files: ResultFiles, directory: Path) -> Certificate:
     check_tables(findings, directory, files.document)
     if files.is_spatial:
         check_spatial(findings, cell, states)
-    if "sensitivities" in files.document:
-        check_sensitivities(findings, cell)
+    check_sensitivities(findings, cell)
     return Certificate(findings.worst(), _title(files, states), _status(files))
 
 

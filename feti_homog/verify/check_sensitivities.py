@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -18,6 +18,7 @@ from feti_homog.verify.constitutive_law import expansions, mixed_phases, plane_s
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.elements import Elements
 from feti_homog.verify.findings import Findings, relative
+from feti_homog.verify.prescribed import NAMES
 from feti_homog.verify.reading import State
 
 STEP = 1e-6
@@ -31,20 +32,48 @@ Case = dict[str, Any]
 
 def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
     """Check the values of all constants and parameters, and one derivative along a direction in which all change."""
-    told = cell.files.document["sensitivities"]
+    document, case = cell.files.document, cell.files.case
+    asked = {"sensitivities": case.get("output", {}).get("sensitivities"), "uncertainty": "uncertainty" in case}
+    missing = [name for name, is_asked in asked.items() if is_asked and name not in document]
+    findings.record("tables", [np.inf] * len(missing), lambda k: f"{missing[k]}, which the case asks for")
+    if "sensitivities" not in document:
+        return
+    told = document["sensitivities"]
     names, values = told["parameters"], np.array(told["parameter_values"])
+    untold = sorted({*_required(cell)}.difference(names))
+    findings.record("tables", [np.inf] * len(untold), lambda k: f"sensitivities, {untold[k]}")
     own = np.array([_place(dict(cell.files.case), name)[2] for name in names])
     findings.record("tables", relative(values - own, np.abs(own)), lambda k: f"sensitivities, {names[k]}")
     sizes = np.array([_size(name, value) for name, value in zip(names, own, strict=True)])
     direction = sizes * np.resize(WEIGHTS, len(own))
     moved = [_moved(cell, names, own + sign * STEP * direction) for sign in (1, -1)]
     states = list(cell.files.states())
-    if told.get("at_fixed_status") or "load" in cell.files.document:
+    if "load" in document:
+        _check_load(findings, cell, states[0], moved, direction)
+    elif told.get("at_fixed_status"):
         _check_energies(findings, cell, states, moved, direction)
     else:
         _check_constants(findings, cell, states, moved, direction)
-    if "uncertainty" in cell.files.document:
-        _check_uncertainty(findings, cell.files.document)
+    if "uncertainty" in document:
+        _check_uncertainty(findings, document)
+
+
+def _required(cell: DiscreteCell) -> Iterator[str]:
+    """Yield the constants of the phases and springs by which there are derivatives."""
+    material, sections = cell.files.case["material"], cell.files.interfaces
+    is_warm = "thermal_stress" in cell.files.document
+    for phase in {*cell.files.phases} & material.keys():
+        for key, value in material[phase].items():
+            numbers = np.array(value, float)
+            if numbers.ndim > 1:
+                yield from (f"material.{phase}.{key}.C{i + 1}{j + 1}" for i, j in np.argwhere(np.triu(numbers)))
+            elif is_warm or not key.startswith("expansion"):
+                places = [f".{k + 1}" for k in range(len(numbers))] if numbers.ndim else [""]
+                yield from (f"material.{phase}.{key}{place}" for place in places)
+    for number, section in enumerate(sections, start=1):
+        name = f"interface.{number}" if len(sections) > 1 else "interface"
+        keys = [key for key, value in section.items() if key.endswith("_stiffness") and value is not None]
+        yield from (f"{name}.{key}" for key in keys if np.isfinite(float(section[key])))
 
 
 def _check_uncertainty(findings: Findings, document: Mapping[str, Any]) -> None:
@@ -52,6 +81,9 @@ def _check_uncertainty(findings: Findings, document: Mapping[str, Any]) -> None:
     told, known = document["uncertainty"], document["sensitivities"]
     given = {name: float(std) for name, std in document["case"]["uncertainty"].items() if name != "correlation"}
     names = told["parameters"]
+    if {*names} != given.keys() or [*told["constants"]] != [*known["constants"]]:
+        findings.record("tables", np.inf, "uncertainty, names")
+        return
     R = np.eye(len(names))
     for first, second, value in document["case"]["uncertainty"].get("correlation", []):
         i, j = names.index(first), names.index(second)
@@ -74,25 +106,49 @@ def _check_energies(
 ) -> None:
     """Check the derivatives of the energies of states with contact, which are stationary, too.
 
-    Those are the diagonal of the secants, and what is stored under given strains.  The others would need fields of
-    other loads at the same status, which no file has.
+    Those are the diagonal of the secants.  The others would need fields of other loads at the same status, which no
+    file has.
     """
-    told, load = cell.files.document["sensitivities"], cell.files.document["case"].get("load")
-    if load is None:
-        strains, _ = _in_order(states[: len(states) // 2])  # those under minus the unit loads follow
-        found = {f"C{k + 1}{k + 1}": (state, 1.0) for k, state in enumerate(strains)}
-    else:
-        found = {"stored": (states[0], 0.5)} if {"stored"} == {n for n in told["constants"] if n[0] not in "S"} else {}
-    for name, (state, share) in found.items():
-        if state.temperature:
-            continue
+    told = cell.files.document["sensitivities"]
+    strains, _ = _in_order(states[: len(states) // 2])  # those under minus the unit loads follow
+    for number, state in enumerate(strains, start=1):
+        k = told["constants"].index(name := f"C{number}{number}")
         above, below = (float(_energies(cell, [state], case)[0, 0]) for case in cases)
-        k = told["constants"].index(name)
         terms, value = np.array(told["derivatives"][k]) * direction, told["constant_values"][k]
-        expected, scale = share * (above - below) / (2 * STEP), max(float(np.abs(terms).max()), abs(value))
+        expected, scale = (above - below) / (2 * STEP), max(float(np.abs(terms).max()), abs(value))
         findings.record("sensitivities", relative(np.array(terms.sum() - expected), scale), name)
-        here = share * float(_energies(cell, [state], cell.files.case)[0, 0])
+        here = float(_energies(cell, [state], cell.files.case)[0, 0])
         findings.record("constants", abs(value - here) / max(abs(here), 1e-300), name)
+
+
+def _check_load(findings: Findings, cell: DiscreteCell, state: State, cases: Sequence[Case], direction: Float) -> None:
+    """Check strains x and stresses s of one load, what is stored, and the derivatives of those that follow from it.
+
+    With given strains g and given stresses f, d(x_g.s_g - x_f.s_f) / 2 is that of the energy of the fields at rest.
+    Beside a temperature, whose conjugate no file has, the values are checked alone.
+    """
+    told, point = cell.files.document["sensitivities"], cell.files.document["load"]
+    pairs = [*zip(*NAMES[len(point["strain"])], strict=True)]
+    known = dict(zip(told["constants"], zip(told["constant_values"], told["derivatives"], strict=True), strict=True))
+    follows = [[name for name in pair if name in known] for pair in pairs]
+    if any(len(names) != 1 for names in follows) or "stored" not in known:
+        findings.record("tables", np.inf, "sensitivities, constants of the load")
+        return
+    of_stored = np.array(known["stored"][1]) * direction
+    terms, rest = np.zeros_like(direction), of_stored.copy()
+    for (name,), strain, stress, (other, _) in zip(follows, point["strain"], point["stress"], pairs, strict=True):
+        value, conjugate, sign = (strain, stress, -1) if name == other else (stress, strain, 1)
+        size = max(map(abs, point["strain" if name == other else "stress"]))
+        findings.record("constants", relative(np.array(known[name][0] - value), size), name)
+        change = conjugate / 2 * np.array(known[name][1]) * direction
+        terms, rest = terms + sign * change, rest - change
+    here, *ends = (0.5 * float(_energies(cell, [state], case)[0, 0]) for case in (cell.files.case, *cases))
+    if state.temperature:
+        return
+    findings.record("constants", abs(known["stored"][0] - here) / max(abs(here), 1e-300), "stored")
+    scale = max(float(np.abs(terms).max()), float(np.abs(of_stored).max()), abs(here))
+    off = [terms.sum() - (ends[0] - ends[1]) / (2 * STEP), rest.sum()]
+    findings.record("sensitivities", relative(np.array(off), scale), lambda k: ("the load", "stored")[k])
 
 
 def _check_constants(

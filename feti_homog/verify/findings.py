@@ -156,7 +156,7 @@ def checks(rtol: float, users_mesh: bool, has_coatings: bool) -> tuple[Check, ..
         ("moduli", "moduli follow from the stiffness, relative to each", 1e-10),
         ("compliance", "compliance and expansion follow from stiffness and thermal stress, relative to each", 1e-10),
         ("Levin", "thermal stress = - mean of expansion : stiffness : strain under unit strains, relative", solver),
-        ("constants", "constants at fixed status are energies of the fields, relative to each", solver),
+        ("constants", "constants at fixed status are those of the fields, relative to each", solver),
         (
             "sensitivities",
             "constants change with the materials and springs of the case as told, relative to each",

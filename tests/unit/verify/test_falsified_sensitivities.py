@@ -13,6 +13,10 @@ from feti_homog.verify.certificate import verify
 
 SIZING = {"young": 120.0, "poisson": 0.25, "expansion": 3e-5}
 TOUCHING = {"contact": True, "debonded": [{"fibre": "all", "centre": 20.0, "angle": 90.0}]}
+LOADS = {
+    "load": {"E11": -0.01, "E22": 0.02, "gamma12": 0.0},
+    "stresses": {"S11": -0.1, "E22": 0.02, "S33": 0.2, "gamma23": 0.01},
+}
 CASES = {
     "space": ("generalized", SQUARE | {"order": 2}, {"matrix": WARM, "fibre": CARBON}, SPRINGS),
     "pairs": (
@@ -24,6 +28,7 @@ CASES = {
     "strain": ("strain", SQUARE | {"order": 2}, {"matrix": MATRIX, "fibre": TURNED}, None),
     "contact": ("generalized", SQUARE, {"matrix": WARM, "fibre": CARBON}, SPRINGS | TOUCHING),
     "load": ("strain", SQUARE, {"matrix": MATRIX, "fibre": FIBRE}, TOUCHING),
+    "stresses": ("generalized", SQUARE, {"matrix": MATRIX, "fibre": CARBON}, SPRINGS | TOUCHING),
     "stress": ("stress", SQUARE, {"matrix": {"stiffness": [[10, 2, 0], [2, 8, 0], [0, 0, 3]]}, "fibre": FIBRE}, None),
 }
 
@@ -36,10 +41,12 @@ def test_sensitivities_are_verified(tmp_path, kind):
         "material": materials,
         "analysis": {"type": "stiffness", "plane": plane},
         "output": {"sensitivities": True, "pictures": False, "mesh_error": False},
-        "petsc": {} if kind == "contact" else {"feti_ksp_rtol": 1e-10},  # fields are as good as the solver
+        "petsc": {}
+        if kind in LOADS or kind == "contact"
+        else {"feti_ksp_rtol": 1e-10},  # fields are as good as the solver
     } | ({} if interface is None else {"interface": interface})
-    if kind == "load":
-        case["analysis"]["type"], case["load"] = "load", {"to": {"E11": -0.01, "E22": 0.02, "gamma12": 0.0}}
+    if kind in LOADS:
+        case["analysis"]["type"], case["load"] = "load", {"to": LOADS[kind]}
     run(Case.parse(case), MPI.COMM_SELF, out=tmp_path / "own")
     certificate = verify(tmp_path / "own")
     assert certificate.holds, certificate.text
@@ -51,7 +58,23 @@ def test_sensitivities_are_verified(tmp_path, kind):
         k = next(k for k, name in enumerate(told["constants"]) if name in ("stored", "E1", "C22"))
         told["derivatives"][k][int(rows[k].argmax())] *= 1 + 1e-3
 
-    assert broken(falsified(tmp_path / "own", tmp_path / "copy", edit)) == {"files", "sensitivities"}
+    def doubled(document, _):
+        told = document["sensitivities"]
+        told["derivatives"] = (2 * np.array(told["derivatives"])).tolist()
+
+    def tripled(document, _):
+        told = document["sensitivities"]
+        told["constant_values"] = (3 * np.array(told["constant_values"])).tolist()
+
+    def cut(document, _):
+        told = document["sensitivities"]
+        told["parameters"], told["parameter_values"] = told["parameters"][:1], told["parameter_values"][:1]
+        told["derivatives"] = [row[:1] for row in told["derivatives"]]
+
+    falsehoods = {edit: {"sensitivities"}, cut: {"tables"}}
+    falsehoods |= {doubled: {"sensitivities"}, tripled: {"constants"}} if kind in LOADS else {}
+    for number, (each, laws) in enumerate(falsehoods.items()):
+        assert broken(falsified(tmp_path / "own", tmp_path / f"copy{number}", each)) == laws | {"files"}
 
 
 @pytest.mark.parametrize("key", ["std", "shares"])
@@ -75,4 +98,16 @@ def test_scatter_is_verified(tmp_path, key):
         value[0] *= 1 + 1e-3
         document["uncertainty"][key] = value.tolist()
 
+    def cut(document, _):
+        own = document["uncertainty"]
+        own["parameters"], own["parameter_std"] = own["parameters"][:1], own["parameter_std"][:1]
+
+    def emptied(document, _):
+        document["uncertainty"] |= {"constants": [], "std": [], "shares": []}
+
+    def deleted(document, _):
+        del document["uncertainty"]
+
     assert broken(falsified(tmp_path / "own", tmp_path / "copy", edit)) == {"files", "sensitivities"}
+    for each in (cut, emptied, deleted) if key == "std" else ():
+        assert broken(falsified(tmp_path / "own", tmp_path / each.__name__, each)) == {"files", "tables"}
