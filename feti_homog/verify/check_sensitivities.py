@@ -25,6 +25,7 @@ STEP = 1e-6
 # Constants beside the largest of their kind below which they are noise.
 NOISE = 1e-3
 SAME = 1e-8  # of a radius
+SPRINGS = ("normal_stiffness", "tangential_stiffness", "axial_stiffness")
 WEIGHTS = (1.0, -0.7, 0.5, 0.9, -0.8)
 ORDER = [0, 1, 5, 2, 4, 3]  # of the unit strains of space among their states, a temperature left out
 Case = dict[str, Any]
@@ -61,19 +62,20 @@ def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
 def _required(cell: DiscreteCell) -> Iterator[str]:
     """Yield the constants of the phases and springs by which there are derivatives."""
     material, sections = cell.files.case["material"], cell.files.interfaces
-    is_warm = "thermal_stress" in cell.files.document
     for phase in {*cell.files.phases} & material.keys():
         for key, value in material[phase].items():
-            numbers = np.array(value, float)
-            if numbers.ndim > 1:
-                yield from (f"material.{phase}.{key}.C{i + 1}{j + 1}" for i, j in np.argwhere(np.triu(numbers)))
-            elif is_warm or not key.startswith("expansion"):
-                places = [f".{k + 1}" for k in range(len(numbers))] if numbers.ndim else [""]
-                yield from (f"material.{phase}.{key}{place}" for place in places)
+            if "thermal_stress" in cell.files.document or not key.startswith("expansion"):
+                yield from (f"material.{phase}.{key}{place}" for place in _places(np.array(value, float)))
     for number, section in enumerate(sections, start=1):
         name = f"interface.{number}" if len(sections) > 1 else "interface"
-        keys = [key for key, value in section.items() if key.endswith("_stiffness") and value is not None]
-        yield from (f"{name}.{key}" for key in keys if np.isfinite(float(section[key])))
+        yield from (f"{name}.{key}" for key in SPRINGS if np.isfinite(float(section.get(key) or np.inf)))
+
+
+def _places(numbers: Float) -> list[str]:
+    """Return what follows the name of a key: nothing of one number, .k of several, .Cij of a stiffness."""
+    if numbers.ndim > 1:
+        return [f".C{i + 1}{j + 1}" for i, j in np.argwhere(np.triu(numbers))]
+    return [f".{k + 1}" for k in range(len(numbers))] if numbers.ndim else [""]
 
 
 def _check_uncertainty(findings: Findings, document: Mapping[str, Any]) -> None:
@@ -142,9 +144,9 @@ def _check_load(findings: Findings, cell: DiscreteCell, state: State, cases: Seq
         findings.record("constants", relative(np.array(known[name][0] - value), size), name)
         change = conjugate / 2 * np.array(known[name][1]) * direction
         terms, rest = terms + sign * change, rest - change
-    here, *ends = (0.5 * float(_energies(cell, [state], case)[0, 0]) for case in (cell.files.case, *cases))
     if state.temperature:
         return
+    here, *ends = (0.5 * float(_energies(cell, [state], case)[0, 0]) for case in (cell.files.case, *cases))
     findings.record("constants", abs(known["stored"][0] - here) / max(abs(here), 1e-300), "stored")
     scale = max(float(np.abs(terms).max()), float(np.abs(of_stored).max()), abs(here))
     off = [terms.sum() - (ends[0] - ends[1]) / (2 * STEP), rest.sum()]

@@ -16,6 +16,7 @@ TOUCHING = {"contact": True, "debonded": [{"fibre": "all", "centre": 20.0, "angl
 LOADS = {
     "load": {"E11": -0.01, "E22": 0.02, "gamma12": 0.0},
     "stresses": {"S11": -0.1, "E22": 0.02, "S33": 0.2, "gamma23": 0.01},
+    "heated": {"S11": -0.1, "E22": 0.02, "S33": 0.2, "temperature": -50.0},
 }
 CASES = {
     "space": ("generalized", SQUARE | {"order": 2}, {"matrix": WARM, "fibre": CARBON}, SPRINGS),
@@ -29,6 +30,7 @@ CASES = {
     "contact": ("generalized", SQUARE, {"matrix": WARM, "fibre": CARBON}, SPRINGS | TOUCHING),
     "load": ("strain", SQUARE, {"matrix": MATRIX, "fibre": FIBRE}, TOUCHING),
     "stresses": ("generalized", SQUARE, {"matrix": MATRIX, "fibre": CARBON}, SPRINGS | TOUCHING),
+    "heated": ("generalized", SQUARE, {"matrix": WARM, "fibre": CARBON}, TOUCHING),
     "stress": ("stress", SQUARE, {"matrix": {"stiffness": [[10, 2, 0], [2, 8, 0], [0, 0, 3]]}, "fibre": FIBRE}, None),
 }
 
@@ -50,7 +52,8 @@ def test_sensitivities_are_verified(tmp_path, kind):
     run(Case.parse(case), MPI.COMM_SELF, out=tmp_path / "own")
     certificate = verify(tmp_path / "own")
     assert certificate.holds, certificate.text
-    assert "sensitivities" in {finding.check.name for finding in certificate.findings}
+    law = "constants" if kind == "heated" else "sensitivities"
+    assert law in {finding.check.name for finding in certificate.findings}
 
     def edit(document, _):
         told = document["sensitivities"]
@@ -73,6 +76,7 @@ def test_sensitivities_are_verified(tmp_path, kind):
 
     falsehoods = {edit: {"sensitivities"}, cut: {"tables"}}
     falsehoods |= {doubled: {"sensitivities"}, tripled: {"constants"}} if kind in LOADS else {}
+    falsehoods = {tripled: {"constants"}} if kind == "heated" else falsehoods
     for number, (each, laws) in enumerate(falsehoods.items()):
         assert broken(falsified(tmp_path / "own", tmp_path / f"copy{number}", each)) == laws | {"files"}
 
