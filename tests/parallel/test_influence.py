@@ -99,6 +99,30 @@ def test_influence_columns_give_the_inverse_for_any_active_rows(comm, case, colu
     assert least <= influence.factorizations <= most
 
 
+def test_blocks_are_right_with_few_followed_columns(comm):
+    """Bonds break one after another all around a fibre; columns of all others go when there is no room for more."""
+    cell = torn_cells.tear(comm, geometry="square", petsc=INFLUENCE)
+    dense, influence, d = DenseDual(cell), cell.solver.exact_inverse, cell.solver.d
+    influence.most_followed, influence.batch = 14, 6
+    status = np.full(len(cell.solver.jump_operator.nodes.row), BONDED, np.int8)
+    rows, first, kept = influence.neighbours.rows, influence.neighbours.first, []
+    for number in range(len(rows) - 3):
+        own = number - first
+        if 0 <= own < len(status):
+            status[own] = OPEN
+        active = activate(cell, status)
+        # The next ones, and far ones that come and go.
+        wanted = np.unique([number + 1, number + 2, len(rows) - 1 - number % 3, (5 * number) % len(rows)])
+        wanted = wanted[active[rows[wanted]]]
+        expected = inverse(dense, active)
+        found, _ = influence.answer(d, np.eye(3))
+        assert np.abs(gathered(cell, found) - expected @ gathered(cell, d)).max() < 1e-8 * influence.norm
+        for row, block in zip(rows[wanted], influence.inverse_blocks(rows[wanted, None] + np.arange(2)), strict=True):
+            assert np.abs(block - expected[row : row + 2, row : row + 2]).max() < 1e-8 * influence.norm
+        kept.append(influence._followed)
+    assert len(kept) > 12 and all(each is kept[0] for each in kept)
+
+
 @CELLS
 def test_influence_columns_leave_nothing_to_iterate(comm, case):
     cell = torn_cells.tear(comm, **case, petsc=INFLUENCE)

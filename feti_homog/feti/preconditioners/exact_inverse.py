@@ -10,8 +10,8 @@ A spring whose compliance grew by dC is one of C, whose jump dC lam is prescribe
     N = (Gamma_CC + D)^-1,  lam_C = D c on such rows,  D = dC^-1 there, and 0 where bonds left.
 
 A bond that breaks or softens and a face that closes or opens cost their columns of what `followed_response` keeps up.
-N follows them, by borders, when new columns or a confirmation want it; no factor is made anew.  After more changes
-than an option allows, the cell as it stands becomes the reference, but for what softened.
+N follows them, by borders, when new columns or a confirmation want it.  The reference cell stays, until there are
+more changes than an option allows: then the cell as it stands, but for what softened, takes its place.
 """
 
 from __future__ import annotations
@@ -51,6 +51,8 @@ class ExactInverse(Preconditioner):
         stiffness: (all rows,) the most that each diagonal entry of H can be: that of a node of either side and of the
             spring between them, in a row, while all others are held.
         factorizations: reference cells so far.
+        batch: columns found at once at least.
+        most_followed: columns at most that are followed, from the next time that none are.
     """
 
     norm: float = np.inf
@@ -74,7 +76,7 @@ class ExactInverse(Preconditioner):
         self._BD = one_sided_jumps(comm, jump_operator, operators)
         self._ties = BodyTies(comm, jump_operator)
         self.neighbours = InterfaceNeighbours(comm, jump_operator, operators.subdomains)
-        self._batch = INFLUENCE_BATCH * comm.size
+        self.batch, self.most_followed = INFLUENCE_BATCH * comm.size, FOLLOWED_COLUMNS
         # Columns without which the reference cell is not the one at hand.
         self.factorizations = self._tied = 0
         self._answer: Float | None = None
@@ -89,7 +91,7 @@ class ExactInverse(Preconditioner):
     def rounding(self) -> float:
         """Return the largest force, relative to `stiffness`, that jumps of rigid-body motions of size 1 make.
 
-        Bodies of the reference cell that follow leave none: it is a relative error of H.  Collective."""
+        Bodies follow them without force: all of it is rounding, a relative error of H.  Collective."""
         if self._followed is None:
             self._catch_up()
         return self._rounding
@@ -111,19 +113,20 @@ class ExactInverse(Preconditioner):
         numbers = np.stack([turned, gained, self.stiffness[self._first :][: self._rows]], axis=1)[own]
         parts = zip(*self.comm.allgather((self._first + own, numbers)), strict=True)
         rows, numbers = (np.concatenate(part) for part in parts)
-        if len(rows) > MOST_FOLLOWED:
-            return False
-        if len(lacking := followed.lacking(rows)) and not self._add_followed(followed, lacking):
-            return False
-        return followed.follow(rows, *numbers.T)
+        is_few = len(rows) <= MOST_FOLLOWED
+        return is_few and self._add_followed(followed, rows) and followed.follow(rows, *numbers.T)
 
-    def _add_followed(self, followed: FollowedResponse, lacking: Int) -> bool:
-        """Find the columns of the present response at rows and near them; False if there are none.  Collective."""
+    def _add_followed(self, followed: FollowedResponse, wanted: Int) -> bool:
+        """Let all rows (k,) `wanted` have columns of the present response; False if that cannot be.  Collective."""
+        lacking = followed.lacking(wanted)
+        if not len(lacking):
+            return True
         self._catch_up()
-        if len(self._dependent):
-            return False  # a body is free
-        rows = self._with_near(lacking, followed.lacking)
-        rows = rows if followed.has_room(rows) or len(rows) <= FOLLOWED_COLUMNS // 2 else lacking
+        if len(self._dependent) or len(wanted) > followed.most:
+            return False  # a body is free, or there is no room
+        if not followed.has_room(rows := self._with_near(lacking, followed.lacking)):
+            followed.clear()
+            rows = near if followed.has_room(near := self._with_near(wanted, followed.lacking)) else wanted
         self._columns.add(rows)
         at, unit = self._columns.positions(rows), np.zeros((self._rows, len(rows)))
         both = np.stack([self._active, self.reference.active], axis=1)
@@ -180,7 +183,8 @@ class ExactInverse(Preconditioner):
             self._answer = y + scale_rows(1.0 - self.reference.active, d)
         answer = self._response(self._answer)
         if self._followed is None:
-            self._followed = FollowedResponse(self.comm, self._first, self._jump_operator.global_rows, answer)
+            own = self.comm, self._first, self._jump_operator.global_rows
+            self._followed = FollowedResponse(*own, answer, self.most_followed)
         self._followed.answer = answer
         return answer
 
@@ -189,22 +193,18 @@ class ExactInverse(Preconditioner):
 
         Rows that leave together change the multipliers of their own by all of them, and open by H_ii^-1 lam_i.
         """
-        if (followed := self._followed) is not None:
-            lacking = followed.lacking(np.unique(pairs))
-            if not len(lacking) or (followed.has_room(lacking) and self._add_followed(followed, lacking)):
-                return followed.blocks(pairs)
+        if (followed := self._followed) is not None and self._add_followed(followed, np.unique(pairs)):
+            return followed.blocks(pairs)
         self._catch_up()
         self._find(pairs.ravel())
         at, members = self._columns.positions(pairs.ravel()), self._inverse.members
-        block = self._columns.block
         # The rows of U, and of the identity on A.
-        U = block[at[:, None], members]
+        U = (block := self._columns.block)[at[:, None], members]
         own = block[at.reshape(-1, 2)[:, :, None], at.reshape(-1, 2)[:, None, :]]
         returned = gather_rows(self.comm, self.reference.active, self._first, pairs.ravel()) == 0
         U[returned] = at[returned, None] == members
         both = ~returned.reshape(-1, 2)
-        own = np.where(both[:, :, None] & both[:, None, :], own, 0.0)
-        paired = U.reshape(len(pairs), 2, len(members))
+        own, paired = np.where(both[:, :, None] & both[:, None, :], own, 0.0), U.reshape(len(pairs), 2, len(members))
         return np.asarray(own - np.matmul((U @ self._inverse.N).reshape(paired.shape), paired.transpose(0, 2, 1)))
 
     def columns(self, rows: Int) -> tuple[Float, Float]:
@@ -249,7 +249,7 @@ class ExactInverse(Preconditioner):
     def _with_near(self, rows: Int, lacking: Callable[[Int], Int]) -> Int:
         """Return rows and active ones near them, which break next: columns are cheaper together.  Collective."""
         active = np.concatenate(self.comm.allgather(self._active)) > 0
-        return self.neighbours.rows_near(rows, lambda near: lacking(near[active[near]]), self._batch)
+        return self.neighbours.rows_near(rows, lambda near: lacking(near[active[near]]), self.batch)
 
     def _update_inverse(self, changed: Int) -> None:
         """Let N be that of the columns `changed`, made anew where updates have lost too many digits.  Collective."""

@@ -30,18 +30,21 @@ class FollowedResponse:
 
     Attributes:
         answer: (owned rows, v) U.
+        most: columns at most.
     """
 
-    def __init__(self, comm: MPI.Intracomm, first: int, global_rows: int, answer: Float) -> None:
+    def __init__(
+        self, comm: MPI.Intracomm, first: int, global_rows: int, answer: Float, most: int = FOLLOWED_COLUMNS
+    ) -> None:
         """`answer` is U; this rank's rows begin at `first`.  No columns yet."""
-        self._comm, self._first, self.answer = comm, first, answer
+        self._comm, self._first, self.answer, self.most = comm, first, answer, most
         self._slot = np.full(global_rows, -1)
         self._rows: Int = np.zeros(0, np.int64)
         # Memory is taken when columns come.
-        self._buffer = np.zeros((len(answer), FOLLOWED_COLUMNS), order="F")
+        self._buffer = np.zeros((len(answer), most), order="F")
         # What is taken off at changes that wait, and its factors in the columns of the rows K that are kept.
         self._waiting = np.zeros((len(answer), WAITING_COLUMNS), order="F")
-        self._factors = np.zeros((FOLLOWED_COLUMNS, WAITING_COLUMNS))
+        self._factors = np.zeros((most, WAITING_COLUMNS))
         self._count = 0
 
     def lacking(self, rows: Int) -> Int:
@@ -50,13 +53,15 @@ class FollowedResponse:
 
     def has_room(self, rows: Int) -> bool:
         """Return whether columns of so many more rows leave the others in place."""
-        return len(self._rows) + len(rows) <= FOLLOWED_COLUMNS
+        return len(self._rows) + len(rows) <= self.most
 
     def blocks(self, pairs: Int) -> Float:
         """(m, 2, 2) diagonal blocks of Gamma at the pairs (m, 2) of global rows, which have columns.  Collective.
 
         A pair is on one rank.
         """
+        if len(self.lacking(pairs)):
+            raise ValueError("rows without columns have no blocks")
         own, at, n = pairs - self._first, self._slot[pairs], self._count
         mine = ((own >= 0) & (own < len(self._buffer))).all(axis=1)
         own, at = own[mine], at[mine]
@@ -65,12 +70,13 @@ class FollowedResponse:
         blocks[mine] -= self._waiting[own, :n] @ self._factors[at, :n].transpose(0, 2, 1)
         return allreduce_sum(self._comm, blocks)
 
+    def clear(self) -> None:
+        """Let all columns go."""
+        self._slot[self._rows], self._rows, self._count = -1, self._rows[:0], 0
+
     def add(self, rows: Int, columns: Float) -> None:
-        """Take the columns (owned rows, k) of these global rows (k,) in; all others go if they are too many."""
+        """Take the columns (owned rows, k) of these global rows (k,) in, for which there is room."""
         self._apply_waiting()
-        if not self.has_room(rows):
-            self._slot[self._rows] = -1
-            self._rows = self._rows[:0]
         old, new = len(self._rows), len(self._rows) + len(rows)
         self._slot[rows] = np.arange(old, new)
         self._rows = np.concatenate([self._rows, rows])
