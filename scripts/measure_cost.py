@@ -94,7 +94,7 @@ def document(cell: dict[str, Any], refine: int, output: Any = WITHOUT_FIELDS) ->
         path = Path(folder) / "case.toml"
         materials = STIFFNESS["material"] | ({"coating": COATING} if "coating" in cell else {})
         own = {"cell": cell | {"refine": refine}, "material": materials, "output": output}
-        path.write_text(tomli_w.dumps(STIFFNESS | own))
+        path.write_text(tomli_w.dumps(STIFFNESS | own | {"decomposition": {"cut": "bodies"}}))
         words = ["-m", "feti_homog", "run", path, "--out", folder, "--quiet"]
         start, used = time.perf_counter(), processor_seconds()
         subprocess.run([sys.executable, *map(str, words)], check=True)

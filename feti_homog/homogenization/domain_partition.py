@@ -159,10 +159,11 @@ def distribute(
         raise CaseError(*faults)
     parts = torus.constituent if case.cell.bodies == "torus" else torus.plane_parts()
     bodies, triangles = int(parts.max()) + 1, len(mesh.triangles)
-    wanted = wanted_pieces(case, np.bincount(parts), _outer_edges(torus, parts), lattice, n_ranks, policy)
-    across = can_be_cut_across(case) and policy.across_pieces(len(mesh.triangles) * lattice.intervals**2, n_ranks)
+    across = can_be_cut_across(case) and policy.across_pieces(triangles * lattice.intervals**2, n_ranks)
     if across:
-        parts, wanted = np.zeros_like(parts), np.array([across])
+        parts, wanted = np.zeros_like(parts), np.array([min(across, triangles)])
+    else:
+        wanted = wanted_pieces(case, np.bincount(parts), _outer_edges(torus, parts), lattice, n_ranks, policy)
     decomposition = decompose(torus, parts, wanted, n_ranks)
     subdomain, rank = decomposition.subdomain, decomposition.rank
     table = SubdomainTable.of(torus, subdomain, rank, across > 0)
@@ -218,7 +219,8 @@ def _interface_nodes(torus: Torus, pairs: Int, lattice: ReferenceLattice) -> int
     between = edge[pairs[torus.mesh.phase[left], torus.mesh.phase[right]] >= 0]
     plane = np.unique(torus.torus_edge, return_index=True)[1][between]
     ends = np.unique(torus.node_class[torus.edges[plane]])
-    return len(between) * (lattice.intervals - 1) + int((~torus.never_part[ends]).sum())
+    may_part = ~torus.never_part[ends] & (torus.class_keys[ends] != pinned_class(torus))
+    return len(between) * (lattice.intervals - 1) + int(may_part.sum())
 
 
 def _outer_edges(torus: Torus, parts: Int) -> Int:

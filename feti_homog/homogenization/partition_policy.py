@@ -12,6 +12,7 @@ from feti_homog.homogenization import phase_laws
 from feti_homog.materials.laws import isotropic_ratio
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.mesh.tiles.tiles import DEFAULT_TILES, TilePolicy
+from feti_homog.petsc.options import given_options
 from feti_homog.typing import Int
 
 # Poisson's ratio up to which single nodes of mixed elements are hardly stiffer than mu says (`SCALED_LAME`).
@@ -19,6 +20,8 @@ MOST_POISSON = 0.45
 # Ratio of stiffnesses up to which subdomains may have several phases: above, rounding in their dense matrices costs
 # accuracy (4e-7 at 1e6) and then convergence.
 MOST_CONTRAST = 1e4
+# Options of the solver that only say how exact it is: others ask for a dual problem, which one subdomain has not.
+TOLERANCES = {"feti_ksp_rtol", "feti_ksp_atol", "feti_ksp_max_it"}
 
 
 @dataclass(frozen=True)
@@ -77,7 +80,8 @@ def can_be_cut_across(case: Case) -> bool:
     """Return whether subdomains may reach across materials: nothing parts, and the case leaves the cut to the program.
 
     Fields have the forces between bodies, derivatives are of bodies, and so is the scaling of jumps in nearly
-    incompressible phases and between phases of very different stiffness.
+    incompressible phases and between phases of very different stiffness. Options of the dual solver are for the
+    subdomains that it is known for.
     """
     asked, output = case.decomposition, case.output
     of_bodies = output.fields, output.sensitivities, case.uncertainty.std, case.interfaces
@@ -87,6 +91,8 @@ def can_be_cut_across(case: Case) -> bool:
         None,
         "torus",
     ):
+        return False
+    if any(name.startswith("feti_") for name in {*case.petsc, *given_options()} - TOLERANCES):
         return False
     kinds = {phase_laws.is_mixed(case, phase) for phase in case.materials}
     ratios = (isotropic_ratio(material) or 0.0 for material in case.materials.values())

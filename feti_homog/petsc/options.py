@@ -39,7 +39,7 @@ def case_options(options: Mapping[str, Value]) -> Iterator[None]:
             made with what is given.
     """
     database = PETSc.Options()
-    on_command_line = _given()
+    on_command_line = given_options()
     options = {name.lower(): value for name, value in options.items()}
     given = {**options, **on_command_line}
     faults = [*unknown_options(given), *without_prefix(given), *faulty_values(given)]
@@ -65,8 +65,8 @@ def _set(database: PETSc.Options, name: str, value: Value | None) -> None:
         database.setValue(name, None if value == "" else value)
 
 
-def _given() -> dict[str, str]:
-    """PETSc's options by name, in small letters, with an empty text where there is no value."""
+def given_options() -> dict[str, str]:
+    """Return PETSc's options by name, in small letters, with an empty text where there is no value."""
     return {name.lower(): value or "" for name, value in PETSc.Options().getAll().items()}
 
 
@@ -75,7 +75,7 @@ def _refuse_early() -> None:
 
     Some options are read by larger solvers alone: other names are left to `refuse_unused`.
     """
-    given = _given()
+    given = given_options()
     faults = faults_of_solvers(given)
     if faults:
         raise CaseError(*faults)

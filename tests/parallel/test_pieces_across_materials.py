@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from support.cases import FIBRE, MATRIX, make_case, monolithic_stiffness, relative_error, solve
+from support.pixel_images import pixel_mesh
 
 from feti_homog import Case, run
 from feti_homog.homogenization.partition_policy import PartitionPolicy
+from feti_homog.parallel.mpi_errors import on_root
 from feti_homog.runtime.records import plain
 
 pytestmark = pytest.mark.parallel
@@ -69,6 +71,15 @@ def test_load_counts_the_bonds_that_it_counts_by_bodies(comm):
     assert across.solver.subdomains == comm.size
     counts = [(r.load.bonded, r.load.open, r.load.closed) for r in (across, bodies)]
     assert counts[0] == counts[1] and counts[0][0] > 0
+
+
+def test_interface_nodes_are_those_by_bodies_if_one_is_pinned(comm, shared_path):
+    on_root(comm, pixel_mesh(np.array([[0, 1], [1, 1]])).write, shared_path / "pixels.msh")
+    cell = {"cell": {"geometry": "mesh", "file": str(shared_path / "pixels.msh"), "refine": 1}}
+    pixels = document("auto") | cell | {"material": {"matrix": MATRIX, "fibre": FIBRE}}
+    across, bodies = (run(Case.parse(pixels | {"decomposition": {"cut": cut}}), comm) for cut in ("auto", "bodies"))
+    assert across.solver.subdomains == comm.size and bodies.solver.subdomains >= 2
+    assert across.solver.interface_nodes == bodies.solver.interface_nodes > 0
 
 
 @pytest.mark.parametrize("young", [1e8, 1e-10])

@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import pytest
+from mpi4py import MPI
 from support.cases import make_case
+from support.whole_meshes import coarse_mesh
 
+from feti_homog.homogenization.domain_partition import distribute
 from feti_homog.homogenization.partition_policy import BY_COST, DEFAULT_POLICY, can_be_cut_across
+from feti_homog.mesh.refinement import ReferenceLattice
+from feti_homog.petsc.options import case_options
 
 WITHOUT_FIELDS = {"output": {"fields": False}}
 
@@ -20,6 +25,8 @@ WITHOUT_FIELDS = {"output": {"fields": False}}
         ({"decomposition": {"subdomains": 9}}, False),
         ({"decomposition": {"max_dofs": 900}}, False),
         ({"bodies": "plane"}, False),
+        ({"petsc": {"feti_ksp_rtol": 1e-9}}, True),
+        ({"petsc": {"feti_pc_type": "lumped"}}, False),
         ({"fibre": {"young": 1e5, "poisson": 0.3}, "matrix": {"young": 1.0, "poisson": 0.3}}, False),
         ({"fibre": {"young": 9e3, "poisson": 0.3}, "matrix": {"young": 1.0, "poisson": 0.3}}, True),
         ({"order": 2, "matrix": {"young": 1.0, "poisson": 0.49}, "element": "mixed"}, False),
@@ -27,6 +34,21 @@ WITHOUT_FIELDS = {"output": {"fields": False}}
 )
 def test_only_cells_in_which_nothing_is_asked_of_bodies_are_cut_across_materials(change, may):
     assert can_be_cut_across(make_case(**WITHOUT_FIELDS | change)) == may
+
+
+def test_options_of_the_command_line_count_like_those_of_the_case():
+    with case_options({"feti_ksp_view": ""}):
+        assert not can_be_cut_across(make_case(**WITHOUT_FIELDS))
+    assert can_be_cut_across(make_case(**WITHOUT_FIELDS))
+
+
+def test_there_are_no_more_pieces_than_coarse_triangles():
+    case = make_case(geometry="square", mesh_size=0.5, **WITHOUT_FIELDS)
+    mesh = coarse_mesh(case, MPI.COMM_SELF)
+    ranks = len(mesh.triangles) + 9
+    share, *_ = distribute(case, mesh, ReferenceLattice.of(0, 1), ranks, BY_COST)
+    # METIS leaves some pieces empty, and nearly all if more are asked for than there are triangles.
+    assert share.summary.across and share.summary.subdomains > len(mesh.triangles) // 5
 
 
 @pytest.mark.parametrize(
