@@ -89,7 +89,9 @@ class Checks:
     kkt_penetration: float | None = described("contact: no gap is negative", default=None)
     kkt_tension: float | None = described("contact: no closed node is pulled", default=None)
     kkt_friction: float | None = described(
-        "friction: shear on closed faces is within mu p, and that of sliding ones opposes the slip", default=None
+        "friction: shear on closed faces is within mu p, that of sliding ones opposes the slip, and along the fibres "
+        "none is borne but by tied faces",
+        default=None,
     )
     symmetry: float | None = described("L^ef is symmetric; of bonded or frictionless free faces only", default=None)
 

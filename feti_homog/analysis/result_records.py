@@ -157,10 +157,15 @@ class PathPoint:
     stored: float = described("elastic energy stored per area of the cell", STRESS)
     stored_in_springs: float = described("the share of elastic interfaces in it", STRESS)
     work: float = described(
-        "work of the loads so far per area of the cell, of a temperature too: `stored` and `dissipated` together",
+        "work of the loads so far per area of the cell, of a temperature too: `stored` and `dissipated` together, with "
+        "friction and `friction_heat`",
         STRESS,
     )
-    dissipated: float = described("energy lost to breaks so far per area of the cell, along all equilibria", STRESS)
+    dissipated: float = described(
+        'energy lost to breaks so far per area of the cell, along all equilibria; with axial_friction = "prevented" '
+        "also what faces lose that open",
+        STRESS,
+    )
     dissipated_strain_controlled: float = described("the same if the load only rises on the first leg", STRESS)
     friction_heat: float | None = described(
         "heat of friction so far per area of the cell: `work` is `stored`, `dissipated` and this", STRESS, default=None
@@ -172,7 +177,8 @@ class PathPoint:
         default=None,
     )
     dissipation_ratio: float | None = described(
-        "`dissipated` / `fracture_energy`, once there is any; 1 of bonds that lose their toughness alone", default=None
+        "`dissipated`, all of it, / `fracture_energy`, once there is any; 1 of bonds that lose their toughness alone",
+        default=None,
     )
     debonded_share: float = described("debonded share of the length of all interfaces")
     debonded_shares: Float | None = described(DEBONDED_SHARES, "", "(i,)", default=None)

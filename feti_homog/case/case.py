@@ -16,7 +16,7 @@ from feti_homog.case.cell_files import checked_cell
 from feti_homog.case.cell_section import GEOMETRY, Cell
 from feti_homog.case.document import read_document, to_document
 from feti_homog.case.fit_sections import FIT_SECTIONS
-from feti_homog.case.interface_faults import read_interfaces
+from feti_homog.case.interface_faults import idle_friction_keys, read_interfaces
 from feti_homog.case.interface_section import Arc, InterfaceSection, interface_tables
 from feti_homog.case.load_section import Envelope, LoadPath, SingleLoad, expansion_faults, load_faults, stress_free
 from feti_homog.case.material_sections import (
@@ -127,7 +127,8 @@ class Case:
     def warnings(self) -> tuple[str, ...]:
         """List settings that are valid but probably unintended, a line each."""
         of_elements = element_choice.warnings(self.cell, self.materials, self.analysis.plane)
-        return (*of_elements, *contrast_warnings(self.materials, self.analysis.plane))
+        contrast = contrast_warnings(self.materials, self.analysis.plane)
+        return (*of_elements, *contrast, *idle_friction_keys(self.interfaces))
 
     def remarks(self) -> tuple[str, ...]:
         """List the assumptions about settings that are not given, a line each."""

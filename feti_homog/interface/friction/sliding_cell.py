@@ -6,6 +6,7 @@ that of `AxialFaces`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -13,14 +14,14 @@ import numpy as np
 from mpi4py import MPI
 from scipy.linalg import block_diag
 
-from feti_homog.feti.dual_solution import DualSolution
+from feti_homog.interface.contact.contact_certificate import coulomb_errors
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, Equilibrium, Status
 from feti_homog.interface.friction.condensed_problem import AxialFaces, CondensedProblem
 from feti_homog.interface.friction.coulomb_faces import CoulombFaces
 from feti_homog.interface.friction.face_system import NOTHING
 from feti_homog.interface.friction.status_system import OPEN_FACE, STICK
-from feti_homog.interface.loads.load import Load, Macroscopic, Multipliers
+from feti_homog.interface.loads.load import CoupledSolution, Load, Macroscopic, Multipliers
 from feti_homog.typing import Bool, Float, Int
 
 
@@ -59,6 +60,7 @@ class SlidingCell:
         rows = [(each.interface.nodes.row[self._held], each.solver.jump_operator.components) for each in problems]
         self._held_rows = [own[:, None] + np.arange(components) for own, components in rows]
         springs = np.divide(1.0, more, out=np.zeros_like(more), where=(more > 0.0) & self._damaged[:, None])
+        self._springs = springs
         friction = np.where(self._damaged, self.friction_of_damage, self.friction)
         along = [each.first + each.interface.nodes.row for each in self._axial]
         tied = np.zeros(len(row), bool) if self.tied is None else self.tied & ~self._damaged
@@ -197,22 +199,24 @@ class SlidingCell:
             certificate = problem.interface.certificate(bonds, solution)
             states.append(Equilibrium(own, bonds, solution, 0, 1, 0, certificate))
         plane, *axial = states
-        excess = {"kkt_friction": self._excess(bonds, plane.solution)}
+        excess = {"kkt_friction": self._excess(bonds, states, x)}
         return replace(plane, certificate=plane.certificate | excess, axial=next(iter(axial), None))
 
-    def _excess(self, bonds: BondState, solution: DualSolution) -> float:
-        """Return how far shear on debonded faces is beyond mu p, or off s mu p, relative to the largest traction.
-
-        Collective.
-        """
-        normal, shear = self.interface.traction(solution).T
-        slipped, damaged = -solution.jump[self.interface.nodes.row + 1], self._damaged
-        shear[damaged] = (slipped / self.interface.nodes.length)[damaged] / self._more[damaged]
-        friction = np.where(damaged, self.friction_of_damage, self.friction)
-        limit, scales = friction * np.maximum(-normal, 0.0), self.interface.scales
-        largest = scales.over_interface(np.maximum(np.abs(normal), np.abs(shear)))
-        largest = np.maximum(largest, scales.bond_stress(self.interface.acting(bonds, solution.strain)))
-        sliding = bonds.sliding_signs
-        off = np.where(sliding == 0, np.maximum(np.abs(shear) - limit, 0.0), np.abs(sliding * shear - limit))
-        off = np.where((bonds.status == BONDED) & ~damaged, 0.0, off) / np.where(largest > 0.0, largest, 1.0)
+    def _excess(self, bonds: BondState, states: Sequence[Equilibrium], x: Float) -> float:
+        """Return the largest of `coulomb_errors` of scaled x, relative to the largest traction.  Collective."""
+        traction = self.cell.traction(CoupledSolution(tuple(each.solution for each in states)))
+        components = [each.solver.jump_operator.components for each in self.cell.problems]
+        # By the jumps of x: what F lambda leaves of them would be divided by a vanishing compliance.
+        parts = zip(self._parts(x), components, strict=True)
+        jumps = np.hstack([jump.reshape(-1, c) for (_, (jump, _)), c in parts])
+        force, own = traction.copy(), self._own
+        force[own] -= jumps[self._place] * self._springs[own] / self.interface.nodes.length[own, None]
+        friction = np.where(self._damaged, self.friction_of_damage, self.friction)
+        tied = np.zeros(len(friction), bool) if self.tied is None else self.tied & (bonds.status == CLOSED)
+        off = coulomb_errors(force, friction, bonds.sliding_signs, tied)
+        largest = self.interface.scales.over_interface(np.abs(traction).max(axis=1, initial=0.0))
+        for each, state in zip(self.cell.problems, states, strict=True):
+            stress = each.scales.bond_stress(each.acting(bonds, state.solution.strain))
+            largest = np.maximum(largest, stress)
+        off = np.where((bonds.status == BONDED) & ~self._damaged, 0.0, off) / np.where(largest > 0.0, largest, 1.0)
         return float(self.solver.comm.allreduce(off.max(initial=0.0), MPI.MAX))

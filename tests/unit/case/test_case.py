@@ -187,6 +187,19 @@ def test_high_contrast_is_warned_of(tmp_path, plane):
     assert case_of(tmp_path, case.replace("1e13", "1e11")).warnings() == ()
 
 
+def test_keys_of_friction_without_friction_are_warned_of():
+    interface = {"friction": 0.0, "axial_friction": "prevented", "debonded": [{"fibre": 1, "angle": 90.0}]}
+    asked = {
+        "cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.3},
+        "material": {name: {"young": 1.0, "poisson": 0.3} for name in ("matrix", "fibre")},
+        "analysis": {"type": "path", "plane": "generalized"},
+        "path": {"waypoints": [{"E11": 0.01}]},
+    }
+    (words,) = parse(asked | {"interface": interface}, Path()).warnings()
+    assert words == '[interface] axial_friction = "prevented": without effect, for friction = 0'
+    assert parse(asked | {"interface": interface | {"friction": 0.3}}, Path()).warnings() == ()
+
+
 @pytest.mark.parametrize("sizes", ["", "accuracy = 0.1\n", "element_size = 0.1\n"])
 def test_elements_of_nearly_incompressible_phases_are_quadratic(tmp_path, sizes):
     sized = BASE if not sizes else BASE.replace("mesh_size = 0.05\n", sizes)

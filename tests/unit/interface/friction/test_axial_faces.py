@@ -1,4 +1,4 @@
-"""Jumps along the fibres that nothing ties are eliminated exactly, whatever the springs of others."""
+"""Faces along the fibres: free jumps are eliminated exactly, and what no face may bear is an error."""
 
 from __future__ import annotations
 
@@ -7,9 +7,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from feti_homog.interface.contact.contact_certificate import coulomb_errors
 from feti_homog.interface.contact.rubbing_bonds import slipped
-from feti_homog.interface.contact.states import BONDED, OPEN, BondState
+from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState
 from feti_homog.interface.friction.condensed_problem import AxialFaces
+from feti_homog.interface.friction.sliding_cell import SlidingCell
+from feti_homog.interface.friction.status_system import FORWARD, STICK
 
 
 @pytest.mark.parametrize("stiff", [1.0, 1e8, 1e12])
@@ -36,3 +39,25 @@ def test_damaged_bonds_slip_by_their_tangential_rows_alone(components, known):
     solution = SimpleNamespace(jump=np.arange(4.0, 10.0), compliance=np.array([1.0, 1.0, 5.0, 5.0, 1.0, 1.0]))
     state = SimpleNamespace(bonds=bonds, status=bonds.status, solution=solution)
     np.testing.assert_array_equal(slipped(interface, state), known)
+
+
+def test_forces_that_no_face_may_bear_are_errors():
+    """Sticking within its limit and beyond it, sliding off its limit; along the fibres tied, loose and open."""
+    force = np.array(
+        [[-1, 0.2, 0], [-1, 0.5, 0], [-2, -0.7, 0], [-1, 0, 0.4], [-1, 0, -0.4], [0, 0, 0.1], [-1, 0.3, 0]]
+    )
+    sliding, tied = np.array([0, 0, -1, 0, 0, 0, 1], np.int8), np.array([0, 0, 0, 1, 0, 0, 0], bool)
+    found = coulomb_errors(force, np.full(7, 0.3), sliding, tied)
+    np.testing.assert_allclose(found, [0.0, 0.2, 0.1, 0.0, 0.4, 0.1, 0.0], atol=1e-15)
+    np.testing.assert_allclose(coulomb_errors(force[:3, :2], np.full(3, 0.3), sliding[:3], tied[:3]), found[:3])
+
+
+def test_faces_without_friction_have_no_sign_of_slip():
+    """Beside one that slides and one that sticks."""
+    faces = SimpleNamespace(friction=np.array([0.3, 0.0, 0.3]))
+    of = {"_place": np.arange(3), "_own": np.arange(3), "_damaged": np.zeros(3, bool), "_jumps": 2, "faces": faces}
+    cell = SimpleNamespace(**of, _jumps_of=lambda x: (x, np.zeros(0)))
+    bonds = BondState.without_memory(np.full(3, OPEN, np.int8))
+    found = SlidingCell.bonds(cell, bonds, np.array([FORWARD, FORWARD, STICK], np.int8), np.zeros(6))
+    np.testing.assert_array_equal(found.sliding, [1, 0, 0])
+    np.testing.assert_array_equal(found.status, [CLOSED] * 3)
