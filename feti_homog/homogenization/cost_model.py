@@ -34,6 +34,8 @@ APPLY_SECONDS = 5.5e-8
 ERROR_SECONDS = 1.3e-6
 # Bytes of a rank without degrees of freedom, for each of these, and for each multiplier that has influence columns.
 BASE_BYTES, DOF_BYTES, COLUMN_BYTES = 1.8e8, 1.5e3, 2.0e4
+# Bytes for each pair of jumps of debonded faces with friction: six dense matrices (`interface.friction`).
+FACE_PAIR_BYTES = 48
 # Bytes of result.h5: of a state for each node, element and interface node in the plane, and what is along the fibres
 # besides; of the mesh for each node and element, and of the interface's nodes.
 STATE_BYTES, AXIAL_BYTES = np.array([16, 36, 138]), np.array([8, 16, 16])
@@ -150,10 +152,12 @@ def events_lines(case: Case, multipliers: int, teeth: int, nodes: Sequence[int],
     dofs = 2.0 * sum(nodes)
     event = EVENT_SECONDS + dofs * (EVENT_DOF_SECONDS + EVENT_RANK_DOF_SECONDS / len(nodes))
     longest = _rounded(seconds + multipliers // 2 * teeth * event)
-    return [
+    lines = [
         f"events     {words}, {1e3 * event:.2g} ms or more for each: "
         f"from {_rounded(seconds)} for few to {longest} or more for all"
     ]
+    faces = _size(FACE_PAIR_BYTES * multipliers**2)
+    return [*lines, f"friction   up to {faces} more on the first rank if all bonds break"] if case.has_friction else lines
 
 
 def estimate_lines(found: Estimate, n_ranks: int) -> list[str]:
