@@ -157,7 +157,9 @@ def events_lines(case: Case, multipliers: int, teeth: int, nodes: Sequence[int],
         f"from {_rounded(seconds)} for few to {longest} or more for all"
     ]
     faces = _size(FACE_PAIR_BYTES * multipliers**2)
-    return [*lines, f"friction   up to {faces} more on the first rank if all bonds break"] if case.has_friction else lines
+    return (
+        [*lines, f"friction   up to {faces} more on the first rank if all bonds break"] if case.has_friction else lines
+    )
 
 
 def estimate_lines(found: Estimate, n_ranks: int) -> list[str]:

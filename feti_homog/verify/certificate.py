@@ -14,7 +14,7 @@ import numpy as np
 
 from feti_homog.errors import CaseError
 from feti_homog.verify.bonds import COATING
-from feti_homog.verify.check_fields import check_derived, check_fields, check_interface_state
+from feti_homog.verify.check_fields import check_derived, check_fields, check_interface_state, check_tied_faces
 from feti_homog.verify.check_loads import StateNumbers, check_load
 from feti_homog.verify.check_mesh import check_arcs, check_interface, check_mesh
 from feti_homog.verify.check_mesh_error import check_mesh_error
@@ -134,7 +134,7 @@ def _verified(files: ResultFiles, directory: Path) -> Certificate:
     cell = DiscreteCell.of(files)
     check_mesh(findings, cell)
     check_interface(findings, cell)
-    states = []
+    states, before = [], None
     for state in files.states():
         arrays = (state.displacement, state.fluctuation, state.stress, state.traction, state.jump, state.strain)
         findings.record("numbers", [np.count_nonzero(~np.isfinite(array)) for array in arrays], state.name)
@@ -144,6 +144,9 @@ def _verified(files: ResultFiles, directory: Path) -> Certificate:
         check_derived(findings, cell, state)
         check_mesh_error(findings, cell, state)
         check_interface_state(findings, cell, state)
+        if before is not None and "path" in files.document:
+            check_tied_faces(findings, cell, before, state)
+        before = state
         states.append(StateNumbers.of(cell, state, fields))
     check_load(findings, cell, states)
     check_arcs(findings, cell, states)

@@ -70,6 +70,24 @@ def _check_contact(findings: Findings, cell: DiscreteCell, state: State, rubs: B
         findings.record("complementarity", relative(np.where(debonded, force * gap, 0.0), push * imposed), at)
 
 
+def check_tied_faces(findings: Findings, cell: DiscreteCell, before: State, state: State) -> None:
+    """Check that tied faces which touch at a point of a path and the next one keep their slip along the fibres.
+
+    Points at which they have opened lie between others.
+    """
+    if not cell.files.is_spatial or state.point != before.point + 1:
+        return
+    kept = tied_at(cell.files) & (before.status == CLOSED) & (state.status == CLOSED)
+    if not kept.any():
+        return
+    slips = [each.jump - law_at(cell.files, damage=each.damage).jumps(each.traction) for each in (before, state)]
+    scale = max(largest_displacement(cell, each) for each in (before, state))
+    off = np.where(kept, np.abs(slips[1] - slips[0])[:, 2], 0.0)
+    findings.record(
+        "sliding", relative(off, scale), f"{state.name}, slip along the fibres of interface node {{}}".format
+    )
+
+
 def check_fields(findings: Findings, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
     """Everything that the fields of a state obey by themselves; `fields` are what its displacements make."""
     element = f"{state.name}, element {{}}".format

@@ -138,7 +138,11 @@ def checks(rtol: float, users_mesh: bool, has_coatings: bool) -> tuple[Check, ..
         ("tension", "closed faces are not pulled, relative to the largest traction", contact),
         ("complementarity", "gap times traction vanishes, relative to the largest force and displacement", contact),
         ("free faces", "open faces bear nothing, closed ones friction only, relative to the largest traction", contact),
-        ("sliding", "friction opposes the slip of sliding faces, relative to the largest traction", contact),
+        (
+            "sliding",
+            "friction opposes the slip of sliding faces, relative to the largest traction; tied ones keep theirs",
+            contact,
+        ),
         ("mean stress", "the mean of the stresses is the state's, relative to the largest component", 1e-10),
         ("mean strain", "the mean of the strains is E and the opening of the faces, relative to E", solver),
         ("Hill", "mean of stress : strain = mean stress : E less the interface's work, relative to it", solver),

@@ -142,7 +142,8 @@ class SlidingLeg:
         if not rounded.any():
             faces.solver.keep(there, faces.solver.product(x) + way * faces.solver.product(rate))
         self._let_go(status, x)
-        if self._opened_tied(here.status, status) and self._most_used(bonds) > 1.0 + UTILISATION_TIE:
+        opened = self._opened_tied(here.status, status)
+        if opened and self._most_used(bonds) > 1.0 + UTILISATION_TIE:
             yield from self._break()
             yield from self._break_overloaded()
             return
@@ -152,7 +153,7 @@ class SlidingLeg:
         if breaks <= 1.0:
             yield from self._break()
             yield from self._break_overloaded()
-        elif not at_end and (self._first or self._share - self._reported >= LEAST_SHARE):
+        elif not at_end and (opened or self._is_point()):
             self._first = False
             yield self._point(0, 0, self._path_state())
 
@@ -170,6 +171,10 @@ class SlidingLeg:
             lost, _ = self.sliding.faces.losses(status, self._here.x, x)
             self._add(self._standing(status, x), lost / self.sliding.area, 0.0)
             self._here = self._standing(status, x)
+
+    def _is_point(self) -> bool:
+        """Return whether a change of statuses here is a point."""
+        return self._first or self._share - self._reported >= LEAST_SHARE
 
     def _opened_tied(self, before: Status, status: Status) -> bool:
         """Return whether tied faces opened, whose shear along the fibres went to bonds."""
