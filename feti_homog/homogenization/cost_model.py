@@ -105,7 +105,8 @@ def estimate(
     `problems` has for each problem, by its displacements of a node, how many times it applies its dual operator,
     `columns` multipliers have influence columns, and errors of the mesh are estimated `with_errors`.
 
-    As many ranks are suggested as there are bodies at most, for more would cut bodies, which costs iterations.
+    As many ranks are suggested as there are bodies at most, for more would cut bodies, which costs iterations; of cells
+    that are cut across materials, coarse triangles stand for these.
     """
     once = SETUP_SECONDS + with_errors * ERROR_SECONDS
     of_node = sum(c * (once + applications * APPLY_SECONDS) for c, applications in problems.items())
@@ -162,13 +163,17 @@ def events_lines(case: Case, multipliers: int, teeth: int, nodes: Sequence[int],
     )
 
 
-def estimate_lines(found: Estimate, n_ranks: int) -> list[str]:
-    """Return an estimate for `n_ranks` ranks in two lines, each with a label of eleven columns."""
+def estimate_lines(found: Estimate, n_ranks: int, across: bool = False) -> list[str]:
+    """Return an estimate for `n_ranks` ranks in two lines, each with a label of eleven columns.
+
+    Bodies that are cut `across` do not limit the ranks.
+    """
     memory = _size(found.memory)
     noun = "rank" if n_ranks == 1 else "ranks"
+    most = "" if across else ", at most one per body"
     return [
         f"estimate   on {n_ranks} {noun} about {_rounded(found.seconds)}, {memory} on the largest, without pictures",
-        f"ranks      recommended: {found.ranks} ({DOFS_OF_A_RANK} degrees of freedom per rank, at most one per body)",
+        f"ranks      recommended: {found.ranks} ({DOFS_OF_A_RANK} degrees of freedom per rank{most})",
     ]
 
 

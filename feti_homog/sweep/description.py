@@ -67,7 +67,8 @@ def _described(
     plan = _plan(case, summary, multipliers, max(problems.values()), options)
     columns = multipliers if plan.preconditioner == "influence" else 0
     errors = cost_model.has_errors(case)
-    taken = cost_model.estimate(nodes, own, summary.coarse_triangles, summary.bodies, problems, columns, errors)
+    triangles, most_ranks = summary.coarse_triangles, summary.coarse_triangles if summary.across else summary.bodies
+    taken = cost_model.estimate(nodes, own, triangles, most_ranks, problems, columns, errors)
     unresolved = process_zone.warnings(case, summary.width, summary.interface_edge)
     lines = [
         f"case       {case.name}: {case.analysis.type}, plane {case.analysis.plane}",
@@ -83,13 +84,13 @@ def _described(
         *_fibres_lines(case, summary),
         *_mix_lines(case, summary),
         *_match_lines(case, summary),
-        f"tearing    {summary.bodies} bodies, {summary.subdomains} subdomains, {multipliers} multipliers",
+        f"tearing    {summary.bodies} bodies, {_subdomains(summary.subdomains)}, {multipliers} multipliers",
         f"solver     {plan.in_words}",
         *(
-            f"rank {rank:<5} {count} subdomains, about {2 * n} degrees of freedom"
+            f"rank {rank:<5} {_subdomains(count)}, about {2 * n} degrees of freedom"
             for rank, (count, n) in enumerate(zip(own, nodes, strict=True))
         ),
-        *cost_model.estimate_lines(taken, len(loads)),
+        *cost_model.estimate_lines(taken, len(loads), summary.across),
         *cost_model.events_lines(case, multipliers, teeth_of(case), nodes, taken.seconds),
         *(
             [cost_model.fields_line(case, sum(nodes), elements, multipliers // 2, len(loads))]
@@ -101,6 +102,10 @@ def _described(
         "the case is valid",
     ]
     return "\n".join(lines)
+
+
+def _subdomains(count: int) -> str:
+    return "1 subdomain" if count == 1 else f"{count} subdomains"
 
 
 def _plan(case: Case, summary: CellSummary, multipliers: int, applications: int, options: SolverOptions) -> SolverPlan:

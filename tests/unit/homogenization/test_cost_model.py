@@ -72,6 +72,8 @@ def test_suggested_ranks_grow_with_the_size_up_to_the_bodies(dofs, bodies, ranks
 def test_words_tell_time_memory_and_better_ranks():
     first, second = cost_model.estimate_lines(cost_model.Estimate(400.0, 3e9, 8), 2)
     assert "on 2 ranks about 7 min, 2.8 GiB" in first and "recommended: 8 (" in second
+    *_, across = cost_model.estimate_lines(cost_model.Estimate(400.0, 3e9, 8), 2, across=True)
+    assert "one per body" in second and "body" not in across
 
 
 @pytest.mark.parametrize("plane", ["strain", "generalized"])
