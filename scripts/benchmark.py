@@ -33,6 +33,9 @@ def main() -> int:
     parser = _parser()
     arguments = parser.parse_args()
     if arguments.table:
+        ignored = ("case", "tools", "ranks", "out")
+        if given := [name for name in ignored if getattr(arguments, name) != parser.get_default(name)]:
+            parser.error(f"--table {arguments.table}: has its own {', '.join(given)}")
         return benchmark_small.compare(arguments, run)
     if not arguments.case.is_file():
         parser.error(f"{arguments.case}: no such file")

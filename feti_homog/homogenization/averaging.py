@@ -44,7 +44,8 @@ class Response:
             `jump`, the largest opening of a glued node relative to the largest displacement, which does not vanish
             where forces do; the KKT certificate of contact; and if stresses are prescribed `stress`, the
             largest error of one relative to the largest stress or, if that is less, to what the strains would make in a
-            bonded cell at least.
+            bonded cell at least. Of a cell that is one subdomain, where nothing is glued, `strain`, `hill` and `jump`
+            vanish identically.
         counts: numbers of `bonded`, `open` and `closed` interface nodes.
         damage: (k,) of the bonds, 0 intact to 1 broken.
         shares: (m,) what each element of this rank has of the estimated error of E . Sigma, where it is known.
