@@ -85,7 +85,7 @@ class FollowedResponse:
     def follow(self, rows: Int, turned: Float, gained: Float, stiffness: Float) -> bool:
         """Let the global rows (k,) leave (`turned` is 1), come (-1) or soften (0), their springs gain compliance (k,).
 
-        `stiffness` (k,) of the rows is the most that Gamma_II can be.  False where columns are lacking or lose too many
+        `stiffness` (k,) of the rows is the most that Gamma_II can be where they are active.  False where columns are lacking or lose too many
         digits; then this is of no state.  Collective.
         """
         soft, moves = turned == 0.0, turned != 0.0
@@ -114,9 +114,11 @@ class FollowedResponse:
         columns, values = self._present(rows)
         k, at = len(rows), self._slot[rows]
         block = (values[:k, :k] + values[:k, :k].T) / 2 - np.diag(np.where(sign < 0.0, gained, 0.0))
+        # Rows that leave and rows that come differ by the square of a stiffness.
         root = np.sqrt(np.maximum(size, np.abs(block.diagonal())))
-        is_regular = np.linalg.svd(block / np.outer(root, root), compute_uv=False).min() > LEAST_FOLLOWED_PIVOT
-        B = self._comm.bcast(np.linalg.inv(block) if is_regular else None)
+        outer = np.outer(root, root)
+        is_regular = np.linalg.svd(block / outer, compute_uv=False).min() > LEAST_FOLLOWED_PIVOT
+        B = self._comm.bcast(np.linalg.inv(block / outer) / outer if is_regular else None)
         if B is None:
             return False
         mine = np.flatnonzero((rows >= self._first) & (rows < self._first + len(columns)))

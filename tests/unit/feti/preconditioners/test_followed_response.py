@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from mpi4py import MPI
 
 from feti_homog.feti.preconditioners.followed_response import FollowedResponse
@@ -22,42 +23,50 @@ def response(F, d, active, more):
     return U, Gamma
 
 
-def cell(seed):
+def cell(seed, scale=1.0, coupling=1.0):
+    """Some random numbers, F and d; the `coupling` of two halves is that of bonds far from each other."""
     rng = np.random.default_rng(seed)
     A = rng.normal(size=(N, N))
-    return rng, A @ A.T + np.eye(N), rng.normal(size=(N, 3))
+    F, half = A @ A.T + np.eye(N), np.arange(N) < N // 2
+    return rng, scale * np.where(half == half[:, None], 1.0, coupling) * F, rng.normal(size=(N, 3))
 
 
-def changed(rng, active, more):
+def changed(rng, active, more, scale):
     """Other states: rows turn, those that come have any compliance, and some that hold soften."""
     active, more = active.copy(), more.copy()
     turned = rng.choice(N, 3, replace=False)
     active[turned] = 1.0 - active[turned]
-    more[turned] = np.where(active[turned] > 0.0, rng.uniform(0.0, 1.0, 3), more[turned])
-    more[rng.choice(N, 2)] += 1.5
+    more[turned] = np.where(active[turned] > 0.0, scale * rng.uniform(0.0, 1.0, 3), more[turned])
+    more[rng.choice(N, 2)] += 1.5 * scale
     return active, more
 
 
-def test_answers_and_columns_follow_all_changes():
+@pytest.mark.parametrize(("scale", "coupling"), [(1.0, 1.0), (1e-10, 1.0), (1e-10, 1e-7)])
+def test_answers_and_columns_follow_all_changes(scale, coupling):
     """As many changes as wait, and more; rows that soften again when they are not active do so when they come."""
-    rng, F, d = cell(3)
+    rng, F, d = cell(3, scale, coupling)
     active, more = np.ones(N), np.zeros(N)
-    active[[2, 5]], more[[0, 7]] = 0.0, 0.5
+    active[[2, 5]], more[[0, 7]] = 0.0, 0.5 * scale
     U, Gamma = response(F, d, active, more)
     followed = FollowedResponse(MPI.COMM_SELF, 0, N, U)
     followed.add(np.arange(N), Gamma)
     for _ in range(30):
-        active_after, more_after = changed(rng, active, more)
+        active_after, more_after = changed(rng, active, more, scale)
         turned, gained = active - active_after, more_after * active_after - more * active
         rows = np.flatnonzero((turned != 0.0) | (gained != 0.0))
         assert followed.follow(rows, turned[rows], gained[rows], 1.0 / F.diagonal()[rows])
         active, more = active_after, more_after
         U, Gamma = response(F, d, active, more)
-        np.testing.assert_allclose(followed.answer, U, atol=1e-12 * np.abs(U).max())
-        blocks = Gamma.reshape(N // 2, 2, N // 2, 2)[np.arange(N // 2), :, np.arange(N // 2)]
-        found = followed.blocks(np.arange(N).reshape(-1, 2))
-        np.testing.assert_allclose(found, blocks, atol=1e-12 * np.abs(Gamma).max())
-        np.testing.assert_allclose(followed._present(np.arange(N))[0], Gamma, atol=1e-12 * np.abs(Gamma).max())
+        # Multipliers and jumps by their own units.
+        unit = np.where(active > 0.0, scale, 1.0)[:, None]
+        np.testing.assert_allclose(unit * followed.answer, unit * U, atol=1e-12 * np.abs(unit * U).max())
+        units = unit @ unit.T / scale
+        blocks, of_units = (
+            M.reshape(N // 2, 2, N // 2, 2)[np.arange(N // 2), :, np.arange(N // 2)] for M in (Gamma, units)
+        )
+        atol, found = 1e-12 * np.abs(units * Gamma).max(), followed.blocks(np.arange(N).reshape(-1, 2))
+        np.testing.assert_allclose(of_units * found, of_units * blocks, atol=atol)
+        np.testing.assert_allclose(units * followed._present(np.arange(N))[0], units * Gamma, atol=atol)
 
 
 def test_what_cannot_be_followed_is_refused():
