@@ -35,11 +35,11 @@ CELLS = pytest.mark.parametrize(
 )
 
 
-def inverse(dense, active):
-    """(total, total) N (N^T F N)^-1 N^T for a basis N of the forces on the active rows that are in equilibrium."""
+def inverse(dense, active, compliance=0.0):
+    """(total, total) N (N^T (F + C) N)^-1 N^T for a basis N of forces on the active rows that are in equilibrium."""
     N = np.eye(dense.total)[:, active]
     N = N @ null_space(dense.G.T @ N)
-    return N @ np.linalg.solve(N.T @ dense.F @ N, N.T)
+    return N @ np.linalg.solve(N.T @ (dense.F + np.diag(compliance + np.zeros(dense.total))) @ N, N.T)
 
 
 def activate(cell, status):
@@ -97,6 +97,21 @@ def test_influence_columns_give_the_inverse_for_any_active_rows(comm, case, colu
     changes = sum(bool((a != b).any()) for a, b in pairwise(masks))
     least, most = {700: (1, 1), 20: (2, changes - 1), 1: (changes, changes + 1)}[columns]
     assert least <= influence.factorizations <= most
+
+
+@pytest.mark.parametrize("columns", [700, 1], ids=["one reference cell", "one a state"])
+def test_springs_that_softened_while_their_rows_were_not_active_are_soft_when_they_come(comm, columns):
+    petsc = INFLUENCE | {"feti_influence_columns": columns}
+    cell = torn_cells.tear(comm, geometry="square", springs=(30.0, 12.0), petsc=petsc)
+    dense, solver, influence = DenseDual(cell), cell.solver, cell.solver.exact_inverse
+    C, d = solver.intact_compliance, solver.d
+    for number, status in enumerate(states(cell)[:4] * 2):
+        active = torn_cells.interface(cell, True).active(status)
+        compliance = C * (1.0 + number * (1.0 + np.cos(np.arange(len(C)))))
+        solver.set_state(active, compliance)
+        expected = inverse(dense, gathered(cell, active) > 0, gathered(cell, compliance))
+        assert np.abs(matrix(cell, influence.apply) - expected).max() < 1e-9 * influence.norm
+        assert np.abs(gathered(cell, influence.multipliers(d, np.eye(3))) - expected @ gathered(cell, d)).max() < 1e-9
 
 
 def test_blocks_are_right_with_few_followed_columns(comm):

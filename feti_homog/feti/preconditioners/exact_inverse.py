@@ -7,7 +7,7 @@ here or there: D of A have left, R beside A have come.  The multipliers that clo
 
 A spring whose compliance grew by dC is one of C, whose jump dC lam is prescribed by its own multiplier:
 
-    N = (Gamma_CC + D)^-1,  lam_C = D c on such rows,  D = dC^-1 there, and 0 where bonds left.
+    N = (Gamma_CC + D)^-1,  lam_C = D c on such rows,  D = dC^-1 there, -dC where bonds came, 0 where they left.
 
 A bond that breaks or softens and a face that closes or opens cost their columns of what `followed_response` keeps up.
 N follows them, by borders, when new columns or a confirmation want it.  The reference cell stays, until there are
@@ -225,9 +225,9 @@ class ExactInverse(Preconditioner):
 
     @property
     def _softened(self) -> Float:
-        """(owned rows,) D: 1 / dC of the springs that softened, of bonds that hold; 0 of all others."""
-        soft = (self._active * self.reference.active > 0.0) & (self._more > 0.0)
-        return np.divide(1.0, self._more, out=np.zeros(self._rows), where=soft)
+        """(owned rows,) D: of springs that softened 1 / dC, or -dC where they came; 0 of all others."""
+        holds, came = self._active * self.reference.active > 0.0, self._active > self.reference.active
+        return np.divide(1.0, self._more, out=-self._more * came, where=holds & (self._more > 0.0))
 
     def _rebase(self, active: Float) -> None:
         """Take a cell with these active rows, and what it takes to hold its bodies, for the reference.  Collective."""
