@@ -44,13 +44,14 @@ def run(context: AnalysisContext) -> dict[str, Any]:
 
 
 def follow(context: AnalysisContext, path: LoadPath, law: BondLaw) -> dict[str, Any]:
-    """`path`, a list of points, one an event (or increment); each is checkpointed before the next is sought.
+    """`path`, a list of points, one an event (or increment), which go to the checkpoint as they are found.
 
     `states` has the numbers of the points whose fields are recorded; which, is chosen when all are known.
     """
     known = _known(context)
     work, entries, last = Work(), list[dict[str, Any]](), None
-    with EventProgress(context.progress, BARS[path.method], context.events) as shown:
+    progress = EventProgress(context.progress, BARS[path.method], context.events)
+    with context.checkpoint, progress as shown:
         for number, (point, energies) in enumerate(_points(context, path, law, known)):
             responses = context.loads.responses(point.state, point.scale, brief=True)
             place = f"at {point.load_factor:.6f}, {responses[0].leading}"
@@ -69,7 +70,6 @@ def follow(context: AnalysisContext, path: LoadPath, law: BondLaw) -> dict[str, 
             last = point
             if not _goes_on(context, path, point, number + 1):
                 break
-    context.checkpoint.flush()
     if last is None:
         return {"path": (), "resumed": known}
     states: dict[str, Any] = {}

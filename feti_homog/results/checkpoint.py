@@ -12,13 +12,14 @@ import contextlib
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from types import TracebackType
+from typing import Any, Self
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from feti_homog.errors import CaseError
+from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.parallel.mpi_errors import on_root, on_root_only
 from feti_homog.results import atomic, checkpoint_file
 from feti_homog.results.checkpoint_file import Arrays
@@ -32,6 +33,8 @@ EVENT_FILE = re.compile(r"\d{6,}\.h5(\..+\.\d+\.part)?")  # also of a writer tha
 class Checkpoint:
     """The events of one path in `directory`/checkpoint; every method is collective.
 
+    A context manager: at its end, and where all ranks raise an error of this program, it writes the events that wait.
+
     Attributes:
         signature: text that an event must carry to belong to this run: case, subdomains and ranks.
     """
@@ -42,6 +45,19 @@ class Checkpoint:
         self._waiting: list[Arrays] = []
         self._starts = [0]
         self._read: tuple[int, Arrays] = (-1, {})
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if kind is None:
+            self.flush()
+        elif issubclass(kind, FetiHomogError):
+            # What ended the run is told, and not a disk that is full besides.
+            with contextlib.suppress(FetiHomogError):
+                self.flush()
 
     def clear(self) -> int:
         """Forget all events; returns how many there were."""

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from feti_homog.errors import CaseError
+from feti_homog.errors import CaseError, ConvergenceError
 from feti_homog.results import atomic
 from feti_homog.results.checkpoint import EVENTS_AT_ONCE, Checkpoint, refuse_others
 from feti_homog.results.checkpoint_file import FORMAT, USER_BLOCK
@@ -54,6 +54,18 @@ def test_light_events_are_written_together(tmp_path):
     resumed.write(last, {"path": [0.1 * last, 1.0]}, {"lam": np.arange(5.0) * last, "jump": np.zeros(0)}, light=True)
     resumed.flush()
     assert resumed.count() == last + 1 and resumed.clear() == last + 1
+
+
+@pytest.mark.parametrize(("error", "kept"), [(ConvergenceError, 2), (RuntimeError, 0)])
+def test_light_events_are_kept_where_all_ranks_raise(tmp_path, error, kept):
+    checkpoint = Checkpoint(tmp_path, MPI.COMM_SELF, "this run")
+    with pytest.raises(error, match="off"), checkpoint:
+        for number in range(2):
+            event = {"path": [0.1 * number, 1.0]}, {"lam": np.arange(5.0) * number, "jump": np.zeros(0)}
+            checkpoint.write(number, *event, light=True)
+        raise error("off")
+    resumed = Checkpoint(tmp_path, MPI.COMM_SELF, "this run")
+    assert resumed.count() == kept and same(map(resumed.read, range(kept)))
 
 
 @pytest.mark.parametrize("count", [0, 2, 3, 5, 7, 8])
