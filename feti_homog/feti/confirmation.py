@@ -18,7 +18,7 @@ from feti_homog.typing import Float
 
 
 class InfluenceSolutions:
-    """Twice as many solves as before go without F lambda after each that left nothing, MOST_UNCONFIRMED at most."""
+    """After each solve that F lambda confirms, where n went without it 2n + 1 do, MOST_UNCONFIRMED at most."""
 
     def __init__(
         self,

@@ -132,6 +132,10 @@ def test_blocks_are_right_with_few_followed_columns(comm):
         expected = inverse(dense, active)
         found, _ = influence.answer(d, np.eye(3))
         assert np.abs(gathered(cell, found) - expected @ gathered(cell, d)).max() < 1e-8 * influence.norm
+        # A confirmation makes the answer anew, whatever it was.
+        influence._followed.answer = 2.0 * influence._followed.answer
+        influence.multipliers(d, np.eye(3))
+        assert np.abs(influence.answer(d, np.eye(3))[0] - found).max(initial=0.0) < 1e-8 * influence.norm
         for row, block in zip(rows[wanted], influence.inverse_blocks(rows[wanted, None] + np.arange(2)), strict=True):
             assert np.abs(block - expected[row : row + 2, row : row + 2]).max() < 1e-8 * influence.norm
         kept.append(influence._followed)

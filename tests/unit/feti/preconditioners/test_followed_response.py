@@ -69,17 +69,18 @@ def test_answers_and_columns_follow_all_changes(scale, coupling):
         np.testing.assert_allclose(units * followed._present(np.arange(N))[0], units * Gamma, atol=atol)
 
 
-def test_what_cannot_be_followed_is_refused():
-    """Rows without columns, springs that stiffen, and a block that is singular: its rows alone hold a body."""
+@pytest.mark.parametrize(("left", "refused"), [(0.0, True), (1e-4, True), (1e-1, False)])
+def test_what_cannot_be_followed_is_refused(left, refused):
+    """Rows without columns, springs that stiffen, and a block that is singular but for left^2: its rows hold a body."""
     _, F, d = cell(4)
     motion = np.zeros(N)
     motion[:3] = 1.0
-    P = np.eye(N) - np.outer(motion, motion) / 3.0
+    P = np.eye(N) - (1.0 - left) * np.outer(motion, motion) / 3.0
     Gamma = P @ np.linalg.inv(F) @ P
     followed = FollowedResponse(MPI.COMM_SELF, 0, N, Gamma @ d)
     rows, one = np.arange(3), np.ones(3)
     assert not followed.follow(rows, one, 0.0 * one, 1.0 / F.diagonal()[:3])
     followed.add(np.arange(N), Gamma)
     assert not followed.follow(rows, 0.0 * one, -0.1 * one, 1.0 / F.diagonal()[:3])
-    assert not followed.follow(rows, one, 0.0 * one, 1.0 / F.diagonal()[:3])
-    assert followed.follow(rows[:2], one[:2], 0.0 * one[:2], 1.0 / F.diagonal()[:2])
+    assert followed.follow(rows, one, 0.0 * one, 1.0 / F.diagonal()[:3]) != refused
+    assert not refused or followed.follow(rows[:2], one[:2], 0.0 * one[:2], 1.0 / F.diagonal()[:2])
