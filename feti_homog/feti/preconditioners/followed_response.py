@@ -85,8 +85,8 @@ class FollowedResponse:
     def follow(self, rows: Int, turned: Float, gained: Float, stiffness: Float) -> bool:
         """Let the global rows (k,) leave (`turned` is 1), come (-1) or soften (0), their springs gain compliance (k,).
 
-        `stiffness` (k,) of the rows is the most that Gamma_II can be where they are active.  False where columns are lacking or lose too many
-        digits; then this is of no state.  Collective.
+        `stiffness` (k,) of the rows is the most that Gamma_II can be where they are active.  False where columns are
+        lacking or lose too many digits; then this is of no state.  Collective.
         """
         soft, moves = turned == 0.0, turned != 0.0
         if len(self.lacking(rows)) or (gained[soft] < 0.0).any():

@@ -24,7 +24,7 @@ def response(F, d, active, more):
 
 
 def cell(seed, scale=1.0, coupling=1.0):
-    """Some random numbers, F and d; the `coupling` of two halves is that of bonds far from each other."""
+    """Draw F and d, and return what draws; the `coupling` of two halves is that of bonds far from each other."""
     rng = np.random.default_rng(seed)
     A = rng.normal(size=(N, N))
     F, half = A @ A.T + np.eye(N), np.arange(N) < N // 2
