@@ -158,13 +158,6 @@ def test_derivatives_with_contact_are_those_at_fixed_status(comm, name):
     assert (np.abs(found.derivatives @ direction - expected) < 1e-6 * scale).all()
 
 
-def test_friction_has_none():
-    case = copy.deepcopy(LOADS["strains"])
-    case["interface"]["friction"] = 0.3
-    with pytest.raises(CaseError, match=r"\[output\] sensitivities: expected friction = 0"):
-        Case.parse(case)
-
-
 def test_only_a_stiffness_and_a_load_have_them():
     case = copy.deepcopy(CASES["voids"])
     case["analysis"]["type"] = "envelope"
