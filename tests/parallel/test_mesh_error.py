@@ -208,6 +208,7 @@ def test_bodies_on_the_coarser_mesh_displace_as_on_the_finer(comm, own):
     cell.destroy()
 
 
+@pytest.mark.few_ranks  # estimates of cut bodies are those of their pieces
 def test_what_the_elements_have_of_it_is_a_field_of_every_state(comm):
     materials = {"matrix": MATRIX, "fibre": FIBRE}
     document = {"cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.2, "order": 2, "refine": 1}}

@@ -232,6 +232,7 @@ def test_angles_have_energies_and_debonded_lengths(comm):
         "analysis": {"type": "angle", "plane": "strain"},
         "interface": SPRINGS | {"debonded": [{"fibre": 1, "centre": 30.0}]},
         "angle": {"values": [0, 60, 180, 360], "strain": [0.01, 0.0, 0.004]},
+        "decomposition": PIECES,
     }
     result = run(Case.parse(document), comm)
     half = np.sqrt(0.4 * np.sqrt(3) / (2 * np.pi))
