@@ -24,7 +24,7 @@ class CellInfo:
         "share of each phase in the area of the cell", entries={"PHASE": "that of one phase"}
     )
     elements: int = described("triangles of the refined mesh")
-    nodes: int = described("nodes of the refined mesh, once for each subdomain and each body in it; by ranks and cut")
+    nodes: int = described("nodes of the refined mesh, once for each body in each subdomain: depends on ranks")
     mesh_size: float | None = described(
         "size of the elements before refinement / width, as the case says or as `accuracy` chooses; absent of users' "
         "meshes",

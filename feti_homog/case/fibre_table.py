@@ -109,9 +109,9 @@ def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
     """Return the table in a text file, which is not judged as a whole: fibres may overlap.
 
     A line of names comes first, in whose place `columns` has them: x, y, radius (or a, b), and phase, coating, angle
-    if there are any, or names that `understood` knows; then a line for each fibre. Columns are parted by commas,
+    if there are any, or other names that `understood` takes; then a line for each fibre. Columns are parted by commas,
     semicolons, tabs or else by spaces; without commas between columns, decimals may have them. What follows "#" is
-    a comment; "# width = 120, height = 80" tells the size of the cell, and "left" and "bottom" where it begins.
+    a comment; "# width = 120, height = 80" has the size of the cell, and "left" and "bottom" have its corner.
 
     Raises:
         CaseError: the table is faulty; a line for each fault, with the line of the file.

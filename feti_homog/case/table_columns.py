@@ -11,10 +11,10 @@ from dataclasses import dataclass
 UNITS = "nm|um|µm|μm|mm|cm|m|px|pixels?|deg|degrees?"
 UNIT = re.compile(rf"\s*(\[[^]]*\]|\([^)]*\)|/\s*[^/]+|_({UNITS}))\s*$", re.IGNORECASE)
 ROW_UNIT = re.compile(rf"[\[(]?({UNITS}|°|-)[\])]?", re.IGNORECASE)
-"""What a cell of a line of units has."""
+"""A cell in a line of units."""
 MATLABS_AXIS = "majoraxislength"
 AXES_OF_PICTURES = {"major", MATLABS_AXIS}
-"""Of tables whose angles are those of pictures, where y points down."""
+"""Major axes of tables whose angles count as in pictures, where y points down."""
 CENTRES = ("{}c", "{}_c", "c{}", "center_{}", "centre_{}", "centroid_{}", "{}_center", "{}_centre")
 EQUIVALENT_DIAMETERS = ("equivdiameter", "equivalent_diameter", "equivalent_diameter_area")
 

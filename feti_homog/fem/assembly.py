@@ -59,20 +59,14 @@ def assemble(
     Args:
         laws: L (v, v), or (materials, v, v) with the `material` (t,) of each coarse triangle.
     """
-    macro, c, classes, n = (
-        MacroElement.of(mesh.lattice),
-        problem.components,
-        mesh.node_class[mesh.nodes],
-        mesh.n_classes,
-    )
+    macro, c = MacroElement.of(mesh.lattice), problem.components
+    classes, n = mesh.node_class[mesh.nodes], mesh.n_classes
     couples, loads = np.empty((len(mesh.nodes), len(macro.rows), c * c)), np.empty((*mesh.nodes.shape, 2))
     stiffnesses = laws.reshape(-1, *laws.shape[-2:])
     Q, slopes, areas = np.zeros((c * n, laws.shape[-1])), np.zeros((n, 2)), np.zeros(len(stiffnesses))
     for number, L in enumerate(stiffnesses):
-        members, tensor = (
-            np.ones(len(mesh.nodes), bool) if material is None else material == number,
-            _tensor(L, problem),
-        )
+        members = np.ones(len(mesh.nodes), bool) if material is None else material == number
+        tensor = _tensor(L, problem)
         for part in _parts(mesh, members):
             integrate = _curved if mesh.curved[part[0]] else _affine
             couples[part], loads[part], area = integrate(macro, mesh, part, tensor, L if is_mixed else None)
@@ -110,8 +104,8 @@ def _parts(mesh: FineMesh, members: Bool) -> Iterator[Int]:
     """Yield the coarse triangles `members` (t,), affine and curved ones apart, in groups that keep memory bounded."""
     most = max(1, ELEMENTS_AT_ONCE // len(mesh.lattice.triangles))
     for kind in (members & ~mesh.curved, members & mesh.curved):
-        those = np.flatnonzero(kind)
-        yield from (those[first : first + most] for first in range(0, len(those), most))
+        triangles = np.flatnonzero(kind)
+        yield from (triangles[first : first + most] for first in range(0, len(triangles), most))
 
 
 def _affine(

@@ -18,7 +18,10 @@ from feti_homog.typing import Float
 
 
 class InfluenceSolutions:
-    """After each solve that F lambda confirms, where n went without it 2n + 1 do, MOST_UNCONFIRMED at most."""
+    """Spare F lambda in solves by influence columns: 2n + 1 after a confirmed one that n spared ones precede.
+
+    They are at most MOST_UNCONFIRMED.
+    """
 
     def __init__(
         self,

@@ -78,7 +78,7 @@ class CellSummary:
 
     @property
     def is_cut(self) -> bool:
-        """Whether there are subdomains that are not whole bodies, and more than one."""
+        """True if there are subdomains that are not whole bodies, and more than one."""
         return self.subdomains > (1 if self.across else self.bodies)
 
     @property

@@ -96,7 +96,7 @@ def energy_errors(
 
 
 def is_nested(cell: TornCell, responses: Sequence[Response]) -> bool:
-    """Return whether the mesh refined once less tells the error: not of quadratic elements at tips of debonded arcs."""
+    """Return whether the mesh refined once less has the error: not of quadratic elements at tips of debonded arcs."""
     lattice = cell.lattice
     if cell.summary.across:
         return False  # interiors are factored anyway

@@ -1,4 +1,4 @@
-"""Into how many pieces a cell is cut: what the case says, else what is fastest."""
+"""Number of pieces that a cell is cut into: from the case, else the fastest."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from feti_homog.mesh.tiles.tiles import DEFAULT_TILES, TilePolicy
 from feti_homog.petsc.options import given_options
 from feti_homog.typing import Int
 
-# Poisson's ratio up to which single nodes of mixed elements are hardly stiffer than mu says (`SCALED_LAME`).
+# Poisson's ratio up to which single nodes of mixed elements are hardly stiffer than mu makes them (`SCALED_LAME`).
 MOST_POISSON = 0.45
 # Ratio of stiffnesses up to which subdomains may have several phases: above, rounding in their dense matrices costs
 # accuracy (4e-7 at 1e6) and then convergence.
@@ -114,7 +114,7 @@ def wanted_pieces(
     n_ranks: int,
     policy: PartitionPolicy = DEFAULT_POLICY,
 ) -> Int:
-    """(b,) wanted pieces of each body: what the case says, else what the policy says; at least one for each rank.
+    """(b,) wanted pieces of each body, from the case, else from the policy; at least one for each rank.
 
     Args:
         load: (b,) coarse triangles of each body.

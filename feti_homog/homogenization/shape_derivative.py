@@ -1,4 +1,4 @@
-"""How nodes move where the fibres of a pattern grow: V = dx / d ln R.
+"""Motion of the nodes where the fibres of a pattern grow: V = dx / d ln R.
 
 It is x - c in a fibre of centre c and radius R, and around it falls to nothing halfway to the next fibre.  The fields
 of unit loads make the energy stationary, so by the fraction f, d f / d ln R = 2 f, a stiffness has the derivative of

@@ -1,4 +1,4 @@
-"""Parts of subdomains that lie in one body each: what averages of phases and estimates are made of.
+"""Parts of subdomains that lie in one body each, for averages of phases and estimates.
 
 A subdomain of one material is a part itself; one across materials has a part for each body that it reaches.
 """

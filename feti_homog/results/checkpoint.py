@@ -55,7 +55,7 @@ class Checkpoint:
         if kind is None:
             self.flush()
         elif issubclass(kind, FetiHomogError):
-            # What ended the run is told, and not a disk that is full besides.
+            # Report what ended the run, not a disk that is full besides.
             with contextlib.suppress(FetiHomogError):
                 self.flush()
 

@@ -23,8 +23,8 @@ def check_mesh_error(findings: Findings, cell: DiscreteCell, state: State) -> No
     is_linear = cell.files.mesh.triangles.shape[1] == 3 and cell.files.case["analysis"]["type"] == "stiffness"
     if not is_linear or energy <= 0 or np.isnan(state.mesh_error).all():
         return
-    told, own = float(state.mesh_error.sum()), _averaged(cell, state) / energy
-    ratio = (told + LEAST) / (own + LEAST)
+    written, own = float(state.mesh_error.sum()), _averaged(cell, state) / energy
+    ratio = (written + LEAST) / (own + LEAST)
     findings.record("mesh error", max(ratio, 1 / ratio) - 1, state.name)
 
 

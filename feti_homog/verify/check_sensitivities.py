@@ -1,4 +1,4 @@
-"""Law of the sensitivities: energies of the fields of unit loads change as told where constants of a case change."""
+"""Law of the sensitivities: energies of the fields of unit loads change as written where constants of a case change."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
     findings.record("tables", [np.inf] * len(missing), lambda k: f"{missing[k]}, which the case asks for")
     if "sensitivities" not in document:
         return
-    told = document["sensitivities"]
-    names, values = told["parameters"], np.array(told["parameter_values"])
+    data = document["sensitivities"]
+    names, values = data["parameters"], np.array(data["parameter_values"])
     untold = sorted({*_required(cell)}.difference(names))
     findings.record("tables", [np.inf] * len(untold), lambda k: f"sensitivities, {untold[k]}")
     own = np.array([_place(dict(cell.files.case), name)[2] for name in names])
@@ -51,7 +51,7 @@ def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
     states = list(cell.files.states())
     if "load" in document:
         _check_load(findings, cell, states[0], moved, direction)
-    elif told.get("at_fixed_status"):
+    elif data.get("at_fixed_status"):
         _check_energies(findings, cell, states, moved, direction)
     else:
         _check_constants(findings, cell, states, moved, direction)
@@ -80,10 +80,10 @@ def _places(numbers: Float) -> list[str]:
 
 def _check_uncertainty(findings: Findings, document: Mapping[str, Any]) -> None:
     """Check the scatter sqrt(a.R a) of constants, of changes a by one standard deviation of each, and its shares."""
-    told, known = document["uncertainty"], document["sensitivities"]
+    data, known = document["uncertainty"], document["sensitivities"]
     given = {name: float(std) for name, std in document["case"]["uncertainty"].items() if name != "correlation"}
-    names = told["parameters"]
-    if {*names} != given.keys() or [*told["constants"]] != [*known["constants"]]:
+    names = data["parameters"]
+    if {*names} != given.keys() or [*data["constants"]] != [*known["constants"]]:
         findings.record("tables", np.inf, "uncertainty, names")
         return
     R = np.eye(len(names))
@@ -91,15 +91,15 @@ def _check_uncertainty(findings: Findings, document: Mapping[str, Any]) -> None:
         i, j = names.index(first), names.index(second)
         R[i, j] = R[j, i] = value
     own = np.array([given[name] for name in names])
-    findings.record("tables", relative(np.array(told["parameter_std"]) - own, own), lambda k: f"uncertain {names[k]}")
-    for k, name in enumerate(told["constants"]):
+    findings.record("tables", relative(np.array(data["parameter_std"]) - own, own), lambda k: f"uncertain {names[k]}")
+    for k, name in enumerate(data["constants"]):
         row = np.array(known["derivatives"][known["constants"].index(name)])
         a = np.array([row[known["parameters"].index(each)] for each in names]) * own
         variance, most = float(a @ R @ a), float(np.abs(a).max())
         std = max(variance, 0.0) ** 0.5
-        findings.record("sensitivities", abs(told["std"][k] - std) / (most or 1.0), f"scatter of {name}")
+        findings.record("sensitivities", abs(data["std"][k] - std) / (most or 1.0), f"scatter of {name}")
         if variance > NOISE**2 * most**2:
-            off = np.array(told["shares"][k]) - a * (R @ a) / variance
+            off = np.array(data["shares"][k]) - a * (R @ a) / variance
             findings.record("sensitivities", float(np.abs(off).max()), f"shares of {name}")
 
 
@@ -111,12 +111,12 @@ def _check_energies(
     Those are the diagonal of the secants.  The others would need fields of other loads at the same status, which no
     file has.
     """
-    told = cell.files.document["sensitivities"]
+    data = cell.files.document["sensitivities"]
     strains, _ = _in_order(states[: len(states) // 2])  # those under minus the unit loads follow
     for number, state in enumerate(strains, start=1):
-        k = told["constants"].index(name := f"C{number}{number}")
+        k = data["constants"].index(name := f"C{number}{number}")
         above, below = (float(_energies(cell, [state], case)[0, 0]) for case in cases)
-        terms, value = np.array(told["derivatives"][k]) * direction, told["constant_values"][k]
+        terms, value = np.array(data["derivatives"][k]) * direction, data["constant_values"][k]
         expected, scale = (above - below) / (2 * STEP), max(float(np.abs(terms).max()), abs(value))
         findings.record("sensitivities", relative(np.array(terms.sum() - expected), scale), name)
         here = float(_energies(cell, [state], cell.files.case)[0, 0])
@@ -129,9 +129,9 @@ def _check_load(findings: Findings, cell: DiscreteCell, state: State, cases: Seq
     With given strains g and given stresses f, d(x_g.s_g - x_f.s_f) / 2 is that of the energy of the fields at rest.
     Beside a temperature, whose conjugate no file has, the values are checked alone.
     """
-    told, point = cell.files.document["sensitivities"], cell.files.document["load"]
+    data, point = cell.files.document["sensitivities"], cell.files.document["load"]
     pairs = [*zip(*NAMES[len(point["strain"])], strict=True)]
-    known = dict(zip(told["constants"], zip(told["constant_values"], told["derivatives"], strict=True), strict=True))
+    known = dict(zip(data["constants"], zip(data["constant_values"], data["derivatives"], strict=True), strict=True))
     follows = [[name for name in pair if name in known] for pair in pairs]
     if any(len(names) != 1 for names in follows) or "stored" not in known:
         findings.record("tables", np.inf, "sensitivities, constants of the load")
@@ -157,7 +157,7 @@ def _check_constants(
     findings: Findings, cell: DiscreteCell, states: Sequence[State], cases: Sequence[Case], direction: Float
 ) -> None:
     """Check the derivatives of all constants of a linear cell."""
-    told = cell.files.document["sensitivities"]
+    data = cell.files.document["sensitivities"]
     ends = [_energies(cell, states, case) for case in cases]
     slope = (ends[0] - ends[1]) / (2 * STEP)
     document = cell.files.document
@@ -166,13 +166,13 @@ def _check_constants(
     here = _constants(C, heat)
     step = 1e-5 * np.abs(C).max() / max(float(np.abs(slope).max()), 1e-300)
     moved = [_constants(*_changed(C, heat, sign * step * slope)) for sign in (1, -1)]
-    for k, name in enumerate(told["constants"]):
+    for k, name in enumerate(data["constants"]):
         kind = max(abs(value) for other, value in here.items() if other[0] == name[0])
-        terms = np.array(told["derivatives"][k]) * direction
+        terms = np.array(data["derivatives"][k]) * direction
         expected = (moved[0][name] - moved[1][name]) / (2 * step)
         scale = max(float(np.abs(terms).max()), abs(here[name]), NOISE * kind)
         findings.record("sensitivities", relative(np.array(terms.sum() - expected), scale), name)
-        findings.record("moduli", abs(told["constant_values"][k] - here[name]) / max(abs(here[name]), NOISE * kind),
+        findings.record("moduli", abs(data["constant_values"][k] - here[name]) / max(abs(here[name]), NOISE * kind),
                         f"sensitivities, {name}")  # fmt: skip
 
 

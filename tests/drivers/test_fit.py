@@ -27,7 +27,7 @@ C11 = {value = 9.0, std = 0.1}
 
 
 def test_a_fit_that_is_killed_goes_on(tmp_path):
-    """It waits before the second result, while another is refused, is killed there, and again before fit.json."""
+    """Kill a fit before the second result, while another is refused, and again before fit.json."""
     path, out = tmp_path / "fit.toml", tmp_path / "out"
     path.write_text(FIT)
     words = ("fit", path, "--out", out)
@@ -56,7 +56,7 @@ def test_a_fit_that_is_killed_goes_on(tmp_path):
 
 
 def test_a_study_of_scatter_that_is_killed_goes_on(tmp_path):
-    """On two ranks, a case on each; a file of its name that is of others stays."""
+    """Kill and resume on two ranks, a case on each; a file of that name of others stays."""
     path, out = tmp_path / "case.toml", tmp_path / "out"
     path.write_text(FIT.partition("[unknown]")[0].replace("0.4", "{mean = 0.4, std = 0.02}"))
     words = ("uncertainty", path, "--out", out, "--ranks-per-case", "1")

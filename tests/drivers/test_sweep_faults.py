@@ -25,7 +25,7 @@ sys.exit(cli.main(sys.argv[1:]))
 
 
 def test_corrupt_results_are_computed_again(tmp_path):
-    """Of a file that is cut, of one that is none, and of another case's."""
+    """Try a file that is cut, one of random bytes, and one of another case."""
     out, path = tmp_path / "out", sweep_file(tmp_path, "cell.fibre_fraction = [0.2, 0.25, 0.3, 0.35]\n")
     swept(out, path)
     file = [out / f"case-{number:04}/result.json" for number in range(1, 5)]

@@ -58,7 +58,7 @@ def energy_error(L, exact):
 
 @cache
 def fine(name):
-    """By quadratic elements of another coarse mesh that is several times as fine, split once."""
+    """Solve by quadratic elements of another coarse mesh that is several times as fine, split once."""
     cell, phases, plane = CELLS[name]
     mesh = {"mesh_size": 0.06, "refine": 1, "order": 2}
     return stiffness(cell | mesh, phases, plane).effective_stiffness

@@ -108,7 +108,7 @@ def test_thin_coatings_obey_every_law(comm, shared_path, thickness):
 
 
 def test_stiff_coatings_that_float_are_in_equilibrium(comm, shared_path):
-    """Of 1e5 times the stiffness around them, free or rubbing: forces are balanced beside their own rounding."""
+    """Balance forces to their own rounding at 1e5 times the stiffness around, free or rubbing."""
     whole, young = {"debonded": [{"fibre": 1, "angle": 360.0}]}, {"matrix": 1.0, "fibre": 9.0, "coating": 1e5}
     document = {
         "cell": {"geometry": "square", "fibre_fraction": 0.3, "mesh_size": 0.15, "coating": 0.1},

@@ -95,7 +95,7 @@ def test_elements_that_an_accuracy_asks_for_and_their_tips(comm):
 
 
 def test_coated_fibres_in_space(comm):
-    """Their derivatives too."""
+    """Compare derivatives too."""
     cell = {"geometry": "hexagonal", "fibre_fraction": 0.3, "coating": 0.2, "mesh_size": 0.2, "order": 2}
     material = {"matrix": WARM, "coating": MATRIX, "fibre": CARBON}
     assert_alike(comm, "spatial", cell=cell, material=material, output={"sensitivities": True})

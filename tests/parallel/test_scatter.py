@@ -57,7 +57,7 @@ def test_onsets_do_not_depend_on_the_unit_of_stress(comm, shared_path, temperatu
 
 
 def test_random_cells_have_the_scatter_of_inputs_and_that_between_them(comm, shared_path):
-    """Without differences: the derivatives are means over the realisations."""
+    """Average the derivatives over the realisations, without differences."""
     case = {
         "cell": {"geometry": "random", "fibres": 2, "fibre_fraction": 0.3, "mesh_size": 0.3, "seed": 1},
         "material": MATERIAL,

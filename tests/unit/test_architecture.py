@@ -239,7 +239,7 @@ def test_types_are_known_not_asked_for():
 
 
 def test_no_result_depends_on_the_clock_of_the_day():
-    """It jumps: limits of time and durations are of clocks that only advance, owners of locks of ticks since boot."""
+    """Clocks that jump are not read: durations are of clocks that only advance, owners of locks of ticks since boot."""
     of_the_day = {"time.time", "time.time_ns", "time.localtime", "time.gmtime", "time.strftime", "time.ctime"}
     names = [(path, node) for path in sources("feti_homog") for node in nodes(path, ast.Attribute)]
     found = [place(*at) for at in names if at[1].attr.startswith(("st_mtime", "st_ctime", "st_atime", "getmtime"))]

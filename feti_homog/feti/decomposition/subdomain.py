@@ -123,7 +123,7 @@ class Subdomain:
 
     @property
     def loads_inside(self) -> bool:
-        """Whether the unit loads act on nodes that are not shared: at voids, and where materials meet."""
+        """True if the unit loads act on nodes that are not shared: at voids, and where materials meet."""
         return self.material is not None or bool(self.submesh.at_void.any())
 
     def without_rounding(self, answers: Float, dofs: Int) -> Float:

@@ -58,7 +58,7 @@ class CondensedProblem:
         return np.asarray(self._response @ strain - self._columns @ jump)
 
     def some_multipliers(self, own: Int, jump: Float, strain: Float) -> Float:
-        """(k, c) the same at the places `own` (k, c) among the owned rows; their columns are kept for this array."""
+        """(k, c) lam at the places `own` (k, c) among the owned rows; their columns are kept for this array."""
         if self._some is None or self._some[0] is not own:
             self._some = own, self._columns[own.ravel()]
         return self._response[own] @ strain - (self._some[1] @ jump).reshape(own.shape)

@@ -120,12 +120,14 @@ class FollowedStatuses:
             x = np.where(self.free, x + self._inverse(left), x)
         return (x, y) if off <= TOO_MUCH * scale else None
 
-    def grow(self, S: Float, old: Int, other: Int) -> None:
+    def grow(self, S: Float, old: Int, other: Int) -> bool:
         """Prescribe more entries: of S (m', m') those that are here stand at the places `old` (m,), with their S.
 
-        Between the places `other` S may be another one, if these entries are coupled with none but each other.
+        Between the places `other` S may be another one, if these entries are coupled with none but each other.  False
+        if a pivot on the way is too small; then R is of no S.
         """
-        self._replace(np.flatnonzero(np.isin(old, other)), S[other[:, None], other])
+        if not self._replace(np.flatnonzero(np.isin(old, other)), S[other[:, None], other]):
+            return False
         self._flush()
         size, m = self._size, len(S)
         new = np.setdiff1d(np.arange(m), old)
@@ -148,15 +150,19 @@ class FollowedStatuses:
         inverse[size:m, :size] = 0.0
         inverse[size:m, size:m] = np.eye(m - size)
         self._size = m
+        return True
 
-    def _replace(self, entries: Int, block: Float) -> None:
-        """Have another block of S between entries that are coupled with none but each other."""
+    def _replace(self, entries: Int, block: Float) -> bool:
+        """Have another block of S between entries that are coupled with none but each other; False as `grow`."""
         free, slope, at = self.free.copy(), self.slope.copy(), self._place[entries]
         free[entries] = False
-        if not len(entries) or not self.turn(free, slope):
-            return
+        if not len(entries):
+            return True
+        if not self.turn(free, slope):
+            return False
         self._flush()
         self._R[1, at[:, None], at] += block - self.S[entries[:, None], entries]
+        return True
 
     def _reserve(self, m: int) -> None:
         """Have room for m entries, and for more to come."""

@@ -35,9 +35,8 @@ class StatusSolver:
 
         Between the places `other` S may be another one, if these entries are coupled with none but each other.
         """
-        if before._followed is not None:
+        if before._followed is not None and before._followed.grow(self.S, old, other):
             self._followed = before._followed
-            self._followed.grow(self.S, old, other)
 
     @cached_property
     def absolute(self) -> Float:

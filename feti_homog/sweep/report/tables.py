@@ -39,7 +39,7 @@ OUTPUT_COLUMNS = (
     Column("porosity", "", "share of voids in the area of the cell, where there are some"),
     Column("match_distance", "", "of cells with `match`: how far they are from the table, in mean diameters"),
     Column("elements", "", "triangles of the refined mesh"),
-    Column("nodes", "", "nodes of the refined mesh, once for each subdomain and each body in it; by ranks and cut"),
+    Column("nodes", "", "nodes of the refined mesh, once for each body in each subdomain: depends on ranks"),
     Column("ranks", "", "MPI ranks"),
     Column("subdomains", "", "subdomains that the bodies are cut into"),
     Column("dofs", "", "degrees of freedom of all subdomains"),

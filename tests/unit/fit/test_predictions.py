@@ -22,7 +22,7 @@ CASE = {
 
 
 def test_a_path_without_a_break_has_no_onset():
-    """Its largest stress is that at the end of the load, which does not grow with the strength."""
+    """The largest stress is that at the end of the load, which does not grow with the strength."""
     document = run(Case.parse(copy.deepcopy(CASE))).document
     data = {name: Datum(0, name, 1.0, 0.1) for name in ("onset_S11", "peak_S11", "peak_E11")}
     with pytest.raises(CaseError, match=r"\[measured\] onset_S11: this result has no such value; no bond breaks"):

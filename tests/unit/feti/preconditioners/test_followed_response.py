@@ -43,7 +43,7 @@ def changed(rng, active, more, scale):
 
 @pytest.mark.parametrize(("scale", "coupling"), [(1.0, 1.0), (1e-10, 1.0), (1e-10, 1e-7)])
 def test_answers_and_columns_follow_all_changes(scale, coupling):
-    """As many changes as wait, and more; rows that soften again when they are not active do so when they come."""
+    """Make more changes than wait; rows that soften again while they are not active do so when they come."""
     rng, F, d = cell(3, scale, coupling)
     active, more = np.ones(N), np.zeros(N)
     active[[2, 5]], more[[0, 7]] = 0.0, 0.5 * scale

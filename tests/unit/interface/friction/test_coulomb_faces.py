@@ -84,7 +84,7 @@ def test_statuses_are_those_of_brute_force(most_friction):
 
 
 def test_each_search_finds_statuses_or_none():
-    """Of 40 states of three nodes with mu up to 6; trial of all statuses finds some where there are any."""
+    """Search 40 states of three nodes with mu up to 6; trial of all statuses finds some where there are any."""
     rng, found = np.random.default_rng(12), {"by_pivots": 0, "by_continuation": 0, "by_rays": 0, "by_trial": 0}
     for _ in range(40):
         nodes = random_nodes(rng, 3, 6.0)
