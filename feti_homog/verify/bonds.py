@@ -11,8 +11,8 @@ from scipy.sparse.csgraph import dijkstra
 
 from feti_homog.typing import AnyInt, Bool, Float, Int
 from feti_homog.verify.bond_laws.law import BondLaw, law_of
-from feti_homog.verify.cell_tables import Mesh
-from feti_homog.verify.reading import ResultFiles, State
+from feti_homog.verify.cell_tables import Mesh, State
+from feti_homog.verify.reading import ResultFiles
 from feti_homog.verify.torus import TornSides
 
 COATING = "coating"

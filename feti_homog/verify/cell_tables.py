@@ -1,8 +1,11 @@
-"""The mesh, the interface nodes and the fibres as result.h5 has them."""
+"""The mesh, the interface nodes, the fibres and a state as result.h5 has them."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+
+import numpy as np
 
 from feti_homog.typing import AnyInt, Float, Int
 
@@ -59,3 +62,54 @@ class Fibres:
     centre: Float
     radius: Float
     strength: Float
+
+
+@dataclass(frozen=True)
+class State:
+    """A state: what /state/K holds, and `name`, under which a violation is reported.
+
+    Strains and stresses have v = 3 components [11, 22, 12], displacements c = 2; of generalized plane strain 6, in the
+    order [11, 22, 33, 23, 13, 12], and 3.
+
+    Attributes:
+        strain, mean_stress: (v,) macroscopic.
+        point: number of its point in `path` or `angle` of result.json.
+        displacement, fluctuation: (n, c); the latter is the displacement less that of the strain.
+        stress: (m, v) means over the elements.
+        traction, jump: (k, c) normal, tangential and along the fibres.
+        status: (k,) 0 bonded, 1 closed, 2 open.
+        damage: (k,) 0 intact to 1 broken, also of bonds that break at once.
+        sliding: (k,) sign of the growing slip of closed nodes that slide.
+        mesh_error: (m,) shares of the estimated error, of the energy of the cell; NaN of none.
+        derived: the tables of `DERIVED` or `SPATIAL_DERIVED`, which follow from those above.
+        temperature: its change.
+    """
+
+    name: str
+    strain: Float
+    mean_stress: Float
+    load_factor: float
+    point: int
+    displacement: Float
+    fluctuation: Float
+    stress: Float
+    traction: Float
+    jump: Float
+    status: AnyInt
+    damage: Float
+    sliding: AnyInt
+    mesh_error: Float
+    derived: Mapping[str, Float]
+    temperature: float = 0.0
+
+    @property
+    def along(self) -> float:
+        """E33, of generalized plane strain."""
+        return float(self.strain[2]) if len(self.strain) > 3 else 0.0
+
+
+def gradient(strain: Float) -> Float:
+    """(c, 2) H of the displacements H x, without rotation in the plane, that make a strain (v,)."""
+    E11, E22, gamma12 = strain[[0, 1, -1]]
+    plane = [[E11, gamma12 / 2], [gamma12 / 2, E22]]
+    return np.array(plane if len(strain) == 3 else [*plane, strain[[4, 3]]])

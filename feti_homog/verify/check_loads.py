@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -12,33 +12,16 @@ import numpy as np
 
 from feti_homog.typing import AnyInt, Bool, Float
 from feti_homog.verify.bonds import energy_of_springs, held_traction, law_at
+from feti_homog.verify.cell_tables import State
 from feti_homog.verify.check_fields import BONDED, CLOSED, OPEN
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.elements import ElementFields
 from feti_homog.verify.findings import Findings, relative
 from feti_homog.verify.prescribed import TEMPERATURE, Prescribed, at_points, targets
-from feti_homog.verify.reading import State
 
 COUNTS = {"bonded": BONDED, "closed": CLOSED, "open": OPEN}
 LAST_OF_PLANE = 2  # place of gamma12 among the unit loads: the state that the counts of an angle are of
 SPATIAL_ORDER = [0, 1, 5, 2, 4, 3]  # of the unit strains of generalized plane strain; the fifth load is a temperature
-
-
-@dataclass(frozen=True)
-class UnitLoad:
-    """A unit strain (v,), or a unit of temperature."""
-
-    strain: Float
-    temperature: float
-
-    def entries(self, told: Mapping[str, Any], stiffness: str, suffix: str, sign: float) -> dict[str, Float]:
-        """Return the stress under a load, or under minus it.
-
-        It is told in a column of a stiffness or in `thermal_stress`.
-        """
-        if self.temperature:
-            return {"stress": sign * np.array(told[f"thermal_stress{suffix}"])}
-        return {"stress": sign * np.array(told[f"{stiffness}{suffix}"]) @ self.strain}
 
 
 @dataclass(frozen=True)
@@ -211,17 +194,17 @@ def _check_entries(findings: Findings, state: StateNumbers, entries: Mapping[str
         findings.record("tables", abs(entries[name] - counted), f"{state.name}, {name}")
 
 
-def _unit_loads(cell: DiscreteCell) -> list[UnitLoad]:
-    """Return the unit loads in the order of their states."""
+def _unit_loads(cell: DiscreteCell) -> list[Prescribed]:
+    """Return the unit strains, and the unit of temperature, in the order of their states."""
     if not cell.files.is_spatial:
-        return [UnitLoad(strain, 0.0) for strain in np.eye(3)]
-    unit = [UnitLoad(strain, 0.0) for strain in np.eye(6)[SPATIAL_ORDER]]
-    thermal = [] if cell.expansions is None else [UnitLoad(np.zeros(6), 1.0)]
+        return [Prescribed.strain(strain, 0.0) for strain in np.eye(3)]
+    unit = [Prescribed.strain(strain, 0.0) for strain in np.eye(6)[SPATIAL_ORDER]]
+    thermal = [] if cell.expansions is None else [Prescribed.strain(np.zeros(6), 1.0)]
     return [*unit[:4], *thermal, *unit[4:]]
 
 
 def _expected_loads(
-    document: Mapping[str, Any], case: Mapping[str, Any], unit: Sequence[UnitLoad]
+    document: Mapping[str, Any], case: Mapping[str, Any], unit: Sequence[Prescribed]
 ) -> Iterator[Prescribed]:
     """Yield the loads of the points of a path, or of the states of another case, in their order."""
     if "path" in document:
@@ -230,19 +213,15 @@ def _expected_loads(
         yield from targets(case)
     elif "angle" in document:
         given = case["angle"].get("strain")
-        own = [Prescribed.strain(np.array(given), 0.0)] if given is not None else _prescribed(unit, 1.0)
+        own = [Prescribed.strain(np.array(given), 0.0)] if given is not None else unit
         for _ in document["angle"]:
             yield from own
     else:
         for sign in (1.0, -1.0) if "effective_stiffness_compression" in document else (1.0,):
-            yield from _prescribed(unit, sign)
+            yield from (replace(load, values=sign * load.values) for load in unit)
 
 
-def _prescribed(unit: Sequence[UnitLoad], sign: float) -> list[Prescribed]:
-    return [Prescribed.strain(sign * load.strain, sign * load.temperature) for load in unit]
-
-
-def _entries(document: Mapping[str, Any], unit: Sequence[UnitLoad]) -> Iterator[Mapping[str, Any]]:
+def _entries(document: Mapping[str, Any], unit: Sequence[Prescribed]) -> Iterator[Mapping[str, Any]]:
     """Yield the entry of result.json for each point of a path, or for each state of another case."""
     if "path" in document:
         yield from document["path"]
@@ -253,13 +232,22 @@ def _entries(document: Mapping[str, Any], unit: Sequence[UnitLoad]) -> Iterator[
             if "stiffness" in point:
                 for number, load in enumerate(unit):
                     counts = {name: point[name] for name in COUNTS} if number == LAST_OF_PLANE else {}
-                    yield load.entries(point, "stiffness", "", 1.0) | counts
+                    yield {"stress": _told_stress(load, point, "stiffness", "", 1.0)} | counts
             else:
                 yield point
     else:
         for suffix, sign in (("", 1.0), ("_compression", -1.0)):
             if f"effective_stiffness{suffix}" in document:
-                yield from (load.entries(document, "effective_stiffness", suffix, sign) for load in unit)
+                for load in unit:
+                    yield {"stress": _told_stress(load, document, "effective_stiffness", suffix, sign)}
+
+
+def _told_stress(load: Prescribed, told: Mapping[str, Any], stiffness: str, suffix: str, sign: float) -> Float:
+    """(v,) stress under a unit load, or under minus it: a column of a stiffness, or `thermal_stress`."""
+    v = 6 if len(load.values) > 3 else 3
+    if load.values[v:].any():
+        return sign * np.array(told[f"thermal_stress{suffix}"])
+    return np.asarray(sign * np.array(told[f"{stiffness}{suffix}"]) @ load.values[:v])
 
 
 def _linear_stiffnesses(document: Mapping[str, Any], contact: bool) -> Iterator[tuple[str, Float]]:

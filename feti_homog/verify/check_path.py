@@ -16,8 +16,7 @@ from feti_homog.typing import Bool, Float
 from feti_homog.verify.bonds import law_at
 from feti_homog.verify.check_fields import BONDED
 from feti_homog.verify.check_loads import StateNumbers, tips
-from feti_homog.verify.check_mesh import directions
-from feti_homog.verify.check_points import tip_shares
+from feti_homog.verify.check_points import bond_directions, tip_shares
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.findings import Findings, relative, same_state_limit
 from feti_homog.verify.path_energies import check_path_energies
@@ -103,8 +102,7 @@ def _check_bonds(
     used = bonds.used(traction)
     largest = float(used.max(initial=0.0))
     rows = cell.files.interface
-    by_normal, about_centre = np.degrees(np.arctan2(rows.normal[:, 1], rows.normal[:, 0])), directions(cell)
-    away = np.where(np.isnan(about_centre), by_normal, about_centre) - point["bond_angle"]
+    away = bond_directions(cell) - point["bond_angle"]
     here = (rows.fibre == point["fibre"]) & (rows.pair == point.get("interface", 1) - 1)
     here &= np.abs((away + 180.0) % 360.0 - 180.0) < SAME_DIRECTION
     findings.record("tables", 0.0 if here.any() else np.inf, f"{at}, where no bond is")

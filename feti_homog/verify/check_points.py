@@ -69,12 +69,12 @@ def tip_shares(cell: DiscreteCell, state: StateNumbers, told: Mapping[str, Seque
 
 def _tips_in_order(cell: DiscreteCell, state: StateNumbers) -> Int:
     node = np.flatnonzero(tips(cell, state.status))
-    turned = np.round(_directions(cell)[node], DIRECTION_DIGITS)
+    turned = np.round(bond_directions(cell)[node], DIRECTION_DIGITS)
     rows = cell.files.interface
     return np.asarray(node[np.lexsort((turned, rows.pair[node], rows.fibre[node]))])
 
 
-def _directions(cell: DiscreteCell) -> Float:
+def bond_directions(cell: DiscreteCell) -> Float:
     """(k,) in degrees, in (-180, 180], about the centres of the fibres; of the normal where there is none."""
     n1, n2 = cell.files.interface.normal.T
     about = directions(cell)
@@ -162,7 +162,7 @@ def _check_tips(
         findings.record("tables", np.inf, f"{state.name}, tips")
         return
     psi = law.mode(state.traction[node])
-    away = (np.array(told["angle"]) - _directions(cell)[node] + 180.0) % 360.0 - 180.0
+    away = (np.array(told["angle"]) - bond_directions(cell)[node] + 180.0) % 360.0 - 180.0
     findings.record("tables", np.abs(away) / 360.0, where)
     findings.record("tables", np.abs(np.array(told["psi"]) - np.degrees(psi)) / 90.0, where)
     first, second = np.array(told["G_I"]), np.array(told["G_II"])

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from feti_homog.typing import Float
-from feti_homog.verify.cell_tables import Mesh
+from feti_homog.verify.cell_tables import Mesh, State
 from feti_homog.verify.check_fields import BONDED, CLOSED
+from feti_homog.verify.check_loads import SPATIAL_ORDER
 from feti_homog.verify.check_spatial import about_fibres, engineering_constants
 from feti_homog.verify.check_summary import moduli
 from feti_homog.verify.constitutive_law import expansions, mixed_phases, plane_stiffnesses, spatial_stiffnesses
@@ -19,7 +20,6 @@ from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.elements import Elements
 from feti_homog.verify.findings import Findings, relative
 from feti_homog.verify.prescribed import NAMES
-from feti_homog.verify.reading import State
 
 STEP = 1e-6
 # Constants beside the largest of their kind below which they are noise.
@@ -27,7 +27,6 @@ NOISE = 1e-3
 SAME = 1e-8  # of a radius
 SPRINGS = ("normal_stiffness", "tangential_stiffness", "axial_stiffness")
 WEIGHTS = (1.0, -0.7, 0.5, 0.9, -0.8)
-ORDER = [0, 1, 5, 2, 4, 3]  # of the unit strains of space among their states, a temperature left out
 Case = dict[str, Any]
 
 
@@ -254,7 +253,7 @@ def _grown(cell: DiscreteCell, growth: float, states: Sequence[State]) -> tuple[
 def _in_order(states: Sequence[State]) -> tuple[list[State], list[State]]:
     """Return those under unit strains in the order of their components, and that under a temperature."""
     strains = [state for state in states if not state.temperature]
-    ordered = [strains[ORDER.index(k)] for k in range(6)] if len(strains) == len(ORDER) else strains
+    ordered = [strains[SPATIAL_ORDER.index(k)] for k in range(6)] if len(strains) == 6 else strains
     return ordered, [state for state in states if state.temperature]
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from feti_homog.typing import Float
 from feti_homog.verify.check_fields import BONDED
 from feti_homog.verify.check_loads import StateNumbers
-from feti_homog.verify.constitutive_law import VOIGT
+from feti_homog.verify.constitutive_law import VOIGT, turned
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.findings import Findings, relative
 
@@ -76,8 +76,8 @@ def engineering_constants(stiffness: Float) -> dict[str, float]:
 
 def about_fibres(stiffness: Float, strains: Float | None) -> dict[str, float | None]:
     """Constants of the mean of the tensor over turns about x3, and how far it is from that."""
-    angles = np.arange(5) * 2 * np.pi / 5  # exact: the turned tensor has no more than four waves in a turn
-    mean = np.mean([_turned(stiffness, angle) for angle in angles], axis=0)
+    angles = np.arange(5) * 72.0  # exact: the turned tensor has no more than four waves in a turn
+    mean = np.mean([turned(stiffness, angle) for angle in angles], axis=0)
     own = engineering_constants(mean)
     voigt = VOIGT[6]
     norms = [
@@ -94,22 +94,13 @@ def about_fibres(stiffness: Float, strains: Float | None) -> dict[str, float | N
 
 def _across_fibres(stiffness: Float) -> dict[str, float]:
     """Return the ranges of E1 and G12 in axes turned about x3."""
-    turned = [engineering_constants(_turned(stiffness, angle)) for angle in np.pi * np.arange(DIRECTIONS) / DIRECTIONS]
-    E, G = (np.array([own[name] for own in turned]) for name in ("E1", "G12"))
+    angles = 180.0 * np.arange(DIRECTIONS) / DIRECTIONS
+    constants = [engineering_constants(turned(stiffness, angle)) for angle in angles]
+    E, G = (np.array([own[name] for own in constants]) for name in ("E1", "G12"))
     return {
         "E_least": float(E.min()), "E_largest": float(E.max()),
         "G_least": float(G.min()), "G_largest": float(G.max()),
     }  # fmt: skip
-
-
-def _turned(stiffness: Float, angle: float) -> Float:
-    """Return the stiffness in axes that are turned about x3 by an angle: stress and strain turn as tensors."""
-    c, s = np.cos(angle), np.sin(angle)
-    turn, voigt = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]), VOIGT[6]
-    tensor = stiffness[voigt[:, :, None, None], voigt[None, None]]
-    tensor = np.einsum("ip,jq,kr,ls,pqrs->ijkl", turn, turn, turn, turn, tensor, optimize=True)
-    i, j = np.array([0, 1, 2, 1, 0, 0]), np.array([0, 1, 2, 2, 2, 1])
-    return np.asarray(tensor[i[:, None], j[:, None], i[None], j[None]])
 
 
 def _thermal_stresses(

@@ -87,7 +87,7 @@ def moduli(stiffness: Float) -> dict[str, float]:
     strain = np.linalg.solve(stiffness, np.eye(3))
     by_s11, by_s22, by_s12 = strain.T
     bulk, shear = _isotropic_part(stiffness)
-    nearest = _isotropic(bulk, shear)
+    nearest = np.array([[bulk + shear, bulk - shear, 0], [bulk - shear, bulk + shear, 0], [0, 0, shear]])
     return {
         "E1": 1 / by_s11[0], "E2": 1 / by_s22[1], "G12": 1 / by_s12[2],
         "nu12": -by_s11[1] / by_s11[0], "nu21": -by_s22[0] / by_s22[1],
@@ -100,10 +100,6 @@ def _isotropic_part(c: Float) -> tuple[float, float]:
     """Moduli k, mu of the nearest isotropic stiffness: its invariants C_iijj / 4 and (C_ijij - C_iijj / 2) / 4."""
     spherical, full = c[0, 0] + c[1, 1] + 2 * c[0, 1], c[0, 0] + c[1, 1] + 2 * c[2, 2]
     return float(spherical / 4), float((full - spherical / 2) / 4)
-
-
-def _isotropic(bulk: float, shear: float) -> Float:
-    return np.array([[bulk + shear, bulk - shear, 0], [bulk - shear, bulk + shear, 0], [0, 0, shear]])
 
 
 def _square(c: Float) -> float:

@@ -122,14 +122,14 @@ def _plane_stiffness(constants: Mapping[str, Any], plane: str) -> Float:
     else:
         law = given if len(given) else np.linalg.inv(_compliance(constants))
         own = law[np.ix_(PLANE, PLANE)]
-    return _turned(np.asarray(own, float), float(constants.get("angle", 0.0)))
+    return turned(np.asarray(own, float), float(constants.get("angle", 0.0)))
 
 
 def _spatial_stiffness(constants: Mapping[str, Any]) -> Float:
     """In the axes of the cell; x3 is one of the material's."""
     given = _given(constants)
     law = given if len(given) else np.linalg.inv(_compliance(constants))
-    return _turned(np.asarray(law, float), float(constants.get("angle", 0.0)))
+    return turned(np.asarray(law, float), float(constants.get("angle", 0.0)))
 
 
 def _expansion(constants: Mapping[str, Any]) -> Float | None:
@@ -179,7 +179,7 @@ def _engineering_constants(constants: Mapping[str, Any]) -> tuple[list[float], l
     return [*moduli, float(constants.get("E3") or moduli[0])], ratios, shears
 
 
-def _turned(stiffness: Float, degrees: float) -> Float:
+def turned(stiffness: Float, degrees: float) -> Float:
     """C_ijkl = R_ip R_jq R_kr R_ls C'_pqrs in axes x1, x2, (x3) of a material.
 
     Its axis 1 is `degrees` from x1 to x2.

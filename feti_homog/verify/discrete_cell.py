@@ -11,9 +11,10 @@ from scipy.spatial import cKDTree
 
 from feti_homog.typing import Bool, Float, Int
 from feti_homog.verify.bonds import friction_at, inwardness, pairs_of
+from feti_homog.verify.cell_tables import State, gradient
 from feti_homog.verify.constitutive_law import expansions, mixed_phases, plane_stiffnesses, spatial_stiffnesses
 from feti_homog.verify.elements import Elements
-from feti_homog.verify.reading import ResultFiles, State, gradient
+from feti_homog.verify.reading import ResultFiles
 from feti_homog.verify.torus import TornNodes, TornSides, along_one_line, constituents, torn, wrapped
 
 # Scales of a state are no less than this share of those of the run: a path may come back to zero strain.

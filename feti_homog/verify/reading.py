@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import json
+import os
+import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,9 +17,8 @@ import numpy as np
 
 from feti_homog.errors import CaseError
 from feti_homog.runtime import input_files
-from feti_homog.typing import AnyInt, Float, Int
-from feti_homog.verify.cell_tables import Fibres, InterfaceRows, Mesh
-from feti_homog.verify.checksums import has_seal, is_as_written
+from feti_homog.typing import Float, Int
+from feti_homog.verify.cell_tables import Fibres, InterfaceRows, Mesh, State, gradient
 
 JSON, FIELDS = "result.json", "result.h5"
 SCHEMA = 1
@@ -30,50 +32,7 @@ DERIVED: dict[str, tuple[Any, ...]] = {
 SPATIAL_DERIVED = {name: shape for name, shape in DERIVED.items() if name != "stress_33"}
 ROWS = ("points", "normal", "length", "fibre_number", "fibre")
 MISSING_FIELDS = "only a run with `fields = true` in [output] can be verified"
-
-
-@dataclass(frozen=True)
-class State:
-    """A state: what /state/K holds, and `name`, under which a violation is reported.
-
-    Strains and stresses have v = 3 components [11, 22, 12], displacements c = 2; of generalized plane strain 6, in the
-    order [11, 22, 33, 23, 13, 12], and 3.
-
-    Attributes:
-        strain, mean_stress: (v,) macroscopic.
-        point: number of its point in `path` or `angle` of result.json.
-        displacement, fluctuation: (n, c); the latter is the displacement less that of the strain.
-        stress: (m, v) means over the elements.
-        traction, jump: (k, c) normal, tangential and along the fibres.
-        status: (k,) 0 bonded, 1 closed, 2 open.
-        damage: (k,) 0 intact to 1 broken, also of bonds that break at once.
-        sliding: (k,) sign of the growing slip of closed nodes that slide.
-        mesh_error: (m,) shares of the estimated error, of the energy of the cell; NaN of none.
-        derived: the tables of `DERIVED` or `SPATIAL_DERIVED`, which follow from those above.
-        temperature: its change.
-    """
-
-    name: str
-    strain: Float
-    mean_stress: Float
-    load_factor: float
-    point: int
-    displacement: Float
-    fluctuation: Float
-    stress: Float
-    traction: Float
-    jump: Float
-    status: AnyInt
-    damage: Float
-    sliding: AnyInt
-    mesh_error: Float
-    derived: Mapping[str, Float]
-    temperature: float = 0.0
-
-    @property
-    def along(self) -> float:
-        """E33, of generalized plane strain."""
-        return float(self.strain[2]) if len(self.strain) > 3 else 0.0
+BLOCK = 1 << 26  # bytes
 
 
 @dataclass(frozen=True)
@@ -169,13 +128,6 @@ class ResultFiles:
         array = _rows(self.file[f"state/{number}/{name}"])
         _expect(array.shape == shape, f"/state/{number}/{name} has shape {array.shape}, expected {shape}")
         return array
-
-
-def gradient(strain: Float) -> Float:
-    """(c, 2) H of the displacements H x, without rotation in the plane, that make a strain (v,)."""
-    E11, E22, gamma12 = strain[[0, 1, -1]]
-    plane = [[E11, gamma12 / 2], [gamma12 / 2, E22]]
-    return np.array(plane if len(strain) == 3 else [*plane, strain[[4, 3]]])
 
 
 def altered(directory: Path) -> tuple[str, ...]:
@@ -296,3 +248,25 @@ def _reading(path: Path) -> Iterator[None]:
     except (AttributeError, RuntimeError, KeyError, ValueError, TypeError) as error:
         words = error.args[0] if error.args else error
         raise CaseError(f"cannot read {path}: {' '.join(str(words).split())}") from error
+
+
+def is_as_written(document: Mapping[str, Any]) -> bool:
+    """Return whether `checksum` in result.json is the CRC-32 of the rest, in the layout in which it is written."""
+    content = {key: value for key, value in document.items() if key != "checksum"}
+    text = json.dumps(content, indent=1, ensure_ascii=False)
+    return bool(document.get("checksum") == f"{zlib.crc32(text.encode('utf-8', 'surrogatepass')):08x}")
+
+
+def has_seal(path: Path, seal: object) -> bool:
+    """Return whether a file has its size and the CRC-32 of the CRC-32s of its blocks, `result_h5` of result.json.
+
+    Raises:
+        OSError: it cannot be read.
+    """
+    with input_files.opened(path) as stream:
+        size = os.fstat(stream.fileno()).st_size
+        if not isinstance(seal, dict) or seal.get("bytes") != size:
+            return False
+        checksums = [zlib.crc32(block) for block in iter(partial(stream.read, BLOCK), b"")]
+    whole = zlib.crc32(np.array(checksums, "<u4").tobytes())
+    return seal == {"bytes": size, "checksum": f"{whole:08x}"}

@@ -17,9 +17,10 @@ from support.falsifications import (
 )
 from support.verified_results import CASES, LOADS, MIXED_PATHS, falsified
 
+from feti_homog.verify.cell_tables import gradient
 from feti_homog.verify.certificate import verify
 from feti_homog.verify.discrete_cell import DiscreteCell
-from feti_homog.verify.reading import gradient, opened
+from feti_homog.verify.reading import opened
 
 pytestmark = pytest.mark.slow
 
