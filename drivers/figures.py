@@ -92,7 +92,7 @@ def tabulate(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -
 
 
 def finish(comm: Intracomm, write: Callable[..., list[Path]], *args: Any) -> None:
-    """Let rank 0 write its files and tell which."""
+    """Write the files of rank 0 and print their names."""
     if comm.rank == 0:
         import matplotlib as mpl
 

@@ -75,7 +75,7 @@ def solved(
 
 
 def row(constants: Any) -> NDArray[np.float64]:
-    """Return the values of NAMES, NaN where a method says nothing."""
+    """Return the values of NAMES, NaN where a method gives none."""
     return np.array([getattr(constants, name) for name in NAMES], float)
 
 

@@ -24,7 +24,7 @@ NAMES = ("C11", "bulk", "shear")
 
 
 def main(given: argparse.Namespace, comm: Intracomm) -> None:
-    """Run the sweep, print means and scatter for each size, say which is representative, and draw."""
+    """Run the sweep, print means and scatter for each size, name the representative one, and draw."""
     sweeping.swept(given, comm, document(given), partial(report, tolerance=given.tolerance))
 
 

@@ -23,7 +23,7 @@ def parser(description: str, name: str) -> argparse.ArgumentParser:
     options.add_argument("--order", type=int, choices=(1, 2), default=2, help="of the elements; 2 are curved")
     options.add_argument("--ranks-per-case", type=int, metavar="R", help="by default all")
     add_output_options(options)
-    options.add_argument("--quiet", action="store_true", help="do not tell of every case")
+    options.add_argument("--quiet", action="store_true", help="do not print a line for every case")
     return options
 
 

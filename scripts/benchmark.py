@@ -118,20 +118,20 @@ def run(tool: str, ranks: int, plane: str, arguments: argparse.Namespace) -> Row
 def job(ranks: int, words: Sequence[object], timeout: float) -> str:
     """Run a Python script with its arguments as an MPI job of its own; why it failed, empty if it did not."""
     command = ["mpirun", "--oversubscribe", "-n", str(ranks), sys.executable, *map(str, words)]
-    with tempfile.TemporaryFile("w+") as told:
-        process = subprocess.Popen(command, stdout=told, stderr=told)
+    with tempfile.TemporaryFile("w+") as output:
+        process = subprocess.Popen(command, stdout=output, stderr=output)
         try:
             process.wait(timeout)
         except subprocess.TimeoutExpired:
             process.terminate()  # mpirun ends its ranks
             process.wait()
             return f"not done in {timeout:g} s"
-        told.seek(0)
-        return f"failed: {_reason(told.read()) or f'exit code {process.returncode}'}" if process.returncode else ""
+        output.seek(0)
+        return f"failed: {_reason(output.read()) or f'exit code {process.returncode}'}" if process.returncode else ""
 
 
 def _reason(words: str) -> str:
-    """Return the last line that tells of an error, empty if there is none."""
+    """Return the last line that reports an error, empty if there is none."""
     lines = [line.strip() for line in words.splitlines() if "rror" in line and "mpirun" not in line]
     return lines[-1] if lines else ""
 

@@ -17,7 +17,7 @@ import matplotlib.pyplot as plt
 
 STAGES = ("mesh", "assemble", "glue", "set-up", "solve")
 INK = ("#c9c9c9", "#9a9a9a", "#d9b38c", "#1f4e9c", "#c44e00")
-# A result that is farther from the direct solvers' than this is wrong whatever the tool says.
+# A result that is farther from the direct solvers' than this is wrong whatever the tool reports.
 WRONG = 1e-4
 
 

@@ -46,7 +46,7 @@ def main() -> int:
     parser.add_argument("tool", choices=["feti", *PEERS])
     parser.add_argument("case", type=Path)
     parser.add_argument("report", type=Path)
-    parser.add_argument("--plane", required=True, help="the plane state, whatever the case says")
+    parser.add_argument("--plane", required=True, help="the plane state, in place of that of the case")
     parser.add_argument("--loads", type=int, help="solve for the first loads only; all by default")
     parser.add_argument("--rtol", type=float, required=True)
     arguments = parser.parse_args()
@@ -89,7 +89,7 @@ def feti(case: Case, progress: Progress, loads: int | None, rtol: float) -> dict
 
 
 def peer(tool: Peer, case: Case, progress: Progress, loads: int | None, rtol: float) -> dict[str, Any]:
-    """One of the others, whose second problem begins when the first one is done and its matrices are gone."""
+    """Run another tool; its second problem begins when the matrices of the first are gone."""
     comm = progress.comm
     plan, _, lattice, subdomains = unit_cell.assemble_subdomains(case, comm, progress, BY_COST)
     with progress.stage("glue"):

@@ -1,6 +1,6 @@
 """Check that every module that feti_homog needs is there and fit for use; names what is missing, exit code 1.
 
-With --quick, only that the modules are found, without importing them. With --versions, say what is there.
+With --quick, only that the modules are found, without importing them. With --versions, print the versions found.
 """
 
 from __future__ import annotations

@@ -54,10 +54,10 @@ class Nodes:
         end = comm.scan(int(owned.sum()))
         number = np.full(len(held), -1)
         number[owned] = np.arange(end - owned.sum(), end)
-        told = np.full(several, -1)
-        told[held[held < several]] = number[held < several]
-        comm.Allreduce(MPI.IN_PLACE, told, MPI.MAX)
-        number[~owned] = told[held[~owned]]
+        shared_number = np.full(several, -1)
+        shared_number[held[held < several]] = number[held < several]
+        comm.Allreduce(MPI.IN_PLACE, shared_number, MPI.MAX)
+        number[~owned] = shared_number[held[~owned]]
         return cls(np.split(place[which], sizes), number, owned)
 
 

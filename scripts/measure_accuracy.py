@@ -60,7 +60,7 @@ def main() -> None:
 
 
 def measured(cell: dict[str, Any], contrast: float, poisson: float) -> dict[int, tuple[list[float], list[float]]]:
-    """By the order of elements the errors of the ladder, and their shares of the estimate."""
+    """Return the errors of the ladder, and their shares of the estimate, by the order of elements."""
     phases = {"matrix": {"young": 1.0, "poisson": poisson}, "fibre": {"young": contrast, "poisson": 0.22}}
     document = {"material": phases, "analysis": {"type": "stiffness", "plane": "strain"}}
     coarse = Case.parse(document | {"cell": cell | {"accuracy": 0.1}})

@@ -15,7 +15,7 @@ class Peer:
         matrix: type of the matrix that it takes.
         sequential: whether one rank is all that it can use.
         direct: whether its solution is exact to rounding.
-        rigid: whether it is told the rigid-body modes.
+        rigid: whether it is given the rigid-body modes.
     """
 
     options: dict[str, str]

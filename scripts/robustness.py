@@ -149,20 +149,20 @@ def main() -> None:
     """Work off the list."""
     arguments = _parser().parse_args()
     comm = MPI.COMM_WORLD
-    say = print if comm.rank == 0 else _silent
+    show = print if comm.rank == 0 else _silent
     done: list[Row] = comm.bcast(_read(arguments.out) if comm.rank == 0 else [])
     grid = combinations(arguments)
     known = {row.cell for row in done}
     wanted = [cell for cell in grid if cell.possible and cell not in known]
-    say(f"{len(grid)} combinations, {len(done)} done, {len(wanted)} to do")
-    say(HEADING)
+    show(f"{len(grid)} combinations, {len(done)} done, {len(wanted)} to do")
+    show(HEADING)
     for cell in wanted:
         done.append(measure(cell, arguments.space, comm))
-        say(done[-1].line(), flush=True)
+        show(done[-1].line(), flush=True)
         if comm.rank == 0:
             _write(arguments.out, done)
     if done:
-        say(summary(done))
+        show(summary(done))
 
 
 def _silent(*_: object, **__: object) -> None:

@@ -142,14 +142,14 @@ def read(path: Path) -> list[Row]:
 def rows_of(study: str, runs: Sequence[Run], arguments: argparse.Namespace) -> list[Row]:
     """Return the runs of a study that are there.
 
-    The largest run of weak scaling is one of strong scaling too; by itself it tells nothing.
+    The largest run of weak scaling is one of strong scaling too; by itself it shows nothing.
     """
     rows = [row for run in runs for row in read(run.report(arguments.out))]
     return rows if study in arguments.studies or len(rows) > 1 else []
 
 
 def report(found: dict[str, list[Row]], arguments: argparse.Namespace) -> list[str]:
-    """All tables and what the model says; draws the picture."""
+    """Return all tables and the forecast of the model; draw the picture."""
     lines = [line for study, rows in found.items() if rows for line in study_tables(study, rows, arguments.cores)]
     rows = list({(row.dofs, row.ranks, row.way): row for some in found.values() for row in some}.values())
     miscounted = max((row.miscounted for row in rows if row.way == FACTOR), default=0.0)

@@ -129,16 +129,16 @@ def table(rows: Sequence[EventRow], cores: int) -> list[str]:
     except ValueError as error:
         return [*lines, f"no model: {error}"]
     for row in sorted(rows, key=lambda row: (row.fibres, row.ranks)):
-        told = model.seconds(row)
+        forecast = model.seconds(row)
         if row.ranks <= cores:
             times = f"{row.setup:10.2f}{1e3 * row.worst:10.1f}{1e3 * row.seconds:8.1f}"
-            error = f"{told / row.seconds - 1.0:+8.0%}"
+            error = f"{forecast / row.seconds - 1.0:+8.0%}"
         else:
             times, error = f"{'-':>10}{'-':>10}{'-':>8}", f"{'-':>8}"
         lines.append(
             f"{row.fibres:7}{row.ranks:6}{row.dofs:9}{row.events:8}{row.solves:10.1f}{row.iterations:12.1f}"
             f"{row.exchanges * row.neighbours:10.0f}{row.collectives:12.1f}{row.kilobytes:9.1f}"
-            f"{times}{1e3 * told:8.1f}{error}"
+            f"{times}{1e3 * forecast:8.1f}{error}"
         )
     return [
         *lines,

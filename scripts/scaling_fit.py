@@ -35,7 +35,7 @@ def fit_shares(work: Sequence[float], ranks: Sequence[float], seconds: Sequence[
     """Return the shares of `nonnegative` least squares.
 
     Raises:
-        ValueError: all runs are on equally many ranks, so that nothing tells the shares apart.
+        ValueError: all runs are on equally many ranks, so that the shares cannot be separated.
     """
     if len(set(ranks)) < 2:
         raise ValueError("serial and parallel shares need runs on two numbers of ranks")

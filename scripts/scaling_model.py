@@ -72,8 +72,8 @@ class Rates:
         triangles, subdomains, vectors, kernel: per dof.
         largest_coarse: most coarse vectors that were timed.
         iterations: most of all runs.
-        surface: values that a rank tells or hears in an exchange per root of its dofs.
-        neighbours: ranks told or heard of in an exchange.
+        surface: values that a rank sends or receives in an exchange per root of its dofs.
+        neighbours: ranks that it sends to or receives from in an exchange.
         imbalance: dofs of the fullest rank relative to the mean.
     """
 
@@ -289,7 +289,7 @@ def _messages(rates: Rates, machine: Machine, dofs: float, ranks: int, way: str 
     exchange = machine.latency * rates.neighbours + VALUE_BYTES * values / machine.bandwidth
     tree = machine.latency * ceil(log2(ranks))
     iteration = (GATHERS + SUMS) * exchange + SCALARS * tree
-    # A sum of a long vector over ranks moves it twice; the solution is told to all.  Motions are solved for twice.
+    # A sum of a long vector over ranks moves it twice; the solution is sent to all.  Motions are solved for twice.
     unknowns = (rates.vectors + NATURAL_SOLVES * rates.kernel) * dofs
     iteration += (1 + NATURAL_SOLVES) * tree + 3 * VALUE_BYTES * unknowns * rates.loads / machine.bandwidth
     if rates.multigrid is not None and way == MULTIGRID:

@@ -1,4 +1,4 @@
-"""The scaling study and what its model says as a picture."""
+"""Draw the scaling study and the forecast of its model."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ FACTOR, MULTIGRID = ("factor", "multigrid")
 class Row:
     """A run: what was asked for, sizes, seconds of each stage, and the counts of `scaling_tool`.
 
-    `wanted` are the dofs asked for, `fullest` those of the rank with most; `way` says how the coarse problem is
+    `wanted` are the dofs asked for, `fullest` those of the rank with most; `way` is how the coarse problem is
     solved, in how many iterations `inner`.  Seconds are those of the coarse problem, of its set-up with the modes and
     the factor, and of that of the rigid-body motions, `natural`, which is solved twice in an iteration.  `peaks` are
     the MB of each rank by stage, `coarse_memory` those by which both factors let them grow.  `latency` (s) and
@@ -51,8 +51,8 @@ class Row:
     converged: bool
     seconds: dict[str, float]
     peaks: dict[str, list[float]]
-    told: tuple[int, ...]
-    heard: tuple[int, ...]
+    outgoing: tuple[int, ...]
+    incoming: tuple[int, ...]
     neighbours: tuple[int, ...]
     exchanges: int
     logged: tuple[float, ...]
@@ -91,13 +91,13 @@ class Row:
     @property
     def values(self) -> int:
         """Values that the rank with most sends and receives in an exchange."""
-        return max(told + heard for told, heard in zip(self.told, self.heard, strict=True))
+        return max(outgoing + incoming for outgoing, incoming in zip(self.outgoing, self.incoming, strict=True))
 
     @property
     def sent(self) -> int:
         """Bytes of multipliers that the rank with most sends in an iteration."""
-        pairs = zip(self.told, self.heard, strict=True)
-        return VALUE_BYTES * max(GATHERS * told + SUMS * heard for told, heard in pairs)
+        pairs = zip(self.outgoing, self.incoming, strict=True)
+        return VALUE_BYTES * max(GATHERS * outgoing + SUMS * incoming for outgoing, incoming in pairs)
 
     @property
     def messages(self) -> int:
@@ -107,7 +107,7 @@ class Row:
     @property
     def miscounted(self) -> float:
         """Relative difference of the counted bytes from those that PETSc logged, on the worst rank."""
-        counted = [VALUE_BYTES * self.exchanges * sum(pair) for pair in zip(self.told, self.heard, strict=True)]
+        counted = [VALUE_BYTES * self.exchanges * sum(pair) for pair in zip(self.outgoing, self.incoming, strict=True)]
         return max(abs(a - b) / max(b, 1.0) for a, b in zip(counted, self.logged, strict=True))
 
 

@@ -176,15 +176,16 @@ def seconds_alone(case: Case, policy: TilePolicy) -> float:
 def _messages(cell: TornCell) -> dict[str, Any]:
     """Count the messages of a rank in one exchange of multipliers, and the exchanges of the solves.
 
-    `told` and `heard` count the values, for all loads, and `neighbours` the ranks that a rank tells or hears of in a
-    gather; in a sum they change places.  `logged` are the bytes, both ways, that PETSc counted in the solves.
+    `outgoing` and `incoming` count the values, for all loads, and `neighbours` the ranks that a rank sends to or
+    receives from in a gather; in a sum they change places.  `logged` are the bytes, both ways, that PETSc counted in
+    the solves.
     """
     comm = cell.comm
     counts = LOADS * np.array(comm.allgather(foreign(cell.solver.jump_operator, comm)))
     log = PETSc.Log.Event("VecScatterBegin").getPerfInfo(PETSc.Log.Stage("solve").id)
     return {
-        "told": counts.sum(axis=0).tolist(),
-        "heard": counts.sum(axis=1).tolist(),
+        "outgoing": counts.sum(axis=0).tolist(),
+        "incoming": counts.sum(axis=1).tolist(),
         "neighbours": ((counts > 0).sum(axis=0) + (counts > 0).sum(axis=1)).tolist(),
         "exchanges": log["count"],
         "logged": comm.allgather(log["messageLength"]),

@@ -1,4 +1,4 @@
-"""The same tests on every rank: only rank 0 shows them, and a rank that fails does not hang the others."""
+"""Run parallel tests on every rank: rank 0 alone reports them, and a rank that fails does not hang the others."""
 
 from __future__ import annotations
 

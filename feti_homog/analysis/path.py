@@ -30,7 +30,7 @@ from feti_homog.results.path_peak import marks, peak_of
 from feti_homog.runtime.progress import Progress
 
 SECONDS_A_LINE = 1.0
-# Of equal steps the time that is left can be told; of events, whose number nobody knows, it cannot.
+# The time left of equal steps is printed; the number of events is unknown.
 STEPS_BAR = "{l_bar}{bar}| {elapsed}, {remaining} left{postfix}"
 EVENTS_BAR = "{l_bar}{bar}| {elapsed}{postfix}"
 BARS = {"events": EVENTS_BAR, "increments": STEPS_BAR}
@@ -64,7 +64,7 @@ def follow(context: AnalysisContext, path: LoadPath, law: BondLaw) -> dict[str, 
                     # Teeth are many and found again at once.
                     event = stored(point, work, context.loads.interfaces)
                     context.checkpoint.write(number, *event, light=point.broke == 0 < point.softened)
-            _tell(context, shown, f"{_label(path, number)} {place}", responses)
+            _report(context, shown, f"{_label(path, number)} {place}", responses)
             entries.append(_entry(context, law, point, responses, work))
             shown.advance(point.load_factor, f"{len(entries)} {path.method}, {_counts(entries[-1])}")
             last = point
@@ -148,13 +148,13 @@ def _sliding_cell(context: AnalysisContext) -> SlidingCell:
     return SlidingCell(cell, friction[pair], of_damage[pair], tied[pair] > 0.0 if tied.any() else None)
 
 
-def _tell(context: AnalysisContext, shown: EventProgress, name: str, responses: Sequence[Response]) -> None:
-    """Check the responses of a point; their lines go to the log and, if due or telling of a fault, to the terminal."""
+def _report(context: AnalysisContext, shown: EventProgress, name: str, responses: Sequence[Response]) -> None:
+    """Check the responses of a point; their lines go to the log and, if due or with a fault, to the terminal."""
     for response, problem in zip(responses, ("", ", along the fibres"), strict=False):
         faults = len(context.checks.faults)
         line = context.checks.record(f"{name}{problem}", response)
         context.log(line)
-        shown.tell(line, urgent=len(context.checks.faults) > faults)
+        shown.report(line, urgent=len(context.checks.faults) > faults)
 
 
 def _label(path: LoadPath, number: int) -> str:
@@ -268,7 +268,7 @@ class EventProgress:
             self._bar = tqdm(total=1.0, desc="path", bar_format=self._layout, leave=False)
         return self
 
-    def tell(self, line: str, urgent: bool) -> None:
+    def report(self, line: str, urgent: bool) -> None:
         """Print or hold back a line about an event."""
         now = self._clock()
         self._left_out += bool(self._held_back)

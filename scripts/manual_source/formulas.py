@@ -1,4 +1,4 @@
-"""A Sphinx extension that reads each formula as the manual is built: MathJax would tell of a fault to readers alone."""
+"""A Sphinx extension that reads each formula as the manual is built: MathJax would show a fault to readers alone."""
 
 from __future__ import annotations
 

@@ -65,7 +65,7 @@ def label(chromium: Any) -> str:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_nothing_is_fetched_and_no_error_told(chromium: Any, reports: dict[str, Path], kind: str) -> None:
+def test_nothing_is_fetched_and_no_error_reported(chromium: Any, reports: dict[str, Path], kind: str) -> None:
     opened(chromium, reports[kind])
     events = [json.loads(entry["message"])["message"] for entry in chromium.get_log("performance")]
     asked = [e["params"]["request"]["url"] for e in events if e["method"] == "Network.requestWillBeSent"]

@@ -54,7 +54,7 @@ def examine(comm: Any, seed: int, numbers: Sequence[int], folder: Path, of_each:
     for number in numbers:
         if _claimed(folder, number):
             found = _alone(MPI.COMM_SELF, seed, number, folder / f"case-{number}", of_each)
-            tell(seed, found, folder)
+            report(seed, found, folder)
             own += found
     rows = [row for of_rank in comm.allgather(own) for row in of_rank]
     ran = sorted(row.number for row in rows if row.relation == RUNS and row.verdict == HELD)
@@ -62,7 +62,7 @@ def examine(comm: Any, seed: int, numbers: Sequence[int], folder: Path, of_each:
         try:
             found = _together(comm, seed, number, folder / f"case-{number}")
             if comm.rank == 0:
-                tell(seed, found, folder)
+                report(seed, found, folder)
             rows += found
         except Exception as error:  # of one rank, perhaps: the others wait
             print(f"case {number} of seed {seed}, on {comm.size} ranks", flush=True)
@@ -140,7 +140,7 @@ def _of_error(number: int, relation: str, error: Exception, refusals: tuple[type
     return Row(number, relation, REFUSED if refused else FAILED, np.inf, 0.0, words)
 
 
-def tell(seed: int, rows: Sequence[Row], folder: Path) -> None:
+def report(seed: int, rows: Sequence[Row], folder: Path) -> None:
     """Leave the rows of one case in its folder, and print what failed: seed, relation, deviation, and the case file."""
     name = "rows.json" if any(row.relation == RUNS for row in rows) else "rows-of-all.json"
     (folder / f"case-{rows[0].number}" / name).write_text(json.dumps([asdict(row) for row in rows]))

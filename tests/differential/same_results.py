@@ -1,4 +1,4 @@
-"""Cases that say the same, or are solved otherwise: their results are alike."""
+"""Equal cases in other words, or solved in other ways: their results are alike."""
 
 from __future__ import annotations
 

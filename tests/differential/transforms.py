@@ -1,4 +1,4 @@
-"""Cases that say the same in other words: in other units, in another order, with a path cut in two."""
+"""Equal cases in other words: in other units, in another order, with a path cut in two."""
 
 from __future__ import annotations
 

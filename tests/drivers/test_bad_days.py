@@ -1,4 +1,4 @@
-"""What is not the case's fault: Ctrl-C, outputs that cannot be written, a locale without the letters of a name."""
+"""Faults outside the case: Ctrl-C, outputs that cannot be written, a locale without the letters of a name."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def test_ctrl_c_is_one_line_and_130(tmp_path, command):
     path = case_file(tmp_path, '[sweep]\n"cell.order" = [1, 2]\n' if command == "sweep" else "")
     words = [command, path] + ([] if command == "check" else ["--out", tmp_path / "out"])
     with HookedJob(0, [Hook(MESHING, WAIT)], *words) as job:
-        assert job.told() == "0 here"
+        assert job.reported() == "0 here"
         job.process.send_signal(signal.SIGINT)
         ended = job.ended()
     assert (ended.returncode, ended.stderr) == (130, "interrupted by SIGINT\n")
@@ -42,14 +42,14 @@ def test_ctrl_c_is_one_line_and_130(tmp_path, command):
 def test_the_order_to_end_is_one_line_of_all_ranks(tmp_path):
     """SIGTERM, which mpirun sends some seconds after Ctrl-C.  Rank 1, here the first, outlives rank 0."""
     out = tmp_path / "out"
-    here = Hook("feti_homog.homogenization.unit_cell:place_nodes", "tell(os.getpid()); wait()", rank=None)
-    last = Hook("feti_homog.runtime.standard_streams:time.sleep", "tell('ends'); outlive(0)", rank=1)
+    here = Hook("feti_homog.homogenization.unit_cell:place_nodes", "report(os.getpid()); wait()", rank=None)
+    last = Hook("feti_homog.runtime.standard_streams:time.sleep", "report('ends'); outlive(0)", rank=1)
     with HookedJob(2, [here, last], "run", case_file(tmp_path), "--out", out) as job:
-        said = [job.told().split() for _ in range(4)]
-        assert [line for line in sorted(said) if not line[1].isdecimal()] == [["0", "here"], ["1", "here"]]
-        pids = {rank: int(word) for rank, word in said if word.isdecimal()}
+        reports = [job.reported().split() for _ in range(4)]
+        assert [line for line in sorted(reports) if not line[1].isdecimal()] == [["0", "here"], ["1", "here"]]
+        pids = {rank: int(word) for rank, word in reports if word.isdecimal()}
         os.kill(pids["1"], signal.SIGTERM)
-        assert job.told() == "1 ends" and (out / "result.lock").exists()
+        assert job.reported() == "1 ends" and (out / "result.lock").exists()
         os.kill(pids["0"], signal.SIGTERM)
         ended = job.ended()
     assert ended.returncode == 143 and ended.stderr.count("interrupted by SIGTERM\n") == 1, ended.stderr

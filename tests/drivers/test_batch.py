@@ -185,14 +185,16 @@ def test_a_single_case_is_run_with_its_options(elsewhere, scheduler, kind, optio
 
 
 @pytest.mark.parametrize("kind", ["slurm", "pbs"])
-def test_a_launcher_of_another_mpi_is_told(elsewhere, scheduler, kind):
-    """It starts each rank as a job of its own."""
+def test_a_launcher_of_another_mpi_is_reported(elsewhere, scheduler, kind):
+    """The launcher starts each rank as a job of its own."""
     sweep_file(elsewhere, "", CASE, "case")
     own = {"RANKS_STARTED": "1", "FETI_HOMOG_LAUNCH": 'mpirun --special="a b" -n $ranks'}
     words = ["case.toml", "out", *(["--ntasks=4"] if kind == "slurm" else [])]
     job, notes = submitted(scheduler | own, ROOT / f"scripts/{kind}/submit_case", *words, cwd=elsewhere)
-    said = job.stderr if kind == "slurm" else (elsewhere / "out/logs/77.server.OU").read_text()
-    assert "does not start one MPI job of 4 ranks" in said and "launcher of the MPI that mpi4py was built for" in said
+    output = job.stderr if kind == "slurm" else (elsewhere / "out/logs/77.server.OU").read_text()
+    assert (
+        "does not start one MPI job of 4 ranks" in output and "launcher of the MPI that mpi4py was built for" in output
+    )
     assert notes[-1] == "exit 2" and not (elsewhere / "out/result.json").exists()
 
 
@@ -223,7 +225,7 @@ def test_a_job_that_is_put_back_into_the_queue_resumes(elsewhere, scheduler):
 
 @pytest.mark.parametrize(("kind", "submit"), [("slurm", "sbatch"), ("pbs", "qsub")])
 def test_job_scripts_work_by_hand(elsewhere, scheduler, kind, submit):
-    """Of PBS from the top folder or with FETI_HOMOG_ROOT."""
+    """Run job scripts of PBS from the top folder or with FETI_HOMOG_ROOT."""
     path, out = sweep_file(elsewhere, "", CASE, "case"), elsewhere / "out"
     script = ROOT / f"scripts/{kind}/case"
     if kind == "slurm":

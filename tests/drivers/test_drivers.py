@@ -1,4 +1,4 @@
-"""The drivers run as their docstrings say, and print what they promise."""
+"""The drivers run as in their docstrings and print what these promise."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`feti-homog export` in processes of its own: cards printed and written, faults told once."""
+"""`feti-homog export` in processes of its own: cards printed and written, faults reported once."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ def test_the_card_is_written(folder, tmp_path):
 
 
 @pytest.mark.parametrize("ranks", [0, 2])
-def test_faults_are_told_once_and_nothing_is_written(folder, tmp_path, ranks):
+def test_faults_are_reported_once_and_nothing_is_written(folder, tmp_path, ranks):
     result_json.write(folder, document(DISTINCT, status="not converged", faults=["jump"]))
     job = command_line(ranks, "export", folder, "--format", "csv", "--out", tmp_path / "card.csv")
     assert (job.returncode, job.stdout) == (2, "") and not (tmp_path / "card.csv").exists()
     assert job.stderr.count('its status is "not converged": jump; run the case again') == 1
 
 
-@pytest.mark.parametrize(("words", "told"), [([], "--format"), (["--format", "nastran"], "--format nastran")])
-def test_unknown_formats_are_told(folder, words, told):
+@pytest.mark.parametrize(("words", "reported"), [([], "--format"), (["--format", "nastran"], "--format nastran")])
+def test_unknown_formats_are_refused(folder, words, reported):
     job = command_line(0, "export", folder, *words)
-    assert (job.returncode, job.stderr) == (2, f"error: {told}: expected one of {', '.join(export.FORMATS)}\n")
+    assert (job.returncode, job.stderr) == (2, f"error: {reported}: expected one of {', '.join(export.FORMATS)}\n")

@@ -1,4 +1,4 @@
-"""How a job of the command line ends when something is wrong: exit codes, messages, no rank left waiting."""
+"""Failures of jobs of the command line: exit codes, messages, no rank left waiting."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ def test_no_convergence_ends_with_3_and_keeps_what_was_computed(tmp_path, ranks)
 
 
 def test_loose_tolerance(tmp_path):
-    """It is told of, and what it makes wrong is marked."""
+    """A loose tolerance is reported, and the checks that it breaks are marked."""
     out = tmp_path / "results"
     job = command_line(2, "run", case_file(tmp_path), "--out", out, "-feti_ksp_rtol", "0.3")
     document = json.loads((out / "result.json").read_text())

@@ -36,7 +36,7 @@ def test_a_cell_its_table_and_the_table_of_its_result(tmp_path):
     assert np.abs(np.subtract(*stiffness)).max() < 1e-9 * np.max(stiffness)
 
 
-def test_faults_are_told_once_and_nothing_is_written(tmp_path):
+def test_faults_are_reported_once_and_nothing_is_written(tmp_path):
     (tmp_path / "square.csv").write_text("x,y,radius\n1,2,-3\n1,2\n")
     (tmp_path / "case.toml").write_text(BASE.replace(HEXAGONAL, TABLE))
     job = command_line(2, "fibres", tmp_path / "case.toml", "--out", tmp_path / "out.csv")

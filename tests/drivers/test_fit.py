@@ -38,7 +38,7 @@ def test_a_fit_that_is_killed_goes_on(tmp_path):
     assert checked.returncode == 0 and checked.stdout.endswith("the case is valid\n") and not out.exists()
     second = "args[1].name == 'result.json' and args[1].parts[-3] == 'evaluation-0002'"
     with HookedJob(0, [Hook(COMMIT, WAIT, when=second)], *words) as job:
-        assert job.told() == "0 here"
+        assert job.reported() == "0 here"
         refused = command_line(0, *words)
         assert refused.returncode == 2 and "another run writes its results there" in refused.stderr
         assert f"process {job.process.pid}" in refused.stderr

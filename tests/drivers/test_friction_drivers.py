@@ -64,7 +64,7 @@ def test_a_path_killed_in_the_middle_of_a_cycle_goes_on_as_it_was(tmp_path):
     assert command_line(1, *words, tmp_path / "whole").returncode == 0
     kept = Hook("feti_homog.results.atomic:commit", WAIT, when="args[1].name == '000039.h5'", after=True)
     with HookedJob(1, [kept], *words, tmp_path / "out") as job:
-        assert job.told() == "0 here"
+        assert job.reported() == "0 here"
         job.killed()
     assert command_line(1, *words, tmp_path / "out", "--resume").returncode == 0
     found, whole = (json.loads((tmp_path / name / "result.json").read_text()) for name in ("out", "whole"))

@@ -118,7 +118,7 @@ def events(out: Path) -> int:
 def killed(ranks: int, case: Path, out: Path, at: int, *words: str, moment: str = "kept") -> int:
     """Run until there are `at` events, and in the moment of `MOMENTS`, then kill -9; returns how many are there."""
     with HookedJob(ranks, [MOMENTS[moment](out, at)], "run", case, "--out", out, *words) as job:
-        assert job.told() == "0 here"
+        assert job.reported() == "0 here"
         job.killed()
     return events(out)
 

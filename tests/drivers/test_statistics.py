@@ -1,4 +1,4 @@
-"""`feti-homog statistics` in processes of its own: printed once, faults told once."""
+"""`feti-homog statistics` in processes of its own: printed once, faults reported once."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def test_statistics_are_printed_and_written_once(tmp_path, ranks):
         ("case.toml", ("--size", "1", "1"), "--size: only for a table of fibres"),
     ],
 )
-def test_faults_are_told_once_and_nothing_is_written(tmp_path, name, words, fault):
+def test_faults_are_reported_once_and_nothing_is_written(tmp_path, name, words, fault):
     (tmp_path / "fibres.csv").write_text(TABLE)
     (tmp_path / "case.toml").write_text(BASE)
     job = command_line(0, "statistics", tmp_path / name, *words, "--out", tmp_path / "out")

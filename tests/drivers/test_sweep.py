@@ -79,7 +79,7 @@ def test_faulty_commands_end_with_2_and_write_nothing(tmp_path, words, message):
     assert not Path(ROOT / "results/none").exists()
 
 
-def test_faults_of_all_points_are_told_before_anything_runs(tmp_path):
+def test_faults_of_all_points_are_reported_before_anything_runs(tmp_path):
     path = sweep_file(tmp_path, "cell.fibre_fraction = [0.2, 0.95, 0.99]\n")
     for words in (["sweep", path, "--out", tmp_path / "out"], ["check", path]):
         job = command_line(2, *words)
@@ -101,7 +101,7 @@ def test_check_tells_cases_points_and_ranks(tmp_path):
 
 
 @pytest.mark.parametrize("ranks", [1, 2])
-def test_failed_cases_are_kept_and_told(tmp_path, ranks):
+def test_failed_cases_are_kept_and_reported(tmp_path, ranks):
     out, path = tmp_path / "out", sweep_file(tmp_path, FAILING_POINTS, FAILING)
     job = swept(out, path, "--ranks-per-case", "1", ranks=ranks, code=3)
     assert "1 failed:\n  case-0002  cell.fibre_fraction = 0.745\n    MeshError: " in job.stdout
@@ -140,7 +140,7 @@ def test_a_killed_sweep_goes_on_to_the_same_table(tmp_path):
     kept: dict[str, int] = {}
     for ranks, words, each in ((2, ["--ranks-per-case", "1"], 2), (1, [], 4)):
         with HookedJob(ranks, [after_results(each)], "sweep", path, "--out", out, *words) as job:
-            assert {job.told() for _ in range(ranks)} == {f"{rank} here" for rank in range(ranks)}
+            assert {job.reported() for _ in range(ranks)} == {f"{rank} here" for rank in range(ranks)}
             job.killed()
         assert kept.items() <= results(out).items() and len(results(out)) == len(kept) + ranks * each
         kept = results(out)
@@ -157,7 +157,7 @@ def test_a_second_sweep_in_the_folder_is_refused_while_the_first_runs(tmp_path):
     """The second is refused while the first runs, even for one case; the first is not disturbed."""
     path, out = sweep_file(tmp_path, TWO), tmp_path / "out"
     with HookedJob(0, [after_results(1)], "sweep", path, "--out", out) as first:
-        first.told()
+        first.reported()
         kept = results(out)
         for words in ([], ["--index", "2"]):
             job = command_line(1, "sweep", path, "--out", out, *words)

@@ -44,7 +44,7 @@ def test_corrupt_results_are_computed_again(tmp_path):
     assert "4 done" in collected(out).stdout
 
 
-def test_a_damaged_list_of_cases_is_told(tmp_path):
+def test_a_damaged_list_of_cases_is_reported(tmp_path):
     out, path = tmp_path / "out", sweep_file(tmp_path, TWO)
     swept(out, path)
     (out / "sweep.json").write_text('{"cases": [')
@@ -62,14 +62,14 @@ def test_a_damaged_list_of_cases_is_told(tmp_path):
     ],
 )
 @pytest.mark.parametrize("words", [[], ["--index", "1"]], ids=["all", "one"])
-def test_faulty_options_are_told_before_anything_is_written(tmp_path, lines, fault, words):
+def test_faulty_options_are_reported_before_anything_is_written(tmp_path, lines, fault, words):
     out = tmp_path / "out"
     job = command_line(2, "sweep", sweep_file(tmp_path, f"{lines}\n"), "--out", out, *words)
     assert job.returncode == 2 and job.stderr.startswith(f"error: {fault}") and not out.exists()
 
 
 @pytest.mark.parametrize("limit", [1500, 200])
-def test_a_full_disk_is_told_and_the_sweep_goes_on_later(tmp_path, limit):
+def test_a_full_disk_is_reported_and_the_sweep_goes_on_later(tmp_path, limit):
     """No file may be longer than the limit: below 1500 bytes no result can be written, below 200 not even the list."""
     out, path, script = tmp_path / "out", sweep_file(tmp_path, TWO), tmp_path / "limited.py"
     script.write_text(LIMITED.format(limit=limit))
@@ -92,7 +92,7 @@ def test_a_full_disk_while_collecting_leaves_the_old_table(tmp_path):
     assert (out / "cases.csv").read_bytes() == before
 
 
-def test_an_unwritable_folder_is_told(tmp_path):
+def test_an_unwritable_folder_is_reported(tmp_path):
     """Root, who may write everywhere, does without that right: as another user it might not reach this file."""
     folder = Path(tempfile.mkdtemp())
     try:

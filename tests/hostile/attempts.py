@@ -21,7 +21,7 @@ class Attempt:
     Attributes:
         kind, name: of the input.
         words: of the command; "@" stands for the folder of its files, in which it may only write to "out".
-        said: words that its output must have.
+        expected: words that its output must have.
         files: by name, their content or a function that makes them.
         codes: with which it may end.
         shell: instead of words, what bash runs, "feti" being the command line.
@@ -30,7 +30,7 @@ class Attempt:
     kind: str
     name: str
     words: tuple[str, ...] = ()
-    said: str = ""
+    expected: str = ""
     files: Mapping[str, Content] = field(default_factory=dict)
     codes: tuple[int, ...] = (2,)
     shell: str = ""
@@ -54,7 +54,7 @@ class Attempt:
         lines = [line for line in errors.splitlines() if line]
         checks = {
             f"code {code} instead of {' or '.join(map(str, self.codes))}": code not in self.codes,
-            f"no word of {self.said!r}": self.said not in output + errors,
+            f"no word of {self.expected!r}": self.expected not in output + errors,
             f"{len(lines)} lines": len(lines) > MOST_LINES,
             "no line": code in (1, 2) and not lines,
             "a traceback": "Traceback" in errors,

@@ -47,20 +47,20 @@ FILES: dict[str, tuple[Content, str]] = {
 
 
 def attempts() -> Iterator[Attempt]:
-    for name, (words, said) in OPTIONS.items():
-        yield Attempt("options", name, ("check", "@/c.toml", *words.split()), said, {"c.toml": changed(SMALL)})
+    for name, (words, expected) in OPTIONS.items():
+        yield Attempt("options", name, ("check", "@/c.toml", *words.split()), expected, {"c.toml": changed(SMALL)})
     grids = {f"{name}.msh": grid_of(*sizes) for name, sizes in MESHES.items()}
-    for name, (content, said) in CASES.items():
+    for name, (content, expected) in CASES.items():
         file: Content = content.encode("utf-16") if name == "UTF-16" else os.mkdir if name == "a folder" else content
-        yield Attempt("case files", name, ("check", "@/c.toml"), said, {"c.toml": file, **grids})
-    for name, (cell, said) in CELLS.items():
+        yield Attempt("case files", name, ("check", "@/c.toml"), expected, {"c.toml": file, **grids})
+    for name, (cell, expected) in CELLS.items():
         case = changed((MESH_CELL[0], cell))
         for phase in ("coating", "glass", "carbon"):
             if phase in cell:
                 case += f"[material.{phase}]\nyoung = 1.0\npoisson = 0.3\n"
-        yield Attempt("cells", name, ("check", "@/c.toml"), said, {"c.toml": case})
-    for name, (content, said) in FILES.items():
-        yield Attempt("case files", name, ("check", "@/c.toml"), said, {"c.toml": content})
+        yield Attempt("cells", name, ("check", "@/c.toml"), expected, {"c.toml": case})
+    for name, (content, expected) in FILES.items():
+        yield Attempt("case files", name, ("check", "@/c.toml"), expected, {"c.toml": content})
     yield Attempt("case files", "of no name", ("check", "@/a\0b.toml"), "null character")
     yield Attempt("case files", "none", ("check", "@/\x1b[31m.toml"), r"\x1b[31m")
     yield Attempt("options", "of control characters", ("check", "@/c.toml", "--\x1b[31m"), r"\x1b[31m")

@@ -65,9 +65,9 @@ OF_A_WINDOW = (
 
 
 def attempts() -> Iterator[Attempt]:
-    for name, (content, said) in TABLES.items():
-        words = "t.csv" if callable(content) and name != "sparse" else said  # no file is not looked into
+    for name, (content, expected) in TABLES.items():
+        words = "t.csv" if callable(content) and name != "sparse" else expected  # no file is not looked into
         yield Attempt("tables", name, ("check", "@/c.toml"), words, {"c.toml": CASE, "t.csv": content})
     for name in OF_A_WINDOW:
-        content, said = TABLES[name]
-        yield Attempt("windows", name, ("statistics", "@/t.csv", "--out", "@/out"), said, {"t.csv": content})
+        content, expected = TABLES[name]
+        yield Attempt("windows", name, ("statistics", "@/t.csv", "--out", "@/out"), expected, {"t.csv": content})

@@ -98,9 +98,9 @@ MESHES: dict[str, tuple[Content, str]] = {
 
 
 def attempts() -> Iterator[Attempt]:
-    for name, (content, said) in MESHES.items():
+    for name, (content, expected) in MESHES.items():
         case = changed((MESH_CELL[0], f'geometry = "mesh"\nfile = "{name}"'))
-        yield Attempt("meshes", name, ("check", "@/c.toml"), said, {"c.toml": case, name: content})
+        yield Attempt("meshes", name, ("check", "@/c.toml"), expected, {"c.toml": case, name: content})
     for name, content in SCRIPTS.items():
         case = changed((MESH_CELL[0], 'geometry = "mesh"\nfile = "a.msh"'))
         files = {"c.toml": case, "a.msh": content, "other.msh": SCRIPT}

@@ -88,8 +88,8 @@ def attempts(prepared: Path) -> Iterator[Attempt]:
     files: dict[str, Content] = {"c.toml": SMALL, "drawn.toml": DRAWN, "big.toml": BIG, "broken.toml": BROKEN}
     made = {**files, "out": copy_of(prepared / "card")}
     for kind, table in (("limits", LIMITS), ("surroundings", SURROUNDINGS)):
-        for name, (shell, said, codes) in table.items():
-            yield Attempt(kind, name, (), said, files | {"out/x": ""}, codes, shell)
+        for name, (shell, expected, codes) in table.items():
+            yield Attempt(kind, name, (), expected, files | {"out/x": ""}, codes, shell)
     for name, words in FULL.items():
         yield Attempt("full outputs", name, (), "standard output cannot be written", made, (1,), f"{words} > /dev/full")
     tag = '"$(hostname).1.0"'  # of a process that began with the machine, which none did
@@ -101,8 +101,8 @@ def attempts(prepared: Path) -> Iterator[Attempt]:
     shell = f"{QUIET_MPI} -n 2 feti check broken.toml"
     yield Attempt("ranks", "a faulty case", (), "fibre_fraction = 1.4", files, (2,), shell)
     if os.geteuid() == 0:
-        for name, (shell, said, codes) in OTHERS.items():
+        for name, (shell, expected, codes) in OTHERS.items():
             words = shell.format(f"{NOBODY} feti")
-            yield Attempt("other users", name, (), said, made, codes, f"chmod 755 . ; {words}")
-        for name, (shell, said, codes) in ON_DISKS.items():
-            yield Attempt("disks", name, (), said, made, codes, shell)
+            yield Attempt("other users", name, (), expected, made, codes, f"chmod 755 . ; {words}")
+        for name, (shell, expected, codes) in ON_DISKS.items():
+            yield Attempt("disks", name, (), expected, made, codes, shell)

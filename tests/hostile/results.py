@@ -148,23 +148,23 @@ OUTS: dict[str, tuple[str, Mapping[str, Content], str]] = {
 
 def attempts(prepared: Path) -> Iterator[Attempt]:
     """Yield those that damage copies of the `PREPARED` folders."""
-    for name, (content, said) in JSON.items():
+    for name, (content, expected) in JSON.items():
         for command in READERS if name in ("a pipe", "endless", "a link in a circle", "nested") else COMMANDS:
             if command == "collect":
                 continue
             files = {"out": copy_of(prepared / "path", result_json=content)}
             codes = (0, 2, 3) if name in HARMLESS else (2, 3) if command == "verify" else (2,)
-            yield Attempt("result.json", f"{name}, {command}", COMMANDS[command], said, files, codes)
-    for name, (content, said) in FIELDS.items():
+            yield Attempt("result.json", f"{name}, {command}", COMMANDS[command], expected, files, codes)
+    for name, (content, expected) in FIELDS.items():
         for command in READERS:
             files = {"out": copy_of(prepared / "path", result_h5=content)}
-            yield Attempt("result.h5", f"{name}, {command}", COMMANDS[command], said, files, (2, 3))
+            yield Attempt("result.h5", f"{name}, {command}", COMMANDS[command], expected, files, (2, 3))
     files = {"out": copy_of(prepared / "path", path_csv=link_to("/dev/zero"))}
     yield Attempt("tables of points", "endless, which is none", COMMANDS["verify"], "", files, (0,))
-    for name, (content, said) in SWEEPS.items():
+    for name, (content, expected) in SWEEPS.items():
         files = {"out": copy_of(prepared / "sweep", sweep_json=content)}
-        yield Attempt("sweeps", name, COMMANDS["collect"], said, files, (2,) if said else (0,))
-    for name, (out, files, said) in OUTS.items():
-        yield Attempt("folders", name, ("run", "@/c.toml", "--out", out), said, {"c.toml": SMALL, **files})
+        yield Attempt("sweeps", name, COMMANDS["collect"], expected, files, (2,) if expected else (0,))
+    for name, (out, files, expected) in OUTS.items():
+        yield Attempt("folders", name, ("run", "@/c.toml", "--out", out), expected, {"c.toml": SMALL, **files})
     for command, words in COMMANDS.items():
         yield Attempt("no results", command, words, "")

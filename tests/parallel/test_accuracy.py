@@ -71,7 +71,7 @@ def test_strain_energies_err_by_less_than_asked_for(name, order):
     result = stiffness(cell | {"order": order, "accuracy": ACCURACIES[order]}, phases, plane)
     error = energy_error(result.effective_stiffness, fine(name))
     assert error < ACCURACIES[order]
-    # A split changes errors by 4^order; meshes of coated cells are finer than the estimate, an upper one, knows.
+    # A split changes errors by 4^order; meshes of coated cells are finer than the estimate, an upper one, assumes.
     assert "coating" in phases or error > 1e-3 * ACCURACIES[order]
 
 

@@ -1,4 +1,4 @@
-"""Which nodes are debonded from the start, at any number of ranks, bodies and pieces."""
+"""Nodes debonded from the start, at any number of ranks, bodies and pieces."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the solver's Python code raises while PETSc calls it comes out of the solve, after PETSc has returned."""
+"""Errors that the solver's Python code raises while PETSc calls it leave the solve after PETSc has returned."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `check` says of the solver of a case is what a run makes."""
+"""`check` describes the solver that a run makes."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ CASES = {
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_the_solver_is_the_one_that_is_told(comm, name):
+def test_the_solver_is_the_one_that_is_reported(comm, name):
     case = Case.parse(tomllib.loads(CASES[name]))
     with case_options(case.petsc):
-        said = comm.bcast(describe(case, comm))
+        printed = comm.bcast(describe(case, comm))
         cell = tear(case, comm, Progress(comm, quiet=True))
-    (line,) = [line for line in said.splitlines() if line.startswith("solver")]
+    (line,) = [line for line in printed.splitlines() if line.startswith("solver")]
     assert ("influence columns" in line) == (cell.solver.exact_inverse is not None)
     assert ("adaptive coarse space" in line) == (cell.solver.adaptive is not None)
     cell.destroy()

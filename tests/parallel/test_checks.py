@@ -1,4 +1,4 @@
-"""What a result must obey to count as done: scales that do not vanish, and limits that no option lifts."""
+"""Checks of a result that is done: scales that do not vanish, and limits that no option lifts."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ pytestmark = pytest.mark.parallel
 
 
 class Words(Progress):
-    """Keeps what is said."""
+    """Keeps the lines."""
 
     def __init__(self, comm):
         super().__init__(comm, quiet=True)
-        self.said = []
+        self.lines = []
 
     def say(self, words):
-        self.said.append(words)
+        self.lines.append(words)
 
 
 def context_of(comm, cell, contact=True):
@@ -56,7 +56,7 @@ def test_hill_holds_where_a_debonded_cell_stores_nothing(comm, shared_path, cont
     comm.barrier()
 
 
-def test_jumps_are_told_on_the_scale_on_which_they_are_checked(comm):
+def test_jumps_are_reported_on_the_scale_on_which_they_are_checked(comm):
     cell = torn_cells.tear(comm, geometry="square", mesh_size=0.3)
     context = context_of(comm, cell)
     (response,) = context.plane.respond(np.eye(3)[:1], context.bonds(None), context.loads.zero_multipliers()[:1])

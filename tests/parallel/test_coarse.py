@@ -66,7 +66,7 @@ def test_soft_modes_solve_the_eigenproblem(comm, narrow):
 
 
 def dense_modes(dense, M):
-    """Of each subdomain its kernel and its soft modes, from dense eigenproblems."""
+    """Return the kernel and the soft modes of each subdomain, from dense eigenproblems."""
     pairs = (eigh(S, B.T @ M @ B) for B, S in zip(dense.B, dense.S, strict=True))
     return [modes[:, theta < THRESHOLD] for theta, modes in pairs]
 

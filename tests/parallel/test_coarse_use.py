@@ -45,7 +45,7 @@ def test_a_load_without_multipliers_leaves_the_others_alone(narrow):
 
 
 def test_soft_modes_and_stress_do_not_depend_on_the_ranks(comm):
-    """The same cell on this and on one rank."""
+    """Compare a cell on all ranks with the same cell on one."""
     found = []
     for some in (comm, MPI.COMM_SELF):
         cell = torn_cells.tear(some, **NARROW)
@@ -129,7 +129,7 @@ def test_a_coarse_problem_solved_by_multigrid_gives_the_same(comm, contrast):
 
 
 def test_translations_of_the_cell_have_little_energy(comm, narrow):
-    """They meet a resistance at the pinned class alone."""
+    """Translations meet a resistance at the pinned class alone."""
     part, translations = narrow.coarse.part(), narrow.coarse._translations
     energy, bound = (
         comm.allreduce(np.einsum("ik,ik->k", translations, product))

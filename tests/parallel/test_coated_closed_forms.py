@@ -56,7 +56,7 @@ def cylinders(coating, fraction):
 
 
 def periodic_axial_shear(coating, fraction):
-    """By Rayleigh's series, the coated fibre in place of the homogeneous one."""
+    """Return the axial shear modulus by Rayleigh's series, the coated fibre in place of the homogeneous one."""
     fibre, ring, matrix = (layer.G_axial for layer, _ in cylinders(coating, fraction))
     contrast = layered_contrast(fibre / matrix, ring / matrix, 1 / OUTER)
     return matrix * axial_shear_modulus("hexagonal", fraction * OUTER, contrast)

@@ -127,7 +127,7 @@ def test_energies_of_two_pairs_break_as_by_brute_force(comm, twin, cell, growth)
 @pytest.mark.parametrize("springs", [None, SPRINGS], ids=["glue", "springs"])
 @pytest.mark.parametrize("number", range(4))
 def test_random_debonding_of_two_pairs_in_contact_is_that_of_the_quadratic_programme(comm, twin, number, springs):
-    """Of each pair alone, so that the coating stays with the fibre or with the matrix; then of both."""
+    """Debond each pair alone, so that the coating stays with the fibre or with the matrix, then both."""
     case = twin(list(CELLS)[number % 3], springs or STRENGTHS)
     interface, pair = torn_cells.interface(case.cell, True), case.cell.solver.jump_operator.nodes.pair
     pair, rng = case.in_reference_order(pair), np.random.default_rng(number)

@@ -249,7 +249,7 @@ def test_single_pivots_find_the_same_state(comm, half):
 
 @pytest.mark.parametrize("strain", [(0, -1, 0), (0, 0, 1)], ids=["E22", "gamma12"])
 def test_forces_between_pieces_of_a_stiff_matrix_hide_no_tension(comm, strain):
-    """They are 10 000 times those on a soft fibre, and who is in contact does not depend on them."""
+    """Forces between pieces are 10 000 times those on a soft fibre; contact does not depend on them."""
     arc, fibre = Arc(fibre="all", centre=20.0, angle=140.0), {"young": 88e-4, "poisson": 0.222}
     cell = {"fibre": fibre, "mesh_size": 0.1, "refine": 2, "petsc": {"feti_ksp_rtol": 1e-8}}
     found = []

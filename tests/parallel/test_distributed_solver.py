@@ -117,8 +117,8 @@ def test_digits_are_those_of_a_factor_of_the_whole(comm):
 
 
 @pytest.mark.parametrize("kind", ["factor", "mumps"])
-def test_a_matrix_that_is_not_definite_is_told_on_every_rank(comm, kind):
-    """Of unknowns that all ranks have, and of those that the last has for itself."""
+def test_a_matrix_that_is_not_definite_is_reported_on_every_rank(comm, kind):
+    """Try unknowns that all ranks have, and unknowns that the last rank alone has."""
     shared = np.arange(2), csr_matrix(np.ones((2, 2)) / comm.size)
     u = 2 if comm.rank == comm.size - 1 else 0
     own = [(np.arange(u), csr_matrix(wrong[:u, :u])) for wrong in (np.ones((2, 2)), np.array([[1.0, 2.0], [2.0, 1.0]]))]
@@ -127,8 +127,8 @@ def test_a_matrix_that_is_not_definite_is_told_on_every_rank(comm, kind):
             made(comm, 2, unknowns, part)
 
 
-def test_a_fault_of_one_rank_is_told_on_every_rank(comm, monkeypatch):
-    """As rounding may be: the first rank alone finds the matrix singular."""
+def test_a_fault_of_one_rank_is_reported_on_every_rank(comm, monkeypatch):
+    """The first rank alone finds the matrix singular, as rounding may cause."""
     A = grid(6)
     unknowns, part = share(comm, A, by_blocks(comm, A.shape[0]))
     factored = distributed_solver.factored

@@ -53,7 +53,7 @@ def test_few_ellipses_have_the_stiffness_of_eshelby(comm):
 
 
 def test_turned_table_has_the_turned_stiffness(comm):
-    """By a right angle: E11 is E22, and the couplings with the shear change their signs; another mesh."""
+    """A turn by a right angle exchanges E11 and E22 and changes the signs of the couplings with shear; another mesh."""
     turned = [row | {"x": 1.0 - row["y"], "y": row["x"]} for row in ROWS]
     turned = [row | ({"angle": row["angle"] + 90.0} if "angle" in row else {}) for row in turned]
     first, second = (stiffness(comm, rows, order=2) for rows in (ROWS, turned))
@@ -96,7 +96,7 @@ def interface_lengths(folder):
 @pytest.mark.one_rank
 @pytest.mark.parametrize(("order", "least"), [(1, 1.9), (2, 3.5)])
 def test_stiffness_converges_to_that_of_another_mesh(comm, order, least):
-    """By about h^2 and h^4: both are refined towards the same ellipse."""
+    """Errors fall by about h^2 and h^4: both meshes are refined towards the same ellipse."""
     exact = stiffness(comm, ROWS[:1], order=2, refine=3, mesh_size=0.09)
     found = [stiffness(comm, ROWS[:1], order=order, refine=refine, mesh_size=0.15) for refine in range(3)]
     errors = [np.abs(each - exact).max() for each in found]
@@ -113,7 +113,7 @@ def test_coated_ellipses_have_the_stiffness_of_their_mesh_solved_at_once(comm, o
 
 
 def test_coatings_of_the_material_within_make_ellipses_larger(comm):
-    """Of ellipses whose semi-axes are longer by the thickness, which is `coating` times sqrt(a b)."""
+    """Compare with ellipses whose semi-axes are longer by the thickness, which is `coating` times sqrt(a b)."""
     inner = {"x": 0.45, "y": 0.55, "a": 0.24, "b": 0.12, "angle": 30.0}
     thick = 0.1 * np.sqrt(inner["a"] * inner["b"])
     outer = inner | {axis: inner[axis] + thick for axis in "ab"}

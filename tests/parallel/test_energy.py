@@ -1,4 +1,4 @@
-"""Debonding by energy: onset and curve against published numbers, and that a tip's break releases what was foretold."""
+"""Debonding by energy: onset and curve against published numbers, and the predicted release of a tip."""
 
 from __future__ import annotations
 
@@ -138,7 +138,7 @@ CELL_PER_RADIUS = 60.0
 
 @pytest.mark.parametrize(("strength", "radius"), [(90.0, 1.5), (90.0, 7.5), (90.0, 75.0), (60.0, 7.5)])
 def test_onset_of_one_fibre_in_much_matrix(comm, strength, radius):
-    """By the energy of springs of this strength in pure opening: that of a fibre alone, by Michell's functions."""
+    """Compare the onset by the energy of springs in pure opening with a fibre alone, by Michell's functions."""
     stiffness = strength**2 / (2 * TOUGHNESS)
     bonds = SpringEnergy(stiffness, stiffness / 4, TOUGHNESS, SENSITIVITY)
     cell = torn_cells.tear(
@@ -173,7 +173,7 @@ RANDOM = {"geometry": "random", "fibres": 3, "fibre_fraction": 0.35, "min_gap": 
 
 
 def test_a_tip_releases_its_toughness(comm):
-    """What the cell loses when a single bond beside a broken one breaks is G_c times its length."""
+    """The energy that the cell loses when one bond beside a broken one breaks is G_c times its length."""
     case = RANDOM | {"mesh_size": 0.1, "radius_spread": 0.2} | CELL
     cell, interface, points = path(comm, "released", [0.03, 0.002, 0.01], **case)
     law, checked = criterion(cell, "released"), 0

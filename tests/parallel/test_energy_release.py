@@ -135,7 +135,7 @@ def test_energy_release_rates_are_of_degree_two_and_symmetric(comm):
 
 @pytest.mark.one_rank
 def test_modes_do_not_depend_on_the_mesh(comm):
-    """They belong to a length of R / 1000, if the elements are smaller."""
+    """Modes belong to a length of R / 1000, if the elements are smaller."""
     angles = []
     for cell in ({"tip_size": 3e-4}, {"tip_size": 2e-5}, {"tip_size": 1e-4, "refine": 1, "order": 1}):
         (point,), _ = solved(comm, [1.0, 0.0, 0.0], [120.0], FREE, **cell)
@@ -207,7 +207,7 @@ def test_one_fibre_in_a_large_matrix_has_the_published_rates(comm):
 
 
 def loaded(comm, cell, arcs, materials=(), folder="."):
-    """Return the point of a load on the cell, whose arcs are 100 degrees long where they do not say."""
+    """Return the point of a load on the cell, whose arcs are 100 degrees long by default."""
     document = {
         "cell": cell,
         "material": {"matrix": MATRIX, "fibre": FIBRE} | dict(materials),
@@ -239,7 +239,7 @@ def test_beside_a_void_rates_are_those_beside_a_fibre_that_nothing_holds(comm, s
 @pytest.mark.one_rank
 @pytest.mark.parametrize("coating", [0.3, 0.02])
 def test_rates_of_coated_fibres_are_those_of_fibres_of_one_material(comm, coating):
-    """Of the same outer radius, on another mesh; the fibre within the coating is bonded to it."""
+    """The fibres have the same outer radius, on another mesh; a coated fibre is bonded to its coating."""
     radius, arc = 0.3, {"fibre": 1, "centre": 20.0}
     cell = {"geometry": "square", "mesh_size": 0.08, "interface_size": 0.04, "order": 2}
     expected = loaded(comm, cell | {"fibre_fraction": np.pi * radius**2}, [arc])

@@ -93,7 +93,7 @@ def test_onsets_grow_with_the_strength(comm, name):
 
 
 def test_a_square_cell_is_as_strong_along_both_axes_and_in_both_shears(comm):
-    """As far as its mesh is symmetric."""
+    """Equal as far as the mesh is symmetric."""
     of_axes = factors(envelope(comm, "strain", MAX, ["S11", "S22"], SQUARE, directions=16))
     parallel_assert(comm, np.abs(of_axes / of_axes[(4 - np.arange(16)) % 16] - 1).max() < 2e-3)
     with_shear = factors(envelope(comm, "strain", QUADRATIC, ["S11", "S12"], SQUARE, directions=16))

@@ -1,4 +1,4 @@
-"""What one rank alone finds while it makes its part of the solver is raised by all."""
+"""All ranks raise an error that one rank finds while it makes its part of the solver."""
 
 from __future__ import annotations
 

@@ -106,7 +106,7 @@ def test_iterations_stay_few_at_any_contrast(comm, contrast):
 
 
 def test_a_whole_matrix_converges_as_with_one_eigenproblem(comm):
-    """By faces, in one, and with rigid-body motions alone; a few more modes come by faces."""
+    """Compare modes by faces, of a whole body, and rigid-body motions alone; faces give a few more modes."""
     case = WHOLE | {"refine": 1, "min_gap": 0.01, "fibre_fraction": 0.65}
     iterations, vectors = [], []
     for whole, space in ((300, "adaptive"), (4000, "adaptive"), (4000, "natural")):

@@ -88,7 +88,7 @@ class Falsified:
         return points[np.argsort(np.arctan2(*points.T[::-1]))]
 
     def chosen(self, *places):
-        """Which nodes of this rank are these nodes of the arc, counted over all ranks."""
+        """Return which nodes of this rank are these nodes of the arc, counted over all ranks."""
         owned = [np.flatnonzero(arc) + first for first, arc in self._arcs()]
         numbers = np.concatenate(owned)[list(places)]
         first = sum(self.comm.allgather(len(self.row))[: self.comm.rank])

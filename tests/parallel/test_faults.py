@@ -1,4 +1,4 @@
-"""Every faulty case and mesh through the command line, by all ranks together: told once, nothing written.
+"""Every faulty case and mesh through the command line, by all ranks together: reported once, nothing written.
 
 `check` and `run` read a case and mesh its cell by the same calls: `check` has all faults, and `run`, whose folder must
 not be made, one of each class.  A class are the faults of a section that name something missing, unknown, or expected
@@ -28,7 +28,7 @@ FAULTY = FAULTY_CASES | FAULTY_BONDINGS | FAULTY_ENVELOPES
 CELL = 'geometry = "hexagonal"\nfibre_fraction = 0.4\nmesh_size = 0.05'
 MESH_CASE = BASE.replace(CELL, 'geometry = "mesh"\nfile = "faulty.msh"')
 RANDOM = 'geometry = "random"\nfibres = 30\n'
-# The case is looked at first, and tells it in its own words.
+# The case is read first, and reports it in its own words.
 BY_CASE = {"missing file": "no such file"}
 
 

@@ -94,14 +94,14 @@ def test_an_exception_leaves_the_old_file(comm: Any, shared_path: Path) -> None:
     comm.barrier()
 
 
-def test_a_folder_that_cannot_be_made_is_told_on_every_rank(comm: Any, shared_path: Path) -> None:
+def test_a_folder_that_cannot_be_made_is_reported_on_every_rank(comm: Any, shared_path: Path) -> None:
     if comm.rank == 0:
         (shared_path / "file").write_text("")
     with pytest.raises(FetiHomogError, match=r"^cannot write .*result\.h5: .*[Nn]ot a directory$"):
         write(shared_path / "file" / "folder", comm, sample(4))
 
 
-def test_a_full_disk_is_told_on_every_rank_and_leaves_no_file(comm: Any, shared_path: Path) -> None:
+def test_a_full_disk_is_reported_on_every_rank_and_leaves_no_file(comm: Any, shared_path: Path) -> None:
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, limits[1]))
     try:

@@ -44,7 +44,7 @@ def test_data_without_noise_return_the_truth(comm, shared_path, name):
 
 
 def test_an_interrupted_fit_goes_on_with_what_it_has(comm, shared_path, glass, monkeypatch):
-    """It computes again what was not finished, and no more."""
+    """Only evaluations that were not finished are computed again."""
     out, calls, compute = shared_path / "out", [], execute.execute.run_all
 
     def counted(sweep, folder, *arguments, **named):

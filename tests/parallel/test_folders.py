@@ -81,8 +81,8 @@ def run(comm, folder, out):
 def refused(comm, folder, out, capsys, message):
     assert run(comm, folder, out) == 2
     lines = capsys.readouterr().err.splitlines()
-    told = len(lines) == 1 and lines[0].startswith("error: ") and message in lines[0]
-    parallel_assert(comm, told if comm.rank == 0 else not lines, str(lines))
+    reported = len(lines) == 1 and lines[0].startswith("error: ") and message in lines[0]
+    parallel_assert(comm, reported if comm.rank == 0 else not lines, str(lines))
 
 
 @pytest.mark.parametrize("name", REFUSED)

@@ -84,7 +84,7 @@ def test_a_disk_that_is_full_before_the_first_byte(comm, shared_path, small_disk
 
 @pytest.mark.parametrize("size", [1000, RESERVE + 10_000])
 def test_files_that_may_not_grow(comm, shared_path, capsys, size):
-    """The same without a disk of its own."""
+    """Limit the size of files in place of that of a disk."""
     with file_limit(size):
         code = run(comm, shared_path, shared_path / "out")
     parallel_assert(comm, code == 1)
@@ -94,7 +94,7 @@ def test_files_that_may_not_grow(comm, shared_path, capsys, size):
 
 @pytest.mark.parametrize("name", ["000002.h5", "result.h5", "result.json", "result.xdmf", "interface.xdmf", "path.csv"])
 def test_every_file_may_be_the_one_that_does_not_fit(comm, shared_path, capsys, monkeypatch, name):
-    """It is told, and --resume goes on from the events that are kept."""
+    """The file is named, and --resume goes on from the events that are kept."""
     if comm.size > 1 and name in ("result.h5", "result.xdmf", "interface.xdmf"):
         pytest.skip("as the others; it takes longer on two ranks")
     out, commit = shared_path / "out", atomic.commit
@@ -119,7 +119,7 @@ def test_every_file_may_be_the_one_that_does_not_fit(comm, shared_path, capsys, 
 
 
 @pytest.mark.parametrize("name", ["cell.png", "path.gif"])
-def test_pictures_that_do_not_fit_are_told(comm, shared_path, capsys, monkeypatch, name):
+def test_pictures_that_do_not_fit_are_reported(comm, shared_path, capsys, monkeypatch, name):
     """The results stay, the old picture too."""
     if comm.size > 1:
         pytest.skip("one rank draws")
@@ -171,13 +171,13 @@ def test_a_log_that_does_not_fit_costs_no_results(comm, shared_path, capsys):
         (shared_path / "cell.toml").write_text(PATH)
     comm.barrier()
     parallel_assert(comm, cli.main(["run", str(shared_path / "cell.toml"), "--out", str(out)]) == 0)
-    told = [line for line in capsys.readouterr().out.splitlines() if "events.log: No space left on device" in line]
+    lines = [line for line in capsys.readouterr().out.splitlines() if "events.log: No space left on device" in line]
     words = "warning: cannot write ", "the path goes on without it"
-    parallel_assert(comm, len(told) == (comm.rank == 0) and all(word in line for line in told for word in words))
+    parallel_assert(comm, len(lines) == (comm.rank == 0) and all(word in line for line in lines for word in words))
 
 
 def test_a_disk_that_another_program_fills_meanwhile(comm, shared_path, small_disk):
-    """What was reserved is there; what follows is told, and closing the file does not crash."""
+    """Reserved space stays; later writes are reported to fail, and closing the file does not crash."""
     disk = small_disk("1M")
     part = part_of(sample(8), comm.rank, comm.size)
     file = FieldFile(disk, comm, part.header, part.mesh, part.fibres, part.interface)

@@ -1,4 +1,4 @@
-"""Estimates and bounds beside a cell are those of its own interfaces and shapes, or are not told."""
+"""Estimates and bounds beside a cell are those of its own interfaces and shapes, or are left out."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_free_faces_have_a_compliance_and_no_estimates(comm):
 
 
 def test_coated_fibres_have_bounds_and_no_estimates(comm):
-    """A coating is no fibre: estimates of cylinders beside each other say nothing of cylinders within each other."""
+    """A coating is no fibre: estimates of cylinders beside each other do not hold for cylinders within each other."""
     material = {"matrix": EPOXY, "fibre": GLASS, "coating": {"young": 1.0, "poisson": 0.3}}
     result = solved(comm, sections={"material": material}, coating=0.2, **CELL)
     lower, upper = result.fibre_bounds.G_axial

@@ -49,7 +49,7 @@ def result_of(comm, shared_path):
 
 
 def same(found, expected, tolerance=EXACT):
-    """Whether two results have the same secants and thermal stress, under loads of either sign."""
+    """Return whether two results have the same secants and thermal stress, under loads of either sign."""
     names = ("effective_stiffness", "thermal_stress", "effective_stiffness_compression", "thermal_stress_compression")
     pairs = [(getattr(found, name), getattr(expected, name)) for name in names]
     return all(one is other is None or error(one, other) < tolerance for one, other in pairs)

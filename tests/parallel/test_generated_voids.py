@@ -45,7 +45,7 @@ def solved(comm, cell, plane="strain", fibre=True, folder=Path(), out=None, **se
 @pytest.mark.quick
 @pytest.mark.parametrize("decomposition", [{}, {"subdomains": 5}])
 def test_voids_of_a_table_are_those_of_a_mesh_with_holes(comm, shared_path, decomposition):
-    """The same nodes: the mesh with fibres, some of which are left out, is a user's."""
+    """Both have the same nodes: the user's mesh has fibres, some of which are left out."""
     case = cases.parse(_document(table([row | {"phase": "fibre"} for row in ROWS[:3]])), Path())
     if comm.rank == 0:
         mesh = generate(case.cell)
@@ -118,7 +118,7 @@ def test_an_accuracy_counts_free_faces_of_voids():
 
 @pytest.mark.parametrize("order", [1, 2])
 def test_a_hollow_fibre_of_the_matrix_is_a_void(comm, order):
-    """Of the tube's inner radius, on another mesh."""
+    """The void has the inner radius of the tube, on another mesh."""
     keys = {"mesh_size": 0.05, "order": order, "refine": 1}
     tube = solved(comm, table([ROWS[1] | {"radius": 0.3, "inner_radius": 0.2}], **keys), material=TWICE)
     hole = solved(comm, table([ROWS[1] | {"phase": "void"}], **keys), fibre=False)

@@ -168,7 +168,7 @@ LAMINATE = {"cell": {"geometry": "mesh", "file": "cut.msh"}, "phases": EPOXY_GLA
     [(True, {"S11": 1.0}), (True, {"S12": 1.0}), (False, {"S11": -1.0}), (True, {"S11": 1.0, "E22": 0.01})],
     ids=str,
 )
-def test_what_nothing_carries_is_told(comm, cut, plane, contact, to):
+def test_what_nothing_carries_is_reported(comm, cut, plane, contact, to):
     with pytest.raises(ConvergenceError, match="carries"):
         solved(comm, cut, **LAMINATE, plane=plane, interface={"contact": contact}, load={"to": to})
 

@@ -123,7 +123,7 @@ def test_a_laminate_parts_at_its_strength_and_bears_nothing_then(comm, strip, pl
     assert last.dissipated == pytest.approx(first.stored, rel=EXACT)
 
 
-def test_stresses_that_nothing_carries_any_more_are_told(comm, strip):
+def test_stresses_that_nothing_carries_any_more_are_reported(comm, strip):
     case = {"cell": {"geometry": "mesh", "file": "strip.msh"}, "phases": EPOXY_GLASS, "plane": "strain"}
     with pytest.raises(ConvergenceError, match="carries"):
         solved(comm, strip, **case, interface=STRENGTH, path={"to": {"S11": 0.1}})

@@ -118,7 +118,7 @@ def test_a_loss_at_parting_that_is_none_is_noticed(comm, shared_path, factor):
     parallel_assert(comm, comm.bcast(held) == (factor == 1.0))
 
 
-def test_a_pull_on_parted_layers_is_told_with_what_was_found(comm, shared_path):
+def test_a_pull_on_parted_layers_is_reported_with_what_was_found(comm, shared_path):
     path = {"waypoints": [{"E11": 0.2}, {"S11": 0.1}]}
     with pytest.raises(ConvergenceError, match="nothing in the cell carries"):
         solved(comm, shared_path, TWO, 0, "strain", STRENGTH, None, path=path)
@@ -139,8 +139,8 @@ UNDETERMINED = {
 def test_strains_that_nothing_determines_are_named(comm, shared_path, phases, materials, name):
     plane, to, names = UNDETERMINED[name]
     result = solved(comm, shared_path, phases, 0, plane, WHOLE, None, materials, len(phases), load={"to": to})
-    told = [remark for remark in result.remarks if "undetermined" in remark]
-    assert [line.split(":")[0] for line in told] == ([] if names is None else [f"[load] {names}"])
+    undetermined = [remark for remark in result.remarks if "undetermined" in remark]
+    assert [line.split(":")[0] for line in undetermined] == ([] if names is None else [f"[load] {names}"])
 
 
 def test_undetermined_strains_of_a_path_are_counted_and_a_loose_fibre_leaves_none(comm, shared_path):

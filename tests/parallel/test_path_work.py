@@ -91,7 +91,7 @@ def test_a_cycle_without_breaks_closes(comm):
 
 
 def test_cooling_a_free_cell_does_no_work_but_on_the_temperature(comm):
-    """What the temperature works on is what is stored: phases that expand alike store nothing."""
+    """The work of the temperature is the stored energy: phases that expand alike store none."""
     alike = tuple(phase | {"expansion": 2e-5} for phase in EPOXY_GLASS)
     waypoints = [{"temperature": -100.0}, {"S11": 0.01}]
     paths = [

@@ -45,7 +45,7 @@ LEGS = [[0.03, 0.002, 0.01], [0.0, 0.0, 0.0], [-0.01, 0.02, 0.03]]
 
 
 def criterion(cell, name, unit=1.0):
-    """Of lengths in micrometres, or in so many of them."""
+    """Return the criterion for lengths in micrometres, or in `unit` of them."""
     if name == "strength":
         return MaxStrength(50.0, 60.0)
     springs = SpringEnergy(NORMAL * unit, TANGENTIAL * unit, TOUGHNESS / unit, 0.25)
@@ -199,7 +199,7 @@ def test_without_sensitivity_to_the_mode_toughness_times_length_is_counted_exact
 
 
 def test_the_tips_of_one_debond(comm):
-    """Bonds beside those that broke; the one that breaks next is at its toughness and releases what it says."""
+    """Bonds beside those that broke; the one that breaks next is at its toughness and releases its toughness."""
     result = run(path_of(SQUARE | {"mesh_size": 0.05}, BY_ENERGY, strain=[0.03, 0, 0]), comm)
     step, checked = 360.0 / result.path[0].bonded, 0
     for before, now in pairwise(result.path):

@@ -61,7 +61,7 @@ def test_a_corner_of_one_makes_a_circle(comm, sides):
 
 
 def test_a_sharp_square_is_that_of_a_users_mesh(comm, shared_path):
-    """Of squares, on other nodes; both err at the corners."""
+    """Compare squares on other nodes; both err at the corners."""
     if comm.rank == 0:
         grid().write(shared_path / "grid.msh")
     comm.barrier()

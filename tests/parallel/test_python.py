@@ -23,7 +23,7 @@ def with_fraction(fraction, **rest):
 
 
 def test_run_gives_the_same_arrays_on_every_rank_and_writes_no_file(comm, shared_path, monkeypatch):
-    """The same arrays on every rank, and no file."""
+    """Compare the arrays of all ranks and look for files."""
     monkeypatch.chdir(shared_path)
     result = run(with_fraction(0.4, order=2), comm)
     L = result.effective_stiffness
@@ -108,10 +108,10 @@ def test_not_quiet_prints_what_the_command_line_prints(comm, capsys):
     run(case, comm)
     silent = capsys.readouterr().out
     result = run(case, comm, quiet=False)
-    said = capsys.readouterr().out
-    stages = all(f"\n{stage} " in f"\n{said}" for stage in ("mesh", "factor", "solve"))
-    whole = stages and said.strip().endswith("done") and f"{result.effective_stiffness[0, 0]:.4f}"[:5] in said
-    parallel_assert(comm, not silent and (whole if comm.rank == 0 else not said), said)
+    printed = capsys.readouterr().out
+    stages = all(f"\n{stage} " in f"\n{printed}" for stage in ("mesh", "factor", "solve"))
+    whole = stages and printed.strip().endswith("done") and f"{result.effective_stiffness[0, 0]:.4f}"[:5] in printed
+    parallel_assert(comm, not silent and (whole if comm.rank == 0 else not printed), printed)
 
 
 @pytest.mark.parametrize("growth", ["released", "springs"])

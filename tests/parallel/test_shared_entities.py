@@ -1,4 +1,4 @@
-"""Which subdomains share what, and where bonds may break: counted triangle by triangle on the whole cell."""
+"""Shared entities and nodes where bonds may break, against a count triangle by triangle on the whole cell."""
 
 from __future__ import annotations
 
@@ -54,12 +54,12 @@ def test_each_constraint_belongs_to_one_rank_and_has_one_number(torus, comm):
     assert owned[-1][1] == share.constraints
     mine = (share.first >= share.owned[0]) & (share.first < share.owned[1])
     assert np.diff(share.owned)[0] == (share.nodes * (share.copies - 1))[mine].sum()
-    told = [
+    received = [
         {(int(k), bool(e)): int(n) for k, e, n in zip(s.key, s.is_edge, s.first, strict=True)}
         for s in comm.allgather(share)
     ]
-    for others in told:
-        for entity, number in told[comm.rank].items():
+    for others in received:
+        for entity, number in received[comm.rank].items():
             assert others.get(entity, number) == number
 
 

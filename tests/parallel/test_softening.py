@@ -87,7 +87,7 @@ def test_paths_are_those_of_brute_force(comm, name):
 
 @pytest.mark.one_rank
 def test_teeth_converge_to_the_law(comm):
-    """So tough an interface holds without snap-back: the law itself is followed by small steps of the strain."""
+    """Compare with the exact law by small steps of the strain; so tough an interface has no snap-back."""
     tough = BILINEAR | {"normal_toughness": 4e-4, "tangential_toughness": 8e-4}
     case = {"cell": {}, "phases": EPOXY_GLASS, "plane": "strain", "petsc": INFLUENCE, "path": {"to": {"E11": 0.03}}}
     case["path"]["to"] |= {"E22": 0.0, "gamma12": 0.0}

@@ -77,7 +77,7 @@ def test_debonded_nodes_carry_nothing_along_the_fibre(comm, springs):
 
 
 def slips_freely(states, path):
-    """Whether debonded nodes slip along the fibre without traction, closed ones with pressure, in all states."""
+    """Return whether debonded nodes slip along the fibre without traction, closed ones with pressure, in all states."""
     last = states[-1]
     for state, point in zip(states, path, strict=True):
         debonded = state.status > 0

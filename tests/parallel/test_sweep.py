@@ -58,7 +58,7 @@ def test_the_same_seeds_give_the_same_numbers(comm, shared_path):
 
 
 def test_groups_of_ranks_compute_every_case_once(comm, shared_path):
-    """As many cases at once as there are ranks: each is computed once, by one rank."""
+    """Compute as many cases at once as there are ranks: each once, by one rank."""
     table = swept(comm, shared_path, FRACTIONS, ranks_per_case=1)
     assert set(table.status) == {"done"} and set(table.outputs["ranks"]) == {1.0}
     times = {p: p.stat().st_mtime_ns for p in shared_path.glob("out/case-*/result.json")}

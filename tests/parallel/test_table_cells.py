@@ -51,7 +51,7 @@ def test_a_random_cell_from_its_table(comm, shared_path):
 
 @pytest.mark.quick
 def test_origin_units_and_order_do_not_matter(comm):
-    """Of fibres of two phases, which are numbered in the order of the rows."""
+    """Try fibres of two phases, numbered in the order of the rows."""
     arrangement = arrange(case_of(RANDOM).cell)
     names = np.array(["fibre", "fibre:2"])[np.arange(8) % 2]
     order = np.random.default_rng(1).permutation(8)

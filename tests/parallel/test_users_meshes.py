@@ -99,7 +99,7 @@ def test_the_result_says_how_far_nodes_were_snapped(comm: Any, shared_path: Path
 
 
 def test_turned_mesh_has_the_turned_stiffness(comm: Any, shared_path: Path) -> None:
-    """By a right angle: E11 is E22, and the couplings with the shear change their signs."""
+    """A turn by a right angle exchanges E11 and E22 and changes the signs of the couplings with the shear."""
     meshio = pytest.importorskip("meshio")
     one, two = shared_path / "one.msh", shared_path / "two.vtu"
     if comm.rank == 0:

@@ -85,7 +85,7 @@ def test_a_debonded_fibre_without_contact_is_a_void(comm, shared_path):
 
 
 @pytest.mark.parametrize("plane", ["stress", "generalized"])
-def test_files_are_certified_and_what_is_told_of_voids_is_checked(comm, shared_path, plane):
+def test_files_are_certified_and_what_is_reported_of_voids_is_checked(comm, shared_path, plane):
     write(comm, shared_path, voids=[0, 1], **RANDOM)
     out = shared_path / plane
     result = run(case_of(shared_path, plane=plane, order=2), comm, out=out)

@@ -1,4 +1,4 @@
-"""Effective moduli that are known exactly, from the moduli of the phases; plane strain unless said.
+"""Effective moduli that are known exactly, from the moduli of the phases; plane strain unless stated.
 
 Bulk modulus k = lambda + mu.  Materials are tables of the case file: young and poisson.
 """

@@ -73,7 +73,7 @@ class DenseDual:
         return sum(A @ S @ A.T for A, S in zip(self.scaled(active), self.S, strict=True))
 
     def scaled(self, active):
-        """Of each subdomain (total, n) B_D = W^-1 B D^-1, W = B D^-1 B^T, of the rows where `active` is true."""
+        """Return of each subdomain (total, n) B_D = W^-1 B D^-1, W = B D^-1 B^T, of the rows where `active` is true."""
         W = sum(B / d @ B.T for B, d in zip(self.B, self.D, strict=True))
         inverse = np.zeros_like(W)
         inverse[np.ix_(active, active)] = np.linalg.inv(W[np.ix_(active, active)])

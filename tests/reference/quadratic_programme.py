@@ -17,7 +17,7 @@ from scipy.sparse.linalg import splu
 
 from reference import monolithic
 
-MOST_DEPTHS = 8  # that places and depths are told apart by
+MOST_DEPTHS = 8  # by which places and depths are distinguished
 EXACT = 1e-9  # relative, of the KKT conditions of an answer
 
 
@@ -212,7 +212,7 @@ def nearest(points, centres, radii, size):
 def rigid_motions(rigid, T, held, C):
     """(free dofs, z) motions of the fibres that do not part what is held, and that no row of C resists.
 
-    They are of all `rigid` (n, c, fibres, m); `held` (h, c, fibres, m) says what is held; T (cn, free dofs) are the
+    They are of all `rigid` (n, c, fibres, m); `held` (h, c, fibres, m) are held; T (cn, free dofs) are the
     displacements of all nodes.
     """
     n, c, fibres, m = rigid.shape

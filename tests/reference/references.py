@@ -89,7 +89,7 @@ DEBONDED_FIBRE_BEM = {
 DEBONDED_FIBRE_FEM = {
     20: (0.2067, 0.1418), 40: (0.1163, 0.4800), 60: (0.0003, 0.6856), 80: (0.0, 0.6085), 100: (0.0, 0.3563),
 }  # fmt: skip
-# t: G / G0, whose modes need not be told apart.
+# t: G / G0, whose modes need not be distinguished.
 DEBONDED_FIBRE_TOTAL = {
     20: Reference((0.3487,), 4e-4, "own: quadratic elements, 150 000 dofs, cell of 80 radii; 160 radii agree"),
     40: Reference((0.5965,), 4e-4, "the same"),

@@ -55,14 +55,14 @@ def elements(corners, C, alpha, is_mixed):
 
 
 def is_isotropic(C):
-    """Whether a stiffness (6, 6) is that of an isotropic material."""
+    """Return whether a stiffness (6, 6) is that of an isotropic material."""
     expected = np.diag([2.0, 2, 2, 1, 1, 1]) * C[3, 3]
     expected[:3, :3] += C[0, 1]
     return np.allclose(C, expected, rtol=1e-12)
 
 
 class SpatialProgramme:
-    """The cell of parts; with `centres` and `radii` of round fibres it knows the interface nodes, sorted by `key`."""
+    """The cell of parts; with `centres` and `radii` of round fibres it has the interface nodes, sorted by `key`."""
 
     def __init__(self, parts, size, centres=(), radii=()):
         self.size = np.array(size)

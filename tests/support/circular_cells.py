@@ -1,4 +1,4 @@
-"""Cells of circular fibres as the geometry is told of them."""
+"""Cells of circular fibres as input of the geometry."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ BREAKING = {"geometry": "hexagonal", "mesh_size": 0.12, "refine": 1, "decomposit
 STRAINS = np.eye(3)
 # Of the largest eigenvalue and 1 / threshold.
 BOUND = 1.3
-# N may be told among subdomains in single precision.
+# Subdomains may exchange N in single precision.
 SINGLE = 2e-6
 
 

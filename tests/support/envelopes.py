@@ -31,7 +31,7 @@ ISOTROPIC = {"matrix": {"young": 88.0, "poisson": 0.299}, "fibre": {"young": 200
 
 
 def document(plane: str, interface: dict[str, Any], **sections: dict[str, Any]) -> dict[str, Any]:
-    """Return a small cell with these bonds; what `sections` say replaces what is here."""
+    """Return a small cell with these bonds; `sections` replace those here."""
     base = {
         "cell": {"geometry": "hexagonal", "fibre_fraction": 0.4, "mesh_size": 0.2},
         "material": ISOTROPIC,
@@ -78,7 +78,7 @@ def torn(comm: Any, plane: str, interface: dict[str, Any], **sections: Any) -> I
 
 
 def path_onset(cell: Any, strain: np.ndarray) -> tuple[float, np.ndarray]:
-    """How many times `strain` the first bond breaks at on a path from zero, and the stress there.  Collective."""
+    """Return the factor of `strain` at which the first bond of a path breaks, and the stress there.  Collective."""
     contact = cell.case.interface.contact
     interface = torn_cells.interface(cell, contact)
     status = np.where(cell.debonded(None), OPEN, 0).astype(np.int8)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 
 def held_ports(stack: ExitStack, number: int) -> list[int]:
-    """So many ports of the loopback on which nobody listens, this process's until the stack is closed.
+    """Return ports of the loopback without a listener, held by this process until the stack is closed.
 
     They are below those that the system gives to whoever asks for any; among tests, the name of a socket holds each.
     """

@@ -1,6 +1,6 @@
 """The command line with hooks: at a named call a rank fails, is killed or waits, and the test hears of it.
 
-Tests never guess when something happens.  A rank that has come somewhere tells so through a FIFO; what ends is waited
+Tests never guess when something happens.  A rank that has come somewhere reports it through a FIFO; what ends is waited
 for, to the last rank: the FIFO ends when no process has it open any more.
 """
 
@@ -32,8 +32,8 @@ class Hook:
 
     Attributes:
         place: "module:name" under which the function is called.
-        code: Python, which may use `args` of the call, `comm`, `tell(text)` to the test, `wait()` for its `release` or
-            for a signal, and `outlive(rank)`.
+        code: Python, which may use `args` of the call, `comm`, `report(text)` to the test, `wait()` for its `release`
+            or for a signal, and `outlive(rank)`.
         rank: all with None.
         call: at the which of its calls on this rank, from 1.
         when: which calls are counted, by `args`.
@@ -58,23 +58,23 @@ class HookedJob:
         from support.jobs import launched
 
         self._folder = Path(tempfile.mkdtemp())
-        for name in ("told", "release", *(f"rank-{rank}" for rank in range(max(ranks, 1)))):
+        for name in ("reported", "release", *(f"rank-{rank}" for rank in range(max(ranks, 1)))):
             os.mkfifo(self._folder / name)
         lives = [path for path in self._folder.iterdir() if path.name != "release"]
         self._ends = {path.name: os.open(path, os.O_RDONLY | os.O_NONBLOCK) for path in lives}
-        self._said = b""
+        self._received = b""
         program = [__file__, self._folder, json.dumps([asdict(hook) for hook in hooks]), *words]
-        own = os.open(self._folder / "told", os.O_WRONLY)  # the launcher's: it ends last
+        own = os.open(self._folder / "reported", os.O_WRONLY)  # the launcher's: it ends last
         texts = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
         self.process = launched(ranks, *program, pass_fds=(own,), **texts | options)
         os.close(own)
 
-    def told(self) -> str:
-        """Return the next that a rank tells: its number and the text, "here" of one that waits."""
-        while b"\n" not in self._said:
+    def reported(self) -> str:
+        """Return the next report: the number of its rank and the text, "here" of a rank that waits."""
+        while b"\n" not in self._received:
             if not self._read():
                 raise AssertionError(f"the job has ended before: {self.process.communicate()}")
-        line, _, self._said = self._said.partition(b"\n")
+        line, _, self._received = self._received.partition(b"\n")
         return line.decode()
 
     def release(self) -> None:
@@ -102,14 +102,14 @@ class HookedJob:
             pass
 
     def _read(self) -> bool:
-        """Wait for what ranks tell; False when no process is left that could."""
+        """Wait for a report; False when no process is left that could send one."""
         from support.jobs import PATIENCE
 
-        if not select.select([self._ends["told"]], [], [], PATIENCE)[0]:
-            raise TimeoutError("processes of the job neither tell anything nor end")
-        said = os.read(self._ends["told"], 4096)
-        self._said += said
-        return bool(said)
+        if not select.select([self._ends["reported"]], [], [], PATIENCE)[0]:
+            raise TimeoutError("processes of the job neither report anything nor end")
+        received = os.read(self._ends["reported"], 4096)
+        self._received += received
+        return bool(received)
 
     def __enter__(self) -> HookedJob:
         return self
@@ -175,20 +175,20 @@ def main(folder: str, hooks: str, *words: str) -> int:
     from feti_homog import api, cli
 
     def command(words: Sequence[str], comm: Any) -> int:
-        told = os.open(f"{folder}/told", os.O_WRONLY)
+        reported = os.open(f"{folder}/reported", os.O_WRONLY)
         os.open(f"{folder}/rank-{comm.rank}", os.O_WRONLY)  # to the end of this process
 
-        def tell(text: str) -> None:
-            os.write(told, f"{comm.rank} {text}\n".encode())
+        def report(text: str) -> None:
+            os.write(reported, f"{comm.rank} {text}\n".encode())
 
         def wait() -> None:
-            tell("here")
+            report("here")
             os.close(os.open(f"{folder}/release", os.O_RDONLY))
 
         def outlive(rank: int) -> None:
             Path(f"{folder}/rank-{rank}").read_bytes()
 
-        names = {"os": os, "signal": signal, "comm": comm, "tell": tell, "wait": wait, "outlive": outlive}
+        names = {"os": os, "signal": signal, "comm": comm, "report": report, "wait": wait, "outlive": outlive}
         for each in json.loads(hooks):
             _install(Hook(**each), comm, names)
         return cli._command(words, comm)

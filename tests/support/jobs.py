@@ -26,7 +26,7 @@ RUN_VARIABLES = {
 
 
 def environment() -> dict[str, str]:
-    """Of a job of its own: without what the launcher of these tests has set."""
+    """Return the environment of a separate job: without the variables of the launcher of these tests."""
     return {k: v for k, v in os.environ.items() if not k.startswith(LAUNCHER_VARIABLES)} | RUN_VARIABLES
 
 
@@ -37,7 +37,7 @@ def launched(ranks: int, *args: str | Path, cwd: Path = ROOT, **options: Any) ->
 
 
 def mpirun(ranks: int, *args: str | Path, cwd: Path = ROOT) -> subprocess.CompletedProcess[str]:
-    """As `launched`, to its end, with its output as text.
+    """Run `launched` to its end, with its output as text.
 
     Raises subprocess.TimeoutExpired if it takes longer than PATIENCE; nothing is left running.
     """

@@ -90,7 +90,7 @@ class LoadedTwin:
 
     @property
     def loads(self):
-        """Those of the case, in full."""
+        """Return the loads of the case, in full."""
         return [MixedLoad.named(target) for target in self.case.targets]
 
     @property
@@ -154,7 +154,7 @@ def relative(found, expected):
 
 
 def is_end(point, legs):
-    """Whether a leg ends at a point."""
+    """Return whether a leg ends at a point."""
     return any(abs(point.load_factor * legs - k) < 1e-12 for k in range(1, legs + 1))
 
 

@@ -69,7 +69,7 @@ class NotStartedError(Exception):
 
 @dataclass(frozen=True)
 class Job:
-    """A job, or a task of an array: its state and exit code as SLURM tells them."""
+    """A job, or a task of an array: its state and exit code as SLURM reports them."""
 
     state: str
     code: int
@@ -134,7 +134,7 @@ def wait(reached: Callable[[], bool], seconds: float, complaint: str) -> None:
 def one_node_slurm() -> Iterator[OneNodeSlurm]:
     """Set up, and taken down with all its jobs, also if something fails.
 
-    Raises NotStartedError with what the daemons say of their errors.
+    Raises NotStartedError with the errors that the daemons report.
     """
     folder = Path(tempfile.mkdtemp(prefix="slurm-", dir="/tmp"))  # short, as names of sockets must be
     slurm = OneNodeSlurm(folder)
@@ -190,8 +190,8 @@ def _await_start(reached: Callable[[], bool], folder: Path) -> None:
         wait(reached, STARTED_S, "it does not start")
     except TimeoutError as error:
         logs = [path.read_text() for path in sorted(folder.glob("*.out"))]
-        said = [line for log in logs for line in log.splitlines() if re.search("error|fatal", line, re.IGNORECASE)]
-        raise NotStartedError("; ".join([str(error), *said[-3:]])) from None
+        errors = [line for log in logs for line in log.splitlines() if re.search("error|fatal", line, re.IGNORECASE)]
+        raise NotStartedError("; ".join([str(error), *errors[-3:]])) from None
 
 
 def _cancel(slurm: OneNodeSlurm) -> None:

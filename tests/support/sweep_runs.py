@@ -15,7 +15,7 @@ def results(out: Path) -> dict[str, int]:
 
 
 def contents(out: Path) -> dict[Path, bytes]:
-    """Of all files but the locks."""
+    """Return the contents of all files but the locks."""
     return {path: path.read_bytes() for path in out.rglob("*") if path.is_file() and "lock" not in path.name}
 
 

@@ -1,4 +1,4 @@
-"""What VTK's reader of XDMF makes of a file: the states, each with its mesh and all of its arrays."""
+"""States of a file by VTK's reader of XDMF, each with its mesh and all of its arrays."""
 
 from __future__ import annotations
 

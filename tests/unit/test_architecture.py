@@ -264,7 +264,7 @@ def test_defaults_are_immutable():
 
 
 def test_tests_replace_no_constants():
-    """What a test varies is an argument: monkeypatch leaves names in capitals alone."""
+    """Tests vary arguments: monkeypatch leaves names in capitals alone."""
     found = [
         place(path, call)
         for path in sources("tests")
@@ -277,7 +277,7 @@ def test_tests_replace_no_constants():
 
 
 def is_known(name: str) -> bool:
-    """Whether a dotted name begins with a module of the package and goes on with a word that it has."""
+    """Return whether a dotted name begins with a module of the package and goes on with a word that it has."""
     place, words = PACKAGE, name.split(".")[1:]
     while words and ((place / words[0]).is_dir() or (place / f"{words[0]}.py").is_file()):
         place = place / words[0] if (place / words[0]).is_dir() else place / f"{words[0]}.py"

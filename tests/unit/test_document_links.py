@@ -1,4 +1,4 @@
-"""What the documents name exists: links, files, modules, commands, case files; and their recipe for a mesh works."""
+"""Links, files, modules, commands and case files of the documents exist; their recipe for a mesh works."""
 
 from __future__ import annotations
 

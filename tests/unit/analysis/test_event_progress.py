@@ -10,14 +10,14 @@ from feti_homog.runtime.progress import Progress
 
 
 class Words(Progress):
-    """Keeps what is said."""
+    """Keeps the lines."""
 
     def __init__(self, on_terminal=False):
         super().__init__(MPI.COMM_SELF, quiet=True)
-        self.said, self.on_terminal = [], on_terminal
+        self.lines, self.on_terminal = [], on_terminal
 
     def say(self, line):
-        self.said.append(line)
+        self.lines.append(line)
 
 
 class Clock:
@@ -28,44 +28,50 @@ class Clock:
         return self.now
 
 
-def told(steps, urgent=(), count=10):
+def shown_lines(steps, urgent=(), count=10):
     """Return the printed lines of events of so many seconds each."""
     progress, clock = Words(), Clock()
     with EventProgress(progress, EVENTS_BAR, "the log", clock) as shown:
         for number in range(count):
             clock.now += steps
-            shown.tell(f"event {number}", urgent=number in urgent)
-    return progress.said
+            shown.report(f"event {number}", urgent=number in urgent)
+    return progress.lines
 
 
 def test_events_of_more_than_a_second_each_have_a_line():
-    assert told(1.5) == [f"event {number}" for number in range(10)]
+    assert shown_lines(1.5) == [f"event {number}" for number in range(10)]
 
 
-def test_of_quick_events_the_first_and_the_last_are_told():
-    assert told(0.01) == ["event 0", "event 9", "  8 more events are in the log"]
+def test_of_quick_events_the_first_and_the_last_are_reported():
+    assert shown_lines(0.01) == ["event 0", "event 9", "  8 more events are in the log"]
 
 
 def test_a_line_a_second():
-    assert told(0.26) == ["event 0", "event 4", "event 8", "event 9", "  6 more events are in the log"]
+    assert shown_lines(0.26) == ["event 0", "event 4", "event 8", "event 9", "  6 more events are in the log"]
 
 
-def test_faults_are_always_told():
-    assert told(0.01, urgent=(3, 4)) == ["event 0", "event 3", "event 4", "event 9", "  6 more events are in the log"]
+def test_faults_are_always_reported():
+    assert shown_lines(0.01, urgent=(3, 4)) == [
+        "event 0",
+        "event 3",
+        "event 4",
+        "event 9",
+        "  6 more events are in the log",
+    ]
 
 
 @pytest.mark.parametrize("count", [0, 1, 2])
 def test_few_events(count):
-    assert told(0.01, count=count) == [f"event {number}" for number in range(count)]
+    assert shown_lines(0.01, count=count) == [f"event {number}" for number in range(count)]
 
 
-def test_the_last_line_is_told_when_the_path_fails():
+def test_the_last_line_is_reported_when_the_path_fails():
     progress = Words()
     with pytest.raises(ValueError), EventProgress(progress, EVENTS_BAR, "the log", Clock()) as shown:
         for number in range(3):
-            shown.tell(f"event {number}", urgent=False)
+            shown.report(f"event {number}", urgent=False)
         raise ValueError
-    assert progress.said == ["event 0", "event 2", "  1 more event is in the log"]
+    assert progress.lines == ["event 0", "event 2", "  1 more event is in the log"]
 
 
 @pytest.mark.parametrize(("layout", "left"), [(EVENTS_BAR, False), (STEPS_BAR, True)])

@@ -1,4 +1,4 @@
-"""What a run leaves when it ends early: the torn cell and the results folder."""
+"""The torn cell and the results folder after a run that ends early."""
 
 from __future__ import annotations
 

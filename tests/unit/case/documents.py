@@ -130,7 +130,7 @@ def paths(draw: st.DrawFn, plane: str, expand: bool) -> dict[str, Any]:
 
 
 def is_new(load: Any, before: Sequence[Any]) -> bool:
-    """Whether a load surely differs from the last: it has a value that none has had yet."""
+    """Return whether a load surely differs from the last: it has a value that none has had yet."""
     values = load.values() if isinstance(load, dict) else load
     had = {value for each in before for value in (each.values() if isinstance(each, dict) else each)}
     return not had.issuperset({*values} - {0.0})
@@ -210,7 +210,7 @@ JUNK = (-1, 0, 1, 0.5, 1e200, True, "x", "all", "inf", math.inf, [], {}, [1, 2],
 
 @st.composite
 def changed_documents(draw: st.DrawFn, sources: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """One of some documents, in a few places changed: keys and sections removed, faulty, or those of another one."""
+    """Draw a document and change it in a few places: keys and sections removed, faulty, or those of another one."""
     document = copy.deepcopy(draw(st.sampled_from(sources)))
     for _ in range(draw(st.integers(1, 3))):
         other = draw(st.sampled_from(sources))
@@ -249,7 +249,7 @@ def with_numpy_values(value: Any) -> Any:
 
 
 def _is_numeric(value: Any) -> bool:
-    """Whether it is a list, nested to any depth, of numbers of one type."""
+    """Return whether a value is a list, nested to any depth, of numbers of one type."""
     if isinstance(value, list):
         return len({type(entry) for entry in value}) == 1 and all(map(_is_numeric, value))
     return isinstance(value, int | float)

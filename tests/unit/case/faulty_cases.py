@@ -1,4 +1,4 @@
-"""Case files with one fault each (or as many as said), and what must be said of it."""
+"""Case files with one fault each (or as many as stated), and the line that must report it."""
 
 from __future__ import annotations
 

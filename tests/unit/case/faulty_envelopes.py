@@ -1,4 +1,4 @@
-"""Case files with faults of envelopes, and what must be said of them."""
+"""Case files with faults of envelopes, and the lines that must report them."""
 
 from __future__ import annotations
 

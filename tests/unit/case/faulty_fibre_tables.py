@@ -1,4 +1,4 @@
-"""Tables of fibres with one fault each, and the line that says so."""
+"""Tables of fibres with one fault each, and the line that reports it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Case files with a fault in their materials, and what must be said of it."""
+"""Case files with a fault in their materials, and the line that must report it."""
 
 from __future__ import annotations
 

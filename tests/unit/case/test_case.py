@@ -62,7 +62,7 @@ def test_keys_that_are_left_out_have_their_defaults(tmp_path):
 
 
 @pytest.mark.parametrize("name", FAULTY)
-def test_faults_are_told_by_section_and_key(tmp_path, name):
+def test_faults_are_reported_by_section_and_key(tmp_path, name):
     content, expected = FAULTY[name]
     with pytest.raises(CaseError) as caught:
         case_of(tmp_path, content)
@@ -87,17 +87,17 @@ def test_there_are_enough_faulty_cases():
     assert len(FAULTY) == sum(map(len, (*parts, FAULTY_COHESIVE_LAWS))) >= 100
 
 
-def test_a_missing_file_is_told(tmp_path):
+def test_a_missing_file_is_reported(tmp_path):
     with pytest.raises(CaseError, match=r"none\.toml: cannot be read: No such file"):
         load(tmp_path / "none.toml")
 
 
-def test_a_folder_in_the_place_of_a_file_is_told(tmp_path):
+def test_a_folder_in_the_place_of_a_file_is_reported(tmp_path):
     with pytest.raises(CaseError, match="cannot be read: Is a directory"):
         load(tmp_path)
 
 
-def test_a_file_that_is_not_utf8_is_told(tmp_path):
+def test_a_file_that_is_not_utf8_is_reported(tmp_path):
     path = tmp_path / "cell.toml"
     path.write_bytes(BASE.encode() + "# Zelle für Stoß\n".encode("latin-1"))
     with pytest.raises(CaseError, match=r"not UTF-8 text \(line 17\)"):

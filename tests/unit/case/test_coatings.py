@@ -1,4 +1,4 @@
-"""What a case says of coatings, and what is wrong with it."""
+"""Coatings in a case file, and their faults."""
 
 from __future__ import annotations
 

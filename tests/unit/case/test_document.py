@@ -1,4 +1,4 @@
-"""What `Case.parse` takes besides TOML's values, and what it says of the rest."""
+"""Values that `Case.parse` takes besides those of TOML, and its lines about others."""
 
 from __future__ import annotations
 

@@ -143,7 +143,7 @@ def test_a_size_of_elements_is_that_after_refinement(geometry, size):
 
 @pytest.mark.parametrize("geometry", ["square", "random"])
 def test_a_size_of_elements_is_met_within_a_fifth(geometry):
-    """By the side of equilateral triangles of the mean area, which tells sizes of a mesh study apart."""
+    """Compare the side of equilateral triangles of the mean area, which separates the sizes of a mesh study."""
     for size in (0.02, 0.012):
         cell = case_of(geometry=geometry, element_size=size).cell
         mesh = generate(cell)

@@ -57,7 +57,7 @@ def test_each_fault_is_one_line_with_its_row(name, tmp_path):
     assert len(error.value.faults) == 1 and error.value.faults[0].startswith(line)
 
 
-def test_all_faults_are_told_and_many_are_counted(tmp_path):
+def test_all_faults_are_reported_and_many_are_counted(tmp_path):
     with pytest.raises(CaseError) as error:
         fibres(tmp_path / "t.csv", HEAD + "1,here,-3\n" * 100)
     assert len(error.value.faults) == MOST_FAULTS + 1
@@ -65,7 +65,7 @@ def test_all_faults_are_told_and_many_are_counted(tmp_path):
     assert error.value.faults[-1] == "170 more faults"
 
 
-def test_a_file_that_is_not_there_is_told(tmp_path):
+def test_a_file_that_is_not_there_is_reported(tmp_path):
     with pytest.raises(CaseError, match=r"none.csv: cannot be read: No such file"):
         read_table(tmp_path / "none.csv")
 

@@ -132,7 +132,7 @@ SOURCES += [{**each, "interface": [each["interface"]]} for each in SOURCES if "i
 @settings(deadline=None, max_examples=max(300, settings.default.max_examples))
 @given(changed_documents(SOURCES))
 def test_documents_are_valid_if_and_only_if_the_reader_takes_them(document):
-    """Of what a schema can state; `--hypothesis-profile=search` tries 2 000."""
+    """Compare all that a schema can state; `--hypothesis-profile=search` tries 2 000."""
     refused = reader_faults(document)
     is_valid = VALIDATOR.is_valid(document)
     assert is_valid or refused, document
@@ -156,7 +156,7 @@ def test_meshes_of_all_formats_are_valid(suffix):
     assert not faults(VALID_CASES["mesh of three phases"].replace("cell.msh", f"cell.{suffix}"))
 
 
-def test_a_missing_file_is_told_beside_other_faults():
+def test_a_missing_file_is_reported_beside_other_faults():
     content = VALID_CASES["mesh of three phases"].replace('file = "cell.msh"', "order = 3")
     found = reader_faults(tomllib.loads(content))
     assert len(found) == 2 and "[cell] file: missing" in found[1] and "[cell] order = 3" in found[0]

@@ -42,7 +42,7 @@ def test_limits_in_words_are_the_true_ones(name):
         assert type_.accepts(limit) == (word in ("at least", "at most"))
         assert not type_.accepts(beside(limit, is_integer, outward))
         inward = beside(limit, is_integer, -outward)
-        # Next to 0 the limits of magnitudes hold, and are told of.
+        # Next to 0 the limits of magnitudes hold, and are reported.
         assert type_.accepts(inward) or type_.complaint(inward).endswith(MAGNITUDES)
     words = {word for word, _ in limits}
     for end, named in ((-LARGEST, {"above", "at least"}), (LARGEST, {"below", "at most"})):
@@ -52,7 +52,7 @@ def test_limits_in_words_are_the_true_ones(name):
 
 
 @pytest.mark.parametrize("value", [SMALLEST / 2, -SMALLEST / 2, LARGEST * 2, -LARGEST * 2, math.inf, 10**400])
-def test_limits_of_magnitudes_are_told_where_they_are_what_is_wrong(value):
+def test_limits_of_magnitudes_are_reported_where_they_are_what_is_wrong(value):
     assert real().complaint(value) == f"expected a number{MAGNITUDES}"
     assert STRAIN.complaint([0.0, value, 0.0]).endswith(MAGNITUDES)
     assert WAYPOINTS.complaint([[1.0, 0.0, 0.0], [0.0, value, 0.0]]).endswith(MAGNITUDES)

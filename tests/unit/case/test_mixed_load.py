@@ -29,7 +29,7 @@ def path(waypoints: str, plane: str = "strain") -> Case:
 
 
 def last_named(waypoints: list[MixedLoad], names: tuple[str, ...], default: tuple[str, float]) -> tuple[str, float]:
-    """Which of some names is given last by waypoints, and its value: searched from the end."""
+    """Return the name that waypoints give last, and its value: searched from the end."""
     found = [(name, each.named[name]) for each in reversed(waypoints) for name in names if name in each.named]
     return found[0] if found else default
 
@@ -93,7 +93,7 @@ def test_a_strain_is_a_table_of_its_components(plane):
     assert by_table.remarks() == by_strain.remarks() == ()
 
 
-def test_what_is_free_of_stress_is_told():
+def test_what_is_free_of_stress_is_reported():
     assert path("[{S11 = 60}]").remarks() == ("[path] S22, S12: never named: stress-free",)
     assert path("[{S11 = 60}, {gamma12 = 0.1}, {S12 = 0, E11 = 0}, [0, 0, 1]]").remarks() == (
         "[path] S12: stress-free until waypoints[1]",

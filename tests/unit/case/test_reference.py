@@ -1,4 +1,4 @@
-"""The reference of the case file: nothing is left out, and every key says what it means."""
+"""The reference of the case file: nothing is left out, and every key is explained."""
 
 from __future__ import annotations
 

@@ -107,7 +107,7 @@ TOUCHING = "x,y,r\n2,2,1\n3.995,2,1\n6,4,0.5\n"
 
 
 def test_small_overlaps_are_repaired_where_that_is_asked_for(tmp_path):
-    """By 0.005, of radii of 1."""
+    """Radii of 1 overlap by 0.005."""
     with pytest.raises(MeshError, match=r'rows 3 and 4: overlap by 0\.005; repair = "overlaps" makes them smaller'):
         table_arrangement(case(tmp_path / "t.csv", SIZE + TOUCHING).cell)
     found = table_arrangement(case(tmp_path / "t.csv", SIZE + TOUCHING, repair="overlaps").cell)

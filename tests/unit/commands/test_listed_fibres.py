@@ -88,7 +88,7 @@ def test_the_table_of_ellipses_gives_the_cell(of, tmp_path):
 
 
 def test_ellipses_of_a_users_mesh_are_found(tmp_path):
-    """Of 0.4 x 0.3 beside a disc, as meshes/README.md says."""
+    """Find an ellipse of 0.4 x 0.3 beside a disc, as in meshes/README.md."""
     rows = listed_fibres.table(Path(__file__).parents[3] / "drivers" / "two_fibres.toml")
     (tmp_path / "t.csv").write_text(rows)
     table = read_table(tmp_path / "t.csv")
@@ -109,7 +109,7 @@ def test_the_table_of_a_users_mesh_has_its_round_fibres(tmp_path):
 
 
 def test_sides_of_a_users_mesh_are_snapped(tmp_path):
-    """The table is that of the mesh whose sides match, once the case says that they are to be moved."""
+    """The table is that of the mesh whose sides match, once the case asks for it."""
     polar_cell((0.5, 0.5), 0.3, tmp_path / "cell.msh")
     source = case_of(tmp_path / "case.toml", 'geometry = "mesh"\nfile = "cell.msh"\n')
     source.write_text(source.read_text().replace("mesh_size = 0.05\n", ""))
@@ -121,7 +121,7 @@ def test_sides_of_a_users_mesh_are_snapped(tmp_path):
         node = np.flatnonzero((x == 1.0) & (np.abs(y - 0.5) < 0.4))[0]
         gmsh.model.mesh.setNode(tags[node], [1.0, y[node] + 2e-4, 0.0], [])
         gmsh.write(str(tmp_path / "cell.msh"))
-    # What gmsh knows of periodic curves would move the node back.
+    # Periodic curves of gmsh would move the node back.
     (tmp_path / "cell.msh").write_text((tmp_path / "cell.msh").read_text().partition("$Periodic")[0])
     with pytest.raises(MeshError, match="not periodic"):
         listed_fibres.table(source)

@@ -1,4 +1,4 @@
-"""What makes the parts of the solver."""
+"""Making the parts of the solver."""
 
 from __future__ import annotations
 

@@ -72,8 +72,8 @@ def test_a_window_is_made_periodic(seed):
     fibres = table(centres, radii, size.tolist(), (0.0, 0.0))
     arrangement = arrange(Cell(geometry="table", table=fibres, window="cut"))
     assert smallest_gap(arrangement) > 0
-    rows, told = moved_rows(fibres)
-    assert np.array_equal(told, far[rows - 1]) and len(rows) < 0.7 * len(radii)
+    rows, listed = moved_rows(fibres)
+    assert np.array_equal(listed, far[rows - 1]) and len(rows) < 0.7 * len(radii)
     assert far[np.setdiff1d(np.arange(len(radii)), rows - 1)].max() < 1e-6 * radii.mean()
     assert far.max() < 1.1 * radii.max()
 
@@ -95,7 +95,7 @@ def test_no_smaller_moves_are_near(seed):
         assert gap(np.where(np.arange(len(radii))[:, None] == k, 0.5 * moved, moved)) < gap(moved)
 
 
-def test_no_room_is_told():
+def test_no_room_is_reported():
     """In a cell of 0.62 x 0.43 two discs are at most 0.38 apart; they need 0.42."""
     fibres = table([[0.1, 0.2], [0.53, 0.2]], [0.21, 0.21], (0.62, 0.43), (0.0, 0.0))
     with pytest.raises(MeshError, match=r'window = "cut": fibres overlap across the border, and there is no room'):

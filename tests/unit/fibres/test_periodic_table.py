@@ -129,7 +129,7 @@ def test_faults_name_the_rows(name):
     assert len(error.value.faults) == (2 if across else 1)
 
 
-def test_every_overlap_is_told_until_there_are_many():
+def test_every_overlap_is_reported_until_there_are_many():
     centres = np.stack([np.arange(50) / 50, np.full(50, 0.5)], axis=1)
     with pytest.raises(MeshError) as error:
         arrange(cell_of(table(centres, np.full(50, 0.011), (1.0, 1.0))))

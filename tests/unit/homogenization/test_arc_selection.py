@@ -1,4 +1,4 @@
-"""How fine meshes are at tips by default: as fine as the rest is accurate, and no finer than many tips allow."""
+"""Default sizes of elements at tips: as fine as the rest is accurate, and no finer than many tips allow."""
 
 from __future__ import annotations
 

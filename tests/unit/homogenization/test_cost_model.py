@@ -87,7 +87,7 @@ def test_the_size_of_result_h5_is_that_of_its_tables(plane):
     assert own.tolist() == list(per_row.values())
 
 
-def test_kept_states_are_told():
+def test_kept_states_are_reported():
     case = make_case(plane="generalized")
     assert "6 states of 6.1 MiB, 41 MiB in" in cost_model.fields_line(case, 50_000, 100_000, 0, 1)
     path = replace(case, analysis=replace(case.analysis, type="path"), path=LoadPath(to={"E11": 1.0}))

@@ -1,4 +1,4 @@
-"""Nodes that never part: what a run and `feti-homog check` say of them, and arcs that select no other."""
+"""Nodes that never part: remarks of a run and of `feti-homog check`, and arcs that select no other."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_they_are_remarked_where_there_are_interfaces(tmp_path: Path, image: np.
     assert run(debonding, MPI.COMM_SELF).remarks == (remark,) and run(bonded, MPI.COMM_SELF).remarks == ()
 
 
-def test_they_are_told_by_the_log(tmp_path: Path, capfd: Any) -> None:
+def test_they_are_reported_by_the_log(tmp_path: Path, capfd: Any) -> None:
     case = case_of(tmp_path, BRANCHES, interface={"normal_stiffness": 1.0})
     assemble_subdomains(case, MPI.COMM_SELF, Progress(MPI.COMM_SELF, quiet=False))
     assert f"remark: {TOUCHES}" in "".join(capfd.readouterr())
@@ -58,8 +58,8 @@ def test_a_bond_that_holds_the_cell_is_remarked(tmp_path: Path, phases: str, pin
         "analysis": {"type": "stiffness", "plane": "strain"},
         "interface": {"normal_stiffness": 1.0},
     }
-    told = describe(Case.parse(document, tmp_path), MPI.COMM_SELF)
-    assert ("never parts: it holds the cell" in told) == pinned
+    described = describe(Case.parse(document, tmp_path), MPI.COMM_SELF)
+    assert ("never parts: it holds the cell" in described) == pinned
 
 
 def test_an_arc_that_selects_no_other_node_is_faulty(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Which cells are cut across materials, and into how many pieces."""
+"""Cells that are cut across materials, and their numbers of pieces."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `feti-homog check` says of components that no load names."""
+"""Remarks of `feti-homog check` on components that no load names."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_check_tells_what_is_free_of_stress(name, expected):
 
 
 @pytest.mark.parametrize("fraction", [None, 0.3])
-def test_another_fraction_than_that_of_a_matched_table_is_told(fraction):
+def test_another_fraction_than_that_of_a_matched_table_is_reported(fraction):
     content = tomllib.loads((ROOT / "drivers/matched.toml").read_text(encoding="utf-8"))
     del content["sweep"]
     if fraction is not None:
@@ -88,8 +88,8 @@ def test_another_number_of_subdomains_than_asked_for_is_remarked(asked, words):
     case = Case.parse(content | {"decomposition": {"subdomains": asked}})
     lines = describe(case, MPI.COMM_SELF).splitlines()
     result = run(case, MPI.COMM_SELF)
-    told = [line for line in lines if line.startswith("remark     [decomposition]")]
-    assert [line.removeprefix("remark     ") for line in told] == [r for r in result.remarks if "[decomp" in r]
-    assert len(told) == (words is not None)
-    for line in told:
+    found = [line for line in lines if line.startswith("remark     [decomposition]")]
+    assert [line.removeprefix("remark     ") for line in found] == [r for r in result.remarks if "[decomp" in r]
+    assert len(found) == (words is not None)
+    for line in found:
         assert int(re.search(f"subdomains = {asked}: {words}$", line)[1]) == result.solver.subdomains != asked

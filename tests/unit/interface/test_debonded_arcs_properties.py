@@ -20,7 +20,7 @@ NODES = st.lists(st.tuples(st.integers(1, FIBRES), HALVES), max_size=20)
 
 
 def is_within(arc, opening, fibre, angle):
-    """Whether a node is within the open arc, after any number of full turns."""
+    """Return whether a node is within the open arc, after any number of full turns."""
     if arc.fibre != "all" and fibre not in arc.fibre:
         return False
     whole = opening if arc.angle is None else arc.angle

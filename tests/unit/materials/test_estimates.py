@@ -34,7 +34,7 @@ every_pair = pytest.mark.parametrize(("matrix", "fibre"), PAIRS)
 every_composite = pytest.mark.parametrize("composite", HEXAGONAL.values(), ids=HEXAGONAL.keys())
 
 
-def said(estimate):
+def given(estimate):
     """Return the values of an estimate by name."""
     return {name: value for name, value in dataclasses.asdict(estimate).items() if value is not None}
 
@@ -47,14 +47,14 @@ def of(constants, names):
 @pytest.mark.parametrize("name", METHODS)
 def test_no_fibres_are_the_matrix_and_all_fibres_the_fibre(name, matrix, fibre):
     for fraction, phase in ((0.0, matrix), (1.0, fibre)):
-        found = said(METHODS[name](matrix, [Fibres(fraction, fibre)]))
+        found = given(METHODS[name](matrix, [Fibres(fraction, fibre)]))
         assert found == pytest.approx(of(phase, found), rel=1e-9, abs=1e-12)
 
 
 @pytest.mark.parametrize("phase", [ANISOTROPIC_MATRIX, CARBON, GLASS])
 @pytest.mark.parametrize("name", METHODS)
 def test_fibres_like_the_matrix_make_the_matrix(name, phase):
-    found = said(METHODS[name](phase, [Fibres(0.4, phase)]))
+    found = given(METHODS[name](phase, [Fibres(0.4, phase)]))
     if name == "chamis":  # whose transverse expansion of the matrix between rigid fibres is not that of free ones
         del found["expansion_transverse"]
     assert found == pytest.approx(of(phase, found), rel=1e-12)
@@ -175,7 +175,7 @@ def test_bounds_of_three_phases_lie_within_those_of_uniform_fields():
 def test_few_fibres_do_the_same_by_all_three_theories(matrix, fibre):
     c = 1e-5
     slopes = [
-        {k: (v - getattr(matrix, k)) / c for k, v in said(METHODS[name](matrix, [Fibres(c, fibre)])).items()}
+        {k: (v - getattr(matrix, k)) / c for k, v in given(METHODS[name](matrix, [Fibres(c, fibre)])).items()}
         for name in ("mori_tanaka", "self_consistent", "composite_cylinders")
     ]
     assert slopes[1] == pytest.approx(slopes[0], rel=1e-3)
@@ -245,13 +245,13 @@ def test_equal_families_are_one():
     one = vars(estimates(EPOXY, [Fibres(0.6, CARBON)]))
     two = vars(estimates(EPOXY, [Fibres(0.2, CARBON), Fibres(0.4, CARBON)]))
     for name in ("rule_of_mixtures", "mori_tanaka"):
-        assert said(two[name]) == pytest.approx(said(one[name]), rel=1e-12)
+        assert given(two[name]) == pytest.approx(given(one[name]), rel=1e-12)
 
 
 def test_methods_of_one_kind_of_fibres_say_nothing_of_two():
     found = vars(estimates(EPOXY, [Fibres(0.3, CARBON), Fibres(0.2, GLASS)]))
     assert [name for name, estimate in found.items() if estimate != NOTHING] == ["rule_of_mixtures", "mori_tanaka"]
-    assert said(found["mori_tanaka"]).keys() == set(CONSTANTS)
+    assert given(found["mori_tanaka"]).keys() == set(CONSTANTS)
 
 
 def test_rules_of_engineers_say_nothing_of_springs():

@@ -42,13 +42,13 @@ every_bond = pytest.mark.parametrize("springs", BONDS.values(), ids=BONDS.keys()
 
 
 def compliances(springs, radius):
-    """Of the springs, for a fibre of another radius that has the same stiffness times radius."""
+    """Return the compliances of the springs of a fibre of another radius with the same stiffness times radius."""
     if springs is None:
         return 0.0, 0.0, 0.0
     return tuple(radius / (k * springs.radius) for k in (springs.normal, springs.tangential, springs.axial))
 
 
-def said(estimate):
+def given(estimate):
     """Return the values of an estimate by name."""
     return {name: value for name, value in dataclasses.asdict(estimate).items() if value is not None}
 
@@ -154,10 +154,10 @@ def test_mori_tanaka_is_that_of_eshelbys_tensor_for_two_kinds_of_fibres():
 @every_pair
 def test_stiff_springs_are_bonds(matrix, fibre):
     for name in ("mori_tanaka", "composite_cylinders", "self_consistent"):
-        bonded = said(METHODS[name](matrix, [Fibres(0.5, fibre)]))
+        bonded = given(METHODS[name](matrix, [Fibres(0.5, fibre)]))
         for stiffness, tolerance in ((1e12, 1e-9), (math.inf, 1e-14)):
             springs = Springs(stiffness, stiffness, stiffness, 0.3)
-            found = said(METHODS[name](matrix, [Fibres(0.5, fibre, springs)]))
+            found = given(METHODS[name](matrix, [Fibres(0.5, fibre, springs)]))
             assert found == pytest.approx(bonded, rel=tolerance)
 
 

@@ -70,7 +70,7 @@ def test_thin_coatings_of_thin_ellipses_have_good_elements():
     body_areas(mesh)
 
 
-def test_coatings_that_overlap_are_told():
+def test_coatings_that_overlap_are_reported():
     """The second lies above the first, 0.05 apart; coatings of a tenth of 0.2 are 0.02 thick each."""
     rows = [{"x": 0.5, "y": y, "a": 0.4, "b": 0.1} for y in (0.3, 0.55)]
     arrange(cell_of(table([row | {"coating": 0.1} for row in rows])))

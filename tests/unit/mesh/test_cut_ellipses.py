@@ -18,7 +18,7 @@ SIZE = np.array([1.0, 1.0])
 
 
 def smallest_gap(ellipses, size=SIZE):
-    """Of all pairs of images on the torus / sum of the radii of their areas."""
+    """Return the smallest gap of all pairs of images on the torus / sum of the radii of their areas."""
     first, second, vector = neighbours(ellipses.centres, size, 2.5 * ellipses.longest.max())
     other = Ellipses(ellipses.centres[first] + vector, ellipses.frames[second])
     radii = np.sqrt(np.abs(np.linalg.det(ellipses.frames)))
@@ -47,7 +47,7 @@ def test_ellipses_that_are_discs_move_like_discs():
 
 
 def test_two_flat_ones_share_the_move_across():
-    """They lie along the side, which they overlap by 0.02, and move away from it to the largest gap."""
+    """Two ellipses lie along the side, which they overlap by 0.02, and move away from it to the largest gap."""
     a, b = 0.2, 0.05
     own = Ellipses.of(np.array([[0.5, 0.04], [0.5, 0.96]]), np.full(2, a), np.full(2, b), np.zeros(2))
     radius = np.sqrt(a * b)

@@ -137,7 +137,7 @@ def test_faults_of_places(tmp_path, rows, fault):
     assert any(fault in line for line in caught.value.faults)
 
 
-def test_too_many_voids_are_told():
+def test_too_many_voids_are_reported():
     with pytest.raises(MeshError, match=r"fibre_fraction = 0.5, voids = 0.4 with min_gap = 0.05 and fibres = 16"):
         arrange(circular(fraction=0.5, gap=0.05, voids=0.4))
 

@@ -1,4 +1,4 @@
-"""Which of two bodies is the inner one, and whose number a coating has."""
+"""The inner one of two bodies, and the number of a coating."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_a_coating_without_a_fibre_is_a_fibre(tmp_path):
         (["matrix", "fibre"], "expected phases that touch"),
     ],
 )
-def test_pairs_that_the_cell_does_not_have_are_told(coated, pair, words):
+def test_pairs_that_the_cell_does_not_have_are_reported(coated, pair, words):
     case = Case.parse(document({"normal_strength": 1.0, "between": pair}))
     (fault,) = cell_remarks.faults(case, coated.phases, *(coated.phase[each] for each in Torus.of(coated).sides[:2]))
     assert fault.startswith("[interface] between = [") and words in fault

@@ -236,7 +236,7 @@ def test_sides_that_nearly_match_are_snapped(mesh, tmp_path):
         assert np.array_equal(low[:, 1 - axis], high[:, 1 - axis]) and len(low) == 5
 
 
-def test_what_is_farther_than_the_tolerance_is_told(tmp_path):
+def test_what_is_farther_than_the_tolerance_is_reported(tmp_path):
     path = written(grid().moved(**{f"n{node(4, 2)}": (1.0, 0.51)}), tmp_path / "rough.msh")
     with pytest.raises(MeshError, match=r"node 15 \(1, 0.51\), expected at \(0, 0.51\)"):
         read(path, snap=1e-3)

@@ -55,7 +55,7 @@ def periodic_grids(draw):
 
 
 def same_parts(one, other):
-    """Whether two labellings divide things into the same parts."""
+    """Return whether two labellings divide things into the same parts."""
     pairs = np.unique(np.stack([one, other]), axis=1).shape[1]
     return pairs == len(np.unique(one)) == len(np.unique(other))
 

@@ -50,7 +50,7 @@ def polygon(x, y, sides, radius, rounding=0.0, angle=0.0):
 
 
 def gap_between(*rows):
-    """Of two outlines that are a row each."""
+    """Return the gap between two outlines of a row each."""
     outlines = outlines_of({name: np.concatenate([row[name] for row in rows]) for name in rows[0]})
     vector = np.diff(outlines.centres, axis=0)
     normal, reach = outlines.parting(np.array([0]), np.array([1]), vector)

@@ -39,7 +39,7 @@ def test_few_edges_are_a_circle_if_their_middle_nodes_are_on_it(tmp_path):
 
 
 def test_straight_edges_stay_straight(tmp_path):
-    """Corners on a circle are no circle if the middle nodes say that the sides are straight."""
+    """Corners on a circle are no circle if by the middle nodes the sides are straight."""
     ring = [(2 + 2**0.5, 2), (3, 3), (2, 2 + 2**0.5), (1, 3), (2 - 2**0.5, 2), (1, 1), (2, 2 - 2**0.5), (3, 1)]
     mesh = grid().moved(**{f"n{node(round(x), round(y))}": (x / 4, y / 4) for x, y in ring})
     assert len(read(_written(mesh, tmp_path)).circles) == 1

@@ -1,4 +1,4 @@
-"""Voids that cannot be: each is told in one line."""
+"""Voids that cannot be: each has one line."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def faults_of(path) -> tuple[str, ...]:
 
 
 def inner_triangles(mesh):
-    """Those with no node on a side of the cell."""
+    """Return the triangles with no node on a side of the cell."""
     inside = np.all((mesh.points > 0) & (mesh.points < mesh.period), axis=1)
     return np.flatnonzero(inside[mesh.triangles].all(axis=1))
 

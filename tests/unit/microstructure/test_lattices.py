@@ -67,7 +67,7 @@ def test_narrow_cell_has_images_beyond_the_next():
 
 
 def test_window_of_a_lattice():
-    """Cells at the sides are cut by them; here they are whole squares of which the window does not know it."""
+    """Cells at the sides are cut by them; here they are whole squares, which the window cannot detect."""
     window = square_lattice(6, periodic=False)
     cells, neighbours = voronoi_cells(window), nearest_neighbours(window, 1)
     inner = np.all((window.centres > 1) & (window.centres < 5), axis=1)

@@ -52,7 +52,7 @@ def test_K_of_random_points_is_that_of_complete_spatial_randomness(periodic):
 
 
 def test_weights_of_a_window_keep_nearest_distances_unbiased():
-    """Of Poisson points the mean nearest distance is 1 / (2 sqrt(density)); without weights it is less."""
+    """The mean nearest distance of Poisson points is 1 / (2 sqrt(density)); without weights it is less."""
     windows = [poisson_points(100, 10.0, seed, periodic=False) for seed in range(200)]
     found = [nearest_neighbours(window, 1) for window in windows]
     means = np.array([neighbours.means[0] for neighbours in found])

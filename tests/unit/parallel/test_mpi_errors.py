@@ -1,4 +1,4 @@
-"""How a job ends when ranks raise, together or alone."""
+"""Ends of jobs in which ranks raise, together or alone."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def test_a_job_without_faults_ends_with_zero(mpirun, ranks):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("ranks", [1, 2, 4])
-def test_faults_of_all_ranks_are_told_once(mpirun, ranks):
+def test_faults_of_all_ranks_are_reported_once(mpirun, ranks):
     job = run(mpirun, ranks, "raise CaseError('[cell] one', '[cell] two')")
     assert job.returncode == 2
     assert job.stderr.count("error: [cell] one\n") == job.stderr.count("error: [cell] two\n") == 1

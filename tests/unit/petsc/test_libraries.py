@@ -1,4 +1,4 @@
-"""Where mpi4py, petsc4py or h5py is missing or does not fit, a line for each says what to do."""
+"""Where mpi4py, petsc4py or h5py is missing or does not fit, a line for each gives the remedy."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_one_line_says_what_is_missing_and_what_to_do(tmp_path, name):
     assert "PETSC_DIR" in line or "install the Debian package" in line
 
 
-def test_all_that_is_missing_is_told_at_once(tmp_path):
+def test_all_that_is_missing_is_reported_at_once(tmp_path):
     assert [line.split()[1] for line in faults(tmp_path, petsc4py=MISSING, mpi4py=MISSING)[:2]] == [
         "mpi4py",
         "petsc4py",

@@ -77,7 +77,7 @@ def test_values_are_the_solvers(name, value, default):
         ("feti_zzz", "prefixes: -feti_ksp_, -feti_pc_, "),
     ],
 )
-def test_misspelt_options_are_told_with_the_nearest(name, words):
+def test_misspelt_options_are_reported_with_the_nearest(name, words):
     (fault,) = unknown_options([name, "feti_ksp_rtol"])
     assert words in fault
 
@@ -107,10 +107,10 @@ def test_known_names_pass(name):
         ("prefix_push", "options that begin with -feti_"),
     ],
 )
-def test_others_are_told(name, words):
+def test_others_are_reported(name, words):
     (fault,) = unknown_to_petsc([name])
     assert fault.startswith(f"-{name}: unknown option; ") and words in fault
 
 
-def test_a_name_without_its_prefix_is_told_elsewhere():
+def test_a_name_without_its_prefix_is_reported_elsewhere():
     assert unknown_to_petsc(["ksp_rtol"]) == []

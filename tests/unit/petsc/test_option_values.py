@@ -1,4 +1,4 @@
-"""What can be opened for writing is told from what cannot, as opening it says."""
+"""Paths that can be opened for writing are accepted, others refused, as opening them shows."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def folder(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_names_are_told_apart(folder, name):
+def test_names_are_reported_apart(folder, name):
     assert can_be_written(name) is NAMES[name]
     if "\0" not in name and name != "pipe":
         try:

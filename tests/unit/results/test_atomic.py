@@ -1,4 +1,4 @@
-"""What writers that were killed leave behind is removed; nothing else is."""
+"""Files that killed writers left are removed, no others."""
 
 from __future__ import annotations
 

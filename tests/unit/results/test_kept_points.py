@@ -1,4 +1,4 @@
-"""Which points of a path are kept: the ends, those around drops of the stress, the rest evenly."""
+"""Kept points of a path: the ends, those around drops of the stress, the rest evenly."""
 
 from __future__ import annotations
 

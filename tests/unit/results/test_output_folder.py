@@ -64,7 +64,7 @@ def test_files_of_an_earlier_result_are_removed_and_nothing_else(tmp_path):
 
 
 @pytest.mark.parametrize("code", [errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP])
-def test_a_file_system_without_locks_is_told_of(tmp_path, monkeypatch, capsys, code):
+def test_a_file_system_without_locks_is_reported_of(tmp_path, monkeypatch, capsys, code):
     def flock(file, kind):
         raise OSError(code, os.strerror(code))
 
@@ -72,8 +72,8 @@ def test_a_file_system_without_locks_is_told_of(tmp_path, monkeypatch, capsys, c
     with output_folder.held(tmp_path / "out", MPI.COMM_SELF, print):
         (tmp_path / "out" / "result.json").touch()
         output_folder.usable(tmp_path / "out")
-    said = capsys.readouterr().out
-    assert said.startswith("warning: cannot lock ") and said.count("\n") == 1 and os.strerror(code) in said
+    printed = capsys.readouterr().out
+    assert printed.startswith("warning: cannot lock ") and printed.count("\n") == 1 and os.strerror(code) in printed
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["result.json"]
 
 

@@ -79,14 +79,14 @@ def test_a_folder_that_is_missing_is_made(tmp_path: Path) -> None:
     assert (tmp_path / "new" / "folder" / "result.json").exists()
 
 
-def test_a_folder_that_cannot_be_made_is_told(tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_made_is_reported(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(FetiHomogError, match=r"^cannot write .*file/folder/result\.json: Not a directory$"):
         result_json.write(tmp_path / "file" / "folder", {})
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
-def test_a_folder_that_cannot_be_written_to_is_told(tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_written_to_is_reported(tmp_path: Path) -> None:
     tmp_path.chmod(0o500)
     with pytest.raises(FetiHomogError, match=r"^cannot write .*result\.json: Permission denied$"):
         result_json.write(tmp_path, {})
@@ -105,7 +105,7 @@ def test_a_full_disk_leaves_the_old_file(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["result.json"]
 
 
-def test_a_missing_or_broken_file_is_told(tmp_path: Path) -> None:
+def test_a_missing_or_broken_file_is_reported(tmp_path: Path) -> None:
     with pytest.raises(FetiHomogError, match=r"^cannot read .*result\.json: No such file"):
         result_json.read(tmp_path)
     (tmp_path / "result.json").write_text('{"a": 1')
@@ -114,7 +114,7 @@ def test_a_missing_or_broken_file_is_told(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("text", ["[]", "null", "3", '"done"'])
-def test_a_file_that_is_no_table_is_told(tmp_path: Path, text: str) -> None:
+def test_a_file_that_is_no_table_is_reported(tmp_path: Path, text: str) -> None:
     (tmp_path / "result.json").write_text(text)
     with pytest.raises(FetiHomogError, match=r"^cannot read .*result\.json: it is damaged"):
         result_json.read(tmp_path)

@@ -28,7 +28,7 @@ def test_what_was_written_is_read():
     assert seals.dumps(seals.loads(text)) == text
 
 
-def test_every_changed_number_or_letter_is_told():
+def test_every_changed_number_or_letter_is_reported():
     text = seals.dumps(DOCUMENT)
     for place, letter in enumerate(text):
         if letter.isalnum():
@@ -62,7 +62,7 @@ def test_the_checksum_is_that_of_the_blocks(tmp_path, size):
 
 
 @pytest.mark.parametrize("size", SIZES[1:])
-def test_another_file_is_told(tmp_path, size):
+def test_another_file_is_reported(tmp_path, size):
     path = tmp_path / "file"
     content = bytearray(np.random.default_rng(size).bytes(size))
     path.write_bytes(content)
@@ -78,6 +78,6 @@ def test_another_file_is_told(tmp_path, size):
         seals.check(path, found, BLOCK)
 
 
-def test_a_file_that_is_gone_is_told(tmp_path):
+def test_a_file_that_is_gone_is_reported(tmp_path):
     with pytest.raises(FetiHomogError, match=r"cannot read .*none: No such file"):
         seals.check(tmp_path / "none", seals.FileSeal(1, ""))

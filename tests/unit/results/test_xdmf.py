@@ -1,4 +1,4 @@
-"""What the XDMF files say is there is there, in forms that every reader knows."""
+"""The XDMF files name data that exist, in forms that every reader takes."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_xdmf_points_at_tables_of_the_right_shape(tmp_path: Path, name: str, tab
 
 
 def test_all_readers_know_the_forms(tmp_path: Path) -> None:
-    """ParaView's default one knows no hyperslabs and no topology without connectivity, and turns tensors of six."""
+    """ParaView's default reader takes no hyperslabs and no topology without connectivity, and turns tensors of six."""
     write(tmp_path, sample(4))
     for path in xdmf.write(tmp_path):
         root = ET.parse(path).getroot()

@@ -1,4 +1,4 @@
-"""Rules: what holds by the words of JSON Schema that they know, against jsonschema; where their faults stand."""
+"""Rules by the words of JSON Schema, against jsonschema; the places of their faults."""
 
 from __future__ import annotations
 

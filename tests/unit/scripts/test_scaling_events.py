@@ -11,7 +11,7 @@ MODEL = EventModel(constant=2e-3, serial=1e-7, parallel=5e-7, latency=3e-6)
 
 
 def made_up(fibres: int, ranks: int) -> EventRow:
-    """Return an event of 30 collective calls and 2 exchanges with `ranks` messages that takes as long as MODEL says."""
+    """Return an event of 30 collective calls and 2 exchanges with `ranks` messages that takes the time of MODEL."""
     row = EventRow(
         fibres=fibres, ranks=ranks, dofs=1000 * fibres, events=10, seconds=0.0, worst=0.1, setup=1.0, solves=1.0,
         iterations=0.0, exchanges=2.0, collectives=30.0, kilobytes=5.0, neighbours=ranks if ranks > 1 else 0,
@@ -44,6 +44,6 @@ def test_runs_that_do_not_tell_the_constants(rows):
 
 
 def test_table_has_the_error_of_each_timed_run():
-    """One run that takes half as long as the model says shows as too dear; of those without cores only the model."""
+    """One run that takes half as long as by the model shows as too dear; of those without cores only the model."""
     lines = table([*ROWS, made_up(50, 16)], cores=2)[2:-1]
     assert [line.split()[-1] for line in lines] == ["+0%", "+0%", "+0%", "+0%", "-"]

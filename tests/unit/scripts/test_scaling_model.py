@@ -35,7 +35,7 @@ def made_up(dofs: int, ranks: int, way: str = FACTOR) -> Row:
         fibres=1, wanted=dofs, refine=2, loads=LOADS, ranks=ranks, dofs=dofs, fullest=dofs // ranks,
         triangles=triangles, subdomains=dofs // 1000, vectors=coarse, kernel=kernel, iterations=ITERATIONS,
         converged=True, seconds=seconds, peaks={stage: [100.0 + r for r in range(ranks)] for stage in seconds},
-        told=(0,) * ranks, heard=(0,) * ranks, neighbours=(0,) * ranks, exchanges=0, logged=(0.0,) * ranks,
+        outgoing=(0,) * ranks, incoming=(0,) * ranks, neighbours=(0,) * ranks, exchanges=0, logged=(0.0,) * ranks,
         coarse_setup=2 * factor, coarse_factor=factor, coarse_solve=solve,
         natural_factor=natural_factor, natural_solve=natural_solve,
         coarse_memory=[1.0] * ranks, inner=17 if way == MULTIGRID else 0, way=way,
@@ -50,7 +50,7 @@ ROWS = [
 
 
 def test_shares_of_amdahl():
-    """Of 3 w (0.2 + 0.8 / p), at any sizes."""
+    """Fit the shares of 3 w (0.2 + 0.8 / p), at any sizes."""
     runs = [(w, p, 3 * w * (0.2 + 0.8 / p)) for w, p in [(10, 1), (700, 2), (30, 4)]]
     found = fit_shares(*zip(*runs, strict=True))
     assert (found.serial, found.parallel) == pytest.approx((0.6, 2.4))
@@ -58,7 +58,7 @@ def test_shares_of_amdahl():
 
 
 def test_shares_are_not_negative():
-    """What gets slower with ranks has no parallel share; the serial one is the geometric mean."""
+    """Work that gets slower with ranks has no parallel share; the serial one is the geometric mean."""
     found = fit_shares([1, 1], [1, 2], [1.0, 2.0])
     assert found.parallel == pytest.approx(0.0, abs=1e-4)
     assert found.serial == pytest.approx(2**0.5, rel=1e-4)
@@ -103,7 +103,7 @@ def test_constants_are_found_again():
 
 
 def test_mesh_is_of_cells_that_all_ranks_mesh():
-    """Of 8 s of runs of 400 fibres rank 0 is alone for one; all others take 1 s on any number of ranks."""
+    """In runs of 400 fibres rank 0 is alone for 1 s of 8; all others take 1 s on any number of ranks."""
     small = [replace(row, seconds={**row.seconds, "mesh": 1.0}, alone=0.0) for row in ROWS]
     large = [replace(made_up(4_000_000, p), fibres=400, alone=1.0) for p in (1, 2)]
     large = [replace(row, seconds={**row.seconds, "mesh": 1.0 + 7.0 / row.ranks}) for row in large]
@@ -136,7 +136,7 @@ def test_subdomains_scale_until_each_rank_has_one():
     assert local[3] == pytest.approx(local[2])
 
 
-def test_errors_of_the_model_are_told():
+def test_errors_of_the_model_are_reported():
     """A run that took twice as long as its stage should shows as -50 %; one without a core each is left out."""
     rates = measured(ROWS, CORES)
     slow = replace(ROWS[0], seconds={**ROWS[0].seconds, "assemble": 2 * ROWS[0].seconds["assemble"]})
@@ -164,7 +164,7 @@ def test_a_report_is_read_again_and_one_of_another_version_refused(tmp_path):
     fields = asdict(ROWS[1])
     report.write_text(json.dumps(fields))
     (row,) = read(report)
-    assert row == replace(ROWS[1], told=[0, 0], heard=[0, 0], neighbours=[0, 0], logged=[0.0, 0.0])
+    assert row == replace(ROWS[1], outgoing=[0, 0], incoming=[0, 0], neighbours=[0, 0], logged=[0.0, 0.0])
     for other in (fields | {"more": 1}, {name: value for name, value in fields.items() if name != "alone"}):
         report.write_text(json.dumps(other))
         with pytest.raises(SystemExit, match=r"report\.json: a report of another version"):

@@ -1,4 +1,4 @@
-"""What a table [sweep] expands to, and what is said of a faulty one."""
+"""Cases of a table [sweep], and the lines about faulty tables."""
 
 from __future__ import annotations
 
@@ -177,7 +177,7 @@ FAULTY = {
 
 
 @pytest.mark.parametrize("name", FAULTY)
-def test_faults_of_a_sweep_are_told(name):
+def test_faults_of_a_sweep_are_reported(name):
     table, expected = FAULTY[name]
     with pytest.raises(CaseError) as caught:
         expanded(table)

@@ -56,7 +56,7 @@ def test_a_lock_excludes_unless_both_share_it(tmp_path, theirs, ours, free):
     assert not is_locked(path)
 
 
-def test_a_lock_that_cannot_be_made_is_told(tmp_path):
+def test_a_lock_that_cannot_be_made_is_reported(tmp_path):
     with pytest.raises(FetiHomogError, match="cannot lock"):
         Lock(tmp_path / "none" / "lock").acquire()
     assert not is_locked(tmp_path / "none" / "lock")
@@ -74,7 +74,7 @@ def test_a_file_is_replaced_whole_or_not_at_all(tmp_path):
     assert path.read_text() == "old" and list(tmp_path.iterdir()) == [path]
 
 
-def test_a_full_device_is_told():
+def test_a_full_device_is_reported():
     with pytest.raises(FetiHomogError, match="No space left on device"):
         atomic.replace(Path("/dev/shm/feti_homog_none"), lambda part: Path("/dev/full").write_text("x"))
 

@@ -1,4 +1,4 @@
-"""Files on which HDF5 crashes, or does not come to an end, are told of in one line."""
+"""Files on which HDF5 crashes, or does not come to an end, are reported in one line."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def test_an_answer_comes_back(tmp_path):
 @pytest.mark.parametrize(
     ("function", "words"), [(crash, "HDF5 crashes on them"), (refuse, "no"), (ask_for_too_much, "256 TiB")]
 )
-def test_what_goes_wrong_is_told(tmp_path, function, words):
+def test_what_goes_wrong_is_reported(tmp_path, function, words):
     with pytest.raises(CaseError, match=f"^{tmp_path}: .*{words}$"):
         in_own_process(tmp_path, function)
 

@@ -67,7 +67,7 @@ def test_a_phase_that_does_not_say_how_it_expands_leaves_all_unknown():
     assert expansions(case, ["matrix", "fibre"]) is None
 
 
-def test_a_phase_without_material_is_told():
+def test_a_phase_without_material_is_reported():
     case = {"material": {"matrix": MATRIX}, "analysis": {"plane": "strain"}}
     with pytest.raises(CaseError, match="no material for the phase fibre"):
         plane_stiffnesses(case, ["matrix", "fibre"])

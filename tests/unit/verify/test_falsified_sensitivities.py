@@ -56,23 +56,23 @@ def test_sensitivities_are_verified(tmp_path, kind):
     assert law in {finding.check.name for finding in certificate.findings}
 
     def edit(document, _):
-        told = document["sensitivities"]
-        rows = np.abs(np.array(told["derivatives"]) * told["parameter_values"])
-        k = next(k for k, name in enumerate(told["constants"]) if name in ("stored", "E1", "C22"))
-        told["derivatives"][k][int(rows[k].argmax())] *= 1 + 1e-3
+        table = document["sensitivities"]
+        rows = np.abs(np.array(table["derivatives"]) * table["parameter_values"])
+        k = next(k for k, name in enumerate(table["constants"]) if name in ("stored", "E1", "C22"))
+        table["derivatives"][k][int(rows[k].argmax())] *= 1 + 1e-3
 
     def doubled(document, _):
-        told = document["sensitivities"]
-        told["derivatives"] = (2 * np.array(told["derivatives"])).tolist()
+        table = document["sensitivities"]
+        table["derivatives"] = (2 * np.array(table["derivatives"])).tolist()
 
     def tripled(document, _):
-        told = document["sensitivities"]
-        told["constant_values"] = (3 * np.array(told["constant_values"])).tolist()
+        table = document["sensitivities"]
+        table["constant_values"] = (3 * np.array(table["constant_values"])).tolist()
 
     def cut(document, _):
-        told = document["sensitivities"]
-        told["parameters"], told["parameter_values"] = told["parameters"][:1], told["parameter_values"][:1]
-        told["derivatives"] = [row[:1] for row in told["derivatives"]]
+        table = document["sensitivities"]
+        table["parameters"], table["parameter_values"] = table["parameters"][:1], table["parameter_values"][:1]
+        table["derivatives"] = [row[:1] for row in table["derivatives"]]
 
     falsehoods = {edit: {"sensitivities"}, cut: {"tables"}}
     falsehoods |= {doubled: {"sensitivities"}, tripled: {"constants"}} if kind in LOADS else {}

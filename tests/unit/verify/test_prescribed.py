@@ -1,4 +1,4 @@
-"""What verification reads of the loads of a case is what the program goes through."""
+"""Verification reads the loads of a case that the program goes through."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ def nothing(lines):
 
 @pytest.mark.parametrize("edit", [junk, number, row, column, nothing])
 @pytest.mark.parametrize("name", ["path", "angle", "load"])
-def test_a_false_table_is_told(results, tmp_path, name, edit):
+def test_a_false_table_is_reported(results, tmp_path, name, edit):
     copy = shutil.copytree(results(KINDS[name]), tmp_path / "copy")
     table = copy / f"{name}.csv"
     assert not broken(copy)

@@ -1,4 +1,4 @@
-"""A folder without a result that can be read is told of in one line, whatever is wrong with it."""
+"""A folder without a result that can be read is reported in one line, whatever is wrong with it."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ DAMAGES = {
 
 
 @pytest.mark.parametrize("name", DAMAGES)
-def test_unreadable_results_are_told_in_one_line(result, tmp_path, name, capsys):
+def test_unreadable_results_are_reported_in_one_line(result, tmp_path, name, capsys):
     copy = falsified(result, tmp_path / "copy", lambda *_: None)
     DAMAGES[name](copy)
     with pytest.raises(CaseError) as caught:

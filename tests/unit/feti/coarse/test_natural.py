@@ -95,7 +95,7 @@ def test_the_resistance_to_a_motion_is_compared_with_that_of_its_own_body():
 
 
 def test_one_of_many_loose_fibres_that_overlaps_is_moved(coarse):
-    """By the overlap, for it has room on the other side; the others stay."""
+    """The fibre moves by the overlap, for it has room on the other side; the others stay."""
     coarse.activate(np.zeros(ROWS))
     row, moved = 2 * np.arange(NODES * FIBRES), 7
     amplitudes = np.zeros(3 * FIBRES)

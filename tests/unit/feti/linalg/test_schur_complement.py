@@ -35,8 +35,8 @@ def test_loads_are_condensed_with_it():
     np.testing.assert_allclose(C, -loads[rest].T @ inside, atol=1e-12)
 
 
-def test_a_failure_of_mumps_is_told():
-    """It may have a megabyte."""
+def test_a_failure_of_mumps_is_reported():
+    """MUMPS may use one megabyte."""
     options = PETSc.Options("feti_schur_")
     options.setValue("mat_mumps_icntl_23", 1)
     try:

@@ -39,7 +39,7 @@ def test_solvers_return_the_unknowns_that_made_the_right_hand_side(columns):
 
 
 def solved_with_a_near_kernel(A, numbers):
-    """By the solver of all ranks."""
+    """Solve by the solver of all ranks."""
     solver = DistributedSolver(MPI.COMM_WORLD, len(numbers), "test_")
     solver.factor(numbers, A, np.ones((len(numbers), 3)))
     solver.solve(np.ones((len(numbers), 20)))

@@ -58,7 +58,7 @@ def test_free_motions_are_refused_and_left_again():
 
 
 def test_what_nothing_determines_stays_as_it_was():
-    """Three rigid motions of open nodes, of which forces say nothing."""
+    """Three rigid motions of open nodes, which forces do not determine."""
     rng = np.random.default_rng(4)
     motions = np.linalg.qr(rng.normal(size=(12, 3)))[0]
     P = np.eye(12) - motions @ motions.T

@@ -65,7 +65,7 @@ def least_angle(points, triangles):
 
 
 def undirected(triangles):
-    """How many triangles each edge has, by its sorted pair of nodes."""
+    """Count the triangles of each edge, by its sorted pair of nodes."""
     return Counter(tuple(sorted((t[i], t[i - 1]))) for t in triangles.tolist() for i in range(3))
 
 
@@ -166,7 +166,7 @@ def test_mesh_is_reproducible():
 @pytest.mark.parametrize("name", ["square", "hexagonal", "seven", "sixteen"])
 @pytest.mark.parametrize("seed", range(2))
 def test_the_last_bits_of_the_outline_do_not_change_the_mesh(name, seed):
-    """They are another machine's."""
+    """Take the last bits as another machine may give them."""
     case, chance = CELLS[name], np.random.default_rng(seed)
     sizes = MeshSizes.uniform(case.mesh_size)
     bare = BareOutline.of(arrange(case), sizes, {})

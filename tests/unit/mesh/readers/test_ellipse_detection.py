@@ -44,7 +44,7 @@ def test_other_chains_are_no_ellipses(places):
 
 @pytest.mark.parametrize("centre", [(0.5, 0.5), (0.0, 0.0), (0.93, 0.08)])
 def test_fine_nodes_lie_on_the_ellipse_wherever_the_cell_cuts_it(centre, tmp_path):
-    """Of which the coarse edges miss it by h^2."""
+    """Coarse edges miss the ellipse by h^2."""
     polar_cell(centre, B, tmp_path / "ellipse.msh", stretch=A / B, turn=TURN, size=0.06)
     mesh = read(tmp_path / "ellipse.msh")
     torus = Torus.of(mesh)
@@ -61,7 +61,7 @@ def test_fine_nodes_lie_on_the_ellipse_wherever_the_cell_cuts_it(centre, tmp_pat
 
 @pytest.mark.parametrize("stretch", [1.5, 3.0])
 def test_areas_approach_that_of_the_ellipse_by_h2(stretch, tmp_path):
-    """Of the polygons of nodes in the middle of the parameter: each halving quarters what is missing."""
+    """Compare polygons of nodes in the middle of the parameter: each halving quarters the missing area."""
     polar_cell((0.5, 0.5), 0.15, tmp_path / "ellipse.msh", stretch=stretch, size=0.06, turn=TURN)
     mesh, exact = read(tmp_path / "ellipse.msh"), np.pi * 0.15**2 * stretch
     missing = [1 - fibre_area(mesh, refinements=refinements, order=2) / exact for refinements in range(5)]

@@ -32,7 +32,7 @@ def test_there_are_enough_faulty_meshes():
     assert len(FAULTY_MESHES) >= 35
 
 
-def test_several_faults_are_told_at_once(tmp_path):
+def test_several_faults_are_reported_at_once(tmp_path):
     mesh = replace(grid(), names={1: "my resin", 2: "my fibre"}).with_element(5, 2, 0, (3, 4, 9))
     assert len(_faults(mesh, tmp_path)) == 4
 

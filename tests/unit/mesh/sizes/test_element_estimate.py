@@ -1,4 +1,4 @@
-"""Numbers of triangles that are told before a cell of ellipses is meshed."""
+"""Numbers of triangles, estimated before a cell of ellipses is meshed."""
 
 from __future__ import annotations
 

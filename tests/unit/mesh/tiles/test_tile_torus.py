@@ -63,7 +63,7 @@ def test_each_fibre_is_in_one_tile(name):
 
 @pytest.mark.parametrize("name", ["dense", "coated, voids", "wide"])
 def test_shares_of_two_ranks_are_those_of_one(name):
-    """Subdomains are the constituents within tiles; keys say which vertices and edges are the same."""
+    """Subdomains are the constituents within tiles; equal keys mean equal vertices and edges."""
     whole, tile = torus_of(name)
     key = whole.constituent * (tile.max() + 1) + tile
     keys, subdomain = np.unique(key, return_inverse=True)

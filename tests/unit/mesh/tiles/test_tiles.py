@@ -153,7 +153,7 @@ def test_small_cells_and_other_shapes_are_not_tiled():
     assert len(begin(CELLS["dense"], None, policy=TilePolicy(least_discs=37)).with_nodes().parts) == 1
 
 
-def test_a_tile_that_gmsh_leaves_unfilled_is_told(monkeypatch):
+def test_a_tile_that_gmsh_leaves_unfilled_is_reported(monkeypatch):
     _, tile = noded("dense").parts[0]
     add = filling._add_surfaces
 
@@ -166,7 +166,7 @@ def test_a_tile_that_gmsh_leaves_unfilled_is_told(monkeypatch):
         filling.fill(tile)
 
 
-def test_a_tile_that_gmsh_fails_on_is_told(monkeypatch):
+def test_a_tile_that_gmsh_fails_on_is_reported(monkeypatch):
     def broken(dimension):
         raise RuntimeError(f"no mesh of dimension {dimension}")
 

@@ -104,11 +104,11 @@ def test_comments_say_what_the_axes_and_units_are(form, mark):
     text = FORMATS[form](
         in_axes_of_the_cell(document(DISTINCT) | {"case": document(DISTINCT)["case"] | {"name": name}})
     )
-    said = " ".join(line.removeprefix(mark).strip() for line in text.splitlines() if line.startswith(mark))
-    assert text.isascii() and max(map(len, text.splitlines())) < 256 and "\\xe9poxy" in said
+    comments = " ".join(line.removeprefix(mark).strip() for line in text.splitlines() if line.startswith(mark))
+    assert text.isascii() and max(map(len, text.splitlines())) < 256 and "\\xe9poxy" in comments
     for words in ("Axis 1 is the fibre, x3 of the cell", "axes 2 and 3 are x1 and x2", "Stresses in GPa", "per unit of",
                   "nu_ij = -eps_j/eps_i", "Orthotropic; "):  # fmt: skip
-        assert words in said
+        assert words in comments
 
 
 @pytest.mark.parametrize("form", ["abaqus", "ansys", "moose"])

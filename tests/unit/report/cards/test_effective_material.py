@@ -1,4 +1,4 @@
-"""What of a result makes a material, and what is refused."""
+"""Results that make a material, and those that are refused."""
 
 from __future__ import annotations
 

@@ -51,7 +51,7 @@ def test_faults_name_the_file(folder):
         export.card(folder, "abaqus", "orthotropic")
 
 
-def test_folders_without_a_result_are_told(tmp_path):
+def test_folders_without_a_result_are_reported(tmp_path):
     with pytest.raises(CaseError, match=r"cannot read .*result\.json: No such file"):
         export.card(tmp_path, "csv", "orthotropic")
 
@@ -68,7 +68,7 @@ def test_folders_without_a_result_are_told(tmp_path):
         {"transversely_isotropic": None},
     ],
 )
-def test_damaged_results_are_told(folder, more):
+def test_damaged_results_are_reported(folder, more):
     result_json.write(folder, document(DISTINCT, **more))
     faults = []
     for symmetry in export.SYMMETRIES:

@@ -219,7 +219,7 @@ def test_the_deformation_scale_shows_a_tenth_of_the_cell(largest: float, scale: 
     assert plot_helpers.magnification(largest, 1.0) == pytest.approx(scale)
 
 
-def test_a_missing_or_broken_result_is_told(tmp_path: Path) -> None:
+def test_a_missing_or_broken_result_is_reported(tmp_path: Path) -> None:
     with pytest.raises(FetiHomogError, match=r"^cannot draw .*result\.h5: "):
         figures.plot(tmp_path)
     (tmp_path / "result.h5").write_text("nothing")

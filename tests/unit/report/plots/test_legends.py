@@ -1,4 +1,4 @@
-"""What the pictures say beside what they draw: legends, scales, numbers of points."""
+"""Text of pictures: legends, scales, numbers of points."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ def test_the_legend_of_tractions_has_only_what_is_there(
     [(2e-3, 0.0, 50.0), (2e-3, 1e-3, 50.0), (2e-2, 2e-3, 10.0), (0.5, 1e-3, 0.5), (0.1, 0.1, 1.0)],
 )
 def test_narrow_openings_are_seen(displacement: float, opening: float, scale: float) -> None:
-    """Of 0.2 % of the cell too; displacements stay below a quarter of it, or about."""
+    """Openings of 0.2 % of the cell are seen too; displacements stay below about a quarter of it."""
     found = plot_helpers.magnification(displacement, 1.0, opening)
     assert found == pytest.approx(scale)
 
@@ -182,14 +182,14 @@ def test_words_of_a_load_leave_out_what_is_not_seen() -> None:
     assert len(lines) == 3 and "33" not in "".join(lines) and r"{6} \cdot 10^{-5}" in lines[1] and "-100" in lines[2]
 
 
-@pytest.mark.parametrize(("stress", "told"), [(7.0, "{7}"), (1e-13, "{0}")])
-def test_words_of_a_path_with_many_strains_are_the_leading_one_and_its_stress(stress: float, told: str) -> None:
+@pytest.mark.parametrize(("stress", "shown"), [(7.0, "{7}"), (1e-13, "{0}")])
+def test_words_of_a_path_with_many_strains_are_the_leading_one_and_its_stress(stress: float, shown: str) -> None:
     state = {"strain": np.array([-0.01, 0.05, -0.01, 0.0, 0.001, 0.0]), "stress": np.array([0, stress, 0, 0, 1, 0])}
     document = in_six([(0.5, 0.0, 0.0), (1.0, 2.0, 3.0)], {"to": {"S13": 3.0, "S22": 7.0}})
     for point in document["path"]:
         point["strain"], point["stress"] = state["strain"].tolist(), [0.0, 7.0, 0.0, 0.0, 1.0, 0.0]
     words = LoadLabels.of(document).words(state | {"temperature": -100.0})
-    assert words == ["$E_{22} = {0.05}$", rf"$\Sigma_{{22}} = {told}$", r"$\Delta T = {-100}$"]
+    assert words == ["$E_{22} = {0.05}$", rf"$\Sigma_{{22}} = {shown}$", r"$\Delta T = {-100}$"]
     few = {"strain": np.array([0.0, 0.05, 0.0, 0.0, 0.001, 0.0]), "stress": state["stress"]}
     assert LoadLabels.of(document).words(few) == ["$E_{22} = {0.05}$", r"$\gamma_{13} = {0.001}$"]
 

@@ -77,7 +77,7 @@ def test_flat_faces_have_an_arc_length(tmp_path: Path, limit: int) -> None:
 
 
 def test_open_ends_of_an_interface_have_an_arc_length_too(tmp_path: Path) -> None:
-    """Of the sample two sides of the fibre are interfaces."""
+    """Two sides of the sample's fibre are interfaces."""
     place, points = found(write(tmp_path, sample(8)), 1, 100_000)
     np.testing.assert_allclose(place.values, [0, 0.125, 0.25, 0.375, 0.5, 0.5, 0.625, 0.75, 0.875, 1.0], atol=1e-12)
     for rows in (place.nodes[:5], place.nodes[5:]):

@@ -1,4 +1,4 @@
-"""The tables of constants in space tell all that is known, and nothing else."""
+"""Tables of constants in space have all that is computed, and nothing else."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_a_row_for_each_source_and_a_column_for_each_constant_that_one_knows():
         ({}, "round fibres"),
     ],
 )
-def test_a_cell_without_estimates_is_told_of_what_they_are(more, words):
+def test_a_cell_without_estimates_is_reported_of_what_they_are(more, words):
     _, table = constants_lines({"transversely_isotropic": CELL, **more}, "")
     assert table[-1] == f"  no closed estimates, which are of {words}"
 

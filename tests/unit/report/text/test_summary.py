@@ -108,7 +108,7 @@ def test_a_value_out_of_its_bounds_is_marked() -> None:
     assert line(summary(changed(effective_stiffness=stiffness)), "C11").endswith("170           160  outside")
 
 
-def test_warnings_and_faults_are_told() -> None:
+def test_warnings_and_faults_are_reported() -> None:
     text = summary(changed(faults=["check jump: 3e-06"], status="not converged"))
     assert "Warning     the matrix" in text and "Fault       check jump: 3e-06" in text
     assert "Warning" not in summary(changed(warnings=[]))
@@ -205,7 +205,7 @@ def test_a_path_in_space_tells_what_is_named_or_there_in_100_columns() -> None:
     assert "Also in path.csv: E33, gamma13" in text and "if the load only rises" in text
 
 
-def test_the_state_under_a_load_is_told() -> None:
+def test_the_state_under_a_load_is_reported() -> None:
     point = counted(9, strain=[-0.01, 0.05, -0.001, 1e-12, 0.02, 0.0], stress=[0.0, 60.0, 0.0, 0.0, 25.0, 1e-12])
     point |= {
         "debonded_share": 0.125,
@@ -248,7 +248,7 @@ def bonding(**top: Any) -> dict[str, Any]:
     return document
 
 
-def test_the_largest_energy_release_rate_of_each_load_is_told() -> None:
+def test_the_largest_energy_release_rate_of_each_load_is_reported() -> None:
     tips = [("E11", 3.0, 1, 60.0), ("E11", 6.0, 12, -60.0), ("-E11", 0.0, 1, 60.0), ("-E11", 1e-12, 2, 60.0)]
     text = summary(bonding(tips=tips_of(*tips)))
     assert "Largest energy release rate (GPa mm)" in text
@@ -288,7 +288,7 @@ def test_checks_of_contact_are_those_of_interfaces() -> None:
     assert "kkt_tension" in summary(document)
 
 
-def test_states_without_iterations_are_told() -> None:
+def test_states_without_iterations_are_reported() -> None:
     document = changed()
     document["solver"] |= {"iterations": [0] * 30}
     assert line(summary(document), "Iterations").endswith(
