@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.criteria import criterion_of
+from feti_homog.analysis.event_progress import BARS, EventProgress
 from feti_homog.analysis.path_events import Work, holding, restored, stored
 from feti_homog.analysis.registry import Analysis
 from feti_homog.analysis.result_records import PathPoint, Peak
@@ -24,16 +23,10 @@ from feti_homog.interface.friction.sliding_cell import SlidingCell
 from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.path.path_following import events, increments
 from feti_homog.interface.path.path_points import Energies, Point, unloaded
+from feti_homog.interface.path.sliding_increments import sliding_increments
 from feti_homog.interface.path.sliding_path import sliding_events
 from feti_homog.results.kept_points import kept
 from feti_homog.results.path_peak import marks, peak_of
-from feti_homog.runtime.progress import Progress
-
-SECONDS_A_LINE = 1.0
-# The time left of equal steps is printed; the number of events is unknown.
-STEPS_BAR = "{l_bar}{bar}| {elapsed}, {remaining} left{postfix}"
-EVENTS_BAR = "{l_bar}{bar}| {elapsed}{postfix}"
-BARS = {"events": EVENTS_BAR, "increments": STEPS_BAR}
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
@@ -124,15 +117,16 @@ def _points(
         point, energies = restored(context.checkpoint.read(number), cell)
         begin = point.after
         yield point, energies
-    if context.case.has_friction:
-        found = sliding_events(cell, _sliding_cell(context), law, waypoints, begin)
-    elif path.method == "events":
-        found = events(cell, law, waypoints, begin)
+    by_events, steps = path.method == "events", (path.increments or 1, path.release == "worst", begin)
+    if not context.case.has_friction:
+        whole = events(cell, law, waypoints, begin) if by_events else increments(cell, law, waypoints, *steps)
+    elif by_events:
+        whole = sliding_events(cell, _sliding_cell(context), law, waypoints, begin)
     else:
-        found = increments(cell, law, waypoints, path.increments or 1, path.release == "worst", begin)
+        whole = sliding_increments(cell, _sliding_cell(context), law, waypoints, *steps)
     count = known
     try:
-        for count, point in enumerate(found, known + 1):  # noqa: B007
+        for count, point in enumerate(whole, known + 1):  # noqa: B007
             yield point, None
     except NotCarriedError as error:
         if count == 0:
@@ -244,57 +238,6 @@ def _checked(context: AnalysisContext, point: Point, name: str) -> tuple[Point, 
     for response in responses:
         context.checks.require(name, response.checks)
     return point, responses
-
-
-class EventProgress:
-    """Lines about the events of a path, and a bar of the share of the path that they have reached; a context manager.
-
-    The first line, the last and urgent ones are said, of the others one a second at most.  The bar is there if
-    `progress` writes to a terminal.
-    """
-
-    def __init__(
-        self, progress: Progress, layout: str, everything: str, clock: Callable[[], float] = time.monotonic
-    ) -> None:
-        """`layout` of the bar is STEPS_BAR or EVENTS_BAR, `everything` the file of all lines."""
-        self._progress, self._layout, self._everything, self._clock = progress, layout, everything, clock
-        self._next_line, self._held_back, self._left_out = float("-inf"), "", 0
-        self._bar: Any = None
-
-    def __enter__(self) -> Self:
-        if self._progress.on_terminal:
-            from tqdm import tqdm  # of no use to most runs, and slow to import
-
-            self._bar = tqdm(total=1.0, desc="path", bar_format=self._layout, leave=False)
-        return self
-
-    def report(self, line: str, urgent: bool) -> None:
-        """Print or hold back a line about an event."""
-        now = self._clock()
-        self._left_out += bool(self._held_back)
-        self._held_back = ""
-        if urgent or now >= self._next_line:
-            self._progress.say(line)
-            self._next_line = now + SECONDS_A_LINE
-        else:
-            self._held_back = line
-
-    def advance(self, share: float, words: str) -> None:
-        """Move the bar to the share of the path at an event, with `words` beside it."""
-        if self._bar is not None:
-            self._bar.set_postfix_str(words, refresh=False)
-            self._bar.update(max(share - self._bar.n, 0.0))
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if self._bar is not None:
-            self._bar.close()
-        if self._held_back:
-            self._progress.say(self._held_back)
-        if self._left_out:
-            count = "1 more event is" if self._left_out == 1 else f"{self._left_out} more events are"
-            self._progress.say(f"  {count} in {self._everything}")
 
 
 ANALYSIS = Analysis(run, table=True, events=True)

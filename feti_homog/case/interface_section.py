@@ -13,7 +13,6 @@ from feti_homog.case.selectors import (
     BREAKING,
     BY_AXIAL_STRENGTH,
     BY_ENERGY,
-    BY_EVENTS,
     BY_STRENGTH,
     BY_TABLE,
     GENERALIZED,
@@ -89,16 +88,16 @@ class InterfaceSection:
         real(least=0.0),
         "Coulomb's coefficient mu of debonded faces: they stick while |t_t| < mu |t_n|, and slide at that traction. "
         "The load is controlled from the first leg on, without snap-back. Cells too large for influence columns are "
-        "refused.",
+        "refused. Increments are implicit steps, whose stresses and heat tend to those of events.",
         default=0.0,
-        only=(PATH_ANALYSIS, BY_EVENTS),
+        only=PATH_ANALYSIS,
     )
     friction_on_damage: bool = key(
         boolean,
         "true: friction acts on the damaged share of bonds that hold, too, with the whole of their pressure. false: on "
         "broken bonds alone.",
         default=False,
-        only=(PATH_ANALYSIS, BY_EVENTS, SOFTENING),
+        only=(PATH_ANALYSIS, SOFTENING),
     )
     axial_friction: str = key(
         choice("free", "prevented"),
@@ -108,7 +107,7 @@ class InterfaceSection:
         "transverse loads, both are the same. The cone of both shears is round, so no path would be straight between "
         "changes of status: it is not offered.",
         default="free",
-        only=(PATH_ANALYSIS, BY_EVENTS, GENERALIZED),
+        only=(PATH_ANALYSIS, GENERALIZED),
     )
     debonded: tuple[Arc, ...] = key(
         ARCS,

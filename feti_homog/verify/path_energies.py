@@ -38,6 +38,7 @@ SAME_RATIO = 1e-9
 # A share of the energy of the bonded cell below which what a parted one stores is rounding.
 NO_ENERGY = 1e-9
 Point = Mapping[str, Any]
+UNLOADED = {"friction_heat": 0.0, "dissipated": 0.0, "broke": 0}
 
 
 class Loads(NamedTuple):
@@ -88,7 +89,8 @@ def check_path_energies(
 ) -> None:
     """`work`, `stored` and what was dissipated at all points; fields are kept of those of `states`."""
     if "friction_heat" in points[0]:
-        _check_heat(findings, states, points, bool(tied_at(cell.files).any()))
+        by_events = cell.files.case["path"]["method"] == "events"
+        _check_heat(findings, states, points, by_events, bool(tied_at(cell.files).any()))
         return
     numbers = _numbers(cell, states, points)
     scale = max(each.stored for each in numbers) + cell.rounded_energy or 1e-300
@@ -101,11 +103,13 @@ def check_path_energies(
         _check_increments(findings, _stiffest(cell), numbers, points, scale)
 
 
-def _check_heat(findings: Findings, states: Sequence[StateNumbers], points: Sequence[Point], tied: bool) -> None:
+def _check_heat(
+    findings: Findings, states: Sequence[StateNumbers], points: Sequence[Point], by_events: bool, tied: bool
+) -> None:
     """Check that the work is stored, lost to breaks or heat, which never falls; breaks alone lose what is `dissipated`.
 
     With friction the energy depends on the way, so nothing bounds what breaks lose.  Faces that are `tied` along the
-    fibres lose energy where they open, too.
+    fibres lose energy where they open, too.  Bonds break behind a point of events, before one of increments.
     """
     stored = {number: float(point["stored"]) for number, point in enumerate(points)}
     stored |= {state.point: state.stored for state in states}
@@ -113,11 +117,11 @@ def _check_heat(findings: Findings, states: Sequence[StateNumbers], points: Sequ
     for number, point in enumerate(points):
         off = point["work"] - stored[number] - point["dissipated"] - point["friction_heat"]
         findings.record("heat", abs(off) / scale, f"path[{number}].work")
-    for number, (before, after) in enumerate(pairwise(points), 1):
+    for number, (before, after) in enumerate(pairwise([UNLOADED, *points])):
         cooled = before["friction_heat"] - after["friction_heat"]
         findings.record("heat", max(cooled, 0.0) / scale, f"path[{number}].friction_heat")
         lost = after["dissipated"] - before["dissipated"]
-        off = 0.0 if damaged_at(before) else max(-lost, 0.0) if tied else abs(lost)
+        off = 0.0 if damaged_at(before if by_events else after) else max(-lost, 0.0) if tied else abs(lost)
         findings.record("heat", off / scale, f"path[{number}].dissipated")
 
 

@@ -57,19 +57,21 @@ def test_friction_carries_shear_under_pressure(tmp_path):
     assert end[2] > end[0] and np.abs(heat[:2]).max() == 0.0 < heat[2]
 
 
-def test_a_path_killed_in_the_middle_of_a_cycle_goes_on_as_it_was(tmp_path):
-    """Between two changes of statuses of the second half-cycle, with a history of slips."""
-    (tmp_path / "case.toml").write_text(CYCLES)
+@pytest.mark.parametrize(("method", "kept"), [("events", 40), ("increments", 12)])
+def test_a_path_killed_in_the_middle_of_a_cycle_goes_on_as_it_was(tmp_path, method, kept):
+    """Between two changes of statuses, or steps, of the second half-cycle, with a history of slips."""
+    steps = 'method = "increments"\nincrements = 20\n' if method == "increments" else ""
+    (tmp_path / "case.toml").write_text(CYCLES.replace("[output]", f"{steps}[output]"))
     words = ("run", tmp_path / "case.toml", "--out")
     assert command_line(1, *words, tmp_path / "whole").returncode == 0
-    kept = Hook("feti_homog.results.atomic:commit", WAIT, when="args[1].name == '000039.h5'", after=True)
-    with HookedJob(1, [kept], *words, tmp_path / "out") as job:
+    there = Hook("feti_homog.results.atomic:commit", WAIT, when=f"args[1].name == '{kept - 1:06}.h5'", after=True)
+    with HookedJob(1, [there], *words, tmp_path / "out") as job:
         assert job.reported() == "0 here"
         job.killed()
     assert command_line(1, *words, tmp_path / "out", "--resume").returncode == 0
     found, whole = (json.loads((tmp_path / name / "result.json").read_text()) for name in ("out", "whole"))
     last = whole["path"][found["resumed"] - 1]
-    assert found["resumed"] == 40 and 0.5 < last["load_factor"] < 0.75 and last["broke"] == 0
+    assert found["resumed"] == kept and 0.5 < last["load_factor"] < 0.75 and last["broke"] == 0
     for key in ("load_factor", "stress", "strain", "friction_heat", "work", "broke", "open"):
         a, b = (np.array([point[key] for point in of["path"]], float) for of in (found, whole))
         np.testing.assert_allclose(a, b, atol=1e-9 * np.abs(b).max(), err_msg=key)

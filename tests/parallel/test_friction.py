@@ -108,3 +108,26 @@ def test_an_unloaded_cell_keeps_slips_and_resumes_between_changes(comm, shared_p
     assert found[-1].friction_heat > 0.0
     certificate = verify(shared_path / "out") if comm.rank == 0 else None
     parallel_assert(comm, certificate is None or certificate.holds, certificate and certificate.text)
+
+
+def numbers_at_ends(points, legs):
+    return np.array([[*p.stress, p.friction_heat] for p in points if is_end(p, legs)])
+
+
+def test_increments_tend_to_events_and_obey_every_law(comm, shared_path):
+    """Loops of a debonded fibre beside bonds that soften and rub: four times the steps, less than half the error."""
+    waypoints = [{"E11": -0.01, "E22": -0.006}, {"gamma12": 0.03}, {"gamma12": -0.03}, {"gamma12": 0.01}]
+    interface = SOFTENING | {"friction": 0.3, "friction_on_damage": True, "normal_strength": 0.06}
+    interface |= {"tangential_strength": 0.06, "debonded": [{"fibre": 1, "angle": 200.0}]}
+    case = {"cell": {"mesh_size": 0.3}, "phases": EPOXY_GLASS, "plane": "strain", "interface": interface}
+    exact = solved(comm, **case, path={"waypoints": waypoints}).path
+    known, errors = numbers_at_ends(exact, 4), []
+    for steps in (16, 64):
+        path = {"waypoints": waypoints, "method": "increments", "increments": steps}
+        asked = document(**case, path=path) | {"output": {"pictures": False, "states": 9}}
+        found = run(Case.parse(asked), comm, out=shared_path / f"{steps}").path
+        errors.append(np.abs(numbers_at_ends(found, 4) - known).max(axis=0) / np.abs(known).max(axis=0))
+        certificate = verify(shared_path / f"{steps}") if comm.rank == 0 else None
+        parallel_assert(comm, certificate is None or certificate.holds, certificate and certificate.text)
+    assert (errors[1] < errors[0] / 2).all() and errors[0].max() < 0.15 and errors[1].max() < 0.03, errors
+    assert sum(p.softened for p in exact) > 5

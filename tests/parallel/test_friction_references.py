@@ -189,6 +189,39 @@ PATHS = {
 }
 
 
+@pytest.mark.parametrize(
+    ("name", "release"),
+    [
+        *(("fibres that come free", "all"), ("breaks on springs", "all"), ("breaks on springs", "worst")),
+        *(("generalized, tied along the fibres", "worst"), ("generalized, tied faces that all open", "all")),
+    ],
+)
+def test_increments_are_those_of_the_twin(comm, name, release):
+    """Implicit steps with given bounds of friction, by quadratic programmes."""
+    cell, phases, interface, waypoints = PATHS[name]
+    plane = "generalized" if name.startswith("generalized") else "strain"
+    case = {"cell": cell, "phases": phases, "plane": plane}
+    steps = 4 * len(waypoints)
+    twin = LoadedTwin(comm, **case, interface=interface, path={"waypoints": waypoints})
+
+    def followed():
+        faces = RubbingFaces.of(twin.cell, twin.bonded, interface["friction"])
+        faces.tied = "axial_friction" in interface
+        return FrictionPath(faces, twin.cell, twin._law).increments(twin.loads, steps, release == "worst")
+
+    known = on_root(comm, followed)
+    path = {"waypoints": waypoints, "method": "increments", "increments": steps, "release": release}
+    found = solved(comm, **case, interface=interface, path=path).path
+    assert [p.broke for p in found] == [int(p.broke.sum()) for p in known]
+    most, energy = max(np.abs(p.state.stress).max() for p in known), max(p.stored for p in known)
+    for point, other in zip(found, known, strict=True):
+        np.testing.assert_allclose(point.stress, other.state.stress[: len(point.stress)], atol=1e-7 * most)
+        energies = (point.work, point.stored, point.friction_heat, point.dissipated)
+        expected = (other.work, other.stored, other.heat, other.dissipated)
+        np.testing.assert_allclose(energies, expected, atol=1e-7 * energy)
+    assert found[-1].friction_heat > 0.0
+
+
 @pytest.mark.parametrize("name", PATHS)
 def test_paths_are_those_of_the_twin(comm, name):
     """Bonds break in one order at the same loads, with the same energies."""

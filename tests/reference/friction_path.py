@@ -50,6 +50,34 @@ class FrictionPath:
             self._leg(load, leg, len(loads))
         return self.points
 
+    def increments(self, loads, steps, worst_only=False):
+        """Return the points after each of so many equal steps: implicit ones, and breaks until none is left."""
+        legs, start = len(loads), None
+        for step in range(1, steps + 1):
+            leg = (step * legs - 1) // steps
+            if start is None or leg > ((step - 1) * legs - 1) // steps:
+                start = self.state.start_of(loads[leg])
+            load, broke = start.towards(loads[leg], step * legs / steps - leg), np.zeros(self.faces.k, bool)
+            self._increment(load)
+            while (which := self._overloaded(1.0 + TOGETHER)).any():
+                which = which if worst_only else self.used(self.state) > 1.0
+                broke |= which
+                self._break(which, load)
+            self._report(step / steps, broke)
+        return self.points
+
+    def _increment(self, load):
+        """Go to a load by one implicit step; tied faces that open let go of their shear behind it."""
+        before, faces = self.state, self.faces
+        after = faces.increment(before, load)
+        heat = after.shear @ (after.slip - before.slip) / faces.area
+        opened = np.where(after.status == OPEN, OPEN, before.status)
+        kept, left = faces.linear(np.stack([before.status, opened]), load, before)
+        lost = kept.axial @ (left.along - kept.along) / 2 / faces.area if faces.tied else 0.0
+        self.heat, self.dissipated = self.heat + heat, self.dissipated + lost
+        self.work += after.stored(faces.area) - before.stored(faces.area) + heat + lost
+        self._stand(after)
+
     def _leg(self, load, leg, legs):
         start, s, stays = self.state.start_of(load), 0.0, 0
         way = MixedLoad(load.values - start.values, load.by_stress)

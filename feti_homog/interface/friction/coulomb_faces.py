@@ -74,6 +74,17 @@ class CoulombFaces(FaceSystem):
             raise StuckError(INDEFINITE)
         return status, v
 
+    def step(self, status: Status, given: Prescribed, start: Float) -> tuple[Status, Float]:
+        """Return the statuses (n,) and x (m,) of an implicit step to what is given, from a first guess and a start.
+
+        Raises:
+            StuckError: as `rates`.
+        """
+        status, x = self.search(status, self.all_allowed(), given, start)
+        if self.solver.sign(*self.free(status, given.by_stress)) < 0:
+            raise StuckError(INDEFINITE)
+        return status, x
+
     def _at_limits(self, status: Status, x: Float) -> Bool:
         """(n, 4) the statuses that nodes of a state may go on with: their own, and others where a limit is reached."""
         closed, gap = status != OPEN_FACE, x[: 2 * self.nodes : 2]
@@ -116,12 +127,22 @@ class CoulombFaces(FaceSystem):
     def losses(self, status: Status, before: Float, after: Float) -> tuple[float, float]:
         """Return what all faces lose in a step at constant load, and the heat of those that slide behind it.
 
-        Along the way the forces change as the jumps do; heat is the slip times the force behind the step, as of one
-        implicit step.
+        Along the way the forces change as the jumps do.
         """
-        last, step = 2 * self.nodes, after - before
         forces = -(self.solver.product(before) + self.solver.product(after)) / 2
         forces[self.loads] = 0.0
-        sliding = np.abs(status) == 1
-        heat = (self.forces(after)[1] * step[1:last:2])[sliding].sum()
-        return float(forces @ step), float(heat)
+        return float(forces @ (after - before)), self.heat_behind(status, before, after)
+
+    def heat_behind(self, status: Status, before: Float, after: Float) -> float:
+        """Return the heat of one implicit step: slips times the forces behind it, of faces that slide behind it."""
+        slips = (after - before)[1 : 2 * self.nodes : 2]
+        return float((self.forces(after)[1] * slips)[np.abs(status) == 1].sum())
+
+    def let_go(self, old: Status, status: Status, given: Prescribed, start: Float) -> float:
+        """Return what tied faces that open in an implicit step from a start lose of their shear along the fibres.
+
+        They let go of it behind the step, up to which they keep their jumps; others stay as with the `old` statuses.
+        """
+        opened = np.where(status == OPEN_FACE, OPEN_FACE, old).astype(np.int8)
+        kept, left = (np.where(self.alone, self.linear(each, given, start), 0.0) for each in (old, opened))
+        return self.losses(opened, kept, left)[0]

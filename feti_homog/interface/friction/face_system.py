@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -88,13 +89,17 @@ class FaceSystem:
         Where a motion is free, which rounding would drive, x is as it was, but for what S does not couple with the
         jumps in the plane: there faces that opened let go of their shear along the fibres.
         """
-        free, last = self.free(status, given.by_stress), 2 * self.nodes
+        free = self.free(status, given.by_stress)
         if self.solver.sign(*free):
             return status, self.linear(status, given, x)
         if not len(self.tied):
             return status, x
-        alone = ~self.S[:last].any(axis=0)
-        return status, np.where(alone, self.linear(status, given, x), x)
+        return status, np.where(self.alone, self.linear(status, given, x), x)
+
+    @cached_property
+    def alone(self) -> Bool:
+        """(m,) which entries of x are not coupled with the jumps in the plane."""
+        return np.asarray(~self.S[: 2 * self.nodes].any(axis=0))
 
     def prescribed(self, status: Status, given: Prescribed, start: Float) -> tuple[Float, Float]:
         """(m,) x with what is prescribed, and (m,) S x on the rows of loads."""

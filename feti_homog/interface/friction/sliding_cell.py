@@ -139,6 +139,10 @@ class SlidingCell:
         pressed[self._own] = np.where(holds, own != OPEN_FACE, pressed[self._own])
         return replace(before, status=nodes, pressed=pressed, gap_and_slip=jump, sliding=sliding)
 
+    def stored(self, x: Float) -> float:
+        """Return the energy per area of the cell in scaled x."""
+        return float(x @ self.faces.solver.product(x)) / (2.0 * self.area)
+
     def stretched(self, x: Float) -> float:
         """Return the energy per area of the springs in scaled x by which damaged bonds have become softer."""
         pairs = zip(self.springs, self._jumps_of(x), strict=True)

@@ -2,31 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.contact.states import BondState, Equilibrium, Status
+from feti_homog.interface.contact.states import BondState, Status
 from feti_homog.interface.friction.coulomb_faces import StuckError
-from feti_homog.interface.friction.face_system import Prescribed
 from feti_homog.interface.friction.sliding_cell import SlidingCell
-from feti_homog.interface.friction.status_system import OPEN_FACE
 from feti_homog.interface.laws.bond_law import BondLaw
-from feti_homog.interface.loads.load import Load, Macroscopic
+from feti_homog.interface.loads.load import Load
 from feti_homog.interface.path.next_change import first_break_between
-from feti_homog.interface.path.path_points import (
-    NO_ENERGIES,
-    UTILISATION_TIE,
-    Energies,
-    PathState,
-    Point,
-    break_bonds,
-    most_utilised,
-)
-from feti_homog.parallel.mpi_errors import on_root
+from feti_homog.interface.path.path_points import NO_ENERGIES, UTILISATION_TIE, PathState, Point, most_utilised
+from feti_homog.interface.path.sliding_leg import SlidingLeg
 from feti_homog.typing import Float
 
 # Share of a leg without a point, after which a change of statuses is one.
@@ -50,48 +39,17 @@ def sliding_events(
         StuckError: nothing goes on from the last point.
     """
     for leg in range(begin.leg, len(waypoints)):
-        for point in SlidingLeg(cell, sliding, law, waypoints, leg, begin).points():
+        for point in SlidingEvents(cell, sliding, law, waypoints, leg, begin).points():
             yield point
             begin = point.after
 
 
-@dataclass(frozen=True)
-class Standing:
-    """Position of a path: the statuses (n,) of the faces and scaled x (m,) of `CoulombFaces`, with its averages."""
-
-    status: Status
-    x: Float
-    mean: Macroscopic
-
-
-class SlidingLeg:
-    """Leg `leg`, the way between two loads of the same kinds, at rising share s of it.
+class SlidingEvents(SlidingLeg):
+    """Leg at whose rising share s statuses change and bonds break.
 
     From a state the rates of the faces are those of a problem of complementarity, and hold up to the first of: a face
-    reaches a limit of its status, a bond its strength, s = 1.  A break is a step at constant load, with the statuses
-    that are admissible behind it: slips grow from where they were with the sign of the traction.
+    reaches a limit of its status, a bond its strength, s = 1.
     """
-
-    def __init__(
-        self,
-        cell: CoupledInterfaces,
-        sliding: SlidingCell,
-        law: BondLaw,
-        waypoints: Sequence[Load],
-        leg: int,
-        begin: PathState,
-    ) -> None:
-        """Stand at `begin`.  Collective."""
-        self.cell, self.sliding, self.law, self.end = cell, sliding, law, waypoints[leg]
-        self.leg, self.legs = leg, len(waypoints)
-        self.origin = begin.last if begin.position == 0.0 else begin.origin
-        self.start = cell.leg_start(self.origin, waypoints[leg - 1] if leg else None, self.end)
-        self._share, self._bonds = begin.position, begin.bonds
-        status, x = sliding.begin(begin.bonds, begin.last.strain)
-        self._here = self._standing(status, x)
-        self._found: tuple[Standing, Equilibrium] | None = None
-        self._reported, self._energies, self._first = begin.position, NO_ENERGIES, begin.position == 0.0
-        self._after_break(begin)
 
     def points(self) -> Iterator[Point]:
         """Yield the points of the leg.  Collective."""
@@ -111,18 +69,6 @@ class SlidingLeg:
         velocity = self.sliding.given(self.end) - self.sliding.given(self.start)
         here, faces = self._here, self.sliding.faces
         return self._on_root(faces.rates, here.status, here.x, self.end.by_stress, velocity)
-
-    def _on_root(self, find: Callable[..., tuple[Status, Float]], *arguments: Any) -> tuple[Status, Float]:
-        """Return the statuses and the array that rank 0 finds, whose product every rank keeps.  Collective."""
-        solver = self.sliding.faces.solver
-
-        def found() -> tuple[Status, Float, Float]:
-            status, x = find(*arguments)
-            return status, x, solver.product(x)
-
-        status, x, product = on_root(self.cell.comm, found)
-        solver.keep(x, product)
-        return status, x
 
     def _advance(self, status: Status, rate: Float) -> Iterator[Point]:
         """Go on along the rates up to the next change, and past it."""
@@ -157,14 +103,6 @@ class SlidingLeg:
             self._first = False
             yield self._point(0, 0, self._path_state())
 
-    def _given(self, share: float, x: Float) -> Prescribed:
-        """Return what is prescribed at a share of the leg, with the slips of scaled x."""
-        load = self.start.after(share, self.end)
-        return Prescribed(load.by_stress, self.sliding.given(load), x[1 : 2 * len(self.sliding.rows) : 2])
-
-    def _standing(self, status: Status, x: Float) -> Standing:
-        return Standing(status, x, Macroscopic(self.sliding.strain(x), self.sliding.stress(x)))
-
     def _let_go(self, status: Status, x: Float) -> None:
         """Go to x with these statuses at the same load: faces that opened bear no shear along the fibres any more."""
         if len(self.sliding.faces.tied):
@@ -175,11 +113,6 @@ class SlidingLeg:
     def _is_point(self) -> bool:
         """Return whether a change of statuses here is a point."""
         return self._first or self._share - self._reported >= LEAST_SHARE
-
-    def _opened_tied(self, before: Status, status: Status) -> bool:
-        """Return whether tied faces opened, whose shear along the fibres went to bonds."""
-        tied, opened = self.sliding.faces.tied, (status == OPEN_FACE) & (before != OPEN_FACE)
-        return bool((tied & opened[: len(tied)]).any())
 
     def _most_used(self, bonds: BondState) -> float:
         """Stand with these bonds, and return the largest share of their strength that they use.  Collective."""
@@ -193,12 +126,6 @@ class SlidingLeg:
         self._add(after, 0.0, heat)
         self._here, self._bonds = after, self.sliding.bonds(self._bonds, status, there)
 
-    def _add(self, after: Standing, released: float, heat: float, fracture: float = 0.0) -> None:
-        """Add the energies of the way to a state."""
-        before = self._here.mean
-        work = 0.5 * float((before.stress + after.mean.stress) @ (after.mean.strain - before.strain))
-        self._energies = self._energies.plus(Energies(work, released, fracture, heat))
-
     def _break_overloaded(self) -> Iterator[Point]:
         """Break what a break has overloaded, at the same load.  Collective."""
         while most_utilised(self.cell, self.law, self._state())[1] > 1.0 + UTILISATION_TIE:
@@ -206,44 +133,9 @@ class SlidingLeg:
 
     def _break(self) -> Iterator[Point]:
         """Break the worst bonds here, and find the state after it.  Collective."""
-        state = self._state()
-        worst = most_utilised(self.cell, self.law, state)[2]
-        bonds, broke, softened, fracture = break_bonds(self.cell, self.law, worst, state)
-        stretched = self.sliding.stretched(self._here.x)
-        broken = replace(self._path_state(), bonds=bonds, broken=fracture, stretched=stretched)
+        broke, softened, broken = self._broken(most_utilised(self.cell, self.law, self._state())[2])
         yield self._point(broke, softened, broken)
         self._after_break(broken)
-
-    def _after_break(self, begin: PathState) -> None:
-        """Go to the state after a break at constant load, if there was one.  Collective.
-
-        The faces lose half the product of their forces, before and after it, and their jumps; of that the slips make
-        heat by the forces after it, and the break has lost the rest.
-        """
-        if begin.broken is None:
-            return
-        status, x = self.sliding.begin(begin.bonds, begin.last.strain)
-        self._here, faces = Standing(status, x, begin.last), self.sliding.faces
-        given = self._given(self._share, x)
-        status, there = self._on_root(faces.search, status, faces.all_allowed(), given, x)
-        lost, heat = (own / self.sliding.area for own in faces.losses(status, x, there))
-        after = self._standing(status, there)
-        # Springs of the bonds that soften do not keep what they were stretched by before.
-        lost += begin.stretched - self.sliding.stretched(x) + self.sliding.released_along(begin.last, after.mean)
-        self._add(after, lost - heat, heat, begin.broken)
-        self._here, self._bonds, self._first = after, self.sliding.bonds(begin.bonds, status, there), True
-
-    def _state(self) -> Equilibrium:
-        """Return the state here, which is found once.  Collective."""
-        if self._found is None or self._found[0] is not self._here:
-            load = self.start.after(self._share, self.end)
-            self._found = self._here, self.sliding.equilibrium(load, self._bonds, self._here.x)
-        return self._found[1]
-
-    def _path_state(self) -> PathState:
-        """Return the beginning of the way from here on."""
-        lam = self.sliding.multipliers(self._here.x)
-        return PathState(self.leg, self._share, self._bonds, lam, self.origin, self._here.mean)
 
     def _point(self, broke: int, softened: int, after: PathState) -> Point:
         """Return the point here, at which so many bonds part and so many soften.  Collective."""

@@ -1,0 +1,90 @@
+"""A path with friction on debonded faces in equal load steps, each an implicit one.
+
+In a step slips grow from where they were with the sign of the traction behind it, then overloaded bonds break at its
+load until none is left.  The way within the step is not known: its heat is that of the slips under the forces behind
+it, and the work of the loads what is stored, lost or heat.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
+from feti_homog.interface.contact.states import BONDED
+from feti_homog.interface.friction.sliding_cell import SlidingCell
+from feti_homog.interface.laws.bond_law import BondLaw
+from feti_homog.interface.loads.load import Load
+from feti_homog.interface.path.path_points import (
+    NO_ENERGIES,
+    UTILISATION_TIE,
+    Energies,
+    PathState,
+    Point,
+    count_on_all_ranks,
+    most_utilised,
+)
+from feti_homog.interface.path.sliding_leg import SlidingLeg
+from feti_homog.parallel.mpi_errors import on_root
+
+
+def sliding_increments(
+    cell: CoupledInterfaces,
+    sliding: SlidingCell,
+    law: BondLaw,
+    waypoints: Sequence[Load],
+    steps: int,
+    worst_only: bool,
+    begin: PathState,
+) -> Iterator[Point]:
+    """Yield the states after each of `steps` equal load steps, `begin.leg` of which are done; as `increments`.
+
+    Collective.
+
+    Raises:
+        StuckError: a step has no admissible statuses.
+    """
+    last, legs, way = -1, len(waypoints), None
+    for step in range(begin.leg + 1, steps + 1):
+        leg = (step * legs - 1) // steps
+        if way is None or leg > last:
+            before = max((step - 1) * legs / steps - leg, 0.0)
+            way = SlidingSteps(cell, sliding, law, waypoints, leg, replace(begin, leg=leg, position=before))
+        point = way.step(step, steps, worst_only)
+        last, begin = leg, point.after
+        yield point
+
+
+class SlidingSteps(SlidingLeg):
+    """Leg along which the load goes in steps."""
+
+    def step(self, step: int, steps: int, worst_only: bool) -> Point:
+        """Return the point after the step of this number, from 1, of the whole path.  Collective."""
+        before, parted = self._bonds, 0
+        self._go_to(step * self.legs / steps - self.leg)
+        while True:
+            state = self._state()
+            used, largest, worst = most_utilised(self.cell, self.law, state)
+            if largest <= 1.0 + UTILISATION_TIE:
+                break
+            count, _, broken = self._broken(worst if worst_only else used > 1.0)
+            parted += count
+            self._after_break(broken)
+        weaker = (state.bonds.history != before.history).any(axis=1) & (state.status == BONDED)
+        energies, self._energies = self._energies, NO_ENERGIES
+        after = replace(self._path_state(), leg=step, position=0.0)
+        softened = count_on_all_ranks(self.cell, weaker)
+        return Point(step / steps, 1.0, state, parted, softened, energies, used, after)
+
+    def _go_to(self, share: float) -> None:
+        """Go to a share of the leg with the bonds as they are.  Collective."""
+        here, faces, area = self._here, self.sliding.faces, self.sliding.area
+        given, self._share = self._given(share, here.x), share
+        status, x = self._on_root(faces.step, here.status, given, here.x)
+        heat = faces.heat_behind(status, here.x, x) / area
+        lost = 0.0
+        if self._opened_tied(here.status, status):
+            lost = on_root(self.cell.comm, faces.let_go, here.status, status, given, here.x) / area
+        stored = self.sliding.stored(x) - self.sliding.stored(here.x)
+        self._energies = self._energies.plus(Energies(stored + heat + lost, lost, 0.0, heat))
+        self._here, self._bonds = self._standing(status, x), self.sliding.bonds(self._bonds, status, x)
