@@ -1,7 +1,8 @@
-"""Aliases of NumPy's array types: the shape stands in each docstring, the type of the entries here."""
+"""Aliases of NumPy's array types, whose shapes stand in docstrings, and of documents such as result.json."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -16,3 +17,4 @@ Index = NDArray[np.intp]  # as NumPy itself numbers
 Bool = NDArray[np.bool_]
 AnyInt = NDArray[np.integer[Any]]
 Array = NDArray[Any]
+Document = Mapping[str, Any]

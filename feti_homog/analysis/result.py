@@ -279,7 +279,7 @@ class Result:
         return short_summary(self.document)
 
     def _repr_html_(self) -> str:
-        from feti_homog.report.html.tables import notebook  # notebooks alone show it
+        from feti_homog.report.text.summary import notebook  # notebooks alone show it
 
         return notebook(self.document)
 

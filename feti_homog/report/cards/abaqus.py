@@ -15,8 +15,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from feti_homog.errors import CaseError
-from feti_homog.report.cards.card_text import comments, identifier, number
-from feti_homog.report.cards.effective_material import PAIRS, EffectiveMaterial
+from feti_homog.report.cards.effective_material import PAIRS, EffectiveMaterial, comments, identifier, number
 from feti_homog.typing import Float
 
 WIDTH, PER_LINE = 20, 8

@@ -8,8 +8,7 @@ with engineering shears.  ALPX, ALPY, ALPZ are secant coefficients; there are no
 from __future__ import annotations
 
 from feti_homog.errors import CaseError
-from feti_homog.report.cards.card_text import comments, number
-from feti_homog.report.cards.effective_material import EffectiveMaterial
+from feti_homog.report.cards.effective_material import EffectiveMaterial, comments, number
 
 ORDER = (0, 1, 2, 5, 3, 4)
 """Where in [11, 22, 33, 23, 13, 12] the components of [x, y, z, xy, yz, xz] stand."""

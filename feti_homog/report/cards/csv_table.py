@@ -7,8 +7,7 @@ import io
 from collections.abc import Iterator
 from itertools import combinations_with_replacement
 
-from feti_homog.report.cards.card_text import number
-from feti_homog.report.cards.effective_material import PAIRS, EffectiveMaterial
+from feti_homog.report.cards.effective_material import PAIRS, EffectiveMaterial, number
 
 COLUMNS = ("name", "value", "unit", "meaning")
 AXES = ("the fibre (x3 of the cell)", "x1 of the cell", "x2 of the cell")

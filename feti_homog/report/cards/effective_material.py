@@ -1,9 +1,14 @@
-"""The effective material of a result in the axes of a card, of which axis 1 is the fibre."""
+"""The effective material of a result in the axes of a card, of which axis 1 is the fibre, and what all cards have.
+
+Cards share their first comments, numbers in fields of a given width, and names.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -11,7 +16,7 @@ import numpy as np
 from feti_homog.errors import CaseError
 from feti_homog.materials.voigt import is_positive_definite
 from feti_homog.report.text import material_axes
-from feti_homog.typing import Float
+from feti_homog.typing import Document, Float
 
 FIBRE_FIRST = (2, 0, 1)
 """The axes of the cell along which axes 1, 2, 3 of a card lie: x3, x1, x2, a right-handed turn."""
@@ -28,6 +33,12 @@ ABOUT_THE_FIBRE = {
     "nu23": "nu_transverse", "G12": "G_axial", "G13": "G_axial", "G23": "G_transverse",
     "alpha1": "expansion_axial", "alpha2": "expansion_transverse", "alpha3": "expansion_transverse",
 }  # fmt: skip
+LONGEST = 100
+AXES = (
+    "Axis 1 is the fibre, x3 of the cell; axes 2 and 3 are x1 and x2 of the cell. So E1, E2, E3, nu12, nu13, nu23, "
+    "G12, G13, G23 of this card are E3, E1, E2, nu31, nu32, nu12, G13, G23, G12 of the cell. nu_ij = -eps_j/eps_i "
+    "under stress along i."
+)
 TINY = float(np.finfo(float).tiny)
 NEGLIGIBLE = 1e-3
 """Couplings up to this part of sqrt(C_ii C_jj), and shears up to this part of the largest expansion, are left out. It
@@ -85,7 +96,7 @@ class EffectiveMaterial:
         }
 
 
-def in_axes_of_the_cell(document: Mapping[str, Any]) -> EffectiveMaterial:
+def in_axes_of_the_cell(document: Document) -> EffectiveMaterial:
     """Return the material of the stiffness and expansion of a result.
 
     It is orthotropic if its other entries are negligible.
@@ -110,11 +121,17 @@ def in_axes_of_the_cell(document: Mapping[str, Any]) -> EffectiveMaterial:
         symmetry = f"Orthotropic; {words} are left out."
         compliance = np.where(COUPLINGS, 0.0, compliance)
         expansion = None if expansion is None else expansion * [1, 1, 1, 0, 0, 0]
-    errors, scatter = material_axes.errors(document), material_axes.scatter(document)
-    return _material(document, symmetry, compliance, expansion, errors, scatter)
+    return EffectiveMaterial(
+        **_origin(document),
+        symmetry=symmetry,
+        compliance=(compliance + compliance.T) / 2.0,
+        expansion=expansion,
+        errors=material_axes.errors(document),
+        scatter=material_axes.scatter(document),
+    )
 
 
-def nearest_transversely_isotropic(document: Mapping[str, Any]) -> EffectiveMaterial:
+def nearest_transversely_isotropic(document: Document) -> EffectiveMaterial:
     """Return the material of the transversely isotropic constants of a result.
 
     Raises:
@@ -135,34 +152,25 @@ def nearest_transversely_isotropic(document: Mapping[str, Any]) -> EffectiveMate
         axial, transverse = _numbers([given["expansion_axial"], given["expansion_transverse"]], (2,))
         expansion = np.array([axial, transverse, transverse, 0.0, 0.0, 0.0])
     symmetry = f"The nearest transversely isotropic material, at a relative distance of {given['deviation']:.2g}."
-    known = (document.get("mesh_error") or {}).get("constants", {})
-    errors = {name: float(known[own]) for name, own in ABOUT_THE_FIBRE.items() if own in known}
-    of_phases = material_axes.standard_deviations(document)
-    scatter = {name: of_phases[own] for name, own in ABOUT_THE_FIBRE.items() if own in of_phases}
-    return _material(document, symmetry, compliance, expansion, errors, scatter)
-
-
-def _material(
-    document: Mapping[str, Any],
-    symmetry: str,
-    compliance: Float,
-    expansion: Float | None,
-    errors: Mapping[str, float],
-    scatter: Mapping[str, float],
-) -> EffectiveMaterial:
+    errors = (document.get("mesh_error") or {}).get("constants", {})
+    scatter = material_axes.standard_deviations(document)
     return EffectiveMaterial(
-        name=document["case"]["name"],
-        version=document["version"],
-        stress_unit=document["case"]["output"]["stress_unit"],
+        **_origin(document),
         symmetry=symmetry,
-        compliance=(compliance + compliance.T) / 2.0,
+        compliance=compliance,
         expansion=expansion,
-        errors=errors,
-        scatter=scatter,
+        errors={name: float(errors[own]) for name, own in ABOUT_THE_FIBRE.items() if own in errors},
+        scatter={name: scatter[own] for name, own in ABOUT_THE_FIBRE.items() if own in scatter},
     )
 
 
-def _stiffness(document: Mapping[str, Any]) -> Float:
+def _origin(document: Document) -> dict[str, Any]:
+    """Return the attributes of a material that result.json has as they are."""
+    case = document["case"]
+    return {"name": case["name"], "version": document["version"], "stress_unit": case["output"]["stress_unit"]}
+
+
+def _stiffness(document: Document) -> Float:
     """(6, 6) in the axes of the cell, symmetric positive definite."""
     analysis = document["case"]["analysis"]
     if document["status"] != "done":
@@ -195,3 +203,46 @@ def _first(faults: Sequence[str]) -> str:
     """Return the first of some faults, and how many more there are."""
     more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
     return f"{faults[0] if faults else 'it was not finished'}{more}"
+
+
+def comments(material: EffectiveMaterial, mark: str) -> list[str]:
+    """Return the first lines of a card, each after the mark of a comment, in ASCII."""
+    stress = material.stress_unit or "the unit of the moduli in the case file"
+    paragraphs = [
+        f"Effective material of {material.name}, by feti_homog {material.version}.",
+        AXES,
+        f"Stresses in {stress}, expansions per unit of temperature; nothing is converted.",
+        material.symmetry,
+    ]
+    if material.expansion is None:
+        paragraphs.append("No thermal expansion: not every phase of the case gives one.")
+    if material.errors:
+        paragraphs.append(f"Estimated errors by the mesh: {_listed(material.errors)}.")
+    if material.scatter:
+        paragraphs.append(f"Standard deviations by uncertain constants of the phases: {_listed(material.scatter)}.")
+    lines = (line for words in paragraphs for line in wrap(_ascii(words), LONGEST))
+    return [f"{mark} {line}" for line in lines]
+
+
+def _listed(values: Mapping[str, float]) -> str:
+    return ", ".join(f"{name} {value:.1e}" for name, value in values.items())
+
+
+def number(value: float, width: int = 24) -> str:
+    """Return the value in at most `width` characters, at least 12: all 17 digits if they fit, else as many as do."""
+    value = float(value) + 0.0  # no -0.0
+    forms = [repr(value), *(f"{value:.{digits}E}" for digits in range(16, 3, -1))]
+    return next(form for form in forms if len(form) <= width)
+
+
+def identifier(name: str) -> str:
+    """Return the name in letters, digits and single underscores.
+
+    It has at most 60 characters, the first of them a letter.
+    """
+    word = re.sub(r"[\W_]+", "_", name, flags=re.ASCII)[:60].strip("_")
+    return word if word[:1].isalpha() else f"material_{word}".strip("_")
+
+
+def _ascii(text: str) -> str:
+    return text.encode("ascii", "backslashreplace").decode()

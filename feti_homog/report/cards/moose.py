@@ -9,8 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from feti_homog.report.cards.card_text import comments, identifier, number
-from feti_homog.report.cards.effective_material import EffectiveMaterial
+from feti_homog.report.cards.effective_material import EffectiveMaterial, comments, identifier, number
 
 SYMMETRIC9 = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2), (3, 3), (4, 4), (5, 5))
 SYMMETRIC21 = tuple((row, column) for row in range(6) for column in range(row, 6))

@@ -10,20 +10,19 @@ from bokeh.models import ColumnDataSource, HoverTool
 from bokeh.plotting import figure
 
 from feti_homog.materials.voigt import STRESSES, voigt_names
-from feti_homog.report.plots.energy_picture import AREAS
 from feti_homog.report.plots.interface_marks import BONDED, CLOSED, OPEN, STATE_COLOURS, STATE_NAMES
-from feti_homog.report.plots.response_curves import INK
+from feti_homog.report.plots.path_picture import AREAS
+from feti_homog.report.plots.plot_helpers import INK
 from feti_homog.report.text.analyses import reported
 from feti_homog.report.text.point_tables import shown_entries
 from feti_homog.results import path_curves
-from feti_homog.typing import Array
+from feti_homog.typing import Array, Document
 
 COUNTS = {BONDED: "bonded", OPEN: "open", CLOSED: "closed"}
 MARKERS = "shown"  # name of the sources whose point the viewer of states moves
 DIRECTIONS = 181
 EQUILIBRIA = 0.4  # opacity
 
-Document = Mapping[str, Any]
 Curves = Mapping[str, Array]
 
 

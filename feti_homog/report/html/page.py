@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import json
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -19,16 +18,17 @@ from numpy.typing import NDArray
 
 from feti_homog.errors import CaseError
 from feti_homog.materials.voigt import SPATIAL_STRAINS, STRAINS, voigt_names
-from feti_homog.report.html import curves, tables
-from feti_homog.report.plots.decimation import DrawnMesh, drawn_displacement, drawn_mesh, outline_edges
+from feti_homog.report.html import curves
+from feti_homog.report.plots.decimation import drawn_displacement
 from feti_homog.report.plots.deformed_panels import shown_scale
-from feti_homog.report.plots.interface_marks import STATE_COLOURS, STATE_NAMES, STATE_WIDTHS, InterfaceEdges
+from feti_homog.report.plots.interface_marks import STATE_COLOURS, STATE_NAMES, STATE_WIDTHS, DrawnCell
 from feti_homog.report.plots.plot_helpers import drawn_stress, stress_component, value_range
 from feti_homog.report.text.analyses import reported
-from feti_homog.report.text.summary import checks, title_of
+from feti_homog.report.text.summary import answers, checks, title_of
 from feti_homog.results import atomic, field_file, output_folder, result_json
 from feti_homog.results.path_curves import FAINT, components_above
 from feti_homog.results.path_peak import marks
+from feti_homog.typing import Document
 from feti_homog.version import __version__
 
 NAME, SWEEP = "report.html", "sweep.json"
@@ -50,8 +50,7 @@ PICTURES = {
 }
 MOST_STATES, TRIANGLES = 48, 8000  # of the viewer, which keep a page below some megabytes
 LARGEST_SHORT, LARGEST_BYTE = 32767, 255
-
-Document = Mapping[str, Any]
+MOST_ROWS = 60  # of a table of points
 
 
 def viewer_data(file: Any, document: Document) -> dict[str, Any]:
@@ -61,22 +60,21 @@ def viewer_data(file: Any, document: Document) -> dict[str, Any]:
     of component and state, which leave out the extreme 0.5 %.  `ranges` are those of all states but the end of a path,
     where stresses may be many times those of the peak; curves begin with them (`common`).
     """
-    drawn = drawn_mesh(file, TRIANGLES)
-    borders = outline_edges(drawn, drawn.body)
-    edges = InterfaceEdges.of(file, drawn, borders)
+    cell = DrawnCell.of(file, TRIANGLES)
+    drawn = cell.drawn
     numbers = reported(document).states(document, MOST_STATES, len(file["state"]))
     shown = [file[f"state/{number}"] for number in numbers]
     stresses = voigt_names(len(shown[0].attrs["strain"]))[1]
     component = stress_component(document["case"]["output"].get("stress", "auto"), shown)
     fields = [[drawn_stress(state, name, drawn) for name in stresses] for state in shown]
-    states = [_state(state, drawn, edges, document) for state in shown]
+    states = [_state(state, cell, document) for state in shown]
     ranged = [own for own, state in zip(fields, states, strict=True) if state["mark"] != "end"] or fields
     areas = np.tile(drawn.areas, len(ranged))
     return {
         "points": _base64(drawn.points, "<f4"),
         "triangles": _base64(drawn.triangles, "<u4"),
-        "borders": _base64(borders, "<u4"),
-        "edges": _base64(edges.edges, "<u4"),
+        "borders": _base64(cell.borders, "<u4"),
+        "edges": _base64(cell.interface.edges, "<u4"),
         "colours": _base64(mpl.colormaps["viridis"](np.arange(256))[:, :3] * LARGEST_BYTE, "u1"),
         "scale": shown_scale(file, document),
         "components": list(stresses),
@@ -92,9 +90,9 @@ def viewer_data(file: Any, document: Document) -> dict[str, Any]:
     }
 
 
-def _state(state: Any, drawn: DrawnMesh, edges: InterfaceEdges, document: Document) -> dict[str, Any]:
+def _state(state: Any, cell: DrawnCell, document: Document) -> dict[str, Any]:
     """Return all but the number and the fields; `mark` names a first break, a peak, what is after it, or an end."""
-    displacement = drawn_displacement(state, drawn)
+    displacement = drawn_displacement(state, cell.drawn)
     unit = float(np.abs(displacement).max()) / LARGEST_SHORT or 1.0
     status = state["status"][:]
     attributes = state.attrs
@@ -112,7 +110,7 @@ def _state(state: Any, drawn: DrawnMesh, edges: InterfaceEdges, document: Docume
         "nodes": [int((status == kind).sum()) for kind in range(3)],
         "unit": unit,
         "displacement": _base64(np.round(displacement / unit), "<i2"),
-        "status": _base64(edges.state(status), "u1"),
+        "status": _base64(cell.interface.state(status), "u1"),
     }
 
 
@@ -164,8 +162,8 @@ def page(document: Document, directory: Path) -> str:
         title=title_of(document),
         document=document,
         version=__version__,
-        facts=tables.facts(document),
-        answers=[Markup(table.html) for table in tables.answers(document)],
+        facts=facts(document),
+        answers=[Markup(table.html) for table in answers(document, MOST_ROWS)],
         checks=checks(document),
         pictures=_pictures(directory),
         library=Markup(library),
@@ -173,6 +171,30 @@ def page(document: Document, directory: Path) -> str:
         curves_script=Markup(script),
         states=None if shown is None else Markup(_json(shown)),
     )
+
+
+def facts(document: Document) -> list[tuple[str, str]]:
+    """Return the facts of a result: case, cell and solver."""
+    case, cell, solver = document["case"], document["cell"], document["solver"]
+    length = case["output"].get("length_unit", "")
+    fractions = ", ".join(f"{phase} {share:.4f}" for phase, share in cell["fractions"].items())
+    iterations, ranks = solver["iterations"], solver["ranks"]
+    return [
+        ("Analysis", f"{case['analysis']['type']}, plane {case['analysis']['plane']}"),
+        ("Cell", f"{case['cell']['geometry']}, {cell['width']:.6g} x {cell['height']:.6g} {length}".rstrip()),
+        ("Phases", fractions),
+        ("Mesh", f"{_count(cell['elements'])} elements, {_count(cell['nodes'])} nodes, "
+                 f"order {case['cell'].get('order', 1)}, refine {case['cell'].get('refine', cell.get('refine', 0))}"),
+        ("Solver", f"{_count(ranks)} rank{'' if ranks == 1 else 's'}, {_count(solver['subdomains'])} subdomains, "
+                   f"{_count(solver['dofs'])} degrees of freedom"),
+        ("Iterations", f"{sum(iterations)} in {len(iterations)} states, to {solver['rtol']:g}"),
+        ("Time", ", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in document["timings"].items())),
+        ("Version", f"feti-homog {document['version']}, layout {document['schema']}"),
+    ]  # fmt: skip
+
+
+def _count(number: int) -> str:
+    return f"{number:,}".replace(",", "\N{NO-BREAK SPACE}")
 
 
 def _document(directory: Path) -> dict[str, Any]:

@@ -1,4 +1,7 @@
-"""cell.png: materials and the numbers of the fibres, those that `fibre = N` of a case file means; partition.png."""
+"""Pictures of the undeformed cell: cell.png, partition.png and mesh_error.png.
+
+The numbers of the fibres are those that `fibre = N` of a case file means.
+"""
 
 from __future__ import annotations
 
@@ -7,12 +10,17 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from scipy.spatial import cKDTree
 
-from feti_homog.report.plots.decimation import DrawnMesh, outline_edges
+from feti_homog.report.plots.decimation import DrawnMesh, outline_edges, triangle_means
+from feti_homog.report.plots.interface_marks import DrawnCell
 from feti_homog.report.plots.plot_helpers import (
+    BAR_INCHES,
+    bar_beside,
     cell_scale,
     draw_segments,
     figure_of,
@@ -30,17 +38,18 @@ MOST_NUMBERS = 2000  # of fibres; of more none could be read
 INSIDE, SEEN = 0.4, 0.85  # of a radius: how far from the sides a number stands, and how far at most from the centre
 POINTS_PER_INCH, CHARACTERS = 72, 2.2
 LEAST_SIZE, LARGEST_SIZE = 3.0, 11.0  # of the letters, in points
+DECADES = 4  # below the largest density of errors, of which less is not told apart
 
 
-def figure(file: Any, drawn: DrawnMesh, borders: Array) -> Figure:
+def figure(cell: DrawnCell) -> Figure:
     """Return the materials with the fibres' numbers and, where they differ, the factors of their strengths."""
-    attributes, fibres = file.attrs, file["fibre"]
+    drawn, attributes, fibres = cell.drawn, cell.file.attrs, cell.file["fibre"]
     phases = list(attributes["phases"])
     inks = np.array([mpl.colors.to_rgba(MATRIX), *(_material(k) for k in range(len(phases) - 1))])
-    picture, axes = _outlined(file, drawn, borders, inks[drawn.phase])
+    picture, axes = _outlined(cell, inks[drawn.phase])
     factors = fibres["strength"][:] if "strength" in fibres else np.ones(len(fibres["number"]))
     varies = bool((factors != 1.0).any())
-    write_fibre_numbers(axes, file, drawn, borders, cell_scale(attributes), factors if varies else None)
+    write_fibre_numbers(axes, cell, cell_scale(attributes), factors if varies else None)
     words = "\nbelow the numbers: strength / that of [interface]" if varies else ""
     axes.set_title(_title(attributes, _count(drawn.body.max() + 1, "body", "bodies")) + words)
     there = np.unique(drawn.phase)
@@ -51,22 +60,52 @@ def figure(file: Any, drawn: DrawnMesh, borders: Array) -> Figure:
     return picture
 
 
-def partition(file: Any, drawn: DrawnMesh, borders: Array) -> Figure:
+def partition(cell: DrawnCell) -> Figure:
     """Return the subdomains into which the bodies are cut."""
+    drawn = cell.drawn
     subdomains = drawn.subdomain.max() + 1
-    picture, axes = _outlined(file, drawn, borders, _distinct(subdomains)[drawn.subdomain])
+    picture, axes = _outlined(cell, _distinct(subdomains)[drawn.subdomain])
     draw_segments(axes, drawn.points[outline_edges(drawn, drawn.subdomain)], "black", 0.5)
     words = f"{_count(drawn.body.max() + 1, 'body', 'bodies')} in {_count(subdomains, 'subdomain', 'subdomains')}"
-    axes.set_title(_title(file.attrs, words))
+    axes.set_title(_title(cell.file.attrs, words))
     return picture
 
 
-def _outlined(file: Any, drawn: DrawnMesh, borders: Array, colours: Array) -> tuple[Figure, Axes]:
-    """Return the cell in the colours (q, 4) of its triangles, with the outlines of the bodies."""
-    picture, (axes,) = figure_of(file.attrs, panels=1)
-    fill_triangles(axes, drawn, drawn.points, colours, len(drawn.triangles) <= MESH_LINES)
-    draw_segments(axes, drawn.points[borders], "black", 0.9)
+def mesh_error(cell: DrawnCell) -> Figure | None:
+    """Return the cell in the colours of the density of the error, None without estimates.
+
+    The error in a part of the cell relative to the strain energy of the cell, over the part's share of the area; the
+    largest of all states.
+    """
+    file, drawn = cell.file, cell.drawn
+    tables = [state["mesh_error"] for state in file.get("state", {}).values() if "mesh_error" in state]
+    if not tables:
+        return None
+    first, second, third = np.moveaxis(drawn.points[drawn.triangles], 1, 0)
+    (x, y), (u, v) = (second - first).T, (third - first).T
+    area = np.abs(x * v - y * u) / 2 / (file.attrs["width"] * file.attrs["height"])
+    elements = drawn.group / drawn.pieces
+    density: Array = np.max([triangle_means(table, None, drawn) for table in tables], axis=0) * elements / area
+    most = float(density.max(initial=0.0))
+    if not 0.0 < most < np.inf:
+        return None
+    picture, (axes,) = figure_of(file.attrs, panels=1, beside=BAR_INCHES)
+    least = most / 10.0**DECADES
+    colours = ScalarMappable(LogNorm(least, most), "magma_r")
+    fill_triangles(axes, drawn, drawn.points, np.asarray(colours.to_rgba(np.maximum(density, least))), edges=False)
+    bar_beside(axes, colours, "min").set_label("error of the strain energy / energy, per share of the area")
+    draw_segments(axes, drawn.points[cell.borders], "black", 0.7)
     label_cell_axes(axes, file.attrs)
+    axes.set_title(_title(file.attrs, "estimated error of the mesh"))
+    return picture
+
+
+def _outlined(cell: DrawnCell, colours: Array) -> tuple[Figure, Axes]:
+    """Return the cell in the colours (q, 4) of its triangles, with the outlines of the bodies."""
+    picture, (axes,) = figure_of(cell.file.attrs, panels=1)
+    fill_triangles(axes, cell.drawn, cell.drawn.points, colours, len(cell.drawn.triangles) <= MESH_LINES)
+    draw_segments(axes, cell.drawn.points[cell.borders], "black", 0.9)
+    label_cell_axes(axes, cell.file.attrs)
     return picture, axes
 
 
@@ -91,19 +130,16 @@ def _count(number: int, one: str, many: str) -> str:
     return f"{number} {one if number == 1 else many}"
 
 
-def write_fibre_numbers(
-    axes: Axes, file: Any, drawn: DrawnMesh, borders: Array, inches: float, factors: Array | None = None
-) -> None:
+def write_fibre_numbers(axes: Axes, cell: DrawnCell, inches: float, factors: Array | None = None) -> None:
     """Write each fibre's number on it, on every part of a round one that the sides of the cell cut.
 
-    `borders` are the outlines (e, 2) of the bodies, `inches` a length unit in the picture; below the numbers stand
-    `factors` (f,), if there are any.
+    `inches` is a length unit in the picture; below the numbers stand `factors` (f,), if there are any.
     """
-    fibres = file["fibre"]
+    fibres, drawn = cell.file["fibre"], cell.drawn
     if len(fibres["number"]) > MOST_NUMBERS:
         return
-    period, low = np.array([file.attrs["width"], file.attrs["height"]]), drawn.points.min(axis=0)
-    outline = cKDTree(drawn.points[np.unique(borders)])
+    period, low = np.array([cell.file.attrs[name] for name in ("width", "height")]), drawn.points.min(axis=0)
+    outline = cKDTree(drawn.points[np.unique(cell.borders)])
     tables = (fibres[name][:] for name in ("number", "body", "centre", "radius"))
     for k, (number, body, centre, radius) in enumerate(zip(*tables, strict=True)):
         if np.isfinite(radius):

@@ -1,12 +1,12 @@
 """The part of result.h5 that pictures show.
 
 It has about TRIANGLE_LIMIT triangles at most, read in blocks, their outlines, the values and displacements on them, and
-how far these may be magnified.
+how far these may be magnified; the state of free expansion, a sum of states.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -14,13 +14,14 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from feti_homog.materials.voigt import voigt_names
-from feti_homog.typing import Array
+from feti_homog.materials.voigt import SPATIAL_STRAINS, voigt_names
+from feti_homog.typing import Array, Document
 
 LEAST_AREA = 0.5  # area of a triangle in a picture / its own: at zero it would be turned over
 TRIANGLE_LIMIT = 100_000  # triangles in a picture
 BLOCK_ROWS = 1 << 18
 SAME_PLACE = 1e-6  # of the size of the cell
+LOADS = (*SPATIAL_STRAINS, "temperature")
 QUARTERS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])  # of a six-node triangle
 
 
@@ -193,3 +194,55 @@ def _determinant(rows: Array) -> Array:
     """(q,) determinants of (q, 2, 2)."""
     found: Array = rows[:, 0, 0] * rows[:, 1, 1] - rows[:, 0, 1] * rows[:, 1, 0]
     return found
+
+
+@dataclass(frozen=True)
+class SummedTable:
+    """Sum of tables times factors, row by row as it is read."""
+
+    tables: Sequence[Any]
+    factors: Sequence[float]
+
+    def __len__(self) -> int:
+        return len(self.tables[0])
+
+    def __getitem__(self, rows: Any) -> Array:
+        parts = (factor * table[rows] for factor, table in zip(self.factors, self.tables, strict=True))
+        return np.asarray(sum(parts))
+
+
+@dataclass(frozen=True)
+class FreeExpansion:
+    """The state u = u_T + sum_j alpha_j u_j of the unit loads' states, of which pictures read fields of the cell.
+
+    Where no face touches, the states superpose; interfaces are those of the state of the temperature, the last one.
+    """
+
+    file: Any
+    states: Sequence[Any]
+    factors: Sequence[float]
+    attrs: Mapping[str, Any]
+
+    @classmethod
+    def of(cls, state: Any, document: Document) -> FreeExpansion | None:
+        """Return that of the state of a unit of temperature; None of another state, and without an expansion."""
+        strain, temperature = state.attrs["strain"], state.attrs.get("temperature", 0.0)
+        expansion = document.get("thermal_expansion")
+        if expansion is None or len(strain) != len(expansion) or np.any(strain) or temperature != 1.0:
+            return None
+        found = {}
+        for other in state.file["state"].values():
+            loads = np.append(other.attrs["strain"], other.attrs["temperature"])
+            if np.count_nonzero(loads) == 1 and loads.max() == 1.0:
+                found[LOADS[int(loads.argmax())]] = other
+        if len(found) < len(LOADS):
+            return None
+        attributes = dict(state.attrs) | {"strain": np.array(expansion), "stress": np.zeros(len(expansion))}
+        return cls(state.file, [found[load] for load in LOADS], [*expansion, 1.0], attributes)
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.states[-1]
+
+    def __getitem__(self, name: str) -> Any:
+        tables = [state[name] for state in self.states]
+        return SummedTable(tables, self.factors) if np.issubdtype(tables[0].dtype, np.floating) else tables[-1]

@@ -17,11 +17,12 @@ from matplotlib.ticker import MaxNLocator
 from PIL import Image
 
 from feti_homog.errors import FetiHomogError
-from feti_homog.report.plots.decimation import DrawnMesh, drawn_displacement, drawn_mesh, largest_scale, outline_edges
-from feti_homog.report.plots.interface_marks import DAMAGED, STATE_NAMES, InterfaceEdges, state_legend, states_of_nodes
+from feti_homog.report.plots.decimation import drawn_displacement, drawn_mesh, largest_scale
+from feti_homog.report.plots.interface_marks import DAMAGED, STATE_NAMES, DrawnCell, state_legend, states_of_nodes
 from feti_homog.report.plots.load_labels import LoadLabels
 from feti_homog.report.plots.plot_helpers import (
     STRESS_SYMBOLS,
+    bar_beside,
     colour_range,
     draw_segments,
     largest_length,
@@ -32,14 +33,12 @@ from feti_homog.report.plots.plot_helpers import (
     save,
     shade_triangles,
     stress_component,
-    unit_label,
+    stress_label,
 )
 from feti_homog.report.text.analyses import reported
 from feti_homog.results import atomic, field_file, kept_points
 from feti_homog.results.path_peak import marks
-from feti_homog.typing import Array
-
-Document = Mapping[str, Any]
+from feti_homog.typing import Array, Document
 
 MAX_PANELS = 6
 MAX_FRAMES, FRAME_TIME = 24, 250  # of the animation; milliseconds
@@ -50,13 +49,9 @@ LOADS_IN_PANEL, LINE = 2, 0.15  # in a line of its title; inches of a line
 
 
 @dataclass(frozen=True)
-class DeformedCell:
+class DeformedCell(DrawnCell):
     """Data that all panels share."""
 
-    file: Any
-    drawn: DrawnMesh
-    borders: Array
-    interface_edges: InterfaceEdges
     component: str
     colours: tuple[Normalize, str, str]
     scale: float
@@ -64,35 +59,34 @@ class DeformedCell:
     marks: Mapping[int, str]
 
     @classmethod
-    def of(cls, file: Any, numbers: Sequence[int], document: Document, scale: float, limit: int) -> DeformedCell:
+    def of_states(cls, file: Any, numbers: Sequence[int], document: Document, scale: float, limit: int) -> DeformedCell:
         """Return the stress that the case chooses, or that suits all these states, and one range of colours of all."""
-        drawn = drawn_mesh(file, limit)
-        borders = outline_edges(drawn, drawn.body)
-        chosen = document["case"]["output"].get("stress", "auto")
-        states = [file[f"state/{n}"] for n in numbers]
-        component = stress_component(chosen, states)
+        cell, states = DrawnCell.of(file, limit), [file[f"state/{n}"] for n in numbers]
+        component = stress_component(document["case"]["output"].get("stress", "auto"), states)
         words = marks(document) if reported(document).is_followed else {}
         # At the end, once all fibres have come off, stresses may be many times those of the peak.
         marked = [state for state in states if words.get(int(state.attrs["point"]), "end") != "end"] or states
-        stress = np.concatenate([nodal_stress(state, component, drawn) for state in marked])
-        colours = colour_range(stress, np.tile(drawn.node_areas, len(marked)))
-        edges = InterfaceEdges.of(file, drawn, borders)
-        return cls(file, drawn, borders, edges, component, colours, scale, LoadLabels.of(document), words)
+        stress = np.concatenate([nodal_stress(state, component, cell.drawn) for state in marked])
+        colours = colour_range(stress, np.tile(cell.drawn.node_areas, len(marked)))
+        parts = vars(cell) | {"component": component, "colours": colours, "scale": scale, "marks": words}
+        return cls(**parts, labels=LoadLabels.of(document))
+
+    def state(self, number: int) -> Any:
+        """Return a state of the file."""
+        return self.file[f"state/{number}"]
 
     def moved(self, number: int) -> Array:
         """(p, 2) places of the drawn nodes."""
-        places: Array = self.drawn.points + self.scale * drawn_displacement(self.file[f"state/{number}"], self.drawn)
+        places: Array = self.drawn.points + self.scale * drawn_displacement(self.state(number), self.drawn)
         return places
 
     def draw(self, axes: Axes, number: int, moved: Array) -> Any:
         """Draw the cell of a state, drawn nodes at `moved`; returns what a colour bar is of."""
-        state = self.file[f"state/{number}"]
-        norm, colours, _ = self.colours
-        shapes = shade_triangles(
-            axes, self.drawn, moved, nodal_stress(state, self.component, self.drawn), norm, colours
-        )
+        state, (norm, colours, _) = self.state(number), self.colours
+        stress = nodal_stress(state, self.component, self.drawn)
+        shapes = shade_triangles(axes, self.drawn, moved, stress, norm, colours)
         draw_segments(axes, moved[self.borders], "black", 0.5)
-        self.interface_edges.mark(axes, moved, states_of_nodes(state), magnified=0.8)
+        self.interface.mark(axes, moved, states_of_nodes(state), magnified=0.8)
         axes.set_aspect("equal")
         axes.set(xticks=(), yticks=())
         axes.set_axis_off()
@@ -102,24 +96,21 @@ class DeformedCell:
         axes.set_title(f"{title}\n{self.labels.label(attributes, LOADS_IN_PANEL)}", fontsize=9, y=1.0)
         return shapes
 
-    def bar(self, axes: Axes, shapes: Any, place: Axes | None = None) -> None:
-        """Draw the colour bar of all states beside axes, or in a `place`."""
-        figure: Any = axes.figure
-        at = axes.inset_axes((1.03, 0.0, 0.04, 1.0)) if place is None else place
-        bar = figure.colorbar(shapes, cax=at, extend=self.colours[2])
+    def bar(self, axes: Axes, shapes: Any) -> None:
+        """Draw the colour bar of all states beside axes."""
+        bar = bar_beside(axes, shapes, self.colours[2])
         bar.ax.tick_params(labelsize=8)
         bar.locator = MaxNLocator(6)
 
     def lines(self, number: int) -> int:
         """Lines of the words for the load of a state."""
-        return 1 + self.labels.label(self.file[f"state/{number}"].attrs, LOADS_IN_PANEL).count("\n")
+        return 1 + self.labels.label(self.state(number).attrs, LOADS_IN_PANEL).count("\n")
 
     @property
     def caption(self) -> str:
         """Return what is drawn."""
-        unit = unit_label(self.file.attrs["stress_unit"]) or "(unit of the moduli)"
         scale = "true scale" if self.scale == 1 else f"displacement × {self.scale:g}"
-        return f"${STRESS_SYMBOLS[self.component]}$ {unit}, {scale}"
+        return f"${STRESS_SYMBOLS[self.component]}$ {stress_label(self.file.attrs['stress_unit'])}, {scale}"
 
 
 def draw_state(
@@ -143,7 +134,7 @@ def draw_state(
     path = directory / field_file.NAME
     try:
         with h5py.File(path, "r") as file:
-            cell = DeformedCell.of(file, [number], {"case": {"output": {"stress": stress}}}, scale, STATE_LIMIT)
+            cell = DeformedCell.of_states(file, [number], {"case": {"output": {"stress": stress}}}, scale, STATE_LIMIT)
             if most is not None:
                 cell = replace(cell, colours=(Normalize(-most, most), "RdBu_r", "both"))
             cell.bar(axes, cell.draw(axes, number, cell.moved(number)))
@@ -183,7 +174,7 @@ def _path(directory: Path, file: Any, document: Document, count: int) -> list[Pa
 PANELS = {"angle": _angle, "path": _path}
 
 
-def shown_scale(file: Any, document: Mapping[str, Any]) -> float:
+def shown_scale(file: Any, document: Document) -> float:
     """Return the factor of displacements in all pictures of an angle or a path and in the report.
 
     It is that of the case or, by default, one at which the largest displacement and opening are seen and no triangle
@@ -206,7 +197,7 @@ def shown_scale(file: Any, document: Mapping[str, Any]) -> float:
 
 
 def _side_by_side(file: Any, numbers: Sequence[int], document: Document, scale: float) -> Figure:
-    cell = DeformedCell.of(file, numbers, document, scale, PANEL_LIMIT)
+    cell = DeformedCell.of_states(file, numbers, document, scale, PANEL_LIMIT)
     places = [cell.moved(number) for number in numbers]
     size = np.subtract(*_corners(places)[::-1])
     rows, columns = _grid(len(numbers), size[0] / size[1])
@@ -221,7 +212,7 @@ def _side_by_side(file: Any, numbers: Sequence[int], document: Document, scale: 
         axes.set_axis_off()
     grid[0].autoscale_view()
     figure.suptitle(f"{plain(file.attrs['title'])}: {cell.caption}".lstrip(": "), fontsize=11)
-    states = [cell.interface_edges.state(states_of_nodes(file[f"state/{n}"])) for n in numbers]
+    states = [cell.interface.state(states_of_nodes(cell.state(number))) for number in numbers]
     found = np.unique(np.concatenate(states))
     handles = state_legend([kind for kind in STATE_NAMES if kind in found])
     if handles:
@@ -239,7 +230,7 @@ def _grid(panels: int, ratio: float) -> tuple[int, int]:
 
 def _animation(file: Any, numbers: Sequence[int], document: Document, scale: float, path: Path) -> Path:
     """Frames of one layout, that of the last state."""
-    cell = DeformedCell.of(file, numbers, document, scale, FRAME_LIMIT)
+    cell = DeformedCell.of_states(file, numbers, document, scale, FRAME_LIMIT)
     places = [cell.moved(number) for number in numbers]
     low, high = _corners(places)
     size = high - low

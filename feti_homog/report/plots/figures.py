@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,26 +19,23 @@ from feti_homog.materials.voigt import voigt_names
 from feti_homog.report.plots import (
     cell_picture,
     deformed_panels,
-    energy_picture,
-    mesh_error_picture,
     response_curves,
-    sensitivities_picture,
     traction_plots,
 )
 from feti_homog.report.plots.decimation import (
     DrawnMesh,
+    FreeExpansion,
     drawn_displacement,
-    drawn_mesh,
     largest_scale,
     nodal_values,
-    outline_edges,
 )
-from feti_homog.report.plots.free_expansion import FreeExpansion
-from feti_homog.report.plots.interface_marks import InterfaceEdges, states_of_nodes
+from feti_homog.report.plots.interface_marks import DrawnCell, states_of_nodes
 from feti_homog.report.plots.load_labels import LoadLabels
 from feti_homog.report.plots.plot_helpers import (
+    BAR_INCHES,
     STRESS_SYMBOLS,
     STYLE,
+    bar_beside,
     colour_range,
     draw_segments,
     figure_of,
@@ -51,18 +47,18 @@ from feti_homog.report.plots.plot_helpers import (
     save,
     shade_triangles,
     stress_component,
-    unit_label,
+    stress_label,
 )
 from feti_homog.report.text.analyses import reported
 from feti_homog.results import atomic, field_file, output_folder, result_json
-from feti_homog.typing import Array
+from feti_homog.typing import Array, Document
 
 LEVEL_INK, LEVEL_WIDTH = "0.15", 0.6  # of lines of equal displacement along the fibres
 LEVELS = 12  # about so many lines
 OUTLINED_BODIES = 8  # up to which the deformed cell is drawn over all that it has left
 FREE = r"free expansion by $\Delta T = 1$"
 POWERS = (-2, 4)  # of ten between which numbers of a colour bar have no common factor
-UNDEFORMED, BAR_INCHES = "0.5", 1.1
+UNDEFORMED = "0.5"
 IN_LEGEND = 2  # entries of a legend in a line: four are wider than a narrow cell
 
 
@@ -89,32 +85,24 @@ def plot(directory: Path) -> list[Path]:
     with mpl.rc_context(STYLE):
         try:
             paths = _pictures(directory, document) if _output(document).get("fields", True) else []
-            for name, picture in (("sensitivities", sensitivities_picture), ("energy", energy_picture)):
-                if (made := picture.figure(document)) is not None:
-                    paths.append(save(made, directory / f"{name}.png"))
             return paths + response_curves.plot(directory, document)
         except OSError as error:
             raise FetiHomogError(f"cannot draw {directory / field_file.NAME}: {error.strerror or error}") from error
 
 
-def _output(document: Mapping[str, Any]) -> Mapping[str, Any]:
+def _output(document: Document) -> Document:
     """Return the section [output] of the case, empty without a result.json."""
-    found: Mapping[str, Any] = document.get("case", {}).get("output", {})
+    found: Document = document.get("case", {}).get("output", {})
     return found
 
 
-def _pictures(directory: Path, document: Mapping[str, Any]) -> list[Path]:
+def _pictures(directory: Path, document: Document) -> list[Path]:
     """Return the pictures of result.h5."""
     with h5py.File(directory / field_file.NAME, "r") as file:
-        drawn = drawn_mesh(file)
-        borders = outline_edges(drawn, drawn.body)
-        interface_edges = InterfaceEdges.of(file, drawn, borders)
-        paths = [
-            save(cell_picture.figure(file, drawn, borders), directory / "cell.png"),
-            save(cell_picture.partition(file, drawn, borders), directory / "partition.png"),
-        ]
-        if (error := mesh_error_picture.figure(file, drawn, borders)) is not None:
-            paths.append(save(error, directory / "mesh_error.png"))
+        cell = DrawnCell.of(file)
+        found = {"cell": cell_picture.figure(cell), "partition": cell_picture.partition(cell)}
+        found |= {"mesh_error": error} if (error := cell_picture.mesh_error(cell)) is not None else {}
+        paths = [save(figure, directory / f"{name}.png") for name, figure in found.items()]
         if reported(document).is_curve:
             paths += deformed_panels.plot(directory, file, document)
         else:
@@ -122,10 +110,9 @@ def _pictures(directory: Path, document: Mapping[str, Any]) -> list[Path]:
                 state = file[f"state/{number}"]
                 draw = _sheared if is_axial(state) else _deformed
                 shown = FreeExpansion.of(state, document) or state
-                figure = draw(file, shown, drawn, borders, interface_edges, document)
                 name = reported(document).picture or _name(number, state.attrs)
-                paths.append(save(figure, directory / f"{name}.png"))
-        return paths + traction_plots.plot(directory, file, interface_edges, document)
+                paths.append(save(draw(cell, shown, document), directory / f"{name}.png"))
+        return paths + traction_plots.plot(directory, cell, document)
 
 
 def _name(number: str, attributes: Any) -> str:
@@ -138,89 +125,67 @@ def _name(number: str, attributes: Any) -> str:
     return f"case_{'minus_' if value < 0 else ''}{name}"
 
 
-def _deformed(
-    file: Any,
-    state: Any,
-    drawn: DrawnMesh,
-    borders: Array,
-    interface_edges: InterfaceEdges,
-    document: Mapping[str, Any],
-) -> Figure:
+def _deformed(cell: DrawnCell, state: Any, document: Document) -> Figure:
     """Return the magnified deformed cell with a stress component in colour, and the outline it has left."""
+    drawn, output = cell.drawn, _output(document)
     displacement = drawn_displacement(state, drawn)
     size = float(np.ptp(drawn.points, axis=0).min())
     seen = magnification(largest_length(displacement), size, largest=largest_scale(displacement, drawn))
-    chosen = _output(document).get("deformation_scale")
+    chosen = output.get("deformation_scale")
     scale = seen if chosen is None else chosen
     moved = drawn.points + scale * displacement
-    figure, axes = _coloured(file, state, drawn, moved, _output(document))
-    draw_segments(axes, _left(file.attrs, drawn, borders), UNDEFORMED, 0.7)
+    figure, axes = _coloured(cell, state, moved, output)
+    draw_segments(axes, _left(cell), UNDEFORMED, 0.7)
     undeformed = Line2D([], [], color=UNDEFORMED, linewidth=0.7, label="undeformed")
-    _outlined(figure, axes, state, moved, borders, interface_edges, [undeformed])
+    _outlined(axes, cell, state, moved, undeformed)
     load = FREE if isinstance(state, FreeExpansion) else LoadLabels.of(document).label(state.attrs)
-    axes.set_title(f"{plain(file.attrs['title'])}\n{load}, displacement × {scale:g}".lstrip())
+    axes.set_title(f"{plain(cell.file.attrs['title'])}\n{load}, displacement × {scale:g}".lstrip())
     return figure
 
 
-def _sheared(
-    file: Any,
-    state: Any,
-    drawn: DrawnMesh,
-    borders: Array,
-    interface_edges: InterfaceEdges,
-    document: Mapping[str, Any],
-) -> Figure:
+def _sheared(cell: DrawnCell, state: Any, document: Document) -> Figure:
     """Return the cell with an axial stress in colour and lines of equal displacement along the fibres.
 
     That displacement moves nothing in the plane.
     """
-    figure, axes = _coloured(file, state, drawn, drawn.points, _output(document))
-    step = draw_levels(axes, state, drawn)
-    length = plain(file.attrs["length_unit"])
-    words = f"$u_3$ every {step:g} {length}".rstrip()
-    levels = Line2D([], [], color=LEVEL_INK, linewidth=LEVEL_WIDTH, label=words)
-    _outlined(figure, axes, state, drawn.points, borders, interface_edges, [levels])
-    axes.set_title(f"{plain(file.attrs['title'])}\n{LoadLabels.of(document).label(state.attrs)}".lstrip())
+    attributes, points = cell.file.attrs, cell.drawn.points
+    figure, axes = _coloured(cell, state, points, _output(document))
+    step = draw_levels(axes, state, cell.drawn)
+    words = f"$u_3$ every {step:g} {plain(attributes['length_unit'])}".rstrip()
+    _outlined(axes, cell, state, points, Line2D([], [], color=LEVEL_INK, linewidth=LEVEL_WIDTH, label=words))
+    axes.set_title(f"{plain(attributes['title'])}\n{LoadLabels.of(document).label(state.attrs)}".lstrip())
     return figure
 
 
-def _coloured(file: Any, state: Any, drawn: DrawnMesh, moved: Array, output: Mapping[str, Any]) -> tuple[Figure, Axes]:
+def _coloured(cell: DrawnCell, state: Any, moved: Array, output: Document) -> tuple[Figure, Axes]:
     """Return the cell, its nodes at `moved`, in the colours of a stress."""
-    attributes = file.attrs
+    attributes, drawn = cell.file.attrs, cell.drawn
     figure, (axes,) = figure_of(attributes, panels=1, beside=BAR_INCHES)
     component = stress_component(output.get("stress", "auto"), [state])
     stress = nodal_stress(state, component, drawn)
     norm, colours, extend = colour_range(stress, drawn.node_areas)
-    picture = shade_triangles(axes, drawn, moved, stress, norm, colours)
-    bar = figure.colorbar(picture, cax=axes.inset_axes((1.03, 0.0, 0.04, 1.0)), extend=extend)
+    bar = bar_beside(axes, shade_triangles(axes, drawn, moved, stress, norm, colours), extend)
     bar.ax.ticklabel_format(axis="y", scilimits=POWERS)
-    bar.set_label(f"${STRESS_SYMBOLS[component]}$ " + (unit_label(attributes["stress_unit"]) or "(unit of the moduli)"))
+    bar.set_label(f"${STRESS_SYMBOLS[component]}$ {stress_label(attributes['stress_unit'])}")
     return figure, axes
 
 
-def _outlined(
-    figure: Figure,
-    axes: Axes,
-    state: Any,
-    moved: Array,
-    borders: Array,
-    interface_edges: InterfaceEdges,
-    lines: list[Line2D],
-) -> None:
-    """Outlines of the bodies and the states of the interfaces, and a legend of them and of other lines."""
-    draw_segments(axes, moved[borders], "black", 0.8)
-    marks = interface_edges.mark(axes, moved, states_of_nodes(state))
-    label_cell_axes(axes, state.file.attrs)
-    handles = [*(marks if len(marks) > 1 else ()), *lines]
+def _outlined(axes: Axes, cell: DrawnCell, state: Any, moved: Array, line: Line2D) -> None:
+    """Outlines of the bodies and the states of the interfaces, and a legend of them and of another line."""
+    draw_segments(axes, moved[cell.borders], "black", 0.8)
+    marks = cell.interface.mark(axes, moved, states_of_nodes(state))
+    label_cell_axes(axes, cell.file.attrs)
+    figure: Any = axes.figure
+    handles = [*(marks if len(marks) > 1 else ()), line]
     figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), IN_LEGEND), frameon=False)
 
 
-def _left(attributes: Any, drawn: DrawnMesh, borders: Array) -> Array:
+def _left(cell: DrawnCell) -> Array:
     """Return the undeformed outlines (e, 2, 2): of the bodies if they are few, else of the cell alone."""
-    if drawn.body.max() < OUTLINED_BODIES:
-        outline: Array = drawn.points[borders]
+    if cell.drawn.body.max() < OUTLINED_BODIES:
+        outline: Array = cell.drawn.points[cell.borders]
         return outline
-    corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * [attributes["width"], attributes["height"]]
+    corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * [cell.file.attrs[name] for name in ("width", "height")]
     return np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
 
 

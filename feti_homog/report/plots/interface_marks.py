@@ -1,4 +1,4 @@
-"""The interface in a picture: which drawn edges are bonded, damaged, in contact or open."""
+"""A cell as pictures show it, and its interface: which drawn edges are bonded, damaged, in contact or open."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from scipy.spatial import cKDTree
 
-from feti_homog.report.plots.decimation import DrawnMesh
+from feti_homog.report.plots.decimation import TRIANGLE_LIMIT, DrawnMesh, drawn_mesh, outline_edges
 from feti_homog.report.plots.plot_helpers import draw_segments
 from feti_homog.typing import Array
 
@@ -61,6 +61,23 @@ class InterfaceEdges:
                 draw_segments(axes, segments, "white", magnified * (STATE_WIDTHS[kind] + HALO), cap)
             draw_segments(axes, segments, STATE_COLOURS[kind], magnified * STATE_WIDTHS[kind], cap)
         return state_legend(found)
+
+
+@dataclass(frozen=True)
+class DrawnCell:
+    """An open result.h5 with its drawn triangles, the outlines of its bodies, and its interface."""
+
+    file: Any
+    drawn: DrawnMesh
+    borders: Array  # (e, 2) drawn nodes
+    interface: InterfaceEdges
+
+    @classmethod
+    def of(cls, file: Any, limit: int = TRIANGLE_LIMIT) -> DrawnCell:
+        """Return that of a file, in about so many triangles at most."""
+        drawn = drawn_mesh(file, limit)
+        borders = outline_edges(drawn, drawn.body)
+        return cls(file, drawn, borders, InterfaceEdges.of(file, drawn, borders))
 
 
 def states_of_nodes(state: Any) -> Array:

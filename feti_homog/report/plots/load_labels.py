@@ -8,16 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, voigt_names
-from feti_homog.report.plots.plot_helpers import strain_symbols
+from feti_homog.materials.voigt import voigt_names
+from feti_homog.report.plots.plot_helpers import SYMBOLS
 from feti_homog.report.text.analyses import reported
 from feti_homog.results.path_curves import FAINT, ZERO, components_above, leading_component
+from feti_homog.typing import Document
 
-SYMBOLS = {
-    **dict(zip(SPATIAL_STRAINS, strain_symbols(len(SPATIAL_STRAINS)), strict=True)),
-    **{name: rf"\Sigma_{{{name[1:]}}}" for name in SPATIAL_STRESSES},
-    "temperature": r"\Delta T",
-}
 LONG = 2  # strains beyond which a label of a path has the leading one alone
 
 
@@ -36,7 +32,7 @@ class LoadLabels:
     given: Mapping[str, float] | None = None
 
     @classmethod
-    def of(cls, document: Mapping[str, Any]) -> LoadLabels:
+    def of(cls, document: Document) -> LoadLabels:
         """Return those of a result.json."""
         analysis = reported(document)
         if analysis.is_followed:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -20,14 +20,18 @@ from matplotlib.tri import Triangulation
 from PIL import Image
 
 from feti_homog.case.bond_laws import DEFAULT, LAWS
-from feti_homog.materials.voigt import AXIAL_STRESSES, SPATIAL_STRESSES, STRESSES, voigt_names
+from feti_homog.materials.voigt import AXIAL_STRESSES, SPATIAL_STRAINS, SPATIAL_STRESSES, STRESSES, voigt_names
 from feti_homog.report.plots.decimation import DrawnMesh, node_means, triangle_means
 from feti_homog.results import atomic
-from feti_homog.results.path_curves import FAINT, components_above
-from feti_homog.typing import Array
+from feti_homog.results.path_curves import FAINT, components_above, interface_sections
+from feti_homog.typing import Array, Document
 
-STRAIN_SYMBOLS = (r"E_{11}", r"E_{22}", r"\gamma_{12}")
-SPATIAL_STRAIN_SYMBOLS = (r"E_{11}", r"E_{22}", r"E_{33}", r"\gamma_{23}", r"\gamma_{13}", r"\gamma_{12}")
+# Of macroscopic strains and stresses by their names, and of stresses.
+SYMBOLS = {
+    **{name: f"{name[:-2].replace('gamma', chr(92) + 'gamma')}_{{{name[-2:]}}}" for name in SPATIAL_STRAINS},
+    **{name: rf"\Sigma_{{{name[1:]}}}" for name in SPATIAL_STRESSES},
+    "temperature": r"\Delta T",
+}
 STRESS_SYMBOLS = {name: rf"\sigma_{{{name[1:]}}}" for name in SPATIAL_STRESSES}
 # Where a state of result.h5 has the stresses: the table, and its column if it has more than one.
 STRESS_TABLES: dict[str, tuple[str, int | None]] = {
@@ -38,7 +42,8 @@ STRESS_TABLES: dict[str, tuple[str, int | None]] = {
 # Fields that vary by less, relatively, have one colour; share of one sign below which zero is not in the middle; share
 # of the area that may lie outside of a colour range, at either end.
 UNIFORM, ONE_SIGN, OUTLIERS = 0.01, 0.1, 0.005
-CELL_INCHES = 4.8  # inches, the longer side of a drawn cell
+CELL_INCHES, BAR_INCHES = 4.8, 1.1  # the longer side of a drawn cell, and the room for a colour bar beside it
+INK = ("#1f4e9c", "#c44e00", "#2a7f3f", "#7a3e9d", "#8a6d00", "#0f7c8c", "#8c1d40")  # of curves
 STYLE = {"font.size": 10, "axes.titlesize": 11, "axes.linewidth": 0.8}
 DPI, PADDING = 200, 0.08  # dots per inch; inches
 # Shares of the cell that the largest displacement and opening are drawn as, and to which the former may be stretched.
@@ -98,6 +103,27 @@ def label_cell_axes(axes: Axes, attributes: Any) -> None:
     axes.margins(0.03)
     axes.set_xlabel(f"$x_1$ {unit}")
     axes.set_ylabel(f"$x_2$ {unit}")
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def bar_beside(axes: Axes, shapes: Any, extend: str) -> Any:
+    """Return the colour bar of shapes, at the right of their axes."""
+    figure: Any = axes.figure
+    return figure.colorbar(shapes, cax=axes.inset_axes((1.03, 0.0, 0.04, 1.0)), extend=extend)
+
+
+def finish_curves(axes: Axes) -> None:
+    """Draw a faint grid behind the curves, without a box around, and their legend at the right."""
+    faint_grid(axes)
+    handles, names = axes.get_legend_handles_labels()
+    if handles:
+        axes.legend(handles, names, frameon=False, fontsize=9, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+
+
+def faint_grid(axes: Axes) -> None:
+    """Draw a faint grid behind what is drawn, without a box around."""
+    axes.grid(color="0.92", linewidth=0.6)
+    axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
 
 
@@ -196,11 +222,6 @@ def largest_length(vectors: Array) -> float:
     return float(np.linalg.norm(vectors, axis=1).max(initial=0.0))
 
 
-def strain_symbols(count: int) -> tuple[str, ...]:
-    """Return those of the strains, 3 in the plane or 6 in space."""
-    return STRAIN_SYMBOLS if count == len(STRAIN_SYMBOLS) else SPATIAL_STRAIN_SYMBOLS
-
-
 def stress_component(chosen: str, states: Sequence[Any]) -> str:
     """Return the stress that is chosen, else that of the largest strain of these states.
 
@@ -224,15 +245,9 @@ def nodal_stress(state: Any, component: str, drawn: DrawnMesh) -> Array:
     return node_means(drawn_stress(state, component, drawn), drawn)
 
 
-def interfaces_of(case: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
-    """Return the section [interface] of a resolved case, or all sections [[interface]]; none of perfect bonding."""
-    sections = case.get("interface", [])
-    return sections if isinstance(sections, list) else [sections]
-
-
-def bond_limits(case: Mapping[str, Any]) -> list[str]:
+def bond_limits(case: Document) -> list[str]:
     """Describe the law of each interface of a case, a line each; of several with the phases that it is between."""
-    bonds, output = interfaces_of(case) or [{}], case.get("output", {})
+    bonds, output = interface_sections({"case": case}) or [{}], case.get("output", {})
     stress, length = output.get("stress_unit", ""), output.get("length_unit", "")
     units = stress, f"{stress} {length}" if stress and length else ""
     if len(bonds) == 1:
@@ -240,7 +255,7 @@ def bond_limits(case: Mapping[str, Any]) -> list[str]:
     return [f"{plain('-'.join(bond['between']))}: {_limits(bond, units)}" for bond in bonds]
 
 
-def _limits(bond: Mapping[str, Any], units: tuple[str, str]) -> str:
+def _limits(bond: Document, units: tuple[str, str]) -> str:
     """Describe a law with constants in these units, of stresses and of energies per area."""
     criterion = bond.get("criterion", DEFAULT)
     symbols = [each for each in LAWS[criterion].symbols if bond.get(each[1])]
@@ -257,3 +272,18 @@ def plain(text: str) -> str:
 
 def unit_label(label: str) -> str:
     return f"({plain(label)})" if label else ""
+
+
+def stress_label(label: str) -> str:
+    """Return the unit of stresses for an axis; of a case without a label, the moduli have it."""
+    return unit_label(label) or "(unit of the moduli)"
+
+
+def stress_unit(case: Document) -> str:
+    """Return the unit of stresses of a case for an axis."""
+    return stress_label(case.get("output", {}).get("stress_unit", ""))
+
+
+def title_of(case: Document, words: str) -> str:
+    """Return the name of a case, if it has one, and these words."""
+    return f"{plain(case.get('name', ''))}: {words}".lstrip(": ")

@@ -13,7 +13,7 @@ from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
 
 from feti_homog.microstructure.statistics import SECTORS, FibreStatistics
-from feti_homog.report.plots.plot_helpers import STYLE, plain, save
+from feti_homog.report.plots.plot_helpers import STYLE, faint_grid, plain, save
 from feti_homog.typing import Float
 
 COLOURS = ("#1f4e9c", "#c44e00", "#2a7f3f")
@@ -134,6 +134,4 @@ def _histogram(axes: Axes, values: Float, weights: Float, label: str) -> None:
 
 def _label(axes: Axes, xlabel: str, ylabel: str) -> None:
     axes.set(xlabel=xlabel, ylabel=ylabel)
-    axes.grid(color="0.92", linewidth=0.6)
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
+    faint_grid(axes)

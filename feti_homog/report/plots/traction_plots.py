@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,13 +22,13 @@ from feti_homog.report.plots.interface_marks import (
     SAME_PLACE,
     STATE_COLOURS,
     STATE_NAMES,
-    InterfaceEdges,
+    DrawnCell,
 )
 from feti_homog.report.plots.load_labels import LoadLabels
-from feti_homog.report.plots.plot_helpers import save, unit_label
+from feti_homog.report.plots.plot_helpers import save, stress_label, unit_label
 from feti_homog.report.text.analyses import reported
 from feti_homog.results.path_peak import peak_of
-from feti_homog.typing import Array
+from feti_homog.typing import Array, Document
 
 DEGREES = (-180.0, 180.0)
 NEAREST = 8  # edges of which the one is looked for that a node lies on
@@ -42,12 +41,13 @@ INK = ("#1f4e9c", "#2a7f3f", "#c44e00")
 NAMES = {"traction": (r"$t_\mathrm{n}$", r"$t_\mathrm{t}$", r"$t_\mathrm{a}$"), "jump": ("gap", "slip", "axial slip")}
 
 
-def plot(directory: Path, file: Any, edges: InterfaceEdges, document: Mapping[str, Any]) -> list[Path]:
+def plot(directory: Path, cell: DrawnCell, document: Document) -> list[Path]:
     """Draw interface.png, if any state has debonded nodes.
 
     It shows, of a path, the state of its peak, dashed, and the valley after it or the last that shows much, else one
     state.
     """
+    file = cell.file
     names = sorted(file.get("state", ()), key=int)
     debonded = {name: int((file[f"state/{name}/status"][:] != BONDED).sum()) for name in names}
     if not any(debonded.values()):
@@ -61,10 +61,10 @@ def plot(directory: Path, file: Any, edges: InterfaceEdges, document: Mapping[st
         if reported(document).is_followed
         else [(partly or [last])[len(partly) // 2]]
     )
-    return [save(_figure(file, edges, shown, LoadLabels.of(document)), directory / "interface.png")]
+    return [save(_figure(cell, shown, LoadLabels.of(document)), directory / "interface.png")]
 
 
-def _around_the_peak(file: Any, names: list[str], last: str, document: Mapping[str, Any]) -> list[str]:
+def _around_the_peak(file: Any, names: list[str], last: str, document: Document) -> list[str]:
     """Return the states at the peak of a path, or the first, and in the valley after it, or the `last`."""
     of_point = {int(file[f"state/{name}"].attrs["point"]): name for name in names}
     peak = peak_of(document)
@@ -77,15 +77,16 @@ def _touching(file: Any, name: str) -> bool:
     return bool((file[f"state/{name}/status"][:] == CLOSED).any())
 
 
-def _figure(file: Any, edges: InterfaceEdges, names: list[str], labels: LoadLabels) -> Figure:
+def _figure(cell: DrawnCell, names: list[str], labels: LoadLabels) -> Figure:
     """Return a row for each of the fibres that are most debonded: tractions, and jumps."""
+    file = cell.file
     fibre, status = file["interface/fibre"][:], file[f"state/{names[-1]}/status"][:]
     bodies, count = np.unique(fibre[status != BONDED], return_counts=True)
     chosen = np.sort(bodies[np.argsort(-count, kind="stable")][:MAX_FIBRES])
     figure = Figure(figsize=(9.0, 2.4 * len(chosen) + 1.5), layout="constrained")
     grid = figure.subplots(len(chosen), 2, sharex="row", sharey="col", squeeze=False)
     for row, body in zip(grid, chosen, strict=True):
-        place = coordinate(file, edges, body)
+        place = coordinate(cell, body)
         for axes, quantity in zip(row, NAMES, strict=True):
             _shade(axes, place, status[place.nodes])
             for name in names:
@@ -159,7 +160,7 @@ def _finish(axes: Axes, place: Coordinate) -> None:
 
 
 def _labels(file: Any, figure: Figure, grid: Any, shaded: Array) -> None:
-    stress = unit_label(file.attrs["stress_unit"]) or "(unit of the moduli)"
+    stress = stress_label(file.attrs["stress_unit"])
     length = unit_label(file.attrs["length_unit"]) or "(cell units)"
     for row in grid:
         row[0].set_ylabel(f"traction {stress}")
@@ -193,12 +194,13 @@ class Coordinate:
     label: str
 
 
-def coordinate(file: Any, edges: InterfaceEdges, body: int) -> Coordinate:
+def coordinate(cell: DrawnCell, body: int) -> Coordinate:
     """Direction of the normal, in degrees, of a body that is a round fibre, or its coating.
 
     Of any other the arc length, counterclockwise from where the normal is nearest to x1 (around each of its boundaries,
     if it has several, one after the other).
     """
+    file, edges = cell.file, cell.interface.nodes
     own = np.flatnonzero(file["interface/fibre"][:] == body)
     normal = file["interface/normal"][:]
     radius = file["fibre/radius"][:][np.isin(file["fibre/number"][:], file["interface/fibre_number"][:][own])]
@@ -207,7 +209,7 @@ def coordinate(file: Any, edges: InterfaceEdges, body: int) -> Coordinate:
         order = np.argsort(angle)
         return Coordinate(own[order], angle[order], DEGREES, "direction of the normal (degrees)")
     period = np.array([file.attrs["width"], file.attrs["height"]])
-    chain = np.unique(np.sort(edges.nodes[np.isin(edges.nodes, own).all(axis=1)], axis=1), axis=0)
+    chain = np.unique(np.sort(edges[np.isin(edges, own).all(axis=1)], axis=1), axis=0)
     length, total = _arc_length(file["interface/points"][:], normal, own, chain, period)
     order = np.argsort(length, kind="stable")
     unit = file.attrs["length_unit"] or "cell units"

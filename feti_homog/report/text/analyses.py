@@ -5,9 +5,8 @@ Curves of an analysis are found by its name: `response_curves.CURVES`, `deformed
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -16,24 +15,11 @@ from feti_homog.report.text import material_axes, point_tables, sensitivity_tabl
 from feti_homog.report.text.path_table import path_table, peak_table
 from feti_homog.report.text.table import Table
 from feti_homog.results.kept_points import chosen, chosen_states
-
-Document = Mapping[str, Any]
+from feti_homog.typing import Document
 
 
 def _evenly(document: Document, most: int, count: int) -> list[int]:
     return sorted({round(k) for k in np.linspace(0, count - 1, min(most, count))})
-
-
-def _never(document: Document) -> bool:
-    return False
-
-
-def _always(document: Document) -> bool:
-    return True
-
-
-def _under_a_strain(document: Document) -> bool:
-    return document.get("case", {}).get("angle", {}).get("strain") is not None
 
 
 def _angle_lines(document: Document, label: str, toughness: str) -> list[list[str]]:
@@ -42,14 +28,14 @@ def _angle_lines(document: Document, label: str, toughness: str) -> list[list[st
     return [table.lines for table in tables]
 
 
-def _path_lines(document: Document, label: str, toughness: str) -> list[list[str]]:
-    return [path_table(document, label).lines]
-
-
 def _load_lines(document: Document, label: str, toughness: str) -> list[list[str]]:
-    tips = point_tables.tip_table(document["load"].get("tips"), toughness)
-    changes = [*sensitivity_tables.sensitivities(document), *sensitivity_tables.uncertainty(document)]
-    return [point_tables.load_lines(document, label), *(table.lines for table in [*tips, *changes])]
+    tables = [*point_tables.tip_table(document["load"].get("tips"), toughness), *_changes(document)]
+    return [point_tables.load_lines(document, label), *(table.lines for table in tables)]
+
+
+def _changes(document: Document) -> list[Table]:
+    """Return the tables of sensitivities and of scatter, if the case asks for them."""
+    return [*sensitivity_tables.sensitivities(document), *sensitivity_tables.uncertainty(document)]
 
 
 def _envelope_lines(document: Document, label: str, toughness: str) -> list[list[str]]:
@@ -59,9 +45,8 @@ def _envelope_lines(document: Document, label: str, toughness: str) -> list[list
 def _stiffness_lines(document: Document, label: str, toughness: str) -> list[list[str]]:
     """Return the effective stiffness with what follows from it; units in brackets."""
     blocks = [table.lines for table in stiffness_tables.stiffnesses(document, label)]
-    last = [table.lines for table in point_tables.tip_table(document.get("tips"), toughness)]
-    last += [table.lines for table in sensitivity_tables.sensitivities(document)]
-    last += [table.lines for table in sensitivity_tables.uncertainty(document)]
+    tables = [*point_tables.tip_table(document.get("tips"), toughness), *_changes(document)]
+    last = [table.lines for table in tables]
     if plane_state_of(document).is_spatial:
         thermal = [table.lines for table in stiffness_tables.thermal(document, label)]
         own = material_axes.lines(document, label)
@@ -81,8 +66,7 @@ def _stiffness_tables(document: Document, label: str, most: int) -> list[Table]:
         *stiffness_tables.constants(document, label),
         *stiffness_tables.moduli(document, document["case"].get("output", {}).get("stress_unit", "")),
         *stiffness_tables.bounds(document, label),
-        *sensitivity_tables.sensitivities(document),
-        *sensitivity_tables.uncertainty(document),
+        *_changes(document),
     ]
 
 
@@ -93,11 +77,6 @@ def _angle_tables(document: Document, label: str, most: int) -> list[Table]:
 
 def _path_tables(document: Document, label: str, most: int) -> list[Table]:
     return [peak_table(document, label), point_tables.all_numbers("path", document, label, chosen(document, most))]
-
-
-def _load_tables(document: Document, label: str, most: int) -> list[Table]:
-    changes = [*sensitivity_tables.sensitivities(document), *sensitivity_tables.uncertainty(document)]
-    return [point_tables.load_table(document, label), *changes]
 
 
 def _envelope_tables(document: Document, label: str, most: int) -> list[Table]:
@@ -126,34 +105,39 @@ class ReportedAnalysis:
     is_curve: bool = False
     is_followed: bool = False
     picture: str = ""
-    is_load_given: Callable[[Document], bool] = _never
+    is_load_given: Callable[[Document], bool] = lambda document: False
     states: Callable[[Document, int, int], list[int]] = _evenly
 
 
 STIFFNESS = ReportedAnalysis("stiffness", "effective stiffness", _stiffness_lines, _stiffness_tables)
-ANALYSES = {
-    each.name: each
-    for each in (
-        ReportedAnalysis(
-            "angle", "debonding angle", _angle_lines, _angle_tables, is_curve=True, is_load_given=_under_a_strain
-        ),
-        ReportedAnalysis(
-            "path",
-            "load path",
-            _path_lines,
-            _path_tables,
-            is_curve=True,
-            is_followed=True,
-            is_load_given=_always,
-            states=chosen_states,
-        ),
-        ReportedAnalysis(
-            "load", "equilibrium under a load", _load_lines, _load_tables, picture="load", is_load_given=_always
-        ),
-        ReportedAnalysis("envelope", "onset of debonding", _envelope_lines, _envelope_tables),
-        STIFFNESS,
-    )
-}
+ANGLE = ReportedAnalysis(
+    "angle",
+    "debonding angle",
+    _angle_lines,
+    _angle_tables,
+    is_curve=True,
+    is_load_given=lambda document: document.get("case", {}).get("angle", {}).get("strain") is not None,
+)
+PATH = ReportedAnalysis(
+    "path",
+    "load path",
+    lambda document, label, toughness: [path_table(document, label).lines],
+    _path_tables,
+    is_curve=True,
+    is_followed=True,
+    is_load_given=lambda document: True,
+    states=chosen_states,
+)
+LOAD = ReportedAnalysis(
+    "load",
+    "equilibrium under a load",
+    _load_lines,
+    lambda document, label, most: [point_tables.load_table(document, label), *_changes(document)],
+    picture="load",
+    is_load_given=lambda document: True,
+)
+ENVELOPE = ReportedAnalysis("envelope", "onset of debonding", _envelope_lines, _envelope_tables)
+ANALYSES = {each.name: each for each in (ANGLE, PATH, LOAD, ENVELOPE, STIFFNESS)}
 
 
 def reported(document: Document) -> ReportedAnalysis:

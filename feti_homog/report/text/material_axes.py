@@ -5,11 +5,9 @@ Axes 1, 2, 3 of the material are x3, x1, x2 of the cell.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
-from feti_homog.report.text.stiffness_tables import beside, value_and_error, value_beside_error
-from feti_homog.report.text.table import Column, Table
+from feti_homog.report.text.stiffness_tables import abreast, with_errors
+from feti_homog.report.text.table import Table
+from feti_homog.typing import Document
 
 TITLE = "Material axes: 1 along the fibres (x3 of the cell), 2 and 3 across (x1, x2)"
 # The constants of the cell with the same value, those that only estimates of errors have, and the axes of the cell in
@@ -18,8 +16,6 @@ IN_THE_CELL = {"E1": "E3", "E2": "E1", "E3": "E2", "G12": "G13", "G13": "G23", "
 RATIOS = {"nu12": "nu31", "nu13": "nu32"}
 ROWS = (("E1", "E2", "E3"), ("G12", "G13", "G23"), ("nu12", "nu13", "nu23"), ("alpha1", "alpha2", "alpha3"))
 EXPANSIONS = {"alpha1": 2, "alpha2": 0, "alpha3": 1}
-
-Document = Mapping[str, Any]
 
 
 def constants(document: Document) -> dict[str, float]:
@@ -34,7 +30,7 @@ def constants(document: Document) -> dict[str, float]:
             found[name] = cell[ratio] * cell["E3"] / cell[across]
     if cell and expansion is not None:
         found |= {name: float(expansion[place]) for name, place in EXPANSIONS.items()}
-    return {name: found[name] for names in ROWS for name in names if name in found}
+    return _in_rows(found)
 
 
 def errors(document: Document) -> dict[str, float]:
@@ -45,7 +41,7 @@ def errors(document: Document) -> dict[str, float]:
     found = {name: float(of_constants[own]) for name, own in places if own in of_constants}
     if of_expansion is not None:
         found |= {name: float(of_expansion[place]) for name, place in EXPANSIONS.items()}
-    return {name: found[name] for names in ROWS for name in names if name in found}
+    return _in_rows(found)
 
 
 def scatter(document: Document) -> dict[str, float]:
@@ -53,6 +49,11 @@ def scatter(document: Document) -> dict[str, float]:
     known = standard_deviations(document)
     places = IN_THE_CELL | {name: f"expansion.{place + 1}" for name, place in EXPANSIONS.items()}
     found = {name: known[own] for name, own in places.items() if own in known}
+    return _in_rows(found)
+
+
+def _in_rows(found: dict[str, float]) -> dict[str, float]:
+    """Return the numbers in the order of ROWS."""
     return {name: found[name] for names in ROWS for name in names if name in found}
 
 
@@ -64,18 +65,12 @@ def standard_deviations(document: Document) -> dict[str, float]:
 
 def table(document: Document, label: str) -> list[Table]:
     """Return the constants as a table; `label` is the unit of stresses in brackets, or empty."""
-    found, off = constants(document), errors(document)
-    rows = [[name, *value_beside_error(value, off.get(name))] for name, value in found.items()]
-    columns = [Column("", -28), Column("computed"), *([Column("mesh error", 12, ".1e")] if off else [])]
-    return [Table(f"{TITLE}{label}", columns, rows)] if found else []
+    found = constants(document)
+    return [with_errors(f"{TITLE}{label}", found, errors(document))] if found else []
 
 
 def lines(document: Document, label: str) -> list[str]:
     """Return the same as text, with the estimated errors of the mesh."""
-    found, off, words = constants(document), errors(document), {}
-    for name, number in found.items():
-        value, error = value_and_error(number, off.get(name), ".7g")
-        words[name] = f"{name:<6}{value:>13}{beside(error)}"
-    rows = ("    ".join(words[name] for name in names if name in words).rstrip() for names in ROWS)
+    found, off = constants(document), errors(document)
     title = f"{TITLE}{label}{'; +- error of the mesh' if off else ''}"
-    return [title, *(f"  {row}" for row in rows if row)] if found else []
+    return [title, *abreast(ROWS, found, off, width=6)] if found else []

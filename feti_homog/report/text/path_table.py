@@ -15,12 +15,11 @@ from feti_homog.report.text.table import Column, Table, without_noise
 from feti_homog.results import path_curves
 from feti_homog.results.kept_points import chosen
 from feti_homog.results.path_peak import peak_of
+from feti_homog.typing import Document
 
 ROWS = 15  # of the table
 SHOWN = 5  # of its strains, stresses and the temperature
 SAME_LOAD, CLOSED_CYCLE = 1e-9, 1e-6  # of load factors; of strains or stresses of one waypoint, relative
-
-Document = Mapping[str, Any]
 
 
 def path_table(document: Document, label: str) -> Table:

@@ -13,6 +13,7 @@ import numpy as np
 from feti_homog.materials.voigt import STRAINS, STRESSES, voigt_names
 from feti_homog.report.text.table import Column, Table, without_noise
 from feti_homog.results import path_curves
+from feti_homog.typing import Document
 
 WIDTH = 79
 ENVELOPE_ROWS = 12  # of its table
@@ -28,7 +29,6 @@ SECTION = Column("interface", 11, "d")  # of cases that have several
 TIP_TITLE = "Largest energy release rate"
 
 Point = Mapping[str, Any]
-Document = Mapping[str, Any]
 
 
 def shown_entries(points: Sequence[Point]) -> dict[str, tuple[int, int]]:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from feti_homog.report.text.stiffness_tables import SHORT, UNKNOWN
 from feti_homog.report.text.table import Column, Table, without_noise
+from feti_homog.typing import Document
 
 # Constants of which sensitivities are shown, by whether the cell is in space; all are in result.json.
 SHOWN = {
@@ -19,7 +20,6 @@ SHOWN = {
 # Of expansions in the axes of the cell, x3 along the fibres.
 SHORT_NAMES = SHORT | {"expansion.3": "exp. axial", "expansion.1": "exp. x1"}
 MOST = 9  # of other constants
-Document = Mapping[str, Any]
 
 
 def sensitivities(document: Document) -> list[Table]:

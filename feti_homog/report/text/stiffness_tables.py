@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import zip_longest
 from math import floor, log10
 from typing import Any
 
 from feti_homog.case.phase_names import COATING
 from feti_homog.materials.voigt import SPATIAL_STRESSES, STRAINS, voigt_names
 from feti_homog.report.text.table import Column, Table, number, with_unit
+from feti_homog.typing import Document
 
 NAMES = Column("", -28)
 STIFF = ("C11", "C22", "C33")
@@ -39,7 +41,6 @@ SHORT = {
     "expansion_axial": "exp. axial",
     "expansion_transverse": "exp. transv.",
 }
-Document = Mapping[str, Any]
 
 
 def stiffnesses(document: Document, label: str, under_minus: str = "Under minus E") -> list[Table]:
@@ -64,12 +65,6 @@ def _errors(document: Document) -> Document:
     return found
 
 
-def _with_error(document: Document, name: str, form: str) -> tuple[str, str]:
-    """Return a constant and its error as `value_and_error`."""
-    value = next(values[name] for key in ("moduli", "constants") if name in (values := document.get(key) or {}))
-    return value_and_error(value, _errors(document).get("constants", {}).get(name), form)
-
-
 def value_and_error(value: float, error: float | None, form: str) -> tuple[str, str]:
     """Return a constant and its error.
 
@@ -83,12 +78,28 @@ def value_and_error(value: float, error: float | None, form: str) -> tuple[str, 
     return f"{value:.{decimals}f}", f"{error:.{decimals}f}"
 
 
-def value_beside_error(value: float, error: float | None) -> list[str]:
-    """Return both for two columns, one without an error."""
-    return [text for text in value_and_error(value, error, ".7g") if text]
+def with_errors(title: str, values: Mapping[str, float], errors: Mapping[str, float], unit: str = "") -> Table:
+    """Return constants, stresses among them with their unit, and a column of errors, if any is known."""
+    rows = [
+        [with_unit(name, unit), *(text for text in value_and_error(value, errors.get(name), ".7g") if text)]
+        for name, value in values.items()
+    ]
+    return Table(title, [NAMES, Column("computed"), *([Column("mesh error", 12, ".1e")] if errors else [])], rows)
 
 
-def beside(error: str) -> str:
+def abreast(
+    rows: Sequence[Sequence[str]], values: Mapping[str, float], errors: Mapping[str, float], width: int
+) -> list[str]:
+    """Return lines of those constants of each row that are known, with their errors; names take so many columns."""
+    words = {}
+    for name, computed in values.items():
+        value, error = value_and_error(computed, errors.get(name), ".7g")
+        words[name] = f"{name:<{width}}{value:>13}{_beside(error)}"
+    known = ([words[name] for name in names if name in words] for names in rows)
+    return [f"  {'    '.join(row)}".rstrip() for row in known if row]
+
+
+def _beside(error: str) -> str:
     """Return an error as it stands behind its value."""
     return f" +- {error:<9}" if error else ""
 
@@ -123,25 +134,17 @@ def _rounded(numbers: Sequence[float]) -> list[float]:
 def moduli(document: Document, unit: str) -> list[Table]:
     """Engineering moduli of the plane state, each with its unit."""
     values, errors = document.get("moduli") or {}, _errors(document).get("constants", {})
-    rows = [[with_unit(name, unit), *value_beside_error(value, errors.get(name))] for name, value in values.items()]
-    return [Table("Engineering moduli", [NAMES, Column("computed"), *_column(errors)], rows)] if rows else []
-
-
-def _column(errors: Document) -> list[Column]:
-    return [Column("mesh error", 12, ".1e")] if errors else []
+    return [with_errors("Engineering moduli", values, errors, unit)] if values else []
 
 
 def moduli_lines(document: Document, label: str) -> list[str]:
     """Return the same as text: moduli on the left, ratios on the right."""
-    values = document["moduli"]
     left, right = list[str](), list[str]()
-    for name in values:
-        is_stress = name in STRESS_MODULI
-        value, error = _with_error(document, name, ".7g" if is_stress else ".6f")
-        width, column = (6, left) if is_stress else (11, right)
-        column.append(f"{name:<{width}}{value:>13}{beside(error)}")
-    count = max(len(left), len(right))
-    pairs = zip(left + [""] * (count - len(left)), right + [""] * (count - len(right)), strict=True)
+    for name, modulus in document["moduli"].items():
+        form, width, column = (".7g", 6, left) if name in STRESS_MODULI else (".6f", 11, right)
+        value, error = value_and_error(modulus, _errors(document).get("constants", {}).get(name), form)
+        column.append(f"{name:<{width}}{value:>13}{_beside(error)}")
+    pairs = zip_longest(left, right, fillvalue="")
     return [f"Engineering moduli{label}", *(f"  {modulus:<34}{ratio}".rstrip() for modulus, ratio in pairs)]
 
 
@@ -166,9 +169,7 @@ def constants(document: Document, label: str) -> list[Table]:
     """Engineering constants in space, their range across the fibres, and closed estimates and bounds beside them."""
     found, errors = list[Table](), _errors(document).get("constants", {})
     if (values := document.get("constants")) is not None:
-        columns = [NAMES, Column("computed"), *_column(errors)]
-        rows = [[name, *value_beside_error(value, errors.get(name))] for name, value in values.items()]
-        found.append(Table(f"Engineering constants in the axes of the cell{label}", columns, rows))
+        found.append(with_errors(f"Engineering constants in the axes of the cell{label}", values, errors))
     if (across := document.get("transverse_moduli")) is not None:
         ends = ("least", "largest")
         rows = [[name, *(across[f"{name}_{end}"] for end in ends)] for name in ("E", "G")]
@@ -181,10 +182,8 @@ def constants_lines(document: Document, label: str) -> list[list[str]]:
     """Return the same as blocks of text; empty blocks where nothing is known."""
     values, block = document.get("constants"), list[str]()
     if values is not None:
-        parts = {name: _with_error(document, name, ".7g") for names in ENGINEERING for name in names}
-        words = {name: f"{name:<5}{value:>13}{beside(error)}" for name, (value, error) in parts.items()}
-        rows = ("    ".join(words[name] for name in names).rstrip() for names in ENGINEERING)
-        block = [f"Engineering constants in the axes of the cell{label}", *(f"  {row}" for row in rows)]
+        rows = abreast(ENGINEERING, values, _errors(document).get("constants", {}), width=5)
+        block = [f"Engineering constants in the axes of the cell{label}", *rows]
     return [block, *(_estimates_lines(document, table) for table in estimates(document, label))]
 
 

@@ -1,9 +1,10 @@
-"""The printed summary of result.json's document."""
+"""The printed summary of result.json's document, and the tables of notebooks."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
 from textwrap import wrap
 from typing import Any
@@ -11,14 +12,15 @@ from typing import Any
 from feti_homog.case.element_sizes import ASKED
 from feti_homog.report.text.analyses import reported
 from feti_homog.report.text.point_tables import WIDTH
-from feti_homog.report.text.table import in_brackets
+from feti_homog.report.text.table import Column, Table, in_brackets
+from feti_homog.typing import Document
 
 LABEL = 12  # columns of the labels at the left
 NAME = 28  # columns of the names of checks
 GLUE = "\N{NO-BREAK SPACE}"  # at which no line is broken
 LISTED = 12  # numbers of iterations that are reported one by one
 
-Document = Mapping[str, Any]
+NOTEBOOK_ROWS = 20  # of a table of points
 
 
 def summary(document: Document) -> str:
@@ -54,6 +56,23 @@ def short_summary(document: Document) -> str:
     law, error = max(document["checks"].items(), key=lambda check: check[1])
     checks = _field("Checks", [f"largest relative error {error:.1e} ({law})"])
     return _joined([_heading(document), *_answer(document), [*checks, *_field("Status", [str(document["status"])])]])
+
+
+def notebook(document: Document) -> str:
+    """Title, tables, checks and status as HTML."""
+    rows = [[check.law, f"{check.error:.1e}"] for check in checks(document)]
+    errors = Table("Largest relative errors", [Column("law"), Column("error")], rows)
+    tables = [table.html for table in (*answers(document, NOTEBOOK_ROWS), errors)]
+    return "\n".join([f"<h4>{escape(title_of(document))}</h4>", *tables, f"<p>{escape(document['status'])}</p>"])
+
+
+def answers(document: Document, most: int) -> list[Table]:
+    """Return the tables of a result: stiffness with moduli and bounds, points of an angle or path, or onsets.
+
+    Tables of points have at most so many rows.
+    """
+    label = in_brackets(document["case"].get("output", {}).get("stress_unit", ""))
+    return reported(document).tables(document, label, most)
 
 
 def title_of(document: Document) -> str:

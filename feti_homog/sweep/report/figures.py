@@ -18,7 +18,7 @@ from feti_homog.microstructure.fibre_pattern import FibrePattern
 from feti_homog.microstructure.neighbour_match import nearest_neighbours
 from feti_homog.microstructure.statistics import distances, pair_functions
 from feti_homog.microstructure.voronoi_cells import voronoi_cells
-from feti_homog.report.plots.plot_helpers import STYLE, plain, save, strain_symbols
+from feti_homog.report.plots.plot_helpers import STYLE, SYMBOLS, faint_grid, plain, save
 from feti_homog.results import path_curves
 from feti_homog.sweep.report import moduli
 from feti_homog.sweep.report.outputs import Document
@@ -86,8 +86,7 @@ def _compare(row: Sequence[Axes], path: Path, documents: Sequence[Document]) -> 
     )
     for axes, (xlabel, ylabel) in zip(row, labels, strict=True):
         axes.set(xlabel=xlabel, ylabel=ylabel)
-        axes.grid(color="0.92", linewidth=0.6)
-        axes.spines[["top", "right"]].set_visible(False)
+        faint_grid(axes)
 
 
 def _distribution(pattern: FibrePattern, k: int) -> tuple[Float, Float]:
@@ -139,14 +138,12 @@ def curves_figure(table: SweepTable) -> Figure:
     there = [point for point in table.points if len(table.curves(point)[0])]
     points = [point for point in there if _leads(table, point) == _leads(table, there[0])][: len(COLOURS)]
     document = next(d for d in table.results_of(points[0]) if d.get("path"))
-    along, (strains, stresses) = (
-        path_curves.leading_component(document),
-        voigt_names(len(document["path"][0]["stress"])),
-    )
+    strains, stresses = voigt_names(len(document["path"][0]["stress"]))
+    along = path_curves.leading_component(document)
     components = [along, *_others(table, points, along)[:1]]
     picture = Figure(figsize=(0.4 + 4.6 * len(components), 4.6), layout="constrained")
     panels = picture.subplots(1, len(components), sharex=True, squeeze=False)[0]
-    symbol = strain_symbols(len(strains))[along]
+    symbol = SYMBOLS[strains[along]]
     few = min(len(table.curves(point)[1]) for point in points) < FEWEST_OF_INTERVAL
     for axes, component in zip(panels, components, strict=True):
         for style, point in enumerate(points):

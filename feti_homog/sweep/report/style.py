@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES
-from feti_homog.report.plots.plot_helpers import strain_symbols, unit_label
+from feti_homog.report.plots.plot_helpers import SYMBOLS, faint_grid, stress_label
 from feti_homog.sweep.report.sweep_table import Series, SweepTable
 
 COLOURS = ("#1f4e9c", "#c44e00", "#2a7f3f", "#7a3e9d", "#8c6d1f", "#c2185b")
@@ -31,9 +31,7 @@ NAMES = {
     "shear": "shear modulus $\\mu$",
     **{f"onset_{name}": f"$\\Sigma_{{{name[1:]}}}$ at the first break" for name in SPATIAL_STRESSES},
     **{f"peak_{name}": f"largest $\\Sigma_{{{name[1:]}}}$" for name in SPATIAL_STRESSES},
-    **{
-        f"end_{name}": f"${symbol}$ at the end" for name, symbol in zip(SPATIAL_STRAINS, strain_symbols(6), strict=True)
-    },
+    **{f"end_{name}": f"${SYMBOLS[name]}$ at the end" for name in SPATIAL_STRAINS},
 }
 
 
@@ -60,15 +58,9 @@ def plot_series(axes: Axes, table: SweepTable, series: Series, name: str, style:
 
 def label_axes(axes: Axes, name: str, table: SweepTable, xlabel: str) -> None:
     """Labels, a faint grid, no box."""
-    unit = (
-        ""
-        if name.startswith(("end_", "nu_", "expansion_"))
-        else unit_label(table.stress_unit) or "(unit of the moduli)"
-    )
+    unit = "" if name.startswith(("end_", "nu_", "expansion_")) else stress_label(table.stress_unit)
     axes.set(xlabel=xlabel, ylabel=f"{NAMES.get(name, name)} {unit}".rstrip())
-    axes.grid(color="0.92", linewidth=0.6)
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
+    faint_grid(axes)
 
 
 def legend(figure: Any, axes: Sequence[Axes]) -> None:

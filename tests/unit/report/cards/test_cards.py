@@ -23,7 +23,7 @@ from support.effective_results import (
 from feti_homog import cli
 from feti_homog.errors import CaseError
 from feti_homog.materials.spatial_constants import engineering_constants
-from feti_homog.report.cards import card_text
+from feti_homog.report.cards import effective_material
 from feti_homog.report.cards.effective_material import in_axes_of_the_cell, nearest_transversely_isotropic
 from feti_homog.report.cards.export import FORMATS
 from feti_homog.report.text import material_axes
@@ -140,10 +140,10 @@ def test_comments_have_the_scatter_by_uncertain_phases_in_the_axes_of_the_card(f
     "value", [215.33468712345678, -1.0993681512345678e-05, 1e-300, 123456789012345678.0, 0.1, -0.0]
 )
 def test_numbers_keep_what_their_field_holds(value):
-    assert float(card_text.number(value)) == value
-    short = card_text.number(value, 20)
+    assert float(effective_material.number(value)) == value
+    short = effective_material.number(value, 20)
     assert len(short) <= 20 and float(short) == pytest.approx(value, rel=1e-13, abs=0.0)
-    assert not card_text.number(-0.0).startswith("-")
+    assert not effective_material.number(-0.0).startswith("-")
 
 
 @pytest.mark.parametrize(
@@ -151,7 +151,7 @@ def test_numbers_keep_what_their_field_holds(value):
     [("E-glass/epoxy 55 %", "E_glass_epoxy_55"), ("55 %", "material_55"), ("\u2126", "material"), ("a" * 99, "a" * 60)],
 )
 def test_names_are_those_that_programs_accept(name, identifier):
-    assert card_text.identifier(name) == identifier
+    assert effective_material.identifier(name) == identifier
 
 
 def test_the_command_line_offers_every_format():

@@ -16,10 +16,10 @@ import pytest
 from support.sample_output import in_space, sample
 
 from feti_homog.errors import CaseError
-from feti_homog.report.html import page, tables
+from feti_homog.report.html import page
 from feti_homog.report.html.page import TRIANGLES, viewer_data
 from feti_homog.report.plots.decimation import drawn_mesh, nodal_values, triangle_means
-from feti_homog.report.text.summary import checks
+from feti_homog.report.text.summary import answers, checks
 from feti_homog.results import result_json
 from feti_homog.results.field_file import FieldFile
 
@@ -66,7 +66,7 @@ def envelope() -> dict[str, Any]:
 
 
 def test_the_table_of_an_envelope() -> None:
-    (table,) = tables.answers(envelope())
+    (table,) = answers(envelope(), page.MOST_ROWS)
     assert table.title == "Onset of debonding; load (GPa)"
     assert [column.name for column in table.columns] == [
         "angle",
@@ -211,19 +211,19 @@ def test_one_scale_is_that_of_all_states_but_the_end(tmp_path: Path) -> None:
 
 def test_the_table_of_a_load() -> None:
     point = COUNTS | {"strain": [0.1, 0.2, 0.3], "stress": [4.0, 5.0, 6.0], "stored": 7.0}
-    (table,) = tables.answers(document("load", load=point))
+    (table,) = answers(document("load", load=point), page.MOST_ROWS)
     expected = {"E11": "0.1", "E22": "0.2", "gamma12": "0.3", "S11": "4", "S22": "5", "S12": "6", "stored": "7"}
     found = dict(table.cells)
     assert {name: found[name] for name in expected} == expected and (found["open"], found["closed"]) == ("3", "2")
 
 
 def test_many_points_are_some_rows(tmp_path: Path) -> None:
-    peak, table = tables.answers(path(500))
+    peak, table = answers(path(500), page.MOST_ROWS)
     assert peak.title == "Peak of the path" and peak.cells[0][0] in ("first break", "peak")
     last = dict(zip((column.name for column in table.columns), table.cells[-1], strict=True))
     expected = {"bonded": "5", "open": "3", "closed": "2", "load_factor": "1", "S11": "3", "S22": "1", "S12": "0"}
     assert {name: last[name] for name in expected} == expected and table.title.endswith("stress (GPa)")
-    assert len(table.rows) == tables.MOST_ROWS and "60 of 500" in table.title
+    assert len(table.rows) == page.MOST_ROWS and "60 of 500" in table.title
     assert (table.cells[0][0], table.cells[-1][0]) == ("0", "499")
 
 
@@ -231,7 +231,7 @@ def test_bounds_stand_on_both_sides_of_what_was_computed() -> None:
     result = bonded()
     result["bounds"]["voigt"] = [[10.0, 2.0, 0.0], [2.0, 8.5, 0.0], [0.0, 0.0, 3.5]]
     result["bounds"]["reuss"] = [[7.0, 2.0, 0.0], [2.0, 6.5, 0.0], [0.0, 0.0, 2.5]]
-    *_, table = tables.answers(result)
+    *_, table = answers(result, page.MOST_ROWS)
     assert [column.name for column in table.columns] == ["", "lower", "computed", "upper"]
     assert table.cells == [
         ["C11 Reuss, Voigt", "7", "9", "10"],
@@ -240,7 +240,7 @@ def test_bounds_stand_on_both_sides_of_what_was_computed() -> None:
         ["bulk Hashin-Shtr.", "1", "1.5", "2"],
     ]
     result["bounds"]["reuss"][0][0] = 9.5
-    *_, table = tables.answers(result)
+    *_, table = answers(result, page.MOST_ROWS)
     assert table.cells[0] == ["C11 Reuss, Voigt", "9.5", "9", "10", "outside"] and len(table.cells[1]) == 4
 
 

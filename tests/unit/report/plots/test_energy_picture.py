@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from feti_homog.report.html import curves
-from feti_homog.report.plots import energy_picture
+from feti_homog.report.plots import path_picture
 
 ENERGIES = {
     "work": [4.0, 9.0, 8.0],
@@ -40,7 +40,7 @@ def path(loads: list[float], **energies: list[float]) -> dict[str, Any]:
 )
 def test_parts_are_stacked_to_the_work(fracture: dict[str, list[float]], parts: dict[str, list[float]]) -> None:
     document = path([0.25, 0.5, 1.0], **ENERGIES, **fracture)
-    figure = energy_picture.figure(document)
+    figure = path_picture.energies(document)
     assert figure is not None
     (axes,) = figure.axes
     top = np.zeros(3)
@@ -60,19 +60,19 @@ def test_parts_are_stacked_to_the_work(fracture: dict[str, list[float]], parts: 
 
 
 def test_a_load_that_falls_leaves_numbers_of_points() -> None:
-    figure = energy_picture.figure(path([0.5, 0.25, 1.0], **ENERGIES))
+    figure = path_picture.energies(path([0.5, 0.25, 1.0], **ENERGIES))
     assert figure is not None
     place = figure.axes[0].lines[0].get_xdata()
     assert list(place[-3:]) == [0.0, 1.0, 2.0] and place[0] == -1.0 and "number" in figure.axes[0].get_xlabel()
 
 
 def test_results_without_energies_have_no_stack() -> None:
-    assert energy_picture.figure(path([0.5, 0.6, 1.0])) is None and "energy" not in curves.figures(path([0.5, 0.6, 1]))
+    assert path_picture.energies(path([0.5, 0.6, 1.0])) is None and "energy" not in curves.figures(path([0.5, 0.6, 1]))
 
 
 def test_what_tied_faces_lose_as_they_open_has_its_name() -> None:
     document = path([0.25, 0.5, 1.0], **ENERGIES)
     document["case"]["interface"] = {"friction": 0.3, "axial_friction": "prevented"}
-    figure = energy_picture.figure(document)
+    figure = path_picture.energies(document)
     assert figure is not None
     assert "lost in breaks and openings" in [area.get_label() for area in figure.axes[0].collections]

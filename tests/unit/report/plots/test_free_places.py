@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from feti_homog.report.plots.free_places import free_offsets
+from feti_homog.report.plots.path_picture import free_offsets
 
 SAWTOOTH = np.array([[0, 0], [1, 9], [1, 5], [2, 10], [2, 3], [3, 4]])
 """Peaks below the upper side, and points at the foot of a drop."""

@@ -23,6 +23,7 @@ from feti_homog.report.html import curves as interactive
 from feti_homog.report.plots import deformed_panels, figures, plot_helpers, response_curves, traction_plots
 from feti_homog.report.plots.interface_marks import BONDED, CLOSED
 from feti_homog.report.plots.load_labels import LoadLabels
+from feti_homog.report.plots.path_picture import figure as path_picture
 from feti_homog.results.field_file import FieldFile
 from feti_homog.results.result_json import SCHEMA
 
@@ -157,7 +158,7 @@ def in_six(points: list[tuple[float, float, float]], path: dict[str, Any], **mor
 
 def test_under_a_given_shear_its_stress_alone_is_drawn_over_its_strain_at_a_rising_load() -> None:
     document = in_six([(0.5, 1.0, 2.0), (0.4, 1.5, 1.6), (1.0, 4.0, 4.0)], {"to": {"S13": 4.0}})
-    figure = response_curves._path(document)
+    figure = path_picture(document)
     upper = figure.axes[0]
     assert upper.get_xlabel() == r"macroscopic strain $\gamma_{13}$"
     assert entries(figure)[:3] == [r"$\Sigma_{13}$", "all equilibria", "rising load"]
@@ -167,9 +168,7 @@ def test_under_a_given_shear_its_stress_alone_is_drawn_over_its_strain_at_a_risi
 
 def test_a_change_of_temperature_has_an_axis_of_its_own() -> None:
     points = [(0.5, 0.0, 0.0), (0.8, 1.0, 2.0), (1.0, 2.0, 3.0)]
-    figure = response_curves._path(
-        in_six(points, {"waypoints": [{"temperature": -9.0}, {"S13": 3.0}]}, temperature=-9.0)
-    )
+    figure = path_picture(in_six(points, {"waypoints": [{"temperature": -9.0}, {"S13": 3.0}]}, temperature=-9.0))
     labels = [axes.get_ylabel() for axes in figure.axes]
     assert any("temperature" in label for label in labels) and "later legs" in entries(figure)
     low, high = figure.axes[next(k for k, label in enumerate(labels) if "temperature" in label)].get_ylim()
@@ -226,7 +225,7 @@ def test_curves_of_the_page_have_their_names_and_units() -> None:
     document["case"]["output"]["length_unit"] = "um"
     document["path"] = [point | {"damaged_length": [point["strain"][0], 0.5]} for point in document["path"]]
     found = {name: curves(figure) for name, figure in interactive.figures(document).items()}
-    beside = response_curves._path(document).axes[-1]
+    beside = path_picture(document).axes[-1]
     assert found["damaged"][1] == beside.get_ylabel() == "damaged length (um)"
     assert found["damaged"][2]["damaged"].tolist() == list(beside.lines[0].get_ydata()) == [1.0, 0.7, 1.5]
     assert found["curve"][:2] == ("macroscopic strain E11", "macroscopic stress (GPa)")
@@ -246,7 +245,7 @@ def test_curves_against_the_angle_have_their_names_and_units(kind: str) -> None:
     document |= {"angle": [counts | point for point in points], "path": None}
     document["case"] |= {"angle": {}, "analysis": {"type": "angle", "plane": "strain"}}
     what = {"stiffness": "effective stiffness", "stress": "macroscopic stress"}[kind]
-    ((_, label, found),) = panels(response_curves._angle(document))
+    ((_, label, found),) = panels(response_curves.angle(document))
     _, beside, interactive_ones = curves(interactive.figures(document)["curve"])
     assert (label, beside) == (f"{what} (GPa)",) * 2
     named = {name: values for name, values in found.items() if name.startswith("$")}
@@ -284,7 +283,7 @@ def test_several_interfaces_have_lines_of_the_title_that_are_within_the_picture(
         "name": "a_case_of_several_interfaces",
         "interface": [bond | {"between": pair} for pair in (["coating", "matrix"], ["glass", "coating"])],
     }
-    figure = response_curves._path(document)
+    figure = path_picture(document)
     FigureCanvasAgg(figure).draw()
     title = figure.axes[0].title
     assert title.get_text().count("\n") == 2

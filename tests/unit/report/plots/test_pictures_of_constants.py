@@ -9,8 +9,8 @@ import h5py
 import numpy as np
 import pytest
 
-from feti_homog.report.plots import sensitivities_picture
-from feti_homog.report.plots.free_expansion import FreeExpansion
+from feti_homog.report.plots import response_curves
+from feti_homog.report.plots.decimation import FreeExpansion
 
 EXPANSION = [3e-5, 2e-5, 1e-5, 0.0, 0.0, 4e-6]
 
@@ -58,10 +58,10 @@ def test_heat_map_has_the_elasticities() -> None:
         "parameters": ["material.matrix.young", "material.$.poisson"], "parameter_values": [2.0, 0.3],
         "constants": ["C11", "C12"], "constant_values": [12.0, 0.0], "derivatives": [[12.0, 0.0], [1.0, 0.0]],
     }  # fmt: skip
-    picture = sensitivities_picture.figure({"case": {"name": "a $"}, "sensitivities": found})
+    picture = response_curves.sensitivities({"case": {"name": "a $"}, "sensitivities": found})
     assert picture is not None
     axes = picture.axes[0]
     assert [text.get_text() for text in axes.texts] == ["2.00", "-", "", "-"]
     assert [label.get_text() for label in axes.get_xticklabels()] == ["C11", "C12"]
     np.testing.assert_allclose(np.ma.filled(axes.images[0].get_array(), np.nan)[:, 0], [2.0, 0.0])
-    assert sensitivities_picture.figure({"case": {}}) is None
+    assert response_curves.sensitivities({"case": {}}) is None

@@ -13,8 +13,7 @@ from matplotlib.figure import Figure
 from support.sample_output import Sample, sample
 
 from feti_homog.report.plots.cell_picture import write_fibre_numbers
-from feti_homog.report.plots.decimation import drawn_mesh, outline_edges
-from feti_homog.report.plots.interface_marks import InterfaceEdges
+from feti_homog.report.plots.interface_marks import DrawnCell
 from feti_homog.report.plots.traction_plots import Coordinate, coordinate
 from feti_homog.results.field_file import FieldFile
 
@@ -58,9 +57,7 @@ def _resized(state: Any, old: int, new: int) -> dict[str, Any]:
 
 def found(path: Path, number: int, limit: int) -> tuple[Coordinate, Any]:
     with h5py.File(path) as file:
-        drawn = drawn_mesh(file, limit)
-        edges = InterfaceEdges.of(file, drawn, outline_edges(drawn, drawn.body))
-        return coordinate(file, edges, number), file["interface/points"][:]
+        return coordinate(DrawnCell.of(file, limit), number), file["interface/points"][:]
 
 
 @pytest.mark.parametrize("limit", [100_000, 40], ids=["all triangles", "coarse ones"])
@@ -109,8 +106,7 @@ def test_every_part_of_a_fibre_has_its_number(tmp_path: Path, radius: float, cen
     fibres = replace(whole.fibres, number=np.array([3]), centre=np.array([centre]), radius=np.array([radius]))
     axes = Figure().subplots()
     with h5py.File(write(tmp_path, replace(whole, fibres=fibres))) as file:
-        drawn = drawn_mesh(file)
-        write_fibre_numbers(axes, file, drawn, outline_edges(drawn, drawn.body), 5.0)
+        write_fibre_numbers(axes, DrawnCell.of(file), 5.0)
     assert {text.get_text() for text in axes.texts} == {"3"}
     shown = sorted(tuple(np.round(text.get_position(), 2)) for text in axes.texts)
     np.testing.assert_allclose(shown, sorted(map(tuple, places)), atol=0.06)
