@@ -20,13 +20,11 @@ import numpy as np
 
 from feti_homog.errors import NotCarriedError
 from feti_homog.interface.contact.states import Status
-from feti_homog.interface.friction.face_system import NOISE, FaceSystem, Prescribed
+from feti_homog.interface.friction.face_system import FaceSystem, Prescribed
 from feti_homog.interface.friction.status_search import StatusSearch
 from feti_homog.interface.friction.status_system import BACKWARD, FORWARD, OPEN_FACE, STICK
 from feti_homog.typing import Bool, Float
 
-# What rounding leaves of a sum, relative to the sum of the sizes of its terms.
-ROUNDED_SUM = 1e-13
 SEARCHED = "friction: no admissible statuses of the faces were found"
 INDEFINITE = "friction: the sliding faces resist no more (an indefinite pivot)"
 
@@ -88,7 +86,7 @@ class CoulombFaces(FaceSystem):
     def _at_limits(self, status: Status, x: Float) -> Bool:
         """(n, 4) the statuses that nodes of a state may go on with: their own, and others where a limit is reached."""
         closed, gap = status != OPEN_FACE, x[: 2 * self.nodes : 2]
-        (normal, tangential), noise = self.forces(x), self._noise_of_state(x)
+        (normal, tangential), noise = self.forces(x), self.noise(x)
         allowed = np.zeros((self.nodes, 4), bool)
         allowed[np.arange(self.nodes), status] = True
         for sign in (FORWARD, BACKWARD):
@@ -97,26 +95,17 @@ class CoulombFaces(FaceSystem):
         allowed[np.where(closed, normal >= -noise, gap <= noise)] = True
         return self._without_friction_free(allowed)
 
-    def _noise_of_state(self, x: Float) -> float:
-        """Return the force, and jump, that is rounding in an equilibrium, with forces of its own where none load it.
-
-        Slips that an unloaded cell keeps leave forces of rounding.
-        """
-        summed = float((self.solver.absolute @ np.abs(x))[: 2 * self.nodes].max(initial=0.0))
-        largest = float(np.abs(self.forces(x)).max(initial=0.0))
-        return max(self.noise(x, np.zeros(self.nodes)), NOISE * largest, ROUNDED_SUM * summed)
-
     def next_change(self, status: Status, x: Float, rate: Float) -> float:
         """Return how far x goes on along its `rate` until a status ends, inf if none does."""
-        noise, closed = self.noise(rate, np.zeros(self.nodes)), status != OPEN_FACE
+        noise, closed = self.noise(rate), status != OPEN_FACE
         (normal, tangential), (dn, dt) = self.forces(x), self.forces(rate)
         sticks, last = status == STICK, 2 * self.nodes
-        rooms = [(x[:last:2][~closed], rate[:last:2][~closed]), (-normal[closed], -dn[closed])]
+        rooms = [(x[:last:2], rate[:last:2], ~closed), (-normal, -dn, closed)]
         for sign in (FORWARD, BACKWARD):
-            room = -self.friction * np.stack([normal, dn]) - sign * np.stack([tangential, dt])
-            rooms.append((room[0][sticks], room[1][sticks]))
-        here, falls = (np.concatenate(each) for each in zip(*rooms, strict=True))
-        ends = falls < -noise
+            room, slope = -self.friction * np.stack([normal, dn]) - sign * np.stack([tangential, dt])
+            rooms.append((room, slope, sticks))
+        here, falls, counts = (np.stack(each) for each in zip(*rooms, strict=True))
+        ends = counts & (falls < -noise)
         return float((np.maximum(here[ends], 0.0) / -falls[ends]).min(initial=np.inf))
 
     def heat(self, status: Status, before: Float, after: Float) -> float:

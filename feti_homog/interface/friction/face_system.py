@@ -12,8 +12,8 @@ from feti_homog.interface.friction.status_solver import StatusSolver
 from feti_homog.interface.friction.status_system import OPEN_FACE, STICK, free_rows
 from feti_homog.typing import Bool, Float
 
-# Forces and jumps below this share of the largest are rounding; both are scaled by the stiffness of a node.
-NOISE = 1e-10
+# Forces and jumps of a node, scaled by its stiffness, that are rounding, relative to the terms of its rows of S x.
+NOISE = 1e-11
 NOTHING = np.zeros(0, bool)
 
 
@@ -110,10 +110,7 @@ class FaceSystem:
         rows[loads] = given.values
         return x, rows
 
-    def noise(self, x: Float, slip: Float) -> float:
-        """Return the scaled force, and jump, that is rounding where the loads of x and a slip (n,) act."""
-        last = 2 * self.nodes
-        by_loads = np.abs(self.S[:last, last:] @ x[last:]).max(initial=0.0)
-        slips = np.zeros(len(x))
-        slips[1:last:2] = slip
-        return NOISE * float(max(by_loads, np.abs((self.S @ slips)[:last]).max(initial=0.0) if slip.any() else 0.0))
+    def noise(self, x: Float) -> Float:
+        """(n,) the scaled force, and jump, of each node that is rounding in x."""
+        terms = self.solver.terms(x)[: 2 * self.nodes].reshape(-1, 2)
+        return np.asarray(NOISE * terms.max(axis=1, initial=0.0))

@@ -10,18 +10,19 @@ w a row of R itself.  Changes are collected and added to R by blocks.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
-from feti_homog.interface.friction.status_system import LEAST_PIVOT, residual
+from feti_homog.interface.friction.status_system import LEAST_PIVOT, largest_share, residual
 from feti_homog.typing import Bool, Float, Int
 
 # Changes that are kept beside R.
 MOST_CHANGES = 32
 # Right-hand sides with no more entries are found from the columns of these alone.
 FEW = 8
-# Residual, relative to the largest force, that is rounding; that is too much after refinement; the least force beside
-# the largest jump; steps of refinement.
-ROUNDED, TOO_MUCH, LEAST_FORCE, REFINEMENTS = 1e-13, 1e-10, 1e-2, 3
+# Residual of a row, relative to its terms, that is rounding; that is too much after refinement; steps of refinement.
+ROUNDED, TOO_MUCH, REFINEMENTS = 1e-14, 1e-11, 3
 
 
 class FollowedStatuses:
@@ -101,10 +102,10 @@ class FollowedStatuses:
         change = self._U[0, :size, : self._count] @ (self._V[: self._count, :size][:, some] @ own[some])
         return np.asarray((self._R[0, :size, :size][:, some] @ own[some] - change)[self._place])
 
-    def solve(self, x: Float, given: Float) -> tuple[Float, Float] | None:
+    def solve(self, x: Float, given: Float, terms: Callable[[Float], Float]) -> tuple[Float, Float] | None:
         """(m,) x and S x, with the rows `given` (m,), from a start that has the prescribed entries.
 
-        None if R has lost too many digits.
+        None if R has lost too many digits: each row is checked by its `terms`, sum_j |S_ij x_j|.
         """
         prescribed = np.where(self.free, given, x)
         if np.count_nonzero(prescribed) <= FEW:
@@ -113,12 +114,11 @@ class FollowedStatuses:
         for step in range(1 + REFINEMENTS):
             y = self.S @ x
             left, before = residual(y, given, self.free, self.slope), off
-            off = float(np.abs(left).max(initial=0.0))
-            scale = max(np.abs(y).max(), np.abs(given).max(), LEAST_FORCE * np.abs(x).max())
-            if off <= ROUNDED * scale or off > before / 2 or step == REFINEMENTS:
+            off = largest_share(left, np.abs(given) + terms(x), self.slope)
+            if off <= ROUNDED or off > before / 2 or step == REFINEMENTS:
                 break
             x = np.where(self.free, x + self._inverse(left), x)
-        return (x, y) if off <= TOO_MUCH * scale else None
+        return (x, y) if off <= TOO_MUCH else None
 
     def grow(self, S: Float, old: Int, other: Int) -> bool:
         """Prescribe more entries: of S (m', m') those that are here stand at the places `old` (m,), with their S.

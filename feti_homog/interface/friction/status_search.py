@@ -14,9 +14,9 @@ from itertools import product
 import numpy as np
 
 from feti_homog.interface.contact.states import Status
-from feti_homog.interface.friction.face_system import NOISE, FaceSystem, Prescribed
+from feti_homog.interface.friction.face_system import FaceSystem, Prescribed
 from feti_homog.interface.friction.lemke import complementary, first_guess
-from feti_homog.interface.friction.status_system import BACKWARD, FORWARD, OPEN_FACE, STICK, residual
+from feti_homog.interface.friction.status_system import BACKWARD, FORWARD, OPEN_FACE, STICK, largest_share, residual
 from feti_homog.typing import Bool, Float
 
 # Share of the forces of the loads that may be left on a free motion.
@@ -113,17 +113,20 @@ class StatusSearch:
 
     def _is_balanced(self, status: Status, x: Float) -> bool:
         """Return False if a free motion, such as the turning of a fibre that slides all around, has a force on it."""
-        faces, given, last = self.faces, self.given, 2 * self.faces.nodes
+        faces, given, terms = self.faces, self.given, self.faces.solver.terms
+        held = np.zeros(len(x))
+        held[faces.loads], held[1 : 2 * faces.nodes : 2] = x[faces.loads], given.slip
         rows = faces.prescribed(status, given, self.start)[1]
-        left = residual(faces.solver.product(x), rows, *faces.free(status, given.by_stress))
-        by_loads = np.abs(faces.S[:, last:] @ x[last:]).max(initial=0.0)
-        return bool(np.abs(left).max(initial=0.0) <= UNBALANCED * max(by_loads, faces.noise(x, given.slip) / NOISE))
+        free = faces.free(status, given.by_stress)
+        left = residual(faces.solver.product(x), rows, *free)
+        # Of the forces of what is prescribed, at a node and at those that it is coupled with.
+        return largest_share(left, np.abs(rows) + terms(terms(held)), free[1]) <= UNBALANCED
 
     def _improved(self, status: Status, x: Float) -> Status:
         """(n,) the statuses that the signs of forces and jumps call for."""
         faces, allowed, slip, last = self.faces, self.allowed, self.given.slip, 2 * self.faces.nodes
         normal, tangential = faces.forces(x)
-        noise, gap, moved = faces.noise(x, slip), x[:last:2], x[1:last:2] - slip
+        noise, gap, moved = faces.noise(x), x[:last:2], x[1:last:2] - slip
         better, closed = status.copy(), status != OPEN_FACE
         limit = -faces.friction * normal
         pulled = closed & (normal > noise) & allowed[:, OPEN_FACE]

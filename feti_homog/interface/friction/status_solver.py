@@ -6,6 +6,7 @@ from collections import deque
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from feti_homog.interface.friction.followed_statuses import FollowedStatuses
 from feti_homog.interface.friction.status_system import StatusSystem
@@ -39,9 +40,14 @@ class StatusSolver:
             self._followed = before._followed
 
     @cached_property
-    def absolute(self) -> Float:
-        """(m, m) |S_ij|."""
-        return np.abs(self.S)
+    def _absolute(self) -> NDArray[np.float32]:
+        """(m, m) |S_ij|, of whose products the size alone counts."""
+        return np.abs(self.S).astype(np.float32)
+
+    def terms(self, x: Float) -> Float:
+        """(m,) sum_j |S_ij x_j|, of whose rounding each row of S x has its share."""
+        largest = float(np.abs(x).max(initial=0.0)) or 1.0
+        return np.asarray(largest * (self._absolute @ np.abs(x / largest).astype(np.float32)), float)
 
     def product(self, x: Float) -> Float:
         """(m,) S x of an array that does not change; the last ones are kept."""
@@ -63,7 +69,7 @@ class StatusSolver:
         followed = self._turned(free, slope)
         if followed is None:
             return self._system(free, slope).solve(x, given)
-        found = followed.solve(x, given)
+        found = followed.solve(x, given, self.terms)
         if found is None:
             self._followed, self._factored = None, 0
             return self._system(free, slope).solve(x, given)

@@ -34,6 +34,13 @@ def residual(y: Float, given: Float, free: Bool, slope: Float) -> Float:
     return np.where(free, left, 0.0)
 
 
+def largest_share(left: Float, terms: Float, slope: Float) -> float:
+    """Return the largest of residuals (m,), each relative to the terms (m,) of its row."""
+    size, sliding = terms.copy(), np.flatnonzero(slope)
+    size[sliding] += np.abs(slope[sliding]) * terms[sliding - 1]
+    return float((np.abs(left) / np.where(size > 0.0, size, 1.0)).max(initial=0.0))
+
+
 class StatusSystem:
     """S x = 0 on the rows that are free, with x given on the others, factored.
 

@@ -101,7 +101,7 @@ def test_each_search_finds_statuses_or_none():
 
 
 def follow(faces, area, loads):
-    """Points of a path: load factor, strain and stress (m,), statuses (k,), and the heat up to each."""
+    """Points of a path: load factor, strain and stress (m,), the heat up to each, and scaled x."""
     n, (status, x, heat) = faces.nodes, (np.zeros(faces.nodes, np.int8), np.zeros(len(faces.S)), 0.0)
     points = []
     for leg, load in enumerate(loads):
@@ -115,7 +115,7 @@ def follow(faces, area, loads):
             heat += faces.heat(status, x, x + way * rate) / area
             share, x = share + way if way < 1.0 - share else 1.0, x + way * rate
             y = (faces.S @ x) * faces.size
-            points.append(((leg + share) / len(loads), x[2 * n :] / faces.size[2 * n :], y[2 * n :] / area, heat))
+            points.append(((leg + share) / len(loads), x[2 * n :] / faces.size[2 * n :], y[2 * n :] / area, heat, x))
     return points
 
 
@@ -130,11 +130,39 @@ def test_paths_with_reversals_are_those_of_slow_ones(seed):
     found = follow(CoulombFaces(A, friction), 1.0, loads)
     assert len(found) == len(expected)
     most = max(np.abs(p.state.stress).max() for p in expected)
-    for (factor, strain, stress, heat), point in zip(found, expected, strict=True):
+    for (factor, strain, stress, heat, _), point in zip(found, expected, strict=True):
         assert factor == pytest.approx(point.load_factor, rel=1e-8)
         np.testing.assert_allclose(stress, point.state.stress, atol=1e-8 * most)
         np.testing.assert_allclose(strain, point.state.strain, atol=1e-8)
         assert heat == pytest.approx(point.heat, abs=1e-8)
+
+
+@pytest.mark.parametrize("share", [1e-6, 1e-12])
+def test_a_fibre_that_bears_little_slips_as_one_that_bears_much(share):
+    """Two groups of nodes that nothing couples, of which the second has a share of the loads of the first."""
+    rng = np.random.default_rng(5)
+    parts, v = [], 3
+    for nodes in (4, 3):
+        B = rng.normal(size=(2 * nodes + 7, 2 * nodes + v))
+        parts.append(B.T @ B / len(B))
+    loads = [MixedLoad(rng.normal(size=v), np.zeros(v, bool)) for _ in range(5)]
+    friction = rng.uniform(0.1, 0.4, 7)
+    both = np.zeros((14 + v, 14 + v))
+    for part, factor, at in ((parts[0], 1.0, np.r_[0:8]), (parts[1], share, np.r_[8:14])):
+        k = len(at)
+        both[np.ix_(at, at)] = part[:k, :k]
+        both[np.ix_(at, np.r_[14:17])] = factor * part[:k, k:]
+        both[np.ix_(np.r_[14:17], at)] = factor * part[k:, :k]
+        both[14:, 14:] += factor**2 * part[k:, k:]
+    ends = []
+    for stiffness, own in ((both, slice(0, 7)), (parts[1], slice(4, 7))):
+        faces, found = CoulombFaces(stiffness, friction[own]), []
+        for *_, x in follow(faces, 1.0, loads):
+            found.append(x / faces.size)
+        ends.append(found)
+    slips, alone = ends[0][-1][8:14], ends[1][-1][:6]
+    assert np.abs(alone).max() > 0.1
+    np.testing.assert_allclose(slips / share, alone, atol=1e-9 * np.abs(alone).max())
 
 
 def test_lemke_solves_a_problem_whose_matrix_is_not_symmetric():

@@ -19,7 +19,7 @@ def assert_solves(followed, S, friction, status, by_stress, rng):
     assert followed.turn(free, slope)
     system = StatusSystem(S, free, slope)
     for start, given in ((np.where(free, 0.0, rng.normal(size=len(S))), rng.normal(size=len(S))), (0.0 * S[0], S[0])):
-        x, y = followed.solve(start, np.where(free, given, 0.0))
+        x, y = followed.solve(start, np.where(free, given, 0.0), lambda x: np.abs(S) @ np.abs(x))
         expected = system.solve(start, np.where(free, given, 0.0))
         np.testing.assert_allclose(x, expected, atol=1e-10 * max(1.0, np.abs(expected).max()))
         np.testing.assert_allclose(y, S @ x, atol=1e-13 * np.abs(x).max() * len(S))
