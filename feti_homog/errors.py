@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from typing import Any
 
 EXIT_DONE, EXIT_DEFECT, EXIT_INPUT, EXIT_UNCONVERGED = 0, 1, 2, 3
 # Characters of a fault and number of faults: a file may have any number of them, with words of any length.
@@ -29,7 +30,7 @@ class FetiHomogError(Exception):
         self.faults = tuple(map(_line, faults))
         super().__init__("\n".join(self.faults))
 
-    def __reduce__(self) -> tuple[type[FetiHomogError], tuple[str, ...]]:
+    def __reduce__(self) -> tuple[type[FetiHomogError], tuple[Any, ...]]:
         return type(self), self.faults
 
 
@@ -60,6 +61,17 @@ class ConvergenceError(FetiHomogError):
 
 class NotCarriedError(ConvergenceError):
     """Stresses are prescribed that nothing in the cell carries."""
+
+
+class CoarseMeshError(FetiHomogError):
+    """A mesh of elements split `refine` times errs by `energy`, more than the case asks for; `finer` times would do."""
+
+    def __init__(self, words: str, energy: float, refine: int, finer: int) -> None:
+        super().__init__(words)
+        self.energy, self.refine, self.finer = energy, refine, finer
+
+    def __reduce__(self) -> tuple[type[FetiHomogError], tuple[Any, ...]]:
+        return type(self), (*self.faults, self.energy, self.refine, self.finer)
 
 
 class LibraryError(FetiHomogError):

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.analysis.context import AnalysisContext
-from feti_homog.analysis.mesh_errors import energy_error, state_error, unit_errors
+from feti_homog.analysis.mesh_errors import energy_error, note_accuracy, state_error, unit_errors
 from feti_homog.analysis.registry import Analysis
 from feti_homog.analysis.result_records import AnglePoint
 from feti_homog.case.sections import Angle
@@ -45,6 +45,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
         starts = [r.state.solution.lam for r in responses]
         tips = context.tips.of(responses, context.loads.names if unit else ("strain",))
         points.append(AnglePoint(**point | context.point(responses), tips=tips))
+    note_accuracy(context, max(point.mesh_error or 0.0 for point in points))
     return {"angle": tuple(points)}
 
 

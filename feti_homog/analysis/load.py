@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from feti_homog.analysis.context import AnalysisContext
-from feti_homog.analysis.mesh_errors import state_error
+from feti_homog.analysis.mesh_errors import note_accuracy, state_error
 from feti_homog.analysis.registry import Analysis
 from feti_homog.analysis.result_records import LoadPoint
 from feti_homog.analysis.sensitivities import load_sensitivities, propagated
@@ -24,6 +24,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     for response, problem in zip(responses, ("load", "load, along the fibres"), strict=False):
         context.progress.say(context.checks.record(problem, response))
     error, responses = state_error(context, responses)
+    note_accuracy(context, max(error.values(), default=0.0))
     context.record_state(responses, 1.0, "load", 0)
     point = context.loaded_point(responses) | error | {"free_motions": state.free_motions}
     others = dict(zip(cell.loads, cell.macroscopic(state.solutions).strain.tolist(), strict=True))

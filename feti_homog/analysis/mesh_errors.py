@@ -12,6 +12,8 @@ from scipy.linalg import eigh
 
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result_records import MeshError
+from feti_homog.case.element_sizes import MOST_REFINED
+from feti_homog.errors import CoarseMeshError, NotCarriedError
 from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response
 from feti_homog.materials import bounds, spatial_constants
@@ -22,6 +24,8 @@ if TYPE_CHECKING:
     from feti_homog.homogenization.mesh_error import EnergyErrors
 
 Named = Mapping[str, Float]
+# Of errors of the energy by a halving of elements, at the least: a crack's is 2.
+LEAST_RATE = 2.0
 # Share of a bound by which rounding may leave a value outside.
 ROUNDING = 1e-9
 
@@ -80,14 +84,24 @@ def mesh_error(
 
 
 def note_accuracy(context: AnalysisContext, energy: float) -> None:
-    """Note which mesh would do if the relative error of the energy is more than the case asks for."""
+    """Note which mesh would do if the relative error of the energy is more than the case asks for.  Collective.
+
+    Raises:
+        CoarseMeshError: the case asks for a solution on that mesh, and this is its first one.
+    """
     cell = context.case.cell
-    if cell.accuracy is None or energy <= cell.accuracy:
+    if cell.accuracy is None or (energy := context.cell.comm.bcast(energy)) <= cell.accuracy:
         return
-    finer = math.ceil(math.log(energy / cell.accuracy, 4**cell.order))
+    rate, before = 4.0**cell.order, context.earlier
+    if before is not None:  # at corners and tips errors fall more slowly than those of smooth fields
+        rate = min(rate, max(LEAST_RATE, (before.energy / energy) ** (1 / (cell.refine - before.refine))))
+    finer = cell.refine + math.ceil(math.log(energy / cell.accuracy, rate))
+    words = f"[cell] accuracy = {cell.accuracy:g}: the estimated error of the strain energy is {energy:.1e}"
+    if cell.accuracy_check == "repeat" and finer <= MOST_REFINED and before is None:
+        words += f" with refine = {cell.refine}: solved once more with refine = {finer}"
+        raise CoarseMeshError(words, energy, cell.refine, finer)
     context.notes.append(
-        f"[cell] accuracy = {cell.accuracy:g}: the estimated error of the strain energy is {energy:.1e}; mesh_size = "
-        f"{cell.mesh_size:g}, refine = {cell.refine + finer} and order = {cell.order} in its place would do"
+        f"{words}; mesh_size = {cell.mesh_size:g}, refine = {finer} and order = {cell.order} in its place would do"
     )
 
 
@@ -137,6 +151,42 @@ def state_error(context: AnalysisContext, responses: Sequence[Response]) -> tupl
     size = max(abs(sum(getattr(each, part).item() for each in errors)) for part in ("signed", "least"))
     shared = [replace(r, shares=each.shares[:, 0] if keep else None) for r, each in zip(responses, errors, strict=True)]
     return {"mesh_error": size / energy if energy > 0 else 0.0}, shared
+
+
+def check_accuracy(context: AnalysisContext) -> None:
+    """Note, of a case that asks for an accuracy, the error of the cell under the first load, before any bond breaks.
+
+    Collective.
+
+    Raises:
+        CoarseMeshError: as `note_accuracy`.
+    """
+    if context.case.cell.accuracy is None or not context.case.output.mesh_error:
+        return
+    cell, target = context.loads.interfaces, next(target for target in context.case.targets if any(target.values()))
+    try:
+        state = cell.equilibrium(context.loads.load(target), context.bonds(None), cell.no_multipliers())
+    except NotCarriedError:
+        return  # so will the path be, unless friction carries its loads
+    error, _ = state_error(context, context.loads.responses(state, 1.0))
+    note_accuracy(context, error["mesh_error"])
+
+
+def add_errors_of_breaks(entries: Sequence[dict[str, Any]]) -> None:
+    """Add `dissipated_mesh_error` to the points of a path that have a `mesh_error` e, as if bonds broke all the same.
+
+    A break loses R of the energy U before it, and errs by e U - e' (U - R), e' of the next point; between the points
+    that have one e is linear.
+    """
+    known = [number for number, entry in enumerate(entries) if "mesh_error" in entry]
+    if not known:
+        return
+    error = np.interp(range(len(entries)), known, [entries[number]["mesh_error"] for number in known])
+    stored, lost = (np.array([entry[name] for entry in entries]) for name in ("stored", "dissipated"))
+    off = error[:-1] * stored[:-1] - error[1:] * (stored[:-1] - np.diff(lost))
+    total = np.cumsum([0.0, *np.where(np.diff(lost) > 0, off, 0.0)])
+    for number in known:
+        entries[number]["dissipated_mesh_error"] = abs(float(total[number]))
 
 
 def energy_error(stiffness: Float, errors: list[EnergyErrors]) -> dict[str, float]:

@@ -11,6 +11,7 @@ import numpy as np
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.criteria import criterion_of
 from feti_homog.analysis.event_progress import BARS, EventProgress
+from feti_homog.analysis.mesh_errors import add_errors_of_breaks, check_accuracy, state_error
 from feti_homog.analysis.path_events import Work, holding, restored, stored
 from feti_homog.analysis.registry import Analysis
 from feti_homog.analysis.result_records import PathPoint, Peak
@@ -41,6 +42,7 @@ def follow(context: AnalysisContext, path: LoadPath, law: BondLaw) -> dict[str, 
 
     `states` has the numbers of the points whose fields are recorded; which, is chosen when all are known.
     """
+    check_accuracy(context)
     known = _known(context)
     work, entries, last = Work(), list[dict[str, Any]](), None
     progress = EventProgress(context.progress, BARS[path.method], context.events)
@@ -202,11 +204,7 @@ def _goes_on(context: AnalysisContext, path: LoadPath, point: Point, count: int)
 
 
 def _kept(
-    context: AnalysisContext,
-    path: LoadPath,
-    law: BondLaw,
-    entries: Sequence[dict[str, Any]],
-    last: Point,
+    context: AnalysisContext, path: LoadPath, law: BondLaw, entries: Sequence[dict[str, Any]], last: Point
 ) -> dict[str, Any]:
     """Tips and fields of the points that are kept, from the checkpoint, in which the last one may not be.
 
@@ -217,17 +215,17 @@ def _kept(
     tips = TipRecorder(context.cell, context.loads.interfaces, law) if law.has_tips else None
     with context.progress.stage("states") as words:
         for number in context.progress.bar(numbers, "states"):
-            point = (
-                last
-                if number == len(entries) - 1
-                else restored(context.checkpoint.read(number), context.loads.interfaces)[0]
-            )
+            is_last = number == len(entries) - 1
+            point = last if is_last else restored(context.checkpoint.read(number), context.loads.interfaces)[0]
             point, responses = _checked(context, point, _label(path, number))
             if tips is not None:
                 entries[number]["tips"] = tips.of(point)
             if context.states.has_place:
+                error, responses = state_error(context, responses)
+                entries[number] |= error
                 context.record_state(responses, point.load_factor, _label(path, number), number)
         words.append(f"{len(numbers)} of {len(entries)} points")
+    add_errors_of_breaks(entries)
     return {"states": numbers} if context.states.has_place else {}
 
 

@@ -156,6 +156,15 @@ class PathPoint:
     free_motions: int = described("rigid motions of fibres that no interface force resists")
     stored: float = described("elastic energy stored per area of the cell", STRESS)
     stored_in_springs: float = described("the share of elastic interfaces in it", STRESS)
+    mesh_error: float | None = described(
+        "estimated relative error of `stored` by the mesh, at the points that `states` in [output] chooses",
+        default=None,
+    )
+    dissipated_mesh_error: float | None = described(
+        "estimated error of `dissipated` there by the mesh, of a path whose bonds break at the same strains",
+        STRESS,
+        default=None,
+    )
     work: float = described(
         "work of the loads so far per area of the cell, of a temperature too: `stored` and `dissipated` together, with "
         "friction and `friction_heat`",

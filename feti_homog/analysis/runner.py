@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -17,7 +17,7 @@ from feti_homog.analysis.registry import analysis_of
 from feti_homog.analysis.result import Result
 from feti_homog.analysis.state_recorder import StateRecorder
 from feti_homog.case.case import Case
-from feti_homog.errors import ConvergenceError
+from feti_homog.errors import CoarseMeshError, ConvergenceError
 from feti_homog.homogenization.partition_policy import BY_COST, DEFAULT_POLICY
 from feti_homog.homogenization.unit_cell import TornCell, tear
 from feti_homog.parallel.mpi_errors import all_raise, on_root, on_root_only
@@ -60,8 +60,13 @@ def run(
         require_report()
     on_root(comm, output_folder.usable, directory)
     on_root(comm, output_folder.refuse_files_of_others, directory)
-    with output_folder.held(directory, comm, progress.say), _torn(case, comm, progress, keep_fields) as cell:
-        result = _run_and_write(cell, directory, progress, resume, keep_fields)
+    with output_folder.held(directory, comm, progress.say):
+
+        def solved(case: Case, earlier: CoarseMeshError | None) -> Result:
+            with _torn(case, comm, progress, keep_fields) as cell:
+                return _run_and_write(cell, directory, progress, resume, keep_fields, earlier)
+
+        result = _accurate(case, solved, progress)
     if result.faults:
         raise ConvergenceError(*result.faults)
     return result
@@ -75,17 +80,34 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False, quiet: b
         ConvergenceError: a solve did not converge or a check failed.
     """
     progress = _begun(case, comm, quiet)
-    with _torn(case, comm, progress, keep_fields) as cell:
-        states = StateRecorder(cell, None, keep_fields, progress.say)
-        context = AnalysisContext.of(cell, progress, states)
-        if keep_fields or context.plane.law.has_toughness:
-            context = replace(context, checkpoint=EventsInMemory(comm))
-        _warn(context)
-        result = result_builder.result(context, _analyse(context), states.kept())
+
+    def solved(case: Case, earlier: CoarseMeshError | None) -> Result:
+        with _torn(case, comm, progress, keep_fields) as cell:
+            states = StateRecorder(cell, None, keep_fields, progress.say)
+            context = AnalysisContext.of(cell, progress, states, earlier)
+            if keep_fields or context.plane.law.has_toughness:
+                context = replace(context, checkpoint=EventsInMemory(comm))
+            _warn(context)
+            return result_builder.result(context, _analyse(context), states.kept())
+
+    result = _accurate(case, solved, progress)
     _print_summary(result, progress)
     if result.faults:
         raise ConvergenceError(*result.faults)
     return result
+
+
+def _accurate(case: Case, solved: Callable[[Case, CoarseMeshError | None], Result], progress: Progress) -> Result:
+    """Return solved(case, fault of an earlier mesh), once more on the finer mesh that the case may ask for.
+
+    Collective.
+    """
+    try:
+        return solved(case, None)
+    except CoarseMeshError as error:
+        earlier = error
+    progress.say(f"remark: {earlier}")
+    return solved(replace(case, cell=replace(case.cell, refine=earlier.finer)), earlier)
 
 
 def _begun(case: Case, comm: MPI.Intracomm, quiet: bool) -> Progress:
@@ -119,13 +141,20 @@ def _torn(case: Case, comm: MPI.Intracomm, progress: Progress, keep_fields: bool
         cell.destroy()
 
 
-def _run_and_write(cell: TornCell, directory: Path, progress: Progress, resume: bool, keep_fields: bool) -> Result:
+def _run_and_write(
+    cell: TornCell,
+    directory: Path,
+    progress: Progress,
+    resume: bool,
+    keep_fields: bool,
+    earlier: CoarseMeshError | None,
+) -> Result:
     """Analyse and write; the result may have faults."""
     output = cell.case.output
     file = _field_file(cell, directory, progress) if output.fields else None
     with file or nullcontext(), closing(EventLog(directory, cell.comm, cell.case.name, progress.say)) as log:
         states = StateRecorder(cell, file, keep_fields, progress.say)
-        context = AnalysisContext.of(cell, progress, states)
+        context = AnalysisContext.of(cell, progress, states, earlier)
         context = replace(context, checkpoint=_checkpoint(cell, directory), resume=resume)
         context = replace(context, log=log.write, events=event_log.NAME)
         _warn(context)

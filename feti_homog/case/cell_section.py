@@ -94,10 +94,8 @@ class Cell:
         real(least=1e-5, most=0.5),
         "Size of the elements on interfaces, before refine, / width of the cell; from there they grow to mesh_size, by "
         "0.4 of the distance. At most mesh_size.",
-        default=None,
-        default_words="mesh_size",
-        only=MESHED,
-    )
+        default=None, default_words="mesh_size", only=MESHED,
+    )  # fmt: skip
     tip_size: float | None = key(
         real(least=1e-6, most=0.5),
         "Size of the elements at the tips of debonded arcs, before refine, / width of the cell; from there they grow "
@@ -116,18 +114,20 @@ class Cell:
         "Largest relative error of the strain energy under any macroscopic strain, and so of the entries of the "
         "effective stiffness: mesh_size and refine are chosen, which it excludes with interface_size and tip_size, and "
         "order, unless it is given. It is not that of paths after bonds break, nor of polygons with sharp corners.",
-        default=None,
-        default_words="none",
-        only=MESHED,
-    )
+        default=None, default_words="none", only=MESHED,
+    )  # fmt: skip
+    accuracy_check: str | None = key(
+        choice("remark", "repeat"),
+        'What follows if the estimated error is more than accuracy. "remark": a remark that names the mesh that would '
+        'do; "repeat": the cell is solved once more, on that mesh.',
+        default=None, default_words='"remark" beside accuracy', only=MESHED,
+    )  # fmt: skip
     element_size: float | None = key(
         real(least=1e-6, most=0.5),
         "Size of the elements, after refine, / width of the cell: mesh_size and refine are chosen, as with accuracy. "
         "Mean edges are 0.8 to 1 of it, unless circles of 16 edges or narrow gaps need smaller ones.",
-        default=None,
-        default_words="none",
-        only=MESHED,
-    )
+        default=None, default_words="none", only=MESHED,
+    )  # fmt: skip
     order: int = key(
         integer(least=1, most=2),
         "Order of the triangles. 1: linear; they lock above poisson = 0.49, but in plane stress. 2: quadratic, curved "

@@ -101,6 +101,7 @@ def _cell() -> Iterator[Rule]:
     line = f"missing; expected {number}, or the width of the cell"
     yield needed(CELL, "fibres", line, beside="radii", unless=("width",))
     yield misplaced(CELL, "void_radius", "voids")
+    yield misplaced(CELL, "accuracy_check", "accuracy")
     yield exclusive(CELL, "match", "voids", words="exclude each other; cells that match a table have no voids")
     both = {"required": ["match", "radius_spread"], "properties": {"radius_spread": {"exclusiveMinimum": 0}}}
     line = "exclude each other; the table gives the radii"
@@ -143,6 +144,10 @@ def _output() -> Iterator[Rule]:
     others = ANALYSIS_TYPE.among(*(name for name in _values(ANALYSIS_TYPE) if name not in DIFFERENTIABLE))
     line = f"belongs to [analysis] type = {' or '.join(map(toml_value, DIFFERENTIABLE))}"
     yield refused(("output", "sensitivities"), {"type": "boolean", "enum": [True]}, line, others)
+    pairs = (("cell", "accuracy_check", "repeat"), ("output", "mesh_error", False))
+    tables = {s: {"type": "object", "required": [key], "properties": {key: {"enum": [v]}}} for s, key, v in pairs}
+    line = '[output] mesh_error = false: expected true with [cell] accuracy_check = "repeat"'
+    yield Rule((), {"not": {"required": ["cell", "output"], "properties": tables}}, lambda _: line)
 
 
 def _loads() -> Iterator[Rule]:

@@ -11,7 +11,7 @@ from reference.references import ARC_OF_120_DEGREES_FINE, AXIAL_SHEAR, BONDED, E
 from support.cases import FIBRE, MATRIX, make_case, solve
 
 from feti_homog import Case, run
-from feti_homog.analysis.mesh_errors import mesh_error, note_accuracy
+from feti_homog.analysis.mesh_errors import mesh_error
 from feti_homog.fem.arc_error import ArcSides
 from feti_homog.fem.stress_recovery import RecoveredStress
 from feti_homog.homogenization.mesh_error import EnergyErrors, energy_errors
@@ -22,12 +22,12 @@ ALL_ROUND = {"contact": False, "debonded": [{"fibre": "all", "centre": 0.0, "ang
 GLASS = {"young": 73.0, "poisson": 0.22, "expansion": 5.0e-6}
 EPOXY = {"young": 3.45, "poisson": 0.35, "expansion": 54.0e-6}
 SIZES = {1: 0.05, 2: 0.1}
-VOIDS = {"geometry": "random", "fibres": 2, "fibre_fraction": 0.2, "voids": 0.1, "mesh_size": 0.25}
-ASKED = {
-    "cell": {"geometry": "square", "fibre_fraction": 0.4, "accuracy": 1e-3, "order": 1},
+CASE = {
+    "cell": {"geometry": "square", "fibre_fraction": 0.4},
     "material": {"matrix": MATRIX, "fibre": FIBRE},
     "analysis": {"type": "stiffness", "plane": "strain"},
 }
+VOIDS = {"geometry": "random", "fibres": 2, "fibre_fraction": 0.2, "voids": 0.1, "mesh_size": 0.25}
 
 
 def springs(normal, tangential):
@@ -258,7 +258,7 @@ def test_what_is_outside_its_bounds_within_its_error_is_remarked(comm):
 @pytest.mark.parametrize(("size", "is_fault"), [(1e-3, True), (0.1, False)])
 def test_what_is_outside_its_bounds_by_more_than_its_error_is_a_fault(size, is_fault):
     faults, notes = [], []
-    case = Case.parse(ASKED | {"cell": {"geometry": "square", "fibre_fraction": 0.4}})
+    case = Case.parse(CASE)
     context = SimpleNamespace(case=case, notes=notes, checks=SimpleNamespace(faults=faults))
     bounds = SimpleNamespace(hashin_shtrikman=SimpleNamespace(bulk=(1.0, 1.95), shear=(0.4, 0.5)))
     secants = {"effective_stiffness": cubic(2.5, 1.5, 0.5), "moduli": None, "bounds": bounds}
@@ -266,14 +266,3 @@ def test_what_is_outside_its_bounds_by_more_than_its_error_is_a_fault(size, is_f
     (words,) = faults if is_fault else notes
     assert not (notes if is_fault else faults)
     assert words.startswith("bulk = 2 is outside its bounds, 1 and 1.95, by 5.0e-02")
-
-
-def test_more_error_than_asked_for_is_remarked_with_a_mesh_that_would_do(comm):
-    context = SimpleNamespace(case=Case.parse(ASKED), notes=[])
-    note_accuracy(context, 0.9e-3)
-    assert not context.notes
-    note_accuracy(context, 5e-3)
-    chosen = context.case.cell
-    (note,) = context.notes
-    # A fifth of the error takes two more halvings of linear elements.
-    assert f"refine = {chosen.refine + 2} and order = 1" in note and "5.0e-03" in note

@@ -87,6 +87,10 @@ def _peak_lines(document: Document, peak: Mapping[str, Any], label: str) -> list
         lost = 1.0 - peak["stress_left"] / peak["stress"]
         rises = f" as the {path_curves.what_rises(document)} rises" if path_curves.is_proportional(document) else ""
         text += f"; {peak['stress_left']:.6g} after it{rises}, {lost:.1%} less (point {peak['event_left']})"
+    events = {"the first break": peak.get("first_break_event"), "the peak": peak["event"]}
+    errors = {words: document["path"][event].get("mesh_error") for words, event in events.items() if event is not None}
+    known = [f"{error:.1e} at {words}" for words, error in errors.items() if error is not None]
+    text += f"; mesh error, of the energy, {', '.join(known)}" if known else ""
     lines = wrap(text, WIDTH, subsequent_indent="  ")
     if path_curves.scales_with_toughness(document):
         lines.append("Scaling: strains and stresses of the path are as the root of the toughness")
@@ -113,10 +117,11 @@ def _path_energies(document: Document, label: str) -> list[str]:
     last = document["path"][-1]
     where = " on the first leg" if path_curves.legs(document) > 1 else ""
     rising = f"{last['dissipated_strain_controlled']:.6g} if the {path_curves.what_rises(document)} only rises{where}"
+    error = f" (mesh error {last['dissipated_mesh_error']:.1e})" if "dissipated_mesh_error" in last else ""
     lines = [
         f"Work per area{label}: {last['work']:.6g}",
         *energies(last, label),
-        f"Dissipated per area{label}: {last['dissipated']:.6g} along all equilibria, {rising}",
+        f"Dissipated per area{label}: {last['dissipated']:.6g} along all equilibria{error}, {rising}",
     ]
     if "friction_heat" in last:
         lines.append(f"Heat of friction per area{label}: {last['friction_heat']:.6g}{_closed_cycle(document)}")

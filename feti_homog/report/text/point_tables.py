@@ -65,7 +65,7 @@ def _path_numbers(document: Document, title: str, names: Sequence[str], numbers:
     rows = []
     for number in numbers:
         point, means = points[number], [strain[number, leading], *stress[number]]
-        rows.append([number, point.get("mark", ""), *map(float, means), *(point[name] for name in names)])
+        rows.append([number, point.get("mark", ""), *map(float, means), *(point.get(name, "") for name in names)])
     return Table(title, [*map(Column, head)], rows)
 
 
@@ -130,7 +130,8 @@ def load_table(document: Document, label: str) -> Table:
 
 def energies(point: Point, label: str) -> list[str]:
     springs = f", {point['stored_in_springs']:.6g} of it in springs" if point["stored_in_springs"] else ""
-    return [f"Stored per area{label}: {point['stored']:.6g}{springs}"]
+    error = f", mesh error {point['mesh_error']:.1e} of it" if "mesh_error" in point else ""
+    return [f"Stored per area{label}: {point['stored']:.6g}{springs}{error}"]
 
 
 def debonded(document: Document, point: Point) -> list[str]:

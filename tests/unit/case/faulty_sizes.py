@@ -26,6 +26,14 @@ FAULTY_SIZES: dict[str, tuple[str, tuple[str, ...]]] = {
         cell("mesh_size = 0.05", "accuracy = 1e-8"),
         ("[cell] accuracy = 1e-08: expected a number at least 1e-07 and at most 0.1",),
     ),
+    "accuracy_check_without_one": (
+        cell("mesh_size = 0.05", 'accuracy_check = "repeat"'),
+        ("[cell] accuracy_check: belongs to accuracy, which is missing",),
+    ),
+    "accuracy_check_without_an_estimate": (
+        cell("mesh_size = 0.05", 'accuracy = 1e-3\naccuracy_check = "repeat"') + "\n[output]\nmesh_error = false\n",
+        ('[output] mesh_error = false: expected true with [cell] accuracy_check = "repeat"',),
+    ),
     "accuracy_of_a_users_mesh": (
         cell(MESH_CELL[0], MESH_CELL[1] + "\naccuracy = 1e-3"),
         ('[cell] accuracy = 0.001: belongs to geometry = "square"',),

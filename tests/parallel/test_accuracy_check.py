@@ -1,0 +1,79 @@
+"""Errors of the mesh beyond the accuracy that a case asks for, and those of the points of paths."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from support.cases import FIBRE, MATRIX
+
+from feti_homog import Case, run
+from feti_homog.analysis.mesh_errors import add_errors_of_breaks, note_accuracy
+
+pytestmark = pytest.mark.parallel
+
+UNIT = {"analysis": {"type": "stiffness", "plane": "strain"}}
+ASKED = {
+    "cell": {"geometry": "square", "fibre_fraction": 0.4, "accuracy": 1e-3, "order": 1},
+    "material": {"matrix": MATRIX, "fibre": FIBRE},
+    "analysis": {"type": "stiffness", "plane": "strain"},
+}
+
+
+def test_more_error_than_asked_for_is_remarked_with_a_mesh_that_would_do(comm):
+    context = SimpleNamespace(case=Case.parse(ASKED), notes=[], earlier=None, cell=SimpleNamespace(comm=comm))
+    note_accuracy(context, 0.9e-3)
+    assert not context.notes
+    note_accuracy(context, 5e-3)
+    chosen = context.case.cell
+    (note,) = context.notes
+    # A fifth of the error takes two more halvings of linear elements.
+    assert f"refine = {chosen.refine + 2} and order = 1" in note and "5.0e-03" in note
+
+
+@pytest.mark.parametrize("kind", ["stiffness", "load", "angle", "path"])
+def test_a_mesh_that_errs_too_much_is_refined_once(comm, kind):
+    # Sharp corners, of which the choice of the mesh does not know.
+    square = {"x": 0.5, "y": 0.5, "radius": 0.35, "sides": 4, "angle": 45.0}
+    cell = {"geometry": "table", "width": 1.0, "height": 1.0, "fibre_list": [square], "order": 2}
+    stiff = {"young": 1000.0, "poisson": 0.3}
+    document = {"cell": cell | {"accuracy": 2e-4, "accuracy_check": "repeat"}, "analysis": {"plane": "strain"}}
+    document |= {"material": {"matrix": {"young": 1.0, "poisson": 0.3}, "fibre": stiff}}
+    own = {"load": {"to": {"E11": 1.0}}, "angle": {"values": [0.0], "strain": [1.0, 0.0, 0.0]}}
+    own["path"] = {"strain": [1.0, 0.0, 0.0]}
+    document["analysis"]["type"] = kind
+    if kind != "stiffness":
+        document[kind] = own[kind]
+    if kind in ("angle", "path"):
+        document["interface"] = {"contact": False, "normal_strength": 1e9, "tangential_strength": 1e9}
+    if kind == "angle":
+        document["interface"] = {"contact": False, "debonded": [{"fibre": "all", "centre": 0.0}]}
+    case = Case.parse(document)
+    found = run(case, comm)
+    first, *others = (note for note in found.remarks if "accuracy" in note)
+    assert f"with refine = {case.cell.refine}: solved once more with refine = {found.cell.refine}" in first
+    if kind == "stiffness":  # of the rate that both meshes have, not of that of smooth fields
+        assert int(others[0].split("refine = ")[1].split(" ")[0]) > found.cell.refine + 1
+    assert found.case == case.resolved() and found.digest == case.digest()
+
+
+def test_kept_points_of_a_path_have_errors_of_their_energies(comm):
+    document = {"cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.1, "refine": 1}}
+    document |= {"material": {"matrix": MATRIX, "fibre": FIBRE}, "analysis": {"type": "path", "plane": "strain"}}
+    document["interface"] = {"contact": False, "normal_strength": 1.0, "tangential_strength": 1.0}
+    document |= {"path": {"strain": [0.02, 0.0, 0.0]}, "output": {"states": "all"}}
+    points = run(Case.parse(document), comm, fields=True).path
+    stiffness = run(Case.parse({name: document[name] for name in ("cell", "material")} | UNIT), comm)
+    first = stiffness.mesh_error.effective_stiffness[0, 0] / stiffness.effective_stiffness[0, 0]
+    assert points[0].mesh_error == pytest.approx(first, rel=1e-6)
+    assert all(0 < point.mesh_error < 0.1 and point.dissipated_mesh_error >= 0 for point in points)
+    # Energies that err by all of themselves, and by a share that grows as bonds break.
+    entries = [vars(point) | {"mesh_error": 1.0} for point in points]
+    add_errors_of_breaks(entries)
+    lost = np.array([point.dissipated for point in points])
+    np.testing.assert_allclose([e["dissipated_mesh_error"] for e in entries], lost, atol=1e-9 * points[0].work)
+    twice = [{"stored": 2.0, "dissipated": 0.0, "mesh_error": 0.1}, {"stored": 3.0, "dissipated": 0.5}]
+    twice.append({"stored": 3.0, "dissipated": 1.5, "mesh_error": 0.3})
+    add_errors_of_breaks(twice)
+    assert twice[2]["dissipated_mesh_error"] == pytest.approx(abs(0.1 * 2 - 0.2 * 1.5 + 0.2 * 3 - 0.3 * 2))
