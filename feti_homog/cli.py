@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NoReturn
 
 from feti_homog.api import parsed, start
-from feti_homog.commands import fibres, fit, products, reference, run, sweep, verify
+from feti_homog.commands import fibres, products, reference, run, sweep
 from feti_homog.errors import EXIT_DONE, CaseError
 from feti_homog.petsc.command_words import split_argv
 from feti_homog.petsc.option_table import help_text
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 LAUNCHER_HELP = "Switches of Open MPI go to mpirun: --allow-run-as-root, --oversubscribe (more ranks than cores)."
-COMMANDS = (run, products, verify, fibres, sweep, fit, reference)
+COMMANDS = (run, products, fibres, sweep, reference)
 
 
 class Parser(argparse.ArgumentParser):
@@ -36,7 +36,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command on all ranks, `verify` without MPI; returns the exit code of `errors`."""
     words = sys.argv[1:] if argv is None else list(argv)
     ours, _ = split_argv(words)
-    return verify.run(command_parser(), ours) if ours[:1] == ["verify"] else start(_command, words)
+    return products.run_verify(command_parser(), ours) if ours[:1] == ["verify"] else start(_command, words)
 
 
 def _command(words: Sequence[str], comm: Intracomm) -> int:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from feti_homog.api import folder
+from feti_homog.parallel.mpi_errors import on_root_only
 from feti_homog.runtime.standard_streams import print_product, say
 
 if TYPE_CHECKING:
@@ -70,7 +71,6 @@ def _length(word: str) -> float:
 
 def _statistics(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.commands import fibre_statistics
-    from feti_homog.parallel.mpi_errors import on_root_only
 
     size = None if arguments.size is None else tuple(arguments.size)
     words = arguments.source, arguments.out, arguments.model, arguments.simulations, size
@@ -91,7 +91,6 @@ def _add_fibres(actions: argparse._SubParsersAction[Any]) -> None:
 
 def _fibres(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.commands import listed_fibres
-    from feti_homog.parallel.mpi_errors import on_root_only
     from feti_homog.results import output_folder
 
     text = on_root_only(comm, listed_fibres.table, arguments.source)

@@ -1,14 +1,22 @@
-"""`feti-homog plot`, `report`, `fields` and `export`: pictures, page, files of VTK and material card of a result."""
+"""`feti-homog plot`, `report`, `fields`, `export`, `verify`: pictures, page, VTK files, material card, certificate.
+
+`verify` checks a result from its files alone, without MPI and PETSc.
+"""
 
 from __future__ import annotations
 
 import argparse
+import json
+import os
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from feti_homog.api import folder
+from feti_homog.errors import EXIT_DEFECT, EXIT_DONE, EXIT_UNCONVERGED, FetiHomogError
+from feti_homog.parallel.mpi_errors import on_root, on_root_only
 from feti_homog.runtime.environment import require_report
-from feti_homog.runtime.standard_streams import print_product, say
+from feti_homog.runtime.standard_streams import complain, end_on_signals, launched_rank, prepare, print_product, say
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
@@ -17,25 +25,56 @@ EXPORT_HELP = (
     'Print the effective constants of a stiffness or an envelope in plane = "generalized" as a card of a material. Its '
     "axis 1 is the fibre, x3 of the cell; axes 2 and 3 are x1 and x2 of the cell. No unit is converted."
 )
+VERIFY_HELP = (
+    "Recompute stresses, equilibrium, periodicity, averages, contact, strengths and energies from result.json and "
+    "result.h5, with elements of its own: a line per law, with its largest violation and limit. Exit code 3 if a law "
+    "is broken. Needs neither MPI nor PETSc; on several ranks each does all of it, and the first one prints."
+)
 
 
 def add(actions: argparse._SubParsersAction[Any]) -> None:
     """Add the commands to those of a parser."""
-    _add_plot(actions)
-    _add_report(actions)
-    _add_fields(actions)
-    _add_export(actions)
+    _add(actions, "plot", _plot, "make the pictures of a results folder again")
+    _add(actions, "report", _report, "write report.html of a results folder: one page with all there is")
+    words = "write the states of a result, with strains, von Mises and principal stresses, for VTK"
+    _add(actions, "fields", _fields, words).add_argument(
+        "--format",
+        choices=("vtkhdf", "vtu"),
+        default="vtkhdf",
+        help="vtkhdf: one file with all states, for ParaView from 5.12 on; vtu: a file for each state and a .pvd",
+    )
+    export = _add(actions, "export", _export, "print a result as a material card", EXPORT_HELP)
+    programs = "abaqus, calculix, ansys, moose, csv"
+    export.add_argument("--format", default="", metavar="PROGRAM", help=f"program that reads the card: {programs}")
+    export.add_argument("--out", type=Path, metavar="FILE", help="write the card to a file instead of printing it")
+    export.add_argument(
+        "--transversely-isotropic",
+        dest="symmetry",
+        action="store_const",
+        const="transversely isotropic",
+        default="orthotropic",
+        help="the nearest transversely isotropic material, not the one in the axes of the cell",
+    )
+    verify = _add(actions, "verify", None, "check from its files alone that a result obeys its laws", VERIFY_HELP)
+    verify.add_argument("--json", action="store_true", help="print the certificate as JSON")
 
 
-def _add_plot(actions: argparse._SubParsersAction[Any]) -> None:
-    parser = actions.add_parser("plot", help="make the pictures of a results folder again")
+def _add(
+    actions: argparse._SubParsersAction[Any],
+    name: str,
+    action: Callable[[argparse.Namespace, Intracomm], None] | None,
+    words: str,
+    description: str | None = None,
+) -> argparse.ArgumentParser:
+    """Return the new parser of a command of a results folder."""
+    parser: argparse.ArgumentParser = actions.add_parser(name, help=words, description=description)
     parser.add_argument("directory", type=folder, metavar="DIR")
-    parser.set_defaults(action=_plot)
+    parser.set_defaults(action=action)
+    return parser
 
 
 def _plot(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.analysis import stored_result
-    from feti_homog.parallel.mpi_errors import on_root_only
     from feti_homog.report.plots import figures
 
     on_root_only(comm, stored_result.check_to_draw, arguments.directory)
@@ -46,16 +85,8 @@ def _plot(arguments: argparse.Namespace, comm: Intracomm) -> None:
         say(str(path))
 
 
-def _add_report(actions: argparse._SubParsersAction[Any]) -> None:
-    words = "write report.html of a results folder: one page with all there is"
-    parser = actions.add_parser("report", help=words)
-    parser.add_argument("directory", type=folder, metavar="DIR")
-    parser.set_defaults(action=_report)
-
-
 def _report(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.analysis import stored_result
-    from feti_homog.parallel.mpi_errors import on_root_only
 
     require_report()
     on_root_only(comm, stored_result.read, arguments.directory)
@@ -71,49 +102,16 @@ def _written_report(directory: Path) -> Path:
     return page.write(directory)
 
 
-def _add_fields(actions: argparse._SubParsersAction[Any]) -> None:
-    parser = actions.add_parser(
-        "fields", help="write the states of a result, with strains, von Mises and principal stresses, for VTK"
-    )
-    parser.add_argument("directory", type=folder, metavar="DIR")
-    parser.add_argument(
-        "--format",
-        choices=("vtkhdf", "vtu"),
-        default="vtkhdf",
-        help="vtkhdf: one file with all states, for ParaView from 5.12 on; vtu: a file for each state and a .pvd",
-    )
-    parser.set_defaults(action=_fields)
-
-
 def _fields(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.analysis import stored_result
-    from feti_homog.parallel.mpi_errors import on_root_only
-    from feti_homog.results import vtk_files
+    from feti_homog.results import viewed_states
 
     on_root_only(comm, stored_result.check_to_draw, arguments.directory)
-    for path in on_root_only(comm, vtk_files.write, arguments.directory, arguments.format) or []:
+    for path in on_root_only(comm, viewed_states.write_vtk, arguments.directory, arguments.format) or []:
         say(str(path))
 
 
-def _add_export(actions: argparse._SubParsersAction[Any]) -> None:
-    parser = actions.add_parser("export", help="print a result as a material card", description=EXPORT_HELP)
-    parser.add_argument("directory", type=folder, metavar="DIR")
-    programs = "abaqus, calculix, ansys, moose, csv"
-    parser.add_argument("--format", default="", metavar="PROGRAM", help=f"program that reads the card: {programs}")
-    parser.add_argument("--out", type=Path, metavar="FILE", help="write the card to a file instead of printing it")
-    parser.add_argument(
-        "--transversely-isotropic",
-        dest="symmetry",
-        action="store_const",
-        const="transversely isotropic",
-        default="orthotropic",
-        help="the nearest transversely isotropic material, not the one in the axes of the cell",
-    )
-    parser.set_defaults(action=_export)
-
-
 def _export(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    from feti_homog.parallel.mpi_errors import on_root, on_root_only
     from feti_homog.report.cards import export
     from feti_homog.results import output_folder
 
@@ -121,3 +119,27 @@ def _export(arguments: argparse.Namespace, comm: Intracomm) -> None:
     if arguments.out is not None:
         text = str(on_root(comm, output_folder.write_product, arguments.out, text))
     on_root_only(comm, print_product, text)
+
+
+def run_verify(parser: argparse.ArgumentParser, words: Sequence[str]) -> int:
+    """Print the certificate of a result; returns the exit code."""
+    prepare()
+    end_on_signals()
+    prints = launched_rank() == 0
+    os.environ.pop("H5PY_ALWAYS_USE_MPI", None)  # the serial h5py reads the files
+    from feti_homog.verify.certificate import verify
+
+    try:
+        arguments = parser.parse_args(words)
+        certificate = verify(arguments.directory)
+        if prints:
+            print_product(json.dumps(certificate.document, indent=1) if arguments.json else certificate.text)
+    except PermissionError as error:
+        if prints:
+            complain(f"error: {error.filename}: {error.strerror}")
+        return EXIT_DEFECT
+    except FetiHomogError as error:
+        if prints:
+            complain(*(f"error: {fault}" for fault in error.faults))
+        return error.exit_code
+    return EXIT_DONE if certificate.holds else EXIT_UNCONVERGED

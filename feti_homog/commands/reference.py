@@ -7,6 +7,7 @@ import json
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from feti_homog.parallel.mpi_errors import on_root_only
 from feti_homog.petsc.option_table import help_text
 from feti_homog.runtime.standard_streams import print_product
 
@@ -27,7 +28,6 @@ def add(actions: argparse._SubParsersAction[Any]) -> None:
 
 def _keys(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.case import reference
-    from feti_homog.parallel.mpi_errors import on_root_only
 
     section = arguments.section
     tables = on_root_only(comm, reference.tables if section is None else partial(reference.tables_of, section))
@@ -36,12 +36,9 @@ def _keys(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 def _schema(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.case.json_schema import json_schema
-    from feti_homog.parallel.mpi_errors import on_root_only
 
     on_root_only(comm, print_product, json.dumps(json_schema(), indent=2))
 
 
 def _options(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    from feti_homog.parallel.mpi_errors import on_root_only
-
     on_root_only(comm, print_product, help_text())

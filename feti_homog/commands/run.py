@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from feti_homog.api import folder
 from feti_homog.errors import CaseError
+from feti_homog.parallel.mpi_errors import on_root, on_root_only
 from feti_homog.runtime.standard_streams import print_product
 
 if TYPE_CHECKING:
@@ -32,7 +33,6 @@ def _add_run(actions: argparse._SubParsersAction[Any]) -> None:
 def _run(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.analysis.runner import run
     from feti_homog.case import case as cases
-    from feti_homog.parallel.mpi_errors import on_root
     from feti_homog.results import output_folder
 
     case = on_root(comm, cases.load, arguments.case)
@@ -53,7 +53,6 @@ def _check(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.case.fit_sections import FIT_SECTIONS
     from feti_homog.fit import description as fits
     from feti_homog.fit import scatter
-    from feti_homog.parallel.mpi_errors import on_root, on_root_only
     from feti_homog.sweep import description
 
     document = on_root(comm, read_document, arguments.case)  # once: it may be a pipe

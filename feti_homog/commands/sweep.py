@@ -1,18 +1,21 @@
-"""`feti-homog sweep` and `collect`: run the cases of a file with [sweep]; make their table and pictures."""
+"""`feti-homog sweep`, `collect`, `fit` and `uncertainty`: many cases, constants from them, scatter of results."""
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from feti_homog.api import folder
 from feti_homog.errors import CaseError
+from feti_homog.parallel.mpi_errors import on_root, on_root_only
 from feti_homog.runtime.standard_streams import print_product, say
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
 
+Action = Callable[[argparse.Namespace, "Intracomm"], None]
 SWEEP_HELP = (
     "Expand the file into numbered cases, check all of them, and run them one after the other. Finished cases are "
     "skipped: the same command resumes. Failed cases are kept and reported at the end, with exit code 3."
@@ -22,15 +25,37 @@ COLLECT_HELP = (
     "both, and pictures of the varied outputs. The sweep may still be running: finished cases are collected."
 )
 
+FIT_HELP = (
+    "Fit the unknowns of a file to measured values by least squares, with exact derivatives where there are some. "
+    "Every evaluation is kept: the same command resumes. Prints estimates with confidence intervals, their "
+    "correlation, and measured beside computed values; unknowns that the data do not determine are named, with exit "
+    "code 3."
+)
+SCATTER_HELP = (
+    "Find the scatter of the constants, onsets and peaks of a case whose numbers are {mean, std} or {mean, cv}, with "
+    "each number's share, beside that between the realisations of a random cell and the error of the mesh. Where a "
+    "result has no exact derivative, the case runs with the number one standard deviation less and more. The same "
+    "command resumes."
+)
+
 
 def add(actions: argparse._SubParsersAction[Any]) -> None:
     """Add the commands to those of a parser."""
     _add_sweep(actions)
     _add_collect(actions)
+    fit = actions.add_parser("fit", help="fit constants of cases to measured values", description=FIT_HELP)
+    fit.add_argument("case", type=Path, metavar="FIT.toml", help="a case file with unknown and measured constants")
+    fit.add_argument("--out", type=folder, metavar="DIR", required=True, help="folder of the fit")
+    _add_case_options(fit, _fit)
+    scatter = actions.add_parser("uncertainty", help="pass scatter of numbers on to results", description=SCATTER_HELP)
+    scatter.add_argument("case", type=Path, metavar="CASE.toml", help="a case file with uncertain numbers")
+    scatter.add_argument("--out", type=folder, metavar="DIR", required=True, help="folder of the runs")
+    _add_case_options(scatter, _uncertainty)
 
 
-def add_case_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options of commands that run many cases."""
+def _add_case_options(parser: argparse.ArgumentParser, action: Action) -> None:
+    """Give a command that runs many cases its action and the options of all of them."""
+    parser.set_defaults(action=action)
     parser.add_argument("--retry", action="store_true", help="compute failed cases again")
     parser.add_argument(
         "--ranks-per-case",
@@ -48,12 +73,10 @@ def _add_sweep(actions: argparse._SubParsersAction[Any]) -> None:
     one = parser.add_mutually_exclusive_group()
     one.add_argument("--list", action="store_true", help="print the cases, with --out also their status; run none")
     one.add_argument("--index", type=int, metavar="K", help="run case K alone, counted from 1, as a job array does")
-    add_case_options(parser)
-    parser.set_defaults(action=_sweep)
+    _add_case_options(parser, _sweep)
 
 
 def _sweep(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    from feti_homog.parallel.mpi_errors import on_root, on_root_only
     from feti_homog.results import output_folder
     from feti_homog.sweep import execute, plan
 
@@ -66,8 +89,7 @@ def _sweep(arguments: argparse.Namespace, comm: Intracomm) -> None:
         return
     on_root(comm, output_folder.usable, arguments.out)
     if arguments.index is None:
-        group = comm.size if arguments.ranks_per_case is None else arguments.ranks_per_case
-        execute.run_all(sweep, arguments.out, comm, group, arguments.retry, arguments.quiet)
+        execute.run_all(sweep, arguments.out, comm, _group(arguments, comm), arguments.retry, arguments.quiet)
     else:
         execute.run_one(sweep, arguments.index, arguments.out, comm, arguments.retry, arguments.quiet)
 
@@ -81,8 +103,26 @@ def _add_collect(actions: argparse._SubParsersAction[Any]) -> None:
 
 
 def _collect(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    from feti_homog.parallel.mpi_errors import on_root_only
     from feti_homog.sweep import collect
 
     for line in on_root_only(comm, collect.collect, arguments.directory, not arguments.no_pictures) or []:
         say(line)
+
+
+def _fit(arguments: argparse.Namespace, comm: Intracomm) -> None:
+    from feti_homog.fit import description, execute
+
+    fit = on_root(comm, description.load, arguments.case)
+    execute.run(fit, arguments.out, comm, _group(arguments, comm), arguments.retry, arguments.quiet)
+
+
+def _uncertainty(arguments: argparse.Namespace, comm: Intracomm) -> None:
+    from feti_homog.fit import scatter
+
+    study = on_root(comm, scatter.load, arguments.case)
+    scatter.run(study, arguments.out, comm, _group(arguments, comm), arguments.retry, arguments.quiet)
+
+
+def _group(arguments: argparse.Namespace, comm: Intracomm) -> int:
+    """Return how many ranks run a case, by default all."""
+    return comm.size if arguments.ranks_per_case is None else arguments.ranks_per_case
