@@ -17,8 +17,7 @@ from mpi4py import MPI
 from scipy.linalg import eigh
 
 from feti_homog import Case, run
-from feti_homog.case.element_choice import LOCKING_POISSON
-from feti_homog.case.element_sizes import coarse_error
+from feti_homog.case.element_sizes import LOCKING_POISSON, coarse_error
 from feti_homog.typing import Float
 
 LADDERS = {1: range(4), 2: range(3)}  # refinements by the order of elements

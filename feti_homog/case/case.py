@@ -10,7 +10,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from feti_homog.case import element_choice, element_sizes
+from feti_homog.case import element_sizes
 from feti_homog.case.asked import AnalysisSection, Stiffness
 from feti_homog.case.cell_files import checked_cell
 from feti_homog.case.cell_section import GEOMETRY, Cell
@@ -126,14 +126,14 @@ class Case:
 
     def warnings(self) -> tuple[str, ...]:
         """List settings that are valid but probably unintended, a line each."""
-        of_elements = element_choice.warnings(self.cell, self.materials, self.analysis.plane)
+        of_elements = element_sizes.warnings(self.cell, self.materials, self.analysis.plane)
         contrast = contrast_warnings(self.materials, self.analysis.plane)
         return (*of_elements, *contrast, *idle_friction_keys(self.interfaces))
 
     def remarks(self) -> tuple[str, ...]:
         """List the assumptions about settings that are not given, a line each."""
         plane = self.analysis.plane
-        of_elements = element_choice.remarks(self.materials, plane)
+        of_elements = element_sizes.remarks(self.materials, plane)
         of_table = () if self.cell.table is None else self.cell.table.remarks
         return (*of_elements, *of_table, *stress_free(self.analysis.type, self.section.placed, plane))
 
@@ -279,7 +279,7 @@ def _sized_cell(table: Mapping[str, Any], sections: Mapping[str, Any], faults: l
     """Return the cell with the sizes of elements, and unless its table says it the order, that it asks for."""
     cell: Cell = sections["cell"]
     plane, free_faces = sections["analysis"].plane, bool(sections["interfaces"]) or cell.has_voids
-    orders = element_choice.orders(cell, table, sections["materials"], plane, faults)
+    orders = element_sizes.orders(cell, table, sections["materials"], plane, faults)
     return element_sizes.with_sizes(cell, sections["materials"], plane, free_faces, orders, faults)
 
 

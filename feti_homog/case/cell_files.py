@@ -12,10 +12,10 @@ from feti_homog.case.cell_section import TOUCHING, Cell, size_faults
 from feti_homog.case.fibre_table import FibreTable, read_table, table_of
 from feti_homog.case.mixed_cell import mix_faults
 from feti_homog.case.section_values import MESH_SUFFIXES, TABLE_SUFFIXES
-from feti_homog.case.table_shapes import check_shapes
 from feti_homog.errors import CaseError
-from feti_homog.fibres.outlines.shapes import given_shapes
+from feti_homog.fibres.outlines.shapes import BOTH_SIZES, SHAPES, given_shapes, have_both_sizes
 from feti_homog.schema.wording import limit_in_words, toml_value
+from feti_homog.typing import Bool
 
 SUFFIXES = {"mesh": MESH_SUFFIXES, "table": TABLE_SUFFIXES}
 LIST = "fibre_list"
@@ -141,3 +141,26 @@ def _size(name: str, asked: float | None, table: FibreTable, faults: list[str]) 
     elif None not in (asked, own) and asked != own:
         faults.append(f"[cell] {name} = {asked:g}: {table.name} says {own:g}; give one")
     return own if asked is None else asked
+
+
+# Inner / outer radius of hollow fibres.
+WIDEST_CORE = 0.05, 0.98
+HOLLOW_WORDS = f"expected inner_radius / radius from {WIDEST_CORE[0]:g} to {WIDEST_CORE[1]:g}, or 0"
+
+
+def check_shapes(table: FibreTable, faults: list[str]) -> None:
+    """Add the faults of shapes and of hollow fibres to `faults`."""
+    rows, before = table.columns, len(faults)
+    _tell(table, have_both_sizes(rows), BOTH_SIZES, faults)
+    for shape in SHAPES:
+        for are_faulty, words in shape.faults(rows):
+            _tell(table, are_faulty, words, faults)
+    if len(faults) > before:
+        return
+    hollow, inner = table.inner_radius > 0, table.inner_radius / table.radius
+    _tell(table, hollow & ((inner < WIDEST_CORE[0]) | (inner > WIDEST_CORE[1])), HOLLOW_WORDS, faults)
+    _tell(table, hollow & (table.coating > 0), "has an inner_radius and a coating; give one", faults)
+
+
+def _tell(table: FibreTable, are_faulty: Bool, words: str, faults: list[str]) -> None:
+    faults += [f"[cell] {table.name}: row {row}: {words}" for row in table.row[are_faulty].tolist()]

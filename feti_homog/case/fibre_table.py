@@ -11,10 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.case import table_text
 from feti_homog.case.phase_names import MATRIX, PHASE, VOID
 from feti_homog.case.section_values import FIBRE_CELLS, NUMBERS
-from feti_homog.case.table_columns import Column, are_units, misspelt, number_of, understood
+from feti_homog.case.table_columns import Column, are_units, lines_of, misspelt, number_of, understood
 from feti_homog.errors import CaseError
 from feti_homog.fibres.outlines.outlines import Columns, Outlines
 from feti_homog.fibres.outlines.shapes import REPLACING, outlines_of
@@ -119,7 +118,7 @@ def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
     name, faults = path.name, _Faults(path.name)
     sizes: dict[str, float] = {}
     lines = list[tuple[int, str]]()
-    for number, contents, comment in table_text.lines(path):
+    for number, contents, comment in lines_of(path):
         _read_sizes(comment, number, sizes, faults)
         if contents:
             lines.append((number, contents))

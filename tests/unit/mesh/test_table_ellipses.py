@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from feti_homog.case.cell_files import check_shapes
 from feti_homog.case.cell_section import Cell
 from feti_homog.case.fibre_table import table_of
-from feti_homog.case.table_shapes import check_shapes
 from feti_homog.errors import MeshError
 from feti_homog.fibres.arrange import arrange
 from feti_homog.fibres.outlines.ellipses import Ellipses, gaps
