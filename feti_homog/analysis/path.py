@@ -26,8 +26,7 @@ from feti_homog.interface.path.path_following import events, increments
 from feti_homog.interface.path.path_points import Energies, Point, unloaded
 from feti_homog.interface.path.sliding_increments import sliding_increments
 from feti_homog.interface.path.sliding_path import sliding_events
-from feti_homog.results.kept_points import kept
-from feti_homog.results.path_peak import marks, peak_of
+from feti_homog.results.landmarks import kept, marks, peak_of
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:

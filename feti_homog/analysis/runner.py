@@ -24,7 +24,6 @@ from feti_homog.parallel.mpi_errors import all_raise, on_root, on_root_only
 from feti_homog.petsc.options import case_options, refuse_unused
 from feti_homog.results import (
     csv_tables,
-    event_log,
     field_file,
     field_parts,
     output_folder,
@@ -32,8 +31,8 @@ from feti_homog.results import (
     xdmf,
 )
 from feti_homog.results.checkpoint import Checkpoint, EventsInMemory
-from feti_homog.results.event_log import EventLog
 from feti_homog.results.field_file import FieldFile
+from feti_homog.results.output_folder import EventLog
 from feti_homog.runtime import process_memory
 from feti_homog.runtime.environment import require_report
 from feti_homog.runtime.progress import Progress
@@ -156,7 +155,7 @@ def _run_and_write(
         states = StateRecorder(cell, file, keep_fields, progress.say)
         context = AnalysisContext.of(cell, progress, states, earlier)
         context = replace(context, checkpoint=_checkpoint(cell, directory), resume=resume)
-        context = replace(context, log=log.write, events=event_log.NAME)
+        context = replace(context, log=log.write, events=output_folder.LOG)
         _warn(context)
         analysis = _analyse(context)
         seal = states.seal()
@@ -215,7 +214,7 @@ def _write(result: Result, directory: Path, cell: TornCell) -> None:
         points = getattr(result, name)
         rows = points if isinstance(points, tuple) else (points,)
         written.add(on_root(cell.comm, csv_tables.write, directory / f"{name}.csv", rows).name)
-    written |= {event_log.NAME} if analysis.events else set()
+    written |= {output_folder.LOG} if analysis.events else set()
     on_root_only(cell.comm, output_folder.remove_other_results, directory, written)
 
 

@@ -1,4 +1,4 @@
-"""The folder that results go to: one run at a time writes there, and no file of others is replaced.
+"""The folder that results go to: one run at a time writes there, and no file of others is replaced; its events.log.
 
 A run knows its own files by their content, not by a marker beside them: a file of somebody else may come to a folder of
 results later, under one of their names.
@@ -14,19 +14,24 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
-
 from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.materials.voigt import SPATIAL_STRAINS
 from feti_homog.parallel.mpi_errors import on_root
-from feti_homog.results import atomic, checkpoint, event_log, field_file, result_json
+from feti_homog.results import atomic, checkpoint, field_file, result_json
 from feti_homog.results.field_layout import PROGRAM
 from feti_homog.runtime import input_files
 from feti_homog.runtime.file_locks import Lock, LockHeld, LocksUnsupported, holder
+from typing import TYPE_CHECKING, TextIO
+from feti_homog.errors import FetiHomogError
+from feti_homog.results import atomic
+from feti_homog.version import __version__
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
 
 LOCK = "result.lock"
+LOG = "events.log"  # a line an event of a path, there to be followed while the path goes on
+LOG_HEADER = "# feti-homog: events"  # the beginning of the first line, by which a log is known as one of this program
 LONGEST = "case_minus_temperature.png"  # of a run's files the one of the longest name
 # The files of a result, those of all analyses and of what `plot` and `fields` make.
 RESULT_FILE = re.compile(
@@ -37,7 +42,7 @@ RESULT_FILE = re.compile(
     rf"|case_(minus_)?({'|'.join(SPATIAL_STRAINS)}|temperature)\.png|state_\d+\.png"
 )
 # Of these those that show that a run has written to the folder.
-SIGNS = (result_json.NAME, field_file.NAME, event_log.NAME, LOCK)
+SIGNS = (result_json.NAME, field_file.NAME, LOG, LOCK)
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 HEAD = 1 << 20  # bytes of result.h5 in which its attributes are
 
@@ -112,7 +117,7 @@ def _is_own(path: Path) -> bool:
         head = stream.read(HEAD)
     if path.name == field_file.NAME:
         return head.startswith(HDF5_SIGNATURE) and PROGRAM.encode() in head
-    return path.name != event_log.NAME or head.startswith(event_log.HEADER.encode())
+    return path.name != LOG or head.startswith(LOG_HEADER.encode())
 
 
 @contextmanager
@@ -194,3 +199,36 @@ def _remove_empty(folders: list[Path]) -> None:
 
 def _busy(directory: Path, who: str) -> CaseError:
     return CaseError(f"--out {directory}: another run writes its results there: {who}; choose another folder or wait")
+
+
+class EventLog:
+    """The log in `directory`, written by rank 0 from the first line on; an earlier one is replaced.
+
+    If it cannot be written `say` is told so once, and the path goes on without it: the log holds no results.
+    """
+
+    def __init__(self, directory: Path, comm: Intracomm, title: str, say: Callable[[str], object]) -> None:
+        self.path, self._title, self._say = directory / LOG, title, say
+        self._wanted = comm.rank == 0
+        self._stream: TextIO | None = None
+
+    def write(self, line: str) -> None:
+        """Add a line."""
+        if not self._wanted:
+            return
+        try:
+            with atomic.write_errors(self.path):
+                if self._stream is None:
+                    self._stream = self.path.open("w", encoding="utf-8", buffering=1)  # whole lines
+                    print(f"{LOG_HEADER} of {self._title}, version {__version__}", file=self._stream)
+                print(line.strip(), file=self._stream)
+        except FetiHomogError as error:
+            self._say(f"warning: {error}; the path goes on without it")
+            self.close()
+
+    def close(self) -> None:
+        """No more lines."""
+        self._wanted = False
+        if self._stream is not None:
+            with contextlib.suppress(OSError):  # every line was written when it was given
+                self._stream.close()

@@ -26,8 +26,8 @@ from feti_homog.report.plots.plot_helpers import drawn_stress, stress_component,
 from feti_homog.report.text.analyses import reported
 from feti_homog.report.text.summary import answers, checks, title_of
 from feti_homog.results import atomic, field_file, output_folder, result_json
+from feti_homog.results.landmarks import marks
 from feti_homog.results.path_curves import FAINT, components_above
-from feti_homog.results.path_peak import marks
 from feti_homog.typing import Document
 from feti_homog.version import __version__
 

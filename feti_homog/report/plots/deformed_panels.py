@@ -36,8 +36,8 @@ from feti_homog.report.plots.plot_helpers import (
     stress_label,
 )
 from feti_homog.report.text.analyses import reported
-from feti_homog.results import atomic, field_file, kept_points
-from feti_homog.results.path_peak import marks
+from feti_homog.results import atomic, field_file, landmarks
+from feti_homog.results.landmarks import marks
 from feti_homog.typing import Array, Document
 
 MAX_PANELS = 6
@@ -165,9 +165,9 @@ def _angle(directory: Path, file: Any, document: Document, count: int) -> list[P
 
 def _path(directory: Path, file: Any, document: Document, count: int) -> list[Path]:
     scale = shown_scale(file, document)
-    panels = _side_by_side(file, kept_points.landmark_states(document, MAX_PANELS, count), document, scale)
+    panels = _side_by_side(file, landmarks.landmark_states(document, MAX_PANELS, count), document, scale)
     paths = [save(panels, directory / "path_states.png")]
-    frames = kept_points.chosen_states(document, MAX_FRAMES, count)
+    frames = landmarks.chosen_states(document, MAX_FRAMES, count)
     return [*paths, _animation(file, frames, document, scale, directory / "path.gif")]
 
 

@@ -25,8 +25,8 @@ from feti_homog.report.plots.plot_helpers import (
     title_of,
     unit_label,
 )
-from feti_homog.results import kept_points, path_curves
-from feti_homog.results.path_peak import peak_of
+from feti_homog.results import landmarks, path_curves
+from feti_homog.results.landmarks import peak_of
 from feti_homog.typing import Array, Document
 
 NUMBERED_POINTS = 6  # of a path
@@ -76,8 +76,8 @@ def figure(document: Document) -> Figure:
     _count_curves(lower, points, style)
     lower.set_xlabel("number of the point, in the order of the path")
     # The panels of path_states.png show the same points.
-    kept = kept_points.kept_points(document)
-    numbers = [kept[state] for state in kept_points.landmark_states(document, NUMBERED_POINTS, len(kept))]
+    kept = landmarks.kept_points(document)
+    numbers = [kept[state] for state in landmarks.landmark_states(document, NUMBERED_POINTS, len(kept))]
     curve = np.stack([strain, stress[:, component]], axis=1)
     _mark_peak(upper, document, INK[component])
     for axes in (upper, middle, lower):

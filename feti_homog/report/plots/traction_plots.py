@@ -27,7 +27,7 @@ from feti_homog.report.plots.interface_marks import (
 from feti_homog.report.plots.load_labels import LoadLabels
 from feti_homog.report.plots.plot_helpers import save, stress_label, unit_label
 from feti_homog.report.text.analyses import reported
-from feti_homog.results.path_peak import peak_of
+from feti_homog.results.landmarks import peak_of
 from feti_homog.typing import Array, Document
 
 DEGREES = (-180.0, 180.0)

@@ -14,7 +14,7 @@ from feti_homog.materials.plane_state import plane_state_of
 from feti_homog.report.text import material_axes, point_tables, sensitivity_tables, stiffness_tables
 from feti_homog.report.text.path_table import path_table, peak_table
 from feti_homog.report.text.table import Table
-from feti_homog.results.kept_points import chosen, chosen_states
+from feti_homog.results.landmarks import chosen, chosen_states
 from feti_homog.typing import Document
 
 

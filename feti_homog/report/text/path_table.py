@@ -13,8 +13,7 @@ from feti_homog.materials.voigt import voigt_names
 from feti_homog.report.text.point_tables import COUNTS, WIDTH, columns_without_noise, counts, debonded, energies
 from feti_homog.report.text.table import Column, Table, without_noise
 from feti_homog.results import path_curves
-from feti_homog.results.kept_points import chosen
-from feti_homog.results.path_peak import peak_of
+from feti_homog.results.landmarks import chosen, peak_of
 from feti_homog.typing import Document
 
 ROWS = 15  # of the table

@@ -10,7 +10,7 @@ import numpy as np
 from feti_homog.materials.plane_state import GENERALIZED, PLANE_STRAIN
 from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, STRESSES, voigt_names
 from feti_homog.report.text import point_tables
-from feti_homog.results.path_peak import peak_of
+from feti_homog.results.landmarks import peak_of
 
 Document = Mapping[str, Any]
 
