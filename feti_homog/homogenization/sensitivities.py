@@ -10,7 +10,7 @@ the integrals alone, once per phase.  With faces in contact the cell is linear a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,9 +27,7 @@ from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.materials.derivatives import law_changes
 from feti_homog.parallel.distributed_arrays import allreduce_sum
-from feti_homog.typing import Float
-
-GROWTH = 1e-5  # of radii
+from feti_homog.typing import Float, Int32
 
 
 @dataclass(frozen=True)
@@ -50,104 +48,137 @@ class Derivative:
 def derivatives(cells: Sequence[TornCell], responses: Sequence[Sequence[Response]]) -> list[Derivative]:
     """Return the derivatives by all constants, from the responses of each problem to its unit loads.  Collective."""
     case, area = cells[0].case, cells[0].summary.area
-    grams = [_grams(cell, own) for cell, own in zip(cells, responses, strict=True)]
+    integrals = [_integrals(cell, own) for cell, own in zip(cells, responses, strict=True)]
+    found = [*_by_phases(cells[0], [grams for grams, _ in integrals])]
     springs = [_stretched_springs(cell, own) for cell, own in zip(cells, responses, strict=True)]
-    found = list[Derivative]()
-    for phase in grams[0]:
-        for change in law_changes(case.materials[phase], case.analysis.plane):
-            if change.name.startswith("expansion") and "temperature" not in cells[0].solver.problem.loads:
-                continue
-            laws = phase_laws.law_derivatives(case, phase, change)
-            pairs = zip(laws, (own[phase] for own in grams), strict=True)
-            energies = tuple(np.einsum("ab,aibj->ij", dA, gram) / area for dA, gram in pairs)
-            found.append(Derivative(f"material.{phase}.{change.name}", change.value, energies))
     for name, value, places in _spring_constants(case):
         energies = tuple(
             sum((own[place] for place in here), np.zeros(own.shape[2:])) / (value * area)
             for own, here in zip(springs, places, strict=False)
         )
         found.append(Derivative(name, value, energies))
-    return [*found, *_by_fraction(cells, responses)]
+    for f in shape_derivative.fractions(case):
+        found.append(Derivative("cell.fibre_fraction", f, tuple(growth / (2 * f * area) for _, growth in integrals)))
+    return found
 
 
-def _by_fraction(cells: Sequence[TornCell], responses: Sequence[Sequence[Response]]) -> Iterator[Derivative]:
-    """Yield the derivative by the fraction of a pattern of equal fibres, whose nodes move.  Collective."""
-    laws: tuple[Callable[[Case, str], Float], ...] = (phase_laws.plane_law, phase_laws.axial_law)
-    for f in shape_derivative.fractions(cells[0].case):
-        triples = zip(cells, responses, laws, strict=False)
-        changes = [_change(cell, own, law) / (2 * f * cell.summary.area) for cell, own, law in triples]
-        yield Derivative("cell.fibre_fraction", f, tuple(changes))
+def _by_phases(cell: TornCell, grams: Sequence[Mapping[str, Float]]) -> Iterator[Derivative]:
+    """Yield the derivatives by the constants of phases, from the integrals of each problem."""
+    case, is_heated = cell.case, "temperature" in cell.solver.problem.loads
+    for phase in grams[0]:
+        for change in law_changes(case.materials[phase], case.analysis.plane):
+            if is_heated or not change.name.startswith("expansion"):
+                pairs = zip(phase_laws.law_derivatives(case, phase, change), (own[phase] for own in grams), strict=True)
+                energies = tuple(np.einsum("ab,aibj->ij", dA, gram) / cell.summary.area for dA, gram in pairs)
+                yield Derivative(f"material.{phase}.{change.name}", change.value, energies)
 
 
-def _change(cell: TornCell, responses: Sequence[Response], law: Callable[[Case, str], Float]) -> Float:
-    """(k, k) derivative of the energies of unit loads by ln R of all fibres.  Collective."""
-    above, below = (_grams(cell, responses, growth) for growth in (GROWTH, -GROWTH))
-    parts = [np.einsum("ab,aibj->ij", law(cell.case, phase), above[phase] - below[phase]) for phase in above]
-    return np.asarray(np.sum(parts, axis=0) / (2 * GROWTH))
+def _integrals(cell: TornCell, responses: Sequence[Response]) -> tuple[dict[str, Float], Float]:
+    """(v, k, v, k) int e_i (x) e_j over the bodies of each material under k unit loads, and what growing fibres change.
 
-
-def _grams(cell: TornCell, responses: Sequence[Response], growth: float = 0.0) -> dict[str, Float]:
-    """(v, k, v, k) int e_i (x) e_j over the bodies of each material under k unit loads, where fibres grow.
-
-    Collective.
+    The latter, (k, k), is the derivative of the energies by ln R of all fibres, if the case has that.  Collective.
     """
     problem, loads = cell.solver.problem, np.stack([response.strain for response in responses], axis=1)
-    u = np.stack([r.scale * cell.solver.displacement(r.state.solution) for r in responses], axis=1)
+    boundary = np.stack([response.u for response in responses], axis=1)
     m, (v, k) = problem.strains, loads.shape
     # Of [strains of displacements, 1], whose products are summed, to [those strains, the other loads].
     whole = np.zeros((m * k + 1, v * k))
     whole[: m * k, : m * k], whole[-1, m * k :] = np.eye(m * k), loads[m:].ravel()
     materials = dict.fromkeys(provider(phase, cell.case.materials) for phase in cell.summary.phases)
     sums = {material: np.zeros((m * k + 1,) * 2) for material in materials}
-    for s, offset in zip(cell.subdomains, cell.offsets, strict=False):
-        own = u[offset : offset + s.n_dofs].reshape(-1, problem.components, k)
-        points = s.mesh.points
-        points = points + growth * shape_derivative.velocity(points, cell.summary) if growth else points
-        sums[provider(s.submesh.phase, cell.case.materials)] += _products(s, points, own, loads[:m])
-    return {name: (whole.T @ allreduce_sum(cell.comm, own) @ whole).reshape(v, k, v, k) for name, own in sums.items()}
+    grows, growth = any(shape_derivative.fractions(cell.case)), np.zeros((k, k))
+    for place, s in enumerate(cell.subdomains):
+        u = cell.solver.extended(place, boundary, loads).reshape(-1, problem.components, k)
+        V = shape_derivative.velocity(s.mesh.points, cell.summary) if grows else None
+        for first in range(0, len(s.mesh.triangles), ELEMENTS_AT_ONCE):
+            nodes = s.mesh.triangles[first : first + ELEMENTS_AT_ONCE]
+            fields = _Fields.of(s, nodes, u[s.mesh.node_class[nodes]], loads[:m])
+            sums[provider(s.submesh.phase, cell.case.materials)] += fields.products()
+            if V is not None:
+                growth += fields.change(problem, s.L, V[nodes], loads[m:])
+    grams = {name: whole.T @ allreduce_sum(cell.comm, own) @ whole for name, own in sums.items()}
+    return {name: own.reshape(v, k, v, k) for name, own in grams.items()}, allreduce_sum(cell.comm, growth)
 
 
-def _products(subdomain: Subdomain, places: Float, u: Float, loads: Float) -> Float:
-    """(mk + 1, mk + 1) int f f^T, f the strains of displacements u (n, c, k) at places (n, 2), and the loads (m, k).
+@dataclass(frozen=True)
+class _Fields:
+    """Fields of e elements at q points under k loads.
 
-    In mixed elements the energy is stationary for the bubble too, and the pressure lambda Pi div u: the products of 11
-    and 22 are such that an isotropic dA has d lambda (Pi div u)^2.
+    In mixed elements the energy is stationary for the bubble too, and with the pressure lambda Pi div u it has
+    -lambda r^2 beside that of the strains, r = div u - Pi div u.
+
+    Attributes:
+        gradients, weights: (e, q, a, 2) of the shape functions of the nodes, and (e, q).
+        slopes: (e, q, 2, c, k) du_i / dx_d.
+        strain: (e, q, m, k) with the loads.
+        rest: (e, q, k) r; None in other elements.
     """
-    problem, mesh = subdomain.problem, subdomain.mesh
-    m, k = loads.shape
-    found = np.zeros((m * k + 1,) * 2)
-    for first in range(0, len(mesh.triangles), ELEMENTS_AT_ONCE):
-        nodes = mesh.triangles[first : first + ELEMENTS_AT_ONCE]
-        points, own = places[nodes], u[mesh.node_class[nodes]]
-        if subdomain.is_mixed:
-            elements = bubble.Elements.of(points, subdomain.L)
-            own, w = elements.with_bubble(own), elements.weights
-            strain = elements.strain(own) + loads
-            dilatations = strain[:, :, 0] + strain[:, :, 1], elements.dilatation(own) + loads[0] + loads[1]
-            change = sum(sign * _gram(of, w) for sign, of in zip((-0.5, 0.5), dilatations, strict=True))
-            found[:k, k : 2 * k] += change
-            found[k : 2 * k, :k] += change
-        else:
-            g, w = gradients(points)
-            strain = _strains(g, own, problem) + loads
-        ones = np.ones((*w.shape, 1))
-        found += _gram(np.concatenate([strain.reshape(*w.shape, -1), ones], axis=2), w)
-    return found
+
+    gradients: Float
+    weights: Float
+    slopes: Float
+    strain: Float
+    rest: Float | None
+
+    @classmethod
+    def of(cls, s: Subdomain, nodes: Int32, u: Float, loads: Float) -> _Fields:
+        """Fields of elements of nodes (e, a) and displacements u (e, a, c, k) under the loads (m, k)."""
+        points, (_, a, c, k) = s.mesh.points[nodes], u.shape
+        elements = bubble.Elements.of(points, s.L) if s.is_mixed else None
+        g, w = gradients(points) if elements is None else (elements.gradients, elements.weights)
+        u = u if elements is None else elements.with_bubble(u)
+        slopes = g.transpose(0, 1, 3, 2).reshape(len(g), -1, g.shape[2]) @ u.reshape(*u.shape[:2], -1)
+        slopes = slopes.reshape(*w.shape, 2, c, k)
+        strain = _strains(slopes, s.problem)
+        rest = None if elements is None else strain[:, :, 0] + strain[:, :, 1] - elements.dilatation(u)
+        return cls(g[:, :, :a], w, slopes, strain + loads, rest)
+
+    def products(self) -> Float:
+        """(mk + 1, mk + 1) int f f^T of the strains and 1.
+
+        Products of 11 and 22 are such that those with an isotropic dA have -d lambda r^2.
+        """
+        *points, _, k = self.strain.shape
+        found = _gram(np.concatenate([self.strain.reshape(*points, -1), np.ones((*points, 1))], axis=2), self.weights)
+        if self.rest is not None:
+            change = _gram(self.rest, self.weights) / 2
+            found[:k, k : 2 * k] -= change
+            found[k : 2 * k, :k] -= change
+        return found
+
+    def change(self, problem: Problem, A: Float, V: Float, others: Float) -> Float:
+        """(k, k) derivative of int e_i A e_j where the nodes (e, a, 2) move by s V, at fixed displacements.
+
+        That is int (de_i + div V e_i / 2) A e_j and its transpose, d grad u = -grad V grad u; `others` (v - m, k) are
+        loads behind.
+        """
+        (e, q, _, c, k), m = self.slopes.shape, problem.strains
+        grad_V = self.gradients.transpose(0, 1, 3, 2) @ V[:, None]
+        div_V = np.trace(grad_V, axis1=2, axis2=3)[..., None, None]
+        moved = -grad_V @ self.slopes.reshape(e, q, 2, c * k)
+        moved = _strains(moved.reshape(self.slopes.shape), problem)
+        behind = np.broadcast_to(others, (e, q, *others.shape))
+        strain = np.concatenate([self.strain, behind], axis=2)
+        work = self.weights[..., None, None] * (A @ strain)
+        half = div_V / 2 * strain
+        half[:, :, :m] += moved
+        found = np.tensordot(half, work, ((0, 1, 2), (0, 1, 2)))
+        if self.rest is not None:
+            half = moved[:, :, 0] + moved[:, :, 1] + div_V[..., 0] / 2 * self.rest
+            found -= A[0, 1] * np.tensordot(half, self.weights[..., None] * self.rest, ((0, 1), (0, 1)))
+        return np.asarray(found + found.T)
 
 
-def _strains(g: Float, u: Float, problem: Problem) -> Float:
-    """(e, q, m, k) strains of displacements u (e, a, c, k) by the gradients g (e, q, a, 2)."""
-    e, q, a, _ = g.shape
-    slopes = g.transpose(0, 1, 3, 2).reshape(e, 2 * q, a) @ u.reshape(e, a, -1)
-    slopes = slopes.reshape(e, q, 2, *u.shape[2:])
-    strain = np.zeros((e, q, problem.strains, u.shape[3]))
+def _strains(slopes: Float, problem: Problem) -> Float:
+    """(e, q, m, k) strains of the slopes (e, q, 2, c, k)."""
+    strain = np.zeros((*slopes.shape[:2], problem.strains, slopes.shape[4]))
     for (i, d), number in np.ndenumerate(problem.voigt):
         strain[:, :, number] += slopes[:, :, d, i]
     return strain
 
 
 def _gram(fields: Float, weights: Float) -> Float:
-    """(n, n) int f f^T of fields (e, q, ...) of n numbers."""
+    """(n, n) int f f^T of fields (e, q, n)."""
     flat = fields.reshape(weights.size, -1)
     return np.asarray(flat.T @ (weights.reshape(-1, 1) * flat))
 
