@@ -16,8 +16,8 @@ from feti_homog.errors import CaseError
 from feti_homog.fibres.arrange import arrange
 from feti_homog.fibres.outlines.ellipses import Ellipses
 from feti_homog.fibres.outlines.shapes import columns_without_tips, elliptic
+from feti_homog.mesh.coarse_mesh import voids
 from feti_homog.mesh.fill.gmsh_mesher import arrangement_scale
-from feti_homog.mesh.interface_edges import voids
 from feti_homog.mesh.mesh_fibres import coating_thickness, fibre_circles, fibre_frames, fibre_numbers
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.readers.msh_reader import read_cell

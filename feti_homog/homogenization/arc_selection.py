@@ -13,7 +13,7 @@ from feti_homog.case.interface_section import Arc, InterfaceSection, interface_l
 from feti_homog.case.phase_names import COATING, MATRIX
 from feti_homog.interface.tips import debonded_arcs
 from feti_homog.interface.tips.debonded_arcs import MovedTips
-from feti_homog.mesh.outline.circle_arcs import MERGED
+from feti_homog.mesh.outline.outline import MERGED
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.mesh.sizes.element_estimate import ElementEstimate, ratio_at_a_tip

@@ -21,8 +21,7 @@ from feti_homog.homogenization.partition_policy import (
 )
 from feti_homog.interface.tips import debonded_arcs
 from feti_homog.interface.tips.debonded_arcs import MovedTips
-from feti_homog.mesh.coarse_mesh import CoarseMesh
-from feti_homog.mesh.interface_edges import voids
+from feti_homog.mesh.coarse_mesh import CoarseMesh, voids
 from feti_homog.mesh.mesh_fibres import coating_thickness, fibre_circles, fibre_frames, fibre_numbers
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.refinement import ReferenceLattice

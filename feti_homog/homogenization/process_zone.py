@@ -11,8 +11,7 @@ from feti_homog.case.interface_section import InterfaceSection, interface_label
 from feti_homog.homogenization.bonds import bond_law, has_process_zone, has_softening
 from feti_homog.materials.bounds import engineering_moduli
 from feti_homog.materials.laws import plane_stiffness
-from feti_homog.mesh.coarse_mesh import CoarseMesh
-from feti_homog.mesh.interface_edges import interface_edges
+from feti_homog.mesh.coarse_mesh import CoarseMesh, interface_edges
 
 # Largest element on an interface / length of the process zone. With 0.54 of it the stresses of the square cell of
 # tests/parallel/test_energy.py are within 1.4 % of those with elements a quarter as long, with 1.1 of it within 4.3 %.

@@ -123,6 +123,11 @@ def directions(angle: Float) -> Float:
     return np.stack([np.cos(angle), np.sin(angle)], axis=-1)
 
 
+def on_circle(circles: Float, angle: Float) -> Float:
+    """Points (..., 2) on circles (..., 3), centre and radius, at angles in radians."""
+    return np.asarray(circles[..., :2] + circles[..., 2:] * directions(angle))
+
+
 def widest(vector: Float, gap: Callable[[Float], Float]) -> tuple[Float, Float]:
     """Return the largest gap (k,) of pairs and its direction (k,) in radians.
 

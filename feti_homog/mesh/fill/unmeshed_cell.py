@@ -13,7 +13,7 @@ from feti_homog.case.phase_names import VOID
 from feti_homog.fibres.arrangement import Arrangement
 from feti_homog.mesh.coarse_mesh import CoarseMesh, representatives
 from feti_homog.mesh.outline.bare_outline import BareOutline, LineStations
-from feti_homog.mesh.outline.edge_samples import IN_TILES
+from feti_homog.mesh.outline.lines import IN_TILES
 from feti_homog.mesh.outline.outline import Outline
 from feti_homog.mesh.sizes.graded_size import MeshSizes
 from feti_homog.mesh.tiles.filling import Filling, Tile, arc_edges, fill

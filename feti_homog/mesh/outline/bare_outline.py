@@ -12,12 +12,22 @@ from scipy.spatial import cKDTree
 
 from feti_homog.fibres.arrangement import Arrangement
 from feti_homog.fibres.outlines.ellipses import Ellipses
-from feti_homog.mesh.lines import Arcs, Segments, on_circle, on_circles
+from feti_homog.fibres.outlines.outlines import on_circle
 from feti_homog.mesh.outline.bridges import Bridges, OnCircles
-from feti_homog.mesh.outline.circle_arcs import SAME_PLACE, arcs_within, marked, vertex_angles
 from feti_homog.mesh.outline.curves import MATRIX, Curves, Numbering
-from feti_homog.mesh.outline.edge_samples import WHOLE, EdgeSamples, Sampling, Stations
-from feti_homog.mesh.outline.outline import Outline, crossings, disc_at, images, on_side, side_curves
+from feti_homog.mesh.outline.lines import WHOLE, Arcs, EdgeSamples, Sampling, Segments, Stations
+from feti_homog.mesh.outline.outline import (
+    SAME_PLACE,
+    Outline,
+    arcs_within,
+    crossings,
+    disc_at,
+    images,
+    marked,
+    on_side,
+    side_curves,
+    vertex_angles,
+)
 from feti_homog.mesh.sizes.graded_size import MeshSizes, SizeField, circle_size, size_field
 from feti_homog.parallel.dividing import even
 from feti_homog.typing import Bool, Float, Int
@@ -172,8 +182,8 @@ def _arcs(
 
     Points on the border, near its points (b, 2), are left out.
     """
-    arcs = arcs_within(len(circles), *vertices, partial(on_circles, circles), size)
-    ends, same = on_circles(circles, *arcs[:2]), SAME_PLACE * size.max()
+    arcs = arcs_within(len(circles), *vertices, lambda of, angle: on_circle(circles[of], angle), size)
+    ends, same = on_circle(circles[arcs[0]], arcs[1]), SAME_PLACE * size.max()
     away = np.all((ends > same) & (ends < size - same), axis=1)
     beside = np.flatnonzero(~away)
     away[beside] = cKDTree(border).query(ends[beside])[0] > same
@@ -192,7 +202,7 @@ def _segments(circles: Float, bridges: Bridges, caps: Float, field: SizeField) -
     Where elements are not graded, edges are no longer than the sizes at both ends, interpolated: so gmsh does it across
     the matrix.
     """
-    begin, end = (on_circles(circles, bridges.ends[:, k], bridges.angle + k * np.pi) for k in (0, 1))
+    begin, end = (on_circle(circles[bridges.ends[:, k]], bridges.angle + k * np.pi) for k in (0, 1))
     longest = np.full((len(begin), 2), field.base.largest)
     if field.graded is None:
         longest = np.stack(

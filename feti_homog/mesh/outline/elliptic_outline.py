@@ -14,10 +14,9 @@ from feti_homog.fibres.arrangement import Arrangement
 from feti_homog.fibres.outlines.ellipses import Ellipses
 from feti_homog.fibres.outlines.outlines import directions
 from feti_homog.mesh.outline.bridges import TURN
-from feti_homog.mesh.outline.circle_arcs import MERGED, SAME_PLACE, arcs_within, marked
 from feti_homog.mesh.outline.curves import MATRIX, Curves, Numbering
-from feti_homog.mesh.outline.edge_samples import WHOLE, EdgeSamples
-from feti_homog.mesh.outline.outline import Outline, on_side, side_curves
+from feti_homog.mesh.outline.lines import WHOLE, EdgeSamples
+from feti_homog.mesh.outline.outline import MERGED, SAME_PLACE, Outline, arcs_within, marked, on_side, side_curves
 from feti_homog.mesh.sizes.element_estimate import refuse_many
 from feti_homog.mesh.sizes.elliptic_size import size_field
 from feti_homog.mesh.sizes.graded_size import MeshSizes

@@ -9,8 +9,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from feti_homog.fibres.outlines.ellipses import Ellipses
-from feti_homog.mesh.coarse_mesh import CoarseMesh, edge_keys, flip_double_arcs
-from feti_homog.mesh.interface_edges import interface_edges
+from feti_homog.mesh.coarse_mesh import CoarseMesh, edge_keys, flip_double_arcs, interface_edges
 from feti_homog.mesh.middle_nodes import MiddleNodes
 from feti_homog.mesh.readers.mesh_checks import SAME_PLACE, RawMesh, at, first_of
 from feti_homog.typing import Bool, Float, Int32

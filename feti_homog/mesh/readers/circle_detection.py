@@ -9,8 +9,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components, depth_first_order
 
 from feti_homog.fibres.outlines.ellipses import Ellipses
-from feti_homog.mesh.coarse_mesh import CoarseMesh, double_arcs, edge_keys, edges, flip_double_arcs
-from feti_homog.mesh.interface_edges import interface_edges
+from feti_homog.mesh.coarse_mesh import CoarseMesh, double_arcs, edge_keys, edges, flip_double_arcs, interface_edges
 from feti_homog.mesh.middle_nodes import MiddleNodes
 from feti_homog.typing import Bool, Float, Int, Int32
 

@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from feti_homog.fibres.outlines.ellipses import Ellipses
-from feti_homog.mesh.coarse_mesh import CoarseMesh, edge_keys, flip_double_arcs
-from feti_homog.mesh.interface_edges import interface_edges
+from feti_homog.mesh.coarse_mesh import CoarseMesh, edge_keys, flip_double_arcs, interface_edges
 from feti_homog.mesh.middle_nodes import MiddleNodes
 from feti_homog.mesh.readers.circle_detection import (
     MIN_CIRCLE_EDGES,

@@ -12,8 +12,7 @@ import numpy as np
 from feti_homog.case.cell_section import Cell
 from feti_homog.errors import MeshError, escaped
 from feti_homog.fibres.outlines.ellipses import Ellipses
-from feti_homog.mesh.coarse_mesh import CoarseMesh, areas, paired_sides, representatives
-from feti_homog.mesh.interface_edges import can_debond
+from feti_homog.mesh.coarse_mesh import CoarseMesh, areas, can_debond, paired_sides, representatives
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.readers import abaqus_file, bent_edges, gmsh_file, mesh_checks, other_cells, void_checks, vtk_file
 from feti_homog.mesh.readers.bent_edges import with_bent_edges

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from feti_homog.mesh.coarse_mesh import CoarseMesh, areas, edge_keys, edges
-from feti_homog.mesh.interface_edges import void_edges
+from feti_homog.mesh.coarse_mesh import CoarseMesh, areas, edge_keys, edges, void_edges
 from feti_homog.mesh.periodic_topology import Torus, components, edge_pairs
 from feti_homog.mesh.readers.mesh_checks import SIDES, RawMesh, first_of
 from feti_homog.typing import Bool, Int32

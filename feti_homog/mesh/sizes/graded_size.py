@@ -10,8 +10,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from feti_homog.fibres.arrangement import Arrangement
+from feti_homog.fibres.outlines.outlines import on_circle
 from feti_homog.fibres.torus_pairs import neighbours
-from feti_homog.mesh.lines import on_circles
 from feti_homog.mesh.sizes.from_sources import MAX_GROWTH, Source, SourcedSize, wrap
 from feti_homog.typing import Bool, Float, Int
 
@@ -258,7 +258,7 @@ class _FromLines:
         disc = np.repeat(np.arange(len(counts)), counts)
         angle = 2 * np.pi * (np.arange(len(disc)) - np.repeat(np.cumsum(counts) - counts, counts)) / counts[disc]
         circles = np.column_stack([arrangement.centres, radii])
-        spokes = cKDTree(wrap(on_circles(circles, disc, angle), size), boxsize=size)
+        spokes = cKDTree(wrap(on_circle(circles[disc], angle), size), boxsize=size)
         near_tips = cKDTree(wrap(tips.reshape(-1, 2), size), boxsize=size)
         return cls(size, circles, caps, sizes.tip, near_tips, spokes, disc)
 

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from feti_homog.mesh.lines import on_circles
+from feti_homog.fibres.outlines.outlines import on_circle
 from feti_homog.mesh.outline.bridges import TURN, Bridges, CentreLines
 from feti_homog.typing import Float, Int
 
@@ -124,9 +124,8 @@ def matrix_tiles(
     nodes, starts = sides
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]) * size
     centres = np.concatenate([circles[:, :2], corners])
-    facing = np.stack(
-        [on_circles(circles, bridges.ends[:, end], bridges.angle + end * np.pi) for end in (0, 1)], axis=1
-    )
+    ends = [on_circle(circles[bridges.ends[:, end]], bridges.angle + end * np.pi) for end in (0, 1)]
+    facing = np.stack(ends, axis=1)
     half = HalfLines.of(np.concatenate([nodes, bridges.ends]), centres, np.concatenate([starts, facing]))
     after, loop = half.faces()
     lone = np.setdiff1d(outer, half.node)

@@ -11,9 +11,8 @@ import tomli_w
 from feti_homog.case import case as cases
 from feti_homog.commands import listed_fibres
 from feti_homog.errors import CaseError
-from feti_homog.mesh.coarse_mesh import areas
+from feti_homog.mesh.coarse_mesh import areas, voids
 from feti_homog.mesh.fill.gmsh_mesher import generate
-from feti_homog.mesh.interface_edges import voids
 from feti_homog.mesh.mesh_fibres import fibre_circles
 from feti_homog.mesh.periodic_topology import Torus
 

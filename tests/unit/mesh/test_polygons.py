@@ -18,10 +18,9 @@ from feti_homog.fibres.arrange import arrange
 from feti_homog.fibres.arrangement import Arrangement
 from feti_homog.fibres.outlines.convex_sums import ConvexSums
 from feti_homog.fibres.outlines.shapes import outlines_of
-from feti_homog.mesh.coarse_mesh import areas
+from feti_homog.mesh.coarse_mesh import areas, voids
 from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.mesh.fill.shape_mesher import mesh_outlines
-from feti_homog.mesh.interface_edges import voids
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.sizes.graded_size import MeshSizes
 

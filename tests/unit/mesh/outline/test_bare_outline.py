@@ -12,7 +12,7 @@ from support.tiled_cells import CELLS, SMALL
 from feti_homog.errors import MeshError
 from feti_homog.mesh.fill.gmsh_mesher import begin
 from feti_homog.mesh.outline.bare_outline import LineStations
-from feti_homog.mesh.outline.edge_samples import Stations
+from feti_homog.mesh.outline.lines import Stations
 
 
 def bare_of(name):
