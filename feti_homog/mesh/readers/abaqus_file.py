@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from feti_homog.errors import MeshError
-from feti_homog.mesh.readers.abaqus_words import blocks, integer, name_of, real
-from feti_homog.mesh.readers.element_blocks import Block, assembled
-from feti_homog.mesh.readers.mesh_checks import RawMesh
+from feti_homog.mesh.readers.raw_mesh import Block, RawMesh, assembled
 from feti_homog.runtime import input_files
 from feti_homog.schema.wording import toml_value
 from feti_homog.typing import Int
@@ -52,7 +50,6 @@ class _Content:
     triangles: dict[int, list[int]] = field(default_factory=dict)
     lines: dict[int, list[int]] = field(default_factory=dict)
     sets: dict[tuple[int, str], set[int]] = field(default_factory=dict)
-    sections: list[str] = field(default_factory=list)
     materials: dict[str, str] = field(default_factory=dict)
     parts: int = 0
     instances: int = 0
@@ -80,7 +77,7 @@ def load(path: Path) -> RawMesh:
     """
     text = input_files.read(path).decode("utf-8", "replace")
     content = _Content(left=max(MOST_MEMBERS, len(text)))
-    for number, words, rows in blocks(text):
+    for number, words, rows in _blocks(text):
         try:
             _take(content, words, rows)
         except KeyError as error:
@@ -115,7 +112,6 @@ def _take(content: _Content, words: dict[str, str], rows: list[list[str]]) -> No
         case "ELSET" if "INSTANCE" not in words:
             _take_set(content, words, rows)
         case "SOLID SECTION" | "SHELL SECTION":
-            content.sections.append(words["ELSET"])
             content.materials[words["ELSET"]] = words.get("MATERIAL", words["ELSET"])
 
 
@@ -132,12 +128,12 @@ def _take_nodes(content: _Content, words: dict[str, str], rows: list[list[str]])
     if words.get("SYSTEM", "r") != "r":
         raise ValueError("its parameter SYSTEM is not read: expected Cartesian coordinates")
     for tag, *place in rows:
-        number = integer(tag)
+        number = _integer(tag)
         if not place:
             raise ValueError(f"node {number} has no coordinates")
         if number in content.nodes:
             raise ValueError(f"node {number} is there twice")
-        content.nodes[number] = [*map(real, place[:3]), 0.0, 0.0][:3]
+        content.nodes[number] = [*map(_real, place[:3]), 0.0, 0.0][:3]
 
 
 def _take_elements(content: _Content, words: dict[str, str], rows: list[list[str]]) -> None:
@@ -145,7 +141,7 @@ def _take_elements(content: _Content, words: dict[str, str], rows: list[list[str
     counts = _node_counts(kind)
     found = content.lines if counts == LINE_NODES else content.triangles
     for row in rows:
-        tag, *nodes = map(integer, row)
+        tag, *nodes = map(_integer, row)
         if len(nodes) not in counts:
             raise ValueError(f"element {tag} has {len(nodes)} nodes: expected {' or '.join(map(str, counts))}")
         if tag in content.triangles or tag in content.lines:
@@ -177,14 +173,14 @@ def _take_set(content: _Content, words: dict[str, str], rows: list[list[str]]) -
             members.update(numbers)
             continue
         for word in filter(None, row):
-            own = {integer(word)} if word.isdecimal() else _members(content, name_of(word))
+            own = {_integer(word)} if word.isdecimal() else _members(content, _name_of(word))
             content.spend(len(own))
             members.update(own)
 
 
 def _range(row: list[str]) -> range:
     """Numbers from the first to the last, in steps of the third or of one."""
-    first, last, step = [*map(integer, row), 1][:3] if len(row) in (2, 3) else (0, 0, 0)
+    first, last, step = [*map(_integer, row), 1][:3] if len(row) in (2, 3) else (0, 0, 0)
     if step < 1 or last < first:
         raise ValueError(f"{', '.join(row)}: expected the first element, the last and a step of at least 1")
     return range(first, last + 1, step)
@@ -200,28 +196,26 @@ def _members(content: _Content, name: str) -> set[int]:
 
 def _faults(content: _Content) -> list[str]:
     """Several parts, no triangles, unknown nodes, sections of unknown sets."""
-    faults = []
-    if content.parts > 1:
-        faults.append(f"{content.parts} parts: expected one")
-    if content.instances > 1:
-        faults.append(f"{content.instances} instances: expected one")
+    counts = {"parts": content.parts, "instances": content.instances}
+    faults = [f"{count} {name}: expected one" for name, count in counts.items() if count > 1]
     if not content.triangles:
         faults.append("no triangles in it")
     elements = content.triangles | content.lines
     lost = ((tag, node) for tag, nodes in elements.items() for node in nodes if node not in content.nodes)
     faults += [f"element {tag}: there is no node {node}" for tag, node in list(lost)[:1]]
     named = {name for _, name in content.sets}
-    unknown = (name for name in content.sections if name not in named)
+    unknown = (name for name in content.materials if name not in named)
     return faults + [f'a section names the element set "{name}": there is none' for name in unknown]
 
 
 def _raw(content: _Content) -> RawMesh:
-    for name in dict.fromkeys(content.sections):
+    for name in content.materials:
         content.members(BY_SECTION, name).update(_members(content, name))
     labels: dict[int, tuple[str, ...]] = {}
     for level in (BY_ELEMENTS, BY_SET, BY_SECTION):
-        labels |= _labels(content, level)
-    others = _aliases(content)
+        labels |= _names_of((name, members) for (own, name), members in content.sets.items() if own == level)
+    made_of = [(material, _members(content, name)) for name, material in content.materials.items()]
+    others = _names_of([*made_of, *((name, members) for (_, name), members in content.sets.items())])
     names_of = {tag: (labels.get(tag, ()), others.get(tag, ())) for tag in content.triangles}
     place = {names: k for k, names in enumerate(dict.fromkeys(names_of.values()))}
     groups, aliases = zip(*place, strict=True)
@@ -235,16 +229,6 @@ def _raw(content: _Content) -> RawMesh:
     return assembled(numbers, points, parts, groups, curves, ("element set", "element set"), aliases)
 
 
-def _aliases(content: _Content) -> dict[int, tuple[str, ...]]:
-    """Return the materials of the sections of each element, and all sets that it is in."""
-    found: dict[int, dict[str, None]] = {}
-    made_of = [(content.materials[name], _members(content, name)) for name in dict.fromkeys(content.sections)]
-    for name, members in [*made_of, *((name, own) for (_, name), own in content.sets.items())]:
-        for tag in members:
-            found.setdefault(tag, {})[name] = None
-    return {tag: tuple(names) for tag, names in found.items()}
-
-
 def _curves(content: _Content, labels: Mapping[int, tuple[str, ...]]) -> dict[str, Int]:
     """Numbers (d, 2) of the nodes at the ends of the lines in each set that has no triangles."""
     with_triangles = {name for tag in content.triangles for name in labels.get(tag, ())}
@@ -255,10 +239,61 @@ def _curves(content: _Content, labels: Mapping[int, tuple[str, ...]]) -> dict[st
     return {name: np.array(ends, np.int64) for name, ends in curves.items() if name not in with_triangles}
 
 
-def _labels(content: _Content, level: int) -> dict[int, tuple[str, ...]]:
-    """Return the names of the sets of one level that each element is in."""
-    found: dict[int, list[str]] = {}
-    for (own, name), members in content.sets.items():
-        for tag in members if own == level else ():
-            found.setdefault(tag, []).append(name)
+def _names_of(sets: Iterable[tuple[str, set[int]]]) -> dict[int, tuple[str, ...]]:
+    """Return the names, each once, of the sets that each element is in."""
+    found: dict[int, dict[str, None]] = {}
+    for name, members in sets:
+        for tag in members:
+            found.setdefault(tag, {})[name] = None
     return {tag: tuple(names) for tag, names in found.items()}
+
+
+def _blocks(text: str) -> Iterator[tuple[int, dict[str, str], list[list[str]]]]:
+    """Yield the keyword lines with their number, their words (the keyword under ""), and the data lines that follow."""
+    number, words, rows = 0, dict[str, str](), list[list[str]]()
+    open_line = ""
+    for place, line in enumerate(text.splitlines(), start=1):
+        line = line.strip()
+        if not line or line.startswith("**"):
+            continue
+        if line.startswith("*") or open_line.startswith("*"):
+            open_line += line
+            if open_line.endswith(","):
+                continue
+            if words:
+                yield number, words, rows
+            number, words, rows, open_line = place, _words(open_line), [], ""
+        elif words:
+            rows.append([word.strip() for word in line.rstrip(", \t").split(",")])
+    if words:
+        yield number, words, rows
+
+
+def _words(line: str) -> dict[str, str]:
+    """Keyword and parameters of a line: *ELEMENT, TYPE=CPE3 has {"": "ELEMENT", "TYPE": "CPE3"}."""
+    keyword, *parameters = (word.strip() for word in line[1:].split(","))
+    pairs = (word.partition("=") for word in parameters)
+    return {"": re.sub(r"\s+", " ", keyword.upper()), **{k.strip().upper(): _name_of(v) for k, _, v in pairs}}
+
+
+def _integer(word: str) -> int:
+    """Return the whole number that a word is; ValueError if it is none."""
+    if not re.fullmatch(r"[+-]?[0-9]{1,15}", word):
+        raise ValueError(f"{toml_value(word)}: expected a whole number of at most 15 digits")
+    return int(word)
+
+
+def _real(word: str) -> float:
+    """Return the number that a word is; ValueError if it is none."""
+    try:
+        if "_" not in word and word.isascii():
+            return float(word)
+    except ValueError:
+        pass
+    raise ValueError(f"{toml_value(word)}: expected a number")
+
+
+def _name_of(word: str) -> str:
+    """Return the name that a word is, in lower case unless it is quoted."""
+    word = word.strip()
+    return word[1:-1] if word[:1] == '"' else word.lower()

@@ -10,8 +10,8 @@ from scipy.sparse.csgraph import connected_components
 
 from feti_homog.fibres.outlines.ellipses import Ellipses
 from feti_homog.mesh.coarse_mesh import CoarseMesh, edge_keys, flip_double_arcs, interface_edges
-from feti_homog.mesh.middle_nodes import MiddleNodes
-from feti_homog.mesh.readers.mesh_checks import SAME_PLACE, RawMesh, at, first_of
+from feti_homog.mesh.readers.mesh_checks import SAME_PLACE
+from feti_homog.mesh.readers.raw_mesh import MiddleNodes, RawMesh, at, first_of
 from feti_homog.typing import Bool, Float, Int32
 
 # Distance of a middle node from its edge / length of the edge up to which the edge is straight.

@@ -8,7 +8,6 @@ import numpy as np
 
 from feti_homog.fibres.outlines.ellipses import Ellipses
 from feti_homog.mesh.coarse_mesh import CoarseMesh, edge_keys, flip_double_arcs, interface_edges
-from feti_homog.mesh.middle_nodes import MiddleNodes
 from feti_homog.mesh.readers.circle_detection import (
     MIN_CIRCLE_EDGES,
     ROUNDNESS_TOLERANCE,
@@ -16,6 +15,7 @@ from feti_homog.mesh.readers.circle_detection import (
     loop_images,
     on_sides,
 )
+from feti_homog.mesh.readers.raw_mesh import MiddleNodes
 from feti_homog.typing import Float, Int32
 
 # More edges than a circle: an ellipse has more freedom to go through the corners of a polygon.

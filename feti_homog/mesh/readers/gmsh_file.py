@@ -9,10 +9,9 @@ from types import ModuleType
 import numpy as np
 
 from feti_homog.errors import MeshError
-from feti_homog.mesh.readers import mesh_checks, msh_content
-from feti_homog.mesh.readers.element_blocks import Block, assembled
-from feti_homog.mesh.readers.mesh_checks import RawMesh
+from feti_homog.mesh.readers import msh_content
 from feti_homog.mesh.readers.msh_content import KINDS, MshContent
+from feti_homog.mesh.readers.raw_mesh import Block, RawMesh, assembled, at, first_of
 from feti_homog.mesh.tiles.filling import LINE, TRIANGLE
 from feti_homog.runtime import input_files
 from feti_homog.typing import Float, Int
@@ -83,7 +82,7 @@ def _repeated(nodes: Int, elements: Mapping[int, Elements]) -> list[str]:
         ordered = np.sort(numbers)
         twice = np.unique(ordered[1:][ordered[1:] == ordered[:-1]])
         if len(twice):
-            faults.append(f"{name} {mesh_checks.first_of(map(str, twice), len(twice))}: the number is there twice")
+            faults.append(f"{name} {first_of(map(str, twice), len(twice))}: the number is there twice")
     return faults
 
 
@@ -108,7 +107,7 @@ def _other_kinds(nodes: Int, points: Float, elements: Mapping[int, Elements]) ->
             numbers, own, _ = elements[kind]
             centre = points[np.isin(nodes, own[0])].mean(axis=0)
             faults.append(
-                f"element {numbers[0]} at {mesh_checks.at(centre)}, the first of {len(numbers)}, is a {name}: only "
+                f"element {numbers[0]} at {at(centre)}, the first of {len(numbers)}, is a {name}: only "
                 f"triangles of three or six nodes can be used ({REMEDY[min(order, 3), dimension]})"
             )
     if not kinds:

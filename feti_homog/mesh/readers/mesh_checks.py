@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from feti_homog.mesh.coarse_mesh import areas, edge_keys, edges
-from feti_homog.mesh.middle_nodes import MiddleNodes
-from feti_homog.typing import Bool, Float, Int, Int32
+from feti_homog.mesh.coarse_mesh import CoarseMesh, areas, edge_keys, edges, void_edges
+from feti_homog.mesh.periodic_topology import Torus, components, edge_pairs
+from feti_homog.mesh.readers.raw_mesh import DEBONDED, RawMesh, at, first_of
+from feti_homog.typing import Bool, Float, Int32
 
 # Nodes nearer than this, relative to the cell, are at the same place: files may round coordinates.
 SAME_PLACE = 1e-7
@@ -24,67 +24,9 @@ HANGING_DISTANCE = 1e-2
 FLAT_AREA = 1e-9
 # Lengths that can be computed with, as of the numbers in a case file.
 SMALLEST, LARGEST = 1e-100, 1e100
-# The physical curve of the edges that are debonded from the start.
-DEBONDED = "debonded"
 SIDES = {(0, 0): "left", (0, 1): "right", (1, 0): "lower", (1, 1): "upper"}
-
-
-@dataclass(frozen=True)
-class RawMesh:
-    """Triangles of a mesh file: nodes in use with their tags, elements with their tags and group.
-
-    Attributes:
-        node_tags: (n,) the file's numbers of the nodes.
-        points: (n, 3) their positions.
-        element_tags: (m,) the file's numbers of the elements.
-        triangles: (m, 3) nodes, numbered from 0.
-        group: (m,) index into `groups`, the names of the physical surfaces or sets that the elements belong to.
-        curves: (d, 2) node tags of the ends of the lines in each physical curve or set of lines, by its name.
-        middles: the middle nodes of second-order triangles.
-        aliases: other names of each group, by which a case may select it; may be empty.
-        container, curve_container: what the file calls a group, and an entry of `curves`.
-    """
-
-    node_tags: Int
-    points: Float
-    element_tags: Int
-    triangles: Int32
-    group: Int
-    groups: tuple[tuple[str, ...], ...]
-    curves: Mapping[str, Int]
-    middles: MiddleNodes
-    container: str
-    curve_container: str
-    aliases: tuple[tuple[str, ...], ...] = ()
-
-    @property
-    def debonded(self) -> Int:
-        """(d, 2) node tags of the ends of the lines in the curve DEBONDED."""
-        return self.curves.get(DEBONDED, np.zeros((0, 2), np.int64))
-
-    def node(self, number: int) -> str:
-        """Return a node in words."""
-        return f"node {self.node_tags[number]} {at(self.points[number])}"
-
-    def element(self, number: int) -> str:
-        """Return an element in words, with the position of its centre."""
-        centre = self.points[self.triangles[number]].mean(axis=0)
-        return f"element {self.element_tags[number]} at {at(centre)}"
-
-    def edge(self, pair: Iterable[int]) -> str:
-        """Return an edge in words."""
-        return "the edge between " + " and ".join(self.node(int(end)) for end in pair)
-
-
-def at(point: Float) -> str:
-    """Return a position in words, (x, y)."""
-    return f"({point[0]:.9g}, {point[1]:.9g})"
-
-
-def first_of(names: Iterable[str], total: int, shown: int = 3) -> str:
-    """Return the first few names and how many more there are."""
-    listed = ", ".join(name for name, _ in zip(names, range(shown), strict=False))
-    return listed if total <= shown else f"{listed} and {total - shown} more"
+# Share of the cell that rounding of coordinates may leave uncovered.
+ROUNDING = 1e-6
 
 
 def unlabelled(mesh: RawMesh) -> list[str]:
@@ -282,3 +224,45 @@ def not_periodic(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
                     f"{SIDES[axis, 1 - here]} side: {first_of(names, len(alone))}"
                 )
     return faults
+
+
+def unmatched_sides(raw: RawMesh, mesh: CoarseMesh) -> list[str]:
+    """Edges on a side of the cell whose image on the opposite side is no edge: a void lies along the side."""
+    pairs = edges(mesh.triangles)
+    faults = []
+    for axis in (0, 1):
+        on = [np.all(mesh.points[pairs, axis] == level, axis=1) for level in (0.0, mesh.period[axis])]
+        keys = [edge_keys(mesh.representative[pairs[own]].astype(np.int32), len(mesh.points)) for own in on]
+        for here in (0, 1):
+            alone = pairs[on[here]][~np.isin(keys[here], keys[1 - here])]
+            if len(alone):
+                sides = f"edges of the {SIDES[axis, here]} side have no partner on the {SIDES[axis, 1 - here]} side"
+                faults.append(f"not periodic, {sides}: {first_of(map(raw.edge, alone), len(alone))}")
+    return faults
+
+
+def islands(raw: RawMesh, mesh: CoarseMesh) -> list[str]:
+    """Parts of the mesh that share no edge with the largest: nothing would hold them."""
+    part = components(len(mesh.triangles), *edge_pairs(Torus.of(mesh).triangle_torus_edges))
+    loose = np.flatnonzero(part != np.bincount(part).argmax())
+    first = loose[np.unique(part[loose], return_index=True)[1]]
+    held = "floating parts, which voids part from all others"
+    return [f"{held}: that with {first_of(map(raw.element, first), len(first))}"] if len(first) else []
+
+
+def no_voids(raw: RawMesh, mesh: CoarseMesh) -> list[str]:
+    """Edges beside voids that have no area, and what is not meshed without such edges."""
+    pairs, empty = void_edges(mesh), 1.0 - areas(mesh.points, mesh.triangles).sum() / mesh.period.prod()
+    if len(pairs) == 0:
+        return [f"the elements leave {empty:.3g} of the cell uncovered"] if empty > ROUNDING else []
+    crowded = pairs[_is_crowded(mesh, pairs)]
+    names = first_of(map(raw.edge, crowded), len(crowded))
+    touching = [f"voids that touch in a node, as at {names}"] if len(crowded) else []
+    slits = first_of(map(raw.edge, pairs), len(pairs), shown=2)
+    return touching + ([f"voids without an area, beside {slits}"] if empty < ROUNDING else [])
+
+
+def _is_crowded(mesh: CoarseMesh, pairs: Int32) -> Bool:
+    """(k,) whether an end of each edge beside a void has more than two of them."""
+    ends = mesh.representative[pairs]
+    return np.asarray((np.bincount(ends.ravel(), minlength=len(mesh.points))[ends] > 2).any(axis=1))

@@ -8,20 +8,20 @@ from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from feti_homog.case.cell_section import Cell
 from feti_homog.errors import MeshError, escaped
 from feti_homog.fibres.outlines.ellipses import Ellipses
-from feti_homog.mesh.coarse_mesh import CoarseMesh, areas, can_debond, paired_sides, representatives
+from feti_homog.mesh.coarse_mesh import CoarseMesh, areas, can_debond, edge_keys, edges, paired_sides, representatives
 from feti_homog.mesh.periodic_topology import Torus
-from feti_homog.mesh.readers import abaqus_file, bent_edges, gmsh_file, mesh_checks, other_cells, void_checks, vtk_file
+from feti_homog.mesh.readers import abaqus_file, bent_edges, gmsh_file, mesh_checks, other_cells, vtk_file
 from feti_homog.mesh.readers.bent_edges import with_bent_edges
 from feti_homog.mesh.readers.circle_detection import with_circles
 from feti_homog.mesh.readers.ellipse_detection import with_ellipses
-from feti_homog.mesh.readers.mesh_checks import RawMesh
 from feti_homog.mesh.readers.named_phases import Selectors, unknown_phases, with_phases
-from feti_homog.mesh.readers.snapping import snapped
-from feti_homog.typing import Float
+from feti_homog.mesh.readers.raw_mesh import RawMesh
+from feti_homog.typing import Float, Int
 
 LOADERS = {".msh": gmsh_file.load, ".inp": abaqus_file.load} | dict.fromkeys(vtk_file.READERS, vtk_file.load)
 
@@ -69,8 +69,8 @@ def made(raw: RawMesh, path: str) -> CoarseMesh:
     _refuse(path, mesh_checks.too_large(plane, raw.triangles, size))
     _refuse(path, mesh_checks.not_periodic(raw, plane, size), mesh_checks.unrefined_sides(plane, size))
     mesh = _coarse_mesh(raw, _matched(plane, size), size)
-    _refuse(path, void_checks.unmatched_sides(raw, mesh))
-    _refuse(path, void_checks.islands(raw, mesh), void_checks.no_voids(raw, mesh))
+    _refuse(path, mesh_checks.unmatched_sides(raw, mesh))
+    _refuse(path, mesh_checks.islands(raw, mesh), mesh_checks.no_voids(raw, mesh))
     _refuse(path, mesh_checks.cannot_debond(raw, mesh.debonded_edges, can_debond(mesh, mesh.debonded_edges)))
     middles = replace(raw.middles, points=raw.middles.points - [*origin, 0.0])
     mesh = with_circles(mesh, middles)
@@ -145,3 +145,60 @@ def _coarse_mesh(raw: RawMesh, plane: Float, size: Float) -> CoarseMesh:
         arc_circle=np.zeros(0, np.int32),
         debonded_edges=np.searchsorted(raw.node_tags, raw.debonded).astype(np.int32),
     )
+
+
+def snapped(raw: RawMesh, tolerance: float) -> tuple[RawMesh, float]:
+    """Return the mesh with its outer edges on the sides of a rectangle, and how far the farthest node has moved.
+
+    Nodes of the outer edges are opposite each other.
+
+    A side lies at the median of the nodes within `tolerance`, relative to the width, of the outermost. Partners, each
+    other's nearest within the tolerance along the side, both move to the middle between them. Middle nodes of
+    second-order triangles are then midway between the ends of their edges on sides. What is farther stays where it is,
+    for the checks to tell.
+    """
+    plane = raw.points[:, :2].copy()
+    if not np.isfinite(plane).all():
+        return raw, 0.0
+    outer = _outer_nodes(raw)
+    reach = tolerance * float(np.ptp(plane[:, 0]))
+    sides = {}
+    for axis in (0, 1):
+        for extreme in (np.min, np.max):
+            along = plane[outer, axis]
+            near = outer[np.abs(along - extreme(along)) <= reach]
+            plane[near, axis] = np.median(plane[near, axis])
+            sides[axis, extreme is np.max] = near
+    for axis in (0, 1):
+        _match(plane, sides[axis, False], sides[axis, True], 1 - axis, reach)
+    moved = float(np.linalg.norm(plane - raw.points[:, :2], axis=1).max())
+    points = np.column_stack([plane, raw.points[:, 2]])
+    return _with_straight_sides(replace(raw, points=points), list(sides.values())), moved
+
+
+def _outer_nodes(raw: RawMesh) -> Int:
+    """Nodes of the edges that one triangle has."""
+    pairs = edges(raw.triangles)
+    _, first, count = np.unique(edge_keys(pairs, len(raw.points)), return_index=True, return_counts=True)
+    return np.asarray(np.unique(pairs[first[count == 1]]), np.int64)
+
+
+def _match(plane: Float, low: Int, high: Int, along: int, reach: float) -> None:
+    """Move partners on two opposite sides to the middle between them, along the sides; corners stay."""
+    trees = [cKDTree(plane[side, along, None]) for side in (low, high)]
+    (away, to_high), (_, to_low) = trees[1].query(plane[low, along, None]), trees[0].query(plane[high, along, None])
+    ends = plane[:, along].min(), plane[:, along].max()
+    inner = ~np.isin(plane[low, along], ends) & ~np.isin(plane[high[to_high], along], ends)
+    mutual = (to_low[to_high] == np.arange(len(low))) & (away <= reach) & inner
+    a, b = low[mutual], high[to_high[mutual]]
+    plane[a, along] = plane[b, along] = (plane[a, along] + plane[b, along]) / 2
+
+
+def _with_straight_sides(raw: RawMesh, sides: list[Int]) -> RawMesh:
+    """Return the mesh with middle nodes on its sides midway between their ends."""
+    middles = raw.middles
+    on_side = np.zeros(len(middles.tags), bool)
+    for side in sides:
+        on_side |= np.isin(middles.edges, side).all(axis=1)
+    midway = raw.points[middles.edges].mean(axis=1)
+    return replace(raw, middles=replace(middles, points=np.where(on_side[:, None], midway, middles.points)))

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from feti_homog.mesh.coarse_mesh import areas
-from feti_homog.mesh.readers.mesh_checks import at
+from feti_homog.mesh.readers.raw_mesh import at
 from feti_homog.typing import Float, Int32
 
 # Sine of the angle at a node of the hull, and cosine between vectors of a lattice, that are zero but for rounding.

@@ -1,18 +1,26 @@
-"""Read the triangles and the lines of a file of VTK or Medit by meshio."""
+"""Read the triangles and the lines of a file of VTK or Medit by meshio, within bounds on what it allocates."""
 
 from __future__ import annotations
 
 import importlib
+import io
+import re
+import sys
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, redirect_stderr
+from functools import partial
 from pathlib import Path
+from types import ModuleType, SimpleNamespace
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 
 from feti_homog.errors import MeshError
-from feti_homog.mesh.readers import vtk_limits
-from feti_homog.mesh.readers.element_blocks import Block, assembled
-from feti_homog.mesh.readers.mesh_checks import DEBONDED, RawMesh
+from feti_homog.mesh.readers.raw_mesh import DEBONDED, Block, RawMesh, assembled
 from feti_homog.runtime import input_files
+from feti_homog.schema.wording import toml_value
 from feti_homog.typing import Int
 
 # Readers of meshio, and how many nodes its triangles have.
@@ -34,6 +42,18 @@ NUMBERS = (
     "gmsh:geometrical",
 )
 MOST_PHASES = 10**9
+# Bytes that compressed data may have: so many in any file, or so many for each of the file's.
+MOST_BYTES, MOST_RATIO = 2**26, 50
+# Modules by which meshio decompresses, and what makes a decompressor that stops where it should.
+DECOMPRESSORS = {"zlib": "decompressobj", "lzma": "LZMADecompressor"}
+# Sizes that sections of a legacy file declare, and arrays of its fields: components, tuples and a type.
+DECLARED = re.compile(
+    rb"(?im)^(POINTS|CELLS|CELL_TYPES|POINT_DATA|CELL_DATA|LOOKUP_TABLE|COLOR_SCALARS)\b([^\n]{0,200})"
+)
+ARRAY = re.compile(rb"(?im)^\S{1,200} (\d+) (\d+) [a-z][a-z_0-9]{0,20}\s*$")
+DATASET = re.compile(rb"(?im)^DATASET\s+(\S{1,60})")
+COUNTED = re.compile(rb"([A-Z][A-Za-z0-9]{0,40})\s+([0-9]{1,40})")
+RAW = re.compile(rb"(<AppendedData[^>]*>).*(</AppendedData>)", re.DOTALL)
 
 
 def load(path: Path) -> RawMesh:
@@ -53,9 +73,9 @@ def load(path: Path) -> RawMesh:
         wanted = f"{path.suffix} files are read by meshio, which is not installed"
         raise MeshError(f"{wanted}: pip install 'feti_homog[meshes]'") from None
     content = input_files.read(path)
-    vtk_limits.check(content, path.suffix)
+    _check_content(content, path.suffix)
     try:
-        with vtk_limits.bounded(reader, len(content)):
+        with _bounded(reader, len(content)):
             mesh = reader.read(str(path))
     except Exception as error:  # meshio's readers raise whatever they meet
         raise MeshError(f"meshio cannot read it: {str(error).strip() or type(error).__name__}") from None
@@ -159,3 +179,74 @@ def _used(blocks: list[Block]) -> tuple[list[Block], list[int]]:
     used: Int = np.unique(np.concatenate([block.group for block in blocks]))
     renumbered = [Block(block.tags, block.nodes, np.searchsorted(used, block.group)) for block in blocks]
     return renumbered, used.tolist()
+
+
+def _check_content(content: bytes, suffix: str) -> None:
+    """Raise MeshError where a file of this kind is damaged, or declares what meshio should not read."""
+    {".vtu": _check_xml, ".vtk": _check_legacy, ".mesh": _check_medit}[suffix](content)
+
+
+def _check_medit(content: bytes) -> None:
+    for name, count in COUNTED.findall(content):
+        if int(count) > len(content):
+            raise MeshError(f"it declares {int(count)} {name.decode()}: there are {len(content)} bytes in all")
+
+
+def _check_xml(content: bytes) -> None:
+    if re.search(rb"<AppendedData[^>]*[\"']raw[\"']", content):
+        content = RAW.sub(rb"\1\2", content)
+    try:
+        root = ElementTree.fromstring(content)
+    except (ElementTree.ParseError, ValueError, LookupError) as error:
+        raise MeshError(f"not XML: {error}") from None
+    header = root.get("header_type", "UInt32")
+    if header not in ("UInt32", "UInt64"):
+        raise MeshError(f"header_type is {toml_value(header)}: expected UInt32 or UInt64")
+    if any(array.get("Name") in ("faces", "faceoffsets") for array in root.iter("DataArray")):
+        raise MeshError("elements are polyhedra: only triangles of three or six nodes can be used")
+
+
+def _check_legacy(content: bytes) -> None:
+    for kind in DATASET.findall(content):
+        if kind.upper() != b"UNSTRUCTURED_GRID":
+            raise MeshError(f"DATASET {kind.decode(errors='replace')}: expected UNSTRUCTURED_GRID")
+    sizes = [
+        (name, int(word))
+        for name, words in DECLARED.findall(content)
+        for word in re.findall(rb"(?<!\S)\d{1,40}(?!\S)", words)
+    ]
+    sizes += [(b"an array", int(components[:40]) * int(tuples[:40])) for components, tuples in ARRAY.findall(content)]
+    for name, size in sizes:
+        if size > len(content):
+            words = f"{name.decode()} of {size} values"
+            raise MeshError(f"it declares {words}: there are {len(content)} bytes in all")
+
+
+@contextmanager
+def _bounded(reader: ModuleType, length: int) -> Iterator[None]:
+    """Let meshio decompress no more data than a file of this length should have, and print nothing."""
+    left = max(MOST_BYTES, MOST_RATIO * length)
+
+    def decompress(make: Callable[[], Any], content: bytes) -> bytes:
+        nonlocal left
+        decompressor = make()
+        data: bytes = decompressor.decompress(content, left + 1)
+        left -= len(data)
+        if left < 0:
+            raise MeshError("its compressed data are too large for a file of its length")
+        if not decompressor.eof:
+            raise MeshError("its compressed data are broken off")
+        return data
+
+    inner = sys.modules.get(f"{reader.__name__}._vtu")
+    kept = {name: module for name in DECOMPRESSORS if (module := getattr(inner, name, None))}
+    for name, module in kept.items():
+        own = partial(decompress, getattr(module, DECOMPRESSORS[name]))
+        setattr(inner, name, SimpleNamespace(decompress=own))
+    try:
+        with redirect_stderr(io.StringIO()), warnings.catch_warnings():
+            warnings.filterwarnings("error", "string or file could not be read")  # what is no number
+            yield
+    finally:
+        for name, module in kept.items():
+            setattr(inner, name, module)

@@ -15,8 +15,8 @@ from unit.mesh.second_order import second_order
 from feti_homog.errors import MeshError
 from feti_homog.mesh.readers import gmsh_file, msh_content
 from feti_homog.mesh.readers.gmsh_file import triangles_of_model
-from feti_homog.mesh.readers.mesh_checks import RawMesh
 from feti_homog.mesh.readers.msh_reader import made, read
+from feti_homog.mesh.readers.raw_mesh import RawMesh
 from feti_homog.mesh.tiles.filling import gmsh_session
 
 MESHES = Path(__file__).parents[4] / "meshes"
