@@ -12,6 +12,7 @@ from feti_homog.fibres.outlines.ellipses import Ellipses
 from feti_homog.mesh.coarse_mesh import CoarseMesh, edge_keys, flip_double_arcs, interface_edges
 from feti_homog.mesh.readers.mesh_checks import SAME_PLACE
 from feti_homog.mesh.readers.raw_mesh import MiddleNodes, RawMesh, at, first_of
+from feti_homog.mesh.readers.round_interfaces import with_arcs
 from feti_homog.typing import Bool, Float, Int32
 
 # Distance of a middle node from its edge / length of the edge up to which the edge is straight.
@@ -54,14 +55,8 @@ def with_bent_edges(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
     bent = np.abs(away) > STRAIGHT * length
     circles, arcs = _circumcircles(a[bent], b[bent], middle[bent]), pairs[bent].astype(np.int32)
     triangles = flip_double_arcs(mesh.triangles, mesh.phase, arcs, _curves(mesh, arcs), nodes)
-    number = len(mesh.ellipses) + np.arange(len(circles), dtype=np.int32)
-    return replace(
-        mesh,
-        triangles=triangles,
-        ellipses=mesh.ellipses.joined(Ellipses.round(circles)),
-        arc_edges=np.concatenate([mesh.arc_edges, arcs]),
-        arc_circle=np.concatenate([mesh.arc_circle, number]),
-    )
+    number = np.arange(len(circles), dtype=np.int32)
+    return with_arcs(replace(mesh, triangles=triangles), Ellipses.round(circles), arcs, number)
 
 
 def _curves(mesh: CoarseMesh, pairs: Int32) -> Int32:

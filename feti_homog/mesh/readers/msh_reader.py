@@ -17,10 +17,9 @@ from feti_homog.mesh.coarse_mesh import CoarseMesh, areas, can_debond, edge_keys
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.readers import abaqus_file, bent_edges, gmsh_file, mesh_checks, other_cells, vtk_file
 from feti_homog.mesh.readers.bent_edges import with_bent_edges
-from feti_homog.mesh.readers.circle_detection import with_circles
-from feti_homog.mesh.readers.ellipse_detection import with_ellipses
 from feti_homog.mesh.readers.named_phases import Selectors, unknown_phases, with_phases
 from feti_homog.mesh.readers.raw_mesh import RawMesh
+from feti_homog.mesh.readers.round_interfaces import with_circles, with_ellipses
 from feti_homog.typing import Float, Int
 
 LOADERS = {".msh": gmsh_file.load, ".inp": abaqus_file.load} | dict.fromkeys(vtk_file.READERS, vtk_file.load)

@@ -8,8 +8,8 @@ from support.users_meshes import fibre_area, polar_cell
 
 from feti_homog.mesh.mesh_fibres import fibre_circles
 from feti_homog.mesh.periodic_topology import Torus
-from feti_homog.mesh.readers.ellipse_detection import fit
 from feti_homog.mesh.readers.msh_reader import read
+from feti_homog.mesh.readers.round_interfaces import fit_ellipse
 from feti_homog.mesh.refinement import ReferenceLattice, refine
 from feti_homog.mesh.submesh import cut
 
@@ -22,7 +22,7 @@ def test_fit_gives_back_the_ellipse(a, b, turn):
     t = np.sort(np.random.default_rng(1).uniform(0, 2 * np.pi, 40))
     turned = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
     centre = np.array([0.7, -0.2])
-    ellipse = fit(centre + (turned @ np.diag([a, b]) @ [np.cos(t), np.sin(t)]).T)
+    ellipse = fit_ellipse(centre + (turned @ np.diag([a, b]) @ [np.cos(t), np.sin(t)]).T)
     assert ellipse is not None and ellipse.centre == pytest.approx(centre, abs=1e-10)
     square = turned @ np.diag([a**2, b**2]) @ turned.T
     assert ellipse.frame @ ellipse.frame.T == pytest.approx(square, rel=1e-8, abs=1e-8 * a * b)
@@ -39,7 +39,7 @@ def test_fit_gives_back_the_ellipse(a, b, turn):
     ids=["astroid", "parabola", "line", "half a circle"],
 )
 def test_other_chains_are_no_ellipses(places):
-    assert fit(places) is None
+    assert fit_ellipse(places) is None
 
 
 @pytest.mark.parametrize("centre", [(0.5, 0.5), (0.0, 0.0), (0.93, 0.08)])

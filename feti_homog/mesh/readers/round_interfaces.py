@@ -1,4 +1,4 @@
-"""Round fibres in a user's mesh: closed interfaces on the torus whose nodes lie on one circle."""
+"""Round and elliptic fibres in a user's mesh: closed interfaces on the torus whose nodes lie on one curve."""
 
 from __future__ import annotations
 
@@ -19,10 +19,16 @@ ROUNDNESS_TOLERANCE = 1e-6
 MIN_CIRCLE_EDGES = 8
 # With middle nodes on the circle the same of halves of edges.
 MIN_BENT_EDGES, LONGEST_BENT_EDGE = 4, 1.5
+# More edges than a circle: an ellipse has more freedom to go through the corners of a polygon.
+MIN_ELLIPSE_EDGES = MIN_CIRCLE_EDGES + 2
+# As the longest edges of circles: bent more, elements beside the tips of thin ellipses could turn over.
+MOST_BENT = 0.14
+# Ratio of semi-axes below which a conic may be a parabola but for rounding.
+THINNEST = 1e-4
 
 
 @dataclass(frozen=True)
-class Loop:
+class _Loop:
     """A closed interface: its node classes (k,) in order, and where they lie, unwrapped, (k, 2)."""
 
     classes: Int
@@ -41,7 +47,7 @@ def with_circles(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
     size = mesh.period
     bends = middles.between(pairs)
     has_middles = len(middles.tags) > 0
-    loops = closed_loops(mesh, pairs, size, MIN_BENT_EDGES if has_middles else MIN_CIRCLE_EDGES)
+    loops = _closed_loops(mesh, pairs, size, MIN_BENT_EDGES if has_middles else MIN_CIRCLE_EDGES)
     loop_of = np.full(len(mesh.points), -1)
     for number, loop in enumerate(loops):
         loop_of[loop.classes] = number
@@ -49,21 +55,22 @@ def with_circles(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
     points, circles, arc_edges = mesh.points.copy(), [], []
     for number, loop in enumerate(loops):
         own = pairs[loop_of == number]
-        circle = _fit(loop.places, LONGEST_BENT_EDGE if has_middles else 1.0)
-        if circle is None or on_sides(mesh.points[own], size).any():
+        circle = _fit_circle(loop.places, LONGEST_BENT_EDGE if has_middles else 1.0)
+        if circle is None or _on_sides(mesh.points[own], size).any():
             continue
         moved = _moved(mesh.points[loop.classes], loop.places, circle, size)
-        images = _images(mesh, loop, circle, own)
+        images = [(np.append(circle[:2] - step, circle[2]), mine) for step, mine in _loop_images(mesh, loop, own)]
         if moved is None or (has_middles and not _through(images, bends[loop_of == number])):
             continue
         points[loop.classes] = moved
         circles += [image for image, _ in images]
         arc_edges += [own[mine] for _, mine in images]
     mesh = replace(mesh, points=_copied(mesh, points, size))
-    return _without_double_arcs(_with_arcs(mesh, circles, arc_edges))
+    ellipses = Ellipses.round(np.array(circles).reshape(-1, 3))
+    return _without_double_arcs(with_arcs(mesh, ellipses, *_numbered(arc_edges)))
 
 
-def closed_loops(mesh: CoarseMesh, pairs: Int32, size: Float, least: int) -> list[Loop]:
+def _closed_loops(mesh: CoarseMesh, pairs: Int32, size: Float, least: int) -> list[_Loop]:
     """Return the interfaces that are simple closed curves of at least so many edges and contractible on the torus."""
     if len(pairs) == 0:
         return []
@@ -84,11 +91,11 @@ def closed_loops(mesh: CoarseMesh, pairs: Int32, size: Float, least: int) -> lis
         if np.all(np.abs(hops.sum(axis=0)) < size / 2):
             nodes = classes[order]
             places = mesh.points[nodes[0]] + np.cumsum(hops, axis=0) - hops
-            loops.append(Loop(nodes, places))
+            loops.append(_Loop(nodes, places))
     return loops
 
 
-def _fit(places: Float, longest: float) -> Float | None:
+def _fit_circle(places: Float, longest: float) -> Float | None:
     """Centre and radius (3,) of the circle through a closed chain of places (k, 2).
 
     None if not round, or with edges longer than `longest` radii.
@@ -128,7 +135,7 @@ def _moved(points: Float, places: Float, circle: Float, size: Float) -> Float | 
     return moved
 
 
-def on_sides(ends: Float, size: Float) -> Bool:
+def _on_sides(ends: Float, size: Float) -> Bool:
     """Return whether edges with ends (k, 2, 2) lie on a side of the cell."""
     return np.asarray(np.any(np.all(ends == 0, axis=1) | np.all(ends == size, axis=1), axis=1))
 
@@ -139,12 +146,7 @@ def _through(images: list[tuple[Float, Int]], bends: Float) -> bool:
     return bool(np.all(np.concatenate(away) <= ROUNDNESS_TOLERANCE))
 
 
-def _images(mesh: CoarseMesh, loop: Loop, circle: Float, own: Int32) -> list[tuple[Float, Int]]:
-    """Return the images of a circle in the plane, each with the numbers of its edges among the loop's own (a, 2)."""
-    return [(np.append(circle[:2] - step, circle[2]), mine) for step, mine in loop_images(mesh, loop, own)]
-
-
-def loop_images(mesh: CoarseMesh, loop: Loop, own: Int32) -> list[tuple[Float, Int]]:
+def _loop_images(mesh: CoarseMesh, loop: _Loop, own: Int32) -> list[tuple[Float, Int]]:
     """(2,) distance of the loop from each of its images in the plane, and the edges of that among its own (a, 2)."""
     order = np.argsort(loop.classes)
     place = order[np.searchsorted(loop.classes[order], mesh.representative[own[:, 0]])]
@@ -159,15 +161,21 @@ def _copied(mesh: CoarseMesh, points: Float, size: Float) -> Float:
     return np.where(mesh.points == size, size, points[mesh.representative])
 
 
-def _with_arcs(mesh: CoarseMesh, circles: list[Float], arc_edges: list[Int32]) -> CoarseMesh:
-    """Return the mesh with these circles (3,) and their edges (a, 2)."""
-    counts = np.array([len(own) for own in arc_edges], dtype=np.intp)
+def with_arcs(mesh: CoarseMesh, ellipses: Ellipses, arcs: Int32, number: Int32) -> CoarseMesh:
+    """Return the mesh with more ellipses, and the edges (a, 2) on them, each on that of its number (a,)."""
     return replace(
         mesh,
-        ellipses=Ellipses.round(np.array(circles).reshape(-1, 3)),
-        arc_edges=np.concatenate([np.zeros((0, 2), np.int32), *arc_edges]),
-        arc_circle=np.repeat(np.arange(len(circles), dtype=np.int32), counts),
+        ellipses=mesh.ellipses.joined(ellipses),
+        arc_edges=np.concatenate([mesh.arc_edges, arcs]),
+        arc_circle=np.concatenate([mesh.arc_circle, len(mesh.ellipses) + number]).astype(np.int32),
     )
+
+
+def _numbered(arcs: list[Int32]) -> tuple[Int32, Int32]:
+    """Return the edges (a, 2) of all curves, and the number (a,) of the curve of each."""
+    counts = np.array([len(own) for own in arcs], dtype=np.intp)
+    ends = np.concatenate([np.zeros((0, 2), np.int32), *arcs])
+    return ends, np.repeat(np.arange(len(arcs), dtype=np.int32), counts)
 
 
 def _without_double_arcs(mesh: CoarseMesh) -> CoarseMesh:
@@ -179,6 +187,96 @@ def _without_double_arcs(mesh: CoarseMesh) -> CoarseMesh:
         return replace(mesh, triangles=triangles)
     keys = edge_keys(mesh.arc_edges, nodes)
     faulty = np.unique(mesh.arc_circle[np.isin(keys, edge_keys(edges(triangles[bad]), nodes))])
-    kept = np.setdiff1d(np.arange(len(mesh.circles)), faulty)
-    remaining = [mesh.arc_edges[mesh.arc_circle == circle] for circle in kept]
-    return _with_arcs(replace(mesh, triangles=triangles), list(mesh.circles[kept]), remaining)
+    kept, remain = np.setdiff1d(np.arange(len(mesh.ellipses)), faulty), ~np.isin(mesh.arc_circle, faulty)
+    return replace(
+        mesh,
+        triangles=triangles,
+        ellipses=mesh.ellipses[kept],
+        arc_edges=mesh.arc_edges[remain],
+        arc_circle=np.searchsorted(kept, mesh.arc_circle[remain]).astype(np.int32),
+    )
+
+
+@dataclass(frozen=True)
+class Ellipse:
+    """The image centre + frame p of the unit circle |p| = 1; `frame` is (2, 2)."""
+
+    centre: Float
+    frame: Float
+
+    def moved(self, step: Float) -> Ellipse:
+        """By a vector (2,)."""
+        return replace(self, centre=self.centre + step)
+
+    def between(self, start: Float, stop: Float) -> Float:
+        """(k, 2) the points at the middle parameter between points (k, 2) on the ellipse less than half of it apart."""
+        middle = np.linalg.solve(self.frame, ((start + stop) / 2 - self.centre).T)
+        return np.asarray(self.centre + (self.frame @ (middle / np.hypot(*middle))).T)
+
+
+def with_ellipses(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
+    """Return the mesh whose elliptic interfaces that are no circles follow their ellipses.
+
+    A closed interface between two phases is an ellipse if all its nodes are within ROUNDNESS_TOLERANCE of one, and it
+    has at least MIN_ELLIPSE_EDGES edges, none on a side of the cell, none that spans more than one radian of its
+    parameter or that the ellipse leaves by more than MOST_BENT of its length. Where its edges have middle nodes these
+    must lie on it too. Others stay as they are. Edges are flipped where a triangle has two on one ellipse.
+    """
+    pairs, nodes = interface_edges(mesh), len(mesh.points)
+    pairs = pairs[~np.isin(edge_keys(pairs, nodes), edge_keys(mesh.arc_edges, nodes))]
+    bends, own_ellipses, arcs = middles.between(pairs), [], []
+    for loop in _closed_loops(mesh, pairs, mesh.period, MIN_ELLIPSE_EDGES):
+        ellipse = fit_ellipse(loop.places)
+        own = np.isin(mesh.representative[pairs[:, 0]], loop.classes)
+        if ellipse is None or _on_sides(mesh.points[pairs[own]], mesh.period).any():
+            continue
+        images = _loop_images(mesh, loop, pairs[own])
+        places = [(ellipse.moved(-step), pairs[own][mine], bends[own][mine]) for step, mine in images]
+        if all(_follow(image, mesh.points[some], bend) for image, some, bend in places):
+            own_ellipses += [image for image, _, _ in places]
+            arcs += [some for _, some, _ in places]
+    if not arcs:
+        return mesh
+    ellipses = Ellipses(np.array([own.centre for own in own_ellipses]), np.array([own.frame for own in own_ellipses]))
+    ends, number = _numbered(arcs)
+    triangles = flip_double_arcs(mesh.triangles, mesh.phase, ends, number, nodes)
+    return with_arcs(replace(mesh, triangles=triangles), ellipses, ends, number)
+
+
+def _follow(ellipse: Ellipse, ends: Float, bends: Float) -> bool:
+    """Return whether edges may follow the ellipse.
+
+    Their ends are (k, 2, 2) and their middle nodes (k, 2), NaN if there are none.
+    """
+    chord = ends[:, 1] - ends[:, 0]
+    bulge = ellipse.between(ends[:, 0], ends[:, 1]) - ends.mean(axis=1)
+    off = np.abs(np.linalg.norm(np.linalg.solve(ellipse.frame, (bends - ellipse.centre).T), axis=0) - 1)
+    return bool(np.all(np.hypot(*bulge.T) <= MOST_BENT * np.hypot(*chord.T)) and not np.any(off > ROUNDNESS_TOLERANCE))
+
+
+def fit_ellipse(places: Float) -> Ellipse | None:
+    """Return the ellipse through a closed chain of places (k, 2) in order.
+
+    None if they are on none or too far apart.
+
+    The conic d.A.d + b.d = 1 that fits best, d from the mean of the places, is |F^-1 (d - c)| = 1.
+    """
+    mean = places.mean(axis=0)
+    scale = np.abs(places - mean).max()
+    x, y = ((places - mean) / scale).T
+    (xx, xy, yy, bx, by), *_ = np.linalg.lstsq(
+        np.column_stack([x * x, x * y, y * y, x, y]), np.ones(len(x)), rcond=None
+    )
+    A = np.array([[xx, xy / 2], [xy / 2, yy]])
+    values, axes = np.linalg.eigh(A)
+    if values[0] <= THINNEST**2 * values[1]:
+        return None
+    centre = -np.linalg.solve(A, [bx, by]) / 2
+    level = 1 + centre @ A @ centre
+    frame = axes * np.sqrt(level / values)
+    on_circle = np.linalg.solve(frame, np.stack([x, y]) - centre[:, None])
+    chord = np.hypot(*(np.roll(on_circle, -1, axis=1) - on_circle))
+    away = np.abs(np.hypot(*on_circle) - 1)
+    if away.max() > ROUNDNESS_TOLERANCE or chord.max() > 2 * np.sin(0.5):
+        return None
+    return Ellipse(mean + scale * centre, scale * frame)
