@@ -34,7 +34,7 @@ from feti_homog.homogenization import coarse_meshes  # noqa: E402
 from feti_homog.homogenization.partition_policy import DEFAULT_POLICY  # noqa: E402
 from feti_homog.homogenization.tile_tearing import summary_of, tiled_cell, tiles_to_fill  # noqa: E402
 from feti_homog.homogenization.unit_cell import TornCell, tear  # noqa: E402
-from feti_homog.mesh.fill.unmeshed_cell import UnmeshedCell  # noqa: E402
+from feti_homog.mesh.fill.gmsh_mesher import UnmeshedCell  # noqa: E402
 from feti_homog.mesh.tiles.tiles import TilePolicy  # noqa: E402
 from feti_homog.parallel.mpi_errors import on_root, run_main  # noqa: E402
 from feti_homog.petsc.options import case_options  # noqa: E402

@@ -15,8 +15,7 @@ from feti_homog.case.case import Case
 from feti_homog.fibres.arrange import listed_arrangement
 from feti_homog.homogenization import arc_selection
 from feti_homog.mesh.coarse_mesh import CoarseMesh
-from feti_homog.mesh.fill.gmsh_mesher import begin
-from feti_homog.mesh.fill.unmeshed_cell import NodedCell, UnmeshedCell
+from feti_homog.mesh.fill.gmsh_mesher import NodedCell, UnmeshedCell, begin
 from feti_homog.mesh.outline.bare_outline import LineStations
 from feti_homog.mesh.sizes.element_estimate import ElementEstimate
 from feti_homog.mesh.sizes.graded_size import SizeField

@@ -21,7 +21,7 @@ from feti_homog.homogenization.coarse_meshes import deal_tiles, fill_own
 from feti_homog.homogenization.domain_partition import CellSummary, RankShare, in_cell, match_distance
 from feti_homog.homogenization.partition_policy import PartitionPolicy, wanted_pieces
 from feti_homog.mesh.coarse_mesh import representatives
-from feti_homog.mesh.fill.unmeshed_cell import NodedCell
+from feti_homog.mesh.fill.gmsh_mesher import NodedCell
 from feti_homog.mesh.outline.curves import MATRIX
 from feti_homog.mesh.periodic_topology import Torus, components, places_by_depth
 from feti_homog.mesh.refinement import ReferenceLattice

@@ -26,7 +26,7 @@ from feti_homog.homogenization.uniform_parts import UniformPart, parts_of
 from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.tips import debonded_arcs
 from feti_homog.mesh.coarse_mesh import CoarseMesh
-from feti_homog.mesh.fill.unmeshed_cell import NodedCell
+from feti_homog.mesh.fill.gmsh_mesher import NodedCell
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.mesh.submesh import Submesh, SubmeshesOfRank
 from feti_homog.parallel.distributed_arrays import scatter

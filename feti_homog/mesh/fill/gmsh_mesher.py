@@ -1,18 +1,26 @@
-"""The coarse periodic mesh of a cell that the program meshes."""
+"""The coarse periodic mesh of a cell that the program meshes: bare lines, nodes on them, tiles; filled."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from types import MappingProxyType
+
+import numpy as np
 
 from feti_homog.case.cell_section import Cell
 from feti_homog.case.mixed_cell import fractions_in_words, mixed_width
+from feti_homog.case.phase_names import VOID
 from feti_homog.errors import MeshError
 from feti_homog.fibres.arrange import arrange, listed_arrangement
 from feti_homog.fibres.arrangement import Arrangement
 from feti_homog.fibres.outlines.discs import Discs
 from feti_homog.fibres.outlines.ellipses import Ellipses
-from feti_homog.mesh.coarse_mesh import CoarseMesh
-from feti_homog.mesh.fill.unmeshed_cell import NO_MARKS, NodedCell, UnmeshedCell
+from feti_homog.mesh.coarse_mesh import CoarseMesh, representatives
+from feti_homog.mesh.outline.bare_outline import BareOutline, LineStations
+from feti_homog.mesh.outline.lines import IN_TILES
+from feti_homog.mesh.outline.outline import Outline
 from feti_homog.mesh.sizes.element_estimate import (
     MAX_TRIANGLES,
     MAX_TRIANGLES_OF_TILES,
@@ -21,10 +29,14 @@ from feti_homog.mesh.sizes.element_estimate import (
     triangles_of_a_tip,
 )
 from feti_homog.mesh.sizes.graded_size import MeshSizes
-from feti_homog.mesh.tiles.tiles import DEFAULT_TILES, TilePolicy, is_tiled
+from feti_homog.mesh.tiles.filling import Filling, Tile, arc_edges, fill
+from feti_homog.mesh.tiles.tile_torus import Regions
+from feti_homog.mesh.tiles.tiles import DEFAULT_TILES, TilePolicy, Tiling, cut, is_tiled, tiling
+from feti_homog.typing import Float, Int, Int32
 
 # Radius / width of the cell above which positions on a circle differ by more than rounding.
 SMALLEST_RADIUS = 1e-6
+NO_MARKS: Mapping[int, Sequence[float]] = MappingProxyType({})
 
 
 def generate(
@@ -59,7 +71,8 @@ def begin(
     Raises:
         MeshError: the fibres cannot be arranged, or there would be too many elements.
     """
-    sizes = _sizes(cell, marks)
+    interface = cell.mesh_size if cell.interface_size is None else cell.interface_size
+    sizes = MeshSizes(cell.mesh_size, interface, interface if cell.tip_size is None or not marks else cell.tip_size)
     estimate = ElementEstimate.of(cell, listed)
     tiled = estimate.fibres >= policy.least_discs if listed is None else is_tiled(listed, policy)
     most = MAX_TRIANGLES_OF_TILES if tiled else MAX_TRIANGLES
@@ -88,13 +101,6 @@ def begin(
     return mesh_outlines(arrangement, sizes, scale)
 
 
-def _sizes(cell: Cell, marks: Mapping[int, Sequence[float]]) -> MeshSizes:
-    """Return those that a cell of width 1 is asked for."""
-    interface = cell.mesh_size if cell.interface_size is None else cell.interface_size
-    tip = interface if cell.tip_size is None or not marks else cell.tip_size
-    return MeshSizes(cell.mesh_size, interface, tip)
-
-
 def arrangement_scale(cell: Cell, arrangement: Arrangement) -> float:
     """Lengths of the cell / those of the arrangement."""
     if cell.fibre_radius is not None:
@@ -116,3 +122,176 @@ def _refuse_extremes(estimate: ElementEstimate, sizes: MeshSizes, tips: int, mos
             f"[cell] {', '.join(given)}: about {count:.2g} elements before refine; expected at most {most}; "
             "refine splits them on the ranks"
         )
+
+
+@dataclass(frozen=True)
+class UnmeshedCell:
+    """A cell of round fibres before its lines have nodes.
+
+    Attributes:
+        arrangement: of the discs.
+        bare: its lines.
+        sizes: of elements.
+        tiles: those that it will be cut into; None if it is filled at once.
+        scale: as in `NodedCell`.
+    """
+
+    arrangement: Arrangement
+    bare: BareOutline
+    sizes: MeshSizes
+    tiles: Tiling | None
+    scale: float
+
+    @classmethod
+    def of(
+        cls,
+        arrangement: Arrangement,
+        sizes: MeshSizes,
+        marks: Mapping[int, Sequence[float]] = NO_MARKS,
+        scale: float = 1.0,
+        policy: TilePolicy = DEFAULT_TILES,
+    ) -> UnmeshedCell:
+        """Return the bare lines of round discs, and their tiles; see `gmsh_mesher.begin`."""
+        tiles = tiling(arrangement, sizes.largest, marks, policy)
+        if tiles is None:
+            bare = BareOutline.of(arrangement, sizes, marks)
+        else:
+            bare = BareOutline.of(arrangement, sizes, marks, tiles.bridges, IN_TILES)
+        return cls(arrangement, bare, sizes, tiles, scale)
+
+    @property
+    def phases(self) -> tuple[str, ...]:
+        """Return those of the mesh."""
+        return self.arrangement.phases
+
+    def with_nodes(self, stations: LineStations | None = None) -> NodedCell:
+        """Return the cell with these nodes on its lines, by default all placed here.
+
+        Raises:
+            MeshError: the lines would have too many.
+        """
+        lines = self.bare.outline(self.bare.stations() if stations is None else stations)
+        return NodedCell.of(self.arrangement, lines, self.sizes, self.tiles, self.scale)
+
+
+@dataclass(frozen=True)
+class NodedCell:
+    """A cell with nodes on its lines, before triangles are made.
+
+    Attributes:
+        arrangement: of the discs.
+        lines: its outline.
+        parts: tiles to fill, each with the numbers (n,) of its nodes in the outline.
+        scale: lengths of the mesh / those of the arrangement.
+    """
+
+    arrangement: Arrangement
+    lines: Outline
+    parts: tuple[tuple[Int, Tile], ...]
+    scale: float
+
+    @classmethod
+    def of(
+        cls, arrangement: Arrangement, lines: Outline, sizes: MeshSizes, tiles: Tiling | None, scale: float
+    ) -> NodedCell:
+        """Return the cell of an arrangement with this outline, cut into tiles."""
+        whole = Tile(lines.points, lines.curves, sizes.largest, sizes.are_graded(arrangement))
+        return cls(arrangement, lines, tuple(cut(lines, whole, tiles)), scale)
+
+    @property
+    def phases(self) -> tuple[str, ...]:
+        """Return those of the mesh."""
+        return self.arrangement.phases
+
+    def filled(self) -> CoarseMesh:
+        """Return the mesh, all tiles filled here."""
+        return self.mesh([fill(tile) for _, tile in self.parts])
+
+    def mesh(self, fillings: Sequence[Filling]) -> CoarseMesh:
+        """Return the mesh of which these are the filled tiles, in their order."""
+        arrangement, lines, scale = self.arrangement, self.lines, self.scale
+        points, triangles, circle = self._joined(fillings)
+        phase, precedence = self._within
+        void = len(self.phases)
+        arcs, arc_circle = arc_edges(lines.curves)
+        filled = CoarseMesh(
+            width=scale * arrangement.width,
+            height=scale * arrangement.height,
+            points=scale * points,
+            triangles=triangles,
+            phase=phase[circle],
+            phases=arrangement.phases,
+            precedence=precedence[circle],
+            representative=representatives(points, arrangement.width, arrangement.height),
+            ellipses=lines.ellipses.scaled(scale),
+            arc_edges=arcs,
+            arc_circle=arc_circle,
+            debonded_edges=np.zeros((0, 2), np.int32),
+            centres=scale * arrangement.centres[: arrangement.fibres],
+            remarks=arrangement.remarks,
+        )
+        return _without_voids(filled, void) if np.any(phase == void) else filled
+
+    @cached_property
+    def _within(self) -> tuple[Int32, Int32]:
+        """(k + 1,) the phase next within each circle, and the precedence, as in `CoarseMesh`.
+
+        The phase of a void is a number behind all; last are those of the matrix.
+        """
+        arrangement, lines = self.arrangement, self.lines
+        in_disc, in_ring = arrangement.within
+        within = [(in_ring if ring else in_disc)[disc] for disc, ring in zip(lines.disc, lines.is_coating, strict=True)]
+        place = {name: number for number, name in enumerate((*arrangement.phases, VOID))}
+        phase = np.array([place[name] for name in (*within, arrangement.phases[0])], np.int32)
+        precedence = arrangement.precedence(lines.disc, lines.is_coating)
+        return phase, np.append(precedence, 0).astype(np.int32)
+
+    @cached_property
+    def regions(self) -> Regions:
+        """Regions of the cell.  The matrix of round fibres is one: the plane without discs that do not touch."""
+        phase, precedence = self._within
+        solid = phase < len(self.phases)
+        _, first, constituent = np.unique(precedence[solid], return_index=True, return_inverse=True)
+        of_circle = np.full(len(phase), -1)
+        of_circle[solid] = constituent
+        return Regions(
+            width=self.scale * self.arrangement.width,
+            height=self.scale * self.arrangement.height,
+            scale=self.scale,
+            phases=self.phases,
+            ellipses=self.lines.ellipses.scaled(self.scale),
+            constituent=of_circle,
+            phase=phase[solid][first].astype(np.int64),
+            nodes=len(self.lines.points),
+        )
+
+    def _joined(self, fillings: Sequence[Filling]) -> tuple[Float, Int32, Int]:
+        """Nodes, those of the outline first, triangles and the circle around each."""
+        count, triangles = len(self.lines.points), []
+        for (nodes, _), filling in zip(self.parts, fillings, strict=True):
+            inner = np.arange(count, count + len(filling.inner))
+            triangles.append(np.concatenate([nodes, inner]).astype(np.int32)[filling.triangles])
+            count += len(filling.inner)
+        points = np.concatenate([self.lines.points, *(filling.inner for filling in fillings)])
+        return points, np.concatenate(triangles), np.concatenate([filling.circle for filling in fillings])
+
+
+def _without_voids(mesh: CoarseMesh, void: int) -> CoarseMesh:
+    """Return the mesh without the triangles of the phase number `void`.
+
+    The phase has no name in it; nodes that no other triangle has are left out.
+    """
+    kept = mesh.phase != void
+    used = np.zeros(len(mesh.points), bool)
+    used[mesh.triangles[kept]] = True
+    number = (np.cumsum(used) - 1).astype(np.int32)
+    points = mesh.points[used]
+    return replace(
+        mesh,
+        points=points,
+        triangles=number[mesh.triangles[kept]],
+        phase=mesh.phase[kept],
+        precedence=mesh.precedence[kept],
+        representative=representatives(points, mesh.width, mesh.height),
+        arc_edges=number[mesh.arc_edges],
+    )

@@ -58,11 +58,19 @@ def images(arrangement: Arrangement) -> tuple[Float, Int, Int]:
     outer, fibre = _outer_images(arrangement, size)
     coated = arrangement.coated[fibre]
     inner = np.column_stack([outer[:, :2], arrangement.radii[fibre]])[coated]
-    place = np.arange(len(outer)) + np.cumsum(coated) - coated
-    rank = np.concatenate([place, place[coated] + 1])
-    order = np.argsort(rank)
-    around = np.concatenate([np.full(len(outer), MATRIX), place[coated]])
-    return np.concatenate([outer, inner])[order], np.concatenate([fibre, fibre[coated]])[order], around[order]
+    order, owner, around = nested(fibre, coated)
+    return np.concatenate([outer, inner])[order], owner, around
+
+
+def nested(fibre: Int, coated: Bool) -> tuple[Int, Int, Int]:
+    """Return the order (k,) of outer curves, all (n,) before those within the coated (n,), from without one by one.
+
+    Also, in this order, their fibres (k,), and the curves around them (k,).
+    """
+    place = np.arange(len(fibre)) + np.cumsum(coated) - coated
+    order = np.argsort(np.concatenate([place, place[coated] + 1]))
+    around = np.concatenate([np.full(len(fibre), MATRIX), place[coated]])
+    return order, np.concatenate([fibre, fibre[coated]])[order], around[order]
 
 
 def _outer_images(arrangement: Arrangement, size: Float) -> tuple[Float, Int]:

@@ -9,8 +9,7 @@ from feti_homog.case.cell_section import Cell
 from feti_homog.fibres.arrange import arrange
 from feti_homog.fibres.arrangement import Arrangement
 from feti_homog.mesh.coarse_mesh import areas, double_arcs
-from feti_homog.mesh.fill.gmsh_mesher import generate
-from feti_homog.mesh.fill.unmeshed_cell import UnmeshedCell
+from feti_homog.mesh.fill.gmsh_mesher import UnmeshedCell, generate
 from feti_homog.mesh.mesh_fibres import fibre_circles
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.refinement import ReferenceLattice, refine
