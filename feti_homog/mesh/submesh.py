@@ -133,12 +133,13 @@ def cut_for_ranks(
 
     `pinned` is the key of the pinned class.
     """
+    whole = _whole(torus, pinned)
     for r in range(n_ranks):
         members = np.flatnonzero(table.rank[subdomain] == r)
         index, member = np.unique(subdomain[members], return_inverse=True)
         body = table.body[index]
         yield SubmeshesOfRank(
-            whole=_submesh(torus, members, pinned),
+            whole=part(whole, members),
             member=member,
             index=index,
             body=body,
@@ -150,8 +151,9 @@ def cut_bodies(torus: Torus, members: Int) -> Iterator[Submesh]:
     """Yield the triangles `members` (m,) as a submesh for each constituent that has some; none is pinned."""
     order = members[np.argsort(torus.constituent[members], kind="stable")]
     ends = np.flatnonzero(np.diff(torus.constituent[order])) + 1
+    whole = _whole(torus, -1)
     for own in np.split(order, ends) if len(order) else ():
-        yield replace(_submesh(torus, own, -1), body=int(torus.constituent[own[0]]))
+        yield replace(part(whole, own), body=int(torus.constituent[own[0]]))
 
 
 def part(submesh: Submesh, members: Int) -> Submesh:
@@ -211,39 +213,30 @@ def pinning(torus: Torus, unfit: Int) -> list[tuple[int, float, int]]:
     return [(int(unfit[k]), float(distance[k]), int(torus.class_keys[k])) for k in best]
 
 
-def _submesh(torus: Torus, members: Int, pinned: int) -> Submesh:
-    """Return the triangles `members` (t,) as one submesh, of no body and phase.
-
-    `pinned` is the key of the pinned class.
-    """
+def _whole(torus: Torus, pinned: int) -> Submesh:
+    """Return all triangles as one submesh, of no body and phase; `pinned` is the key of the pinned class."""
     mesh = torus.mesh
-    vertices, triangles = np.unique(mesh.triangles[members], return_inverse=True)
-    edges, triangle_edges = np.unique(torus.triangle_edges[members], return_inverse=True)
-    ends = np.searchsorted(vertices, torus.edges[edges])
-    triangles, triangle_edges = triangles.reshape(-1, 3), triangle_edges.reshape(-1, 3)
-    classes, vertex_class = np.unique(torus.node_class[vertices], return_inverse=True)
-    torus_edges, edge_class = np.unique(torus.torus_edge[edges], return_inverse=True)
-    pinned_here = np.flatnonzero(torus.class_keys[classes] == pinned)
+    pinned_here = np.flatnonzero(torus.class_keys == pinned)
     return Submesh(
         index=0,
         body=0,
         phase="",
-        constituent=torus.constituent[members],
-        points=mesh.points[vertices],
-        triangles=triangles,
-        triangle_edges=triangle_edges,
-        backwards=ends[triangle_edges, 0] != triangles,
-        edges=ends,
-        circles=torus.edge_circles[edges],
-        turns=torus.edge_turns[edges],
-        vertex_class=vertex_class,
-        edge_class=edge_class,
-        at_void=torus.at_void[torus_edges],
-        debonded=torus.debonded[torus_edges],
-        touching=torus.touching[classes],
-        class_keys=torus.class_keys[classes],
-        edge_keys=torus.edge_keys[torus_edges],
-        period=np.array([mesh.width, mesh.height]),
+        constituent=torus.constituent,
+        points=mesh.points,
+        triangles=mesh.triangles.astype(np.int64),
+        triangle_edges=torus.triangle_edges,
+        backwards=torus.edges[torus.triangle_edges, 0] != mesh.triangles,
+        edges=torus.edges,
+        circles=torus.edge_circles,
+        turns=torus.edge_turns,
+        vertex_class=torus.node_class,
+        edge_class=torus.torus_edge,
+        at_void=torus.at_void,
+        debonded=torus.debonded,
+        touching=torus.touching,
+        class_keys=torus.class_keys,
+        edge_keys=torus.edge_keys,
+        period=mesh.period,
         pinned=int(pinned_here[0]) if len(pinned_here) else -1,
     )
 

@@ -67,8 +67,7 @@ def outline(
     # Vertices within coatings are as far from each other as those on the ellipse around, which they face, or marked.
     sparse = (around != MATRIX) & ~np.isin(curve, list(marks))
     outer = np.concatenate([border, ends[away & ~sparse[which]]])
-    tips = _tips(arrangement, inner, marks, numbering.vertices)
-    field = _size_field(arrangement, inner, sizes, outer, sharp, tips)
+    field = _size_field(arrangement, inner, sizes, outer, sharp, _tips(arrangement, inner, marks, numbering.vertices))
     refuse_many(field.at, field.least, size)
     find = partial(_ellipse_at, ellipses)
     curves = [side_curves(axis, places[axis], find, around, size, field, numbering, WHOLE) for axis in (0, 1)]
