@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 
 from feti_homog.case.phase_names import COATING, MATRIX, VOID
-from feti_homog.fibres.outlines.discs import Discs
+from feti_homog.fibres.outlines.ellipses import Discs
 from feti_homog.fibres.outlines.outlines import Outlines
 from feti_homog.typing import Bool, Float, Int
 

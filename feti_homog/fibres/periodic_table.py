@@ -11,7 +11,7 @@ from feti_homog.case.fibre_table import FibreTable
 from feti_homog.errors import MeshError
 from feti_homog.fibres import cut_window
 from feti_homog.fibres.arrangement import Arrangement, clear_shift, clearance
-from feti_homog.fibres.outlines.discs import Discs
+from feti_homog.fibres.outlines.ellipses import Discs
 from feti_homog.fibres.outlines.outlines import Outlines, directions
 from feti_homog.fibres.outlines.shapes import SHAPES, with_parts
 from feti_homog.fibres.torus_pairs import neighbours

@@ -1,36 +1,33 @@
-"""Outlines of any convex shape: sums of a polygon and an ellipse."""
+"""Outlines of any convex shape: sums of a polygon and an ellipse; among them rounded polygons."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 
 from feti_homog.fibres.outlines.ellipses import Ellipses
-from feti_homog.fibres.outlines.outlines import directions, widest
+from feti_homog.fibres.outlines.outlines import Column, Columns, ConvexCurves, directions, widest
 from feti_homog.typing import Bool, Float, Int
 
 # Points of each outline from which distances are taken.
 POINTS = 256
+# The fewest and the most sides.
+SIDES = 3, 12
 
 
 @dataclass(frozen=True)
-class ConvexSums:
+class ConvexSums(ConvexCurves):
     """The k sums c + V + F D of convex hulls V and the unit disc D, as `Outlines`.
 
     V is that of `cores` (k, m, 2), about the origin; `frames` F (k, 2, 2); `centres` c (k, 2). The core of circles and
     ellipses is the origin, one of fewer corners than m repeats one of them.
     """
 
-    centres: Float
     cores: Float
     frames: Float
-
-    def __len__(self) -> int:
-        return len(self.centres)
-
-    def __getitem__(self, rows: Int | Bool) -> ConvexSums:
-        return ConvexSums(self.centres[rows], self.cores[rows], self.frames[rows])
 
     @property
     def radii(self) -> Float:
@@ -53,18 +50,6 @@ class ConvexSums:
         axes = np.broadcast_to([[-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0]], (len(self), 4, 2))
         return self.support(axes).reshape(-1, 2, 2)
 
-    def at(self, centres: Float) -> ConvexSums:
-        """See `Outlines`."""
-        return replace(self, centres=centres)
-
-    def per(self, unit: float) -> ConvexSums:
-        """See `Outlines`."""
-        return ConvexSums(self.centres / unit, self.cores / unit, self.frames / unit)
-
-    def rounded(self, decimals: int) -> ConvexSums:
-        """See `Outlines`."""
-        return ConvexSums(*(each.round(decimals) for each in (self.centres, self.cores, self.frames)))
-
     def grown(self, thickness: Float) -> ConvexSums:
         """See `Outlines`."""
         frames, some = self.frames.copy(), thickness > 0
@@ -73,11 +58,6 @@ class ConvexSums:
         round_ = some & ~is_sharp
         frames[round_] = Ellipses(self.centres[round_], frames[round_]).grown(thickness[round_]).frames
         return replace(self, frames=frames)
-
-    def joined(self, others: ConvexSums) -> ConvexSums:
-        """See `Outlines`; for cores of as many corners."""
-        pairs = ((self.centres, others.centres), (self.cores, others.cores), (self.frames, others.frames))
-        return ConvexSums(*(np.concatenate(pair) for pair in pairs))
 
     def support(self, normal: Float) -> Float:
         """(k, ...) max_v v . n + |F^T n| for unit vectors n (k, ..., 2), as in `Outlines`."""
@@ -129,3 +109,38 @@ class ConvexSums:
         on_side = steps[shape, place] > 1
         across[on_side] /= length[shape, place][on_side][:, None]
         return points[shape, place] + moved, np.where(on_side[:, None], across, normal[place]), shape
+
+
+class PolygonalRows:
+    """Rows with `sides`, as `Shape`.
+
+    Regular polygons of that circumradius, the first corner at `angle`, rounded by circles that touch both sides at a
+    corner; `corner` is their radius / that of the circle within the sides.
+    """
+
+    name, sizes, has_tips = "polygons", ("radius",), False
+    columns = MappingProxyType({"sides": Column(0.0, least=0.0), "corner": Column(0.0, least=0.0)})
+
+    def given(self, rows: Columns) -> Bool:
+        """(N,) which rows have it."""
+        return np.asarray(rows["sides"] != 0)
+
+    def faults(self, rows: Columns) -> Iterator[tuple[Bool, str]]:
+        """See `Shape`."""
+        (least, most), sides, corner, given = SIDES, rows["sides"], rows["corner"], self.given(rows)
+        are_odd = given & ((sides != np.round(sides)) | (sides < least) | (sides > most))
+        yield are_odd, f"expected sides from {least} to {most}, a whole number, or 0"
+        yield given & (corner > 1), "expected corner at most 1, which makes a circle"
+        yield ~given & (corner > 0), "has a corner, but no sides"
+        for name in ("a", "coating", "inner_radius"):
+            yield given & (np.nan_to_num(rows[name]) > 0), f"has sides and {name}; give one"
+
+    def outlines(self, rows: Columns, centres: Float) -> ConvexSums:
+        """See `Shape`."""
+        sides, radius = np.maximum(rows["sides"].astype(np.intp), SIDES[0]), rows["radius"]
+        rounding = rows["corner"] * radius * np.cos(np.pi / sides)
+        # Corners of the polygon of the centres of the rounding circles.
+        core = radius - rounding / np.cos(np.pi / sides)
+        corner = np.minimum(np.arange(sides.max()), sides[:, None] - 1)
+        turn = np.radians(rows["angle"])[:, None] + 2 * np.pi * corner / sides[:, None]
+        return ConvexSums(centres, core[:, None, None] * directions(turn), rounding[:, None, None] * np.eye(2))

@@ -1,15 +1,15 @@
-"""Ellipses as affine images of the unit circle: points, tangency with lines, curvature, and distances."""
+"""Discs, and ellipses as affine images of the unit circle: points, tangency with lines, curvature, and distances."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
 
-from feti_homog.fibres.outlines.outlines import Column, Columns, directions, widest
-from feti_homog.typing import Bool, Float, Int, Int32
+from feti_homog.fibres.outlines.outlines import Column, Columns, ConvexCurves, directions, widest
+from feti_homog.typing import Bool, Float, Int
 
 # Relative difference of the squares of semi-axes of a circle.
 SAME_AXES = 1e-12
@@ -18,10 +18,9 @@ THINNEST = 0.05
 
 
 @dataclass(frozen=True)
-class Ellipses:
+class Ellipses(ConvexCurves):
     """The k images c + F p of the unit circle |p| = 1, as `Outlines`; `centres` (k, 2), `frames` (k, 2, 2)."""
 
-    centres: Float
     frames: Float
 
     @classmethod
@@ -39,8 +38,7 @@ class Ellipses:
     @property
     def circles(self) -> Float:
         """(k, 3) centre and radius; that of ellipses which are not round is NaN."""
-        radius = np.sqrt(np.abs(np.linalg.det(self.frames)))
-        return np.column_stack([self.centres, np.where(self.are_round, radius, np.nan)])
+        return np.column_stack([self.centres, np.where(self.are_round, self.radii, np.nan)])
 
     @property
     def cores(self) -> Float:
@@ -57,37 +55,10 @@ class Ellipses:
         """See `Outlines`."""
         return np.repeat(self.reach[:, :, None], 2, axis=2)
 
-    def at(self, centres: Float) -> Ellipses:
-        """See `Outlines`."""
-        return Ellipses(centres, self.frames)
-
-    def per(self, unit: float) -> Ellipses:
-        """See `Outlines`."""
-        return Ellipses(self.centres / unit, self.frames / unit)
-
-    def rounded(self, decimals: int) -> Ellipses:
-        """See `Outlines`."""
-        return Ellipses(self.centres.round(decimals), self.frames.round(decimals))
-
-    def joined(self, others: Ellipses) -> Ellipses:
-        """See `Outlines`."""
-        pairs = (self.centres, others.centres), (self.frames, others.frames)
-        return Ellipses(*(np.concatenate(pair) for pair in pairs))
-
     def grown(self, thickness: Float) -> Ellipses:
         """Ellipses whose semi-axes are longer by `thickness` (k,)."""
         lengths = np.linalg.norm(self.frames, axis=1)
         return Ellipses(self.centres, self.frames * (1 + thickness[:, None] / lengths)[:, None])
-
-    def scaled(self, factor: float) -> Ellipses:
-        """All lengths multiplied."""
-        return Ellipses(factor * self.centres, factor * self.frames)
-
-    def __len__(self) -> int:
-        return len(self.centres)
-
-    def __getitem__(self, rows: Int | Int32 | Bool) -> Ellipses:
-        return Ellipses(self.centres[rows], self.frames[rows])
 
     @property
     def squares(self) -> Float:
@@ -213,3 +184,48 @@ class EllipticRows:
     def outlines(self, rows: Columns, centres: Float) -> Ellipses:
         """See `Shape`."""
         return Ellipses.of(centres, rows["a"], rows["b"], rows["angle"])
+
+
+@dataclass(frozen=True)
+class Discs(ConvexCurves):
+    """k of them, as `Outlines`; `centres` (k, 2), `radii` (k,)."""
+
+    radii: Float
+
+    @property
+    def cores(self) -> Float:
+        """The origin."""
+        return np.zeros((len(self), 1, 2))
+
+    @property
+    def frames(self) -> Float:
+        """See `Outlines`."""
+        return np.asarray(self.radii[:, None, None] * np.eye(2))
+
+    @property
+    def longest(self) -> Float:
+        """The radii."""
+        return self.radii
+
+    @property
+    def extents(self) -> Float:
+        """The radii."""
+        return np.broadcast_to(self.radii[:, None, None], (len(self), 2, 2))
+
+    def grown(self, thickness: Float) -> Discs:
+        """See `Outlines`."""
+        return replace(self, radii=self.radii + thickness)
+
+    def support(self, normal: Float) -> Float:
+        """See `Outlines`."""
+        return np.broadcast_to(self.radii.reshape(-1, *[1] * (normal.ndim - 2)), normal.shape[:-1])
+
+    def parting(self, first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
+        """Gaps as in `Outlines`: along the vectors, or along x where that is 0."""
+        length = np.linalg.norm(vector, axis=1)
+        normal = np.where(length[:, None] > 0, vector / np.maximum(length, 1e-300)[:, None], [1.0, 0.0])
+        return normal, self.radii[first] + self.radii[second]
+
+    def distances(self, offsets: Float) -> Float:
+        """See `Outlines`."""
+        return np.asarray(np.abs(np.linalg.norm(offsets, axis=2) - self.radii))

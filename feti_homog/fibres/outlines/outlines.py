@@ -1,13 +1,14 @@
-"""Protocols of the outlines of fibres and of the shapes of rows."""
+"""Protocols of the outlines of fibres and of the shapes of rows, and what curves of any shape have alike."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, fields, replace
 from typing import NamedTuple, Protocol, Self
 
 import numpy as np
 
-from feti_homog.typing import Bool, Float, Int
+from feti_homog.typing import Bool, Float, Int, Int32
 
 # Directions in which the distance of two outlines is first looked for, and how often the best are looked between.
 DIRECTIONS, ZOOMS, ZOOM = 180, 12, 9
@@ -76,6 +77,44 @@ class Outlines(Protocol):
 
         About, of those that are not round.
         """
+
+
+@dataclass(frozen=True)
+class ConvexCurves:
+    """Curves about the centres (k, 2), given by the rows of all fields: what `Outlines` of any shape have alike."""
+
+    centres: Float
+
+    def __len__(self) -> int:
+        return len(self.centres)
+
+    def __getitem__(self, rows: Int | Int32 | Bool) -> Self:
+        return self._each(lambda array: array[rows])
+
+    def at(self, centres: Float) -> Self:
+        """See `Outlines`."""
+        return replace(self, centres=centres)
+
+    def per(self, unit: float) -> Self:
+        """See `Outlines`."""
+        return self._each(lambda array: array / unit)
+
+    def scaled(self, factor: float) -> Self:
+        """All lengths multiplied."""
+        return self._each(lambda array: factor * array)
+
+    def rounded(self, decimals: int) -> Self:
+        """See `Outlines`."""
+        return self._each(lambda array: array.round(decimals))
+
+    def joined(self, others: Self) -> Self:
+        """See `Outlines`; cores need as many corners."""
+        return self._each(lambda *arrays: np.concatenate(arrays), others)
+
+    def _each(self, function: Callable[..., Float], *others: Self) -> Self:
+        """Apply a function to each field, or to that of several curves together."""
+        names = [field.name for field in fields(self)]
+        return type(self)(*(function(*(getattr(each, name) for each in (self, *others))) for name in names))
 
 
 class Column(NamedTuple):

@@ -6,11 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from feti_homog.fibres.outlines.convex_sums import ConvexSums
-from feti_homog.fibres.outlines.discs import Discs
-from feti_homog.fibres.outlines.ellipses import Ellipses, EllipticRows
+from feti_homog.fibres.outlines.convex_sums import ConvexSums, PolygonalRows
+from feti_homog.fibres.outlines.ellipses import Discs, Ellipses, EllipticRows
 from feti_homog.fibres.outlines.outlines import Columns, Outlines, Shape
-from feti_homog.fibres.outlines.polygons import PolygonalRows
 from feti_homog.typing import Bool, Float
 
 SHAPES: tuple[Shape, ...] = (EllipticRows(), PolygonalRows())

@@ -15,8 +15,7 @@ from feti_homog.case.phase_names import VOID
 from feti_homog.errors import MeshError
 from feti_homog.fibres.arrange import arrange, listed_arrangement
 from feti_homog.fibres.arrangement import Arrangement
-from feti_homog.fibres.outlines.discs import Discs
-from feti_homog.fibres.outlines.ellipses import Ellipses
+from feti_homog.fibres.outlines.ellipses import Discs, Ellipses
 from feti_homog.mesh.coarse_mesh import CoarseMesh, representatives
 from feti_homog.mesh.outline.bare_outline import BareOutline, LineStations
 from feti_homog.mesh.outline.lines import IN_TILES

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import QhullError
 
 from feti_homog.fibres.arrangement import Arrangement
-from feti_homog.fibres.outlines.discs import Discs
+from feti_homog.fibres.outlines.ellipses import Discs
 from feti_homog.mesh.outline.bridges import CLEAR, Bridges, bridges, centre_lines
 from feti_homog.mesh.outline.curves import MATRIX, OUTSIDE
 from feti_homog.mesh.outline.outline import Outline, crossings, disc_at, images, on_side

@@ -12,7 +12,7 @@ from feti_homog.case.cell_section import Cell
 from feti_homog.errors import MeshError
 from feti_homog.fibres.arrange import arrange
 from feti_homog.fibres.cut_window import LEAST_GAP, MOST_GAP, moves
-from feti_homog.fibres.outlines.discs import Discs
+from feti_homog.fibres.outlines.ellipses import Discs
 
 SIZE = np.array([1.0, 1.0])
 
