@@ -5,7 +5,7 @@ import signal
 import sys
 
 from feti_homog.errors import FetiHomogError
-from feti_homog.runtime import limits
+from feti_homog.runtime import process_memory
 from feti_homog.runtime.environment import prepare
 from feti_homog.runtime.standard_streams import complain, launched_rank
 
@@ -16,7 +16,7 @@ def main() -> int:
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # until the program listens, Ctrl-C ends it without a traceback
     try:
-        limits.require()
+        process_memory.require_limits()
     except FetiHomogError as error:
         rank = launched_rank()  # others may have other limits
         complain(*(f"error: {f'rank {rank}: ' if rank else ''}{fault}" for fault in error.faults))

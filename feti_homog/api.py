@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING, Any
 from feti_homog.case.case import Case
 from feti_homog.errors import EXIT_DONE, CaseError, LibraryError
 from feti_homog.petsc import libraries
-from feti_homog.petsc.command_words import named_values, petsc_words, split_argv
 from feti_homog.petsc.option_table import unknown_to_petsc
-from feti_homog.petsc.option_values import faulty_values
+from feti_homog.petsc.option_values import faulty_values, named_values, petsc_words, split_argv
 from feti_homog.runtime import standard_streams
 from feti_homog.runtime.environment import ignore_settings_of_the_folder, prefer_own_toolkits
 from feti_homog.runtime.standard_streams import end_on_signals, launched_rank

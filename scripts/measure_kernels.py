@@ -19,7 +19,7 @@ from scipy.linalg.lapack import dtrtri
 from scipy.sparse import csr_matrix, diags, kronsum
 
 from feti_homog.feti import thresholds
-from feti_homog.feti.linalg.dense_cholesky import full_from_lower
+from feti_homog.feti.linalg.dense_matrices import full_from_lower
 from feti_homog.feti.linalg.distributed_solver import DistributedSolver
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
 

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from feti_homog.analysis.result_records import TipRates, Tips
-from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
+from feti_homog.feti.decomposition.neighbours import InterfaceNeighbours
 from feti_homog.homogenization.averaging import Homogenization, Response
 from feti_homog.homogenization.energy_release import EnergyReleaseRates
 from feti_homog.homogenization.unit_cell import TornCell

@@ -16,8 +16,7 @@ from feti_homog.commands import listed_fibres
 from feti_homog.errors import CaseError
 from feti_homog.fibres.hard_core import hard_core
 from feti_homog.microstructure.fibre_pattern import FibrePattern
-from feti_homog.microstructure.statistics import SECTORS, FibreStatistics, measure, poisson
-from feti_homog.microstructure.voronoi_cells import VoronoiCells
+from feti_homog.microstructure.statistics import SECTORS, FibreStatistics, VoronoiCells, measure, poisson
 from feti_homog.results import atomic, output_folder
 from feti_homog.typing import Array, Float
 

@@ -26,8 +26,8 @@ from feti_homog.feti.decomposition.shared_entities import SharedEntities
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.feti.krylov import ActiveRows, Krylov
-from feti_homog.feti.operators.implicit import CondensedLoads
 from feti_homog.feti.operators.interface_operators import DualOperator
+from feti_homog.feti.operators.one_subdomain import CondensedLoads
 from feti_homog.feti.thresholds import DEFAULTS, MAX_RESTARTS, Thresholds
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.runtime import process_memory

@@ -18,7 +18,7 @@ MODULES = {
     "square": "arrange",
     "hexagonal": "arrange",
     "random": "hard_core",
-    "matched": "matched_arrangement",
+    "matched": "hard_core",
     "table": "periodic_table",
 }
 """Module of this package whose function NAME_arrangement makes each; it is imported when a cell asks for it."""
@@ -29,7 +29,7 @@ def arrange(cell: Cell) -> Arrangement:
 
     square: one disc in the middle of a 1 x 1 cell. hexagonal: 1 x sqrt(3), a disc in the middle and one at
     the corner. random: discs in a 1 x 1 cell, see `hard_core.random_arrangement`, with
-    `cell.match` see `matched_arrangement`. table: see `periodic_table.table_arrangement`.
+    `cell.match` see `hard_core.matched_arrangement`. table: see `periodic_table.table_arrangement`.
 
     Raises:
         MeshError: discs of that fraction touch, no arrangement is found, or the table is faulty.

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.optimize import nnls
 
 from feti_homog.errors import MeshError
+from feti_homog.fibres.arrangement import neighbours
 from feti_homog.fibres.outlines.outlines import Outlines
-from feti_homog.fibres.torus_pairs import neighbours
 from feti_homog.typing import Float, Int
 
 # Gap / sum of the radii of fibres across the border, at least and at most.

@@ -10,11 +10,10 @@ from feti_homog.case.cell_section import Cell
 from feti_homog.case.fibre_table import FibreTable
 from feti_homog.errors import MeshError
 from feti_homog.fibres import cut_window
-from feti_homog.fibres.arrangement import Arrangement, clear_shift, clearance
+from feti_homog.fibres.arrangement import Arrangement, clear_shift, clearance, neighbours
 from feti_homog.fibres.outlines.ellipses import Discs
 from feti_homog.fibres.outlines.outlines import Outlines, directions
 from feti_homog.fibres.outlines.shapes import SHAPES, with_parts
-from feti_homog.fibres.torus_pairs import neighbours
 from feti_homog.typing import Bool, Float, Int
 
 # Relative to the radius: rows nearer than this, or a period apart to this, are one fibre.

@@ -13,7 +13,7 @@ import numpy as np
 from mpi4py import MPI
 
 from feti_homog.errors import ConvergenceError
-from feti_homog.feti.operators.node_blocks import NodeBlocks
+from feti_homog.feti.decomposition.jump_operator import NodeBlocks
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.rubbing_bonds import energy_beside_springs, slipped

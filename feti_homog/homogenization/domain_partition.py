@@ -201,7 +201,7 @@ def match_distance(case: Case, width: float, height: float, centres: Float, radi
     window = case.cell.matched
     if window is None:
         return None
-    from feti_homog.fibres.matched_arrangement import distance_of  # with statistics of neighbours
+    from feti_homog.fibres.hard_core import distance_of  # with statistics of neighbours
 
     return distance_of(window, width, height, centres, radii)
 

@@ -15,7 +15,7 @@ from typing import TypeVar
 import numpy as np
 from scipy.spatial import cKDTree
 
-from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
+from feti_homog.feti.decomposition.neighbours import InterfaceNeighbours
 from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.crack_extension import (
     CrackExtension,

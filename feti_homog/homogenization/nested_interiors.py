@@ -12,8 +12,8 @@ import numpy as np
 
 from feti_homog.fem.assembly import assemble
 from feti_homog.feti.decomposition.subdomain import Subdomain
-from feti_homog.feti.operators.implicit import Interior
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
+from feti_homog.feti.operators.one_subdomain import Interior
 from feti_homog.homogenization.uniform_parts import UniformPart
 from feti_homog.mesh.refinement import FineMesh, ReferenceLattice, joined, refine
 from feti_homog.typing import Float, Int

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from feti_homog.errors import EXIT_DEFECT, LibraryError
-from feti_homog.runtime import limits
+from feti_homog.runtime import process_memory
 from feti_homog.runtime.standard_streams import complain
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def start_petsc(words: Sequence[str], comm: Intracomm) -> None:
     from petsc4py import PETSc
 
     atexit.register(_end_petsc, comm)
-    if limits.limits_addresses():
+    if process_memory.limits_addresses():
         _reserve_buffers()
     options = PETSc.Options()
     if not options.hasName("options_left"):

@@ -1,4 +1,4 @@
-"""The memory of the process."""
+"""The memory of the process, and limits under which the program would hang or crash without a word."""
 
 from __future__ import annotations
 
@@ -7,8 +7,12 @@ import resource
 from contextlib import suppress
 from pathlib import Path
 
+from feti_homog.errors import FetiHomogError
+
 # Writing 5 to this file resets the peak of resident memory; see proc(5).
 CLEAR_REFS, RESET_PEAK = Path("/proc/self/clear_refs"), "5"
+# Bytes: of a stack, with a quarter of which MPI does not start; of the addresses of a small run on one rank.
+STACK, ADDRESSES = 1 << 20, 1 << 30
 
 
 def trim() -> None:
@@ -26,3 +30,24 @@ def forget_peak(clear_refs: Path = CLEAR_REFS) -> None:
     trim()
     with suppress(OSError):
         clear_refs.write_text(RESET_PEAK)
+
+
+def require_limits() -> None:
+    """Check the limits of the stack and of addresses, before libraries are loaded.
+
+    Raises:
+        FetiHomogError: one is too small; a line for each.
+    """
+    least = (("stack (ulimit -s)", resource.RLIMIT_STACK, STACK), ("memory (ulimit -v)", resource.RLIMIT_AS, ADDRESSES))
+    faults = [
+        f"the {name} of the process is limited to {limit >> 10} KiB; expected at least {needed >> 10} KiB"
+        for name, kind, needed in least
+        if (limit := resource.getrlimit(kind)[0]) != resource.RLIM_INFINITY and limit < needed
+    ]
+    if faults:
+        raise FetiHomogError(*faults)
+
+
+def limits_addresses() -> bool:
+    """Return whether the process may have so many addresses only."""
+    return resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY

@@ -13,9 +13,8 @@ from support.cases import make_case, relative_error, solve
 
 from feti_homog.case import sections
 from feti_homog.errors import CaseError
-from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
-from feti_homog.feti.operators.implicit import ImplicitInterfaceOperator
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
+from feti_homog.feti.operators.one_subdomain import ExplicitInterfaceOperator, ImplicitInterfaceOperator
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.homogenization import unit_cell
 from feti_homog.homogenization.partition_policy import PartitionPolicy, wanted_pieces

@@ -22,8 +22,8 @@ from scipy.sparse import csr_matrix
 
 from feti_homog.fem.problem import Problem
 from feti_homog.feti.decomposition.subdomain import Subdomain
-from feti_homog.feti.linalg.schur_complement import schur_complement
-from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
+from feti_homog.feti.linalg.dense_matrices import schur_complement
+from feti_homog.feti.operators.one_subdomain import ExplicitInterfaceOperator
 from feti_homog.feti.thresholds import DEFAULTS, MIN_FACE_NODES, Thresholds
 from feti_homog.mesh.periodic_topology import components, edge_pairs
 from feti_homog.mesh.refinement import ReferenceLattice

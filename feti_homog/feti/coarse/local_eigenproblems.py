@@ -22,7 +22,7 @@ from scipy.sparse import csr_matrix
 
 from feti_homog.feti.coarse.face_neighbourhoods import face_neighbourhoods, trace_space
 from feti_homog.feti.decomposition.subdomain import Subdomain
-from feti_homog.feti.linalg.dense_cholesky import cholesky
+from feti_homog.feti.linalg.dense_matrices import cholesky
 from feti_homog.feti.operators.with_springs import BoundaryOperator, DenseOperator, is_dense
 from feti_homog.feti.thresholds import DEFAULTS, SINGLE_PRECISION_NULL, Thresholds
 from feti_homog.typing import Float, Float32, Int

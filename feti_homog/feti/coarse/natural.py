@@ -9,8 +9,8 @@ from mpi4py import MPI
 from scipy.sparse import block_diag, csc_matrix, csr_matrix, diags
 
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
-from feti_homog.feti.linalg.distributed_matrix import assemble_owned_rows
 from feti_homog.feti.linalg.distributed_solver import DistributedSolver
+from feti_homog.feti.linalg.sparse_matrices import assemble_owned_rows
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.thresholds import UNCONSTRAINED_EIGENVALUE
 from feti_homog.mesh.periodic_topology import components

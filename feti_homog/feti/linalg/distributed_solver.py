@@ -7,8 +7,8 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
-from feti_homog.feti.linalg.distributed_matrix import assemble_distributed, gathered_sum
 from feti_homog.feti.linalg.sparse_direct import factored, is_direct, power_of_two, sequential, solve_columns
+from feti_homog.feti.linalg.sparse_matrices import assemble_distributed, gathered_sum
 from feti_homog.feti.thresholds import (
     CHOLMOD_COLUMNS_ONE_BY_ONE,
     MUMPS_COLUMNS_ONE_BY_ONE,

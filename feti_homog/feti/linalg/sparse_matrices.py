@@ -1,12 +1,15 @@
-"""Sparse matrices: sums of dense blocks, and symmetric scaling."""
+"""Sparse matrices: sums of dense blocks, symmetric scaling, and sums over ranks whose rows belong to one rank each."""
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import csr_matrix
+from mpi4py import MPI
+from petsc4py import PETSc
+from scipy.sparse import csr_matrix, diags
 
 from feti_homog.feti.thresholds import MAX_BUFFERED_ENTRIES
-from feti_homog.typing import Float, Int, Int32
+from feti_homog.parallel.distributed_arrays import allgather_rows
+from feti_homog.typing import Bool, Float, Int, Int32
 
 
 class DenseBlockSum:
@@ -57,3 +60,106 @@ def scaled(A: csr_matrix, weights: Float) -> csr_matrix:
     data = A.data * weights[A.indices] * np.repeat(weights, np.diff(A.indptr))
     # Indices of its own: sorting one matrix must not shuffle the other.
     return csr_matrix((data, A.indices.copy(), A.indptr.copy()), shape=A.shape)
+
+
+def assemble_owned_rows(
+    comm: MPI.Intracomm, local: csr_matrix, rows: Int, columns: Int, owned: tuple[int, int]
+) -> csr_matrix:
+    """Return the owned rows of the sum over ranks of `local`. Collective.
+
+    Args:
+        local: (r, c) this rank's contribution.
+        rows, columns: (r,) and (c,) global numbers of its rows and columns.
+        owned: numbers of rows and columns that this rank owns.
+
+    Returns:
+        (owned rows, all columns).
+    """
+    A = _assemble(comm, local, rows, columns, owned)
+    indptr, indices, values = A.getValuesCSR()
+    sizes = A.getLocalSize()[0], A.getSize()[1]
+    A.destroy()
+    return csr_matrix((values, indices, indptr), shape=sizes)
+
+
+def gathered_sum(comm: MPI.Intracomm, part: csr_matrix, unknowns: Int, total: int) -> csr_matrix:
+    """Return the sum (n, n) over ranks of `part` (u, u) in the `unknowns` (u,), the same on every rank.  Collective."""
+    entries = part.tocoo()
+    own = unknowns[entries.row], unknowns[entries.col], entries.data
+    rows, columns, values = (np.concatenate(parts) for parts in zip(*comm.allgather(own), strict=True))
+    return csr_matrix((values, (rows, columns)), shape=(total, total))
+
+
+def add_shared_rows(comm: MPI.Intracomm, local: csr_matrix, rows: Int, is_shared_row: Bool, owned: int) -> csr_matrix:
+    """`local` with what other ranks have in the same rows added.  Collective.
+
+    Args:
+        local: (r, n) this rank's contribution, with the same n columns on every rank.
+        rows: (r,) global numbers of its rows.
+        is_shared_row: (r,) whether other ranks have the row too; only these travel.
+        owned: number of rows that this rank owns.
+
+    Returns:
+        (r, n) the same rows of the sum over ranks.
+    """
+    if comm.size == 1:
+        return local
+    shared, n = local[is_shared_row], local.shape[1]
+    used, indices = np.unique(shared.indices, return_inverse=True)
+    narrow = csr_matrix((shared.data, indices, shared.indptr), shape=(shared.shape[0], len(used)))
+    A = _assemble(comm, narrow, rows[is_shared_row], used, (owned, _even_share(comm, n)))
+    # In descending order: PETSc 3.18 mixes up the columns if every rank asks for all rows in ascending order.
+    wanted = PETSc.IS().createGeneral(rows[is_shared_row][::-1].astype(PETSc.IntType), comm=PETSc.COMM_SELF)
+    all_columns = PETSc.IS().createStride(n, 0, 1, comm=PETSc.COMM_SELF)
+    sums = A.createSubMatrices(wanted, all_columns)[0]
+    indptr, indices, data = sums.getValuesCSR()
+    for petsc_object in (sums, A, wanted, all_columns):
+        petsc_object.destroy()
+    at = np.flatnonzero(is_shared_row)[::-1]
+    place = csr_matrix((np.ones(len(at)), (at, np.arange(len(at)))), shape=(len(rows), len(at)))
+    unshared = diags((~is_shared_row).astype(float)) @ local
+    return unshared + place @ csr_matrix((data, indices, indptr), shape=(len(at), n))
+
+
+def assemble_distributed(comm: MPI.Intracomm, part: csr_matrix, numbers: Int, total: int) -> PETSc.Mat:
+    """(n, n) the sum over ranks of parts (k, k), as a matrix whose rows the ranks share evenly.  Collective.
+
+    Rows and columns of the parts have these numbers (k,).
+    """
+    share = _even_share(comm, total)
+    return _assemble(comm, part, numbers, numbers, (share, share))
+
+
+def allreduce_sparse(comm: MPI.Intracomm, part: csr_matrix) -> csr_matrix:
+    """Return the sum over ranks of small sparse square matrices of one shape, on every rank. Collective."""
+    if comm.size == 1:
+        return part
+    some = np.union1d(np.flatnonzero(np.diff(part.indptr)), part.indices)
+    A = assemble_distributed(comm, part[some][:, some], some, part.shape[0])
+    own = A.getValuesCSR()
+    A.destroy()
+    counts, entries = (np.array(comm.allgather(n)) for n in (len(own[0]) - 1, len(own[1])))
+    lengths = allgather_rows(comm, np.diff(own[0]), counts)
+    indices, values = (allgather_rows(comm, x, entries) for x in own[1:])
+    return csr_matrix((values, indices, np.concatenate([[0], np.cumsum(lengths)])), shape=part.shape)
+
+
+def _even_share(comm: MPI.Intracomm, n: int) -> int:
+    """Return how many of n rows this rank gets if all ranks get about as many."""
+    return n // comm.size + (comm.rank < n % comm.size)
+
+
+def _assemble(comm: MPI.Intracomm, local: csr_matrix, rows: Int, columns: Int, owned: tuple[int, int]) -> PETSc.Mat:
+    """Return the sum of the contributions as PETSc's distributed sparse matrix; arguments as `assemble_owned_rows`."""
+    maps = [PETSc.LGMap().create(i.astype(PETSc.IntType), comm=comm) for i in (rows, columns)]
+    sizes = tuple((n, comm.allreduce(n)) for n in owned)
+    A = PETSc.Mat().createIS(sizes, lgmapr=maps[0], lgmapc=maps[1], comm=comm)
+    csr = csr_matrix(local)
+    part = PETSc.Mat().createAIJ(csr.shape, csr=(csr.indptr, csr.indices, csr.data), comm=PETSc.COMM_SELF)
+    A.setISLocalMat(part)
+    A.assemble()
+    whole = PETSc.Mat()
+    A.convert(PETSc.Mat.Type.AIJ, whole)
+    for petsc_object in (A, part, *maps):
+        petsc_object.destroy()
+    return whole

@@ -16,8 +16,12 @@ from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.shared_entities import SharedEntities
 from feti_homog.feti.decomposition.subdomain import Subdomain, label
 from feti_homog.feti.operators.choice import SubdomainSize, choose
-from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
-from feti_homog.feti.operators.implicit import CondensedLoads, ImplicitInterfaceOperator, Interior
+from feti_homog.feti.operators.one_subdomain import (
+    CondensedLoads,
+    ExplicitInterfaceOperator,
+    ImplicitInterfaceOperator,
+    Interior,
+)
 from feti_homog.feti.operators.with_springs import BoundaryOperator, WithSprings, compliance_root
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.parallel.distributed_arrays import scale_rows

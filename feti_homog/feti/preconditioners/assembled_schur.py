@@ -7,9 +7,8 @@ from mpi4py import MPI
 from scipy.sparse import csr_matrix, diags, hstack
 
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
-from feti_homog.feti.linalg.distributed_matrix import allreduce_sparse
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
-from feti_homog.feti.linalg.sparse_matrices import DenseBlockSum
+from feti_homog.feti.linalg.sparse_matrices import DenseBlockSum, allreduce_sparse
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.operators.with_springs import is_dense
 from feti_homog.parallel.distributed_arrays import share_columns

@@ -23,8 +23,8 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from feti_homog.errors import CaseError
-from feti_homog.feti.decomposition.interface_neighbours import InterfaceNeighbours
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
+from feti_homog.feti.decomposition.neighbours import InterfaceNeighbours
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.bordered_inverse import BorderedInverse
 from feti_homog.feti.preconditioners.followed_response import FollowedResponse

@@ -13,9 +13,8 @@ import numpy as np
 from mpi4py import MPI
 from scipy.sparse import csr_matrix, diags
 
-from feti_homog.feti.decomposition.jump_operator import JumpOperator
+from feti_homog.feti.decomposition.jump_operator import JumpOperator, NodeBlocks
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
-from feti_homog.feti.operators.node_blocks import NodeBlocks
 from feti_homog.typing import Float
 
 

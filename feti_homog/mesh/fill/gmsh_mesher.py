@@ -70,8 +70,7 @@ def begin(
     Raises:
         MeshError: the fibres cannot be arranged, or there would be too many elements.
     """
-    interface = cell.mesh_size if cell.interface_size is None else cell.interface_size
-    sizes = MeshSizes(cell.mesh_size, interface, interface if cell.tip_size is None or not marks else cell.tip_size)
+    sizes = MeshSizes.of(cell, len(marks) > 0)
     estimate = ElementEstimate.of(cell, listed)
     tiled = estimate.fibres >= policy.least_discs if listed is None else is_tiled(listed, policy)
     most = MAX_TRIANGLES_OF_TILES if tiled else MAX_TRIANGLES

@@ -10,10 +10,9 @@ from itertools import product
 import numpy as np
 from scipy.spatial import cKDTree
 
-from feti_homog.fibres.arrangement import Arrangement
+from feti_homog.fibres.arrangement import Arrangement, neighbours
 from feti_homog.fibres.outlines.ellipses import Ellipses, gaps
 from feti_homog.fibres.outlines.outlines import directions
-from feti_homog.fibres.torus_pairs import neighbours
 from feti_homog.mesh.outline.bridges import TURN
 from feti_homog.mesh.outline.curves import MATRIX, Curves, Numbering
 from feti_homog.mesh.outline.lines import WHOLE, EdgeSamples

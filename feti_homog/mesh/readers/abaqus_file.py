@@ -167,13 +167,8 @@ def _node_counts(kind: str) -> tuple[int, ...]:
 def _take_set(content: _Content, words: dict[str, str], rows: list[list[str]]) -> None:
     members = content.members(BY_SET, words["ELSET"])
     for row in rows:
-        if "GENERATE" in words:
-            numbers = _range(row)
-            content.spend(len(numbers))
-            members.update(numbers)
-            continue
-        for word in filter(None, row):
-            own = {_integer(word)} if word.isdecimal() else _members(content, _name_of(word))
+        parts = ({_integer(word)} if word.isdecimal() else _members(content, _name_of(word)) for word in row if word)
+        for own in [_range(row)] if "GENERATE" in words else parts:
             content.spend(len(own))
             members.update(own)
 
@@ -211,9 +206,7 @@ def _faults(content: _Content) -> list[str]:
 def _raw(content: _Content) -> RawMesh:
     for name in content.materials:
         content.members(BY_SECTION, name).update(_members(content, name))
-    labels: dict[int, tuple[str, ...]] = {}
-    for level in (BY_ELEMENTS, BY_SET, BY_SECTION):
-        labels |= _names_of((name, members) for (own, name), members in content.sets.items() if own == level)
+    labels = _labels(content)
     made_of = [(material, _members(content, name)) for name, material in content.materials.items()]
     others = _names_of([*made_of, *((name, members) for (_, name), members in content.sets.items())])
     names_of = {tag: (labels.get(tag, ()), others.get(tag, ())) for tag in content.triangles}
@@ -225,8 +218,8 @@ def _raw(content: _Content) -> RawMesh:
         group = np.array([place[names_of[tag]] for tag in own])
         parts.append(Block(np.fromiter(own, np.int64), np.array(list(own.values()), np.int64), group))
     numbers, points = np.fromiter(content.nodes, np.int64), np.array(list(content.nodes.values()))
-    curves = _curves(content, labels)
-    return assembled(numbers, points, parts, groups, curves, ("element set", "element set"), aliases)
+    containers = "element set", "element set"
+    return assembled(numbers, points, parts, groups, _curves(content, labels), containers, aliases)
 
 
 def _curves(content: _Content, labels: Mapping[int, tuple[str, ...]]) -> dict[str, Int]:
@@ -237,6 +230,14 @@ def _curves(content: _Content, labels: Mapping[int, tuple[str, ...]]) -> dict[st
         for name in labels.get(tag, ()):
             curves.setdefault(name, []).append([nodes[0], nodes[-1]])
     return {name: np.array(ends, np.int64) for name, ends in curves.items() if name not in with_triangles}
+
+
+def _labels(content: _Content) -> dict[int, tuple[str, ...]]:
+    """Return the names of the sets from which each element has its phase."""
+    found: dict[int, tuple[str, ...]] = {}
+    for level in (BY_ELEMENTS, BY_SET, BY_SECTION):
+        found |= _names_of((name, members) for (own, name), members in content.sets.items() if own == level)
+    return found
 
 
 def _names_of(sets: Iterable[tuple[str, set[int]]]) -> dict[int, tuple[str, ...]]:

@@ -59,7 +59,7 @@ def with_circles(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
         if circle is None or _on_sides(mesh.points[own], size).any():
             continue
         moved = _moved(mesh.points[loop.classes], loop.places, circle, size)
-        images = [(np.append(circle[:2] - step, circle[2]), mine) for step, mine in _loop_images(mesh, loop, own)]
+        images = _images(mesh, loop, circle, own)
         if moved is None or (has_middles and not _through(images, bends[loop_of == number])):
             continue
         points[loop.classes] = moved
@@ -144,6 +144,11 @@ def _through(images: list[tuple[Float, Int]], bends: Float) -> bool:
     """Return whether all middle nodes (a, 2) lie on the circles of their edges."""
     away = [np.abs(np.linalg.norm(bends[mine] - image[:2], axis=1) / image[2] - 1) for image, mine in images]
     return bool(np.all(np.concatenate(away) <= ROUNDNESS_TOLERANCE))
+
+
+def _images(mesh: CoarseMesh, loop: _Loop, circle: Float, own: Int32) -> list[tuple[Float, Int]]:
+    """Return the images of a circle in the plane, each with the numbers of its edges among the loop's own (a, 2)."""
+    return [(np.append(circle[:2] - step, circle[2]), mine) for step, mine in _loop_images(mesh, loop, own)]
 
 
 def _loop_images(mesh: CoarseMesh, loop: _Loop, own: Int32) -> list[tuple[Float, Int]]:

@@ -9,9 +9,9 @@ from itertools import product
 import numpy as np
 from scipy.spatial import cKDTree
 
-from feti_homog.fibres.arrangement import Arrangement
+from feti_homog.case.cell_section import Cell
+from feti_homog.fibres.arrangement import Arrangement, neighbours
 from feti_homog.fibres.outlines.outlines import on_circle
-from feti_homog.fibres.torus_pairs import neighbours
 from feti_homog.mesh.sizes.from_sources import MAX_GROWTH, Source, SourcedSize, wrap
 from feti_homog.typing import Bool, Float, Int
 
@@ -162,6 +162,12 @@ class MeshSizes:
     def uniform(cls, largest: float) -> MeshSizes:
         """One size for all."""
         return cls(largest, largest, largest)
+
+    @classmethod
+    def of(cls, cell: Cell, has_tips: bool) -> MeshSizes:
+        """Return those that a cell of width 1 is asked for."""
+        interface = cell.mesh_size if cell.interface_size is None else cell.interface_size
+        return cls(cell.mesh_size, interface, interface if cell.tip_size is None or not has_tips else cell.tip_size)
 
     def are_graded(self, arrangement: Arrangement) -> bool:
         """Return whether the mesh is finer on circles or at tips than elsewhere.

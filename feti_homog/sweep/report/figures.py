@@ -16,8 +16,7 @@ from feti_homog.case.fibre_window import read_window
 from feti_homog.materials.voigt import voigt_names
 from feti_homog.microstructure.fibre_pattern import FibrePattern
 from feti_homog.microstructure.neighbour_match import nearest_neighbours
-from feti_homog.microstructure.statistics import distances, pair_functions
-from feti_homog.microstructure.voronoi_cells import voronoi_cells
+from feti_homog.microstructure.statistics import distances, pair_functions, voronoi_cells
 from feti_homog.report.plots.plot_helpers import STYLE, SYMBOLS, faint_grid, plain, save
 from feti_homog.results import path_curves
 from feti_homog.sweep.report import moduli

@@ -10,9 +10,8 @@ from support.circular_cells import cell
 
 from feti_homog.errors import MeshError
 from feti_homog.fibres.arrange import arrange
-from feti_homog.fibres.arrangement import Arrangement, clear_shift
+from feti_homog.fibres.arrangement import Arrangement, clear_shift, neighbours
 from feti_homog.fibres.hard_core import random_arrangement
-from feti_homog.fibres.torus_pairs import neighbours
 
 
 def smallest_gap(arrangement):

@@ -19,7 +19,7 @@ from feti_homog.case.fibre_window import read_window
 from feti_homog.case.json_schema import json_schema
 from feti_homog.errors import CaseError
 from feti_homog.fibres.arrange import arrange
-from feti_homog.fibres.matched_arrangement import distance_of
+from feti_homog.fibres.hard_core import distance_of
 from feti_homog.microstructure.fibre_pattern import FibrePattern
 from feti_homog.microstructure.neighbour_match import match_distance, matched, nearest_neighbours, wanted_distances
 

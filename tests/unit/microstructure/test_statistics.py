@@ -10,8 +10,14 @@ import pytest
 from support.fibre_patterns import pattern, poisson_points, square_lattice
 
 from feti_homog.microstructure.neighbour_match import nearest_neighbours
-from feti_homog.microstructure.statistics import envelope, measure, pair_directions, pair_functions, poisson
-from feti_homog.microstructure.voronoi_cells import voronoi_cells
+from feti_homog.microstructure.statistics import (
+    envelope,
+    measure,
+    pair_directions,
+    pair_functions,
+    poisson,
+    voronoi_cells,
+)
 
 r = np.linspace(0.1, 4.0, 40)
 both = pytest.mark.parametrize("periodic", [True, False])

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from feti_homog.feti import solver_plan, thresholds
-from feti_homog.petsc.command_words import split_argv
 from feti_homog.petsc.option_table import OPTIONS, help_text, unknown_options, unknown_to_petsc
+from feti_homog.petsc.option_values import split_argv
 
 
 @pytest.mark.parametrize(

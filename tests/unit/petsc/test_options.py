@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from petsc4py import PETSc
 
-from feti_homog.petsc.command_words import petsc_words
+from feti_homog.petsc.option_values import petsc_words
 from feti_homog.petsc.options import case_options
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from feti_homog.feti.linalg.dense_cholesky import full_from_lower, invert_upper
+from feti_homog.feti.linalg.dense_matrices import full_from_lower, invert_upper
 from feti_homog.feti.thresholds import MIRRORED_BLOCK_ROWS, TRIANGLE_INVERSE_ROWS
 
 SIZES = [1, 2, TRIANGLE_INVERSE_ROWS, TRIANGLE_INVERSE_ROWS + 1, MIRRORED_BLOCK_ROWS, MIRRORED_BLOCK_ROWS + 1, 203]

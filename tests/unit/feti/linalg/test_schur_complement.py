@@ -7,7 +7,7 @@ import pytest
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix, diags, identity, kron
 
-from feti_homog.feti.linalg.schur_complement import schur_complement, schur_complement_with_loads
+from feti_homog.feti.linalg.dense_matrices import schur_complement, schur_complement_with_loads
 
 
 def laplacian(n: int) -> csr_matrix:

@@ -9,12 +9,10 @@ import pytest
 from mpi4py import MPI
 from scipy.sparse import csr_matrix, diags, kronsum
 
-from feti_homog.feti.linalg.dense_cholesky import check_lapack, cholesky, invert_upper
-from feti_homog.feti.linalg.distributed_matrix import assemble_owned_rows
+from feti_homog.feti.linalg.dense_matrices import check_lapack, cholesky, invert_upper, schur_complement
 from feti_homog.feti.linalg.distributed_solver import DistributedSolver
-from feti_homog.feti.linalg.schur_complement import schur_complement
 from feti_homog.feti.linalg.sparse_direct import DirectSolver, power_of_two
-from feti_homog.feti.linalg.sparse_matrices import DenseBlockSum
+from feti_homog.feti.linalg.sparse_matrices import DenseBlockSum, assemble_owned_rows
 from feti_homog.petsc.options import case_options
 from feti_homog.runtime import process_memory
 

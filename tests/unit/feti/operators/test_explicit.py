@@ -12,9 +12,8 @@ from scipy.sparse import csr_matrix, diags, identity
 from support import torn_cells
 
 from feti_homog.fem.problem import PLANE
-from feti_homog.feti.linalg.schur_complement import schur_complement
-from feti_homog.feti.operators.explicit import ExplicitInterfaceOperator
-from feti_homog.feti.operators.implicit import ImplicitInterfaceOperator
+from feti_homog.feti.linalg.dense_matrices import schur_complement
+from feti_homog.feti.operators.one_subdomain import ExplicitInterfaceOperator, ImplicitInterfaceOperator
 
 TIGHT = 1e-10
 

@@ -11,7 +11,7 @@ from mpi4py import MPI
 from scipy.linalg import block_diag
 from scipy.sparse import csr_matrix
 
-from feti_homog.feti.operators.node_blocks import NodeBlocks
+from feti_homog.feti.decomposition.jump_operator import NodeBlocks
 
 
 @st.composite
