@@ -27,7 +27,7 @@ from feti_homog.mesh.periodic_topology import Torus, components, places_by_depth
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.mesh.submesh import SubdomainTable, SubmeshesOfRank, cut_for_ranks, joined, pinning
 from feti_homog.mesh.tiles.filling import arc_edges
-from feti_homog.mesh.tiles.tile_torus import FilledTile, NumberedTile, Regions, tile_torus
+from feti_homog.mesh.tiles.tiles import FilledTile, NumberedTile, Regions, tile_torus
 from feti_homog.parallel.distributed_arrays import alltoall
 from feti_homog.parallel.mpi_errors import agree, on_root, on_root_only
 from feti_homog.typing import Float, Int

@@ -26,8 +26,7 @@ from feti_homog.verify.check_mesh import check_arcs, check_interface, check_mesh
 from feti_homog.verify.check_path import check_envelope, check_path
 from feti_homog.verify.check_points import check_points
 from feti_homog.verify.check_sensitivities import check_sensitivities
-from feti_homog.verify.check_spatial import check_spatial
-from feti_homog.verify.check_summary import check_summary, check_tables
+from feti_homog.verify.check_summary import check_spatial, check_summary, check_tables
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.findings import Finding, Findings, checks
 from feti_homog.verify.reading import ResultFiles, altered, opened

@@ -13,8 +13,7 @@ from feti_homog.typing import Float
 from feti_homog.verify.cell_tables import Mesh, State
 from feti_homog.verify.check_fields import BONDED, CLOSED
 from feti_homog.verify.check_loads import SPATIAL_ORDER
-from feti_homog.verify.check_spatial import about_fibres, engineering_constants
-from feti_homog.verify.check_summary import moduli
+from feti_homog.verify.check_summary import about_fibres, engineering_constants, moduli
 from feti_homog.verify.constitutive_law import expansions, mixed_phases, plane_stiffnesses, spatial_stiffnesses
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.elements import Elements

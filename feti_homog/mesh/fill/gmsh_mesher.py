@@ -29,8 +29,7 @@ from feti_homog.mesh.sizes.element_estimate import (
 )
 from feti_homog.mesh.sizes.graded_size import MeshSizes
 from feti_homog.mesh.tiles.filling import Filling, Tile, arc_edges, fill
-from feti_homog.mesh.tiles.tile_torus import Regions
-from feti_homog.mesh.tiles.tiles import DEFAULT_TILES, TilePolicy, Tiling, cut, is_tiled, tiling
+from feti_homog.mesh.tiles.tiles import DEFAULT_TILES, Regions, TilePolicy, Tiling, cut, is_tiled, tiling
 from feti_homog.typing import Float, Int, Int32
 
 # Radius / width of the cell above which positions on a circle differ by more than rounding.
