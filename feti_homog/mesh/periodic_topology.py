@@ -65,7 +65,7 @@ class Torus:
         first = np.full(label.max() + 1, len(mesh.ellipses))
         np.minimum.at(first, np.repeat(label, 3), circle[triangle_edges].ravel())
         order = np.lexsort((np.arange(len(label)), first[label], mesh.precedence))
-        return replace(torus, constituent=_renumber(label, order))
+        return replace(torus, constituent=renumber(label, order))
 
     @cached_property
     def triangle_torus_edges(self) -> Int:
@@ -194,7 +194,7 @@ class Torus:
         left, right = edge_pairs(self.triangle_edges)
         same = self.constituent[left] == self.constituent[right]
         label = components(len(self.constituent), left[same], right[same])
-        return _renumber(label, np.argsort(self.constituent, kind="stable"))
+        return renumber(label, np.argsort(self.constituent, kind="stable"))
 
 
 def places_by_depth(depth: Float | Int, phase: Int, phases: tuple[str, ...]) -> Int:
@@ -220,7 +220,7 @@ def components(n: int, left: Int, right: Int) -> Int:
     return np.asarray(connected_components(graph, directed=False)[1], np.int64)
 
 
-def _renumber(label: Int, order: Int) -> Int:
+def renumber(label: Int, order: Int) -> Int:
     """Assign numbers to the labels by their first appearance in `order`."""
     first = np.unique(label[order], return_index=True)[1]
     rank = np.empty_like(first)

@@ -76,11 +76,9 @@ def prepare() -> None:
 def say(text: str) -> None:
     """Print a line beside the results.  If it cannot be written, nothing more is, and standard error says so once."""
     try:
-        print(escaped(text, KEPT), flush=True)
-    except OSError as error:
-        _give_up()
-        if not isinstance(error, BrokenPipeError):  # a reader that left, as `head` does, wants no more
-            complain(f"warning: standard output cannot be written: {error.strerror}; result files are not affected")
+        print_product(text)
+    except FetiHomogError as error:
+        complain(f"warning: {error}; result files are not affected")
 
 
 def print_product(text: str) -> None:
@@ -93,7 +91,7 @@ def print_product(text: str) -> None:
         print(escaped(text, KEPT), flush=True)
     except OSError as error:
         _give_up()
-        if not isinstance(error, BrokenPipeError):
+        if not isinstance(error, BrokenPipeError):  # a reader that left, as `head` does, wants no more
             raise FetiHomogError(f"standard output cannot be written: {error.strerror}") from error
 
 

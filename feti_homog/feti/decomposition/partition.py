@@ -10,7 +10,7 @@ import pymetis
 from scipy.sparse import coo_matrix, csr_matrix
 
 from feti_homog.feti.thresholds import LENGTH_CLASSES, MAX_IMBALANCE
-from feti_homog.mesh.periodic_topology import Torus, components
+from feti_homog.mesh.periodic_topology import Torus, components, renumber
 from feti_homog.parallel.dividing import balanced
 from feti_homog.typing import Int
 
@@ -55,11 +55,7 @@ def cut_into_pieces(torus: Torus, parts: Int, pieces: Int, longest: float, lengt
     together = key[left] == key[right]
     connected = components(len(parts), left[together], right[together])
     # Numbered body by body, so that neighbours in number are neighbours in place.
-    order = np.lexsort((connected, piece, parts))
-    first = np.unique(connected[order], return_index=True)[1]
-    number = np.empty_like(first)
-    number[np.argsort(first)] = np.arange(len(first))
-    return np.asarray(number[connected])
+    return renumber(connected, np.lexsort((connected, piece, parts)))
 
 
 def pieces_for_count(load: Int, wanted: int) -> Int:

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from feti_homog.fibres.outlines.ellipses import Ellipses
 from feti_homog.mesh.coarse_mesh import CoarseMesh, edge_keys, flip_double_arcs, interface_edges
+from feti_homog.mesh.periodic_topology import components
 from feti_homog.mesh.readers.mesh_checks import SAME_PLACE
 from feti_homog.mesh.readers.raw_mesh import MiddleNodes, RawMesh, at, first_of
 from feti_homog.mesh.readers.round_interfaces import with_arcs
@@ -61,9 +60,8 @@ def with_bent_edges(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
 
 def _curves(mesh: CoarseMesh, pairs: Int32) -> Int32:
     """(k,) which edges (k, 2) are connected."""
-    ends = mesh.representative[pairs]
-    graph = coo_matrix((np.ones(len(ends), np.int8), (ends[:, 0], ends[:, 1])), shape=(len(mesh.points),) * 2)
-    return np.asarray(connected_components(graph, directed=False)[1][ends[:, 0]], np.int32)
+    start, stop = mesh.representative[pairs].T
+    return np.asarray(components(len(mesh.points), start, stop)[start], np.int32)
 
 
 def _offsets(middle: Float, start: Float, stop: Float) -> tuple[Float, Float, Float]:

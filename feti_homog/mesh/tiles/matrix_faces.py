@@ -9,11 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from feti_homog.fibres.outlines.outlines import on_circle
 from feti_homog.mesh.outline.bridges import TURN, Bridges, CentreLines
+from feti_homog.mesh.periodic_topology import components
 from feti_homog.typing import Float, Int
 
 NOWHERE = -1
@@ -66,8 +65,7 @@ class HalfLines:
         # Clockwise the next from where one came.
         arrived = place[self.twin]
         after = order[np.where(arrived == first[arrived], last[arrived], arrived - 1)]
-        graph = coo_matrix((np.ones(len(after), np.int8), (np.arange(len(after)), after)), shape=(len(after),) * 2)
-        return after, np.asarray(connected_components(graph, directed=False)[1], np.int64)
+        return after, components(len(after), np.arange(len(after)), after)
 
 
 @dataclass(frozen=True)
@@ -176,5 +174,4 @@ def _faces_of_loops(half: HalfLines, loop: Int, alone: Int, lines: CentreLines, 
     is_bridge = np.isin(ends[:, 0] * n + ends[:, 1], half.node * n + half.node[half.twin])
     ends, angle = ends[~is_bridge], angle[~is_bridge]
     one, other = (beside(half, loop, alone, ends[:, end], angle + end * np.pi) for end in (0, 1))
-    graph = coo_matrix((np.ones(len(one), np.int8), (one, other)), shape=(count, count))
-    return np.asarray(connected_components(graph, directed=False)[1], np.int64)
+    return components(count, one, other)
