@@ -165,7 +165,8 @@ def _positions(submesh: Submesh, lattice: ReferenceLattice) -> Float:
         span = 1 - b[:, (k + 2) % 3]
         s = np.divide(b[:, (k + 1) % 3], span, out=np.zeros_like(span), where=span > 0)
         centre, turn = submesh.circles[edge[curved], :2], submesh.turns[edge[curved]]
-        x[curved] += span[:, None] ** 2 * (_arc(a, c, centre, turn, s) - _chord(a, c, s))
+        chord = a[:, None] + s[None, :, None] * (c - a)[:, None]
+        x[curved] += span[:, None] ** 2 * (_arc(a, c, centre, turn, s) - chord)
     if lattice.order == 2:
         _straighten(x, submesh, lattice)
     return x
@@ -179,11 +180,6 @@ def _straighten(x: Float, submesh: Submesh, lattice: ReferenceLattice) -> None:
     on_edge = lattice.nodes[lattice.triangles[:, 3:]][..., [2, 0, 1]] == 0
     on_arc = (curved[:, None, None, :] & on_edge).any(axis=3)
     x[:, lattice.triangles[:, 3:]] = np.where(on_arc[..., None], x[:, lattice.triangles[:, 3:]], middle)
-
-
-def _chord(a: Float, b: Float, s: Float) -> Float:
-    """(t, q, 2) points that cut the chords from a to b (t, 2) in the ratio s (q,)."""
-    return a[:, None] + s[None, :, None] * (b - a)[:, None]
 
 
 def _arc(a: Float, b: Float, centre: Float, turn: Float, s: Float) -> Float:

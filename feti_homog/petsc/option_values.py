@@ -125,10 +125,6 @@ def _integer(least: int, most: int = LARGEST_INTEGER) -> Rule:
     return Rule(f"an integer of at least {least} and at most {most}", holds)
 
 
-def _names(known: list[str]) -> Rule:
-    return Rule(f"one of {', '.join(known)}", known.__contains__)
-
-
 def _is_viewer(text: str) -> bool:
     """Return whether the text says where to print, in a folder that exists."""
     match = VIEWER.fullmatch(text)
@@ -169,7 +165,7 @@ RULES: dict[str, Rule] = {
     **{name: SWITCH for name in FLAGS},
     **{name: PRINTS for name in VIEWERS},
     **{
-        option.name: _names(option.value.split("|"))
+        option.name: Rule(f"one of {option.value.replace('|', ', ')}", option.value.split("|").__contains__)
         for option in OPTIONS
         if "|" in option.value and not option.value.endswith("...")
     },
@@ -250,8 +246,4 @@ def _may_be_value(name: str, word: str) -> bool:
     """
     if word.endswith(CASE_FILE) and name != "options_file":
         return False
-    return not is_flag(name) or is_flag_value(word) or not _is_path(word)
-
-
-def _is_path(word: str) -> bool:
-    return os.sep in word or os.path.exists(word)
+    return not is_flag(name) or is_flag_value(word) or not (os.sep in word or os.path.exists(word))

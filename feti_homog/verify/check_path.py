@@ -211,7 +211,8 @@ def _check_strength(
     for state, after in pairwise(states):
         if by_events and after.point == state.point + 1:
             due = max(float(np.nan_to_num(state.used).max(initial=0.0)), 1.0)
-            off = np.where(_broken(state, after) & ~np.isnan(state.used), 1.0 - state.used / due, 0.0)
+            broken = (after.damage > state.damage) & ~np.isnan(state.used)
+            off = np.where(broken, 1.0 - state.used / due, 0.0)
             findings.record("strength", off, f"{state.name}, interface node {{}}".format)
 
 
@@ -229,12 +230,10 @@ def _overloaded_by_jump(state: StateNumbers, points: Sequence[Point], near: floa
 
 def _in_cascade(points: Sequence[Point], number: int) -> bool:
     """Return whether bonds broke at the same load just before."""
-    before = points[number - 1] if number else None
-    return before is not None and damaged_at(before) > 0 and _same_load(before, points[number])
-
-
-def _same_load(one: Point, other: Point) -> bool:
-    return bool(abs(one["load_factor"] - other["load_factor"]) <= SAME_SHARE)
+    if number == 0:
+        return False
+    before, now = points[number - 1], points[number]
+    return damaged_at(before) > 0 and bool(abs(before["load_factor"] - now["load_factor"]) <= SAME_SHARE)
 
 
 def _only_contact_changed(points: Sequence[Point], number: int, near: float) -> bool:
@@ -249,7 +248,3 @@ def _only_contact_changed(points: Sequence[Point], number: int, near: float) -> 
 def _is_near(one: Any, other: Any, near: float) -> bool:
     here, there = (np.atleast_1d(np.asarray(value or 0.0, float)) for value in (one, other))
     return float(np.abs(here - there).max()) <= near * float(np.abs(there).max())
-
-
-def _broken(state: StateNumbers, after: StateNumbers) -> Bool:
-    return np.asarray(after.damage > state.damage)

@@ -195,11 +195,10 @@ def _contents(document: Mapping[str, Any], file: h5py.File, altered: tuple[str, 
         "/mesh has labels of another number of elements",
     )
     _expect(bool((mesh.phase >= 0).all() and (mesh.phase < len(phases)).all()), "/mesh/phase names unknown phases")
-    _expect(rows.points.shape == rows.normal.shape == (k, 2), "/interface has tables of different lengths")
     lengths = {table.shape for table in (rows.length, rows.fibre, rows.body, rows.pair)}
-    _expect(lengths == {(k,)}, "/interface has tables of different lengths")
+    alike = rows.points.shape == rows.normal.shape == faces.shape == (k, 2) and lengths == {(k,)}
+    _expect(alike, "/interface has tables of different lengths")
     _expect_known_pairs(_interfaces(document["case"]), rows, phases)
-    _expect(faces.shape == (k, 2), "/interface has tables of different lengths")
     _expect(bool((faces >= 0).all() and (faces < n).all()), "/interface names unknown nodes")
     within = (rows.fibre >= 1) & (rows.fibre <= len(fibres.radius))
     _expect(bool(within.all()), "/interface/fibre_number names unknown fibres")

@@ -65,7 +65,8 @@ def with_circles(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
         points[loop.classes] = moved
         circles += [image for image, _ in images]
         arc_edges += [own[mine] for _, mine in images]
-    mesh = replace(mesh, points=_copied(mesh, points, size))
+    # Copies follow their representatives; those on high sides stay there.
+    mesh = replace(mesh, points=np.where(mesh.points == size, size, points[mesh.representative]))
     ellipses = Ellipses.round(np.array(circles).reshape(-1, 3))
     return _without_double_arcs(with_arcs(mesh, ellipses, *_numbered(arc_edges)))
 
@@ -159,11 +160,6 @@ def _loop_images(mesh: CoarseMesh, loop: _Loop, own: Int32) -> list[tuple[Float,
     distinct, which = np.unique(steps, axis=0, return_inverse=True)
     which = which.ravel()
     return [(step * mesh.period, np.flatnonzero(which == k)) for k, step in enumerate(distinct)]
-
-
-def _copied(mesh: CoarseMesh, points: Float, size: Float) -> Float:
-    """Points (n, 2) whose periodic copies follow their representatives; those on high sides stay there."""
-    return np.where(mesh.points == size, size, points[mesh.representative])
 
 
 def with_arcs(mesh: CoarseMesh, ellipses: Ellipses, arcs: Int32, number: Int32) -> CoarseMesh:

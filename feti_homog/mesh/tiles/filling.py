@@ -226,7 +226,7 @@ def _loops(lines: list[Signed]) -> list[list[Signed]]:
 
 def _with_holes(loops: list[list[Signed]], points: Float) -> list[list[list[Signed]]]:
     """Return groups of loops, each an outer one followed by the holes, which run clockwise, within it."""
-    polygons = [_polygon(loop, points) for loop in loops]
+    polygons = [points[np.concatenate([curve.nodes[:-1] for _, curve in loop])] for loop in loops]
     is_hole = [_area(polygon) < 0 for polygon in polygons]
     groups = {k: [loop] for k, loop in enumerate(loops) if not is_hole[k]}
     for loop in (loop for loop, hole in zip(loops, is_hole, strict=True) if hole):
@@ -235,11 +235,6 @@ def _with_holes(loops: list[list[Signed]], points: Float) -> list[list[list[Sign
         around = groups if len(groups) == 1 else (k for k in groups if _contains(polygons[k], place))
         groups[min(around, key=lambda k: _area(polygons[k]))].append(loop)
     return list(groups.values())
-
-
-def _polygon(loop: list[Signed], points: Float) -> Float:
-    """(k, 2) nodes of the loop in order."""
-    return np.asarray(points[np.concatenate([curve.nodes[:-1] for _, curve in loop])])
 
 
 def _area(polygon: Float) -> float:
