@@ -120,13 +120,13 @@ class FollowedStatuses:
             x = np.where(self.free, x + self._inverse(left), x)
         return (x, y) if off <= TOO_MUCH else None
 
-    def grow(self, S: Float, old: Int, other: Int) -> bool:
+    def grow(self, S: Float, old: Int, other: Int, units: Float) -> bool:
         """Prescribe more entries: of S (m', m') those that are here stand at the places `old` (m,), with their S.
 
-        Between the places `other` S may be another one, if these entries are coupled with none but each other.  False
-        if a pivot on the way is too small; then R is of no S.
+        Theirs has `units` (m,) of what S was scaled by.  Between the places `other` S may be another one.  False if a
+        pivot on the way is too small; then R is of no S.
         """
-        if not self._replace(np.flatnonzero(np.isin(old, other)), S[other[:, None], other]):
+        if not self._replace(np.flatnonzero(np.isin(old, other)), S[other[:, None], other], units):
             return False
         self._flush()
         size, m = self._size, len(S)
@@ -152,16 +152,22 @@ class FollowedStatuses:
         self._size = m
         return True
 
-    def _replace(self, entries: Int, block: Float) -> bool:
-        """Have another block of S between entries that are coupled with none but each other; False as `grow`."""
+    def _replace(self, entries: Int, block: Float, units: Float) -> bool:
+        """Have another block of S between rising entries, and other units (m,) of all; False as `grow`.
+
+        Where the entries are prescribed their rows of M^-1 are those of the identity, and change nothing else of S M^-1.
+        """
         free, slope, at = self.free.copy(), self.slope.copy(), self._place[entries]
-        free[entries] = False
-        if not len(entries):
-            return True
-        if not self.turn(free, slope):
+        free[entries], slope[entries] = False, 0.0
+        if len(entries) and not self.turn(free, slope):
             return False
         self._flush()
-        self._R[1, at[:, None], at] += block - self.S[entries[:, None], entries]
+        some = np.flatnonzero(units != 1.0)
+        places, unit = self._place[some], units[some]
+        self._R[:, : self._size, places] *= np.where(self.free[some], 1.0 / unit, unit)
+        self._R[:, places, : self._size] *= np.stack([1.0 / unit, unit])[:, :, None]
+        before = self.S[entries[:, None], entries] * np.outer(units[entries], units[entries])
+        self._R[1, at[:, None], at] += block - before
         return True
 
     def _reserve(self, m: int) -> None:

@@ -78,20 +78,31 @@ class SlidingCell:
         b = np.pad(b, [(0, 0), (0, len(S) - self._loads)])
         tied = whole[:, 2] > 0.0 if has_jumps else NOTHING
         self.faces = CoulombFaces(np.block([[K, -b], [-b.T, S]]), whole[:, 1], tied)
-        old = self._places_of(before, held)
-        if old is not None:
-            others = slice(0) if has_jumps else slice(2 * len(before) + self._loads, None)
-            self.faces.solver.follow(faces.solver, old, old[others])
+        old = self._places_of(before)
+        if len(old):
+            units = faces.size / self.faces.size[old]
+            self.faces.solver.follow(faces.solver, old, old[self._changed(old, before, held)], units)
 
-    def _places_of(self, rows: Int, springs: tuple[Float, Float]) -> Int | None:
-        """Return where entries of x of other faces stand now; None if some are not there, or on other springs."""
+    def _places_of(self, rows: Int) -> Int:
+        """(m',) where entries of x of faces of other rows (n',) stand now, none if some are not there."""
         if not len(rows) or not np.isin(rows, self.rows).all():
-            return None
+            return np.zeros(0, np.int64)
         nodes, loads = np.searchsorted(self.rows, rows), self.faces.loads
-        pairs, along = (2 * nodes[:, None] + np.arange(2)).ravel(), nodes[: len(springs[1])]
-        if (self.springs[0][pairs] != springs[0]).any() or (self.springs[1][along] != springs[1]).any():
-            return None
+        along = nodes if self.tied is not None else nodes[:0]
+        pairs = (2 * nodes[:, None] + np.arange(2)).ravel()
         return np.asarray(np.concatenate([pairs, np.arange(loads.start, loads.stop), loads.stop + along]))
+
+    def _changed(self, old: Int, rows: Int, springs: tuple[Float, Float]) -> Bool:
+        """(m',) which entries of `_places_of` are on other springs, or loads whose stiffness all jumps change."""
+        nodes, changed = np.searchsorted(self.rows, rows), np.zeros(len(old), bool)
+        pairs = (2 * nodes[:, None] + np.arange(2)).ravel()
+        last = len(pairs)
+        changed[:last] = np.repeat((self.springs[0][pairs] != springs[0]).reshape(-1, 2).any(axis=1), 2)
+        if self.tied is None:
+            changed[last + self._loads :] = True
+        else:
+            changed[len(old) - len(rows) :] = self.springs[1][nodes] != springs[1]
+        return changed
 
     @staticmethod
     def _gained(problem: CondensedProblem, bonds: BondState) -> Float:

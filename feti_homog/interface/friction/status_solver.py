@@ -31,12 +31,11 @@ class StatusSolver:
         self._factored = 0
         self._products: deque[tuple[Float, Float]] = deque(maxlen=PRODUCTS)
 
-    def follow(self, before: StatusSolver, old: Int, other: Int) -> None:
-        """Go on from a solver whose entries stand at the places `old` (m',) here, with the same S.
-
-        Between the places `other` S may be another one, if these entries are coupled with none but each other.
-        """
-        if before._followed is not None and before._followed.grow(self.S, old, other):
+    def follow(self, before: StatusSolver, old: Int, other: Int, units: Float) -> None:
+        """Go on from a solver whose entries stand at the places `old` (m',) here, as `FollowedStatuses.grow`."""
+        if before._followed is None:
+            self._factored = before._factored
+        elif before._followed.grow(self.S, old, other, units):
             self._followed = before._followed
 
     @cached_property

@@ -26,7 +26,8 @@ def assert_solves(followed, S, friction, status, by_stress, rng):
     assert followed.sign == system.sign
 
 
-def test_statuses_are_followed_and_nodes_come_in_any_order():
+def test_statuses_are_followed_and_nodes_come_in_any_order_and_on_other_springs():
+    """Springs of two nodes change at each growth, and with them the units of their entries."""
     rng = np.random.default_rng(1)
     n, kinds = 30, np.array([STICK, FORWARD, OPEN_FACE, BACKWARD], np.int8)
     S, by_stress = scaled(rng, 2 * n + 3), np.array([False, True, False])
@@ -35,11 +36,16 @@ def test_statuses_are_followed_and_nodes_come_in_any_order():
     for count in (2, 3, 7, 8, 20, n):
         nodes, before = np.sort(arrival[:count]), own
         own = np.concatenate([(2 * nodes[:, None] + np.arange(2)).ravel(), 2 * n + np.arange(3)])
+        changed = np.flatnonzero(np.isin(own, 2 * nodes[:2, None] + np.arange(2)) & np.isin(own, before))
+        S[own[changed], own[changed]] += rng.uniform(-0.3, 3.0)
+        units = np.ones(2 * n + 3)
+        units[own[changed]] = np.repeat(rng.uniform(0.3, 3.0, len(changed) // 2), 2)
+        S *= np.outer(units, units)
         part = S[own[:, None], own]
         if followed is None:
             followed = FollowedStatuses(part)
         else:
-            followed.grow(part, np.searchsorted(own, before), np.zeros(0, np.int64))
+            assert followed.grow(part, np.searchsorted(own, before), changed, units[before])
         status = rng.choice(kinds, count)
         for _ in range(8):
             assert_solves(followed, part, friction[nodes], status, by_stress, rng)
