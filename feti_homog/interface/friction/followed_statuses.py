@@ -155,7 +155,7 @@ class FollowedStatuses:
     def _replace(self, entries: Int, block: Float, units: Float) -> bool:
         """Have another block of S between rising entries, and other units (m,) of all; False as `grow`.
 
-        Where the entries are prescribed their rows of M^-1 are those of the identity, and change nothing else of S M^-1.
+        While the entries are prescribed, their rows of M^-1 are those of the identity: no more of S M^-1 changes.
         """
         free, slope, at = self.free.copy(), self.slope.copy(), self._place[entries]
         free[entries], slope[entries] = False, 0.0
