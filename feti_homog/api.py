@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
     from feti_homog.analysis.result import Result
     from feti_homog.results.viewed_states import ViewedState
-    from feti_homog.sweep.plan import Sweep
     from feti_homog.sweep.report.sweep_table import SweepTable
 
 
@@ -90,9 +89,12 @@ def run_sweep(
     """
     comm = _started(comm)
     from feti_homog.parallel.mpi_errors import on_root
-    from feti_homog.sweep import collect, execute
+    from feti_homog.sweep import collect, execute, plan
 
-    expanded = on_root(comm, _expanded, cases)
+    if isinstance(cases, Mapping):
+        expanded = on_root(comm, plan.expand, cases, Path())
+    else:
+        expanded = on_root(comm, plan.load, cases)
     group = comm.size if ranks_per_case is None else ranks_per_case
     execute.run_all(expanded, folder(out), comm, group, retry, quiet)
     return on_root(comm, collect.read, Path(out))
@@ -175,7 +177,12 @@ def launch(
     PETSc starts with the options among `argv` (default: the process's) that have a single dash; `parser` reads the
     others.  A FetiHomogError is printed once and gives its exit code; any other exception ends the job on all ranks.
     """
-    return start(lambda words, comm: _parsed_main(main, parser, words, comm), argv)
+
+    def command(words: Sequence[str], comm: Intracomm) -> int:
+        main(parsed(parser, words, comm), comm)
+        return EXIT_DONE
+
+    return start(command, argv)
 
 
 def start(command: Callable[[Sequence[str], Intracomm], int], argv: Sequence[str] | None = None) -> int:
@@ -250,16 +257,6 @@ def parsed(parser: argparse.ArgumentParser, words: Sequence[str], comm: Intracom
         raise
 
 
-def _parsed_main(
-    main: Callable[[argparse.Namespace, Intracomm], object],
-    parser: argparse.ArgumentParser,
-    words: Sequence[str],
-    comm: Intracomm,
-) -> int:
-    main(parsed(parser, words, comm), comm)
-    return EXIT_DONE
-
-
 def _started(comm: Intracomm | None) -> Intracomm:
     """Return the communicator, all ranks' by default, with PETSc started."""
     prefer_own_toolkits()
@@ -270,10 +267,3 @@ def _started(comm: Intracomm | None) -> Intracomm:
         # On more ranks it would wait for those that run no case, or have run one; cases bring their own communicator.
         libraries.start_petsc([], MPI.COMM_SELF)
     return MPI.COMM_WORLD if comm is None else comm
-
-
-def _expanded(cases: str | Path | Mapping[str, Any]) -> Sweep:
-    """Return the sweep of a file or of a document."""
-    from feti_homog.sweep import plan
-
-    return plan.expand(cases, Path()) if isinstance(cases, Mapping) else plan.load(cases)

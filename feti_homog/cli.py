@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NoReturn
 
 from feti_homog.api import parsed, start
-from feti_homog.commands import fibres, products, reference, run, sweep
+from feti_homog.commands import fibres, products, run, sweep
 from feti_homog.errors import EXIT_DONE, CaseError
 from feti_homog.petsc.option_table import help_text
 from feti_homog.petsc.option_values import split_argv
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 LAUNCHER_HELP = "Switches of Open MPI go to mpirun: --allow-run-as-root, --oversubscribe (more ranks than cores)."
-COMMANDS = (run, products, fibres, sweep, reference)
+COMMANDS = (run.add, products.add, fibres.add, sweep.add, run.add_reference)
 
 
 class Parser(argparse.ArgumentParser):
@@ -68,6 +68,6 @@ def command_parser() -> Parser:
     )
     parser.add_argument("--version", action="version", version=f"feti-homog {__version__}")
     actions = parser.add_subparsers(dest="command", required=True, parser_class=Parser)
-    for command in COMMANDS:
-        command.add(actions)
+    for add in COMMANDS:
+        add(actions)
     return parser

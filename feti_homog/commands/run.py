@@ -1,14 +1,17 @@
-"""`feti-homog run` and `check`: run a case file and write its results; validate it and print what would run."""
+"""`feti-homog run`, `check`, `keys`, `schema`, `options`: run and check a case file; the reference of its keys."""
 
 from __future__ import annotations
 
 import argparse
+import json
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from feti_homog.api import folder
 from feti_homog.errors import CaseError
 from feti_homog.parallel.mpi_errors import on_root, on_root_only
+from feti_homog.petsc.option_table import help_text
 from feti_homog.runtime.standard_streams import print_product
 
 if TYPE_CHECKING:
@@ -16,18 +19,16 @@ if TYPE_CHECKING:
 
 
 def add(actions: argparse._SubParsersAction[Any]) -> None:
-    """Add the commands to those of a parser."""
-    _add_run(actions)
-    _add_check(actions)
-
-
-def _add_run(actions: argparse._SubParsersAction[Any]) -> None:
+    """Add the commands that run and check to those of a parser."""
     parser = actions.add_parser("run", help="run a case file and write its results to a folder")
     parser.add_argument("case", type=Path, metavar="CASE.toml")
     parser.add_argument("--out", type=folder, required=True, metavar="DIR", help="folder of the results")
     parser.add_argument("--quiet", action="store_true", help="print nothing but errors")
     parser.add_argument("--resume", action="store_true", help="go on from where a path to the same folder was ended")
     parser.set_defaults(action=_run)
+    check = actions.add_parser("check", help="validate a case file, mesh its cell and describe the run")
+    check.add_argument("case", type=Path, metavar="CASE.toml", help="a file of run, sweep, fit or uncertainty")
+    check.set_defaults(action=_check)
 
 
 def _run(arguments: argparse.Namespace, comm: Intracomm) -> None:
@@ -42,12 +43,6 @@ def _run(arguments: argparse.Namespace, comm: Intracomm) -> None:
     run(case, arguments.out, comm, arguments.quiet, arguments.resume)
 
 
-def _add_check(actions: argparse._SubParsersAction[Any]) -> None:
-    parser = actions.add_parser("check", help="validate a case file, mesh its cell and describe the run")
-    parser.add_argument("case", type=Path, metavar="CASE.toml", help="a file of run, sweep, fit or uncertainty")
-    parser.set_defaults(action=_check)
-
-
 def _check(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.case.document import read_document
     from feti_homog.case.fit_sections import FIT_SECTIONS
@@ -59,3 +54,32 @@ def _check(arguments: argparse.Namespace, comm: Intracomm) -> None:
     describe = scatter.of_document if on_root(comm, scatter.is_study, document) else description.of_document
     describe = fits.of_document if document.keys() & {*FIT_SECTIONS} else describe
     on_root_only(comm, print_product, describe(document, arguments.case.parent, comm))
+
+
+def add_reference(actions: argparse._SubParsersAction[Any]) -> None:
+    """Add the commands that print references to those of a parser."""
+    keys = actions.add_parser("keys", help="print the keys of a case file and their meaning")
+    keys.add_argument("section", nargs="?", metavar="SECTION", help="cell, material, ...; by default all of them")
+    keys.set_defaults(action=_keys)
+    schema = actions.add_parser("schema", help="print the JSON Schema of a case file, for editors")
+    schema.set_defaults(action=_schema)
+    options = actions.add_parser("options", help="print PETSc's options that the solver takes")
+    options.set_defaults(action=_options)
+
+
+def _keys(arguments: argparse.Namespace, comm: Intracomm) -> None:
+    from feti_homog.case import reference
+
+    section = arguments.section
+    tables = on_root_only(comm, reference.tables if section is None else partial(reference.tables_of, section))
+    on_root_only(comm, print_product, reference.as_text(tables or []))
+
+
+def _schema(arguments: argparse.Namespace, comm: Intracomm) -> None:
+    from feti_homog.case.json_schema import json_schema
+
+    on_root_only(comm, print_product, json.dumps(json_schema(), indent=2))
+
+
+def _options(arguments: argparse.Namespace, comm: Intracomm) -> None:
+    on_root_only(comm, print_product, help_text())
