@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from feti_homog.analysis import path_scaling
 from feti_homog.analysis.cell_records import (
     CellInfo,
     Checks,
@@ -246,6 +245,8 @@ class Result:
 
         Raises ValueError for any other result, and for a toughness that is not positive.
         """
+        from feti_homog.analysis import path_scaling  # of paths by energy alone
+
         s = path_scaling.ratio(self.document, toughness)
         return replace(
             self,

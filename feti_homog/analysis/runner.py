@@ -11,7 +11,7 @@ from typing import Any
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from feti_homog.analysis import result_builder, stored_result
+from feti_homog.analysis import result_builder
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.registry import analysis_of
 from feti_homog.analysis.result import Result
@@ -23,7 +23,6 @@ from feti_homog.homogenization.unit_cell import TornCell, tear
 from feti_homog.parallel.mpi_errors import all_raise, on_root, on_root_only
 from feti_homog.petsc.options import case_options, refuse_unused
 from feti_homog.results import (
-    csv_tables,
     field_file,
     field_parts,
     output_folder,
@@ -52,7 +51,7 @@ def run(
         ConvergenceError: after what was computed has been written, marked as such.
     """
     progress = _begun(case, comm, quiet)
-    if resume and on_root(comm, stored_result.finished, directory, case):
+    if resume and on_root(comm, _is_finished, directory, case):
         progress.say(f"{directory} holds the finished result of this case: nothing to do")
         return Result.of(on_root(comm, result_json.read, directory))
     if case.output.report:
@@ -203,6 +202,12 @@ def _checkpoint(cell: TornCell, directory: Path) -> Checkpoint:
     return Checkpoint(directory, cell.comm, f"case {on_root(cell.comm, cell.case.digest)}, {parts}")
 
 
+def _is_finished(directory: Path, case: Case) -> bool:
+    from feti_homog.analysis import stored_result  # which reads and checks files that most runs have not
+
+    return stored_result.finished(directory, case)
+
+
 def _write(result: Result, directory: Path, cell: TornCell) -> None:
     """result.json, then what can be made of it again; files of an earlier result do not stay beside them."""
     on_root_only(cell.comm, result_json.write, directory, result.document)
@@ -211,6 +216,8 @@ def _write(result: Result, directory: Path, cell: TornCell) -> None:
         written |= {field_file.NAME, *(path.name for path in on_root(cell.comm, xdmf.write, directory))}
     analysis, name = analysis_of(cell.case), cell.case.analysis.type
     if analysis.table:
+        from feti_homog.results import csv_tables  # which a stiffness has none of
+
         points = getattr(result, name)
         rows = points if isinstance(points, tuple) else (points,)
         written.add(on_root(cell.comm, csv_tables.write, directory / f"{name}.csv", rows).name)

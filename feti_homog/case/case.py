@@ -11,14 +11,22 @@ from pathlib import Path
 from typing import Any
 
 from feti_homog.case import element_sizes
-from feti_homog.case.asked import AnalysisSection, Stiffness
 from feti_homog.case.cell_files import checked_cell
 from feti_homog.case.cell_section import GEOMETRY, Cell
 from feti_homog.case.document import read_document, to_document
 from feti_homog.case.fit_sections import FIT_SECTIONS
 from feti_homog.case.interface_faults import idle_friction_keys, read_interfaces
 from feti_homog.case.interface_section import Arc, InterfaceSection, interface_tables
-from feti_homog.case.load_section import Envelope, LoadPath, SingleLoad, expansion_faults, load_faults, stress_free
+from feti_homog.case.load_section import (
+    AnalysisSection,
+    Envelope,
+    LoadPath,
+    SingleLoad,
+    Stiffness,
+    expansion_faults,
+    load_faults,
+    stress_free,
+)
 from feti_homog.case.material_sections import (
     coating_faults,
     missing_expansions,

@@ -5,17 +5,20 @@ from __future__ import annotations
 import os
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from feti_homog.case.cell_section import TOUCHING, Cell, size_faults
-from feti_homog.case.fibre_table import FibreTable, read_table, table_of
 from feti_homog.case.mixed_cell import mix_faults
 from feti_homog.case.section_values import MESH_SUFFIXES, TABLE_SUFFIXES
 from feti_homog.errors import CaseError
 from feti_homog.fibres.outlines.shapes import BOTH_SIZES, SHAPES, given_shapes, have_both_sizes
 from feti_homog.schema.wording import limit_in_words, toml_value
 from feti_homog.typing import Bool
+
+if TYPE_CHECKING:
+    from feti_homog.case.fibre_table import FibreTable
 
 SUFFIXES = {"mesh": MESH_SUFFIXES, "table": TABLE_SUFFIXES}
 LIST = "fibre_list"
@@ -98,6 +101,8 @@ def _with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
 
 def _with_table(cell: Cell, faults: list[str]) -> Cell:
     """Return the cell with its table, which has the size of the cell."""
+    from feti_homog.case.fibre_table import read_table, table_of  # which few cases need
+
     try:
         table = read_table(cell.file, cell.columns) if cell.file is not None else table_of(cell.fibre_list or (), LIST)
     except CaseError as error:

@@ -1,4 +1,7 @@
-"""Sections [path], [load] and [envelope]: loads of a path, a single one, and the plane of loads of an envelope."""
+"""Sections of the analyses: what all of them answer, and [path], [load] and [envelope].
+
+These have loads of a path, a single one, and the plane of loads of an envelope.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import ClassVar
 
-from feti_homog.case.asked import AnalysisSection
 from feti_homog.case.material_sections import missing_expansions
 from feti_homog.case.mixed_load import LOAD, TEMPERATURE, WAYPOINTS, MixedLoad, Strain, completed, first_named, named
 from feti_homog.case.section_values import STRAIN
@@ -17,6 +19,37 @@ from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES
 from feti_homog.schema.keys import key
 from feti_homog.schema.values import choice, either, integer, list_of, real
 from feti_homog.schema.wording import toml_value
+
+
+class AnalysisSection:
+    """The section of an analysis; the values here are those of one in which the load breaks no bonds.
+
+    Attributes:
+        breaks: whether bonds break under its loads.
+        is_followed: whether it goes from event to event, debonding as it goes, and can be resumed.
+    """
+
+    breaks: ClassVar[bool] = False
+    is_followed: ClassVar[bool] = False
+
+    @property
+    def openings(self) -> tuple[float, ...]:
+        """Openings of the arcs without an angle of their own, one after the other; none if they have angles."""
+        return ()
+
+    @property
+    def placed(self) -> Mapping[str, Strain | MixedLoad]:
+        """The loads as they are given, by their places in the section; none of unit loads."""
+        return {}
+
+    def solves(self, loads: int, one_sided: bool) -> int:
+        """Equilibria of a problem with so many unit loads, under plus and minus each where faces touch one-sidedly."""
+        return 2 * loads if one_sided else loads
+
+
+class Stiffness(AnalysisSection):
+    """The effective stiffness, which has no section."""
+
 
 FAMILIES = (SPATIAL_STRESSES, SPATIAL_STRAINS)
 

@@ -10,10 +10,9 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
-from feti_homog.case.asked import AnalysisSection
 from feti_homog.case.cell_section import Cell
 from feti_homog.case.interface_section import Arc, InterfaceSection, Scatter
-from feti_homog.case.load_section import Envelope, LoadPath, SingleLoad
+from feti_homog.case.load_section import AnalysisSection, Envelope, LoadPath, SingleLoad
 from feti_homog.case.mixed_load import MixedLoad, Strain
 from feti_homog.case.section_values import OPENINGS, SEED, STATES, STRAIN
 from feti_homog.case.selectors import (

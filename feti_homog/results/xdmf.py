@@ -151,11 +151,8 @@ def _attributes(grid: ET.Element, file: h5py.File, state: str, arrays: Iterable[
     """Add the arrays of a state, each with its dataset."""
     for name, place in arrays:
         table = file[place.replace("/K/", f"/{state}/")]
-        _attribute(grid, name, 1 if table.ndim == 1 else table.shape[1], centre, _table(table))
-
-
-def _attribute(grid: ET.Element, name: str, components: int, centre: str, values: ET.Element) -> None:
-    ET.SubElement(grid, "Attribute", Name=name, AttributeType=SHAPES[components], Center=centre).append(values)
+        kind = SHAPES[1 if table.ndim == 1 else table.shape[1]]
+        ET.SubElement(grid, "Attribute", Name=name, AttributeType=kind, Center=centre).append(_table(table))
 
 
 def _table(table: Any) -> ET.Element:

@@ -20,10 +20,9 @@ from feti_homog.microstructure.statistics import distances, pair_functions, voro
 from feti_homog.report.plots.plot_helpers import STYLE, SYMBOLS, faint_grid, plain, save
 from feti_homog.results import path_curves
 from feti_homog.sweep.report import moduli
-from feti_homog.sweep.report.outputs import Document
 from feti_homog.sweep.report.style import COLOURS, MARKERS, label_axes, legend, plot_series
 from feti_homog.sweep.report.sweep_table import Series, Statistics, SweepTable, series_over, varies
-from feti_homog.typing import Float
+from feti_homog.typing import Document, Float
 
 MOST_TABLES, MOST_CELLS = 4, 60  # that are drawn
 TABLE_STYLE: dict[str, Any] = {"color": "black", "linewidth": 1.8, "zorder": 3}

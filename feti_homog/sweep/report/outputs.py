@@ -11,9 +11,7 @@ from feti_homog.materials.plane_state import GENERALIZED, PLANE_STRAIN
 from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, STRESSES, voigt_names
 from feti_homog.report.text import point_tables
 from feti_homog.results.landmarks import peak_of
-
-Document = Mapping[str, Any]
-
+from feti_homog.typing import Document
 
 PHASES_OF_ONE_FIBRE = 2
 ERROR, ENERGY_ERROR = "_mesh_error", "energy_mesh_error"

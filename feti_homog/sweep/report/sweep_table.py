@@ -12,8 +12,7 @@ from scipy.stats import t as student
 
 from feti_homog.report.text.table import unit
 from feti_homog.results import path_curves
-from feti_homog.sweep.report.outputs import Document
-from feti_homog.typing import Float
+from feti_homog.typing import Document, Float
 
 CONFIDENCE = 0.95
 CURVE_POINTS = 401  # strains at which curves are averaged
