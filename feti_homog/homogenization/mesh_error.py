@@ -11,7 +11,7 @@ from feti_homog.fem.arc_error import ArcSides, arc_energy
 from feti_homog.fem.stress_recovery import RecoveredStress
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.homogenization.averaging import Response
-from feti_homog.homogenization.nested_interiors import groups, nested_interiors
+from feti_homog.homogenization.nested_interiors import groups, nested_interiors, nested_lattice
 from feti_homog.homogenization.uniform_parts import UniformPart
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.mesh.refinement import FineMesh, joined
@@ -20,9 +20,9 @@ from feti_homog.typing import Float
 
 Members = list[Subdomain] | list[UniformPart]
 Displacements = Iterator[tuple[Members, FineMesh, Float]]
-# Errors of elements and of arcs over those of the mesh that is refined once less, by the order of elements: of
-# `scripts/measure_mesh_error.py`.
-NESTED = {1: (0.26, 0.27), 2: (1 / 15, 1 / 14)}
+# Errors of elements and of arcs over those of the mesh itself and of meshes refined once and twice less, by the order
+# of elements: of `scripts/measure_mesh_error.py`.
+NESTED = {1: ((1.0, 1.0), (0.26, 0.27), (0.07, 0.066)), 2: ((1.0, 1.0), (1 / 15, 1 / 14), (1 / 185, 1 / 255))}
 # The two parts may cancel; what is left of both at least, `scripts/measure_mesh_error.py`: of one state, of a pair, and
 # of a pair whose faces touch at different places, for which the energy is not bilinear.
 LEAST_SHARE, LEAST_SHARE_OF_PAIRS, LEAST_SHARE_OF_CONTACT = 0.07, 0.035, 0.5
@@ -78,28 +78,29 @@ def energy_errors(
     """Return the estimates of responses of one problem, a few subdomains at a time.  Collective.
 
     `keep` what states of the cell need later: the factors of interiors, and `shares`.  `nested` from the mesh that is
-    refined once less, by default where `is_nested`.
+    refined less, by default where `is_nested`.
     """
     k, area = len(responses), cell.summary.area
     nested = is_nested(cell, responses) if nested is None else nested
-    of_elements, of_arcs = NESTED[cell.lattice.order] if nested else (1.0, 1.0)
-    lattice = cell.lattice.coarser() if nested else cell.lattice
+    lattice = nested_lattice(cell.lattice) if nested else cell.lattice
+    fewer = cell.lattice.halvings - lattice.halvings
+    of_elements, of_arcs = NESTED[lattice.order][fewer]
     found, shares = np.zeros((2, k, k)), [np.zeros((0, k))]
     for members, stress in _recovered(cell, responses, keep, nested):
         total, each = stress.difference(keep)
         arcs = arc_energy(stress, ArcSides.of(stress, [s.submesh for s in members], lattice))
         found += of_elements * total, of_arcs * arcs
-        shares.append(np.repeat(of_elements * each / 4, 4, axis=0) if nested else each)
+        shares.append(np.repeat(of_elements * each / 4**fewer, 4**fewer, axis=0))
     elements, arcs = allreduce_sum(cell.comm, found) / area
     return EnergyErrors(elements, arcs, np.concatenate(shares) / area, contact)
 
 
 def is_nested(cell: TornCell, responses: Sequence[Response]) -> bool:
-    """Return whether the mesh refined once less has the error: not of quadratic elements at tips of debonded arcs."""
+    """Return whether a mesh refined less has the error: not of quadratic elements at tips of debonded arcs."""
     lattice = cell.lattice
     if cell.summary.across:
         return False  # interiors are factored anyway
-    return lattice.intervals > lattice.order and not (lattice.order == 2 and any(r.debonded for r in responses))
+    return lattice.halvings > 0 and not (lattice.order == 2 and any(r.debonded for r in responses))
 
 
 def _recovered(
@@ -114,7 +115,7 @@ def _recovered(
 
 
 def _nested(cell: TornCell, u: Float, loads: Float, keep: bool) -> Displacements:
-    """Yield subdomains, their mesh that is refined once less, and their displacements (classes, c, k) on it."""
+    """Yield subdomains, their mesh that is refined less, and their displacements (classes, c, k) on it."""
     fresh = nested_interiors(cell.solver.interface_operators, cell.lattice)
     for interior in cell.nested_interiors if keep else fresh:
         yield interior.members, interior.mesh, interior.displacement(u, loads)

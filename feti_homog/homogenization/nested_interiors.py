@@ -1,6 +1,6 @@
-"""Displacements inside bodies on the mesh that is refined once less, from those of the boundaries.
+"""Displacements inside bodies on a mesh that is refined less, from those of the boundaries.
 
-Its nodes are among those of the mesh, and it has a quarter of the elements.
+Its nodes are among those of the mesh, and it has a quarter or a sixteenth of the elements.
 """
 
 from __future__ import annotations
@@ -20,6 +20,8 @@ from feti_homog.typing import Float, Int
 
 # Subdomains of so many elements at once: few enough for the processor's cache, many enough for NumPy.
 ELEMENTS_AT_ONCE = 1 << 13
+# Halvings from which on the mesh that is refined twice less serves.
+REFINED_OFTEN = 3
 # What is not on a boundary.
 INSIDE, PINNED = -2, -1
 
@@ -71,9 +73,14 @@ class NestedInterior:
         return found.reshape(-1, problem.components, u.shape[1])
 
 
+def nested_lattice(lattice: ReferenceLattice) -> ReferenceLattice:
+    """Return the lattice of the coarser mesh: refined once less, or twice of many elements a coarse triangle."""
+    return lattice.coarser(2 if lattice.halvings >= REFINED_OFTEN else 1)
+
+
 def nested_interiors(boundary: InterfaceOperators, lattice: ReferenceLattice) -> Iterator[NestedInterior]:
     """Yield those of this rank's subdomains, which the lattice refines, some at a time."""
-    coarser = lattice.coarser()
+    coarser = nested_lattice(lattice)
     nested = coarser.within(lattice)
     for group in groups(boundary.subdomains, coarser):
         yield NestedInterior.of(group, boundary, coarser, nested)

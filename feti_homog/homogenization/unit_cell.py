@@ -102,7 +102,7 @@ class TornCell:
 
     @cached_property
     def nested_interiors(self) -> list[NestedInterior]:
-        """The interiors of this rank's subdomains on the mesh that is refined once less."""
+        """The interiors of this rank's subdomains on the mesh that is refined less."""
         return list(nested_interiors(self.solver.interface_operators, self.lattice))
 
     def debonded(self, opening: float | None) -> Bool:

@@ -57,9 +57,14 @@ class ReferenceLattice:
         """Order of the elements: 1 or 2."""
         return 1 if self.triangles.shape[1] == 3 else 2
 
-    def coarser(self) -> ReferenceLattice:
-        """Return the lattice of one halving less; there has to be one."""
-        return ReferenceLattice.of(int(self.intervals // self.order).bit_length() - 2, self.order)
+    @property
+    def halvings(self) -> int:
+        """Number of times that each triangle is split in four."""
+        return (self.intervals // self.order).bit_length() - 1
+
+    def coarser(self, fewer: int = 1) -> ReferenceLattice:
+        """Return the lattice of fewer halvings."""
+        return ReferenceLattice.of(self.halvings - fewer, self.order)
 
     def within(self, finer: ReferenceLattice) -> Int:
         """(q,) its nodes among those of a lattice of more halvings."""
