@@ -186,7 +186,7 @@ def test_the_mesh_refined_less_tells_nearly_the_same_errors(comm, order, refine)
 @pytest.mark.parametrize(
     "own",
     [
-        {"order": 1, "refine": 3, "mesh_size": 0.4},
+        {"order": 1, "refine": 3, "mesh_size": 0.2},
         {"order": 2, "refine": 1, "mesh_size": 0.2},
         VOIDS | {"order": 1, "refine": 2},
         {"order": 2, "refine": 1, "mesh_size": 0.2, "matrix": {"young": 88.0, "poisson": 0.4999}},
