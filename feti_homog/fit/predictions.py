@@ -44,11 +44,6 @@ class Datum:
     strain: float | None = None
     strain_name: str = ""
 
-    @property
-    def words(self) -> str:
-        """The name, of a point of a curve with its place."""
-        return self.name if self.strain is None else f"{self.name}({self.strain_name} = {self.strain:g})"
-
 
 def available(case: Case) -> list[str]:
     """Return the names of values that a result of the case has; none of analyses that no fit takes."""

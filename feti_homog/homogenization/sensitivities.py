@@ -6,6 +6,9 @@ With e_i the strains of the unit load i, its other uniform loads behind, the sti
 
 and since its fields make it stationary, dC_ij is the same with dA and dk: exact for the discrete cell.  Bodies need
 the integrals alone, once per phase.  With faces in contact the cell is linear as long as none opens or closes.
+
+By the fraction f of fibres that grow, d f / d ln R = 2 f, a stiffness has the derivative of the energies on the mesh
+that moves, at fixed nodal u - E x: exact for that mesh, whatever the nodes do between the fibres.
 """
 
 from __future__ import annotations
@@ -22,12 +25,17 @@ from feti_homog.fem.assembly import ELEMENTS_AT_ONCE
 from feti_homog.fem.problem import Problem
 from feti_homog.fem.shape_functions import gradients
 from feti_homog.feti.decomposition.subdomain import Subdomain
-from feti_homog.homogenization import phase_laws, shape_derivative
+from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response
+from feti_homog.homogenization.domain_partition import CellSummary
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.materials.derivatives import law_changes
 from feti_homog.parallel.distributed_arrays import allreduce_sum
 from feti_homog.typing import Float, Int32
+
+PATTERNS = ("square", "hexagonal")
+ON_CIRCLE = 1e-9  # of the radius
+IMAGES = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), axis=-1).reshape(-1, 2)
 
 
 @dataclass(frozen=True)
@@ -57,7 +65,7 @@ def derivatives(cells: Sequence[TornCell], responses: Sequence[Sequence[Response
             for own, here in zip(springs, places, strict=False)
         )
         found.append(Derivative(name, value, energies))
-    for f in shape_derivative.fractions(case):
+    for f in _fractions(case):
         found.append(Derivative("cell.fibre_fraction", f, tuple(growth / (2 * f * area) for _, growth in integrals)))
     return found
 
@@ -86,10 +94,10 @@ def _integrals(cell: TornCell, responses: Sequence[Response]) -> tuple[dict[str,
     whole[: m * k, : m * k], whole[-1, m * k :] = np.eye(m * k), loads[m:].ravel()
     materials = dict.fromkeys(provider(phase, cell.case.materials) for phase in cell.summary.phases)
     sums = {material: np.zeros((m * k + 1,) * 2) for material in materials}
-    grows, growth = any(shape_derivative.fractions(cell.case)), np.zeros((k, k))
+    grows, growth = any(_fractions(cell.case)), np.zeros((k, k))
     for place, s in enumerate(cell.subdomains):
         u = cell.solver.extended(place, boundary, loads).reshape(-1, problem.components, k)
-        V = shape_derivative.velocity(s.mesh.points, cell.summary) if grows else None
+        V = _velocity(s.mesh.points, cell.summary) if grows else None
         for first in range(0, len(s.mesh.triangles), ELEMENTS_AT_ONCE):
             nodes = s.mesh.triangles[first : first + ELEMENTS_AT_ONCE]
             fields = _Fields.of(s, nodes, u[s.mesh.node_class[nodes]], loads[:m])
@@ -211,3 +219,30 @@ def _spring_constants(case: Case) -> Iterator[tuple[str, float, tuple[list[tuple
             value = getattr(bond, name)
             if value is not None and np.isfinite(value):
                 yield f"{section}.{name}", value, own
+
+
+def _fractions(case: Case) -> Iterator[float]:
+    """Yield the fraction of equal fibres in a pattern, bonded to the matrix without a coating; none of other cells."""
+    cell = case.cell
+    if cell.geometry in PATTERNS and cell.coating is None and not case.interfaces and cell.fibre_fraction is not None:
+        yield cell.fibre_fraction
+
+
+def _velocity(points: Float, cell: CellSummary) -> Float:
+    """(n, 2) V = dx / d ln R at points (n, 2) where all fibres of a pattern grow.
+
+    It is x - c in a fibre of centre c and radius R, and around it falls to nothing halfway to the next fibre.
+    """
+    period = np.array([cell.width, cell.height])
+    centres, radii = cell.centres[cell.is_fibre], cell.radii[cell.is_fibre]
+    found = np.zeros_like(points)
+    for number, (centre, radius) in enumerate(zip(centres, radii, strict=True)):
+        gaps = np.linalg.norm(centres[:, None] + IMAGES * period - centre, axis=2) - radii[:, None] - radius
+        gaps[number, (IMAGES == 0).all(axis=1)] = np.inf
+        reach = gaps.min() / 2  # so that no two fibres move a node
+        away = points - centre
+        away -= period * np.round(away / period)
+        distance = np.linalg.norm(away, axis=1, keepdims=True)
+        share = np.clip((radius + reach - distance) / reach, 0.0, 1.0) * radius / np.maximum(distance, radius)
+        found += away * np.where(distance <= radius * (1 + ON_CIRCLE), 1.0, share)
+    return found

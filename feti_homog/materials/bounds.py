@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from feti_homog.runtime.records import STRESS, described
-from feti_homog.typing import Float
+from feti_homog.typing import Array, Float
 
 
 @dataclass(frozen=True)
@@ -44,18 +45,18 @@ class Bounds:
 
 
 def engineering_moduli(stiffness: ArrayLike) -> Moduli:
-    """Return the moduli of a stiffness C, with compliance S = C^-1: E_i = 1/S_ii, nu_ij = -S_ji/S_ii, G12 = 1/S_33.
-
-    Raises numpy.linalg.LinAlgError if C is singular.
-    """
+    """Return the moduli of a stiffness. Raises numpy.linalg.LinAlgError if it is singular."""
     s = np.linalg.inv(np.asarray(stiffness, dtype=float))
     bulk, shear = isotropic_part(stiffness)
-    values = {
-        "E1": 1 / s[0, 0], "E2": 1 / s[1, 1], "nu12": -s[1, 0] / s[0, 0], "nu21": -s[0, 1] / s[1, 1],
-        "G12": 1 / s[2, 2], "eta1": s[2, 0] / s[0, 0], "eta2": s[2, 1] / s[1, 1],
-        "bulk": bulk, "shear": shear, "anisotropy": anisotropy(stiffness),
-    }  # fmt: skip
+    values = plane_constants(s) | {"eta1": s[2, 0] / s[0, 0], "eta2": s[2, 1] / s[1, 1]}
+    values |= {"bulk": bulk, "shear": shear, "anisotropy": anisotropy(stiffness)}
     return Moduli(**{name: float(value) for name, value in values.items()})
+
+
+def plane_constants(S: Array) -> dict[str, Any]:
+    """E_i = 1/S_ii, nu_ij = -S_ji/S_ii and G12 = 1/S_33 of a compliance (3, 3), real or complex."""
+    found = {"E1": 1 / S[0, 0], "E2": 1 / S[1, 1], "nu12": -S[1, 0] / S[0, 0], "nu21": -S[0, 1] / S[1, 1]}
+    return found | {"G12": 1 / S[2, 2]}
 
 
 def isotropic_part(stiffness: ArrayLike) -> tuple[float, float]:

@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from feti_homog.materials.bounds import plane_constants
 from feti_homog.materials.forms import EXPANSION_PAIR, General, Isotropic, Material, Orthotropic, TransverselyIsotropic
 from feti_homog.materials.laws import COUPLINGS, expansion, known_compliance, stiffness_of
 from feti_homog.materials.plane_state import PLANE_STATES
-from feti_homog.materials.spatial_constants import transverse_constants
+from feti_homog.materials.spatial_constants import constants_about_fibres, constants_along_axes
 from feti_homog.materials.voigt import IN_PLANE, IN_PLANE_BLOCK, strain_rotation
 from feti_homog.typing import Float
 
@@ -135,28 +136,13 @@ def composite_constants(C: NDArray[Any], thermal: NDArray[Any] | None) -> dict[s
     entries = [(i, j) for i in range(n) for j in range(i, n) if n == 3 or (i, j) not in COUPLINGS]
     found = {f"C{i + 1}{j + 1}": C[i, j] for i, j in entries}
     if n == 3:
-        found |= {"E1": 1 / S[0, 0], "E2": 1 / S[1, 1], "nu12": -S[1, 0] / S[0, 0], "nu21": -S[0, 1] / S[1, 1]}
-        return found | {"G12": 1 / S[2, 2]}
-    found |= {f"E{i + 1}": 1 / S[i, i] for i in range(3)}
-    found |= {f"nu{i + 1}{j + 1}": -S[j, i] / S[i, i] for i, j in ((0, 1), (0, 2), (1, 2))}
-    found |= {"G12": 1 / S[5, 5], "G13": 1 / S[4, 4], "G23": 1 / S[3, 3]} | _about_fibres(C)
+        return found | plane_constants(S)
+    found |= constants_along_axes(S) | constants_about_fibres(C)
     if thermal is not None:
         strains = -S @ thermal
         found |= {f"{name}.{i + 1}": x[i] for name, x in (("thermal_stress", thermal), ("expansion", strains))
                   for i in range(3)}  # fmt: skip
     return found
-
-
-def _about_fibres(C: NDArray[Any]) -> dict[str, Any]:
-    """Return the constants of `spatial_constants.transversely_isotropic_part`, by Hill's moduli."""
-    k, across = (C[0, 0] + C[1, 1] + 2 * C[0, 1]) / 4, (C[0, 2] + C[1, 2]) / 2
-    m = (C[0, 0] + C[1, 1] - 2 * C[0, 1] + 4 * C[5, 5]) / 8
-    E, nu = C[2, 2] - across**2 / k, across / (2 * k)
-    E_transverse, nu_transverse = transverse_constants(E, nu, k, m)
-    return {
-        "E_axial": E, "E_transverse": E_transverse, "nu_axial": nu, "nu_transverse": nu_transverse,
-        "G_axial": (C[3, 3] + C[4, 4]) / 2, "G_transverse": m, "K_transverse": k,
-    }  # fmt: skip
 
 
 def constant_changes(C: Float, thermal: Float | None, dC: Float, dthermal: Float | None) -> dict[str, float]:

@@ -6,16 +6,17 @@ direction of the fibres.  Expansions are strains per unit of temperature, (6,) i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from feti_homog.materials.forms import PER_TEMPERATURE
 from feti_homog.runtime.records import STRESS, described
-from feti_homog.typing import Float
+from feti_homog.typing import Array, Float
 
 DIRECTIONS = 720  # across the fibres
-PER_TEMPERATURE = "1 / temperature"
 TRANSVERSELY_ISOTROPIC = 1e-9  # relative distance to the nearest transversely isotropic stiffness, from rounding
 
 # Turns a (6, 6) matrix of the components of a stiffness into one of the same Frobenius norm as the tensor.
@@ -82,58 +83,66 @@ def transverse_moduli(stiffness: ArrayLike) -> TransverseModuli:
 
 
 def engineering_constants(stiffness: ArrayLike) -> EngineeringConstants:
-    """Return the constants of a stiffness C, with compliance S = C^-1.
-
-    E_i = 1/S_ii, nu_ij = -S_ji/S_ii, G_ij = 1/S_kk.
-
-    Raises numpy.linalg.LinAlgError if C is singular.
-    """
-    s = np.linalg.inv(np.asarray(stiffness, dtype=float))
-    values = {
-        "E1": 1 / s[0, 0], "E2": 1 / s[1, 1], "E3": 1 / s[2, 2],
-        "nu12": -s[1, 0] / s[0, 0], "nu13": -s[2, 0] / s[0, 0], "nu23": -s[2, 1] / s[1, 1],
-        "G12": 1 / s[5, 5], "G13": 1 / s[4, 4], "G23": 1 / s[3, 3],
-    }  # fmt: skip
-    return EngineeringConstants(**{name: float(value) for name, value in values.items()})
+    """Return the constants of a stiffness, as `constants_along_axes`. Raises numpy.linalg.LinAlgError if singular."""
+    found = constants_along_axes(np.linalg.inv(np.asarray(stiffness, dtype=float)))
+    return EngineeringConstants(**{name: float(value) for name, value in found.items()})
 
 
-def transversely_isotropic_part(stiffness: ArrayLike, expansion: ArrayLike | None = None) -> TransverselyIsotropic:
-    """Constants of the transversely isotropic stiffness about x3 nearest to C in the Frobenius norm of the tensors.
+def constants_along_axes(S: Array) -> dict[str, Any]:
+    """E_i = 1/S_ii, nu_ij = -S_ji/S_ii and G_ij = 1/S_kk of a compliance (6, 6), real or complex, in this order."""
+    found = {f"E{i + 1}": 1 / S[i, i] for i in range(3)}
+    found |= {f"nu{i + 1}{j + 1}": -S[j, i] / S[i, i] for i, j in ((0, 1), (0, 2), (1, 2))}
+    return found | {"G12": 1 / S[5, 5], "G13": 1 / S[4, 4], "G23": 1 / S[3, 3]}
 
-    It is the mean of C over all turns about x3, in Hill's moduli
+
+def constants_about_fibres(C: Array) -> dict[str, Any]:
+    """Constants of the transversely isotropic stiffness about x3 nearest to C, (6, 6) real or complex.
+
+    Nearest in the Frobenius norm of the tensors is the mean of C over all turns about x3, in Hill's moduli
 
         k = (C11 + C22 + 2 C12)/4,  l = (C13 + C23)/2,  n = C33,  m = (C11 + C22 - 2 C12 + 4 C66)/8,  p = (C44 + C55)/2,
 
     which are the same in all axes turned about x3; E_axial = n - l^2/k, nu_axial = l/(2 k), G_axial = p,
-    G_transverse = m, K_transverse = k.  The expansion is the mean over the same turns, alpha_33 and
-    (alpha_11 + alpha_22)/2.  `deviation` is ||C - C_nearest|| / ||C||.  Hill 1964.
+    G_transverse = m, K_transverse = k (Hill 1964).
+    """
+    k = (C[0, 0] + C[1, 1] + 2 * C[0, 1]) / 4
+    m = (C[0, 0] + C[1, 1] - 2 * C[0, 1] + 4 * C[5, 5]) / 8
+    across = (C[0, 2] + C[1, 2]) / 2
+    E, nu = C[2, 2] - across**2 / k, across / (2 * k)
+    E_transverse, nu_transverse = transverse_constants(E, nu, k, m)
+    return {
+        "E_axial": E, "E_transverse": E_transverse, "nu_axial": nu, "nu_transverse": nu_transverse,
+        "G_axial": (C[3, 3] + C[4, 4]) / 2, "G_transverse": m, "K_transverse": k,
+    }  # fmt: skip
+
+
+def transversely_isotropic_part(stiffness: ArrayLike, expansion: ArrayLike | None = None) -> TransverselyIsotropic:
+    """Constants of a stiffness C as `constants_about_fibres`, and `deviation`, ||C - C_nearest|| / ||C||.
+
+    The expansion is the mean over the same turns, alpha_33 and (alpha_11 + alpha_22)/2.
     """
     c = np.asarray(stiffness, dtype=float)
-    k = (c[0, 0] + c[1, 1] + 2 * c[0, 1]) / 4
-    m = (c[0, 0] + c[1, 1] - 2 * c[0, 1] + 4 * c[5, 5]) / 8
-    across, along = (c[0, 2] + c[1, 2]) / 2, c[2, 2]
-    E, nu, G = along - across**2 / k, across / (2 * k), (c[3, 3] + c[4, 4]) / 2
-    rest = c - _stiffness(E, nu, k, G, m)
-    E_transverse, nu_transverse = transverse_constants(E, nu, k, m)
+    found = {name: float(value) for name, value in constants_about_fibres(c).items()}
     strains = None if expansion is None else np.asarray(expansion, dtype=float)
-    return TransverselyIsotropic(
-        E_axial=float(E),
-        E_transverse=float(E_transverse),
-        nu_axial=float(nu),
-        nu_transverse=float(nu_transverse),
-        G_axial=float(G),
-        G_transverse=float(m),
-        K_transverse=float(k),
+    nearest = TransverselyIsotropic(
+        **found,
         expansion_axial=None if strains is None else float(strains[2]),
         expansion_transverse=None if strains is None else float(strains[0] + strains[1]) / 2,
-        deviation=float(np.linalg.norm(_MANDEL * rest) / np.linalg.norm(_MANDEL * c)),
+        deviation=0.0,
     )
+    rest = c - transversely_isotropic_stiffness(nearest)
+    return replace(nearest, deviation=float(np.linalg.norm(_MANDEL * rest) / np.linalg.norm(_MANDEL * c)))
 
 
 def transversely_isotropic_stiffness(constants: TransverselyIsotropic) -> Float:
     """(6, 6) C11 = C22 = k + m, C12 = k - m, C13 = C23 = 2 nu_A k, C33 = E_A + 4 nu_A^2 k, C44 = C55 = G_A, C66 = m."""
-    c = constants
-    return _stiffness(c.E_axial, c.nu_axial, c.K_transverse, c.G_axial, c.G_transverse)
+    k, m = constants.K_transverse, constants.G_transverse
+    across = 2 * constants.nu_axial * k
+    along = constants.E_axial + 2 * constants.nu_axial * across
+    c = np.diag([k + m, k + m, along, constants.G_axial, constants.G_axial, m])
+    c[0, 1] = c[1, 0] = k - m
+    c[:2, 2] = c[2, :2] = across
+    return c
 
 
 def transverse_constants(E_axial: float, nu_axial: float, bulk: float, shear: float) -> tuple[float, float]:
@@ -145,11 +154,3 @@ def transverse_constants(E_axial: float, nu_axial: float, bulk: float, shear: fl
 def is_transversely_isotropic(constants: TransverselyIsotropic) -> bool:
     """Return whether the stiffness of which these are the constants is, up to rounding."""
     return constants.deviation < TRANSVERSELY_ISOTROPIC
-
-
-def _stiffness(E: float, nu: float, k: float, p: float, m: float) -> Float:
-    across = 2 * nu * k
-    c = np.diag([k + m, k + m, E + 2 * nu * across, p, p, m])
-    c[0, 1] = c[1, 0] = k - m
-    c[:2, 2] = c[2, :2] = across
-    return c

@@ -6,7 +6,8 @@ import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from feti_homog.materials.spatial_constants import PER_TEMPERATURE, TransverselyIsotropic, transverse_constants
+from feti_homog.materials.forms import PER_TEMPERATURE
+from feti_homog.materials.spatial_constants import TransverselyIsotropic, transverse_constants
 from feti_homog.runtime.records import STRESS, described
 
 Pair = tuple[float, float]
