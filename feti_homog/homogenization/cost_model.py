@@ -1,9 +1,9 @@
 """Cost of a case: seconds, memory, and how many ranks are worth while; estimates before anything is solved.
 
 About linear in the degrees of freedom, for bodies are cut into pieces of one size.  The constants are those that
-`.venv/bin/python scripts/measure_cost.py` prints, on a 2-core machine; those of setup, subdomains and applications were
-fitted later to the processor time of 9 stiffnesses of 700 to 130 000 degrees of freedom beside other programs.  Times
-of stiffnesses are within a factor of 1.5; those of paths lie between few events and as many as bonds have teeth, so
+`.venv/bin/python scripts/measure_cost.py` prints, on a 2-core machine; those of setup, subdomains, applications,
+columns and states were fitted later to the processor time of cases of 700 to 130 000 degrees of freedom beside other
+programs.  Times are within a factor of 1.5; those of paths lie between few events and as many as bonds have teeth, so
 that a job's time limit should leave room.
 """
 
@@ -30,6 +30,8 @@ MESH_SECONDS = 2.7e-5
 SETUP_SECONDS, SUBDOMAIN_SECONDS = 5.7e-6, 1.2e-2
 # Seconds for each degree of freedom in one application of operator and preconditioner.
 APPLY_SECONDS = 5.5e-8
+# Seconds for each multiplier that has influence columns, to make these and their inverse.
+COLUMN_SECONDS = 1.4e-4
 # Seconds for each degree of freedom to estimate the errors of the mesh, of cells that are refined.
 ERROR_SECONDS = 1.3e-6
 # Bytes of a rank without degrees of freedom, for each of these, and for each multiplier that has influence columns.
@@ -40,9 +42,9 @@ FACE_PAIR_BYTES = 48
 # besides; of the mesh for each node and element, and of the interface's nodes.
 STATE_BYTES, AXIAL_BYTES = np.array([16, 36, 138]), np.array([8, 16, 16])
 MESH_BYTES, CORNER_BYTES = np.array([16, 16, 80]), 8
-# Seconds to make and write the fields of a state, for each element; of a point of a path, whose displacements follow
-# from its checkpoint, and for which errors of the mesh are estimated: in any case, and for each element.
-STATE_SECONDS = 6e-7
+# Seconds to make and write the fields of a state, in any case and for each element; of a point of a path, whose
+# displacements follow from its checkpoint, and for which errors of the mesh are estimated.
+STATE_SECONDS, STATE_ELEMENT_SECONDS = 2.8e-2, 6e-7
 POINT_SECONDS, POINT_ELEMENT_SECONDS = 3.4e-2, 2.5e-6
 # Seconds of an event of a path: in any case, for each degree of freedom on every rank, and for each of a rank
 # (`scripts/scaling events`). Later events of a large cell take up to four times as long.
@@ -64,14 +66,17 @@ class Estimate:
     ranks: int
 
 
-def applications(case: Case, problem: Problem, across: bool = False) -> int:
-    """About how many times the analysis applies the dual operator of a problem; of pieces `across` materials or not."""
+def applications(case: Case, problem: Problem, easy: bool = False) -> int:
+    """About how many times the analysis applies the dual operator of a problem.
+
+    Solves are `easy` by influence columns, and of pieces across materials: coatings then cost no iterations.
+    """
     # A mesh may have a curve "debonded"; along the fibres nothing touches.
     may_open = bool(case.arcs) or case.cell.has_own_mesh or case.section.is_followed
     contact = case.interface is not None and case.interface.contact and may_open and problem != AXIAL
     many = case.section.is_followed or _asks_for_tips(case)
     solves = SOLVES_OF_A_PATH if many else case.section.solves(len(problem.loads), contact)
-    return _iterations(case, across) * solves * (SOLVES_OF_A_CONTACT if contact else 1)
+    return _iterations(case, easy) * solves * (SOLVES_OF_A_CONTACT if contact else 1)
 
 
 def has_errors(case: Case) -> bool:
@@ -79,9 +84,9 @@ def has_errors(case: Case) -> bool:
     return case.output.mesh_error and (case.output.fields or not case.section.is_followed)
 
 
-def _iterations(case: Case, across: bool) -> int:
+def _iterations(case: Case, easy: bool) -> int:
     """About those of a solve by a preconditioner."""
-    return ITERATIONS_WITH_COATINGS if COATING in case.materials and not across else ITERATIONS_OF_A_SOLVE
+    return ITERATIONS_WITH_COATINGS if COATING in case.materials and not easy else ITERATIONS_OF_A_SOLVE
 
 
 def _asks_for_tips(case: Case) -> bool:
@@ -114,7 +119,7 @@ def estimate(
     slowest = max(n * of_node + k * of_subdomain for n, k in zip(nodes, subdomains, strict=True))
     dofs = [sum(problems) * n for n in nodes]
     return Estimate(
-        seconds=START_SECONDS + coarse_triangles * MESH_SECONDS + slowest,
+        seconds=START_SECONDS + coarse_triangles * MESH_SECONDS + slowest + columns / len(nodes) * COLUMN_SECONDS,
         memory=BASE_BYTES + max(dofs) * DOF_BYTES + columns / len(nodes) * COLUMN_BYTES,
         ranks=max(1, min(bodies, ceil(sum(dofs) / DOFS_OF_A_RANK))),
     )
@@ -135,7 +140,7 @@ def fields_line(case: Case, nodes: int, elements: int, interface_nodes: int, ran
     assert isinstance(count, int)
     noun = "state" if count == 1 else "states"
     words = f"{'at most ' if case.section.is_followed else ''}{count} {noun} of {_size(state)}"
-    of_each = elements / ranks * STATE_SECONDS
+    of_each = STATE_SECONDS + elements / ranks * STATE_ELEMENT_SECONDS
     if case.section.is_followed:
         of_each = POINT_SECONDS + elements / ranks * POINT_ELEMENT_SECONDS
     return f"fields     {words}, {_size(mesh + count * state)} in result.h5, {_rounded(count * of_each)}"

@@ -60,12 +60,9 @@ def _described(
     own = [subdomains for subdomains, _ in loads]
     nodes = [triangles * lattice.intervals**2 // 2 for _, triangles in loads]
     elements = summary.coarse_triangles * len(lattice.triangles)
-    problems = {
-        problem.components: cost_model.applications(case, problem, summary.across)
-        for problem in phase_laws.problems(case)
-    }
-    plan = _plan(case, summary, multipliers, max(problems.values()), options)
+    plan = _plan(case, summary, multipliers, max(_applications(case, summary.across).values()), options)
     columns = multipliers if plan.preconditioner == "influence" else 0
+    problems = _applications(case, summary.across or columns > 0)
     errors = cost_model.has_errors(case)
     triangles, most_ranks = summary.coarse_triangles, summary.coarse_triangles if summary.across else summary.bodies
     taken = cost_model.estimate(nodes, own, triangles, most_ranks, problems, columns, errors)
@@ -102,6 +99,11 @@ def _described(
         "the case is valid",
     ]
     return "\n".join(lines)
+
+
+def _applications(case: Case, easy: bool) -> dict[int, int]:
+    """Return for each problem, by its displacements of a node, how many times it applies its dual operator."""
+    return {p.components: cost_model.applications(case, p, easy) for p in phase_laws.problems(case)}
 
 
 def _subdomains(count: int) -> str:

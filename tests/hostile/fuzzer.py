@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-import signal
 import traceback
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -26,8 +25,9 @@ from feti_homog.report.text.summary import summary
 from feti_homog.results import seals
 from feti_homog.sweep import plan, store
 from feti_homog.verify.certificate import verify
-from hostile.attempts import LIMIT_S
+from hostile.attempts import LIMIT_S, PATIENCE_S
 from hostile.fibre_tables import CASE, HEAD
+from hostile.job import limit
 
 VALUES: tuple[Any, ...] = (
     *(None, True, 0, -1, 1.5, 1e308, 10**40, "", "x", "\x1b[31m", "\ud800", [], [0], [[]], [None], {}, {"x": 1}),
@@ -56,7 +56,7 @@ def faults(prepared: Path, folder: Path, count: int, seed: int) -> Iterator[str]
         shutil.copytree(prepared / name, folder / name)
     rng = np.random.default_rng(seed)
     for number in range(count):
-        signal.alarm(LIMIT_S)  # ends the program
+        limit(LIMIT_S, PATIENCE_S)
         try:
             KINDS[number % len(KINDS)](prepared, folder, rng)
         except FetiHomogError as error:
@@ -64,7 +64,7 @@ def faults(prepared: Path, folder: Path, count: int, seed: int) -> Iterator[str]
                 yield f"file {number} of seed {seed}: {error.faults}"
         except Exception:
             yield f"file {number} of seed {seed}: {traceback.format_exc()[-1500:]}"
-        signal.alarm(0)
+        limit(0, 0)
 
 
 def _table(_: Path, folder: Path, rng: np.random.Generator) -> None:

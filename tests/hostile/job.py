@@ -13,7 +13,13 @@ from mpi4py import MPI
 from feti_homog import cli
 
 
-def main(commands: Path, limit: int) -> None:
+def limit(processor: float, clock: float) -> None:
+    """End the program after so many seconds; zeros take the limits back."""
+    signal.setitimer(signal.ITIMER_PROF, processor)
+    signal.setitimer(signal.ITIMER_REAL, clock)
+
+
+def main(commands: Path, processor: float, clock: float) -> None:
     """Run the commands in a file; rank 0 writes output, errors and exit code of number K beside it: K.1, K.2, K.code.
 
     What other ranks print, whose errors are of their own, goes to K.2 too.
@@ -23,12 +29,12 @@ def main(commands: Path, limit: int) -> None:
             end = os.open(f"{commands}.{number}.{stream}", os.O_WRONLY | os.O_CREAT | os.O_APPEND)
             os.dup2(end, stream)
             os.close(end)
-        signal.alarm(limit)  # ends the job
+        limit(processor, clock)
         try:
             code = cli.main(words)
         except SystemExit as end_of_help:
             code = int(str(end_of_help.code or 0))
-        signal.alarm(0)
+        limit(0, 0)
         sys.stdout.flush()
         sys.stderr.flush()
         if MPI.COMM_WORLD.rank == 0:
@@ -36,4 +42,4 @@ def main(commands: Path, limit: int) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), int(sys.argv[2]))
+    main(Path(sys.argv[1]), float(sys.argv[2]), float(sys.argv[3]))

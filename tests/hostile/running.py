@@ -14,7 +14,7 @@ from pathlib import Path
 import matplotlib as mpl
 from support.jobs import ROOT, environment, mpirun
 
-from hostile.attempts import LIMIT_S, Attempt, entries
+from hostile.attempts import LIMIT_S, PATIENCE_S, Attempt, entries
 
 AT_ONCE = 3  # processes
 MOST_TOLD = 1500  # characters of what a faulty attempt printed
@@ -30,7 +30,8 @@ def in_one_job(attempts: Sequence[Attempt], ranks: int, folder: Path) -> dict[st
     before = [entries(place) for place in places]
     commands = folder / "commands"
     commands.write_text(json.dumps([a.command(place) for a, place in zip(attempts, places, strict=True)]))
-    job = mpirun(ranks, Path(__file__).with_name("job.py"), commands, str(LIMIT_S), cwd=here)
+    limits = str(LIMIT_S), str(PATIENCE_S)
+    job = mpirun(ranks, Path(__file__).with_name("job.py"), commands, *limits, cwd=here)
     found = {}
     for number, (attempt, place) in enumerate(zip(attempts, places, strict=True)):
         answers = [Path(f"{commands}.{number}.{end}") for end in ("code", "1", "2")]
@@ -68,7 +69,8 @@ def _in_process(attempt: Attempt, place: Path) -> list[str]:
     home, path = str(place.parent / "home"), f"{place.parent / 'bin'}:{os.environ['PATH']}"
     own = {"PATH": path, "PYTHONPATH": str(ROOT), "HOME": home, "MPLCONFIGDIR": home}
     mounts = ["unshare", "--mount"] if attempt.kind == "disks" else []
-    words = ["timeout", "--signal=KILL", str(LIMIT_S), *mounts, "bash", "-c", attempt.shell]
+    shell = f"ulimit -t {LIMIT_S}; {attempt.shell}"
+    words = ["timeout", "--signal=KILL", str(PATIENCE_S), *mounts, "bash", "-c", shell]
     job = subprocess.run(
         words, cwd=place, env=environment() | own, capture_output=True, text=True, errors="replace", check=False
     )
