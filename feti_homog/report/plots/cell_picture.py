@@ -27,6 +27,7 @@ from feti_homog.report.plots.plot_helpers import (
     fill_triangles,
     label_cell_axes,
     plain,
+    value_range,
 )
 from feti_homog.typing import Array
 
@@ -38,7 +39,7 @@ MOST_NUMBERS = 2000  # of fibres; of more none could be read
 INSIDE, SEEN = 0.4, 0.85  # of a radius: how far from the sides a number stands, and how far at most from the centre
 POINTS_PER_INCH, CHARACTERS = 72, 2.2
 LEAST_SIZE, LARGEST_SIZE = 3.0, 11.0  # of the letters, in points
-DECADES = 4  # below the largest density of errors, of which less is not told apart
+DECADES = 4  # below the density of errors that hardly any area exceeds; less is not told apart
 
 
 def figure(cell: DrawnCell) -> Figure:
@@ -75,7 +76,7 @@ def mesh_error(cell: DrawnCell) -> Figure | None:
     """Return the cell in the colours of the density of the error, None without estimates.
 
     The error in a part of the cell relative to the strain energy of the cell, over the part's share of the area; the
-    largest of all states.
+    largest of all states.  That of singular tips is above the range, otherwise all else would have one colour.
     """
     file, drawn = cell.file, cell.drawn
     tables = [state["mesh_error"] for state in file.get("state", {}).values() if "mesh_error" in state]
@@ -90,10 +91,12 @@ def mesh_error(cell: DrawnCell) -> Figure | None:
     if not 0.0 < most < np.inf:
         return None
     picture, (axes,) = figure_of(file.attrs, panels=1, beside=BAR_INCHES)
-    least = most / 10.0**DECADES
-    colours = ScalarMappable(LogNorm(least, most), "magma_r")
+    top = float(value_range(density, area)[0].vmax or most)
+    least = top / 10.0**DECADES
+    colours = ScalarMappable(LogNorm(least, top), "magma_r")
     fill_triangles(axes, drawn, drawn.points, np.asarray(colours.to_rgba(np.maximum(density, least))), edges=False)
-    bar_beside(axes, colours, "min").set_label("error of the strain energy / energy, per share of the area")
+    extend = "both" if most > top else "min"
+    bar_beside(axes, colours, extend).set_label("error of the strain energy / energy, per share of the area")
     draw_segments(axes, drawn.points[cell.borders], "black", 0.7)
     label_cell_axes(axes, file.attrs)
     axes.set_title(_title(file.attrs, "estimated error of the mesh"))

@@ -13,8 +13,8 @@ from PIL import Image
 from support.sample_output import Sample, in_space, sample
 
 from feti_homog.errors import CaseError, FetiHomogError
-from feti_homog.report.plots import decimation, figures, plot_helpers
-from feti_homog.report.plots.interface_marks import InterfaceEdges
+from feti_homog.report.plots import cell_picture, decimation, figures, plot_helpers
+from feti_homog.report.plots.interface_marks import DrawnCell, InterfaceEdges
 from feti_homog.results.field_file import FieldFile
 from feti_homog.results.result_json import SCHEMA
 
@@ -49,6 +49,17 @@ def test_coarser_triangles_have_the_means_of_theirs(tmp_path: Path, limit: int, 
     np.testing.assert_array_equal(drawn.body, inside)
     expected = 0.5 * drawn.points[:, ::-1] + 0.05 * np.sin(2 * np.pi * drawn.points[:, ::-1])
     np.testing.assert_allclose(displacement, expected, atol=1e-12)
+
+
+def test_errors_at_tips_leave_colours_to_the_rest_of_the_cell(tmp_path: Path) -> None:
+    with h5py.File(write(tmp_path, sample(8, refine=3)), "r+") as file:
+        for state in file["state"].values():
+            state["mesh_error"][:] = 1.0
+        file["state/0/mesh_error"][17] = 1e9
+        picture = cell_picture.mesh_error(DrawnCell.of(file, 10_000))
+        assert picture is not None
+        least, most = picture.axes[0].child_axes[0].get_ylim()
+        assert most == pytest.approx(1e4 * least) == pytest.approx(8192.0)  # of an element's error over its area
 
 
 @pytest.mark.parametrize("block", [1, 7, 64, 1 << 18])
