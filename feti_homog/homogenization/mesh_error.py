@@ -96,11 +96,14 @@ def energy_errors(
 
 
 def is_nested(cell: TornCell, responses: Sequence[Response]) -> bool:
-    """Return whether a mesh refined less has the error: not of quadratic elements at tips of debonded arcs."""
-    lattice = cell.lattice
-    if cell.summary.across:
-        return False  # interiors are factored anyway
-    return lattice.halvings > 0 and not (lattice.order == 2 and any(r.debonded for r in responses))
+    """Return whether a mesh refined less has the error: not where errors fall more slowly, at corners and tips.
+
+    Not of cells with fibres other than circles and ellipses, nor of quadratic elements with debonded arcs.
+    """
+    summary, lattice = cell.summary, cell.lattice
+    if summary.across or not lattice.halvings or np.isnan(summary.frames[summary.fibre_bodies]).any():
+        return False  # interiors across materials are factored anyway
+    return lattice.order == 1 or not any(response.debonded for response in responses)
 
 
 def _recovered(

@@ -55,7 +55,18 @@ def test_a_mesh_that_errs_too_much_is_refined_once(comm, kind):
     assert f"with refine = {case.cell.refine}: solved once more with refine = {found.cell.refine}" in first
     if kind == "stiffness":  # of the rate that both meshes have, not of that of smooth fields
         assert int(others[0].split("refine = ")[1].split(" ")[0]) > found.cell.refine + 1
+    assert found.cell.refine > case.cell.refine
     assert found.case == case.resolved() and found.digest == case.digest()
+
+
+def test_corners_are_known_from_the_mesh_itself(comm):
+    square = {"x": 0.5, "y": 0.5, "radius": 0.35, "sides": 4, "angle": 45.0}
+    document = {"material": {"matrix": MATRIX | {"young": 1.0}, "fibre": FIBRE}, **UNIT}
+    cell = {"geometry": "table", "width": 1.0, "height": 1.0, "fibre_list": [square], "mesh_size": 0.5, "order": 2}
+    fine, found = (run(Case.parse(document | {"cell": cell | {"refine": k}}), comm) for k in (4, 2))
+    off = np.abs(np.diag(found.effective_stiffness - fine.effective_stiffness))
+    ratio = off / np.diag(found.mesh_error.effective_stiffness)
+    assert (ratio > 0.2).all() and (ratio < 1.0).all()
 
 
 def test_kept_points_of_a_path_have_errors_of_their_energies(comm):
