@@ -39,16 +39,19 @@ class InfluenceSolutions:
     def solutions(self, strains: Float, d: Float) -> list[DualSolution] | None:
         """Return those of the loads (k, v), with jumps d (owned rows, v) of the torn cell; None if F lambda is due.
 
-        It always is where bodies are free, and for loads of which the active rows see so little that it may be
-        rounding.  Collective.
+        It always is for loads of which the active rows see so little that it may be rounding, and where as many motions
+        are free by rank as columns find is not so.  Collective.
         """
         self._expected = None
-        if self._natural.unconstrained_modes.shape[1] or not self._granted:
+        if not self._granted:
             return None
         seen, torn = np.einsum("ki,nij,kj->nk", strains, self._squares, strains)
         if not (seen > LEAST_UNCONFIRMED_JUMP**2 * torn).all():
             return None
-        lam, jumps = self._inverse.answer(d, strains.T)
+        found = self._inverse.answer(d, strains.T, self._natural.unconstrained_modes.shape[1])
+        if found is None:
+            return None
+        lam, jumps = found
         if not self._left:
             self._expected = lam
             return None

@@ -154,6 +154,8 @@ MOST_FOLLOWED, FOLLOWED_COLUMNS, WAITING_COLUMNS = 16, 1200, 32
 # Least singular value of the rows that turn, relative to their stiffness, with which columns are followed: they lose as
 # many digits.
 LEAST_FOLLOWED_PIVOT = 1e-6
+# Share of a force on a face that a row bears which holds a free body in its place, below which that is rounding.
+RIGID_SHARE = 1e-6
 # Stiffness of a fibre over that of what is around it, as the diagonals of K have them, above which influence columns
 # take the forces of the latter: those of the fibre lose as many digits as this has.
 STIFF_FIBRES = 1e3

@@ -7,7 +7,7 @@ from mpi4py import MPI
 from scipy.linalg.lapack import dpstrf
 
 from feti_homog.feti.thresholds import INVERSE_ERROR, SINGULAR_PIVOT
-from feti_homog.typing import Float, Int
+from feti_homog.typing import Bool, Float, Int
 
 
 class BorderedInverse:
@@ -20,14 +20,39 @@ class BorderedInverse:
         N: (k, k).
         M: (k, k) M[C, C].
         added: (k,) the part of the diagonal of M that changes.
+        dependent: those that `exchange` left out, for they depend on others.
     """
 
     def __init__(self, comm: MPI.Intracomm) -> None:
         """No members yet."""
         self._comm = comm
         self.members: Int = np.zeros(0, np.int64)
+        self.dependent: Int = self.members
         self.N = self.M = np.zeros((0, 0))
         self._root = self.added = np.zeros(0)
+
+    def exchange(self, M: Float, stiffness: Float, changed: Int, returned: Bool, added: Float) -> None:
+        """Take the members that are not `changed` (p,) out, and the others in: those `returned` (p,) with sign -1.
+
+        The diagonal of the matrix `M` (n, n) gets `added` (p,) there; `stiffness` (n,) as `size` of sign 1, its inverse
+        of -1.  Collective.
+        """
+        D = np.zeros(len(stiffness))
+        D[changed] = added
+        # What no longer holds at all is taken out and in again, for N may be singular with it.
+        left = (D[self.members] == 0.0) & (self.added > 0.0)
+        gone = np.union1d(np.setdiff1d(self.members, changed), self.members[left])
+        self.remove(gone)
+        at = np.flatnonzero(D[self.members] != self.added)
+        if len(at):
+            self.change(at, D[self.members[at]])
+        taken_in = np.setdiff1d(changed[returned], self.members)
+        self.append(M, 1.0 / stiffness, taken_in, -1, D)
+        if len(gone) or len(taken_in):
+            self.dependent = np.zeros(0, np.int64)
+        left_out = np.setdiff1d(changed[~returned], np.concatenate([self.members, self.dependent]))
+        self.append(M, stiffness, left_out, 1, D)
+        self.dependent = np.setdiff1d(changed, self.members)
 
     def append(self, M: Float, size: Float, new: Int, sign: int, added: Float | None = None) -> None:
         """Border with the members `new`, on which `sign` M, Schur's complement of the others, is semi-definite.
@@ -93,6 +118,18 @@ class BorderedInverse:
         """M[C, C]^-1 b for b (k,) or (k, n), with one step of iterative refinement: borders add up rounding."""
         x = self.N @ b
         return np.asarray(x + self.N @ (b - self.M @ x))
+
+    def blocks(self, M: Float, at: Int, returned: Bool) -> Float:
+        """(m, 2, 2) diagonal blocks of M - U N U^T at the pairs `at` (2m,) of rows of M, with U = M[:, C].
+
+        On those `returned` (2m,) U has the rows of the identity, and the first M is 0.
+        """
+        pairs = at.reshape(-1, 2)
+        U, own = M[at[:, None], self.members], M[pairs[:, :, None], pairs[:, None, :]]
+        U[returned] = at[returned, None] == self.members
+        both, paired = ~returned.reshape(-1, 2), U.reshape(len(pairs), 2, len(self.members))
+        own = np.where(both[:, :, None] & both[:, None, :], own, 0.0)
+        return np.asarray(own - np.matmul((U @ self.N).reshape(paired.shape), paired.transpose(0, 2, 1)))
 
     def holds(self) -> bool:
         """Check M[C, C] N x = x but for rounding, for a vector x of the rows' sizes, on rank 0.  Collective."""

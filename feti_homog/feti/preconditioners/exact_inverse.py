@@ -9,9 +9,9 @@ A spring whose compliance grew by dC is one of C, whose jump dC lam is prescribe
 
     N = (Gamma_CC + D)^-1,  lam_C = D c on such rows,  D = dC^-1 there, -dC where bonds came, 0 where they left.
 
-A bond that breaks or softens and a face that closes or opens cost their columns of what `followed_response` keeps up.
-N follows them, by borders, when new columns or a confirmation want it.  The reference cell stays, until there are
-more changes than an option allows: then the cell as it stands, but for what softened, takes its place.
+Changes cost their columns of what `followed_response` keeps up.  N follows them, by borders, when new columns or a
+confirmation want it.  The reference cell stays, until there are more changes than an option allows: then the cell as it
+stands, but for what softened, takes its place.
 """
 
 from __future__ import annotations
@@ -81,8 +81,10 @@ class ExactInverse(Preconditioner):
         self.factorizations = self._tied = 0
         self._answer: Float | None = None
         self._followed: FollowedResponse | None = None
-        self._active, self._more = np.ones(self._rows), np.zeros(self._rows)
-        self._next, self._is_behind = self._more, False
+        # `_held` has the pins of free bodies, too.
+        self._held = self._active = np.ones(self._rows)
+        self._more = self._next = np.zeros(self._rows)
+        self._is_behind, self._loose = False, np.zeros(0, np.int64)
         self._rebase(self._active)
         # Rows that leave make H smaller.
         self.norm = NORM_MARGIN * self.reference.largest_eigenvalue(self._first)
@@ -105,31 +107,41 @@ class ExactInverse(Preconditioner):
         if self._followed is not None and not self._follow(self._followed, active):
             self._followed = None
         self._active, self._more, self._is_behind = active, self._next, True
+        self._held = active if self._followed is None else self._with_pins(self._followed.pins, active)
 
     def _follow(self, followed: FollowedResponse, active: Float) -> bool:
         """Keep what is followed up with the rows that soften, leave or come, if it can be.  Collective."""
         gained = self._next * active - self._more * self._active
         own = np.flatnonzero(((turned := self._active - active) != 0.0) | (gained != 0.0))
-        numbers = np.stack([turned, gained, self.stiffness[self._first :][: self._rows]], axis=1)[own]
-        parts = zip(*self.comm.allgather((self._first + own, numbers)), strict=True)
-        rows, numbers = (np.concatenate(part) for part in parts)
+        parts = zip(*self.comm.allgather((self._first + own, turned[own], gained[own])), strict=True)
+        rows, *numbers = (np.concatenate(part) for part in parts)
         is_few = len(rows) <= MOST_FOLLOWED
-        return is_few and self._add_followed(followed, rows) and followed.follow(rows, *numbers.T)
+        return is_few and self._add_followed(followed, rows) and followed.follow(rows, *numbers)
+
+    def _with_pins(self, pins: Int, active: Float) -> Float:
+        """(owned rows,) 1 on active rows and on the global rows `pins`."""
+        held = active.copy()
+        held[pins[(pins >= self._first) & (pins < self._first + self._rows)] - self._first] = 1.0
+        return held
 
     def _add_followed(self, followed: FollowedResponse, wanted: Int) -> bool:
-        """Let all rows (k,) `wanted` have columns of the present response; False if that cannot be.  Collective."""
+        """Let all rows (k,) `wanted` and the pins have columns of the present response; False if that cannot be.
+
+        Collective.
+        """
+        wanted = np.union1d(wanted, followed.pins)
         lacking = followed.lacking(wanted)
         if not len(lacking):
             return True
         self._catch_up()
-        if len(self._dependent) or len(wanted) > followed.most:
-            return False  # a body is free, or there is no room
+        if self._has_others(followed) or len(wanted) > followed.most:
+            return False  # other bodies are free than those with pins, or there is no room
         if not followed.has_room(rows := self._with_near(lacking, followed.lacking)):
             followed.clear()
             rows = near if followed.has_room(near := self._with_near(wanted, followed.lacking)) else wanted
         self._columns.add(rows)
         at, unit = self._columns.positions(rows), np.zeros((self._rows, len(rows)))
-        both = np.stack([self._active, self.reference.active], axis=1)
+        both = np.stack([self._held, self.reference.active], axis=1)
         turned = -np.diff(gather_rows(self.comm, both, self._first, rows)).ravel()
         mine = np.flatnonzero((rows >= self._first) & (rows < self._first + self._rows))
         unit[rows[mine] - self._first, mine] = turned[mine]
@@ -146,11 +158,17 @@ class ExactInverse(Preconditioner):
             # The memory of the old cell goes before the new one takes its own.
             self.reference.destroy()
             self._columns.clear()
-            self._rebase(self._active)
+            self._rebase(self._held)
             changed = self._changed()
             self._tied = len(changed)
         self._find(changed)
         self._update_inverse(self._columns.positions(changed))
+        self._loose = self._columns.rows[self._inverse.dependent]
+        self._held = self._with_pins(self._loose, self._held)
+
+    def _has_others(self, followed: FollowedResponse) -> bool:
+        """Return whether N finds other bodies free than those with pins."""
+        return not np.isin(self._loose, followed.pins).all()
 
     def apply(self, r: Float) -> Float:
         """H r for r (owned rows,) or (owned rows, k); 0 on inactive rows.  Collective."""
@@ -159,32 +177,40 @@ class ExactInverse(Preconditioner):
         return scale_rows(self._active, self._response(y + scale_rows(1.0 - self.reference.active, r)))
 
     def multipliers(self, d: Float, E: Float) -> Float:
-        """H d E for d (owned rows, v), the same at every call, and E (v, k).
-
-        The solution for the loads E, but for rounding; the reference cell answers to d once.  Collective.
-        """
+        """H d E, but for rounding, for d (owned rows, v), the same at every call, and E (v, k).  Collective."""
         return scale_rows(self._active, self._whole_answer(d) @ E)
 
-    def answer(self, d: Float, E: Float) -> tuple[Float, Float]:
+    def answer(self, d: Float, E: Float, free: int = 0) -> tuple[Float, Float] | None:
         """Multipliers H d E and jumps on inactive rows, (owned rows, k), with arguments as of `multipliers`.
 
-        They are those of before with updates, where these can be followed. Collective.
+        They are those of before with updates, where these can be followed.  Jumps are those of one place of the bodies
+        that nothing holds; None where these have another number of motions than `free`.  Collective.
         """
-        answer = self._whole_answer(d) if self._followed is None else self._followed.answer
-        whole = answer @ E
+        whole = (self._whole_answer(d) if self._followed is None else self._followed.answer) @ E
+        if self._followed is None or len(self._followed.pins) != free:
+            self._forget()
+            return None
         lam = scale_rows(self._active, whole)
         return lam, whole - lam
+
+    def _forget(self) -> None:
+        """Follow nothing, so that pins are found anew."""
+        self._followed, self._held, self._is_behind = None, self._active, True
 
     def _whole_answer(self, d: Float) -> Float:
         """(owned rows, v) U, from which updates go on.  Collective."""
         self._catch_up()
+        if self._followed is not None and self._has_others(self._followed):
+            self._forget()
+            self._catch_up()
         if self._answer is None:
             y = self.reference.respond(scale_rows(self.reference.active, d))
             self._answer = y + scale_rows(1.0 - self.reference.active, d)
-        answer = self._response(self._answer)
+        # Pins bear nothing, and stay.
+        answer = scale_rows(1.0 - self._held + self._active, self._response(self._answer))
         if self._followed is None:
-            own = self.comm, self._first, self._jump_operator.global_rows
-            self._followed = FollowedResponse(*own, answer, self.most_followed)
+            arguments = self.stiffness, answer, self._loose, self.most_followed
+            self._followed = FollowedResponse(self.comm, self._first, *arguments)
         self._followed.answer = answer
         return answer
 
@@ -197,15 +223,8 @@ class ExactInverse(Preconditioner):
             return followed.blocks(pairs)
         self._catch_up()
         self._find(pairs.ravel())
-        at, members = self._columns.positions(pairs.ravel()), self._inverse.members
-        # The rows of U, and of the identity on A.
-        U = (block := self._columns.block)[at[:, None], members]
-        own = block[at.reshape(-1, 2)[:, :, None], at.reshape(-1, 2)[:, None, :]]
         returned = gather_rows(self.comm, self.reference.active, self._first, pairs.ravel()) == 0
-        U[returned] = at[returned, None] == members
-        both = ~returned.reshape(-1, 2)
-        own, paired = np.where(both[:, :, None] & both[:, None, :], own, 0.0), U.reshape(len(pairs), 2, len(members))
-        return np.asarray(own - np.matmul((U @ self._inverse.N).reshape(paired.shape), paired.transpose(0, 2, 1)))
+        return self._inverse.blocks(self._columns.block, self._columns.positions(pairs.ravel()), returned)
 
     def columns(self, rows: Int) -> tuple[Float, Float]:
         """(owned rows, k) columns of H of the reference cell, and their (k, k) block, for the same global rows (k,).
@@ -220,23 +239,24 @@ class ExactInverse(Preconditioner):
         """Return the global rows that are active here or in the reference cell, not both, and those that softened.
 
         Collective."""
-        own = self._first + np.flatnonzero((self._active != self.reference.active) | (self._softened > 0.0))
+        own = self._first + np.flatnonzero((self._held != self.reference.active) | (self._softened > 0.0))
         return np.concatenate(self.comm.allgather(own))
 
     @property
     def _softened(self) -> Float:
         """(owned rows,) D: of springs that softened 1 / dC, or -dC where they came; 0 of all others."""
-        holds, came = self._active * self.reference.active > 0.0, self._active > self.reference.active
-        return np.divide(1.0, self._more, out=-self._more * came, where=holds & (self._more > 0.0))
+        holds, came = self._held * self.reference.active > 0.0, self._held > self.reference.active
+        more = self._more * self._active
+        return np.divide(1.0, more, out=-more * came, where=holds & (more > 0.0))
 
     def _rebase(self, active: Float) -> None:
         """Take a cell with these active rows, and what it takes to hold its bodies, for the reference.  Collective."""
         tied = self._ties.tied(active)
         self.reference = ReferenceCell(self.comm, self._jump_operator, self._operators, self._BD, tied)
         self.factorizations += 1
-        owned = self._jump_operator.owned
-        self._columns = ResponseColumns(self.comm, self.reference, owned, self._jump_operator.global_rows)
-        self._inverse, self._dependent = BorderedInverse(self.comm), np.zeros(0, np.int64)
+        own = self._jump_operator.owned, self._jump_operator.global_rows
+        self._columns = ResponseColumns(self.comm, self.reference, *own)
+        self._inverse = BorderedInverse(self.comm)
         self._answer, self._tied = None, 0
         self._rounding = self.reference.force_of_rigid_motions(self.stiffness[self._first :][: self._rows])
 
@@ -253,33 +273,13 @@ class ExactInverse(Preconditioner):
 
     def _update_inverse(self, changed: Int) -> None:
         """Let N be that of the columns `changed`, made anew where updates have lost too many digits.  Collective."""
-        self._exchange_members(changed)
-        if not self._inverse.holds():
-            self._inverse, self._dependent = BorderedInverse(self.comm), np.zeros(0, np.int64)
-            self._exchange_members(changed)
-
-    def _exchange_members(self, changed: Int) -> None:
-        """Take the columns that are not `changed` out of N, and the others in.  Collective."""
-        inverse, M = self._inverse, self._columns.block
         ours = np.stack([self.reference.active, self._softened], axis=1)
         active, softened = gather_rows(self.comm, ours, self._first, self._columns.rows[changed]).T
-        returned, size = active == 0, self.stiffness[self._columns.rows]
-        D = np.zeros(len(size))
-        D[changed] = softened
-        # What no longer holds at all is taken out and in again, for N may be singular with it.
-        left = (D[inverse.members] == 0.0) & (inverse.added > 0.0)
-        gone = np.union1d(np.setdiff1d(inverse.members, changed), inverse.members[left])
-        inverse.remove(gone)
-        at = np.flatnonzero(D[inverse.members] != inverse.added)
-        if len(at):
-            inverse.change(at, D[inverse.members[at]])
-        taken_in = np.setdiff1d(changed[returned], inverse.members)
-        inverse.append(M, 1.0 / size, taken_in, -1, D)
-        if len(gone) or len(taken_in):
-            self._dependent = np.zeros(0, np.int64)
-        left_out = np.setdiff1d(changed[~returned], np.concatenate([inverse.members, self._dependent]))
-        inverse.append(M, size, left_out, 1, D)
-        self._dependent = np.setdiff1d(changed, inverse.members)
+        columns = self._columns.block, self.stiffness[self._columns.rows]
+        self._inverse.exchange(*columns, changed, active == 0, softened)
+        if not self._inverse.holds():
+            self._inverse = BorderedInverse(self.comm)
+            self._inverse.exchange(*columns, changed, active == 0, softened)
 
     def _response(self, z: Float) -> Float:
         """(owned rows,[ k]) H g on active rows, what of g is left on others; z = Gamma g_A + g_R.  Collective."""

@@ -13,14 +13,25 @@ and where the rows I leave (s = 1) or come to be active (s = -1), with B = Gamma
 all others as above.  Springs of rows that are not active have C_0: Gamma_II gives up what they gained where they
 leave, and takes it where they come.  The rows I need one column each; changes of the other columns that are kept wait
 until there are many.
+
+A row that leaves without a force, for it alone resisted a motion of a body, becomes a pin: it stays among the active
+ones, where it bears nothing and its jump, like the place of the body, is as good as any other.  Pins leave when rows
+come that resist the motion.
 """
 
 from __future__ import annotations
 
 import numpy as np
 from mpi4py import MPI
+from scipy.linalg.lapack import dpstrf
 
-from feti_homog.feti.thresholds import FOLLOWED_COLUMNS, LEAST_FOLLOWED_PIVOT, WAITING_COLUMNS
+from feti_homog.feti.thresholds import (
+    FOLLOWED_COLUMNS,
+    LEAST_FOLLOWED_PIVOT,
+    RIGID_SHARE,
+    SINGULAR_PIVOT,
+    WAITING_COLUMNS,
+)
 from feti_homog.parallel.distributed_arrays import allreduce_sum, gather_rows
 from feti_homog.typing import Float, Int
 
@@ -30,15 +41,26 @@ class FollowedResponse:
 
     Attributes:
         answer: (owned rows, v) U.
+        pins: (p,) global rows that left and hold bodies that nothing else does.
         most: columns at most.
     """
 
     def __init__(
-        self, comm: MPI.Intracomm, first: int, global_rows: int, answer: Float, most: int = FOLLOWED_COLUMNS
+        self,
+        comm: MPI.Intracomm,
+        first: int,
+        stiffness: Float,
+        answer: Float,
+        pins: Int,
+        most: int = FOLLOWED_COLUMNS,
     ) -> None:
-        """`answer` is U; this rank's rows begin at `first`.  No columns yet."""
-        self._comm, self._first, self.answer, self.most = comm, first, answer, most
-        self._slot = np.full(global_rows, -1)
+        """`answer` is U with these `pins`; this rank's rows begin at `first`.  No columns yet.
+
+        `stiffness` (all rows,) is the most that the diagonal of Gamma can be on active rows.
+        """
+        self._comm, self._first, self._stiffness = comm, first, stiffness
+        self.answer, self.pins, self.most = answer, pins, most
+        self._slot = np.full(len(stiffness), -1)
         self._rows: Int = np.zeros(0, np.int64)
         # Memory is taken when columns come.
         self._buffer = np.zeros((len(answer), most), order="F")
@@ -82,19 +104,21 @@ class FollowedResponse:
         self._rows = np.concatenate([self._rows, rows])
         self._buffer[:, old:new] = columns
 
-    def follow(self, rows: Int, turned: Float, gained: Float, stiffness: Float) -> bool:
+    def follow(self, rows: Int, turned: Float, gained: Float) -> bool:
         """Let the global rows (k,) leave (`turned` is 1), come (-1) or soften (0), their springs gain compliance (k,).
 
-        `stiffness` (k,) of the rows is the most that Gamma_II can be where they are active.  False where columns are
-        lacking or lose too many digits; then this is of no state.  Collective.
+        False where columns, those of pins too, are lacking or lose too many digits; then this is of no state.
+        Collective.
         """
-        soft, moves = turned == 0.0, turned != 0.0
-        if len(self.lacking(rows)) or (gained[soft] < 0.0).any():
+        soft, is_pin = turned == 0.0, np.isin(rows, self.pins)
+        if len(self.lacking(np.concatenate([rows, self.pins]))) or (gained[soft] < 0.0).any():
             return False
-        if soft.any():
-            self.soften(rows[soft], gained[soft])
-        size = np.where(turned > 0.0, stiffness, 1.0 / stiffness)
-        return not moves.any() or self._exchange(*(x[moves] for x in (rows, turned, gained, size)))
+        self.pins = np.setdiff1d(self.pins, rows)
+        softer = (soft | is_pin) & (gained != 0.0)
+        if softer.any():
+            self.soften(rows[softer], gained[softer])
+        moves = ~soft & ~is_pin
+        return not moves.any() or self._exchange(*(x[moves] for x in (rows, turned, gained)))
 
     def soften(self, rows: Int, more: Float) -> None:
         """Let springs of the global rows (k,), which have columns, gain compliance (k,).  Collective."""
@@ -105,22 +129,46 @@ class FollowedResponse:
         B = self._comm.bcast(np.linalg.inv(np.diag(1.0 / more) + (values[:k, :k] + values[:k, :k].T) / 2))
         self._change(columns, B, values)
 
-    def _exchange(self, rows: Int, sign: Float, gained: Float, size: Float) -> bool:
-        """Let rows leave (sign 1) or come (-1); False where their block is nearly singular, as where bodies come free.
+    def _exchange(self, rows: Int, sign: Float, gained: Float) -> bool:
+        """Let rows leave (sign 1) or come (-1), and pins leave with those that come; False where digits are lost.
 
-        `size` (k,) is what the diagonal of sign Gamma_II may be.  Collective.
+        Collective.
         """
-        self._make_room(len(rows))
         columns, values = self._present(rows)
-        k, at = len(rows), self._slot[rows]
-        block = (values[:k, :k] + values[:k, :k].T) / 2 - np.diag(np.where(sign < 0.0, gained, 0.0))
-        # Rows that leave and rows that come differ by the square of a stiffness.
-        root = np.sqrt(np.maximum(size, np.abs(block.diagonal())))
-        outer = np.outer(root, root)
-        is_regular = np.linalg.svd(block / outer, compute_uv=False).min() > LEAST_FOLLOWED_PIVOT
-        B = self._comm.bcast(np.linalg.inv(block / outer) / outer if is_regular else None)
-        if B is None:
+        if len(moved := self._moved_pins(values[len(rows) :, : len(rows)][:, sign < 0.0])):
+            rows, none = np.concatenate([rows, moved]), np.zeros(len(moved))
+            sign, gained = np.concatenate([sign, none + 1.0]), np.concatenate([gained, none])
+            columns, values = self._present(rows)
+        if (k := len(rows)) > WAITING_COLUMNS:
             return False
+        block = (values[:k, :k] + values[:k, :k].T) / 2 - np.diag(np.where(sign < 0.0, gained, 0.0))
+        found = self._comm.bcast(_regular(block, sign, self._stiffness[rows]))
+        if found is None:
+            return False
+        which, B = found
+        if len(which):
+            self._make_room(len(which))
+            kept = np.concatenate([which, np.arange(k, len(values))])
+            values = np.hstack([values[kept][:, which], values[kept, k:]])
+            self._turn(rows[which], sign[which], gained[which], B, columns[:, which], values)
+        loose = np.setdiff1d(np.arange(k), which)
+        self.pins = np.union1d(np.setdiff1d(self.pins, moved), rows[loose])
+        own = self.pins[(self.pins >= self._first) & (self.pins < self._first + len(columns))] - self._first
+        self.answer = self.answer.copy()
+        self.answer[own] = 0.0
+        # Springs of pins have C_0, as of all rows that are not active.
+        if len(loose := loose[gained[loose] != 0.0]):
+            self.soften(rows[loose], gained[loose])
+        return True
+
+    def _moved_pins(self, forces: Float) -> Int:
+        """Return the pins that unit forces on rows that come press; `forces` (columns, k) of them on all columns."""
+        pins: Int = self.pins[(np.abs(forces[self._slot[self.pins]]) > RIGID_SHARE).any(axis=1)]
+        return pins
+
+    def _turn(self, rows: Int, sign: Float, gained: Float, B: Float, columns: Float, values: Float) -> None:
+        """Let rows leave (sign 1) or come (-1) whose block has the inverse B.  Collective."""
+        at = self._slot[rows]
         mine = np.flatnonzero((rows >= self._first) & (rows < self._first + len(columns)))
         own = rows[mine] - self._first
         theirs = columns @ (B * sign)
@@ -133,7 +181,6 @@ class FollowedResponse:
         taken[own] = -np.diag(sign)[mine]
         self._change(taken, B, values)
         self._buffer[:, at], self._factors[at] = theirs, 0.0
-        return True
 
     def _present(self, rows: Int) -> tuple[Float, Float]:
         """(owned rows, k) columns, and (k + all columns, k + v) rows of them and of U on every rank.  Collective."""
@@ -158,3 +205,31 @@ class FollowedResponse:
         if n:
             self._buffer[:, :k] -= self._waiting[:, :n] @ self._factors[:k, :n].T
         self._count = 0
+
+
+def _regular(block: Float, sign: Float, stiffness: Float) -> tuple[Int, Float] | None:
+    """Return the rows that can turn, and the inverse of their part of `block` (k, k); None if that loses digits.
+
+    They are all that come (sign -1), and of those that leave (1) as many as leave no body free.
+    """
+    # Rows that leave and rows that come differ by the square of a stiffness.
+    root = np.sqrt(np.maximum(np.where(sign > 0.0, stiffness, 1.0 / stiffness), np.abs(block.diagonal())))
+    outer = np.outer(root, root)
+    scaled, which = block / outer, np.arange(len(block))
+    if not _has_digits(scaled):
+        come, leave = np.flatnonzero(sign < 0.0), np.flatnonzero(sign > 0.0)
+        if not len(leave) or not _has_digits(scaled[come[:, None], come]):
+            return None
+        across = scaled[come[:, None], leave]
+        rest = scaled[leave[:, None], leave] - across.T @ np.linalg.solve(scaled[come[:, None], come], across)
+        factor, order, rank, _ = dpstrf(rest, tol=SINGULAR_PIVOT, lower=1)
+        # The first pivot is taken whatever it is.
+        rank = min(rank, int((factor.diagonal() ** 2 > SINGULAR_PIVOT).sum()))
+        which = np.concatenate([come, leave[order[:rank] - 1]])
+        if not _has_digits(scaled[which[:, None], which]):
+            return None
+    return which, np.linalg.inv(scaled[which[:, None], which]) / outer[which[:, None], which]
+
+
+def _has_digits(block: Float) -> bool:
+    return bool(np.linalg.svd(block, compute_uv=False).min(initial=1.0) > LEAST_FOLLOWED_PIVOT)

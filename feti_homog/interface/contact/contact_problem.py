@@ -162,7 +162,7 @@ class ContactProblem:
         if state.solution.alpha is not None:
             return state
         self.prepare(state.bonds)
-        return replace(state, solution=self.solver.completed(state.solution))
+        return replace(state, solution=self._placed(state.bonds, self.solver.completed(state.solution))[0])
 
     def is_linear(self, status: Status) -> bool:
         """Return whether no face can come to touch another; collective."""
@@ -228,9 +228,9 @@ class ContactProblem:
         coarse, noise = self.solver.natural, self.scales.gap_noise(solution.strain)
         if self.contact and coarse.unconstrained_modes.shape[1]:
             placement = place(self.solver.comm, coarse, self.nodes, status == OPEN, solution, noise)
-            solution = self.solver.completed(solution)
-            alpha, jump = placement.alpha + np.asarray(solution.alpha), solution.jump + placement.jump(coarse)
-            solution, pressed = replace(solution, alpha=alpha, jump=jump), placement.pressed
+            alpha = None if solution.alpha is None else placement.alpha + solution.alpha
+            solution = replace(solution, alpha=alpha, jump=solution.jump + placement.jump(coarse))
+            pressed = placement.pressed
         force, gap = solution.lam[self.nodes.row], solution.jump[self.nodes.row]
         force_noise, meets = self.scales.force_noise(solution), (status == OPEN) & self.contact
         pulled = ((status == CLOSED) | (damaged & bonds.pressed)) & (force > force_noise)
@@ -243,9 +243,6 @@ class ContactProblem:
         """Return the state that a search ended with, its free motions and its certificate."""
         certificate = self.certificate(bonds, solution)
         status, motions = self._without_idle(bonds.status, solution)
-        if motions:
-            # Of the rows that count as open now the amplitudes would be others.
-            solution = self.solver.completed(solution)
         return Equilibrium(load, bonds.with_status(status), solution, iterations, solves, motions, certificate)
 
     def certificate(self, bonds: BondState, solution: DualSolution) -> dict[str, float]:
