@@ -94,8 +94,10 @@ def place(
     Raises:
         ConvergenceError: on every rank; a linear programme was not solved.
     """
-    gaps = [solution.jump[nodes.row]]
-    amplitudes, pressed = _decided_on_root(comm, coarse, nodes, is_open, _place_all, gaps, noise)
+    gap = solution.jump[nodes.row]
+    if not comm.allreduce(bool((is_open & (gap < -noise)).any()), MPI.LOR):
+        return Placement(np.zeros(coarse.kernel_dimension), np.zeros(len(gap), bool))
+    amplitudes, pressed = _decided_on_root(comm, coarse, nodes, is_open, _place_all, [gap], noise)
     first = comm.exscan(len(nodes.row)) or 0
     return Placement(coarse.unconstrained_modes @ amplitudes, pressed[first : first + len(nodes.row)])
 
