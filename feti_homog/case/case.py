@@ -14,11 +14,11 @@ from feti_homog.case import element_sizes
 from feti_homog.case.cell_files import checked_cell
 from feti_homog.case.cell_section import GEOMETRY, Cell
 from feti_homog.case.document import read_document, to_document
-from feti_homog.case.fit_sections import FIT_SECTIONS
 from feti_homog.case.interface_faults import idle_friction_keys, read_interfaces
 from feti_homog.case.interface_section import Arc, InterfaceSection, interface_tables
 from feti_homog.case.load_section import (
     AnalysisSection,
+    Angle,
     Envelope,
     LoadPath,
     SingleLoad,
@@ -37,6 +37,7 @@ from feti_homog.case.material_sections import (
 from feti_homog.case.mixed_load import completed
 from feti_homog.case.rules import RULES
 from feti_homog.case.sections import (
+    FIT_SECTIONS,
     KEY_OWNERS,
     REQUIRED,
     SECTIONS,
@@ -44,7 +45,6 @@ from feti_homog.case.sections import (
     SWEEP,
     TOP_LEVEL,
     Analysis,
-    Angle,
     Decomposition,
     Output,
     Scalar,

@@ -41,6 +41,7 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 def json_schema() -> Schema:
     """Return the schema of a case file, with or without [sweep]."""
+    forms = {"anyOf": [_reference(_definition(form)) for form in MATERIAL_FORMS]}
     return {
         "$schema": DIALECT,
         "title": "Case file of feti_homog",
@@ -49,8 +50,8 @@ def json_schema() -> Schema:
             "name": dict(text.json_schema) | {"description": "Name of the case; by default the name of the file."},
             **{section: _reference(section) for section in SECTIONS},
             "interface": {"anyOf": [_reference("interface"), _several(_reference("interface"))]},
-            "material": _materials(),
-            "petsc": _petsc(),
+            "material": _by_name(f"^({PHASE.pattern})$", forms),
+            "petsc": _by_name(f"^{PREFIXED}$", {"type": ["string", "number", "boolean"]}),
             UNCERTAINTY: {"type": "object"},  # of cases that are written; files give {mean, std} in place of a number
             SWEEP: _sweep(),
         },
@@ -110,16 +111,9 @@ def _with_uncertain(table: Schema, ending: str = "") -> Schema:
     return table
 
 
-def _materials() -> Schema:
-    forms = {"anyOf": [_reference(_definition(form)) for form in MATERIAL_FORMS]}
-    phases = {f"^({PHASE.pattern})$": forms}
-    return {"type": "object", "patternProperties": phases, "additionalProperties": False}
-
-
-def _petsc() -> Schema:
-    value = {"type": ["string", "number", "boolean"]}
-    names = {f"^{PREFIXED}$": value}
-    return {"type": "object", "patternProperties": names, "additionalProperties": False}
+def _by_name(pattern: str, contents: Schema) -> Schema:
+    """Return the table of contents of one kind by names of this pattern."""
+    return {"type": "object", "patternProperties": {pattern: contents}, "additionalProperties": False}
 
 
 def _sweep() -> Schema:

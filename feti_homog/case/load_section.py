@@ -1,7 +1,4 @@
-"""Sections of the analyses: what all of them answer, and [path], [load] and [envelope].
-
-These have loads of a path, a single one, and the plane of loads of an envelope.
-"""
+"""Sections of the analyses: what all of them answer, and [angle], [path], [load] and [envelope]."""
 
 from __future__ import annotations
 
@@ -12,7 +9,7 @@ from typing import ClassVar
 
 from feti_homog.case.material_sections import missing_expansions
 from feti_homog.case.mixed_load import LOAD, TEMPERATURE, WAYPOINTS, MixedLoad, Strain, completed, first_named, named
-from feti_homog.case.section_values import STRAIN
+from feti_homog.case.section_values import OPENINGS, STRAIN
 from feti_homog.case.selectors import BY_EVENTS, BY_INCREMENTS, GENERALIZED, IN_THE_PLANE
 from feti_homog.materials.forms import Material
 from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES
@@ -59,6 +56,29 @@ PLANE_OF_LOADS = either(
     f"({', '.join(SPATIAL_STRAINS)})",
     *(list_of(choice(*family), "", count=2, unique=True) for family in FAMILIES),
 )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Angle(AnalysisSection):
+    """Openings of the arcs, one after the other."""
+
+    values: tuple[float, ...] = key(OPENINGS, "Openings of all arcs of [interface] debonded.", unit="degrees")
+    strain: Strain | None = key(
+        STRAIN,
+        "Macroscopic strain, other than zero; by default the three unit strains, which give the effective stiffness.",
+        default=None,
+        default_words="unit strains",
+        only=IN_THE_PLANE,
+    )
+
+    @property
+    def openings(self) -> tuple[float, ...]:
+        """All of them."""
+        return self.values
+
+    def solves(self, loads: int, one_sided: bool) -> int:
+        """Return the number of solves of all openings."""
+        return len(self.values) * (loads if self.strain is None else 1)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -185,8 +205,9 @@ def _repeated_loads(path: LoadPath, plane: str) -> list[str]:
     loads = completed(path.targets, plane)
     is_last = [not any(loads[0].values()), *(before == after for before, after in pairwise(loads))]
     last = ["zero, where the path begins", *placed]
+    nouns = ["load" if isinstance(load, MixedLoad) else "strain" for load in placed.values()]
     return [
-        f"[path] {place} = {_in_words(load)}: expected a {_noun(load)} other than {last[k]}"
+        f"[path] {place} = {_in_words(load)}: expected a {nouns[k]} other than {last[k]}"
         for k, (place, load) in enumerate(placed.items())
         if is_last[k]
     ]
@@ -194,10 +215,6 @@ def _repeated_loads(path: LoadPath, plane: str) -> list[str]:
 
 def _in_words(load: Strain | MixedLoad) -> str:
     return toml_value(load.named if isinstance(load, MixedLoad) else list(load))
-
-
-def _noun(load: Strain | MixedLoad) -> str:
-    return "load" if isinstance(load, MixedLoad) else "strain"
 
 
 def expansion_faults(path: LoadPath | None, load: SingleLoad | None, materials: Mapping[str, Material]) -> list[str]:

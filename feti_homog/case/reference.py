@@ -8,17 +8,22 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from feti_homog.case.fit_sections import CURVE, MEASURED, UNKNOWN, Measured, MeasuredCurve, Unknown
 from feti_homog.case.sections import (
     AXIS_EXPECTED,
     AXIS_MEANING,
+    CURVE,
+    MEASURED,
     OPTION_EXPECTED,
     RANGE_KEYS,
     SECTIONS_OF_AN_ANALYSIS,
     SWEEP,
     TABLES,
+    UNKNOWN,
+    Measured,
+    MeasuredCurve,
     SweepSection,
     Table,
+    Unknown,
 )
 from feti_homog.case.uncertainty import CORRELATION, UNCERTAINTY
 from feti_homog.errors import CaseError
@@ -97,15 +102,19 @@ class TableReference:
     rows: tuple[KeyRow, ...]
 
 
+NAME = KeyRow("name", "before the first section", "name", text.expected, "", "the file's name", "", "Name of the case.")
+RANGE = f"a range in [{SWEEP}]"
+
+
 def tables() -> list[TableReference]:
     """All tables of the case file, in the order of `ORDER`."""
     found = [
-        _name_table(),
+        TableReference("name", NAME.table, "the case as a whole.", (NAME,)),
         *map(_table, (*TABLES, *FIT_TABLES)),
         _petsc_table(),
         _uncertainty_table(),
         _sweep_table(),
-        _range_table(),
+        TableReference(SWEEP, RANGE, "Values of a key that lie between two ends.", _rows(SWEEP, RANGE, RANGE_KEYS)),
     ]
     return sorted(found, key=lambda table: ORDER.index(table.section))
 
@@ -148,12 +157,6 @@ def _first_paragraph(cls: type[Any]) -> str:
     return " ".join((inspect.getdoc(cls) or "").partition("\n\n")[0].split())
 
 
-def _name_table() -> TableReference:
-    place = "before the first section"
-    row = KeyRow("name", place, "name", text.expected, "", "the file's name", "", "Name of the case.")
-    return TableReference("name", place, "the case as a whole.", (row,))
-
-
 def _petsc_table() -> TableReference:
     words = "An option of the solver, such as feti_ksp_rtol = 1e-10; `feti-homog options` lists them."
     option = KeyRow("petsc", "[petsc]", "feti_OPTION", OPTION_EXPECTED, "", "", "", words)
@@ -187,20 +190,11 @@ def _sweep_table() -> TableReference:
     return TableReference(SWEEP, place, _first_paragraph(SweepSection), (axis, *settings))
 
 
-def _range_table() -> TableReference:
-    place = f"a range in [{SWEEP}]"
-    meaning = "Values of a key that lie between two ends."
-    return TableReference(SWEEP, place, meaning, _rows(SWEEP, place, RANGE_KEYS))
-
-
 def as_text(references: Sequence[TableReference]) -> str:
     """Return the tables in plain text: each key, then what it accepts and when, and what it means."""
-    return "\n\n".join(map(_table_text, references))
-
-
-def _table_text(table: TableReference) -> str:
-    heading = textwrap.fill(f"{table.place}: {table.meaning}", WIDTH)
-    return "\n".join([heading, *map(_row_text, table.rows)])
+    headings = (textwrap.fill(f"{table.place}: {table.meaning}", WIDTH) for table in references)
+    tables = zip(headings, references, strict=True)
+    return "\n\n".join("\n".join([heading, *map(_row_text, table.rows)]) for heading, table in tables)
 
 
 def _row_text(row: KeyRow) -> str:

@@ -1,4 +1,4 @@
-"""Sections of a case file, [sweep] among them: their keys, accepted values and meanings.
+"""Sections of a case file, [sweep] and the tables of a fit among them: their keys, accepted values and meanings.
 
 [petsc] has PETSc's options of the solver without their dash.  What PETSc itself takes, as -log_view, it reads when it
 starts and ends, which is on the command line alone.
@@ -8,24 +8,24 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from feti_homog.case.cell_section import Cell
 from feti_homog.case.interface_section import Arc, InterfaceSection, Scatter
-from feti_homog.case.load_section import AnalysisSection, Envelope, LoadPath, SingleLoad
-from feti_homog.case.mixed_load import MixedLoad, Strain
-from feti_homog.case.section_values import OPENINGS, SEED, STATES, STRAIN
+from feti_homog.case.load_section import Angle, Envelope, LoadPath, SingleLoad
+from feti_homog.case.mixed_load import MixedLoad
+from feti_homog.case.section_values import SEED, STATES
 from feti_homog.case.selectors import (
     ANGLE_ANALYSIS,
     ENVELOPE_ANALYSIS,
-    IN_THE_PLANE,
     LOAD_ANALYSIS,
     PATH_ANALYSIS,
 )
 from feti_homog.case.uncertainty import UNCERTAINTY
 from feti_homog.materials.forms import MATERIAL_FORMS
 from feti_homog.schema.keys import Key, key, keys_of
-from feti_homog.schema.values import boolean, choice, integer, is_number, real, text
+from feti_homog.schema.values import boolean, choice, file_name, integer, is_number, real, text
 from feti_homog.schema.wording import toml_key, toml_value
 
 Scalar = str | int | float | bool
@@ -33,6 +33,9 @@ Scalar = str | int | float | bool
 PREFIXED = r"feti_\w+"  # options of [petsc]
 OPTION_EXPECTED = "a text, a number, true or false"
 SWEEP = "sweep"
+UNKNOWN, MEASURED, TEST, CURVE = "unknown", "measured", "test", "curve"
+FIT_SECTIONS = (UNKNOWN, MEASURED, TEST)
+STD = real(above=0.0)
 MAX_CASES = 20_000
 
 AXIS_EXPECTED = "a list of values, or a range {from, to} with step, with count, or with samples in [sweep]"
@@ -100,29 +103,6 @@ class Analysis:
         'Plane state: "strain" for long fibres along x3, "stress" for a thin sheet; "generalized" is '
         "generalized plane strain: long fibres under all six strains, also along x3.",
     )
-
-
-@dataclass(frozen=True, kw_only=True)
-class Angle(AnalysisSection):
-    """Openings of the arcs, one after the other."""
-
-    values: tuple[float, ...] = key(OPENINGS, "Openings of all arcs of [interface] debonded.", unit="degrees")
-    strain: Strain | None = key(
-        STRAIN,
-        "Macroscopic strain, other than zero; by default the three unit strains, which give the effective stiffness.",
-        default=None,
-        default_words="unit strains",
-        only=IN_THE_PLANE,
-    )
-
-    @property
-    def openings(self) -> tuple[float, ...]:
-        """All of them."""
-        return self.values
-
-    def solves(self, loads: int, one_sided: bool) -> int:
-        """Return the number of solves of all openings."""
-        return len(self.values) * (loads if self.strain is None else 1)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -196,6 +176,39 @@ class Output:
     )
     length_unit: str = key(text, "A label, such as mm; nothing is converted.", default="")
     stress_unit: str = key(text, "A label, such as GPa; nothing is converted.", default="")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Unknown:
+    """An unknown SECTION.KEY = {start, lower, upper} of a fit: any key of the file whose value is a number."""
+
+    start: float = key(real(), "First value, not outside of the bounds.")
+    lower: float = key(real(), "Lower bound.")
+    upper: float = key(real(), "Upper bound, above the lower one.")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Measured:
+    """A measured NAME = {value, std}, of several tests as measured.NAME in a section [[test]] for each."""
+
+    value: float = key(
+        real(),
+        "Measured value. Names of a stiffness are those of `sensitivities` in result.json, such as E1 or G_axial; of a "
+        "path those of cases.csv, such as onset_S11 and peak_S11. A section [[test]] has besides the keys in which its "
+        "case differs, such as cell.fibre_fraction = 0.5.",
+    )
+    std: float = key(STD, "Standard deviation of the measurement.")
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeasuredCurve:
+    """A measured curve = {file, std} of a fit whose analysis is a path of one leg."""
+
+    file: Path = key(
+        file_name("the name of a .csv file", ".csv"),
+        "A table with a head: a column of strains, such as E11, that rise with the load, and one of stresses, S11.",
+    )
+    std: float = key(STD, "Standard deviation of each stress.", unit="stress")
 
 
 SECTIONS: dict[str, type[Any]] = {

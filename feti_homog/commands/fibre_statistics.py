@@ -30,10 +30,12 @@ def text(found: FibreStatistics, model: str, simulations: int) -> str:
     pattern, cells = found.pattern, found.cells
     kind = "periodic cell" if pattern.periodic else "window, corrected for its edges,"
     size = 2 * pattern.mean_radius
+    radii = pattern.radii
+    spread = f"{radii.mean():.4g} +- {radii.std():.2g}, from {radii.min():.4g} to {radii.max():.4g}"
     lines = [
         ("fibres", f"{pattern.count} in a {kind} of {pattern.width:.6g} x {pattern.height:.6g}"),
         ("fibre fraction", f"{pattern.fibre_fraction:.4f}"),
-        ("radii", _spread(pattern.radii)),
+        ("radii", spread),
         ("smallest gap", f"{pattern.smallest_gap:.4g}, {pattern.smallest_gap / size:.3f} mean diameters"),
         *_neighbours(found, size),
         ("local fractions", _local_fractions(cells)),
@@ -41,10 +43,6 @@ def text(found: FibreStatistics, model: str, simulations: int) -> str:
         ("randomness", _randomness(found, model, simulations)),
     ]
     return "\n".join(f"{name:<16}{words}" for name, words in lines)
-
-
-def _spread(values: Float) -> str:
-    return f"{values.mean():.4g} +- {values.std():.2g}, from {values.min():.4g} to {values.max():.4g}"
 
 
 def _local_fractions(cells: VoronoiCells) -> str:

@@ -45,7 +45,7 @@ def _run(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 def _check(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.case.document import read_document
-    from feti_homog.case.fit_sections import FIT_SECTIONS
+    from feti_homog.case.sections import FIT_SECTIONS
     from feti_homog.fit import description as fits
     from feti_homog.fit import scatter
     from feti_homog.sweep import description

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from feti_homog.case.document import TomlPath
-from feti_homog.case.fit_sections import CURVE, MEASURED, TEST, UNKNOWN, Measured, MeasuredCurve, Unknown
+from feti_homog.case.sections import CURVE, MEASURED, TEST, UNKNOWN, Measured, MeasuredCurve, Unknown
 from feti_homog.fit.predictions import Datum
 from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES
 from feti_homog.runtime import input_files

@@ -37,7 +37,7 @@ from feti_homog.fit.files import begin
 from feti_homog.fit.predictions import Datum, exact_derivatives, responses
 from feti_homog.fit.scatter_table import text
 from feti_homog.parallel.mpi_errors import on_root, on_root_only
-from feti_homog.report.text.sensitivity_tables import mesh_errors
+from feti_homog.report.text.constant_tables import mesh_errors
 from feti_homog.results import atomic, output_folder, seals
 from feti_homog.runtime.standard_streams import complain, say
 from feti_homog.schema.wording import toml_value

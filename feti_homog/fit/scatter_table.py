@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from feti_homog.report.text.sensitivity_tables import shown
+from feti_homog.report.text.constant_tables import shown
 from feti_homog.report.text.table import Column, Table, without_noise
 
 DIGITS = "0123456789"

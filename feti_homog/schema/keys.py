@@ -98,15 +98,12 @@ def key(
     """
     conditions = only if isinstance(only, tuple) else (only,)
     required = default is dataclasses.MISSING
-    words = default_words or ("" if required or default is None else _default_in_words(default))
+    written = toml_value(list(default) if isinstance(default, tuple) else default)
+    words = default_words or ("" if required or default is None else written)
     metadata = {"key": Key(type_, meaning, unit, words, conditions, required, instead, unless)}
     if required and not conditions:
         return dataclasses.field(metadata=metadata)
     return dataclasses.field(default=None if required else default, metadata=metadata)
-
-
-def _default_in_words(default: Any) -> str:
-    return toml_value(list(default) if isinstance(default, tuple) else default)
 
 
 def keys_of(table_class: type[Any]) -> dict[str, Key]:

@@ -100,7 +100,8 @@ def checked(name: str, unchecked: Sequence[CaseDocument], folder: Path) -> Sweep
     for number, each in enumerate(unchecked, start=1):
         try:
             case = cases.parse(each.document | {"name": f"{name}-{number:04d}"}, folder)
-            found.append((SweepCase(number, each.point, each.realisation, each.inputs, _identity(case)), case))
+            identity = identity_of(case.digest(), case.petsc)
+            found.append((SweepCase(number, each.point, each.realisation, each.inputs, identity), case))
         except CaseError as error:
             for fault in error.faults:
                 numbers_by_fault.setdefault(fault, []).append(number)
@@ -113,10 +114,6 @@ def checked(name: str, unchecked: Sequence[CaseDocument], folder: Path) -> Sweep
 def identity_of(digest: str, petsc: Mapping[str, Any]) -> str:
     """Short name of what is computed, and with which options."""
     return hashlib.sha256((digest + json.dumps(dict(petsc), sort_keys=True)).encode()).hexdigest()[:16]
-
-
-def _identity(case: Case) -> str:
-    return identity_of(case.digest(), case.petsc)
 
 
 def case_names(numbers: list[int]) -> str:

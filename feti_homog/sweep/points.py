@@ -76,12 +76,7 @@ def combine(axes: Sequence[Axis], settings: SweepSection) -> list[Assignment]:
     lists = [[{axis.path: value} for value in axis.values] for axis in axes if axis.values]
     lists += _samples([axis for axis in axes if not axis.values], settings)
     rows = product(*lists) if settings.mode == "grid" or not lists else zip(*lists, strict=True)
-    return [_merged(row) for row in rows]
-
-
-def _merged(parts: Sequence[Assignment]) -> Assignment:
-    """One point of the values of its axes."""
-    return {path: value for part in parts for path, value in part.items()}
+    return [{path: value for part in row for path, value in part.items()} for row in rows]
 
 
 def _samples(axes: Sequence[Axis], settings: SweepSection) -> list[list[Assignment]]:
@@ -223,7 +218,8 @@ def _spacing_fault(table: Mapping[str, Any], is_sampled: bool) -> str:
     if step is not None:
         return _step_fault(step, table)
     if count is not None:
-        return "" if _is_count(count) else f"expected a count from 2 to {MAX_CASES}"
+        is_right = isinstance(count, int) and 2 <= count <= MAX_CASES
+        return "" if is_right else f"expected a count from 2 to {MAX_CASES}"
     return "" if is_sampled else f"expected {AXIS_EXPECTED}"
 
 
@@ -234,10 +230,6 @@ def _step_fault(step: Any, table: Mapping[str, Any]) -> str:
     if width / step >= MAX_CASES:
         return f"about {width / step:.6g} values; expected a step that makes at most {MAX_CASES}"
     return ""
-
-
-def _is_count(count: Any) -> bool:
-    return isinstance(count, int) and 2 <= count <= MAX_CASES
 
 
 def _steps(low: float, high: float, step: float) -> list[float]:

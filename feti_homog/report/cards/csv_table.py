@@ -37,7 +37,8 @@ def _rows(material: EffectiveMaterial) -> Iterator[tuple[str, float, str, str]]:
             )
     C = material.stiffness
     for i, j in combinations_with_replacement(range(6), 2):
-        words = f"stress {_digits(i)} under the unit strain {COMPONENTS[j]}"
+        digits = "".join(str(axis + 1) for axis in PAIRS[i])
+        words = f"stress {digits} under the unit strain {COMPONENTS[j]}"
         yield f"C{i + 1}{j + 1}", float(C[i, j]), material.stress_unit, f"stiffness: {words}"
 
 
@@ -48,7 +49,3 @@ def _meaning(name: str, axes: list[int]) -> str:
     if name.startswith("G"):
         return f"shear modulus between {where}"
     return f"-eps_{axes[1]}/eps_{axes[0]} under stress along axis {axes[0]}: {where}"
-
-
-def _digits(component: int) -> str:
-    return "".join(str(axis + 1) for axis in PAIRS[component])

@@ -15,7 +15,7 @@ import numpy as np
 
 from feti_homog.errors import CaseError
 from feti_homog.materials.voigt import is_positive_definite
-from feti_homog.report.text import material_axes
+from feti_homog.report.text import constant_tables
 from feti_homog.typing import Document, Float
 
 FIBRE_FIRST = (2, 0, 1)
@@ -126,8 +126,8 @@ def in_axes_of_the_cell(document: Document) -> EffectiveMaterial:
         symmetry=symmetry,
         compliance=(compliance + compliance.T) / 2.0,
         expansion=expansion,
-        errors=material_axes.errors(document),
-        scatter=material_axes.scatter(document),
+        errors=constant_tables.errors(document),
+        scatter=constant_tables.scatter(document),
     )
 
 
@@ -153,7 +153,7 @@ def nearest_transversely_isotropic(document: Document) -> EffectiveMaterial:
         expansion = np.array([axial, transverse, transverse, 0.0, 0.0, 0.0])
     symmetry = f"The nearest transversely isotropic material, at a relative distance of {given['deviation']:.2g}."
     errors = (document.get("mesh_error") or {}).get("constants", {})
-    scatter = material_axes.standard_deviations(document)
+    scatter = constant_tables.standard_deviations(document)
     return EffectiveMaterial(
         **_origin(document),
         symmetry=symmetry,
@@ -220,7 +220,7 @@ def comments(material: EffectiveMaterial, mark: str) -> list[str]:
         paragraphs.append(f"Estimated errors by the mesh: {_listed(material.errors)}.")
     if material.scatter:
         paragraphs.append(f"Standard deviations by uncertain constants of the phases: {_listed(material.scatter)}.")
-    lines = (line for words in paragraphs for line in wrap(_ascii(words), LONGEST))
+    lines = (line for words in paragraphs for line in wrap(words.encode("ascii", "backslashreplace").decode(), LONGEST))
     return [f"{mark} {line}" for line in lines]
 
 
@@ -242,7 +242,3 @@ def identifier(name: str) -> str:
     """
     word = re.sub(r"[\W_]+", "_", name, flags=re.ASCII)[:60].strip("_")
     return word if word[:1].isalpha() else f"material_{word}".strip("_")
-
-
-def _ascii(text: str) -> str:
-    return text.encode("ascii", "backslashreplace").decode()

@@ -24,7 +24,7 @@ from feti_homog.report.plots.plot_helpers import (
     stress_unit,
     title_of,
 )
-from feti_homog.report.text import sensitivity_tables
+from feti_homog.report.text import constant_tables
 from feti_homog.report.text.analyses import reported
 from feti_homog.report.text.point_tables import shown_entries
 from feti_homog.results.path_curves import interface_sections
@@ -167,7 +167,7 @@ def _notes(case: Document, without: int) -> list[str]:
 
 def sensitivities(document: Document) -> Figure | None:
     """Return the elasticities d ln c / d ln p, a row for each p and a column for each c; None without sensitivities."""
-    tables = sensitivity_tables.sensitivities(document)
+    tables = constant_tables.sensitivities(document)
     if not tables or not tables[0].rows:
         return None
     names = [plain(str(row[0])) for row in tables[0].rows]

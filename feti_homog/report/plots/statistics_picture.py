@@ -67,14 +67,14 @@ def fibres(axes: Axes, found: FibreStatistics) -> None:
     axes.figure.colorbar(discs, ax=axes, orientation="horizontal", shrink=0.8, pad=0.02, label=words)
 
 
-def nearest_distances(axes: Axes, found: FibreStatistics, colours: tuple[str, ...] = COLOURS, **style: Any) -> None:
+def nearest_distances(axes: Axes, found: FibreStatistics) -> None:
     """Weighted distributions of the distances to the three nearest centres."""
     near, size = found.neighbours, 2 * found.pattern.mean_radius
-    for k, (colour, ordinal) in enumerate(zip(colours, ORDINALS, strict=True)):
+    for k, (colour, ordinal) in enumerate(zip(COLOURS, ORDINALS, strict=True)):
         order = np.argsort(near.distances[:, k])
         order = order[near.weights[order, k] > 0]
         distances = near.distances[order, k] / size
-        axes.step(distances, np.cumsum(near.weights[order, k]), where="post", color=colour, label=ordinal, **style)
+        axes.step(distances, np.cumsum(near.weights[order, k]), where="post", color=colour, label=ordinal)
     _label(axes, "distance of centres / mean diameter", "share of fibres below")
     axes.set_ylim(0, 1.02)
     axes.legend(frameon=False)

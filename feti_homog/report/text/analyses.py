@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from feti_homog.materials.plane_state import plane_state_of
-from feti_homog.report.text import material_axes, point_tables, sensitivity_tables, stiffness_tables
+from feti_homog.report.text import constant_tables, point_tables, stiffness_tables
 from feti_homog.report.text.path_table import path_table, peak_table
 from feti_homog.report.text.table import Table
 from feti_homog.results.landmarks import chosen, chosen_states
@@ -35,11 +35,7 @@ def _load_lines(document: Document, label: str, toughness: str) -> list[list[str
 
 def _changes(document: Document) -> list[Table]:
     """Return the tables of sensitivities and of scatter, if the case asks for them."""
-    return [*sensitivity_tables.sensitivities(document), *sensitivity_tables.uncertainty(document)]
-
-
-def _envelope_lines(document: Document, label: str, toughness: str) -> list[list[str]]:
-    return [point_tables.envelope_lines(document, label), *_stiffness_lines(document, label, toughness)]
+    return [*constant_tables.sensitivities(document), *constant_tables.uncertainty(document)]
 
 
 def _stiffness_lines(document: Document, label: str, toughness: str) -> list[list[str]]:
@@ -49,7 +45,7 @@ def _stiffness_lines(document: Document, label: str, toughness: str) -> list[lis
     last = [table.lines for table in tables]
     if plane_state_of(document).is_spatial:
         thermal = [table.lines for table in stiffness_tables.thermal(document, label)]
-        own = material_axes.lines(document, label)
+        own = constant_tables.lines(document, label)
         return [own, *blocks, *thermal, *stiffness_tables.constants_lines(document, label), *last]
     if document["case"].get("interface"):  # moduli and bounds are of bonded, linear composites
         return [*blocks, *last]
@@ -60,7 +56,7 @@ def _stiffness_lines(document: Document, label: str, toughness: str) -> list[lis
 
 def _stiffness_tables(document: Document, label: str, most: int) -> list[Table]:
     return [
-        *material_axes.table(document, label),
+        *constant_tables.table(document, label),
         *stiffness_tables.stiffnesses(document, label, "Effective stiffness under minus the unit strains"),
         *stiffness_tables.thermal(document, label),
         *stiffness_tables.constants(document, label),
@@ -68,19 +64,6 @@ def _stiffness_tables(document: Document, label: str, most: int) -> list[Table]:
         *stiffness_tables.bounds(document, label),
         *_changes(document),
     ]
-
-
-def _angle_tables(document: Document, label: str, most: int) -> list[Table]:
-    numbers = range(min(len(document["angle"]), most))
-    return [point_tables.all_numbers("angle", document, label, numbers)]
-
-
-def _path_tables(document: Document, label: str, most: int) -> list[Table]:
-    return [peak_table(document, label), point_tables.all_numbers("path", document, label, chosen(document, most))]
-
-
-def _envelope_tables(document: Document, label: str, most: int) -> list[Table]:
-    return [point_tables.envelope_table(document, label, most), *_stiffness_tables(document, label, most)]
 
 
 @dataclass(frozen=True)
@@ -114,7 +97,9 @@ ANGLE = ReportedAnalysis(
     "angle",
     "debonding angle",
     _angle_lines,
-    _angle_tables,
+    lambda document, label, most: [
+        point_tables.all_numbers("angle", document, label, range(min(len(document["angle"]), most)))
+    ],
     is_curve=True,
     is_load_given=lambda document: document.get("case", {}).get("angle", {}).get("strain") is not None,
 )
@@ -122,7 +107,10 @@ PATH = ReportedAnalysis(
     "path",
     "load path",
     lambda document, label, toughness: [path_table(document, label).lines],
-    _path_tables,
+    lambda document, label, most: [
+        peak_table(document, label),
+        point_tables.all_numbers("path", document, label, chosen(document, most)),
+    ],
     is_curve=True,
     is_followed=True,
     is_load_given=lambda document: True,
@@ -136,7 +124,18 @@ LOAD = ReportedAnalysis(
     picture="load",
     is_load_given=lambda document: True,
 )
-ENVELOPE = ReportedAnalysis("envelope", "onset of debonding", _envelope_lines, _envelope_tables)
+ENVELOPE = ReportedAnalysis(
+    "envelope",
+    "onset of debonding",
+    lambda document, label, toughness: [
+        point_tables.envelope_lines(document, label),
+        *_stiffness_lines(document, label, toughness),
+    ],
+    lambda document, label, most: [
+        point_tables.envelope_table(document, label, most),
+        *_stiffness_tables(document, label, most),
+    ],
+)
 ANALYSES = {each.name: each for each in (ANGLE, PATH, LOAD, ENVELOPE, STIFFNESS)}
 
 

@@ -38,7 +38,7 @@ def summary(document: Document) -> str:
         *_answer(document),
         _checks(document),
         [
-            *_timings(document["timings"]),
+            *_field("Time", [f"{stage}{GLUE}{took:.2f}{GLUE}s" for stage, took in document["timings"].items()]),
             *_field("Memory", [f"{_bytes(document['memory'])} per rank at most"]),
         ],
         [
@@ -202,11 +202,6 @@ def _checks(document: Document) -> list[str]:
         f"  {c.law:<{NAME - 2}}{c.error:>14.1e}    {'' if c.limit is None else verdicts[c.holds]}".rstrip()
         for c in found
     ]
-
-
-def _timings(timings: Document) -> list[str]:
-    stages = [f"{stage}{GLUE}{seconds:.2f}{GLUE}s" for stage, seconds in timings.items()]
-    return _field("Time", stages)
 
 
 def _remarks(label: str, remarks: Iterable[str]) -> list[str]:

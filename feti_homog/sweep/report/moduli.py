@@ -91,7 +91,7 @@ def _why_no_bounds(table: SweepTable) -> str:
         return "phases are others than matrix and fibre"
     if panels_of(table) == SECANTS:
         return "faces may touch"
-    return "there are voids" if _has_voids(table) else ""
+    return "there are voids" if any(document["cell"].get("porosity") for document in table.finished) else ""
 
 
 def _bounds(table: SweepTable) -> PanelBounds | None:
@@ -115,10 +115,6 @@ def _fractions(meshed: list[float]) -> Float:
     least, largest = min(meshed), max(meshed)
     first = 0.0 if least <= largest / 2 else least - BEFORE * (largest - least or least)
     return np.linspace(first, min(1.0, MARGIN * largest), FRACTIONS)
-
-
-def _has_voids(table: SweepTable) -> bool:
-    return any(document["cell"].get("porosity") for document in table.finished)
 
 
 def _bounds_at(shares: list[float], phases: list[Float]) -> dict[str, list[float]]:

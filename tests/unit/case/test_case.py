@@ -20,8 +20,7 @@ from unit.case.valid_cases import MESH, VALID_CASES
 
 from feti_homog.case.case import check_phases, load, parse
 from feti_homog.case.interface_section import Arc, InterfaceSection
-from feti_homog.case.load_section import LoadPath
-from feti_homog.case.sections import Angle
+from feti_homog.case.load_section import Angle, LoadPath
 from feti_homog.errors import CaseError
 from feti_homog.materials.forms import General, Isotropic, Orthotropic
 

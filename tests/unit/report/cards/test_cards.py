@@ -26,7 +26,7 @@ from feti_homog.materials.spatial_constants import engineering_constants
 from feti_homog.report.cards import effective_material
 from feti_homog.report.cards.effective_material import in_axes_of_the_cell, nearest_transversely_isotropic
 from feti_homog.report.cards.export import FORMATS
-from feti_homog.report.text import material_axes
+from feti_homog.report.text import constant_tables
 from feti_homog.runtime.records import plain
 
 every_format = pytest.mark.parametrize("form", FORMATS)
@@ -169,7 +169,7 @@ def _export_actions():
 def test_the_printed_material_axes_are_those_of_cards():
     """Constants of distinct values, with the fibre along axis 1, from those in the axes of the cell."""
     cell = plain(engineering_constants(DISTINCT.stiffness_in_the_cell))
-    printed = material_axes.constants({"constants": cell, "thermal_expansion": DISTINCT.expansion_in_the_cell})
+    printed = constant_tables.constants({"constants": cell, "thermal_expansion": DISTINCT.expansion_in_the_cell})
     names = ("E1", "E2", "E3", "nu12", "nu13", "nu23", "G12", "G13", "G23")
     assert [printed[name] for name in names] == pytest.approx(DISTINCT.constants, rel=1e-12)
     assert [printed[f"alpha{k}"] for k in (1, 2, 3)] == pytest.approx(DISTINCT.expansion)
