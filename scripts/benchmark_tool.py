@@ -91,7 +91,7 @@ def feti(case: Case, progress: Progress, loads: int | None, rtol: float) -> dict
 def peer(tool: Peer, case: Case, progress: Progress, loads: int | None, rtol: float) -> dict[str, Any]:
     """Run another tool; its second problem begins when the matrices of the first are gone."""
     comm = progress.comm
-    plan, _, lattice, subdomains = unit_cell.assemble_subdomains(case, comm, progress, BY_COST)
+    own, _, lattice, subdomains = unit_cell.assemble_subdomains(case, comm, progress, BY_COST)
     with progress.stage("glue"):
         nodes = Nodes.of(comm, subdomains, lattice)
     meshed, dofs = list(subdomains), 0
@@ -99,7 +99,7 @@ def peer(tool: Peer, case: Case, progress: Progress, loads: int | None, rtol: fl
     for problem in ("plane", "axial")[: len(phase_laws.problems(case))]:
         if problem == "axial":
             with progress.stage("assemble"):
-                subdomains = agree(comm, unit_cell.assemble_axial, case, plan, meshed)
+                subdomains = agree(comm, unit_cell.assemble_axial, case, own.summary, meshed)
         with progress.stage("glue"):
             cell = glue(comm, subdomains, nodes)
             A = _operator(tool, cell)
@@ -109,12 +109,12 @@ def peer(tool: Peer, case: Case, progress: Progress, loads: int | None, rtol: fl
         with progress.stage("solve"):
             solved = (_solved_together if tool.direct else _solved_in_turn)(ksp, cell.Q[:loads])
             stresses = [cell.stress(u) for u in solved.solutions]
-            columns.append((cell.stiffness[:, :loads] - np.stack(stresses, axis=1)) / plan.area)
+            columns.append((cell.stiffness[:, :loads] - np.stack(stresses, axis=1)) / own.summary.area)
         iterations += solved.iterations
         reasons += solved.reasons
         ksp.destroy()
         A.destroy()
-    return _report(dofs, plan.subdomains, columns, iterations, reasons)
+    return _report(dofs, own.summary.subdomains, columns, iterations, reasons)
 
 
 def _operator(tool: Peer, cell: Glued) -> PETSc.Mat:

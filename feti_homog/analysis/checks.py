@@ -39,7 +39,8 @@ class Checks:
         self.iterations.append(state.iterations)
         self.reasons.append(state.solution.reason)
         confirmed = response.checks.get("jump")
-        jump = "by influence columns" if confirmed is None else f"relative jump {confirmed:.1e}"
+        without = "by the factor of the cell" if response.checks.keys() & {"hill"} else "by influence columns"
+        jump = without if confirmed is None else f"relative jump {confirmed:.1e}"
         words = f"{state.iterations} iterations, {jump}"
         if response.debonded:
             words += f", {response.debonded} debonded ({response.counts['closed']} closed), {state.solves} solves"

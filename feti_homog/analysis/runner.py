@@ -18,7 +18,7 @@ from feti_homog.analysis.result import Result
 from feti_homog.analysis.state_recorder import StateRecorder
 from feti_homog.case.case import Case
 from feti_homog.errors import CoarseMeshError, ConvergenceError
-from feti_homog.homogenization.partition_policy import BY_COST, DEFAULT_POLICY
+from feti_homog.homogenization.partition_policy import BY_COST
 from feti_homog.homogenization.unit_cell import TornCell, tear
 from feti_homog.parallel.mpi_errors import all_raise, on_root, on_root_only
 from feti_homog.petsc.options import case_options, refuse_unused
@@ -61,7 +61,7 @@ def run(
     with output_folder.held(directory, comm, progress.say):
 
         def solved(case: Case, earlier: CoarseMeshError | None) -> Result:
-            with _torn(case, comm, progress, keep_fields) as cell:
+            with _torn(case, comm, progress) as cell:
                 return _run_and_write(cell, directory, progress, resume, keep_fields, earlier)
 
         result = _accurate(case, solved, progress)
@@ -80,7 +80,7 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False, quiet: b
     progress = _begun(case, comm, quiet)
 
     def solved(case: Case, earlier: CoarseMeshError | None) -> Result:
-        with _torn(case, comm, progress, keep_fields) as cell:
+        with _torn(case, comm, progress) as cell:
             states = StateRecorder(cell, None, keep_fields, progress.say)
             context = AnalysisContext.of(cell, progress, states, earlier)
             if keep_fields or context.plane.law.has_toughness:
@@ -123,12 +123,12 @@ def _warn(context: AnalysisContext) -> None:
 
 
 @contextmanager
-def _torn(case: Case, comm: MPI.Intracomm, progress: Progress, keep_fields: bool = False) -> Iterator[TornCell]:
-    """Provide the torn cell, by bodies for fields that are kept, with the case's options set, while the block lasts."""
+def _torn(case: Case, comm: MPI.Intracomm, progress: Progress) -> Iterator[TornCell]:
+    """Provide the torn cell with the case's options set, while the block lasts."""
     PETSc.garbage_cleanup(comm)  # what earlier cases left: parallel objects are freed by all ranks together
     process_memory.forget_peak()
     with case_options(case.petsc):
-        cell = tear(case, comm, progress, policy=DEFAULT_POLICY if keep_fields else BY_COST)
+        cell = tear(case, comm, progress, policy=BY_COST)
         try:
             refuse_unused()
             yield cell

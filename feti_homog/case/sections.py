@@ -124,9 +124,8 @@ class Decomposition:
     cut: str = key(
         choice("auto", "bodies"),
         "What is cut: bodies one by one; or what is faster, which in cells up to 400 000 unknowns in which nothing can "
-        "part is the whole cell, across its materials, unless stiffnesses differ by more than 1e4, one of the other "
-        "keys or an option of the solver other than its tolerances is given, or fields, sensitivities or uncertainty "
-        "are asked for.",
+        "part is the whole cell, across its materials, unless stiffnesses differ by more than 1e4, or one of the other "
+        "keys or an option of the solver other than its tolerances is given.",
         default="auto",
     )
 

@@ -44,8 +44,8 @@ class Response:
             `jump`, the largest opening of a glued node relative to the largest displacement, which does not vanish
             where forces do; the KKT certificate of contact; and if stresses are prescribed `stress`, the
             largest error of one relative to the largest stress or, if that is less, to what the strains would make in a
-            bonded cell at least. Of a cell that is one subdomain, where nothing is glued, `strain`, `hill` and `jump`
-            vanish identically.
+            bonded cell at least. Of a cell that is one subdomain nothing is glued, and there is no `jump`; `strain`
+            is that of its mesh, which is closed, and `hill` that of the factor (`CondensedLoads.energy`).
         counts: numbers of `bonded`, `open` and `closed` interface nodes.
         damage: (k,) of the bonds, 0 intact to 1 broken.
         shares: (m,) what each element of this rank has of the estimated error of E . Sigma, where it is known.
@@ -146,8 +146,9 @@ class Homogenization:
         checks = {
             "strain": float(np.abs(star - opening / self.cell.summary.area).max() / imposed) + self._strain_inside,
             "hill": float(abs(energy + rubbing - stress @ strain) / (max(abs(energy), least) or 1.0)),
-            "jump": self._largest(active * state.solution.jump) / largest,
         }
+        if solver.jump_operator.global_rows:
+            checks["jump"] = self._largest(active * state.solution.jump) / largest
         if state.load.by_stress.any():
             checks["stress"] = self._unmet_stress(state, stress)
         return self._scaled(state, scale, stress, energy, u, checks)
@@ -215,11 +216,11 @@ class Homogenization:
 
     @cached_property
     def _strain_inside(self) -> float:
-        """The largest share of an inner node in int eps*, which is 0 if voids are closed; relative.  Collective."""
+        """The largest share of an inner node in int eps*, relative: 0 of closed meshes and voids.  Collective."""
         inner, size = 0.0, 0.0
         for s, own in zip(self.cell.subdomains, self.cell.solver.interface_operators.dofs, strict=True):
             size = max(size, float(np.sqrt(s.area)))
-            if not s.submesh.at_void.any():
+            if not s.loads_inside:
                 continue
             inside = np.ones(s.n_dofs, bool)
             inside[own] = False
@@ -232,7 +233,9 @@ class Homogenization:
         """<sigma>, <eps*> over bodies and voids, and <sigma:eps>; collective."""
         cell, v = self.cell, len(E)
         without_u, from_u = cell.solver.condensed.stiffness @ E, cell.solver.loads.T @ u
-        energy = E @ without_u + 2 * E @ from_u + u @ cell.solver.interface_operators.apply_schur(u)
+        energy = (
+            E @ cell.solver.condensed.energy @ E + 2 * E @ from_u + u @ cell.solver.interface_operators.apply_schur(u)
+        )
         sums = np.concatenate([without_u + from_u, self._strain_of_displacements.T @ u, [energy]])
         sums = allreduce_sum(cell.comm, sums) / cell.summary.area
         return sums[:v], sums[v:-1], float(sums[-1])
@@ -248,15 +251,15 @@ def asymmetry(L: Float) -> float:
 
 
 def displacement(cell: TornCell, strain: Float, u: Float) -> Float:
-    """(nodes, c) total displacement H y + u*, Eq. (14), at this rank's plane nodes; H y of the strains in the loads."""
-    points = np.concatenate([s.mesh.points for s in cell.subdomains] or [np.zeros((0, 2))])
+    """(nodes, c) total displacement H y + u*, Eq. (14), at the plane nodes of this rank's parts; H y of the strains."""
+    points = np.concatenate([s.mesh.points for s in cell.parts] or [np.zeros((0, 2))])
     problem = cell.solver.problem
     imposed = points @ problem.gradient(strain[: problem.strains]).T
     return np.asarray(imposed + fluctuation(cell, u))
 
 
 def fluctuation(cell: TornCell, u: Float) -> Float:
-    """(nodes, c) u* at this rank's plane nodes."""
-    parts, c = zip(cell.subdomains, cell.offsets, strict=False), cell.solver.problem.components
-    own = [u[o : o + len(s.Q)].reshape(-1, c)[s.mesh.node_class] for s, o in parts]
+    """(nodes, c) u* at these nodes."""
+    parts, c = zip(cell.parts, cell.offsets, strict=False), cell.solver.problem.components
+    own = [u[o : o + len(s.dofs)].reshape(-1, c)[s.mesh.node_class] for s, o in parts]
     return np.concatenate(own or [np.zeros((0, c))])

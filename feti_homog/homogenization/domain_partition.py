@@ -8,7 +8,7 @@ import numpy as np
 
 from feti_homog.case.case import Case
 from feti_homog.errors import CaseError
-from feti_homog.feti.decomposition.partition import decompose
+from feti_homog.feti.decomposition.partition import Decomposition, decompose
 from feti_homog.fibres.outlines.ellipses import Ellipses
 from feti_homog.homogenization import arc_selection, cell_remarks, process_zone
 from feti_homog.homogenization.arc_selection import InterfaceNodes
@@ -158,14 +158,13 @@ def distribute(
         raise CaseError(*faults)
     parts = torus.constituent if case.cell.bodies == "torus" else torus.plane_parts()
     bodies, triangles = int(parts.max()) + 1, len(mesh.triangles)
-    across = can_be_cut_across(case) and policy.across_pieces(triangles * lattice.intervals**2, n_ranks)
-    if across:
-        parts, wanted = np.zeros_like(parts), np.array([min(across, triangles)])
-    else:
+    found = _cut_across(case, torus, lattice, n_ranks, policy)
+    across = found is not None
+    if found is None:
         wanted = wanted_pieces(case, np.bincount(parts), _outer_edges(torus, parts), lattice, n_ranks, policy)
-    decomposition = decompose(torus, parts, wanted, n_ranks)
-    subdomain, rank = decomposition.subdomain, decomposition.rank
-    table = SubdomainTable.of(torus, subdomain, rank, across > 0)
+        found = decompose(torus, parts, wanted, n_ranks)
+    subdomain, rank = found.subdomain, found.rank
+    table = SubdomainTable.of(torus, subdomain, rank, across)
     summary = CellSummary(
         width=mesh.width,
         height=mesh.height,
@@ -189,11 +188,23 @@ def distribute(
             *mesh_remarks(case, torus, pairs),
             *subdomain_remarks(case, bodies, len(rank), triangles),
         ),
-        across=across > 0,
+        across=across,
         interface_nodes=_interface_nodes(torus, pairs, lattice) if across else None,
     )
     shares = cut_for_ranks(torus, subdomain, table, n_ranks, pinned_class(torus))
     return [RankShare(summary, table, pairs, own) for own in shares]
+
+
+def _cut_across(
+    case: Case, torus: Torus, lattice: ReferenceLattice, n_ranks: int, policy: PartitionPolicy
+) -> Decomposition | None:
+    """Return the cell cut across materials; None where that is not wanted, or leaves a rank without a piece."""
+    triangles = len(torus.mesh.triangles)
+    pieces = policy.across_pieces(triangles * lattice.intervals**2, n_ranks) if can_be_cut_across(case) else 0
+    if not 0 < pieces <= triangles:
+        return None
+    found = decompose(torus, np.zeros(triangles, np.int64), np.array([pieces]), n_ranks)
+    return found if len(found.rank) >= n_ranks else None  # METIS leaves some pieces empty
 
 
 def match_distance(case: Case, width: float, height: float, centres: Float, radii: Float) -> float | None:

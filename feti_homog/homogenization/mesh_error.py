@@ -126,13 +126,9 @@ def _nested(cell: TornCell, u: Float, loads: Float, keep: bool) -> Displacements
 
 def _whole(cell: TornCell, u: Float, loads: Float, keep: bool) -> Displacements:
     """Yield the same on the mesh itself."""
-    place, extended = -1, np.zeros(0)
+    displacements = cell.displacements(u, loads, keep)
     for group in groups(cell.parts, cell.lattice):
-        members, each = [cell.parts[k] for k in group], list[Float]()
-        for part in members:
-            if part.place != place:
-                place, extended = part.place, cell.solver.extended(part.place, u, loads, keep)
-            each.append(extended[part.dofs])
-        own = np.concatenate(each)
+        members = [cell.parts[k] for k in group]
+        own = np.concatenate([next(displacements)[1] for _ in group])
         own = own.reshape(-1, members[0].problem.components, u.shape[1])
         yield members, joined([s.mesh for s in members]), own

@@ -35,21 +35,23 @@ class RecoveredFields:
 
 def recover(cell: TornCell, response: Response | None) -> RecoveredFields:
     """Recover the fields of a response; zero without one.  Collective."""
-    nodes, problem = cell.solver.jump_operator.nodes, cell.solver.problem
+    nodes, problem = cell.jumps.nodes, cell.solver.problem
     if response is None:
         c, v = problem.components, len(problem.loads)
-        n, m = (sum(sizes) for sizes in zip(*_sizes(cell), strict=True)) if cell.subdomains else (0, 0)
+        n, m = (sum(sizes) for sizes in zip(*_sizes(cell), strict=True)) if cell.parts else (0, 0)
         points, elements, pairs = np.zeros((n, c)), np.zeros((m, v)), np.zeros((len(nodes.row), c))
         return RecoveredFields(points, points, elements, elements, pairs, pairs, np.zeros(m))
     solution = response.state.solution
-    u = response.scale * cell.solver.displacement(solution)
+    u = cell.displacement(solution)
+    lam, opening = (response.scale * each for each in cell.across_bonds(solution, u))
+    u *= response.scale
     pair = nodes.row[:, None] + np.arange(problem.components)
     return RecoveredFields(
         displacement(cell, response.strain, u),
         fluctuation(cell, u),
         *_element_fields(cell, response.strain, u),
-        response.scale * solution.lam[pair] / nodes.length[:, None],
-        response.scale * solution.opening[pair],
+        lam[pair] / nodes.length[:, None],
+        opening[pair],
         _shares(cell, response),
     )
 
@@ -58,15 +60,15 @@ def _shares(cell: TornCell, response: Response) -> Float:
     if response.shares is not None:
         return response.shares
     if not cell.case.output.mesh_error:
-        return np.full(sum(len(s.mesh.triangles) for s in cell.subdomains), np.nan)
+        return np.full(sum(len(s.mesh.triangles) for s in cell.parts), np.nan)
     from feti_homog.homogenization.mesh_error import energy_errors  # cases may forgo it
 
     return energy_errors(cell, [response]).shares[:, 0]
 
 
 def _sizes(cell: TornCell) -> list[tuple[int, int]]:
-    """Nodes and elements of this rank's subdomains."""
-    return [(len(s.mesh.points), len(s.mesh.triangles)) for s in cell.subdomains]
+    """Nodes and elements of this rank's parts."""
+    return [(len(s.mesh.points), len(s.mesh.triangles)) for s in cell.parts]
 
 
 def _element_fields(cell: TornCell, loads: Float, u: Float) -> tuple[Float, Float]:
@@ -74,8 +76,8 @@ def _element_fields(cell: TornCell, loads: Float, u: Float) -> tuple[Float, Floa
     problem = cell.solver.problem
     of_displacements, others = loads[: problem.strains], loads[problem.strains :]
     strains, stresses = ([np.zeros((0, len(loads)))] for _ in range(2))
-    for s, offset in zip(cell.subdomains, cell.offsets, strict=False):
-        own = u[offset : offset + len(s.Q)].reshape(-1, problem.components)
+    for s, offset in zip(cell.parts, cell.offsets, strict=False):
+        own = u[offset : offset + len(s.dofs)].reshape(-1, problem.components)
         strain = of_displacements + element_strain(
             s.mesh.points, s.mesh.triangles, s.mesh.node_class, own, problem
         )[0]  # fmt: skip
@@ -88,6 +90,6 @@ def _element_fields(cell: TornCell, loads: Float, u: Float) -> tuple[Float, Floa
 def out_of_plane_stress(cell: TornCell, stress: Float) -> Float:
     """Stresses 33 (m,) of the stresses (m, 3) in plane strain or stress."""
     plane = cell.case.analysis.plane
-    rules = [laws.out_of_plane(cell.case.material_of(s.submesh.phase), plane)[0] for s in cell.subdomains]
+    rules = [laws.out_of_plane(cell.case.material_of(s.submesh.phase), plane)[0] for s in cell.parts]
     sizes = [elements for _, elements in _sizes(cell)]
     return np.asarray(np.einsum("ev,ev->e", stress, np.repeat(np.reshape(rules, (-1, 3)), sizes, axis=0)))

@@ -24,10 +24,10 @@ from feti_homog.fem import bubble
 from feti_homog.fem.assembly import ELEMENTS_AT_ONCE
 from feti_homog.fem.problem import Problem
 from feti_homog.fem.shape_functions import gradients
-from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.domain_partition import CellSummary
+from feti_homog.homogenization.uniform_parts import UniformPart
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.materials.derivatives import law_changes
 from feti_homog.parallel.distributed_arrays import allreduce_sum
@@ -95,8 +95,8 @@ def _integrals(cell: TornCell, responses: Sequence[Response]) -> tuple[dict[str,
     materials = dict.fromkeys(provider(phase, cell.case.materials) for phase in cell.summary.phases)
     sums = {material: np.zeros((m * k + 1,) * 2) for material in materials}
     grows, growth = any(_fractions(cell.case)), np.zeros((k, k))
-    for place, s in enumerate(cell.subdomains):
-        u = cell.solver.extended(place, boundary, loads).reshape(-1, problem.components, k)
+    for s, own in cell.displacements(boundary, loads):
+        u = own.reshape(-1, problem.components, k)
         V = _velocity(s.mesh.points, cell.summary) if grows else None
         for first in range(0, len(s.mesh.triangles), ELEMENTS_AT_ONCE):
             nodes = s.mesh.triangles[first : first + ELEMENTS_AT_ONCE]
@@ -129,7 +129,7 @@ class _Fields:
     rest: Float | None
 
     @classmethod
-    def of(cls, s: Subdomain, nodes: Int32, u: Float, loads: Float) -> _Fields:
+    def of(cls, s: UniformPart, nodes: Int32, u: Float, loads: Float) -> _Fields:
         """Fields of elements of nodes (e, a) and displacements u (e, a, c, k) under the loads (m, k)."""
         points, (_, a, c, k) = s.mesh.points[nodes], u.shape
         elements = bubble.Elements.of(points, s.L) if s.is_mixed else None

@@ -9,11 +9,16 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from mpi4py import MPI
+from scipy.sparse import csr_matrix
 
+from feti_homog.fem.assembly import assemble
 from feti_homog.fem.problem import Problem
+from feti_homog.feti.decomposition.jump_operator import JumpOperator, NodeBlocks
+from feti_homog.feti.decomposition.shared_entities import SharedEntities, share_entities
 from feti_homog.feti.decomposition.subdomain import Subdomain
-from feti_homog.mesh.refinement import FineMesh
-from feti_homog.mesh.submesh import Submesh, part
+from feti_homog.mesh.refinement import FineMesh, ReferenceLattice, joined
+from feti_homog.mesh.submesh import SubdomainTable, Submesh, SubmeshesOfRank, joined_meshes, part
 from feti_homog.typing import Float, Int
 
 
@@ -23,7 +28,7 @@ class UniformPart:
 
     Attributes:
         place: of the subdomain among those of its rank.
-        submesh, mesh: of the part; the index is that of the subdomain.
+        submesh, mesh: of the part.
         dofs: (cn,) the degrees of freedom of the subdomain that are the part's.
         L, problem, is_mixed: as of `Subdomain`.
     """
@@ -38,7 +43,7 @@ class UniformPart:
 
 
 def parts_of(subdomains: Sequence[Subdomain], phase_of: Sequence[str]) -> Iterator[UniformPart]:
-    """Yield the parts of one subdomain after the other, those of one phase together.
+    """Yield the parts of one subdomain after the other, with its index, those of one phase together.
 
     `phase_of` (constituents,) are the names of phases.
     """
@@ -61,3 +66,50 @@ def _restricted(mesh: FineMesh, members: Int) -> tuple[FineMesh, Int]:
     classes, node_class = np.unique(mesh.node_class[nodes], return_inverse=True)
     own = local.reshape(len(members), -1).astype(np.int32), node_class.astype(np.int32)
     return FineMesh(mesh.points[nodes], own[0], mesh.curved[members], own[1], len(classes), mesh.lattice), classes
+
+
+def numbered(comm: MPI.Intracomm, parts: Sequence[UniformPart]) -> list[UniformPart]:
+    """Return parts with numbers of their own among those of all ranks.  Collective."""
+    first = comm.exscan(len(parts)) or 0
+    return [replace(p, submesh=replace(p.submesh, index=first + k)) for k, p in enumerate(parts)]
+
+
+def share_parts(
+    comm: MPI.Intracomm, parts: Sequence[UniformPart], table: SubdomainTable, pairs: Int, lattice: ReferenceLattice
+) -> SharedEntities:
+    """Return what parts share, as `share_entities` does of subdomains; of these there is the `table`.  Collective."""
+    body = np.array([p.submesh.body for p in parts])
+    member = np.repeat(np.arange(len(parts)), [len(p.mesh.nodes) for p in parts])
+    index, phase = np.array([p.submesh.index for p in parts]), tuple(p.submesh.phase for p in parts)
+    own = SubmeshesOfRank(joined_meshes([p.submesh for p in parts]), member, index, body, phase)
+    bodies = comm.allgather(body)
+    rank = np.repeat(np.arange(comm.size), [len(each) for each in bodies])
+    return share_entities(
+        comm, own, SubdomainTable(np.concatenate(bodies), rank, table.nesting, table.phase), pairs, lattice
+    )
+
+
+class ForcesBetweenParts:
+    """Multipliers of the constraints between parts, by which each is in equilibrium with its displacements."""
+
+    def __init__(self, comm: MPI.Intracomm, parts: Sequence[UniformPart], jumps: JumpOperator) -> None:
+        """Assemble the coarse triangles at constraints, of one problem.  Collective."""
+        self._jumps, problem = jumps, jumps.problem
+        torn, nodes = joined([p.mesh for p in parts]), problem.nodes(np.flatnonzero(jumps.B.getnnz(axis=0)))
+        is_shared = np.zeros(torn.n_classes, bool)
+        is_shared[nodes] = True
+        beside = np.flatnonzero(is_shared[torn.node_class[torn.nodes]].any(axis=1))
+        mesh, classes = _restricted(torn, beside)
+        law = np.repeat(np.arange(len(parts)), [len(p.mesh.nodes) for p in parts])[beside]
+        used, material = np.unique(law, return_inverse=True)
+        found = assemble(mesh, np.stack([parts[k].L for k in used]), problem, parts[0].is_mixed, material)
+        self._dofs, self._K, self._Q = problem.dofs(classes), found.K, found.Q
+        self._inverse = NodeBlocks(comm, jumps, csr_matrix(jumps.B @ jumps.B.T)).inverse(
+            np.ones(jumps.owned[1] - jumps.owned[0])
+        )
+
+    def multipliers(self, u: Float, loads: Float) -> Float:
+        """(owned rows,) lam = (B B^T)^-1 B f, f = -K u - Q E, of displacements u (dofs,) and loads E.  Collective."""
+        forces = np.zeros(len(u))
+        forces[self._dofs] = -self._K @ u[self._dofs] - self._Q @ loads
+        return np.asarray(self._inverse @ self._jumps.sum(self._jumps.B @ forces))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
@@ -12,23 +12,25 @@ from mpi4py import MPI
 from feti_homog.case.case import Case
 from feti_homog.case.phase_names import COATING, MATRIX
 from feti_homog.fem.problem import AXIAL
+from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.shared_entities import SharedEntities, share_entities
 from feti_homog.feti.decomposition.subdomain import Subdomain
+from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.feti.solver import FetiSolver
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
-from feti_homog.homogenization import bonds, cost_model, phase_laws
+from feti_homog.homogenization import bonds, cell_remarks, cost_model, phase_laws
 from feti_homog.homogenization.coarse_meshes import fill_tiles, place_nodes
 from feti_homog.homogenization.domain_partition import CellSummary, RankShare, distribute
 from feti_homog.homogenization.nested_interiors import NestedInterior, nested_interiors
 from feti_homog.homogenization.partition_policy import DEFAULT_POLICY, PartitionPolicy
 from feti_homog.homogenization.tile_tearing import can_be_torn_by_tiles, tear_by_tiles
-from feti_homog.homogenization.uniform_parts import UniformPart, parts_of
+from feti_homog.homogenization.uniform_parts import ForcesBetweenParts, UniformPart, numbered, parts_of, share_parts
 from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.tips import debonded_arcs
 from feti_homog.mesh.coarse_mesh import CoarseMesh
 from feti_homog.mesh.fill.gmsh_mesher import NodedCell
 from feti_homog.mesh.refinement import ReferenceLattice
-from feti_homog.mesh.submesh import Submesh, SubmeshesOfRank
+from feti_homog.mesh.submesh import SubdomainTable, Submesh, SubmeshesOfRank
 from feti_homog.parallel.distributed_arrays import scatter
 from feti_homog.parallel.mpi_errors import agree, on_root_only
 from feti_homog.runtime.progress import Progress
@@ -47,6 +49,7 @@ class TornCell:
     case: Case
     summary: CellSummary
     lattice: ReferenceLattice
+    table: SubdomainTable
     subdomains: list[Subdomain]
     solver: FetiSolver
     axial: TornCell | None = None
@@ -58,23 +61,60 @@ class TornCell:
 
     @cached_property
     def offsets(self) -> Int:
-        """Return where each subdomain begins in this rank's vectors of degrees of freedom."""
-        return np.cumsum([0, *(len(s.Q) for s in self.subdomains)])
+        """Return where each part begins in this rank's vectors of their degrees of freedom."""
+        return np.cumsum([0, *(len(part.dofs) for part in self.parts)])
 
     @cached_property
     def parts(self) -> list[UniformPart]:
-        """The parts of this rank's subdomains that lie in one body each."""
+        """The parts of this rank's subdomains that lie in one body each.  Collective when first read."""
         summary = self.summary
-        return list(parts_of(self.subdomains, [summary.phases[k] for k in summary.constituent_phase.tolist()]))
+        names = [summary.phases[k] for k in summary.constituent_phase.tolist()]
+        parts = list(parts_of(self.subdomains, names))
+        return numbered(self.comm, parts) if summary.across else parts
+
+    @cached_property
+    def jumps(self) -> JumpOperator:
+        """B between all parts, also those of one subdomain, of no multipliers.  Collective when first read."""
+        if not self.summary.across:
+            return self.solver.jump_operator
+        pairs = cell_remarks.pairs_of(self.case, self.summary.phases)
+        shared = share_parts(self.comm, self.parts, self.table, pairs, self.lattice)
+        return JumpOperator(self.comm, shared, self.parts, self.lattice, self.solver.problem)
+
+    @cached_property
+    def _forces(self) -> ForcesBetweenParts:
+        return ForcesBetweenParts(self.comm, self.parts, self.jumps)
+
+    def displacement(self, solution: DualSolution) -> Float:
+        """(dofs,) u* of a solution on the parts of this rank.  Collective."""
+        u = self.solver.boundary_displacement(solution)
+        return np.concatenate([np.zeros(0), *(own for _, own in self.displacements(u, solution.strain))])
+
+    def displacements(self, u: Float, loads: Float, keep: bool = True) -> Iterator[tuple[UniformPart, Float]]:
+        """Yield each part with its u* (dofs, k), of u (boundary dofs, k) on all boundaries under the loads (v, k).
+
+        `keep` the factors of interiors.
+        """
+        place, extended = -1, np.zeros(0)
+        for part in self.parts:
+            if part.place != place:
+                place, extended = part.place, self.solver.extended(part.place, u, loads, keep)
+            yield part, extended[part.dofs]
+
+    def across_bonds(self, solution: DualSolution, u: Float) -> tuple[Float, Float]:
+        """(owned rows of `jumps`,) lam and openings of a solution with the displacements u of parts.  Collective."""
+        if not self.summary.across:
+            return solution.lam, solution.opening
+        return self._forces.multipliers(u, solution.strain), self.jumps.sum(self.jumps.B @ u)
 
     @cached_property
     def class_nodes(self) -> Int:
-        """(c,) a plane node of each class of this rank's subdomains, one subdomain after the other.
+        """(c,) a plane node of each class of this rank's parts, one part after the other.
 
         The nodes are numbered alike.
         """
         nodes, first = [np.zeros(0, np.int64)], 0
-        for mesh in (s.mesh for s in self.subdomains):
+        for mesh in (part.mesh for part in self.parts):
             own = np.empty(mesh.n_classes, np.int64)
             own[mesh.node_class] = first + np.arange(len(mesh.points))
             nodes.append(own)
@@ -154,23 +194,24 @@ def tear(
     Raises:
         CaseError, MeshError: on every rank.
     """
-    summary, shared, lattice, subdomains = assemble_subdomains(case, comm, progress, policy)
+    own, shared, lattice, subdomains = assemble_subdomains(case, comm, progress, policy)
+    summary, table = own.summary, own.table
     problem = phase_laws.plane_problem(case)
     with progress.stage("factor") as words:
         applications, springs = cost_model.applications(case, problem, summary.across), bonds.springs(case)
         solver = FetiSolver(comm, shared, subdomains, lattice, applications, thresholds, springs, problem)
         multipliers, dimension = solver.jump_operator.global_rows, solver.coarse_dimension
         words.append(f"{multipliers} multipliers, coarse dimension {dimension}")
-    cell = TornCell(comm, case, summary, lattice, subdomains, solver)
+    cell = TornCell(comm, case, summary, lattice, table, subdomains, solver)
     if len(phase_laws.problems(case)) == 1:
         return cell
     with progress.stage("assemble") as words:
-        own = agree(comm, assemble_axial, case, summary, subdomains)
-        words.append(f"{comm.allreduce(sum(s.n_dofs for s in own))} degrees of freedom along the fibres")
+        axial = agree(comm, assemble_axial, case, summary, subdomains)
+        words.append(f"{comm.allreduce(sum(s.n_dofs for s in axial))} degrees of freedom along the fibres")
     with progress.stage("axial"):
         applications, springs = cost_model.applications(case, AXIAL, summary.across), bonds.axial_springs(case)
-        solver = FetiSolver(comm, shared, own, lattice, applications, thresholds, springs, AXIAL)
-    return replace(cell, axial=TornCell(comm, case, summary, lattice, own, solver))
+        solver = FetiSolver(comm, shared, axial, lattice, applications, thresholds, springs, AXIAL)
+    return replace(cell, axial=TornCell(comm, case, summary, lattice, table, axial, solver))
 
 
 def assemble_axial(case: Case, summary: CellSummary, subdomains: Sequence[Subdomain]) -> list[Subdomain]:
@@ -186,10 +227,10 @@ def assemble_axial(case: Case, summary: CellSummary, subdomains: Sequence[Subdom
 
 def assemble_subdomains(
     case: Case, comm: MPI.Intracomm, progress: Progress, policy: PartitionPolicy = DEFAULT_POLICY
-) -> tuple[CellSummary, SharedEntities, ReferenceLattice, list[Subdomain]]:
+) -> tuple[RankShare, SharedEntities, ReferenceLattice, list[Subdomain]]:
     """Mesh the cell, cut it on rank 0; refine and assemble the subdomains on their ranks.  Collective.
 
-    Returns the summary, what this rank's subdomains share with others, the lattice of the refinement, and they.
+    Returns this rank's share, what its subdomains share with others, the lattice of the refinement, and they.
     Raises as `tear`.
     """
     lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
@@ -207,7 +248,7 @@ def assemble_subdomains(
         if summary.voids:
             words.append(f"{summary.voids} voids, porosity {1 - meshed / summary.area:.6g},")
         words.append(f"{dofs} degrees of freedom, refine = {case.cell.refine}, order = {case.cell.order}")
-    return summary, shared, lattice, subdomains
+    return own, shared, lattice, subdomains
 
 
 def cut(case: Case, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: PartitionPolicy) -> RankShare:

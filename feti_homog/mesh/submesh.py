@@ -247,7 +247,7 @@ def joined(parts: Sequence[SubmeshesOfRank]) -> SubmeshesOfRank:
     order = np.argsort(index)
     phase = [name for part in parts for name in part.phase]
     return SubmeshesOfRank(
-        whole=_joined_meshes([part.whole for part in parts]),
+        whole=joined_meshes([part.whole for part in parts]),
         member=np.argsort(order)[_numbers(parts, "member", "index")],
         index=index[order],
         body=_all(parts, "body")[order],
@@ -255,7 +255,7 @@ def joined(parts: Sequence[SubmeshesOfRank]) -> SubmeshesOfRank:
     )
 
 
-def _joined_meshes(meshes: list[Submesh]) -> Submesh:
+def joined_meshes(meshes: list[Submesh]) -> Submesh:
     """All triangles of these; plane vertices and edges are not identified, classes and torus edges are."""
     class_keys, first_class, class_of = np.unique(_all(meshes, "class_keys"), return_index=True, return_inverse=True)
     edge_keys, first, edge_of = np.unique(_all(meshes, "edge_keys"), return_index=True, return_inverse=True)

@@ -1,7 +1,7 @@
 """Layout of result.h5: the parts that each rank hands over, and where the file has them.
 
 Lengths are in the unit of the cell, stresses in that of the moduli.  n nodes, m elements, k interface nodes, f fibres
-are all of the file's, of which each rank has a part; nodes are torn, so that each subdomain has its own.
+are all of the file's, of which each rank has a part; nodes are torn, so that each body in a subdomain has its own.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Header:
 
 @dataclass(frozen=True)
 class MeshPart:
-    """This rank's n nodes and m triangles, one subdomain after the other; nodes are torn between subdomains.
+    """This rank's n nodes and m triangles, one subdomain after the other; nodes are torn between these and bodies.
 
     Each group of 4**refine consecutive triangles fills one coarse triangle.
     """
@@ -48,7 +48,11 @@ class MeshPart:
         shape="(m, 3 or 6)", dtype="int64",
     )  # fmt: skip
     body: AnyInt = described("body of each element, from 0, the matrix", shape="(m,)", dtype="int32")
-    subdomain: AnyInt = described("subdomain of each element, from 0", shape="(m,)", dtype="int32")
+    subdomain: AnyInt = described(
+        "subdomain of each element, from 0; of one across materials each part in one body has a number of its own",
+        shape="(m,)",
+        dtype="int32",
+    )
     phase: AnyInt = described("phase of each element, a place in `phases`", shape="(m,)", dtype="int32")
     fibre_number: AnyInt = described(
         "number of the fibre, also of its coating, from 1; 0 in the matrix", shape="(m,)", dtype="int32"

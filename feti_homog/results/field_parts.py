@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from typing import Any
 
 import numpy as np
 
@@ -34,8 +35,8 @@ def header(cell: TornCell) -> Header:
 
 
 def mesh_part(cell: TornCell) -> MeshPart:
-    """Return the refined meshes of this rank's subdomains, one after the other."""
-    subdomains = cell.subdomains
+    """Return the refined meshes of this rank's parts, one after the other."""
+    subdomains = cell.parts
     nodes = np.cumsum([0, *(len(s.mesh.points) for s in subdomains)])
     columns = 3 * cell.case.cell.order
     sizes = [len(s.mesh.triangles) for s in subdomains]
@@ -67,8 +68,8 @@ def fibre_part(cell: TornCell) -> FibrePart:
 
 def interface_part(cell: TornCell) -> InterfacePart:
     """Return the interface nodes whose multipliers this rank owns. Collective."""
-    jumps, nodes = cell.solver.jump_operator, cell.solver.jump_operator.nodes
-    first = cell.comm.exscan(sum(len(s.mesh.points) for s in cell.subdomains)) or 0
+    jumps, nodes = cell.jumps, cell.jumps.nodes
+    first = cell.comm.exscan(sum(len(s.mesh.points) for s in cell.parts)) or 0
     numbers = first + cell.class_nodes
     return InterfacePart(
         points=nodes.points,
@@ -85,7 +86,7 @@ def interface_part(cell: TornCell) -> InterfacePart:
 
 def state_part(cell: TornCell, response: Response, load_factor: float, label: str, point: int) -> StatePart:
     """Return the fields of a response in plane strain or stress. Collective when first called."""
-    fields, nodes = recover(cell, response), cell.solver.jump_operator.nodes
+    fields, nodes = recover(cell, response), cell.jumps.nodes
     opening = _in_axes(nodes.normal, fields.jump)
     fibre = fields.displacement[cell.class_nodes[nodes.fibre_node]]
     return StatePart(
@@ -104,9 +105,7 @@ def state_part(cell: TornCell, response: Response, load_factor: float, label: st
         jump_vector=_vectors(opening),
         displacement_fibre=_vectors(fibre),
         displacement_matrix=_vectors(fibre + opening),
-        status=response.state.status,
-        damage=response.damage,
-        sliding=response.state.bonds.sliding_signs,
+        **_bonds(cell, response),
     )
 
 
@@ -124,7 +123,7 @@ def spatial_state_part(
     if response is None or cell.axial is None:
         raise ValueError("expected a response of a cell with an axial problem")
     in_plane, along = recover(cell, plane), recover(cell.axial, axial)
-    nodes = cell.solver.jump_operator.nodes
+    nodes = cell.jumps.nodes
     opening = _vectors(_in_axes(nodes.normal, in_plane.jump), along.jump)
     fibre = _vectors(in_plane.displacement, along.displacement)[cell.class_nodes[nodes.fibre_node]]
     return SpatialStatePart(
@@ -148,10 +147,17 @@ def spatial_state_part(
         jump_vector=opening,
         displacement_fibre=fibre,
         displacement_matrix=fibre + opening,
-        status=response.state.status,
-        damage=response.damage,
-        sliding=response.state.bonds.sliding_signs,
+        **_bonds(cell, response),
     )
+
+
+def _bonds(cell: TornCell, response: Response) -> dict[str, Any]:
+    """Return status, damage and sliding of the interface nodes, none of which has parted in a cell cut across."""
+    if cell.summary.across:
+        none = np.zeros(len(cell.jumps.nodes.row), np.int8)
+        return {"status": none, "damage": none.astype(float), "sliding": none}
+    state = response.state
+    return {"status": state.status, "damage": response.damage, "sliding": state.bonds.sliding_signs}
 
 
 def _relative(shares: Float, *responses: Response | None) -> Float32:

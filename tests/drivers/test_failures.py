@@ -116,7 +116,8 @@ def test_a_folder_that_another_run_writes_to(tmp_path, ranks):
 @pytest.mark.parametrize("ranks", [1, 2])
 def test_no_convergence_ends_with_3_and_keeps_what_was_computed(tmp_path, ranks):
     out = tmp_path / "results"
-    job = command_line(ranks, "run", case_file(tmp_path), "--out", out, "-feti_ksp_max_it", "2")
+    case = case_file(tmp_path, '[output]\npictures = false\n[decomposition]\ncut = "bodies"\n')
+    job = command_line(ranks, "run", case, "--out", out, "-feti_ksp_max_it", "2")
     assert job.returncode == 3
     assert job.stderr.count("error: E11: no convergence after 2 iterations") == 1
     document = json.loads((out / "result.json").read_text())

@@ -8,6 +8,7 @@ import pytest
 from support.base_case import changed
 
 from feti_homog import Case, CaseError, run
+from feti_homog.homogenization.partition_policy import BY_COST
 from feti_homog.homogenization.unit_cell import tear
 from feti_homog.petsc.options import case_options
 from feti_homog.runtime.progress import Progress
@@ -34,7 +35,7 @@ def test_the_solver_is_the_one_that_is_reported(comm, name):
     case = Case.parse(tomllib.loads(CASES[name]))
     with case_options(case.petsc):
         printed = comm.bcast(describe(case, comm))
-        cell = tear(case, comm, Progress(comm, quiet=True))
+        cell = tear(case, comm, Progress(comm, quiet=True), policy=BY_COST)
     (line,) = [line for line in printed.splitlines() if line.startswith("solver")]
     assert ("influence columns" in line) == (cell.solver.exact_inverse is not None)
     assert ("adaptive coarse space" in line) == (cell.solver.adaptive is not None)

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from mpi4py import MPI
+from scipy.spatial import cKDTree
 from support.cases import FIBRE, MATRIX, make_case, monolithic_stiffness, relative_error, solve
 from support.pixel_images import pixel_mesh
 
 from feti_homog import Case, run
+from feti_homog.feti.operators.one_subdomain import Interior
+from feti_homog.homogenization.averaging import Homogenization
 from feti_homog.homogenization.partition_policy import PartitionPolicy
 from feti_homog.parallel.mpi_errors import on_root
 from feti_homog.runtime.records import plain
@@ -38,6 +42,20 @@ def test_stiffness_is_the_monolithic_one(comm, cell, policy):
     assert relative_error(L, monolithic_stiffness(torn)) < 1e-8
     assert max(max(r.checks.values()) for r in responses) < 1e-7
     assert all(r.state.iterations < 40 for r in responses)
+
+
+@pytest.mark.parametrize("fault", ["strain", "hill"])
+def test_checks_of_one_subdomain_can_fail(fault, monkeypatch):
+    rng, solve_exactly = np.random.default_rng(0), Interior.solve
+    if fault == "hill":
+        monkeypatch.setattr(Interior, "solve", lambda s, f: solve_exactly(s, f * (1 + 1e-4 * rng.random(f.shape))))
+    torn, _, _ = solve(make_case(**RANDOM), MPI.COMM_SELF, policy=POLICIES["whole"])
+    if fault == "strain":
+        torn.subdomains[0].slopes[3] += 1e-4
+    averages = Homogenization(torn, contact=False)
+    checks = averages.respond(np.eye(3)[:1], averages.intact, [np.zeros(0)])[0].checks
+    assert {law for law, error in checks.items() if not error < 1e-6} == {fault}
+    assert "jump" not in checks  # nothing is glued
 
 
 def document(cut):
@@ -91,7 +109,21 @@ def test_phases_of_very_different_stiffness_stay_apart(comm, young):
     assert relative_error(L, monolithic_stiffness(torn)) < 1e-7
 
 
-def test_fields_that_are_asked_for_are_those_of_bodies(comm):
-    result = run(Case.parse(document("auto")), comm, fields=True)
-    assert result.solver.subdomains > comm.size
-    assert comm.allreduce(len(result.fields.interface.points)) == result.solver.interface_nodes > 0
+@pytest.mark.parametrize("plane", ["generalized", "stress"])
+def test_fields_and_derivatives_are_those_by_bodies(comm, plane):
+    asked = {"output": {"sensitivities": True}}
+    runs = [document(cut) | asked | {"analysis": {"type": "stiffness", "plane": plane}} for cut in ("auto", "bodies")]
+    across, bodies = (run(Case.parse(each), comm, fields=True) for each in runs)
+    assert across.solver.subdomains == comm.size < bodies.solver.subdomains
+    values = across.sensitivities.derivatives, bodies.sensitivities.derivatives
+    np.testing.assert_allclose(*values, rtol=1e-7, atol=1e-9 * np.abs(values[1]).max())
+    names = ["traction", "jump", "displacement_matrix", *(["axial_traction"] if plane == "generalized" else [])]
+    for state, other in zip(across.fields.states, bodies.fields.states, strict=True):
+        ours, theirs = (
+            [np.concatenate(comm.allgather(part)) for part in (of.interface.points, *(getattr(s, n) for n in names))]
+            for of, s in ((across.fields, state), (bodies.fields, other))
+        )
+        off, place = cKDTree(theirs[0] % 1.0, boxsize=1.0).query(ours[0] % 1.0)
+        assert len(ours[0]) == across.solver.interface_nodes and off.max() < 1e-12
+        for own, their in zip(ours[1:], theirs[1:], strict=True):
+            np.testing.assert_allclose(own, their[place], atol=1e-7 * np.abs(their).max() + 1e-9)

@@ -4,15 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from scipy.linalg import block_diag, helmert
 from scipy.sparse import coo_matrix, csr_matrix
 
 from feti_homog.feti.decomposition.shared_entities import SharedEntities, along, mean_speed
-from feti_homog.feti.decomposition.subdomain import Subdomain
-from feti_homog.mesh.refinement import ReferenceLattice, edge_node
+from feti_homog.mesh.refinement import FineMesh, ReferenceLattice, edge_node
+from feti_homog.mesh.submesh import Submesh
 from feti_homog.typing import Bool, Float, Int
+
+
+class Meshed(Protocol):
+    """A subdomain, or a part of one: its coarse share and its refined mesh."""
+
+    @property
+    def submesh(self) -> Submesh: ...
+
+    @property
+    def mesh(self) -> FineMesh: ...
 
 
 @dataclass(frozen=True)
@@ -57,7 +68,7 @@ class ConstraintLayout:
     """
 
     def __init__(
-        self, shared: SharedEntities, subdomains: Sequence[Subdomain], lattice: ReferenceLattice, components: int
+        self, shared: SharedEntities, subdomains: Sequence[Meshed], lattice: ReferenceLattice, components: int
     ) -> None:
         self.shared, self.subdomains, self.lattice = shared, subdomains, lattice
         self.components = components
@@ -228,7 +239,7 @@ class ConstraintLayout:
         return self.first[entity] + self.components * ((p + 1) * (shared.copies[entity] - 1) - 1), first[entity] + p
 
 
-def _class_points(subdomain: Subdomain) -> Float:
+def _class_points(subdomain: Meshed) -> Float:
     """(c, 2) a plane position of each class."""
     points = np.empty((subdomain.mesh.n_classes, 2))
     points[subdomain.mesh.node_class] = subdomain.mesh.points

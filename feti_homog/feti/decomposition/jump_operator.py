@@ -17,9 +17,8 @@ from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
 from feti_homog.fem.problem import PLANE, Problem
-from feti_homog.feti.decomposition.constraint_layout import ConstraintLayout, expand
+from feti_homog.feti.decomposition.constraint_layout import ConstraintLayout, Meshed, expand
 from feti_homog.feti.decomposition.shared_entities import SharedEntities
-from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.linalg.sparse_matrices import assemble_owned_rows
 from feti_homog.feti.thresholds import KEPT_EXCHANGES
 from feti_homog.mesh.refinement import ReferenceLattice
@@ -75,7 +74,7 @@ class JumpOperator:
         self,
         comm: MPI.Intracomm,
         shared: SharedEntities,
-        subdomains: Sequence[Subdomain],
+        subdomains: Sequence[Meshed],
         lattice: ReferenceLattice,
         problem: Problem = PLANE,
     ) -> None:

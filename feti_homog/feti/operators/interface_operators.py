@@ -184,7 +184,8 @@ class InterfaceOperators:
         v = self._loads
         each = [operator.condensed for operator in self.operators]
         boundary = np.concatenate([np.zeros((0, v)), *(own.boundary for own in each)])
-        return CondensedLoads(boundary, sum((own.stiffness for own in each), np.zeros((v, v))))
+        of_stresses = sum((own.stiffness for own in each), np.zeros((v, v)))
+        return CondensedLoads(boundary, of_stresses, sum((own.energy for own in each), np.zeros((v, v))))
 
     def _interior(self, place: int, keep: bool) -> Interior:
         """Return the factored interior of the subdomain at a place, kept for other loads if that is asked for."""

@@ -55,7 +55,7 @@ class ExplicitInterfaceOperator:
             C = C + condensed
         else:
             both = schur_complement(K, dofs)
-        self.condensed = CondensedLoads(q, C)
+        self.condensed = CondensedLoads(q, C, C)
         self._schur_diagonal = both.diagonal().copy()
         # S stays below the diagonal; the inverse of the regularised S comes above it.
         both[np.ix_(self._fixed, self._fixed)] += np.triu(self._term)
@@ -137,10 +137,13 @@ class CondensedLoads:
     Attributes:
         boundary: (n, v) q.
         stiffness: (v, v) C, or the sum.
+        energy: (v, v) C as what 2 x the energy is where u_b = 0. Without a boundary that is not how stresses are
+            computed, but |Omega| L + 2 Q_i^T u_i + u_i^T K_ii u_i, which errors of u_i make another.
     """
 
     boundary: Float
     stiffness: Float
+    energy: Float
 
 
 class ImplicitInterfaceOperator:
@@ -156,6 +159,9 @@ class ImplicitInterfaceOperator:
         nodes = np.unique(own) if len(dofs) else np.arange(subdomain.mesh.n_classes)
         if not len(dofs) and not subdomain.R.shape[1]:
             self.interior = Interior(K, dofs)  # all of it, and no forces come from outside
+            s, u = subdomain, self.interior.solve(-subdomain.Q)
+            C = s.area * s.L + s.Q.T @ u
+            self.condensed = CondensedLoads(s.Q[dofs], C, C + s.Q.T @ u + u.T @ (K @ u))
             return
         self._solver = DirectSolver(subdomain.regularised(K, nodes), "feti_sub_")
 
@@ -167,12 +173,12 @@ class ImplicitInterfaceOperator:
     @cached_property
     def condensed(self) -> CondensedLoads:
         """The loads, which need the interior where they act inside."""
-        s, interior = self._subdomain, self.interior if self._subdomain.loads_inside else None
-        if interior is None:
-            return CondensedLoads(s.Q[self.dofs], s.area * s.L)
-        inside = s.Q[interior.dofs]
-        u = interior.solve(-inside)
-        return CondensedLoads(s.Q[self.dofs] + interior.coupling @ u, s.area * s.L + inside.T @ u)
+        s, q, C = self._subdomain, self._subdomain.Q[self.dofs], self._subdomain.area * self._subdomain.L
+        if s.loads_inside:
+            inside = s.Q[self.interior.dofs]
+            u = self.interior.solve(-inside)
+            q, C = q + self.interior.coupling @ u, C + inside.T @ u
+        return CondensedLoads(q, C, C)
 
     def apply_schur(self, x: Float, out: Float | None = None) -> Float:
         """S x = K_bb x - K_bi K_ii^-1 K_ib x for x (n,) or (n, k), into `out` if it is given."""

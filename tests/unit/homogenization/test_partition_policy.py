@@ -12,15 +12,12 @@ from feti_homog.homogenization.partition_policy import BY_COST, DEFAULT_POLICY, 
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.petsc.options import case_options
 
-WITHOUT_FIELDS = {"output": {"fields": False}}
-
 
 @pytest.mark.parametrize(
     ("change", "may"),
     [
         ({}, True),
-        ({"output": {}}, False),
-        ({"output": {"fields": False, "sensitivities": True}}, False),
+        ({"output": {"fields": True, "sensitivities": True}}, True),
         ({"decomposition": {"cut": "bodies"}}, False),
         ({"decomposition": {"subdomains": 9}}, False),
         ({"decomposition": {"max_dofs": 900}}, False),
@@ -33,22 +30,22 @@ WITHOUT_FIELDS = {"output": {"fields": False}}
     ],
 )
 def test_only_cells_in_which_nothing_is_asked_of_bodies_are_cut_across_materials(change, may):
-    assert can_be_cut_across(make_case(**WITHOUT_FIELDS | change)) == may
+    assert can_be_cut_across(make_case(**change)) == may
 
 
 def test_options_of_the_command_line_count_like_those_of_the_case():
     with case_options({"feti_ksp_view": ""}):
-        assert not can_be_cut_across(make_case(**WITHOUT_FIELDS))
-    assert can_be_cut_across(make_case(**WITHOUT_FIELDS))
+        assert not can_be_cut_across(make_case())
+    assert can_be_cut_across(make_case())
 
 
-def test_there_are_no_more_pieces_than_coarse_triangles():
-    case = make_case(geometry="square", mesh_size=0.5, **WITHOUT_FIELDS)
+def test_cells_of_fewer_pieces_than_ranks_are_cut_by_bodies():
+    case = make_case(geometry="square", mesh_size=0.5)
     mesh = coarse_mesh(case, MPI.COMM_SELF)
     ranks = len(mesh.triangles) + 9
     share, *_ = distribute(case, mesh, ReferenceLattice.of(0, 1), ranks, BY_COST)
     # METIS leaves some pieces empty, and nearly all if more are asked for than there are triangles.
-    assert share.summary.across and share.summary.subdomains > len(mesh.triangles) // 5
+    assert not share.summary.across and share.summary.subdomains > len(mesh.triangles) // 5
 
 
 @pytest.mark.parametrize(
