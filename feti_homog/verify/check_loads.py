@@ -107,8 +107,7 @@ def check_load(findings: Findings, cell: DiscreteCell, states: Sequence[StateNum
     document, case = cell.files.document, cell.files.case
     same = json.loads(str(cell.files.file.attrs["case"])) == case
     findings.record("tables", 0.0 if same else np.inf, "the case, which differs between the two files")
-    unit = _unit_loads(cell)
-    rows = list(zip(_expected_loads(document, case, unit), _entries(document, unit), strict=False))
+    rows = list(_rows(document, case, _unit_loads(cell)))
     scales = _Scales.of(cell, states)
     if "path" in document:
         _check_kept(findings, document, case, [state.point for state in states])
@@ -203,43 +202,28 @@ def _unit_loads(cell: DiscreteCell) -> list[Prescribed]:
     return [*unit[:4], *thermal, *unit[4:]]
 
 
-def _expected_loads(
+def _rows(
     document: Mapping[str, Any], case: Mapping[str, Any], unit: Sequence[Prescribed]
-) -> Iterator[Prescribed]:
-    """Yield the loads of the points of a path, or of the states of another case, in their order."""
+) -> Iterator[tuple[Prescribed, Mapping[str, Any]]]:
+    """Yield the load and the entry of result.json of each point of a path, or of each state of another case."""
     if "path" in document:
-        yield from at_points(case, document["path"])
+        yield from zip(at_points(case, document["path"]), document["path"], strict=True)
     elif "load" in document:
-        yield from targets(case)
+        yield from ((load, document["load"]) for load in targets(case))
     elif "angle" in document:
         given = case["angle"].get("strain")
-        own = [Prescribed.strain(np.array(given), 0.0)] if given is not None else unit
-        for _ in document["angle"]:
-            yield from own
-    else:
-        for sign in (1.0, -1.0) if "effective_stiffness_compression" in document else (1.0,):
-            yield from (replace(load, values=sign * load.values) for load in unit)
-
-
-def _entries(document: Mapping[str, Any], unit: Sequence[Prescribed]) -> Iterator[Mapping[str, Any]]:
-    """Yield the entry of result.json for each point of a path, or for each state of another case."""
-    if "path" in document:
-        yield from document["path"]
-    elif "load" in document:
-        yield document["load"]
-    elif "angle" in document:
         for point in document["angle"]:
-            if "stiffness" in point:
-                for number, load in enumerate(unit):
-                    counts = {name: point[name] for name in COUNTS} if number == LAST_OF_PLANE else {}
-                    yield {"stress": _told_stress(load, point, "stiffness", "", 1.0)} | counts
-            else:
-                yield point
+            if given is not None:
+                yield Prescribed.strain(np.array(given), 0.0), point
+                continue
+            for number, load in enumerate(unit):
+                counts = {name: point[name] for name in COUNTS} if number == LAST_OF_PLANE else {}
+                yield load, {"stress": _told_stress(load, point, "stiffness", "", 1.0)} | counts
     else:
         for suffix, sign in (("", 1.0), ("_compression", -1.0)):
-            if f"effective_stiffness{suffix}" in document:
-                for load in unit:
-                    yield {"stress": _told_stress(load, document, "effective_stiffness", suffix, sign)}
+            for load in unit if f"effective_stiffness{suffix}" in document else ():
+                told = _told_stress(load, document, "effective_stiffness", suffix, sign)
+                yield replace(load, values=sign * load.values), {"stress": told}
 
 
 def _told_stress(load: Prescribed, told: Mapping[str, Any], stiffness: str, suffix: str, sign: float) -> Float:

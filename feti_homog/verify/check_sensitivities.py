@@ -14,7 +14,7 @@ from feti_homog.verify.cell_tables import Mesh, State
 from feti_homog.verify.check_fields import BONDED, CLOSED
 from feti_homog.verify.check_loads import SPATIAL_ORDER
 from feti_homog.verify.check_summary import about_fibres, engineering_constants, moduli
-from feti_homog.verify.constitutive_law import expansions, mixed_phases, plane_stiffnesses, spatial_stiffnesses
+from feti_homog.verify.constitutive_law import laws, mixed_phases
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.elements import Elements
 from feti_homog.verify.findings import Findings, relative
@@ -212,8 +212,7 @@ def _energies(cell: DiscreteCell, states: Sequence[State], case: Mapping[str, An
     files, phases = cell.files, cell.files.phases
     growth = float(np.log(case["cell"].get("fibre_fraction", 1.0) / files.case["cell"].get("fibre_fraction", 1.0))) / 2
     mesh, states = _grown(cell, growth, states) if growth else (files.mesh, states)
-    stiffnesses = (spatial_stiffnesses if files.is_spatial else plane_stiffnesses)(case, phases)
-    free = expansions(case, phases) if files.is_spatial else None
+    stiffnesses, free = laws(case, phases)
     # Elements stay what they are where constants that are alike change apart.
     elements = Elements(mesh, stiffnesses, mixed_phases(files.case, phases))
     strains, heated = _in_order(states)

@@ -16,33 +16,21 @@ PLANE = [0, 1, 5]  # of the order [11, 22, 33, 23, 13, 12]
 VOIGT = {3: np.array([[0, 2], [2, 1]]), 6: np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])}
 
 
-def spatial_stiffnesses(case: Mapping[str, Any], phases: Sequence[str]) -> Float:
-    """(phases, 6, 6) matrices that turn [E11, E22, E33, gamma23, gamma13, gamma12] into stresses.
+def laws(case: Mapping[str, Any], phases: Sequence[str]) -> tuple[Float, Float | None]:
+    """Return the stiffnesses (phases, v, v) of the plane state of a case, and strains (phases, v) per temperature.
+
+    Stiffnesses turn [E11, E22, gamma12] into [S11, S22, S12], in generalized plane strain [E11, E22, E33, gamma23,
+    gamma13, gamma12] into stresses.  Strains are None but there, and where a phase does not give them.
 
     Raises:
         CaseError: a phase of the mesh has no material in the case.
     """
-    return np.stack([_spatial_stiffness(_constants(case, phase)) for phase in phases])
-
-
-def expansions(case: Mapping[str, Any], phases: Sequence[str]) -> Float | None:
-    """(phases, 6) strains per unit of temperature in the same order; None if a phase does not give them.
-
-    Raises:
-        CaseError: a phase of the mesh has no material in the case.
-    """
-    found = [_expansion(_constants(case, phase)) for phase in phases]
-    known = [strain for strain in found if strain is not None]
-    return np.stack(known) if len(known) == len(found) else None
-
-
-def plane_stiffnesses(case: Mapping[str, Any], phases: Sequence[str]) -> Float:
-    """(phases, 3, 3) matrices that turn [E11, E22, gamma12] into [S11, S22, S12].
-
-    Raises:
-        CaseError: a phase of the mesh has no material in the case.
-    """
-    return np.stack([_plane_stiffness(_constants(case, phase), case["analysis"]["plane"]) for phase in phases])
+    constants, plane = [_constants(case, phase) for phase in phases], case["analysis"]["plane"]
+    if plane != "generalized":
+        return np.stack([_plane_stiffness(own, plane) for own in constants]), None
+    strains = [strain for own in constants if (strain := _expansion(own)) is not None]
+    known = len(strains) == len(constants)
+    return np.stack([_spatial_stiffness(own) for own in constants]), np.stack(strains) if known else None
 
 
 def mixed_phases(case: Mapping[str, Any], phases: Sequence[str]) -> Bool:

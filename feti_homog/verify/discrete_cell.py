@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from feti_homog.typing import Bool, Float, Int
 from feti_homog.verify.bonds import friction_at, inwardness, pairs_of
 from feti_homog.verify.cell_tables import State, gradient
-from feti_homog.verify.constitutive_law import expansions, mixed_phases, plane_stiffnesses, spatial_stiffnesses
+from feti_homog.verify.constitutive_law import laws, mixed_phases
 from feti_homog.verify.elements import Elements
 from feti_homog.verify.reading import ResultFiles
 from feti_homog.verify.torus import TornNodes, TornSides, along_one_line, constituents, torn, wrapped
@@ -98,8 +98,7 @@ class DiscreteCell:
     def of(cls, files: ResultFiles) -> DiscreteCell:
         """Return the cell of a result. Raises CaseError if a phase has no material."""
         mesh = files.mesh
-        stiffnesses = (spatial_stiffnesses if files.is_spatial else plane_stiffnesses)(files.case, files.phases)
-        free = expansions(files.case, files.phases) if files.is_spatial else None
+        stiffnesses, free = laws(files.case, files.phases)
         elements = Elements(mesh, stiffnesses, mixed_phases(files.case, files.phases))
         sides, nodes, radius = torn(mesh, files.size)
         parts = constituents(mesh, sides)

@@ -75,15 +75,8 @@ def _pairs(pointer: Int, sharer: Int, own: Sequence[int]) -> Iterator[tuple[int,
         entity = np.flatnonzero(copies == k)
         among = sharer[pointer[entity][:, None] + np.arange(k)]
         shape = (len(entity), k, k)
-        parts.append(
-            np.stack(
-                [
-                    np.broadcast_to(among[:, :, None], shape).ravel(),
-                    np.broadcast_to(among[:, None, :], shape).ravel(),
-                    np.broadcast_to(entity[:, None, None], shape).ravel(),
-                ]
-            )
-        )
+        columns = among[:, :, None], among[:, None, :], entity[:, None, None]
+        parts.append(np.stack([np.broadcast_to(column, shape).ravel() for column in columns]))
     pairs = np.concatenate(parts or [np.zeros((3, 0), np.int64)], axis=1)
     pairs = pairs[:, np.isin(pairs[0], own)]
     first, second, entity = pairs[:, np.lexsort(pairs[::-1])]
