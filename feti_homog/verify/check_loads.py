@@ -216,22 +216,24 @@ def _rows(
             if given is not None:
                 yield Prescribed.strain(np.array(given), 0.0), point
                 continue
-            for number, load in enumerate(unit):
-                counts = {name: point[name] for name in COUNTS} if number == LAST_OF_PLANE else {}
-                yield load, {"stress": _told_stress(load, point, "stiffness", "", 1.0)} | counts
+            for number, (load, entry) in enumerate(_columns(point, "stiffness", "", 1.0, unit)):
+                yield load, entry | ({name: point[name] for name in COUNTS} if number == LAST_OF_PLANE else {})
     else:
         for suffix, sign in (("", 1.0), ("_compression", -1.0)):
-            for load in unit if f"effective_stiffness{suffix}" in document else ():
-                told = _told_stress(load, document, "effective_stiffness", suffix, sign)
-                yield replace(load, values=sign * load.values), {"stress": told}
+            if f"effective_stiffness{suffix}" in document:
+                yield from _columns(document, "effective_stiffness", suffix, sign, unit)
 
 
-def _told_stress(load: Prescribed, told: Mapping[str, Any], stiffness: str, suffix: str, sign: float) -> Float:
-    """(v,) stress under a unit load, or under minus it: a column of a stiffness, or `thermal_stress`."""
-    v = 6 if len(load.values) > 3 else 3
-    if load.values[v:].any():
-        return sign * np.array(told[f"thermal_stress{suffix}"])
-    return np.asarray(sign * np.array(told[f"{stiffness}{suffix}"]) @ load.values[:v])
+def _columns(
+    told: Mapping[str, Any], stiffness: str, suffix: str, sign: float, unit: Sequence[Prescribed]
+) -> Iterator[tuple[Prescribed, dict[str, Float]]]:
+    """Yield the unit loads, or minus them, with their stresses: columns of a stiffness, and `thermal_stress`."""
+    v = 6 if len(unit[0].values) > 3 else 3
+    for load in unit:
+        matrix = np.array(told[f"{stiffness}{suffix}"])
+        is_thermal = load.values[v:].any()
+        stress = np.array(told[f"thermal_stress{suffix}"]) if is_thermal else matrix @ load.values[:v]
+        yield replace(load, values=sign * load.values), {"stress": sign * stress}
 
 
 def _linear_stiffnesses(document: Mapping[str, Any], contact: bool) -> Iterator[tuple[str, Float]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -34,9 +35,13 @@ def with_phases(mesh: RawMesh, phases: Selectors) -> RawMesh:
     wanted = {_key(own): phase for phase, own in pairs if phase != DEBONDED}
     lines = set(map(_key, phases.get(DEBONDED, ())))
     curves = {DEBONDED if _key(name) in lines else name: ends for name, ends in mesh.curves.items()}
-    pairs_of_names = zip(mesh.groups, mesh.aliases or ((),) * len(mesh.groups), strict=True)
-    groups = (_phases(names, wanted) or _phases(aliases, wanted) or names for names, aliases in pairs_of_names)
+    groups = map(partial(_named, wanted), mesh.groups, mesh.aliases or ((),) * len(mesh.groups))
     return replace(mesh, groups=tuple(groups), curves=curves)
+
+
+def _named(wanted: Mapping[str, str], names: tuple[str, ...], aliases: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the phases that select one of the names of a group, else of its aliases; else its names."""
+    return _phases(names, wanted) or _phases(aliases, wanted) or names
 
 
 def _fault(mesh: RawMesh, phase: str, own: str | int) -> str:
