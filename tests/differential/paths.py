@@ -59,7 +59,9 @@ def _alike(ours: Point, theirs: Point | None) -> bool:
 
 
 def _points_apart(ours: Any, theirs: Any) -> list[tuple[float, str]]:
-    wrapped = [{"angle": document["path"]} for document in (ours, theirs)]  # `path` itself is left out
+    # Of the errors of the mesh a run without files has none.
+    points = [[{k: v for k, v in p.items() if "mesh_error" not in k} for p in each["path"]] for each in (ours, theirs)]
+    wrapped = [{"angle": each} for each in points]  # `path` itself is left out
     return [(off, words.replace("angle[]", "path[]")) for off, words in apart(*wrapped)]
 
 
