@@ -188,7 +188,7 @@ def test_a_stiffness_run_loads_no_other_analysis(tmp_path):
     others |= {"feti.coarse.adaptive", "feti.preconditioners.exact_inverse", "feti.preconditioners.spring_update"}
     assert "analysis.stiffness" in loaded and not {"matplotlib", "bokeh"} & {*run.stdout.split()}
     assert not {name for name in loaded if any(name == other or name.startswith(f"{other}.") for other in others)}
-    assert len(loaded) <= 205
+    assert len(loaded) <= 195
 
 
 def test_only_a_rank_that_prints_or_draws_loads_what_is_for_readers():
