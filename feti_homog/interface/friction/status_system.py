@@ -15,7 +15,8 @@ STICK, FORWARD, OPEN_FACE, BACKWARD = 0, 1, 2, -1
 HELD = 1e-9
 # A smaller pivot is that of a free motion: its sign is rounding.
 LEAST_PIVOT = 1e-6
-REFINEMENTS = 3
+# Steps of refinement at most, until each row is left with this share of its terms.
+MOST_REFINEMENTS, ROUNDED = 20, 1e-14
 
 
 def free_rows(status: Status, friction: Float, by_stress: Bool) -> tuple[Bool, Float]:
@@ -79,8 +80,13 @@ class StatusSystem:
         What nothing determines stays as it was at the start.
         """
         x = x.copy()
-        if self._factor is not None:
-            for _ in range(REFINEMENTS):
-                left = given[self.free] - self._rows @ x
-                x[self.free] += lu_solve(self._factor, left, check_finite=False)
+        if self._factor is None:
+            return x
+        terms, rows = np.abs(self._rows), given[self.free]
+        for _ in range(MOST_REFINEMENTS):
+            left = rows - self._rows @ x
+            # Soft motions, whose stiffness is near that by which they are held, take more steps.
+            if (np.abs(left) <= ROUNDED * (terms @ np.abs(x) + np.abs(rows))).all():
+                break
+            x[self.free] += lu_solve(self._factor, left, check_finite=False)
         return x

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from itertools import product
 
 import numpy as np
@@ -10,10 +11,10 @@ from reference.condensed_cell import MixedLoad
 from reference.friction import RubbingFaces
 from reference.friction_path import FrictionPath
 
-from feti_homog.interface.friction.coulomb_faces import CoulombFaces
+from feti_homog.interface.friction.coulomb_faces import INDEFINITE, SEARCHED, CoulombFaces, StuckError
 from feti_homog.interface.friction.face_system import Prescribed
 from feti_homog.interface.friction.lemke import lemke
-from feti_homog.interface.friction.status_search import StatusSearch
+from feti_homog.interface.friction.status_search import STATUSES, StatusSearch
 from feti_homog.interface.friction.status_system import BACKWARD, FORWARD, OPEN_FACE, STICK
 
 BY_STRAIN = np.zeros(2, bool)
@@ -75,7 +76,7 @@ def assert_is_one_of(expected, faces, x, load):
 @pytest.mark.parametrize("most_friction", [0.4, 3.0])
 def test_statuses_are_those_of_brute_force(most_friction):
     rng = np.random.default_rng(7)
-    for _ in range(120):
+    for _ in range(150):
         nodes = random_faces(rng, most_friction)
         faces, given = prescribed(*nodes)
         first, start = np.zeros(faces.nodes, np.int8), np.zeros(len(faces.S))
@@ -135,6 +136,29 @@ def test_paths_with_reversals_are_those_of_slow_ones(seed):
         np.testing.assert_allclose(stress, point.state.stress, atol=1e-8 * most)
         np.testing.assert_allclose(strain, point.state.strain, atol=1e-8)
         assert heat == pytest.approx(point.heat, abs=1e-8)
+
+
+def test_paths_of_much_friction_end_where_no_statuses_go_on():
+    """Random paths with mu up to 3: those that stop do where trials of all statuses find no rates, or not one alone."""
+    rng, words = np.random.default_rng(0), Counter()
+    for _ in range(60):
+        nodes = int(rng.integers(1, 6))
+        B = rng.normal(size=(2 * nodes + 4, 2 * nodes + 3))
+        faces = CoulombFaces(B.T @ B / len(B), rng.uniform(0.0, 3.0, nodes))
+        asked, rates = [], faces.rates
+        faces.rates = lambda *state, asked=asked, rates=rates: asked.append(state) or rates(*state)
+        try:
+            follow(faces, 1.0, [MixedLoad(rng.normal(size=3), rng.random(3) < 0.3) for _ in range(4)])
+        except StuckError as error:
+            status, x, by_stress, rate = asked[-1]
+            search = StatusSearch(
+                faces, faces._at_limits(status, x), Prescribed(by_stress, rate, 0.0 * status), 0.0 * x
+            )
+            several = [STATUSES[own] for own in search.allowed]
+            found = [search._checked(np.array(own, np.int8)) for own in product(*several)]
+            assert sum(each is not None for each in found) == 0 if str(error) == SEARCHED else len(found) > 1
+            words[str(error)] += 1
+    assert words[SEARCHED] > 5 and set(words) <= {SEARCHED, INDEFINITE}
 
 
 @pytest.mark.parametrize("share", [1e-6, 1e-12])

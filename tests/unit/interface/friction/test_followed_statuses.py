@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from feti_homog.interface.friction.followed_statuses import FollowedStatuses
 from feti_homog.interface.friction.status_system import BACKWARD, FORWARD, OPEN_FACE, STICK, StatusSystem, free_rows
@@ -76,3 +77,14 @@ def test_what_nothing_determines_stays_as_it_was():
     x = StatusSystem(S, free, slope).solve(start, np.zeros(13))
     np.testing.assert_allclose((S @ x)[:12], 0.0, atol=1e-12)
     np.testing.assert_allclose(motions.T @ x[:12], motions.T @ start[:12], atol=1e-5)
+
+
+@pytest.mark.parametrize("stiffness", [1e-6, 1e-8, 1e-9])
+def test_soft_motions_are_not_held(stiffness):
+    """Two nodes of opposite slips whose sum hardly anything resists."""
+    S = np.eye(5)
+    S[1, 3] = S[3, 1] = -1.0 + stiffness
+    free, slope = free_rows(np.array([FORWARD, BACKWARD], np.int8), np.zeros(2), np.zeros(1, bool))
+    given = np.array([0.0, stiffness, 0.0, stiffness, 0.0])
+    x = StatusSystem(S, free, slope).solve(np.zeros(5), given)
+    np.testing.assert_allclose(x[[1, 3]], 1.0, rtol=1e-4)
