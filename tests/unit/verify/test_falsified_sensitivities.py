@@ -11,6 +11,7 @@ from support.verified_results import CARBON, FIBRE, HEXAGONAL, MATRIX, SPRINGS, 
 from feti_homog import Case, run
 from feti_homog.verify.certificate import verify
 
+INCOMPRESSIBLE = {"young": 3.0, "poisson": 0.45}
 SIZING = {"young": 120.0, "poisson": 0.25, "expansion": 3e-5}
 TOUCHING = {"contact": True, "debonded": [{"fibre": "all", "centre": 20.0, "angle": 90.0}]}
 LOADS = {
@@ -26,7 +27,7 @@ CASES = {
         {"matrix": WARM, "fibre": CARBON, "coating": SIZING},
         [SPRINGS | {"between": ["coating", "matrix"]}, SPRINGS | {"between": ["fibre", "coating"]}],
     ),
-    "strain": ("strain", SQUARE | {"order": 2}, {"matrix": MATRIX, "fibre": TURNED}, None),
+    "strain": ("strain", SQUARE | {"order": 2, "element": "mixed"}, {"matrix": INCOMPRESSIBLE, "fibre": TURNED}, None),
     "contact": ("generalized", SQUARE, {"matrix": WARM, "fibre": CARBON}, SPRINGS | TOUCHING),
     "load": ("strain", SQUARE, {"matrix": MATRIX, "fibre": FIBRE}, TOUCHING),
     "stresses": ("generalized", SQUARE, {"matrix": MATRIX, "fibre": CARBON}, SPRINGS | TOUCHING),
