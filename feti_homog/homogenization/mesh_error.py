@@ -82,7 +82,7 @@ def energy_errors(
     """
     k, area = len(responses), cell.summary.area
     nested = is_nested(cell, responses) if nested is None else nested
-    lattice = nested_lattice(cell.lattice) if nested else cell.lattice
+    lattice = nested_lattice(cell.lattice, cell.subdomains) if nested else cell.lattice
     fewer = cell.lattice.halvings - lattice.halvings
     of_elements, of_arcs = NESTED[lattice.order][fewer]
     found, shares = np.zeros((2, k, k)), [np.zeros((0, k))]

@@ -22,6 +22,8 @@ from feti_homog.typing import Float, Int
 ELEMENTS_AT_ONCE = 1 << 13
 # Halvings from which on the mesh that is refined twice less serves.
 REFINED_OFTEN = 3
+# Largest lambda / mu there, of a Poisson's ratio of 0.4: beyond, errors of coarse elements say too little.
+LOCKING = 4.0
 # What is not on a boundary.
 INSIDE, PINNED = -2, -1
 
@@ -73,14 +75,15 @@ class NestedInterior:
         return found.reshape(-1, problem.components, u.shape[1])
 
 
-def nested_lattice(lattice: ReferenceLattice) -> ReferenceLattice:
-    """Return the lattice of the coarser mesh: refined once less, or twice of many elements a coarse triangle."""
-    return lattice.coarser(2 if lattice.halvings >= REFINED_OFTEN else 1)
+def nested_lattice(lattice: ReferenceLattice, subdomains: Sequence[Subdomain]) -> ReferenceLattice:
+    """Return the lattice of a rank's coarser mesh: refined once less, or twice where that is often and none locks."""
+    locks = any(s.problem.components == 2 and s.L[0, 1] > LOCKING * s.L[2, 2] for s in subdomains)
+    return lattice.coarser(2 if lattice.halvings >= REFINED_OFTEN and not locks else 1)
 
 
 def nested_interiors(boundary: InterfaceOperators, lattice: ReferenceLattice) -> Iterator[NestedInterior]:
     """Yield those of this rank's subdomains, which the lattice refines, some at a time."""
-    coarser = nested_lattice(lattice)
+    coarser = nested_lattice(lattice, boundary.subdomains)
     nested = coarser.within(lattice)
     for group in groups(boundary.subdomains, coarser):
         yield NestedInterior.of(group, boundary, coarser, nested)
