@@ -10,13 +10,14 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from heapq import heapify, heapreplace
 from itertools import pairwise
+from typing import Any
+
 import numpy as np
-from feti_homog.materials.voigt import STRAINS
+
+from feti_homog.materials.voigt import STRAINS, voigt_names
 from feti_homog.results import path_curves
 from feti_homog.results.path_curves import SAME_LOAD, Document, Point
 from feti_homog.typing import Float
-from typing import Any
-from feti_homog.materials.voigt import voigt_names
 
 # A fall of the stress, or a jump of the strain, by more than this share of the largest is a drop: saw teeth of single
 # nodes are none.

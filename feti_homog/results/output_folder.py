@@ -13,7 +13,8 @@ import re
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
+
 from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.materials.voigt import SPATIAL_STRAINS
 from feti_homog.parallel.mpi_errors import on_root
@@ -21,9 +22,6 @@ from feti_homog.results import atomic, checkpoint, field_file, result_json
 from feti_homog.results.field_layout import PROGRAM
 from feti_homog.runtime import input_files
 from feti_homog.runtime.file_locks import Lock, LockHeld, LocksUnsupported, holder
-from typing import TYPE_CHECKING, TextIO
-from feti_homog.errors import FetiHomogError
-from feti_homog.results import atomic
 from feti_homog.version import __version__
 
 if TYPE_CHECKING:

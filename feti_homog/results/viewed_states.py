@@ -5,25 +5,26 @@ VTK's file formats, .vtu, a file for each state, and .vtkhdf: https://docs.vtk.o
 
 from __future__ import annotations
 
+import base64
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree as ET
+
 import h5py
 import numpy as np
+
 from feti_homog.errors import CaseError
 from feti_homog.fem.assembly import element_strain
 from feti_homog.fem.problem import AXIAL, PLANE
 from feti_homog.materials import voigt
-from feti_homog.results import field_file, xdmf
+from feti_homog.results import atomic, field_file, xdmf
 from feti_homog.results.field_views import AXIAL as AXIAL_DISPLACEMENT
 from feti_homog.typing import Array, Float
 from feti_homog.verify.constitutive_law import out_of_plane
-import base64
-from xml.etree import ElementTree as ET
-from feti_homog.results import atomic, field_file
-from feti_homog.typing import Array
+
 
 @dataclass(frozen=True, repr=False)
 class ViewedState:

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from feti_homog.results.landmarks import drops, kept
-from feti_homog.results.landmarks import turning_points
+from feti_homog.results.landmarks import drops, kept, turning_points
 
 
 def path(stresses: Any, loads: Any = None) -> list[dict[str, Any]]:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from feti_homog.results.landmarks import chosen, chosen_states
+from feti_homog.results.landmarks import chosen, chosen_states, marks, peak_of
 from feti_homog.results.path_curves import (
     changed_components,
     ends_of_legs,
@@ -21,7 +21,6 @@ from feti_homog.results.path_curves import (
     targets,
     what_rises,
 )
-from feti_homog.results.landmarks import marks, peak_of
 
 
 def point(load: float, stiffness: float, broke: int = 1) -> dict[str, Any]:
