@@ -5,7 +5,7 @@ From a program of one's own, under `mpirun` or not:
     from feti_homog import Case, run
     result = run(Case.load("case.toml"))            # the same on every rank; no files, no output
     print(result)                                   # a short summary; in a notebook, tables
-    result.effective_stiffness, result.moduli.E1    # arrays and numbers; `Result` says what there is
+    result.effective_stiffness, result.moduli.E1    # arrays and numbers; see `Result`
     run(case, out="results", fields=True).fields    # with files, and with mesh and states in memory
 
 - `Case`: a checked case, of a file (`Case.load`) or of a document of the same sections (`Case.parse`).
@@ -22,7 +22,7 @@ import importlib
 import os
 from typing import TYPE_CHECKING, Any
 
-# Debian's h5py is the build with MPI only if it is told so before its first import.
+# Debian's h5py is the build with MPI only if it is asked for before its first import.
 os.environ.setdefault("H5PY_ALWAYS_USE_MPI", "1")
 
 from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError, MeshError

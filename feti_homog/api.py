@@ -232,7 +232,7 @@ def _start_petsc(words: Sequence[str], comm: Intracomm) -> None:
 def folder(name: str | Path) -> Path:
     """Return the folder, or file, of that name.
 
-    Raises CaseError for an empty one, by which Path means the current folder, and for one that no system knows.
+    Raises CaseError for an empty one, by which Path means the current folder, and for one that no system takes.
     """
     if name == "":
         raise CaseError('"" is no name of a folder; the current one is "."')

@@ -16,7 +16,7 @@ def escaped(text: str, kept: str = "") -> str:
 
 
 class FetiHomogError(Exception):
-    """An error told to the user in words, one line per fault, without a traceback.
+    """An error printed for the user, one line per fault, without a traceback.
 
     Lines are cut to LONGEST_LINE characters, before their last KEPT_END; beyond MOST_FAULTS the others are counted.
     """
@@ -75,6 +75,6 @@ class CoarseMeshError(FetiHomogError):
 
 
 class LibraryError(FetiHomogError):
-    """A library that pip does not bring is missing or does not fit; each fault says what to do."""
+    """A library that pip does not bring is missing or does not fit; each fault gives the remedy."""
 
     exit_code = EXIT_INPUT

@@ -26,7 +26,7 @@ class CellInfo:
     elements: int = described("triangles of the refined mesh")
     nodes: int = described("nodes of the refined mesh, once for each body in each subdomain: depends on ranks")
     mesh_size: float | None = described(
-        "size of the elements before refinement / width, as the case says or as `accuracy` chooses; absent of users' "
+        "size of the elements before refinement / width, from the case or as `accuracy` chooses; absent of users' "
         "meshes",
         default=None,
     )

@@ -19,7 +19,7 @@ BARS = {"events": EVENTS_BAR, "increments": STEPS_BAR}
 class EventProgress:
     """Lines about the events of a path, and a bar of the share of the path that they have reached; a context manager.
 
-    The first line, the last and urgent ones are said, of the others one a second at most.  The bar is there if
+    The first line, the last and urgent ones are printed, of the others one a second at most.  The bar is there if
     `progress` writes to a terminal.
     """
 

@@ -84,7 +84,7 @@ REGISTRY = (
         for name, description, needs in (
             ("bilinear", "a cohesive law, softening in a straight line", (*STIFFNESSES, *COHESIVE)),
             ("exponential", "softening exponentially", (*STIFFNESSES, *COHESIVE)),
-            ("table", "softening as openings and tractions say", (*STIFFNESSES[1:], *COHESIVE[1::2], *BRANCH)),
+            ("table", "softening by openings and tractions", (*STIFFNESSES[1:], *COHESIVE[1::2], *BRANCH)),
         )
     ),
 )

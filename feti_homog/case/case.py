@@ -176,7 +176,7 @@ class Case:
 
 
 def load(path: str | Path) -> Case:
-    """Return the case in a file, named after the file unless it says otherwise. Raises CaseError with all faults."""
+    """Return the case in a file, named after the file unless it has a name. Raises CaseError with all faults."""
     return parse(read_document(path), Path(path).parent)
 
 
@@ -284,7 +284,7 @@ def _read_section(document: Mapping[str, Any], section: str, reader: TableReader
 
 
 def _sized_cell(table: Mapping[str, Any], sections: Mapping[str, Any], faults: list[str]) -> Cell:
-    """Return the cell with the sizes of elements, and unless its table says it the order, that it asks for."""
+    """Return the cell with the sizes of elements, and the order unless its table gives it, that it asks for."""
     cell: Cell = sections["cell"]
     plane, free_faces = sections["analysis"].plane, bool(sections["interfaces"]) or cell.has_voids
     orders = element_sizes.orders(cell, table, sections["materials"], plane, faults)

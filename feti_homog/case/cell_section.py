@@ -221,7 +221,7 @@ class Cell:
         "(of its bonds / that of [interface]); of ellipses a and b, the semi-axes, in place of the radius, and angle "
         "from x to a in degrees; of hollow fibres inner_radius; of rounded polygons sides and corner, with the angle "
         "of the first corner. Rows of the phase void are voids. What "
-        'follows # is a comment, of which "# width = 120, height = 80" says the size of the cell.',
+        'follows # is a comment, of which "# width = 120, height = 80" gives the size of the cell.',
         default=None,
         only=FROM_A_FILE,
         default_words="required, or fibre_list of a table",
@@ -237,7 +237,7 @@ class Cell:
     )
     repair: str = key(
         choice("none", "snap", "overlaps"),
-        '"snap", of a mesh: nodes on sides that nearly match are moved to match; the result says how far. "overlaps", '
+        '"snap", of a mesh: nodes on sides that nearly match are moved to match; the result has how far. "overlaps", '
         "of a table: fibres that touch, or overlap by less than 1 % of a radius, are made smaller until they do not; "
         "the result names the rows.",
         default="none",
@@ -272,7 +272,7 @@ class Cell:
 
     @property
     def fractions(self) -> dict[str, float]:
-        """Fibre fraction of each phase of round fibres, in the order of the names; none where files say it."""
+        """Fibre fraction of each phase of round fibres, in the order of the names; none where files give it."""
         if self.mix is not None:
             return dict(sorted(self.mix.items()))
         return {} if self.fibre_fraction is None else {FIBRE: self.fibre_fraction}

@@ -40,7 +40,7 @@ def read_document(path: str | Path) -> dict[str, Any]:
         raise CaseError(f"{path}: cannot be read: {error.strerror}") from None
     if _is_deeper(document, MAX_DEPTH):
         raise _too_deep(path)
-    # Where the locale knows no UTF-8, Python escapes the bytes of names of files.
+    # Where the locale has no UTF-8, Python escapes the bytes of names of files.
     return {"name": os.fsencode(path.stem).decode("utf-8", "replace")} | document
 
 

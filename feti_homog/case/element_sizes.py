@@ -113,7 +113,7 @@ def with_sizes(
     for elements of order p; of orders the one with the fewest nodes, about p^2 4^r. It is a fault if more than
     MOST_REFINED were needed. Of an element_size e, the coarse elements have the size e 2^r with r the most for which
     it is that of all but the narrowest places: at most that of the coarsest mesh, and FREE_SHARE of the edges that
-    circles have at most. Were they larger, circles would say how fine the mesh is, whatever e.
+    circles have at most. Were they larger, circles would set how fine the mesh is, whatever e.
 
     Args:
         free_faces: whether there are faces that no other phase holds firmly: of voids, of bonds that are soft or part.
@@ -146,14 +146,14 @@ def _refinements(error: float, accuracy: float, order: int) -> int:
 def asked(cell: Cell) -> str:
     """Return the key of which the sizes follow, with its value, as "accuracy = 0.001".
 
-    Empty if the cell says them itself.
+    Empty if the cell gives them itself.
     """
     values = {name: getattr(cell, name) for name in ASKED}
     return next((f"{name} = {value:g}" for name, value in values.items() if value is not None), "")
 
 
 def without_chosen(cell: Cell, table: dict[str, Any]) -> dict[str, Any]:
-    """Return the table [cell] of a cell without the sizes that it does not say but chooses."""
+    """Return the table [cell] of a cell without the sizes that it does not give but chooses."""
     return {name: value for name, value in table.items() if not (asked(cell) and name in CHOSEN)}
 
 

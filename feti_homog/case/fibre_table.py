@@ -23,7 +23,7 @@ from feti_homog.typing import Bool, Float, Int
 
 COLUMNS = (*list(NUMBERS)[:3], "phase", *list(NUMBERS)[3:])
 SIZES = ("width", "height", "left", "bottom")
-"""What comment lines may say of the cell: its size, and the coordinates of its lower left corner."""
+"""Names in comment lines about the cell: its size, and the coordinates of its lower left corner."""
 OF_FIBRES = ("coating", "inner_radius")
 SIZE = re.compile(r"\b(width|height|left|bottom)\s*[=:]\s*([^\s;=]+?)(?=,?\s|,?$|;|,[a-z])")
 
@@ -37,8 +37,8 @@ class FibreTable:
         row: (N,) line of the file, counted from 1, or place in the list: what faults call the fibre.
         columns: (N,) numbers of all NUMBERS, and which of them the table has.
         phase: N names, "fibre" where the table gives none, "void" of voids.
-        width, height: of the cell; None if the table does not say.
-        left, bottom: coordinates of its lower left corner; None if the table does not say.
+        width, height: of the cell; None if the table does not give it.
+        left, bottom: coordinates of its lower left corner; None if the table does not give it.
         remarks: what of the table is not used, a line each.
     """
 
@@ -176,7 +176,7 @@ def _bare(word: str) -> str:
 
 
 def _read_sizes(comment: str, row: int, sizes: dict[str, float], faults: _Faults) -> None:
-    """Add what a comment says of the cell to `sizes`."""
+    """Add the sizes of the cell in a comment to `sizes`."""
     for key, word in SIZE.findall(comment):
         value = number_of(word, ";")
         if value is None or not is_number(value) or (value <= 0 and key in SIZES[:2]):

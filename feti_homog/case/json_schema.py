@@ -2,7 +2,7 @@
 
 Types, choices, ranges and unknown keys are checked everywhere; which keys are required or belong to a case only in
 files without [sweep], where all keys must stand in their sections.  Relations between numbers, such as the fibre
-fraction at which fibres touch, are beyond a schema: `feti-homog check` knows them.
+fraction at which fibres touch, are beyond a schema: `feti-homog check` checks them.
 """
 
 from __future__ import annotations

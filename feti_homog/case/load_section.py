@@ -218,7 +218,7 @@ def _in_words(load: Strain | MixedLoad) -> str:
 
 
 def expansion_faults(path: LoadPath | None, load: SingleLoad | None, materials: Mapping[str, Material]) -> list[str]:
-    """Faults of phases that do not say how they expand, where a load names a temperature."""
+    """Faults of phases without thermal expansion, where a load names a temperature."""
     placed: dict[str, Strain | MixedLoad] = {} if load is None else {"[load] to": load.to}
     placed |= {} if path is None else {f"[path] {place}": each for place, each in path.placed.items()}
     place = next((place for place, load in placed.items() if TEMPERATURE in named(load)), None)

@@ -80,7 +80,7 @@ def _phase_fault(phase: str, known: tuple[str, ...] | None, geometry: str | None
 
 
 def _read_material(table: object, section: str, plane: str | None, reader: TableReader) -> Material | None:
-    """Return the material of a section, in the form that its keys tell; None if it is faulty."""
+    """Return the material of a section, in the form of its keys; None if it is faulty."""
     given = _keys_by_form(table)
     forms = list(given) or ["isotropic"]
     if len(forms) > 1:
@@ -109,9 +109,9 @@ def _law_faults(material: Material, plane: str | None) -> list[str]:
 
 
 def missing_expansions(materials: Mapping[str, Material], needed_by: str) -> list[str]:
-    """Faults of materials that do not say how they expand, which something needs.
+    """Faults of materials without thermal expansion, which something needs.
 
-    What they say wrongly is told elsewhere.
+    Their other faults are reported elsewhere.
     """
     return [
         f"[material.{toml_key(phase)}] expansion: missing; {needed_by} needs it"

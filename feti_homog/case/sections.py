@@ -270,7 +270,7 @@ KEY_OWNERS = {name: _places(name) for table in TABLES for name in keys_of(table.
 
 
 def read_petsc(table: object, faults: list[str]) -> dict[str, Scalar]:
-    """PETSc's options by name; whether PETSc knows one of prefix feti_ only the run can tell."""
+    """PETSc's options by name; only the run checks those of prefix feti_."""
     if not isinstance(table, dict):
         faults.append(f"petsc = {toml_value(table)}: expected a section [petsc]")
         return {}

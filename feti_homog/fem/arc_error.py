@@ -106,7 +106,7 @@ def _rate(body: RecoveredStress, sides: ArcSides) -> Float:
     normal = np.column_stack([tangent[:, 1], -tangent[:, 0]])
     traction = _tractions(body, stress[:, None], normal[:, None])[:, 0]
     gradient = loads[:, body.problem.voigt]
-    if body.problem.components == 2:  # of which the strains know the symmetric part, and the nodes du/ds along the side
+    if body.problem.components == 2:  # of which the strains have the symmetric part, and the nodes du/ds along the side
         gradient[:, [0, 1], [1, 0]] /= 2
         u = body.u[body.node_class[sides.nodes]]
         along = (u[:, -1] - u[:, 0]) / h[..., None] + np.einsum("cdk,fd->fck", _macroscopic(body), tangent)

@@ -172,7 +172,7 @@ class GroupedSum:
 
     @classmethod
     def of(cls, target: Int) -> GroupedSum:
-        """One sum for each value of `target`, which says where an entry belongs, in ascending order."""
+        """One sum for each value of `target`, the place of an entry, in ascending order."""
         entries = np.argsort(target, axis=None, kind="stable")
         return cls(entries, np.unique(target.ravel()[entries], return_index=True)[1])
 

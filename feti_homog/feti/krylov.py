@@ -21,7 +21,7 @@ from feti_homog.petsc.c_functions import CallbackErrors
 from feti_homog.typing import Float
 
 # Methods that apply the preconditioner to the residual itself, so that the jump can be read off there.  With the
-# others the test is on the forces alone, and the checks of the response tell of the jump.
+# others the test is on the forces alone, and the checks of the response have the jump.
 PRECONDITION_TRUE_RESIDUAL = (PETSc.KSP.Type.CG, PETSc.KSP.Type.FCG)
 
 ESTIMATES_SINGULAR_VALUES = (PETSc.KSP.Type.CG, PETSc.KSP.Type.GMRES, PETSc.KSP.Type.FGMRES)
@@ -66,7 +66,7 @@ class ProjectedOperator:
 
 
 class ProjectedPreconditioner:
-    """z = P H r; keeps r, which tells the interface jump B u of the iterate."""
+    """z = P H r; keeps r, the interface jump B u of the iterate."""
 
     def __init__(
         self,

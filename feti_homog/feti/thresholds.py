@@ -15,7 +15,7 @@ from dataclasses import dataclass
 class Thresholds:
     """Sizes at which the solver changes its methods.  Tests and studies pass others than the defaults.
 
-    "Measured" is what `scripts/measure_thresholds.py NAME VALUE...` says of the values in brackets.
+    "Measured" is by `scripts/measure_thresholds.py NAME VALUE...` for the values in brackets.
 
     Attributes:
         dense_boundary_dofs: boundary degrees of freedom of a subdomain up to which `-feti_dual_operator auto` ever

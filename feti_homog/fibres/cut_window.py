@@ -33,7 +33,7 @@ class _Pairs:
 
     @property
     def key(self) -> Float:
-        """(k, 4) what tells pairs from each other."""
+        """(k, 4) keys that distinguish pairs."""
         return np.column_stack([self.first, self.second, np.round(self.shift)])
 
     def joined(self, other: _Pairs) -> _Pairs:

@@ -42,7 +42,7 @@ def table_arrangement(cell: Cell) -> Arrangement:
     Periodic images are one, the first of them. In a window that is cut out of something larger, fibres that overlap
     across its border are moved apart.
 
-    A table that says where its cell begins keeps that place, if the sides are clear of tangency with its discs; the
+    A table that gives the corner of its cell keeps it, if the sides are clear of tangency with its discs; the
     table of a cell gives the mesh of that cell. Else all is shifted (`clear_shift`), rounded and meshed in the order of
     the coordinates, so that tables that differ by a shift, by the order of rows or by units have one mesh. Outlines
     that are not round are rounded wherever they are.
@@ -169,7 +169,7 @@ def fibre_rows(table: FibreTable, window: str) -> Int:
 
 
 def _corner(table: FibreTable) -> Float:
-    """(2,) the lower left corner of the cell; the lowest coordinates of centres if the table does not say."""
+    """(2,) the lower left corner of the cell; the lowest coordinates of centres if the table gives none."""
     given = np.array([table.left, table.bottom], float)
     return np.where(np.isnan(given), table.centres.min(axis=0), given)
 

@@ -48,12 +48,12 @@ def marks(case: Case, fibres: int) -> dict[int, list[float]]:
 
 
 def size(case: Case, estimate: ElementEstimate) -> float | None:
-    """Element size at tips / width of the cell, None for that of the interface: what the case says, or by default
+    """Element size at tips / width of the cell, None for that of the interface: that of the case, or by default
 
         h_t = 2^refine R (h / R)^(2 order) / 2,  h = interface_size / 2^refine,
 
     with R the mean radius / width; but with several openings not so small that their tips took more than TIP_TRIANGLES.
-    Along paths tips move, and only what the case says counts; so it is with envelopes, for they begin paths.
+    Along paths tips move, and only that of the case counts; so it is with envelopes, for they begin paths.
     """
     cell, tips = case.cell, sum(len(own) for own in marks(case, estimate.fibres).values())
     if cell.tip_size is not None or case.section.breaks or not tips:

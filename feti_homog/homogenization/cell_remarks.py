@@ -20,7 +20,7 @@ def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:
 
     It is -1 where there is none and they never part.
 
-    An interface that does not say between what is that of the matrix, the first phase, with all others; so is perfect
+    An interface without `between` is that of the matrix, the first phase, with all others; so is perfect
     bonding, which is looked at there too.
     """
     pairs = np.full((len(phases), len(phases)), -1)

@@ -86,7 +86,7 @@ def fill_tiles(found: NodedCell | CoarseMesh | None, comm: MPI.Intracomm) -> Coa
 
 
 def deal_tiles(tiles: list[T], loads: list[int], comm: MPI.Intracomm) -> list[tuple[int, T]]:
-    """Return those of the tiles of rank 0 that this rank fills, with their numbers; `loads` says how large they are.
+    """Return those of the tiles of rank 0 that this rank fills, with their numbers; `loads` are their sizes.
 
     Collective.
     """

@@ -22,7 +22,7 @@ from feti_homog.typing import Float, Int
 ELEMENTS_AT_ONCE = 1 << 13
 # Halvings from which on the mesh that is refined twice less serves.
 REFINED_OFTEN = 3
-# Largest lambda / mu there, of a Poisson's ratio of 0.4: beyond, errors of coarse elements say too little.
+# Largest lambda / mu there, of a Poisson's ratio of 0.4: beyond, errors of coarse elements are no guide.
 LOCKING = 4.0
 # What is not on a boundary.
 INSIDE, PINNED = -2, -1

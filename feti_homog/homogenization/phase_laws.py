@@ -26,7 +26,7 @@ IN_PLANE, AXIAL_SHEAR = [0, 1, 5, 2], [4, 3]
 def problems(case: Case) -> tuple[Problem, ...]:
     """Return the problem of the plane and, if strains along the fibres are loads, the axial one.
 
-    A temperature is a load if the phases say how they expand.
+    A temperature is a load if the phases have thermal expansions.
     """
     if not PLANE_STATES[case.analysis.plane].is_spatial:
         return (PLANE,)

@@ -78,7 +78,7 @@ def _of_constants(material: Any, plane: str, C: Float) -> Iterator[tuple[str, fl
 
 
 def _compliance(material: Any) -> NDArray[Any]:
-    """(6, 6) complex compliance in the material axes; NaN where the constants do not say it."""
+    """(6, 6) complex compliance in the material axes; NaN where the constants leave it open."""
     if isinstance(material, Isotropic):
         shear = material.young / (2 * (1 + material.poisson))
         named = {name: getattr(material, key) for name, key in ISOTROPIC_COMPLIANCE.items()}

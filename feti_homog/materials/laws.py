@@ -56,7 +56,7 @@ def plane_stiffness(material: Material, plane: str) -> Float:
     """C with [S11, S22, S12] = C [E11, E22, gamma12], (3, 3), symmetric positive definite, unit of stress.
 
     `plane` is "stress" (S33 = 0), "strain" (E33 = 0), or "generalized", where C is that at E33 = 0. Raises ValueError,
-    with the keys at fault, if the constants do not say C or are those of no stable material.
+    with the keys at fault, if the constants leave C open or are those of no stable material.
     """
     if isinstance(material, Isotropic):
         lame, shear = _lame(material, plane)
@@ -117,14 +117,14 @@ def expansion(material: Material) -> Float | None:
 def out_of_plane(material: Material, plane: str) -> tuple[Float, Float]:
     """s and e, (3,) each, with S33 = s . [S11, S22, S12] and E33 = e . [S11, S22, S12], in plane strain and stress.
 
-    S33 vanishes in plane stress, E33 in plane strain. NaN if the constants of the material do not say it.
+    S33 vanishes in plane stress, E33 in plane strain. NaN if the constants of the material leave it open.
     """
     row, young = _compliance_33(material)
     return (np.zeros(3), row) if PLANE_STATES[plane].is_sheet else (-young * row, np.zeros(3))
 
 
 def _compliance_33(material: Material) -> tuple[Float, float]:
-    """c (3,) and E3 of E33 = c . [S11, S22, S12] + S33 / E3; NaN where the constants do not say it."""
+    """c (3,) and E3 of E33 = c . [S11, S22, S12] + S33 / E3; NaN where the constants leave it open."""
     if isinstance(material, Isotropic):
         ratio = -material.poisson / material.young
         return np.array([ratio, ratio, 0.0]), material.young
@@ -232,7 +232,7 @@ def _of_data_sheets(material: Orthotropic | TransverselyIsotropic) -> str:
 
 
 def known_compliance(material: Orthotropic | TransverselyIsotropic) -> Float:
-    """Compliance (6, 6) in the material axes; NaN where the constants do not say it."""
+    """Compliance (6, 6) in the material axes; NaN where the constants leave it open."""
     if isinstance(material, TransverselyIsotropic):
         E1, E3, G13, nu31 = _numbers(material.E_transverse, material.E_axial, material.G_axial, material.nu_axial)
         nu12, nu13 = material.nu_transverse, nu31 * E1 / E3

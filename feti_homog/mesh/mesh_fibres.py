@@ -73,7 +73,7 @@ def _part_shifts(submesh: Submesh, part: Int) -> Float:
 def fibre_circles(torus: Torus) -> Float:
     """(constituents, 3) centre and radius of each fibre's circle, of a coating the outer one; any image of it.
 
-    The centre of a fibre that is not round is that of its area, or the one that the mesh knows, and its radius NaN.
+    The centre of a fibre that is not round is that of its area, or the one that the mesh has, and its radius NaN.
     NaN for the matrix, and for a fibre that winds around the torus, which has no centre.
     """
     circles = _discs(torus)

@@ -104,7 +104,7 @@ def knows_neighbours(measured: FibrePattern) -> bool:
 def wanted_distances(measured: FibrePattern, count: int) -> Float:
     """(count, SHELLS) quantiles at the levels (i + 1/2) / count of the nearest and the second distances of a pattern.
 
-    In its mean diameters.  Raises ValueError if a window is too small to know them.
+    In its mean diameters.  Raises ValueError if a window is too small for them.
     """
     near, levels = nearest_neighbours(measured, SHELLS), (np.arange(count) + 0.5) / count
     return np.stack([near.quantiles(levels, k) for k in range(SHELLS)], axis=1) / (2 * measured.mean_radius)

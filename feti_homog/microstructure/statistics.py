@@ -177,7 +177,7 @@ class VoronoiCells:
     Attributes:
         areas: (N,), with the sum width x height.
         fractions: (N,) local fibre fractions pi R^2 / area, whose mean, weighted with the areas, is the fibre fraction.
-            Cells of the centres know no radii: of unequal fibres close together that of the larger may be above 1.
+            Cells of the centres have no radii: of unequal fibres close together that of the larger may be above 1.
         weights: (N,), with the sum 1, of the cells in a distribution: 1/N in a periodic cell.  In a window a cell
             counts if it is what it would be in larger surroundings, with the weight 1 / (share of the places of the
             window where it would fit in, with all that decides on it): larger cells are fewer.

@@ -96,7 +96,7 @@ def run_main(comm: Comm, main: Callable[[], int]) -> int:
         if not others_come(comm, ARRIVAL_TIMEOUT_S):
             end_job(comm, error)
         if comm.rank == 0:
-            complain(_told(error))
+            complain(_lines(error))
         return error.exit_code
     except Exception as error:
         end_job(comm, error)
@@ -104,10 +104,10 @@ def run_main(comm: Comm, main: Callable[[], int]) -> int:
 
 def end_job(comm: Comm, error: BaseException) -> NoReturn:
     """Tell of an error that one rank has met alone, and end the processes of all."""
-    told = _without_memory(comm, error) if isinstance(error, MemoryError) else error
-    if isinstance(told, FetiHomogError):
-        complain(_told(told))
-        abort(comm, told.exit_code)
+    ending = _without_memory(comm, error) if isinstance(error, MemoryError) else error
+    if isinstance(ending, FetiHomogError):
+        complain(_lines(ending))
+        abort(comm, ending.exit_code)
     text = "".join(traceback.format_exception(error))
     complain(f"rank {comm.rank} of {comm.size}:\n{text}")
     abort(comm, EXIT_DEFECT)
@@ -148,7 +148,7 @@ def _comes(request: Request, timeout: float) -> bool:
     return is_fulfilled
 
 
-def _told(error: FetiHomogError) -> str:
+def _lines(error: FetiHomogError) -> str:
     """Return a line for each fault."""
     return "\n".join(f"error: {fault}" for fault in error.faults)
 

@@ -1,4 +1,4 @@
-"""The libraries that are built on one MPI, which pip does not bring: found, started, or told of in a sentence."""
+"""The libraries that are built on one MPI, which pip does not bring: found, started, or reported in a sentence."""
 
 from __future__ import annotations
 

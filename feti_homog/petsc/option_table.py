@@ -86,7 +86,7 @@ MUMPS_PREFIXES = ("feti_schur_",)
 """Those of them that are MUMPS by default."""
 
 PREFIXES = ("feti_ksp_", "feti_pc_", *DIRECT_PREFIXES)
-"""Prefixes of PETSc solvers: what follows is PETSc's to know."""
+"""Prefixes of PETSc solvers: PETSc reads what follows."""
 
 # Options that PETSc reads when it starts, logs and ends.
 PETSC_NAMES = (

@@ -28,7 +28,7 @@ VIEWERS = (
     "log_view",
     "options_view",
 )
-"""Flags that print, whose value may say where."""
+"""Flags that print, whose value may be a place."""
 OWN_SHORT = ("-h",)
 CASE_FILE = ".toml"
 
@@ -126,7 +126,7 @@ def _integer(least: int, most: int = LARGEST_INTEGER) -> Rule:
 
 
 def _is_viewer(text: str) -> bool:
-    """Return whether the text says where to print, in a folder that exists."""
+    """Return whether the text is a place to print, in a folder that exists."""
     match = VIEWER.fullmatch(text)
     return match is not None and (not match["file"] or can_be_written(match["file"]))
 

@@ -32,7 +32,7 @@ READ_WHEN_SOLVING = {
 def case_options(options: Mapping[str, Value]) -> Iterator[None]:
     """Insert the options that the command line does not give, and take them out afterwards.
 
-    PETSc knows no flags that are true or false, but such as are there or not: false ones are taken out meanwhile.
+    PETSc has no flags that are true or false, but flags that are there or not: false ones are taken out meanwhile.
 
     Raises:
         CaseError: before the block, if an option of ours is misspelt or has no such value, or a solver cannot be
@@ -164,7 +164,7 @@ def _hidden(options: Mapping[str, str]) -> Iterator[None]:
 
 
 class _Identity:
-    """The 1 x 1 matrix and preconditioner that, as those of the dual problem, only Python knows."""
+    """The 1 x 1 matrix and preconditioner that, as those of the dual problem, are Python's alone."""
 
     def mult(self, mat: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         x.copy(y)
@@ -199,7 +199,7 @@ def _solve_directly(prefix: str) -> None:
 def _solver(A: PETSc.Mat, prefix: str) -> Iterator[PETSc.KSP]:
     """Provide a solver of the 1 x 1 matrix.
 
-    At the end of the block it solves, as the options under `prefix` say, and is freed with its matrix.
+    At the end of the block it solves, by the options under `prefix`, and is freed with its matrix.
     """
     ksp, (x, b) = PETSc.KSP().create(PETSc.COMM_SELF), A.createVecs()
     ksp.setOptionsPrefix(prefix)

@@ -59,7 +59,7 @@ class _Rows:
 class FieldFile:
     """The file `directory`/result.h5 while it is being written; every method is collective over `comm`.
 
-    `field_layout` says which tables and attributes it has, `field_views` which of them show others.
+    `field_layout` lists its tables and attributes, `field_views` which of them show others.
 
     Until `close` the file is called `part`. As a context manager it closes when the block ends well; an error that
     all ranks raise removes it, any other exception leaves the unfinished file. Empty parts still need their columns:

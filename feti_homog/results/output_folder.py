@@ -1,7 +1,7 @@
 """The folder that results go to: one run at a time writes there, and no file of others is replaced; its events.log.
 
-A run knows its own files by their content, not by a marker beside them: a file of somebody else may come to a folder of
-results later, under one of their names.
+A run recognizes its own files by their content, not by a marker beside them: a file of somebody else may come to a
+folder of results later, under one of their names.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ def refuse_files_of_others(directory: Path) -> None:
 
 
 def _foreign(paths: Sequence[Path]) -> list[Path]:
-    """Return the files that no run wrote: those that it would know; without any of these all that are not empty."""
+    """Return the files that no run wrote: those without its marks; if none is its own, all that are not empty."""
     signs = [path for path in paths if path.name in SIGNS]
     return [path for path in signs or paths if path.stat().st_size and not (signs and _is_own(path))]
 
@@ -123,7 +123,7 @@ def held(directory: Path, comm: Intracomm, say: Callable[[str], object]) -> Iter
     """Provide the folder, made with its parents, is this run's alone while the block lasts. Collective.
 
     What earlier runs left unfinished in it is removed; so are, at the end, the folders made here that are empty.
-    Where the file system has no locks, `say` is told so and the run goes on without one.
+    Where the file system has no locks, `say` gets a warning and the run goes on without one.
 
     Raises:
         CaseError: it cannot be made, or another run has it.
@@ -202,7 +202,7 @@ def _busy(directory: Path, who: str) -> CaseError:
 class EventLog:
     """The log in `directory`, written by rank 0 from the first line on; an earlier one is replaced.
 
-    If it cannot be written `say` is told so once, and the path goes on without it: the log holds no results.
+    If it cannot be written `say` gets one warning, and the path goes on without it: the log holds no results.
     """
 
     def __init__(self, directory: Path, comm: Intracomm, title: str, say: Callable[[str], object]) -> None:

@@ -1,4 +1,4 @@
-"""result.xdmf and interface.xdmf: say where in result.h5 ParaView finds the cell, the interface and their states.
+"""result.xdmf and interface.xdmf, by which ParaView finds in result.h5 the cell, the interface and their states.
 
 All of ParaView's and VTK's readers understand them: whole datasets alone, points with a connectivity, tensors of nine
 components, one collection a file.  The readers take no texts: the label of a state is the name of its block, which two

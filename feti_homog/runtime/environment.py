@@ -24,7 +24,7 @@ def prefer_own_toolkits() -> None:
 
     An environment with --system-site-packages takes `matplotlib` from its own folder, but Debian's
     matplotlib-nspkg.pth has bound `mpl_toolkits` to Debian's at the start of Python: Matplotlib cannot import its 3-D
-    axes from there, and says so whenever it is loaded.
+    axes from there, and warns whenever it is loaded.
     """
     matplotlib = find_spec("matplotlib")
     if matplotlib is None or matplotlib.origin is None:

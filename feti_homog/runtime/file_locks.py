@@ -19,13 +19,13 @@ from feti_homog.runtime import owners
 
 # Seconds that a lock is tried for: one who only looks whether it is held, holds it for a moment.
 LOCK_TIMEOUT_S = 0.2
-# What the system says of a lock that somebody else has, and of a file system that has no locks.
+# Errors of the system for a lock that somebody else has, and for a file system without locks.
 HELD = (errno.EAGAIN, errno.EACCES)
 UNSUPPORTED = (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP)
 
 
 class LockHeld(Exception):
-    """Somebody else holds the lock; the text says who."""
+    """Somebody else holds the lock; the text names the holder."""
 
 
 class LocksUnsupported(FetiHomogError):

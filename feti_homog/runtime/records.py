@@ -1,4 +1,4 @@
-"""Records: dataclasses whose fields say what they hold, in which unit, and under which names they are written.
+"""Records: dataclasses whose fields carry their meaning, unit and the names under which they are written.
 
 The writers of files take names and types from these descriptions, and so do the reference tables of the manual.
 Fields without a description are not written.
@@ -96,7 +96,7 @@ def plain(value: Any) -> Any:
 
 
 def restored(kind: type[T], document: Mapping[str, Any]) -> T:
-    """Return the record of a class from what `plain` made of it; keys that it does not know are left out.
+    """Return the record of a class from what `plain` made of it; other keys are left out.
 
     Raises:
         KeyError: a key without a default is missing.

@@ -20,7 +20,7 @@ from feti_homog.errors import FetiHomogError, escaped
 from feti_homog.runtime import owners
 
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGXCPU)  # the last: the limit of CPU time
-# Where launchers say the rank of a process before MPI has started.
+# Variables in which launchers give the rank of a process before MPI has started.
 RANK_VARIABLES = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID")
 # How long the others wait: after a rank has ended, Open MPI drops what rank 0 prints, and a call of a library may keep
 # rank 0 from hearing the signal for a while.
@@ -31,18 +31,18 @@ KEPT = "\n\t"  # of the characters that are not printable; others may come from 
 def end_on_signals() -> None:
     """From now on SIGINT, SIGTERM and SIGXCPU end the process with exit code 128 + signal: 130, 143 and 152.
 
-    Files of locks and unfinished ones are removed before.  Rank 0 tells of it on standard error.  Signals that are
+    Files of locks and unfinished ones are removed before.  Rank 0 reports it on standard error.  Signals that are
     ignored, as in a background job of a shell, stay so.  Call it before any other thread starts.
     """
     awaited = {number for number in ENDING if signal.getsignal(number) is not signal.SIG_IGN}
-    # Of a pipe that its reader has closed, writing tells.
+    # Writing shows that the reader of a pipe has closed it.
     signal.pthread_sigmask(signal.SIG_BLOCK, {*awaited, signal.SIGPIPE})
     if awaited:
         threading.Thread(target=_wait_and_end, args=(awaited,), daemon=True).start()
 
 
 def launched_rank() -> int:
-    """Return the rank of this process among those that a launcher started, as far as that says it.
+    """Return the rank of this process among those that a launcher started, as far as that gives it.
 
     Does not need MPI.
     """
@@ -74,7 +74,7 @@ def prepare() -> None:
 
 
 def say(text: str) -> None:
-    """Print a line beside the results.  If it cannot be written, nothing more is, and standard error says so once."""
+    """Print a line beside the results.  If that fails, nothing more is printed, and standard error reports it once."""
     try:
         print_product(text)
     except FetiHomogError as error:

@@ -1,4 +1,4 @@
-"""Reading a table of a case file into a frozen dataclass whose fields say what they accept and what they mean."""
+"""Reading a table of a case file into a frozen dataclass whose fields carry their rules and their meaning."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ class Rule:
 
     Attributes:
         path: from the section to a table or value; where there is none, the rule holds. Empty: the whole document.
-        schema: the JSON Schema of what stands there, of the words that `holds` knows.
+        schema: the JSON Schema of what stands there, in the words that `holds` takes.
         fault: the line for a place that is not valid.
         when: conditions all of which must hold.
     """

@@ -25,7 +25,7 @@ class ValueType:
         expected: in words, for faults and for the reference.
         accepts: whether a value, of TOML's types, is right.
         store: of a right value, what the dataclass of its table keeps.
-        json_schema: the same as JSON Schema, which knows no relations between numbers.
+        json_schema: the same as JSON Schema, which has no relations between numbers.
         table: the dataclass of the value if it is a table; `TableReader` reads it.
         item: of a list with tables in it, the type of its entries.
     """

@@ -160,8 +160,8 @@ def _check_kept(
     They include the first and the last, and are as many as the case asks for.
     """
     count, asked = len(document["path"]), case["output"]["states"]
-    told = list(document["states"]) == list(numbers)
-    findings.record("tables", 0.0 if told else np.inf, "states, which differ between the two files")
+    given = list(document["states"]) == list(numbers)
+    findings.record("tables", 0.0 if given else np.inf, "states, which differ between the two files")
     rising = all(a < b for a, b in pairwise(numbers))
     ends = len(numbers) > 0 and numbers[0] == 0 and numbers[-1] == count - 1
     findings.record(
@@ -181,10 +181,10 @@ def _check_all(findings: Findings, document: Mapping[str, Any], states: Sequence
 
 def _check_entries(findings: Findings, state: StateNumbers, entries: Mapping[str, Any], scales: _Scales) -> None:
     """Check the numbers of a state in result.json."""
-    told = {"strain": (state.strain, scales.strain), "stress": (state.stress, scales.stress)}
-    told |= {TEMPERATURE: (np.array(state.temperature), max(abs(state.temperature), 1.0))}
-    for name in told.keys() & entries.keys():
-        value, scale = told[name]
+    given = {"strain": (state.strain, scales.strain), "stress": (state.stress, scales.stress)}
+    given |= {TEMPERATURE: (np.array(state.temperature), max(abs(state.temperature), 1.0))}
+    for name in given.keys() & entries.keys():
+        value, scale = given[name]
         findings.record("tables", relative(np.array(entries[name]) - value, scale), f"{state.name}, {name}")
     if "load_factor" in entries:
         findings.record("tables", abs(entries["load_factor"] - state.load_factor), f"{state.name}, load_factor")
@@ -225,14 +225,14 @@ def _rows(
 
 
 def _columns(
-    told: Mapping[str, Any], stiffness: str, suffix: str, sign: float, unit: Sequence[Prescribed]
+    given: Mapping[str, Any], stiffness: str, suffix: str, sign: float, unit: Sequence[Prescribed]
 ) -> Iterator[tuple[Prescribed, dict[str, Float]]]:
     """Yield the unit loads, or minus them, with their stresses: columns of a stiffness, and `thermal_stress`."""
     v = 6 if len(unit[0].values) > 3 else 3
     for load in unit:
-        matrix = np.array(told[f"{stiffness}{suffix}"])
+        matrix = np.array(given[f"{stiffness}{suffix}"])
         is_thermal = load.values[v:].any()
-        stress = np.array(told[f"thermal_stress{suffix}"]) if is_thermal else matrix @ load.values[:v]
+        stress = np.array(given[f"thermal_stress{suffix}"]) if is_thermal else matrix @ load.values[:v]
         yield replace(load, values=sign * load.values), {"stress": sign * stress}
 
 

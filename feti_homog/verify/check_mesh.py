@@ -59,15 +59,17 @@ def directions(cell: DiscreteCell) -> Float:
 
 def check_mesh(findings: Findings, cell: DiscreteCell) -> None:
     """Elements have positive areas that fill the cell but for voids; a torn side has one partner or is at a void."""
-    elements, sides, told = cell.elements, cell.sides, cell.files.document["cell"].get("porosity", 0.0)
+    elements, sides, given = cell.elements, cell.sides, cell.files.document["cell"].get("porosity", 0.0)
     findings.record("mesh", np.where(elements.least_jacobian > 0, 0.0, np.inf), "element {}".format)
-    findings.record("mesh", relative(elements.area.sum() - (1 - told) * cell.area, cell.area), "the sum of all areas")
+    findings.record("mesh", relative(elements.area.sum() - (1 - given) * cell.area, cell.area), "the sum of all areas")
     normals = sides.normal[sides.at_void]
     findings.record(
         "mesh", relative(np.abs(normals.sum(axis=0)), cell.files.size.max()), "the sides at voids are closed"
     )
-    is_told = bool(sides.at_void.any()) == (told > 0)
-    findings.record("mesh", np.where(is_told, 0.0, np.inf), f"cell.porosity = {told:g}, {len(normals)} sides at voids")
+    is_given = bool(sides.at_void.any()) == (given > 0)
+    findings.record(
+        "mesh", np.where(is_given, 0.0, np.inf), f"cell.porosity = {given:g}, {len(normals)} sides at voids"
+    )
     findings.record("mesh", sides.mismatch, lambda i: f"a side of element {sides.element[i]}")
 
 

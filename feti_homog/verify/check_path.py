@@ -1,6 +1,6 @@
 """Laws of paths and envelopes: breaking bonds and their loads; the first bond of an envelope at its strength.
 
-Fields may be kept of some points only; what result.json says of the others obeys the same laws of counts.
+Fields may be kept of some points only; the others in result.json obey the same laws of counts.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from feti_homog.verify.prescribed import NAMES, SAME_SHARE, TEMPERATURE, damaged
 
 # Utilisations by tractions below 10 rtol of the stress are none to the program; twice as many are here.
 NOISE_PER_RTOL = 20.0
-# Directions of bonds are told apart to so many degrees.
+# Directions of bonds are distinguished to so many degrees.
 SAME_DIRECTION = 1e-6
 Point = Mapping[str, Any]
 
@@ -87,9 +87,9 @@ def _check_load(
 ) -> None:
     """Check that named loads are factor times cosine and sine, others zero, and that stress follows from strain."""
     (stiffness, thermal), strain, stress = law, np.array(point["strain"]), np.array(point["stress"])
-    told = strain if plane[0] in NAMES[len(strain)][0] else stress
-    scale = max(float(point["factor"]), float(np.abs(told).max()))
-    findings.record("load", relative(told - point["factor"] * unit, scale), f"{at}, {' and '.join(plane)}")
+    given = strain if plane[0] in NAMES[len(strain)][0] else stress
+    scale = max(float(point["factor"]), float(np.abs(given).max()))
+    findings.record("load", relative(given - point["factor"] * unit, scale), f"{at}, {' and '.join(plane)}")
     terms = np.abs(stiffness) @ np.abs(strain) + np.abs(thermal)
     findings.record("load", relative(stress - stiffness @ strain - thermal, terms.max()), f"{at}.stress")
 
@@ -97,7 +97,7 @@ def _check_load(
 def _check_bonds(
     findings: Findings, cell: DiscreteCell, bonds: _Bonds, point: Point, temperature: float, at: str
 ) -> None:
-    """No bond is over its strength, the one that is told is at it, and breaks as told."""
+    """No bond is over its strength, the one of the file is at it, and breaks as in the file."""
     traction = bonds.traction(np.array(point["strain"]), temperature)
     used = bonds.used(traction)
     largest = float(used.max(initial=0.0))
@@ -136,7 +136,7 @@ def check_path(findings: Findings, cell: DiscreteCell, states: Sequence[StateNum
 
 
 def _with_tips(cell: DiscreteCell, state: StateNumbers, point: Point) -> StateNumbers:
-    """Return the state with what its point says of tips whose strength is not in the fields."""
+    """Return the state with the tips of its point whose strength is not in the fields."""
     if "tips" not in point:
         return state
     node, shares = tip_shares(cell, state, point["tips"])
@@ -171,8 +171,8 @@ def _check_peak(findings: Findings, peak: Point | None, points: Sequence[Point])
     findings.record("tables", max(before - float(abs(stress[event])), 0.0) / (size or 1.0), "peak.event")
     findings.record("tables", relative(np.array(peak["strain"] - strain[event]), np.abs(strain).max()), "peak.strain")
     broken = [number for number, point in enumerate(points) if point["broke"]]
-    told = peak.get("first_break_event")
-    findings.record("tables", 0.0 if told == next(iter(broken), None) else np.inf, "peak.first_break_event")
+    given = peak.get("first_break_event")
+    findings.record("tables", 0.0 if given == next(iter(broken), None) else np.inf, "peak.first_break_event")
 
 
 def _check_breaks(findings: Findings, states: Sequence[StateNumbers], points: Sequence[Point], by_events: bool) -> None:
@@ -204,7 +204,7 @@ def _check_strength(
         held = ~_overloaded_by_jump(state, points, near) if by_events else np.ones(len(used), bool)
         findings.record("strength", np.where(held, np.maximum(used - 1.0, 0.0), 0.0), where)
         if by_events and (broke := damaged_at(points[state.point])):
-            # Which break, the next point tells; that so many are as near to their strength as the worst, this one does.
+            # The next point has the bonds that break; here so many are as near to their strength as the worst.
             due = max(float(used.max(initial=0.0)), 1.0)
             worst = np.sort(np.where(np.isnan(state.used), np.inf, state.used))[-broke:]
             findings.record("strength", np.maximum(1.0 - worst / due, 0.0), f"{state.name}, bonds that break")

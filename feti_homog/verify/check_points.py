@@ -1,4 +1,4 @@
-"""Laws of what points of an angle or a path say of energies, of what has debonded, and of the tips."""
+"""Laws of energies, debonded shares and tips in points of an angle or a path."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.findings import Findings, relative
 
 Point = Mapping[str, Any]
-# To so many digits directions of tips are told apart.
+# To so many digits directions of tips are distinguished.
 DIRECTION_DIGITS = 9
 
 
@@ -54,16 +54,16 @@ def _check_path(
             _check_tips(findings, cell, state, points[state.point]["tips"])
 
 
-def tip_shares(cell: DiscreteCell, state: StateNumbers, told: Mapping[str, Sequence[float]]) -> tuple[Int, Float]:
-    """(t,) the tips of a state, by fibre and direction, and sqrt(G / G_c) by what is told of them.
+def tip_shares(cell: DiscreteCell, state: StateNumbers, given: Mapping[str, Sequence[float]]) -> tuple[Int, Float]:
+    """(t,) the tips of a state, by fibre and direction, and sqrt(G / G_c) by the rates in the file.
 
     None, if of other tips.
     """
     node = _tips_in_order(cell, state)
     law = law_at(cell.files, node)
-    if len(told["G_I"]) != len(node) or len(told["G_II"]) != len(node):
+    if len(given["G_I"]) != len(node) or len(given["G_II"]) != len(node):
         return node[:0], np.zeros(0)
-    energy = np.array(told["G_I"]) + np.array(told["G_II"])
+    energy = np.array(given["G_I"]) + np.array(given["G_II"])
     return node, np.sqrt(energy / law.lost(law.mode(state.traction[node])))
 
 
@@ -102,8 +102,8 @@ def _check_debonding(findings: Findings, cell: DiscreteCell, state: StateNumbers
     if len(cell.files.interfaces) > 1:
         expected["debonded_shares"] = _shares_of_pairs(cell, state)
     for name, value in expected.items():
-        told = np.array(point.get(name, np.nan), float)
-        off = told - value if told.shape == np.shape(value) else np.array(np.inf)
+        given = np.array(point.get(name, np.nan), float)
+        off = given - value if given.shape == np.shape(value) else np.array(np.inf)
         findings.record("tables", relative(off, scales.get(name, 1.0)), f"{state.name}, {name}")
 
 
@@ -117,8 +117,8 @@ def _shares_of_pairs(cell: DiscreteCell, state: StateNumbers) -> Float:
 def _check_ratios(findings: Findings, points: Sequence[Point]) -> None:
     for number, point in enumerate(points):
         energy = point["fracture_energy"]
-        told, own = point.get("dissipation_ratio", 0.0), point["dissipated"] / energy if energy else 0.0
-        findings.record("tables", abs(told - own) / max(abs(own), 1.0), f"path[{number}].dissipation_ratio")
+        given, own = point.get("dissipation_ratio", 0.0), point["dissipated"] / energy if energy else 0.0
+        findings.record("tables", abs(given - own) / max(abs(own), 1.0), f"path[{number}].dissipation_ratio")
 
 
 def _check_toughness(
@@ -146,7 +146,7 @@ def _check_toughness(
 
 
 def _check_tips(
-    findings: Findings, cell: DiscreteCell, state: StateNumbers, told: Mapping[str, Sequence[float]]
+    findings: Findings, cell: DiscreteCell, state: StateNumbers, given: Mapping[str, Sequence[float]]
 ) -> None:
     """Check that tips are the bonds beside broken ones, in the mode of their tractions.
 
@@ -156,16 +156,16 @@ def _check_tips(
     law = law_at(cell.files, node)
     fibre, where = cell.files.interface.fibre[node], f"{state.name}, tip {{}}".format
     pair = (cell.files.interface.pair[node] + 1).tolist() if len(cell.files.interfaces) > 1 else None
-    if (list(told["fibre"]), told.get("interface")) != (fibre.tolist(), pair) or any(
-        len(values) != len(node) for values in told.values()
+    if (list(given["fibre"]), given.get("interface")) != (fibre.tolist(), pair) or any(
+        len(values) != len(node) for values in given.values()
     ):
         findings.record("tables", np.inf, f"{state.name}, tips")
         return
     psi = law.mode(state.traction[node])
-    away = (np.array(told["angle"]) - bond_directions(cell)[node] + 180.0) % 360.0 - 180.0
+    away = (np.array(given["angle"]) - bond_directions(cell)[node] + 180.0) % 360.0 - 180.0
     findings.record("tables", np.abs(away) / 360.0, where)
-    findings.record("tables", np.abs(np.array(told["psi"]) - np.degrees(psi)) / 90.0, where)
-    first, second = np.array(told["G_I"]), np.array(told["G_II"])
+    findings.record("tables", np.abs(np.array(given["psi"]) - np.degrees(psi)) / 90.0, where)
+    first, second = np.array(given["G_I"]), np.array(given["G_II"])
     findings.record("tables", relative(first * np.sin(psi) ** 2 - second * np.cos(psi) ** 2, first + second), where)
     if not law.grows_by_release:
         own = law.energies(state.traction[node])

@@ -36,7 +36,7 @@ def check_summary(findings: Findings, cell: DiscreteCell) -> None:
         _check_bounds(findings, cell, document["bounds"], np.array(document["effective_stiffness"]))
 
 
-def _check_cell(findings: Findings, cell: DiscreteCell, told: Section) -> None:
+def _check_cell(findings: Findings, cell: DiscreteCell, given: Section) -> None:
     width, height = cell.files.size
     names, mesh = cell.files.phases, cell.files.mesh
     fibres = [number for number, name in enumerate(names) if name not in ("matrix", "coating")]
@@ -45,26 +45,26 @@ def _check_cell(findings: Findings, cell: DiscreteCell, told: Section) -> None:
     expected |= {"nodes": len(mesh.points), "fibre_fraction": float(cell.fractions[fibres].sum())}
     for name, value in expected.items():
         scale = 1.0 if name in ("fibre_fraction", "porosity") else abs(value) or 1.0
-        findings.record("cell", abs(told.get(name, 0.0) - value) / scale, f"cell.{name}")
+        findings.record("cell", abs(given.get(name, 0.0) - value) / scale, f"cell.{name}")
     for name, value in zip(names, cell.fractions, strict=True):
-        findings.record("cell", abs(told["fractions"][name] - value), f"cell.fractions.{name}")
+        findings.record("cell", abs(given["fractions"][name] - value), f"cell.fractions.{name}")
 
 
-def _check_fibres(findings: Findings, cell: DiscreteCell, told: Sequence[Section]) -> None:
+def _check_fibres(findings: Findings, cell: DiscreteCell, given: Sequence[Section]) -> None:
     """Check that the list of fibres is that of result.h5, in the order of their numbers."""
     fibres, phases = cell.files.fibres, cell.files.phases
     numbers = np.arange(1, len(fibres.number) + 1)
     findings.record("tables", np.where(np.array_equal(fibres.number, numbers), 0.0, np.inf), "/fibre/number")
-    listed = [(fibre["number"], fibre["phase"]) for fibre in told]
+    listed = [(fibre["number"], fibre["phase"]) for fibre in given]
     expected = [(number, phases[phase]) for number, phase in zip(numbers, fibres.phase, strict=True)]
     findings.record("tables", np.where(listed == expected, 0.0, np.inf), "fibres")
     if listed == expected:
-        circles = np.array([[*fibre.get("centre", (None, None)), fibre.get("radius")] for fibre in told], float)
+        circles = np.array([[*fibre.get("centre", (None, None)), fibre.get("radius")] for fibre in given], float)
         circles = circles.reshape(-1, 3)  # of a cell without fibres too
         stored = np.column_stack([fibres.centre, fibres.radius])
         off = np.where(np.isnan(circles) & np.isnan(stored), 0.0, circles - stored)
         findings.record("tables", relative(off, cell.files.size.max()).max(axis=1), lambda i: f"fibres[{i}]")
-        factors = np.array([fibre.get("strength", 1.0) for fibre in told]) - fibres.strength
+        factors = np.array([fibre.get("strength", 1.0) for fibre in given]) - fibres.strength
         findings.record("tables", np.abs(factors), lambda i: f"fibres[{i}].strength")
         findings.record("tables", _unlike_scatter(cell), "/fibre/strength at fibre {}".format)
 
@@ -110,19 +110,19 @@ def _square(c: Float) -> float:
     return float(np.square(c[index[:, None], index[None]]).sum())
 
 
-def _check_bounds(findings: Findings, cell: DiscreteCell, told: Section, stiffness: Float) -> None:
+def _check_bounds(findings: Findings, cell: DiscreteCell, given: Section, stiffness: Float) -> None:
     """Voigt's and Reuss' bounds, those of Hashin and Shtrikman, and the order of all."""
     upper, lower = np.einsum("p,pij->ij", cell.fractions, cell.stiffnesses), cell.reuss
     size = float(np.abs(upper).max())
     for name, bound in (("voigt", upper), ("reuss", lower)):
-        findings.record("bounds", relative(np.array(told[name]) - bound, size), f"bounds.{name}")
+        findings.record("bounds", relative(np.array(given[name]) - bound, size), f"bounds.{name}")
     for place, gap in (("Voigt - L", upper - stiffness), ("L - Reuss", stiffness - lower)):
         least = float(np.linalg.eigvalsh((gap + gap.T) / 2).min())
         findings.record("bounds", max(-least, 0.0) / size, f"the least eigenvalue of {place}")
-    if told["hashin_shtrikman"] is not None:
+    if given["hashin_shtrikman"] is not None:
         expected = _hashin_shtrikman(cell)
         for name, pair in expected.items():
-            off = np.array(told["hashin_shtrikman"][name]) - pair
+            off = np.array(given["hashin_shtrikman"][name]) - pair
             findings.record("bounds", relative(off, pair[1]), f"bounds.hashin_shtrikman.{name}")
 
 
@@ -153,9 +153,9 @@ def _check_table(findings: Findings, path: Path, points: Sequence[Mapping[str, s
     stream = io.StringIO(input_files.read(path).decode("utf-8", "replace"), newline="")
     rows = list(csv.DictReader(stream))
     columns = list(dict.fromkeys(name for point in points for name in point))
-    told = [*rows[0]] if rows else columns
+    given = [*rows[0]] if rows else columns
     findings.record("CSV", 0.0 if len(rows) == len(points) else np.inf, f"{path.name}, the number of its rows")
-    findings.record("CSV", 0.0 if sorted(told) == sorted(columns) else np.inf, f"{path.name}, its columns")
+    findings.record("CSV", 0.0 if sorted(given) == sorted(columns) else np.inf, f"{path.name}, its columns")
     for number, (row, point) in enumerate(zip(rows, points, strict=False)):
         wrong = next((name for name in columns if row.get(name) != point.get(name, "")), None)
         findings.record("CSV", 0.0 if wrong is None else np.inf, f"{path.name}, row {number}, {wrong}")
@@ -212,16 +212,16 @@ def _check_stiffness(findings: Findings, document: Section) -> None:
 
 
 def _check_numbers(
-    findings: Findings, section: str, told: Section, values: Mapping[str, float | None], ratios: tuple[str, ...]
+    findings: Findings, section: str, given: Section, values: Mapping[str, float | None], ratios: tuple[str, ...]
 ) -> None:
     """Check constants; the scale of those whose names begin as `ratios` is 1 at least."""
     for name, value in values.items():
         place = f"{section}.{name}"
-        if value is None or told[name] is None:
-            findings.record("moduli", 0.0 if value is told[name] else np.inf, place)
+        if value is None or given[name] is None:
+            findings.record("moduli", 0.0 if value is given[name] else np.inf, place)
         else:
             scale = max(abs(value), 1.0) if name.startswith(ratios) else abs(value)
-            findings.record("moduli", relative(np.array(told[name] - value), scale), place)
+            findings.record("moduli", relative(np.array(given[name] - value), scale), place)
 
 
 def engineering_constants(stiffness: Float) -> dict[str, float]:

@@ -46,7 +46,7 @@ def mixed_phases(case: Mapping[str, Any], phases: Sequence[str]) -> Bool:
 
 
 def _is_isotropic(constants: Mapping[str, Any]) -> bool:
-    """Return whether one modulus and one ratio say all, to ISOTROPY."""
+    """Return whether one modulus and one ratio determine all, to ISOTROPY."""
     if "E_transverse" in constants:
         E, nu = float(constants["E_transverse"]), float(constants["nu_transverse"])
         known = [constants.get("E_axial"), constants.get("nu_axial")]
@@ -57,7 +57,7 @@ def _is_isotropic(constants: Mapping[str, Any]) -> bool:
 
 
 def out_of_plane(case: Mapping[str, Any], phases: Sequence[str]) -> Float:
-    """(phases, 2, 3) matrices that turn [S11, S22, S12] into [S33, E33]; NaN where the constants do not say it.
+    """(phases, 2, 3) matrices that turn [S11, S22, S12] into [S33, E33]; NaN where the constants leave it open.
 
     Raises:
         CaseError: a phase of the mesh has no material in the case.
@@ -91,7 +91,7 @@ def _out_of_plane(constants: Mapping[str, Any], plane: str) -> Float:
 
 
 def _says_out_of_plane(constants: Mapping[str, Any], plane: str) -> bool:
-    """Return whether the constants say what S33 or E33 is."""
+    """Return whether the constants determine S33 or E33."""
     if "stiffness" in constants:
         return len(constants["stiffness"]) == 6
     wanted = {"young": ("poisson",), "E_transverse": ("E_axial", "nu_axial"), "E1": ("nu13", "nu23")}

@@ -159,7 +159,7 @@ class Elements:
             (a, b), (c, d) = np.moveaxis(jacobian, (2, 3), (0, 1))
             determinant = a * d - b * c
             adjugate = np.moveaxis(np.array([[d, -b], [-c, a]]), (0, 1), (2, 3))
-            # Of an element without area nothing is finite, and every law says so.
+            # Of an element without area nothing is finite, and every law fails.
             inverse = adjugate / determinant[..., None, None]
             gradients = np.einsum("qas,eqsd->eqad", free, inverse)
             yield part, gradients, determinant * shares / 2

@@ -163,7 +163,7 @@ def checks(rtol: float, users_mesh: bool, has_coatings: bool) -> tuple[Check, ..
         ("constants", "constants at fixed status are those of the fields, relative to each", solver),
         (
             "sensitivities",
-            "constants change with the materials and springs of the case as told, relative to each",
+            "constants change with the materials and springs of the case as in the file, relative to each",
             max(SLOPE, solver),
         ),
         ("bounds", "bounds follow from fractions and materials, and the stiffness is between them", 1e-10),

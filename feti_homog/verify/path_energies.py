@@ -53,7 +53,7 @@ class PointNumbers:
     """Numbers of a point that the laws of energy need.
 
     Attributes:
-        strain, stress: (n,) with the temperature and what works on it, which is NaN where no file tells of it.
+        strain, stress: (n,) with the temperature and what works on it, which is NaN where no file has it.
         stored: per area.
         load: what is prescribed.
         terms: energy per area of which the stored one is summed at least.

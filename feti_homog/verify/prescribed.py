@@ -19,7 +19,7 @@ NAMES = {
     6: (("E11", "E22", "E33", "gamma23", "gamma13", "gamma12"), ("S11", "S22", "S33", "S23", "S13", "S12")),
 }
 TEMPERATURE = "temperature"
-# Shares of a leg that are not told apart.
+# Shares of a leg that are not distinguished.
 SAME_SHARE = 1e-12
 
 Document = Mapping[str, Any]

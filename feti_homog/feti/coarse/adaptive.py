@@ -47,7 +47,7 @@ from feti_homog.typing import Float, Int
 class AdaptiveCoarseSpace:
     """The coarse space of this module.  Every rank has S Z_0 on its subdomains, and its part of a factor.
 
-    A rank knows those u of the n coarse displacements that reach its subdomains, and no others.
+    A rank has those u of the n coarse displacements that reach its subdomains, and no others.
 
     Of a subdomain S Z_0 is dense: of an outer body left whole it has a column for every mode of every inner one.
 

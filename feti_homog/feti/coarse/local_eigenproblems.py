@@ -69,7 +69,7 @@ class SubdomainEigenproblem:
         nodes = np.unique(subdomain.problem.nodes(block.dofs))
         self._P = trace_space(subdomain.submesh, subdomain.mesh.lattice, subdomain.problem, nodes, min_trace_dofs)
         self._regular_S = congruent(self._P, S) + operator.regularisation(self._P)
-        # (rows, rows) its share W^-1 B D^-1 S D^-1 B^T W^-1 of M^-1; this precision tells soft from stiff.
+        # (rows, rows) its share W^-1 B D^-1 S D^-1 B^T W^-1 of M^-1; this precision separates soft from stiff.
         BW = block.BW.astype(np.float32)
         self._share = BW @ (BW @ S.astype(np.float32)).T
 
@@ -182,7 +182,7 @@ def soft_modes(S: Float, N: Float, threshold: float) -> Float:
     NR, RNR = N[:m, m:], N[m:, m:]
     # Without the kernel's part, N has eigenvectors N-orthogonal to the kernel, where the definite matrix is S.
     rest = N[:m, :m] - NR @ np.linalg.pinv(RNR, rcond=SINGLE_PRECISION_NULL, hermitian=True) @ NR.T
-    # A Cholesky factorization tells at a tenth of the cost whether there are any.
+    # A Cholesky factorization shows at a tenth of the cost whether there are any.
     try:
         cholesky(S - threshold * rest)
     except np.linalg.LinAlgError:

@@ -53,7 +53,7 @@ class JumpOperator:
     """B of this rank's subdomains and the layout of the multipliers.
 
     Attributes:
-        problem: the displacements and the unit loads, which ranks without subdomains know from here.
+        problem: the displacements and the unit loads, which ranks without subdomains take from here.
         components: rows of a vector constraint.
         B: (local rows, local dofs) signed, rotated entries; a local row is one that a local dof takes part in.
         rows: global number of each local row.

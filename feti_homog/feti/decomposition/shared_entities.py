@@ -1,7 +1,7 @@
 """Coarse vertices and edges shared by subdomains: constraints, and the normals and lengths of interfaces.
 
 An entity is a vertex class or a torus edge that belongs to several subdomains.  Each fine node on an entity of k
-subdomains needs k - 1 vector constraints.  It belongs to the rank of its last sharer, which numbers these and tells the
+subdomains needs k - 1 vector constraints.  It belongs to the rank of its last sharer, which numbers these and sends the
 others.
 """
 
@@ -240,7 +240,7 @@ def share_entities(
     constraints = np.where(owner == comm.rank, nodes * (found.copies - 1), 0)
     begin, own_constraints = comm.exscan(int(constraints.sum())) or 0, int(constraints.sum())
     numbers = begin + np.cumsum(constraints) - constraints
-    first, normal, turn, precracked = _told_by_owners(
+    first, normal, turn, precracked = _sent_by_owners(
         comm, found, table, numbers, geometry.normal, geometry.turn, geometry.precracked
     )
     order = np.argsort(first)
@@ -264,7 +264,7 @@ def share_entities(
     )
 
 
-def _told_by_owners(comm: MPI.Intracomm, found: Sharers, table: SubdomainTable, *columns: Array) -> list[Array]:
+def _sent_by_owners(comm: MPI.Intracomm, found: Sharers, table: SubdomainTable, *columns: Array) -> list[Array]:
     """Return the columns (n,) or (n, ...) of the entities, each row as the owner of the entity has it. Collective."""
     rank = table.rank[found.sharer]
     mine = np.repeat(table.rank[found.innermost] == comm.rank, found.copies)

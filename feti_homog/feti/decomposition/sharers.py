@@ -1,7 +1,7 @@
 """Who shares which coarse vertices and edges, found by all ranks.
 
-Each key has a home rank, key modulo ranks.  Every rank tells the homes which of its subdomains have a key that others
-may have, too; the home puts the subdomains in order, and tells them to the ranks that have one.
+Each key has a home rank, key modulo ranks.  Every rank sends the homes which of its subdomains have a key that others
+may have, too; the home puts the subdomains in order, and sends them to the ranks that have one.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def find_sharers(comm: MPI.Intracomm, own: SubmeshesOfRank, table: SubdomainTabl
 
     Several subdomains share each, one of them of this rank.
     """
-    code, subdomain = _told(own)
+    code, subdomain = _to_send(own)
     code, subdomain = exchange(comm, code // 2 % comm.size, code, subdomain)
     order = np.lexsort((subdomain, table.nesting[table.body[subdomain]], code))
     code, subdomain = code[order], subdomain[order]
@@ -70,7 +70,7 @@ def find_sharers(comm: MPI.Intracomm, own: SubmeshesOfRank, table: SubdomainTabl
     shared = copies[entity] > 1
     code, subdomain = code[shared], subdomain[shared]
     code, first, copies = np.unique(code, return_index=True, return_counts=True)
-    # Each rank that has one of the sharers is told of all.
+    # Each rank that has one of the sharers receives all.
     entity = np.repeat(np.arange(len(code)), copies)
     pairs = np.unique(entity * comm.size + table.rank[subdomain])
     entity, to = pairs // comm.size, pairs % comm.size
@@ -81,7 +81,7 @@ def find_sharers(comm: MPI.Intracomm, own: SubmeshesOfRank, table: SubdomainTabl
     return found.chosen(np.lexsort((found.key, found.is_edge)))
 
 
-def _told(own: SubmeshesOfRank) -> tuple[Int, Int]:
+def _to_send(own: SubmeshesOfRank) -> tuple[Int, Int]:
     """Codes of what others may have too, and the subdomains of this rank that have it; each pair once."""
     whole = own.whole
     corner, side = whole.vertex_class[whole.triangles], whole.edge_class[whole.triangle_edges]
@@ -111,7 +111,7 @@ def _several(keys: Int, member: Int, at_border: Bool) -> tuple[Int, Int]:
     for corner in keys.T:
         np.minimum.at(low, corner, member)
         np.maximum.at(high, corner, member)
-    told = (low[:-1] < high[:-1]) | at_border
-    chosen = (keys >= 0) & told[keys]
+    sent = (low[:-1] < high[:-1]) | at_border
+    chosen = (keys >= 0) & sent[keys]
     pairs = np.unique(keys[chosen] * n + np.broadcast_to(member[:, None], keys.shape)[chosen])
     return pairs // n, pairs % n

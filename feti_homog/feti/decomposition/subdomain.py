@@ -150,7 +150,7 @@ class Subdomain:
         """Share of the diagonal of K in the scaling D: that of a phase with the same mu and lambda <= 2 mu.
 
         1 of several materials, none of which is nearly incompressible.
-        A boundary that keeps the volume is as stiff as mu says, but single nodes of mixed elements are as lambda.
+        A boundary that keeps the volume is as stiff as mu, but single nodes of mixed elements are as lambda.
         """
         if not self.is_mixed or self.material is not None:
             return 1.0

@@ -13,7 +13,7 @@ from feti_homog.feti.thresholds import MIRRORED_BLOCK_ROWS, TRIANGLE_INVERSE_ROW
 from feti_homog.petsc import c_functions
 from feti_homog.typing import Float, Int
 
-# What MUMPS says of a workspace that is smaller than it needs, and per cent more than its estimate that it then gets.
+# MUMPS' status of a workspace that is too small, and per cent more than its estimate that it then gets.
 TOO_SMALL, MORE_WORKSPACE = (-8, -9), (None, 100, 1000)
 
 

@@ -82,7 +82,7 @@ class InterfaceOperators:
         thresholds: Thresholds = DEFAULTS,
         compliance: Float | None = None,
     ) -> None:
-        """Factor every subdomain, once, as `choose` says; takes the stiffness of each.  Arguments as of `choose`.
+        """Factor every subdomain, once, as `choose` chooses; takes the stiffness of each.  Arguments as of `choose`.
 
         `compliance` (local rows,) is that of the springs of the interfaces, None where no rank has any.  Nothing is
         communicated: a rank may fail alone.

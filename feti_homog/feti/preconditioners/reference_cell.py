@@ -136,7 +136,7 @@ class ReferenceCell:
 def one_sided_jumps(comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> csr_matrix:
     """(local rows, boundary dofs) B_D with B B_D^T = I that leaves one side of each interface at rest.  Collective.
 
-    So forces are wanted of the other side alone: of the inner body, if it is not so stiff that rounding would tell.
+    So forces are wanted of the other side alone: of the inner body, if it is not so stiff that rounding would show.
     """
     inside, B = jump_operator.inside, operators.B.tocoo()
     is_bond = inside >= 0

@@ -62,7 +62,7 @@ class Ellipses(ConvexCurves):
 
     @property
     def squares(self) -> Float:
-        """(k, 2, 2) F F^T, which say of an ellipse all but where it is."""
+        """(k, 2, 2) F F^T, which determine an ellipse but for its place."""
         return np.asarray(self.frames @ self.frames.transpose(0, 2, 1))
 
     @property

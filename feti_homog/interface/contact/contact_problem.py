@@ -43,7 +43,7 @@ from feti_homog.typing import Bool, Float, Int
 LEAST_SHARE_OF_MOTION = 1e-6
 # Block pivots in a row, the last one with progress included: ten without progress are usual in the literature.
 BLOCK_PIVOTS = 11
-# Dual problems after which the search is given up; the certificate then tells how far off it is.
+# Dual problems after which the search is given up; the certificate then has its errors.
 MAX_CONTACT_SOLVES = 500
 
 

@@ -150,7 +150,7 @@ class LoadScales:
         """(k,) nodal forces at each node of this rank smaller than which may be the solver's error; collective.
 
         It is a share of the largest of the same interface, or of what the imposed strain makes: an error of the jumps
-        moves forces by the stiffness of the softer side.  Forces between the pieces of a cut body say nothing here,
+        moves forces by the stiffness of the softer side.  Forces between the pieces of a cut body do not count here,
         however large, nor do those of other interfaces."""
         B = self._solver.jump_operator
         pairs = B.nodes.row[:, None] + np.arange(B.components)

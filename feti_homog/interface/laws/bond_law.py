@@ -16,7 +16,7 @@ from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BondState
 from feti_homog.typing import Bool, Float, Int
 
-# Halvings of an interval of length one, after which double precision tells no more.
+# Halvings of an interval of length one, after which double precision ends.
 BISECTIONS = 60
 
 

@@ -25,8 +25,8 @@ from feti_homog.typing import Bool, Float, Int
 
 # Share of the stiffness beside a bond that the inverse of the dual operator is where only rounding is left of it.
 RIGID = 1e-9
-# Largest rounding of the inverse of the dual operator with which energies are told: bonds whose utilisation differs by
-# less break together.
+# Largest rounding of the inverse of the dual operator with which energies are compared: bonds whose utilisation differs
+# by less break together.
 MOST_ROUNDING = 1e-6
 
 
@@ -72,7 +72,7 @@ class ReleasedEnergy(BondLaw):
 
     Attributes:
         springs: the criterion of the others, and the toughness.
-        influence: the inverse of the dual operator, which knows the bonds beside each other.
+        influence: the inverse of the dual operator, which couples the bonds beside each other.
         axial: that of slip along the fibres, where it counts.
     """
 
@@ -178,7 +178,7 @@ class ReleasedUtilisation(Utilisation):
         return np.asarray(self._number < 0)
 
     def first_factor(self, before: Float, ahead: Float) -> None:
-        """No formula knows what the breaks of tips release."""
+        """There is no formula for the energies that breaks of tips release."""
 
 
 def released_energy(H: Float, lam: Float, stiffness: Float, contact: bool) -> Float:

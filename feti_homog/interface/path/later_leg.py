@@ -24,7 +24,7 @@ from feti_homog.interface.path.path_points import (
 )
 from feti_homog.typing import Float
 
-# Shares of a leg that are not told apart.
+# Shares of a leg that are not distinguished.
 LEAST_SHARE = 1e-9
 # A response is on a straight line if it is off by no more than this many relative tolerances of the Krylov method, and
 # by no more than rounding leaves of the best solves, both relative to the largest stress of the line.  The solver,
@@ -56,7 +56,7 @@ class LaterLeg:
     def __init__(
         self, cell: CoupledInterfaces, law: BondLaw, waypoints: Sequence[Load], leg: int, begin: PathState
     ) -> None:
-        """Stand where `begin` says on the way from its origin to waypoint `leg`.  Collective."""
+        """Stand at `begin` on the way from its origin to waypoint `leg`.  Collective."""
         self.cell, self.law, self.end = cell, law, waypoints[leg]
         self.leg, self.legs = leg, len(waypoints)
         self.origin = begin.last if begin.position == 0.0 else begin.origin

@@ -136,7 +136,7 @@ def debonded(
 ) -> Bool:
     """Return whether nodes are within an arc of their fibre: (k,) for the fibres' numbers from 1 and directions (k,).
 
-    `opening` is that of arcs without an angle; `moved` says which tips the mesh has elsewhere.
+    `opening` is that of arcs without an angle; `moved` are the tips that the mesh has elsewhere.
     """
     inside = np.zeros(len(fibre), bool)
     for arc in arcs:

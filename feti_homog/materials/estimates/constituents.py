@@ -41,7 +41,7 @@ class Fibres:
 
 @dataclass(frozen=True)
 class Estimate:
-    """Constants by one method; null where it says nothing."""
+    """Constants by one method; null where it gives none."""
 
     E_axial: float | None = described("Young's modulus along the fibres", STRESS)
     E_transverse: float | None = described("Young's modulus across the fibres", STRESS)
@@ -84,7 +84,7 @@ NOTHING = Estimate(**dict.fromkeys(CONSTANTS))
 
 
 def estimate_of(constants: TransverselyIsotropic) -> Estimate:
-    """Return the estimate that says all of these constants."""
+    """Return the estimate that has all of these constants."""
     return Estimate(**{name: getattr(constants, name) for name in CONSTANTS})
 
 

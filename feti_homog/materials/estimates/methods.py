@@ -102,7 +102,7 @@ def chamis(matrix: TransverselyIsotropic, fibres: Sequence[Fibres]) -> Estimate:
         nu_T = E_T/(2 G_T) - 1,  alpha_A = (c E_f alpha_f + (1 - c) E_m alpha_m)/E_A,
         alpha_T = sqrt(c) alpha_Tf + (1 - sqrt(c)) (alpha_Tm + c nu_m E_f/E_A alpha_m),
 
-    E, nu and alpha of the phases being the axial ones where T does not say otherwise.  Chamis 1984, for an isotropic
+    E, nu and alpha of the phases being the axial ones where T does not occur.  Chamis 1984, for an isotropic
     matrix.
     """
     if len(fibres) != 1 or not bonded(fibres):
@@ -255,8 +255,8 @@ def estimates(matrix: TransverselyIsotropic, fibres: Sequence[Fibres]) -> Estima
     """Return the estimates of each method for fibres in a matrix.
 
     The rule of mixtures and Mori and Tanaka's estimate are defined for any kinds of fibres, the others for one; on
-    springs the last three.  No method says anything if a phase is not transversely isotropic about x3, and none says
-    anything of expansions if a phase has none.
+    springs the last three.  No method gives a constant if a phase is not transversely isotropic about x3, nor an
+    expansion if a phase has none.
     """
     if not all(map(is_transversely_isotropic, [matrix, *(family.constants for family in fibres)])):
         return Estimates(**dict.fromkeys(METHODS, NOTHING))

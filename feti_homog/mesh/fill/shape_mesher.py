@@ -1,6 +1,6 @@
 """The coarse periodic mesh of a cell with outlines of any convex shape: gmsh cuts them and fills them.
 
-The middle nodes of its second-order edges tell the curves, as those of users' meshes do.
+The middle nodes of its second-order edges define the curves, as in users' meshes.
 """
 
 from __future__ import annotations
@@ -179,7 +179,7 @@ def _match_sides(gmsh: ModuleType, arrangement: Arrangement) -> None:
 
 
 def _set_sizes(gmsh: ModuleType, path: Path, arrangement: Arrangement, least: float, size_at: SizeAt) -> None:
-    """Let gmsh interpolate the sizes at positions (n, 2), the least of which is told, on a grid, by way of a file."""
+    """Let gmsh interpolate the sizes at positions (n, 2), of which the least is given, on a grid, by way of a file."""
     size = arrangement.size
     counts = np.clip(np.ceil(size / least), FEWEST_CELLS, MOST_CELLS).astype(np.int32) + 1
     x, y = (np.linspace(0.0, width, count) for width, count in zip(size, counts, strict=True))

@@ -118,7 +118,7 @@ def side_curves(
 ) -> Curves:
     """Return the pieces of the two sides along `axis`, with the same nodes on both.
 
-    `disc_at` tells the smallest closed curve around points, which is a number of `around` or MATRIX.
+    `disc_at` returns the smallest closed curve around points, which is a number of `around` or MATRIX.
     """
     begin, span = places[:-1], np.diff(places)
     longest = np.full((len(span), 2), field.base.largest)

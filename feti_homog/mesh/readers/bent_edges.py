@@ -33,10 +33,10 @@ def faults(mesh: RawMesh) -> list[str]:
         off_side |= np.any(on_side & (np.abs(places[:, :2] - side) > near), axis=1)
     along, away, length = _offsets(places[:, :2], start, stop)
     return [
-        *_told(mesh, ~finite, "coordinates are not finite"),
-        *_told(mesh, np.abs(places[:, 2] - mesh.points[0, 2]) > near, "not in the plane"),
-        *_told(mesh, off_side, "off the straight side of the cell"),
-        *_told(mesh, np.hypot(along, away) >= length / 2, "farther from the middle than half the edge's length"),
+        *_faults(mesh, ~finite, "coordinates are not finite"),
+        *_faults(mesh, np.abs(places[:, 2] - mesh.points[0, 2]) > near, "not in the plane"),
+        *_faults(mesh, off_side, "off the straight side of the cell"),
+        *_faults(mesh, np.hypot(along, away) >= length / 2, "farther from the middle than half the edge's length"),
         *_unshared(mesh),
     ]
 
@@ -97,7 +97,7 @@ def _unshared(mesh: RawMesh) -> list[str]:
     return [f"two middle nodes on an edge: {first_of(names, count)}"] if count else []
 
 
-def _told(mesh: RawMesh, bad: Bool, what: str) -> list[str]:
+def _faults(mesh: RawMesh, bad: Bool, what: str) -> list[str]:
     """One line about the middle nodes at fault."""
     middles = mesh.middles
     found = np.flatnonzero(bad)

@@ -40,7 +40,7 @@ def unlabelled(mesh: RawMesh) -> list[str]:
         if len(names) > 1:
             element = mesh.element(int(number))
             counts = f"is in {len(names)} {mesh.container}s: {', '.join(names)}"
-            faults.append(f"{element} {counts}; [cell.phases] says which of them are phases")
+            faults.append(f"{element} {counts}; [cell.phases] names the phases among them")
     return faults
 
 
@@ -188,7 +188,7 @@ def stray_lines(mesh: RawMesh) -> list[str]:
 
 
 def cannot_debond(mesh: RawMesh, pairs: Int32, fit: Bool) -> list[str]:
-    """Debonded lines (d, 2) that are not edges between a fibre and the matrix; `fit` (d,) says which are."""
+    """Debonded lines (d, 2) that are not edges between a fibre and the matrix; `fit` (d,) marks those that are."""
     bad = pairs[~fit]
     what = f'lines in the {mesh.curve_container} "{DEBONDED}" that are not between a fibre and the matrix'
     return [f"{what}: {first_of(map(mesh.edge, bad), len(bad))}"] if len(bad) else []

@@ -161,7 +161,7 @@ def snapped(raw: RawMesh, tolerance: float) -> tuple[RawMesh, float]:
     A side lies at the median of the nodes within `tolerance`, relative to the width, of the outermost. Partners, each
     other's nearest within the tolerance along the side, both move to the middle between them. Middle nodes of
     second-order triangles are then midway between the ends of their edges on sides. What is farther stays where it is,
-    for the checks to tell.
+    for the checks to report.
     """
     plane = raw.points[:, :2].copy()
     if not np.isfinite(plane).all():

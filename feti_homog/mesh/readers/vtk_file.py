@@ -108,7 +108,7 @@ def _faults(mesh: Any) -> list[str]:
 
 
 def _numbers_name(mesh: Any) -> str:
-    """Return the name of the cell data that say which phase an element is of; empty if there are none."""
+    """Return the name of the cell data with the phase of an element; empty if there are none."""
     if known := [name for name in (PHASE, *NUMBERS) if name in mesh.cell_data]:
         return known[0]
     whole = [

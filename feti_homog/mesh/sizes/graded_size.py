@@ -236,7 +236,7 @@ def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips
 class _FromLines:
     """h_i + g d and h_t + g max(0, d - h_t) as in `size_field`, whichever is smaller.
 
-    Which disc is the nearest, points h_i apart on the circles tell.
+    Points h_i apart on the circles find the nearest disc.
 
     Attributes:
         size: (2,) of the cell.

@@ -1,7 +1,7 @@
 """Tiles of a large cell: parts of its outline that ranks fill by themselves, with the same nodes on common borders.
 
 They depend on the cell alone, so that its mesh is the same on any number of ranks.  Of those that it has filled a rank
-knows the torus: nodes on lines have the numbers of the outline, those within tiles the numbers behind these, one tile
+has the torus: nodes on lines have the numbers of the outline, those within tiles the numbers behind these, one tile
 after the other; a torus edge has the number that its two classes make.
 """
 
@@ -156,7 +156,7 @@ def _tiles_beside(lines: Outline, tiles: Tiling) -> tuple[Int, Int]:
     is_side = curves.outside == OUTSIDE
     left[is_side & (curves.inside == MATRIX)], right[is_side] = tiles.sides, OUTSIDE
     arc = np.flatnonzero((curves.circle != MATRIX) & (curves.outside == MATRIX))
-    # The middle of the first edge tells where on the circle an arc is.
+    # The middle of the first edge shows where on the circle an arc is.
     begin = curves.first[arc]
     middle = (lines.points[curves.node[begin]] + lines.points[curves.node[begin + 1]]) / 2
     offset = middle - lines.ellipses.centres[curves.circle[arc]]

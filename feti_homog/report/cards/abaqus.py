@@ -29,7 +29,7 @@ ENTRIES = tuple((ORDER[row], ORDER[column]) for column in range(6) for row in ra
 def text(material: EffectiveMaterial) -> str:
     """Return the card. Raises CaseError for an expansion with shears."""
     if material.expansion is not None and material.expansion[3:].any():
-        # Abaqus' guide does not say whether alpha12 of TYPE=ANISO is the tensor's shear or the engineering one.
+        # Abaqus' guide leaves open whether alpha12 of TYPE=ANISO is the tensor's shear or the engineering one.
         raise CaseError(
             "its thermal expansion has shears in its axes, which cards for Abaqus do not carry; "
             "use --transversely-isotropic"

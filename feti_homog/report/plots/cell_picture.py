@@ -39,7 +39,7 @@ MOST_NUMBERS = 2000  # of fibres; of more none could be read
 INSIDE, SEEN = 0.4, 0.85  # of a radius: how far from the sides a number stands, and how far at most from the centre
 POINTS_PER_INCH, CHARACTERS = 72, 2.2
 LEAST_SIZE, LARGEST_SIZE = 3.0, 11.0  # of the letters, in points
-DECADES = 4  # below the density of errors that hardly any area exceeds; less is not told apart
+DECADES = 4  # below the density of errors that hardly any area exceeds; less is one colour
 
 
 def figure(cell: DrawnCell) -> Figure:

@@ -75,7 +75,7 @@ class ReportedAnalysis:
         lines: blocks of the summary, of the units of stresses and of energy release rates in brackets, or empty.
         tables: the same for pages, of the unit of stresses, and with at most so many rows.
         is_curve: whether its states are points of a curve, shown side by side.
-        is_followed: whether the first and the last of them say most.
+        is_followed: whether the first and the last of them matter most.
         picture: name of the picture of a state, "" for that of its unit load.
         is_load_given: whether states of a result are under a load of the case, not under unit strains.
         states: numbers of at most so many of the first states, whose count comes last.

@@ -190,7 +190,7 @@ def constants_lines(document: Document, label: str) -> list[list[str]]:
 def estimates(document: Document, label: str) -> list[Table]:
     """Constants along the fibres and across them.
 
-    A row for each source that knows one, a column for each constant that some source knows.
+    A row for each source that has one, a column for each constant that some source has.
     """
     if document.get("transversely_isotropic") is None:
         return []

@@ -30,7 +30,7 @@ def summary(document: Document) -> str:
 
     Cell, solver, effective stiffness with moduli and bounds or else the points of `angle` or `path`, the state of
     `load`, onsets, checks, timings, memory, warnings and status.
-    Keys that it does not know are left out. Raises KeyError if one that it prints is missing.
+    Other keys are left out. Raises KeyError if one that it prints is missing.
     """
     blocks = [
         _heading(document),

@@ -29,7 +29,7 @@ TABLE_STYLE: dict[str, Any] = {"color": "black", "linewidth": 1.8, "zorder": 3}
 X_FACTOR, MARGIN = 0.94, 1.3  # factors on a logarithmic axis
 CHOICES = (("C11", "bulk", "shear"), ("C11", "C33", "C44", "C66"))
 FIBRES = "cell.fibres"
-FEWEST_OF_INTERVAL = 10  # realisations: of fewer saw-teeth an interval of the mean tells nothing
+FEWEST_OF_INTERVAL = 10  # realisations: of fewer saw-teeth an interval of the mean means nothing
 
 
 def tables(table: SweepTable) -> list[Path]:
