@@ -103,7 +103,7 @@ class TornCell:
 
     def across_bonds(self, solution: DualSolution, u: Float) -> tuple[Float, Float]:
         """(owned rows of `jumps`,) lam and openings of a solution with the displacements u of parts.  Collective."""
-        if not self.summary.across:
+        if not self.summary.across or not self.jumps.global_rows:  # a single part: there is nothing between parts
             return solution.lam, solution.opening
         return self._forces.multipliers(u, solution.strain), self.jumps.sum(self.jumps.B @ u)
 

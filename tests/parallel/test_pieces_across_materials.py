@@ -100,6 +100,16 @@ def test_interface_nodes_are_those_by_bodies_if_one_is_pinned(comm, shared_path)
     assert across.solver.interface_nodes == bodies.solver.interface_nodes > 0
 
 
+def test_porous_cells_of_one_phase_have_fields_and_no_interface(comm, shared_path):
+    on_root(comm, pixel_mesh(np.diag([0, -1, 0, 0])).write, shared_path / "porous.msh")
+    cell = {"cell": {"geometry": "mesh", "file": str(shared_path / "porous.msh")}, "material": {"matrix": MATRIX}}
+    runs = [Case.parse(document(cut) | cell) for cut in ("auto", "bodies")]
+    across, bodies = (run(case, comm, fields=True) for case in runs)
+    assert comm.allreduce(len(across.fields.interface.points)) == 0
+    largest = [[comm.allreduce(np.abs(s.stress).max(), MPI.MAX) for s in r.fields.states] for r in (across, bodies)]
+    np.testing.assert_allclose(*largest, rtol=1e-8)
+
+
 @pytest.mark.parametrize("young", [1e8, 1e-10])
 def test_phases_of_very_different_stiffness_stay_apart(comm, young):
     materials = {"matrix": {"young": 1.0, "poisson": 0.3}, "fibre": {"young": young, "poisson": 0.2}}
