@@ -98,12 +98,14 @@ def energy_errors(
 def is_nested(cell: TornCell, responses: Sequence[Response]) -> bool:
     """Return whether a mesh refined less has the error: not where errors fall more slowly, at corners and tips.
 
-    Not of cells with fibres other than circles and ellipses, nor of quadratic elements with debonded arcs.
+    Not of cells with fibres other than circles and ellipses, nor of debonded arcs with quadratic elements or with tips
+    to which the mesh is not graded: those of a given `tip_size`, and where bonds break.
     """
     summary, lattice = cell.summary, cell.lattice
     if summary.across or not lattice.halvings or np.isnan(summary.frames[summary.fibre_bodies]).any():
         return False  # interiors across materials are factored anyway
-    return lattice.order == 1 or not any(response.debonded for response in responses)
+    graded = cell.case.cell.tip_size is None and not cell.case.section.breaks
+    return (lattice.order == 1 and graded) or not any(response.debonded for response in responses)
 
 
 def _recovered(

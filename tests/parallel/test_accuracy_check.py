@@ -13,6 +13,7 @@ from feti_homog.analysis.mesh_errors import add_errors_of_breaks, note_accuracy
 
 pytestmark = pytest.mark.parallel
 
+EPOXY, GLASS = {"young": 3.45, "poisson": 0.35}, {"young": 73.0, "poisson": 0.22}
 UNIT = {"analysis": {"type": "stiffness", "plane": "strain"}}
 ASKED = {
     "cell": {"geometry": "square", "fibre_fraction": 0.4, "accuracy": 1e-3, "order": 1},
@@ -67,6 +68,17 @@ def test_corners_are_known_from_the_mesh_itself(comm):
     off = np.abs(np.diag(found.effective_stiffness - fine.effective_stiffness))
     ratio = off / np.diag(found.mesh_error.effective_stiffness)
     assert (ratio > 0.2).all() and (ratio < 1.0).all()
+
+
+def test_tips_to_which_the_mesh_is_not_graded_are_known_from_the_mesh_itself(comm):
+    arc = {"contact": False, "debonded": [{"fibre": "all", "centre": 0.0, "angle": 60.0}]}
+    document = {"material": {"matrix": EPOXY, "fibre": GLASS}, "interface": arc, **UNIT}
+    meshes = {"mesh_size": 0.2, "tip_size": 0.2, "refine": 3, "order": 1}, {"mesh_size": 0.1, "refine": 1, "order": 2}
+    cells = ({"geometry": "square", "fibre_fraction": 0.4} | mesh for mesh in meshes)
+    found, exact = (run(Case.parse(document | {"cell": cell}), comm) for cell in cells)
+    off = np.abs(np.diag(found.effective_stiffness - exact.effective_stiffness))
+    ratio = off / np.diag(found.mesh_error.effective_stiffness)
+    assert (ratio > 0.5).all() and (ratio < 2.5).all()  # up to 6 from the mesh refined twice less
 
 
 def test_kept_points_of_a_path_have_errors_of_their_energies(comm):
