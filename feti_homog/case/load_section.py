@@ -141,7 +141,8 @@ class LoadPath(AnalysisSection):
     )
     increments: int | None = key(
         integer(least=1, most=1_000_000),
-        "Number of load steps of the whole path, at least one for each waypoint.",
+        "Number of load steps of the whole path, at least one for each waypoint. Steps end on every waypoint if it "
+        "is a multiple of their number; others pass by the corners of the path.",
         only=BY_INCREMENTS,
     )
     release: str = key(

@@ -19,6 +19,7 @@ from feti_homog.verify.check_fields import (
     check_fields,
     check_interface_state,
     check_mesh_error,
+    check_step_heat,
     check_tied_faces,
 )
 from feti_homog.verify.check_loads import StateNumbers, check_load
@@ -150,6 +151,7 @@ def _verified(files: ResultFiles, directory: Path) -> Certificate:
         check_interface_state(findings, cell, state)
         if before is not None and "path" in files.document:
             check_tied_faces(findings, cell, before, state)
+            check_step_heat(findings, cell, before, state)
         before = state
         states.append(StateNumbers.of(cell, state, fields))
     check_load(findings, cell, states)

@@ -94,6 +94,25 @@ def check_tied_faces(findings: Findings, cell: DiscreteCell, before: State, stat
     )
 
 
+def check_step_heat(findings: Findings, cell: DiscreteCell, before: State, state: State) -> None:
+    """Check that an increment without breaks makes the heat of its slips under the tractions behind it.
+
+    The work of increments is booked as what is stored, lost or heat, so it does not bear witness to the heat.
+    """
+    files, at = cell.files, state.point
+    points = files.document["path"]
+    if at != before.point + 1 or "friction_heat" not in points[at] or damaged_at(points[at]):
+        return
+    if files.case["path"]["method"] == "events" or friction_of_damage_at(files).any():
+        return
+    slips = [each.jump - law_at(files, damage=each.damage).jumps(each.traction) for each in (before, state)]
+    rubs = (state.status == CLOSED) & (friction_at(files) > 0.0)
+    made = np.where(rubs, state.traction[:, 1] * (slips[1] - slips[0])[:, 1], 0.0) @ files.interface.length
+    off = abs(made / cell.area - points[at]["friction_heat"] + points[before.point]["friction_heat"])
+    scale = max(point["stored"] for point in points) or 1e-300
+    findings.record("heat", off / scale, f"path[{at}].friction_heat")
+
+
 def check_fields(findings: Findings, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
     """Everything that the fields of a state obey by themselves; `fields` are what its displacements make."""
     element = f"{state.name}, element {{}}".format
