@@ -94,7 +94,7 @@ class LaterLeg:
         if reached and target == breaks and self._is_due():
             yield from self._break()
         elif reached and target == begins:
-            yield from self._change(min(breaks, certain))
+            yield from self._change(min(breaks, certain), before)
         elif self._differs(before):
             self._false_alarm = False
             if self._share > self._reported + LEAST_SHARE:
@@ -153,17 +153,18 @@ class LaterLeg:
         """(n,) what the load leaves open: stresses, and strains times a stiffness."""
         return np.where(self.end.by_stress, self.cell.plane.scales.largest_stiffness * state.strain, state.stress)
 
-    def _change(self, beyond: float) -> Iterator[Point]:
+    def _change(self, beyond: float, from_state: Equilibrium) -> Iterator[Point]:
         """Report the state in which the contact begins to change, and go on to where the change is beyond doubt.
 
-        If there is a point here, of a break or a waypoint, report the state after the change instead.
+        If there is a point here, of a break or a waypoint, report the state after the change instead.  Faces that touch
+        without a force may open on the way here from `from_state`.
         """
         before, beyond = self._state, min(max(beyond, self._share + LEAST_SHARE), 1.0)
         there_is_one = self._share <= self._reported + LEAST_SHARE
         if not there_is_one:
             yield self._turn(beyond)
         self._stand(beyond, self.cell.equilibrium(self._load_at(beyond), before.bonds, before.multipliers))
-        self._false_alarm = not self._differs(before)
+        self._false_alarm = not self._differs(from_state)
         if there_is_one and not self._false_alarm:
             yield from self._turned()
 
