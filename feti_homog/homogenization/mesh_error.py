@@ -11,7 +11,7 @@ from feti_homog.fem.arc_error import ArcSides, arc_energy
 from feti_homog.fem.stress_recovery import RecoveredStress
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.homogenization.averaging import Response
-from feti_homog.homogenization.nested_interiors import groups, nested_interiors, nested_lattice
+from feti_homog.homogenization.nested_interiors import groups, nested_interiors
 from feti_homog.homogenization.uniform_parts import UniformPart
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.mesh.refinement import FineMesh, joined
@@ -82,7 +82,7 @@ def energy_errors(
     """
     k, area = len(responses), cell.summary.area
     nested = is_nested(cell, responses) if nested is None else nested
-    lattice = nested_lattice(cell.lattice, cell.subdomains) if nested else cell.lattice
+    lattice = cell.nested_lattice if nested else cell.lattice
     fewer = cell.lattice.halvings - lattice.halvings
     of_elements, of_arcs = NESTED[lattice.order][fewer]
     found, shares = np.zeros((2, k, k)), [np.zeros((0, k))]
@@ -121,7 +121,7 @@ def _recovered(
 
 def _nested(cell: TornCell, u: Float, loads: Float, keep: bool) -> Displacements:
     """Yield subdomains, their mesh that is refined less, and their displacements (classes, c, k) on it."""
-    fresh = nested_interiors(cell.solver.interface_operators, cell.lattice)
+    fresh = nested_interiors(cell.solver.interface_operators, cell.lattice, cell.nested_lattice)
     for interior in cell.nested_interiors if keep else fresh:
         yield interior.members, interior.mesh, interior.displacement(u, loads)
 

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from mpi4py import MPI
 
 from feti_homog.fem.assembly import assemble
 from feti_homog.feti.decomposition.subdomain import Subdomain
@@ -75,15 +76,20 @@ class NestedInterior:
         return found.reshape(-1, problem.components, u.shape[1])
 
 
-def nested_lattice(lattice: ReferenceLattice, subdomains: Sequence[Subdomain]) -> ReferenceLattice:
-    """Return the lattice of a rank's coarser mesh: refined once less, or twice where that is often and none locks."""
-    locks = any(s.problem.components == 2 and s.L[0, 1] > LOCKING * s.L[2, 2] for s in subdomains)
+def nested_lattice(lattice: ReferenceLattice, subdomains: Sequence[Subdomain], comm: MPI.Intracomm) -> ReferenceLattice:
+    """Return the lattice of the coarser mesh: refined once less, or twice where that is often and no phase locks.
+
+    Of the subdomains of all ranks.  Collective.
+    """
+    own = any(s.problem.components == 2 and s.L[0, 1] > LOCKING * s.L[2, 2] for s in subdomains)
+    locks = comm.allreduce(own, MPI.LOR)
     return lattice.coarser(2 if lattice.halvings >= REFINED_OFTEN and not locks else 1)
 
 
-def nested_interiors(boundary: InterfaceOperators, lattice: ReferenceLattice) -> Iterator[NestedInterior]:
-    """Yield those of this rank's subdomains, which the lattice refines, some at a time."""
-    coarser = nested_lattice(lattice, boundary.subdomains)
+def nested_interiors(
+    boundary: InterfaceOperators, lattice: ReferenceLattice, coarser: ReferenceLattice
+) -> Iterator[NestedInterior]:
+    """Yield those of this rank's subdomains, which the lattice refines, on the coarser one, some at a time."""
     nested = coarser.within(lattice)
     for group in groups(boundary.subdomains, coarser):
         yield NestedInterior.of(group, boundary, coarser, nested)

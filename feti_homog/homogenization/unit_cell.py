@@ -21,7 +21,7 @@ from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.homogenization import bonds, cell_remarks, cost_model, phase_laws
 from feti_homog.homogenization.coarse_meshes import fill_tiles, place_nodes
 from feti_homog.homogenization.domain_partition import CellSummary, RankShare, distribute
-from feti_homog.homogenization.nested_interiors import NestedInterior, nested_interiors
+from feti_homog.homogenization.nested_interiors import NestedInterior, nested_interiors, nested_lattice
 from feti_homog.homogenization.partition_policy import DEFAULT_POLICY, PartitionPolicy
 from feti_homog.homogenization.tile_tearing import can_be_torn_by_tiles, tear_by_tiles
 from feti_homog.homogenization.uniform_parts import ForcesBetweenParts, UniformPart, numbered, parts_of, share_parts
@@ -68,8 +68,7 @@ class TornCell:
     def parts(self) -> list[UniformPart]:
         """The parts of this rank's subdomains that lie in one body each.  Collective when first read."""
         summary = self.summary
-        names = [summary.phases[k] for k in summary.constituent_phase.tolist()]
-        parts = list(parts_of(self.subdomains, names))
+        parts = list(parts_of(self.subdomains, [summary.phases[k] for k in summary.constituent_phase.tolist()]))
         return numbered(self.comm, parts) if summary.across else parts
 
     @cached_property
@@ -109,10 +108,7 @@ class TornCell:
 
     @cached_property
     def class_nodes(self) -> Int:
-        """(c,) a plane node of each class of this rank's parts, one part after the other.
-
-        The nodes are numbered alike.
-        """
+        """(c,) a plane node, numbered alike, of each class of this rank's parts, one part after the other."""
         nodes, first = [np.zeros(0, np.int64)], 0
         for mesh in (part.mesh for part in self.parts):
             own = np.empty(mesh.n_classes, np.int64)
@@ -141,9 +137,14 @@ class TornCell:
         return debonded_arcs.angles(nodes.points, nodes.fibre, self.summary.centres, self.summary.period)
 
     @cached_property
+    def nested_lattice(self) -> ReferenceLattice:
+        """The lattice of the mesh that is refined less.  Collective when first read."""
+        return nested_lattice(self.lattice, self.subdomains, self.comm)
+
+    @cached_property
     def nested_interiors(self) -> list[NestedInterior]:
         """The interiors of this rank's subdomains on the mesh that is refined less."""
-        return list(nested_interiors(self.solver.interface_operators, self.lattice))
+        return list(nested_interiors(self.solver.interface_operators, self.lattice, self.nested_lattice))
 
     def debonded(self, opening: float | None) -> Bool:
         """(k,) which of this rank's interface nodes are debonded from the start: none without an [interface].

@@ -15,7 +15,6 @@ from feti_homog.analysis.mesh_errors import mesh_error
 from feti_homog.fem.arc_error import ArcSides
 from feti_homog.fem.stress_recovery import RecoveredStress
 from feti_homog.homogenization.mesh_error import EnergyErrors, energy_errors
-from feti_homog.homogenization.nested_interiors import nested_lattice
 
 pytestmark = pytest.mark.parallel
 
@@ -196,7 +195,7 @@ def test_the_mesh_refined_less_tells_nearly_the_same_errors(comm, order, refine)
 def test_bodies_on_the_coarser_mesh_displace_as_on_the_finer(comm, own):
     cell, _, responses = solve(make_case(**own, decomposition={"subdomains": 8}), comm)
     u, loads = (np.stack([getattr(each, name) for each in responses], axis=1) for name in ("u", "strain"))
-    k, nested = len(responses), nested_lattice(cell.lattice, cell.subdomains).within(cell.lattice)
+    k, nested = len(responses), cell.nested_lattice.within(cell.lattice)
     fine = iter(cell.solver.extended(place, u, loads) for place in range(len(cell.subdomains)))
     largest = 0.0
     for interior in cell.nested_interiors:
