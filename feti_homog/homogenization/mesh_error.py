@@ -21,7 +21,7 @@ from feti_homog.typing import Float
 Members = list[Subdomain] | list[UniformPart]
 Displacements = Iterator[tuple[Members, FineMesh, Float]]
 # Errors of elements and of arcs over those of the mesh itself and of meshes refined once and twice less, by the order
-# of elements: of `scripts/measure_mesh_error.py`.
+# of elements: once less by `scripts/measure_mesh_error.py`, twice less by four cells of two meshes each.
 NESTED = {1: ((1.0, 1.0), (0.26, 0.27), (0.07, 0.066)), 2: ((1.0, 1.0), (1 / 15, 1 / 14), (1 / 185, 1 / 255))}
 # The two parts may cancel; at least these shares of both are left, `scripts/measure_mesh_error.py`: in general, and of
 # a pair of states whose faces touch at different places, for which the energy is not bilinear.

@@ -1,8 +1,8 @@
 """Landmarks of a path: its first break, its peak, what is left after it, its end; the points that are kept and shown.
 
 The peak is the largest stress before it falls, of the component whose strain leads; points are those of `path` in
-result.json.  Kept with their fields are the ends, the points around drops, and the rest evenly.  The
-choice is made at the end of the path.
+result.json.  Kept with their fields are the ends, the points around drops, and the rest evenly.  The choice is made at
+the end of the path.
 """
 
 from __future__ import annotations

@@ -66,10 +66,8 @@ def check_mesh(findings: Findings, cell: DiscreteCell) -> None:
     findings.record(
         "mesh", relative(np.abs(normals.sum(axis=0)), cell.files.size.max()), "the sides at voids are closed"
     )
-    is_given = bool(sides.at_void.any()) == (given > 0)
-    findings.record(
-        "mesh", np.where(is_given, 0.0, np.inf), f"cell.porosity = {given:g}, {len(normals)} sides at voids"
-    )
+    agrees = bool(sides.at_void.any()) == (given > 0)
+    findings.record("mesh", np.where(agrees, 0.0, np.inf), f"cell.porosity = {given:g}, {len(normals)} sides at voids")
     findings.record("mesh", sides.mismatch, lambda i: f"a side of element {sides.element[i]}")
 
 

@@ -278,7 +278,7 @@ def _thermal_stresses(
 def _check_levin(
     findings: Findings, cell: DiscreteCell, place: str, thermal: Float, states: Sequence[StateNumbers]
 ) -> None:
-    """By reciprocity, which contact without tension has not."""
+    """Check a thermal stress by reciprocity, which does not hold with contact without tension."""
     if cell.files.contact and any((state.status != BONDED).any() for state in states):
         return
     scale = float(np.abs(thermal).max())

@@ -206,7 +206,7 @@ class Ellipse:
     frame: Float
 
     def moved(self, step: Float) -> Ellipse:
-        """By a vector (2,)."""
+        """Return the ellipse moved by a vector (2,)."""
         return replace(self, centre=self.centre + step)
 
     def between(self, start: Float, stop: Float) -> Float:
