@@ -13,6 +13,7 @@ from feti_homog.errors import LibraryError
 
 SETTINGS = {
     "OMP_NUM_THREADS": "1",  # one core per rank: threads of BLAS would compete with the ranks
+    "OMP_THREAD_LIMIT": "1",  # CHOLMOD starts four whatever the number of threads is: half of its time is theirs
     "H5PY_ALWAYS_USE_MPI": "1",  # Debian has a serial h5py beside the parallel one
     "OMPI_MCA_btl_vader_single_copy_mechanism": "none",  # containers forbid the default of Open MPI 4
     "OMPI_MCA_smsc": "^cma",  # and of Open MPI 5
@@ -53,9 +54,10 @@ def ignore_settings_of_the_folder() -> None:
 
 
 def prepare(environment: MutableMapping[str, str]) -> None:
-    """Set what is not yet set."""
+    """Set what is not yet set; who asks for threads may have them."""
     for name, value in SETTINGS.items():
-        environment.setdefault(name, value)
+        if name != "OMP_THREAD_LIMIT" or environment["OMP_NUM_THREADS"] == "1":
+            environment.setdefault(name, value)
 
 
 def require_report() -> None:

@@ -21,6 +21,7 @@ RUN_VARIABLES = {
     "OMPI_MCA_hwloc_base_binding_policy": "none",  # all of them: rank 0 of every small job would be bound to the first
     "PRTE_MCA_hwloc_default_binding_policy": "none",  # the same of Open MPI 5
     "OMP_NUM_THREADS": "1",
+    "OMP_THREAD_LIMIT": "1",
     "H5PY_ALWAYS_USE_MPI": "1",
 }
 

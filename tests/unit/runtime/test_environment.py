@@ -13,9 +13,16 @@ from feti_homog.runtime import environment
 
 
 def test_settings_of_the_user_stay():
+    variables = {"OMP_THREAD_LIMIT": "2"}
+    environment.prepare(variables)
+    assert variables == environment.SETTINGS | {"OMP_THREAD_LIMIT": "2"}
+
+
+def test_threads_that_the_user_asks_for_are_not_limited():
     variables = {"OMP_NUM_THREADS": "4"}
     environment.prepare(variables)
-    assert variables == environment.SETTINGS | {"OMP_NUM_THREADS": "4"}
+    assert variables.pop("OMP_NUM_THREADS") == "4" and "OMP_THREAD_LIMIT" not in variables
+    assert environment.SETTINGS.items() >= variables.items()
 
 
 def test_numpy_is_not_loaded_before_the_settings():
