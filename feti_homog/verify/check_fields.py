@@ -168,18 +168,21 @@ def _group_means(group: Int, values: Float) -> Float:
 
 
 def _check_equilibrium(findings: Findings, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
-    """Return the forces of all copies of a node add up to zero.
+    """Check that the forces of all copies of a node add up to zero, those of each face at an interface to its traction.
 
-    At an interface node those of each face to its traction.
+    The place that is held, where u* = 0, collects what rounding leaves at all others: errors of independent signs, so
+    the root of the sum of their squares.
     """
     nodes, faces = cell.nodes, cell.faces
     traction = interface_forces(cell, state)
     scale = max(fields.largest_force, float(np.abs(traction).max(initial=0.0)))
     scale = max(scale, cell.least_stress(state) * float(np.sqrt(cell.elements.area.min())) * 1e-3)
+    held = (state.fluctuation == 0.0).all(axis=1)
+    most, of_all = float(fields.force_size.max()), float(np.linalg.norm(fields.force_size))
     rest = fields.force.copy()
     rest[nodes.node] = 0.0
-    scale += ROUNDED_TERMS * fields.force_size  # of all nodes: the one that is held collects what is left of the others
-    findings.record("equilibrium", relative(np.abs(rest).max(axis=1), scale), f"{state.name}, mesh node {{}}".format)
+    scales = scale + ROUNDED_TERMS * np.where(held, of_all, most)
+    findings.record("equilibrium", relative(np.abs(rest).max(axis=1), scales), f"{state.name}, mesh node {{}}".format)
     side, inverse = np.unique(_sides(cell), return_inverse=True)
     own = fields.force[nodes.node]
     sums = np.stack([np.bincount(inverse.ravel(), column, len(side)) for column in own.T], axis=1)
@@ -195,7 +198,9 @@ def _check_equilibrium(findings: Findings, cell: DiscreteCell, state: State, fie
     def name(i: int) -> str:
         return where.format(nodes.node[first[i]], f" (interface node {at[i]})" if at[i] >= 0 else "")
 
-    findings.record("equilibrium", relative(np.abs(sums).max(axis=1), scale), name)
+    is_held = np.bincount(inverse.ravel(), held[nodes.node], len(side)) > 0
+    scales = scale + ROUNDED_TERMS * np.where(is_held, of_all, most)
+    findings.record("equilibrium", relative(np.abs(sums).max(axis=1), scales), name)
 
 
 def _check_averages(findings: Findings, cell: DiscreteCell, state: State, fields: ElementFields) -> None:

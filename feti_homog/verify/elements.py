@@ -39,8 +39,8 @@ class ElementFields:
         strain_size: (m,) sum t_a |dN_a/dx| with the terms t of u, du/dx times the same of places, and the other
             strains, of whose rounding the strain has its share.
         force: (n, c) int B^T sigma, what the elements of a node resist with.
-        force_size: the largest sum of |dN/dx| |L| strain_size over the elements of a node, of whose rounding the forces
-            have their share: large where a phase is far stiffer than it is strained.
+        force_size: (n,) the larger sum of |dN/dx| |L| strain_size over the elements of a node, of whose rounding the
+            forces have their share: large where a phase is far stiffer than it is strained.
         largest_force: the largest that a single element exerts on a node.
         energy: int sigma : eps.
     """
@@ -49,7 +49,7 @@ class ElementFields:
     stress: Float
     strain_size: Float
     force: Float
-    force_size: float
+    force_size: Float
     largest_force: float
     energy: float
 
@@ -112,7 +112,7 @@ class Elements:
             _add(terms, nodes, np.einsum("eqad,eq,e->ead", np.abs(gradients), weights, rounded, optimize=True))
             largest = max(largest, float(np.abs(own).max()))
             energy += float(np.einsum("eqi,eqi,eq->", answer, local, weights, optimize=True))
-        return ElementFields(strain, stress, size, force, float(terms.max()), largest, energy)
+        return ElementFields(strain, stress, size, force, terms.max(axis=1), largest, energy)
 
     def _add_bubbles(self, part: slice, gradients: Float, weights: Float, local: Float, free: Float) -> Float:
         """(e, q) pressure of mixed elements less lambda tr eps, 0 in others; adds the bubbles' strains to `local`."""

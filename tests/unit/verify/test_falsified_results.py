@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from support.falsifications import (
@@ -19,7 +21,9 @@ from support.verified_results import CASES, LOADS, MIXED_PATHS, falsified
 
 from feti_homog.verify.cell_tables import gradient
 from feti_homog.verify.certificate import verify
+from feti_homog.verify.check_fields import check_fields
 from feti_homog.verify.discrete_cell import DiscreteCell
+from feti_homog.verify.findings import Findings, checks
 from feti_homog.verify.reading import opened
 
 pytestmark = pytest.mark.slow
@@ -254,3 +258,24 @@ def test_displacements_that_fit_their_stresses_break_equilibrium_alone(results, 
         "equilibrium",
         "files",
     }
+
+
+def test_the_held_place_may_collect_the_rounding_of_all_others_and_no_more(results):
+    """As beside a phase that is far stiffer than it is strained: terms are large, forces are not."""
+    rng, limits = np.random.default_rng(1), []
+    with opened(results("bonded")) as files:
+        cell, state = DiscreteCell.of(files), next(files.states())
+        displacement = state.displacement
+        fields = cell.elements.fields(displacement, np.abs(displacement))
+        fields = replace(fields, force_size=1e6 * fields.force_size)
+        inner = np.setdiff1d(np.arange(len(displacement)), cell.nodes.node)
+        held = np.flatnonzero((state.fluctuation == 0).all(axis=1))[0]
+        noise = np.zeros_like(displacement)
+        noise[inner] = 0.5e-15 * fields.force_size.max() * rng.choice([-1.0, 1.0], (len(inner), 2))
+        noise[held] = -noise.sum(axis=0)
+        assert np.abs(noise[held]).max() > 4 * np.abs(noise[inner]).max()
+        for added in (noise, 10 * noise, np.roll(noise, inner[0] - held, axis=0)):
+            findings = Findings(checks(1e-8, users_mesh=False, has_coatings=False))
+            check_fields(findings, cell, state, replace(fields, force=fields.force + added))
+            limits.append(next(found.holds for found in findings.worst() if found.check.name == "equilibrium"))
+    assert limits == [True, False, False]
