@@ -12,6 +12,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 import tomllib
 from functools import cache
 from pathlib import Path
@@ -19,7 +20,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 TABLE = ROOT / "tests" / "mutations.toml"
 PYTEST = ("pytest", "-x", "-q", "-p", "no:cacheprovider")
-LIMIT_S = 90  # ranks that wait for each other have noticed the error, too
+# Ranks that wait for each other have noticed the error, too: after this many times as long as the tests take without.
+TIMES, LEAST_S, LIMIT_S = 4.0, 90.0, 1200.0
 PASSED, FAILED, LATE = 0, 1, (124, 137, -9)
 
 
@@ -34,18 +36,24 @@ def copied(folder: Path) -> Path:
     return folder
 
 
-def run_tests(folder: Path, tests: str, ranks: int) -> int:
+def run_tests(folder: Path, tests: str, ranks: int, limit: float) -> int:
     """Return the exit status of tests in a folder at this number of ranks; `tests` are pytest's or hostile ones."""
     is_hostile = tests.startswith("hostile ")
     words = [sys.executable, "-m", *([] if is_hostile else PYTEST), *shlex.split(tests)]
     command = words if ranks == 1 else ["mpirun", "--oversubscribe", "-n", str(ranks), *words, "-m", "parallel"]
     paths = ":".join(str(folder / name) for name in ("", "tests", "scripts"))
     environment = os.environ | {"PYTHONPATH": paths, "PYTHONDONTWRITEBYTECODE": "1"}
-    job = ["timeout", "--kill-after=10", str(LIMIT_S), *command]
+    job = ["timeout", "--kill-after=10", str(limit), *command]
     return subprocess.run(job, cwd=folder, env=environment, capture_output=True).returncode
 
 
-def outcome(folder: Path, mutation: tuple[str, str, str], tests: str, ranks: int) -> str:
+def time_of(folder: Path, tests: str, ranks: int) -> float | None:
+    """Return the seconds that tests take without an error; None if they fail."""
+    begin = time.monotonic()
+    return time.monotonic() - begin if run_tests(folder, tests, ranks, LIMIT_S) == PASSED else None
+
+
+def outcome(folder: Path, mutation: tuple[str, str, str], tests: str, ranks: int, limit: float) -> str:
     """Put an error in, run the tests and take it out again; returns what became of it."""
     name, old, new = mutation
     path = folder / name
@@ -54,7 +62,7 @@ def outcome(folder: Path, mutation: tuple[str, str, str], tests: str, ranks: int
         return f"not tried: {text.count(old)} such lines"
     path.write_text(text.replace(old, new), encoding="utf-8")
     try:
-        status = run_tests(folder, tests, ranks)
+        status = run_tests(folder, tests, ranks, limit)
     finally:
         path.write_text(text, encoding="utf-8")
     return "SURVIVED" if status == PASSED else "killed" if status in (FAILED, *LATE) else f"not tried: status {status}"
@@ -65,14 +73,16 @@ def main(words: list[str]) -> int:
     alive = tried = 0
     with tempfile.TemporaryDirectory() as temporary:
         folder = copied(Path(temporary))
-        passes = cache(lambda tests, ranks: run_tests(folder, tests, ranks) == PASSED)
+        takes = cache(lambda tests, ranks: time_of(folder, tests, ranks))
         for group in groups:
             tests, ranks = group["tests"], group.get("ranks", 1)
             for mutation in group["lines"]:
                 line = f"{mutation[0]}: {mutation[2]}   [{ranks}: {tests}]"
                 if words and not any(word in line for word in words):
                     continue
-                found = outcome(folder, mutation, tests, ranks) if passes(tests, ranks) else "not tried: tests fail"
+                alone = takes(tests, ranks)
+                limit = max(LEAST_S, TIMES * (alone or 0.0))
+                found = outcome(folder, mutation, tests, ranks, limit) if alone else "not tried: tests fail"
                 tried, alive = tried + 1, alive + (found != "killed")
                 print(f"{found:10} {line}", flush=True)
     print(f"{tried - alive} of {tried} killed")

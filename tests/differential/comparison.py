@@ -20,7 +20,10 @@ LEFT_OUT = {
 }  # fmt: skip
 # Numbers of the solver, or of pieces; a ratio of two others; which point is the peak, as above.
 LEFT_OUT_WITHIN = {"iterations", "nodes", "dissipation_ratio", "mark"}
-ENERGIES = {"stored", "stored_in_springs", "work", "dissipated", "dissipated_strain_controlled", "fracture_energy"}
+ENERGIES = {
+    "stored", "stored_in_springs", "work", "dissipated", "dissipated_strain_controlled", "fracture_energy",
+    "friction_heat",
+}  # fmt: skip
 RATES = {"G", "G_I", "G_II"}
 DIRECTIONS = {"angle", "bond_angle", "psi"}
 COUNTS = {"broke", "bonded", "open", "closed", "free_motions", "fibre", "interface", "number", "elements"}

@@ -27,7 +27,8 @@ from feti_homog.parallel.mpi_errors import end_job, on_root
 # Relations that a case draws, and the share of cases that try one of these on all ranks.
 DRAWN_PER_CASE = 2
 SHARE_ON_ALL_RANKS = 0.25
-NOT_CARRIED = "prescribe strains there"  # of a path that ends since nothing carries the stresses any more
+# Of a path that ends since nothing carries the stresses any more, or faces with friction cannot go on.
+NOT_CARRIED = "prescribe strains there", "friction: "
 HELD, REFUSED, FAILED = "held", "refused", "FAILED"
 RUNS = "runs"
 ROWS = "rows*.json"  # of a case, in its folder
@@ -133,7 +134,9 @@ def _checked(comm: Any, relation: Relation, drawn: Drawn, base: Any, folder: Pat
 
 def _of_error(number: int, relation: str, error: Exception, refusals: tuple[type[Exception], ...]) -> Row:
     """Return the row of a relation, or a case, whose run raised."""
-    refused = isinstance(error, refusals) or (isinstance(error, FetiHomogError) and NOT_CARRIED in str(error))
+    refused = isinstance(error, refusals) or (
+        isinstance(error, FetiHomogError) and any(words in str(error) for words in NOT_CARRIED)
+    )
     words = f"{type(error).__name__}: {error}"
     if not isinstance(error, FetiHomogError):
         words = "".join(traceback.format_exception(error))

@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from differential.random_cells import random_cell
-from differential.random_loads import random_bonds, random_loads
+from differential.random_loads import random_bonds, random_friction, random_loads
 from differential.random_phases import Document, random_phases
+from differential.transforms import sections
 from feti_homog import Case
 
 ANALYSES = {"stiffness": 0.2, "angle": 0.1, "path": 0.4, "load": 0.15, "envelope": 0.15}
@@ -28,7 +29,7 @@ DECOMPOSITIONS: tuple[Document, ...] = (
     {"decomposition": {"max_dofs": 200}},
 )
 # Streams of random numbers of a case: those of one do not depend on how many others draw.
-CASE, RELATIONS, ON_ALL_RANKS = 0, 1, 2
+CASE, RELATIONS, ON_ALL_RANKS, FRICTION = 0, 1, 2, 3
 
 
 @dataclass(frozen=True)
@@ -93,4 +94,6 @@ def draw(seed: int, number: int, folder: Path) -> Drawn:
     document |= DECOMPOSITIONS[rng.choice(len(DECOMPOSITIONS), p=[0.6, 0.2, 0.15, 0.05])]
     if analysis in ("stiffness", "load") and rng.random() < 0.4:
         document["petsc"] |= SOLVERS[rng.integers(len(SOLVERS))]
+    if analysis == "path":
+        random_friction(stream(seed, number, FRICTION), sections(document), plane)
     return Drawn(seed, number, document, folder)

@@ -18,6 +18,7 @@ STRENGTH = 0.012
 TEMPERATURE = 200.0
 MOST_LEGS = 3
 STEPS = 6  # of a path by increments
+RUB = 0.5  # share of the paths with contact whose faces have friction
 
 
 def components(plane: str) -> int:
@@ -57,6 +58,18 @@ def _law(rng: np.random.Generator, common: Document, breaks: bool, plane: str, l
     elif breaks:
         law |= {f"{key}_strength": STRENGTH * float(rng.uniform(0.7, 1.6)) for key in keys}
     return law
+
+
+def random_friction(rng: np.random.Generator, sections: list[Document], plane: str) -> None:
+    """Give the faces of a path with contact a coefficient of friction, of each pair its own; not of every path."""
+    if not sections or not sections[0]["contact"] or rng.random() > RUB:
+        return
+    for section in sections:
+        section["friction"] = float(rng.uniform(0.1, 0.9))
+        if section.get("growth") == "released":
+            section["growth"] = "springs"
+        if plane == "generalized" and rng.random() < 0.5:
+            section["axial_friction"] = "prevented"
 
 
 def _arcs(rng: np.random.Generator, analysis: str, fibres: int) -> list[Document]:

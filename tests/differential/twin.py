@@ -1,7 +1,8 @@
 """Solve the states of a result once more by SciPy: bodies, bonds and contact, assembled anew from result.h5.
 
-It shares with the program the mesh, normals and lengths of the interfaces, which `verify` checks, and which bonds hold
-and which faces touch.  u = (u1, u2, u3) is u* of all nodes, one for each constituent at each place of the torus.
+It shares with the program the mesh, normals and lengths of the interfaces, which `verify` checks, which bonds hold and
+which faces touch, and the slip of faces with friction, whose shear must obey Coulomb's law.
+u = (u1, u2, u3) is u* of all nodes, one for each constituent at each place of the torus.
 """
 
 from __future__ import annotations
@@ -32,11 +33,12 @@ OPEN, CLOSED, BONDED = 2, 1, 0
 
 @dataclass(frozen=True)
 class Twin:
-    """Deviations of a state: stress and energy relative to their largest; contact, what opens or overlaps wrongly."""
+    """Deviations of a state: stress and energy relative to their largest; of contact and friction by their laws."""
 
     stress: float
     energy: float
     contact: float
+    friction: float
 
 
 def phase_law(material: Any, plane: str) -> tuple[np.ndarray, np.ndarray]:
@@ -123,6 +125,10 @@ class SolvedAnew:
         self.joined = np.where(parted, np.arange(self.n), first[place_of])
         pair = own["pair"][()] if "pair" in own else np.zeros(self.k, int)
         self.springs = self._springs()[pair] if self.k else np.zeros((0, 3))
+        rubbing = [(each.get("friction", 0.0), each.get("axial_friction") == "prevented")
+                   for each in sections(self.document["case"]) or [{}]]  # fmt: skip
+        self.friction, tied = np.array(rubbing, float)[pair].T if self.k else np.zeros((2, 0))
+        self.tied = (tied > 0.0) & (self.friction > 0.0)
 
     def _springs(self) -> np.ndarray:
         """(sections, 3) stiffnesses of bonds, inf of glue."""
@@ -138,28 +144,35 @@ class SolvedAnew:
         status = state["status"][()]
         load, stress = self._loads(state)
         holds = np.column_stack([status != OPEN, status == BONDED, status == BONDED])
+        rubs = np.column_stack([np.zeros(self.k, bool), self.friction > 0.0, self.tied]) & (status == CLOSED)[:, None]
         glued, sprung = holds & np.isinf(self.springs), holds & np.isfinite(self.springs)
         whole = glued.all(axis=1)
         jumps = self._jumps()
-        stiff = diags((np.where(sprung, self.springs, 0.0) * self.length[:, None]).ravel())
+        springs = (np.where(sprung, self.springs, 0.0) * self.length[:, None]).ravel()
         T = self._together(whole)
-        held = (glued & ~whole[:, None]).ravel()
+        held = (rubs | glued & ~whole[:, None]).ravel()
         C = (jumps[held] @ T).tocsr()
-        K = self.K + jumps.T @ stiff @ jumps
-        u, force = _solved((T.T @ K @ T).tocsr(), C, -T.T @ (self.Q @ load))
+        K = self.K + jumps.T @ diags(springs) @ jumps
+        slip = np.where(rubs, self._jump(state), 0.0).ravel()[held]
+        u, force = _solved((T.T @ K @ T).tocsr(), C, -T.T @ (self.Q @ load), slip)
         u = T @ u
+        jump = jumps @ u
+        pull = springs * jump
+        pull[held] -= force
         area = float(self.size.prod())
         found = (self.mean @ load + self.Q.T @ u) / area
-        energy = (load @ self.mean @ load / 2 + load @ self.Q.T @ u + u @ (K @ u) / 2) / area
+        # Springs are in series with faces that rub.
+        rubbed = np.where(rubs, pull.reshape(-1, 3) ** 2 / self.springs, 0.0).sum(axis=1)
+        energy = (load @ self.mean @ load + u @ (K @ u) + (rubbed / self.length).sum()) / 2 + load @ self.Q.T @ u
         v = len(stress)
         found = found[:6] if v == 6 else found[IN_PLANE]
         size = max(np.abs(stress).max(), self._least(load))
         entry = self._entry(state)
         stored = entry.get("stored") if entry else None
-        off = 0.0 if stored is None else abs(energy - stored) / max(abs(stored), self._least(load) * _largest(load))
-        return Twin(
-            float(np.abs(found - stress).max() / size), off, self._contact(status, jumps @ u, held, force, entry)
-        )
+        least = self._least(load) * _largest(load)
+        off = 0.0 if stored is None else abs(energy / area - stored) / max(abs(stored), least)
+        contact = self._contact(status, jump, pull.reshape(-1, 3), entry)
+        return Twin(float(np.abs(found - stress).max() / size), off, contact, self._rubbing(state, pull.reshape(-1, 3)))
 
     def _loads(self, state: Any) -> tuple[np.ndarray, np.ndarray]:
         strain, stress = (np.array(state.attrs[name], float) for name in ("strain", "stress"))
@@ -199,20 +212,29 @@ class SolvedAnew:
         one = csr_matrix((np.ones(self.n), (np.arange(self.n), number)), shape=(self.n, count))
         return block_diag([one] * 3).tocsr()[_interleaved(self.n)][:, _interleaved(count)]
 
-    def _contact(self, status: Any, jump: Any, held: Any, force: Any, entry: Any) -> float:
+    def _contact(self, status: Any, jump: Any, pull: Any, entry: Any) -> float:
         """Compute overlap / largest jump of open faces and pull / largest force of closed ones, without free fibres."""
         contact = any(section.get("contact", False) for section in sections(self.document["case"]))
         if not contact or not self.k or not entry or entry.get("free_motions", 0):
             return 0.0
-        forces = np.zeros(3 * self.k)
-        forces[held] = -force
-        pull = (
-            forces + np.where(np.isfinite(self.springs), self.springs, 0.0).ravel() * np.repeat(self.length, 3) * jump
-        )
-        gap, normal = jump.reshape(-1, 3)[:, 0], pull.reshape(-1, 3)[:, 0]
+        gap, normal = jump.reshape(-1, 3)[:, 0], pull[:, 0]
         largest_gap, largest_pull = np.abs(jump).max(initial=0.0), np.abs(pull).max(initial=0.0)
         overlap = float(np.max(-gap[status == OPEN], initial=0.0)) / (largest_gap or 1.0)
         return max(overlap, float(np.max(normal[status == CLOSED], initial=0.0)) / (largest_pull or 1.0))
+
+    def _jump(self, state: Any) -> np.ndarray:
+        """(k, 3) jumps that a result has."""
+        along = state["axial_jump"][()] if "axial_jump" in state else np.zeros(self.k)
+        return np.column_stack([state["jump"][()], along])
+
+    def _rubbing(self, state: Any, pull: np.ndarray) -> float:
+        """Compute what shear exceeds mu p, or differs from it where faces slide, / largest force."""
+        if not self.friction.any():
+            return 0.0
+        shear, limit = pull[:, 1], self.friction * np.maximum(-pull[:, 0], 0.0)
+        closed, sign = (state["status"][()] == CLOSED) & (self.friction > 0.0), state["sliding"][()]
+        off = np.where(sign != 0, np.abs(sign * shear - limit), np.maximum(np.abs(shear) - limit, 0.0))
+        return float(off[closed].max(initial=0.0) / (np.abs(pull).max(initial=0.0) or 1.0))
 
 
 def _largest(load: np.ndarray) -> float:
@@ -230,14 +252,14 @@ def _interleaved(n: int) -> np.ndarray:
     return np.asarray((np.arange(n)[:, None] + n * np.arange(3)).ravel())
 
 
-def _solved(K: Any, C: Any, f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Solve K u - C^T force = f, C u = 0 by refinement from a little stiffness, which keeps free motions small."""
+def _solved(K: Any, C: Any, f: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Solve K u - C^T force = f, C u = c by refinement from a little stiffness, which keeps free motions small."""
     m, n = C.shape
     scale = K.diagonal().max()
     borders = bmat([[K, -C.T * scale], [-C * scale, csr_matrix((m, m))]]).tocsc() if m else K.tocsc()
     more = block_diag([FREE * scale * identity(n), csr_matrix((m, m))]).tocsc() if m else FREE * scale * identity(n)
     factor = splu((borders + more).tocsc())
-    b = np.r_[f, np.zeros(m)]
+    b = np.r_[f, -scale * c]
     x = np.zeros(len(b))
     for _ in range(REFINEMENTS):
         x += factor.solve(b - borders @ x)

@@ -14,6 +14,7 @@ from differential.__main__ import CASES, SEED
 from differential.comparison import DIFFERENT, apart, envelopes_apart, leaves
 from differential.paths import document_of, keyed, paths_apart
 from differential.random_cases import draw, stream
+from differential.random_loads import STEPS
 from differential.twin import SolvedAnew
 from mpi4py import MPI
 from support import dimensions
@@ -22,7 +23,7 @@ from support.dimensions import Units
 from feti_homog import run
 
 WRONG = 1e-6
-STATE = "state/0"
+STATE, LAST = "state/0", STEPS - 1
 SHAPES = {"ellipses": "a", "polygons": "sides", "hollow fibres": "inner_radius", "coatings": "coating"}
 
 
@@ -38,6 +39,8 @@ def kinds(drawn):
     has |= {"pieces"} & {"pieces" * ("decomposition" in document)}
     for section in sections:
         has |= {f"contact {section['contact']}", str(section.get("criterion")), str(section.get("growth"))}
+        has |= {"friction"} if section.get("friction") else set()
+        has |= {f"axial friction {section['axial_friction']}"} if "axial_friction" in section else set()
         has |= {"springs" if "normal_stiffness" in section else "glue", "arcs" * bool(section.get("debonded"))}
     has |= {"bonded"} if not sections else {f"{len(sections)} interfaces"}
     has |= {path.get("method", "events")} if path else set()
@@ -59,7 +62,7 @@ def test_the_cases_of_ci_cover_the_language(tmp_path):
         "plane strain", "plane stress", "plane generalized", "order 1", "order 2", "torus", "plane", *SHAPES, "voids",
         "refined", "pieces", "contact True", "contact False", "max", "quadratic", "energy", "released", "springs",
         "glue", "arcs", "bonded", "1 interfaces", "2 interfaces", "events", "increments", "legs", "stresses",
-        "temperature",
+        "temperature", "friction", "axial friction prevented",
     }  # fmt: skip
     assert expected <= found.keys(), expected - found.keys()
 
@@ -90,6 +93,11 @@ def is_small_path(drawn):
 
 def is_load(drawn):
     return drawn.analysis == "load" and "interface" in drawn.document
+
+
+def rubs(drawn):
+    """Return True for increments with friction; their states are all kept."""
+    return drawn.document.get("path", {}).get("method") == "increments" and "friction" in kinds(drawn)
 
 
 def put(document, path, place=0):
@@ -164,6 +172,19 @@ def test_the_solve_by_scipy_notices_a_wrong_stress_and_energy(solved):
     cell.document["load"]["stored"] *= 1 + WRONG
     wrong = cell.compare(0)
     assert wrong.stress == pytest.approx(WRONG, rel=0.01) and wrong.energy == pytest.approx(WRONG, rel=0.01)
+
+
+@pytest.mark.parametrize(("part", "factor", "noticed"), [("sliding", -1, "friction"), ("jump", 1.01, "stress")])
+def test_the_solve_by_scipy_notices_faces_that_slide_otherwise(solved, part, factor, noticed):
+    _, folder = solved(rubs)
+    name = f"state/{LAST}/{part}"
+    for expected, scale in ((True, 1), (False, factor), (True, 1 / factor)):
+        with h5py.File(folder / "result.h5", "r+") as file:
+            file[name][...] = file[name][()] * scale
+        cell = SolvedAnew(folder)
+        found = cell.compare(LAST)
+        cell.file.close()
+        assert (max(vars(found).values()) < 1e-8) == expected and (getattr(found, noticed) < 1e-4) == expected
 
 
 def test_streams_of_a_case_do_not_depend_on_others():
