@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from mpi4py import MPI
-from scipy.sparse import csr_matrix, issparse, vstack
+from scipy.sparse import csr_matrix, vstack
 
 from feti_homog.errors import ConvergenceError
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace
@@ -52,14 +52,15 @@ class Placement:
 
 @dataclass(frozen=True)
 class _Fibres:
-    """On rank 0, of all open nodes: the change of gap and slip with each free motion, (k, motions), and the fibre.
+    """On rank 0, of all open nodes: the change of gap with each free motion, (k, motions), and the fibre.
 
-    A fibre and its coating, which may part too, are one, and so are layers with others between them.
+    A fibre and its coating, which may part too, are one, and so are layers with others between them.  `reach`
+    (motions,) is the largest gap or slip of each motion at any node: open nodes alone may be within what moves as one.
     """
 
     is_open: Bool
     opening: csr_matrix
-    slip: csr_matrix
+    reach: Float
     fibre: Array
 
     def nodes_and_motions(self, of: Bool) -> Iterator[tuple[Array, Float, Array, Float]]:
@@ -70,11 +71,11 @@ class _Fibres:
         """
         nodes = np.flatnonzero(self.is_open & np.isin(self.fibre, self.fibre[self.is_open & of]))
         nodes = nodes[np.argsort(self.fibre[nodes], kind="stable")]
-        opening, slip = self.opening[nodes], self.slip[nodes]
+        opening = self.opening[nodes]
         ends = [0, *(np.flatnonzero(np.diff(self.fibre[nodes])) + 1), len(nodes)]
         for first, last in pairwise(ends) if len(nodes) else ():
-            columns, (motions, slips) = _block(first, last, opening, slip)
-            modes = _opening_modes(motions, slips)
+            columns, motions = _block(first, last, opening)
+            modes = _opening_modes(motions, self.reach[columns])
             yield nodes[first:last], motions @ modes, columns, modes
 
 
@@ -148,13 +149,15 @@ def _decided_on_root(
     """decide(fibres, *gaps, noise) of rank 0, with the gaps of all nodes, on every rank; collective."""
     free = coarse.unconstrained_modes.tocsr()
     opening, slip = ((coarse.G[nodes.row + i] @ free).tocsr() for i in range(2))
-    parts = comm.gather((is_open, opening, slip, nodes.bodies, *gaps))
+    reach = np.zeros(free.shape[1])
+    np.maximum.at(reach, np.r_[opening.indices, slip.indices], np.abs(np.r_[opening.data, slip.data]))
+    parts = comm.gather((is_open, opening, nodes.bodies, reach, *gaps))
 
     def decided() -> T:
-        each = zip(*(parts or []), strict=True)
-        whole = [vstack(p).tocsr() if issparse(p[0]) else np.concatenate(p) for p in each]
-        groups = _moving_together(whole[3], coarse.pinned_body)
-        return decide(_Fibres(whole[0], whole[1], whole[2], groups), *whole[4:], noise)
+        is_open, opening, bodies, reach, *gaps = zip(*(parts or []), strict=True)
+        groups = _moving_together(np.concatenate(bodies), coarse.pinned_body)
+        fibres = _Fibres(np.concatenate(is_open), vstack(opening).tocsr(), np.max(reach, axis=0), groups)
+        return decide(fibres, *map(np.concatenate, gaps), noise)
 
     return on_root(comm, decided)
 
@@ -193,25 +196,18 @@ def _shares_of_all(fibres: _Fibres, here: Float, ahead: Float, noise: float) -> 
     return float(begins), float(certain)
 
 
-def _block(first: int, last: int, *matrices: csr_matrix) -> tuple[Array, list[Float]]:
-    """Return the columns (c,) in which rows of these matrices have entries, and the dense rows (rows, c) there."""
-    spans = [slice(*matrix.indptr[[first, last]]) for matrix in matrices]
-    parts = [(matrix.indices[span], matrix.data[span]) for matrix, span in zip(matrices, spans, strict=True)]
-    columns, dense = np.unique(np.concatenate([indices for indices, _ in parts])), []
-    for matrix, (indices, data) in zip(matrices, parts, strict=True):
-        block = np.zeros((last - first, len(columns)))
-        row = np.repeat(np.arange(last - first), np.diff(matrix.indptr[first : last + 1]))
-        block[row, np.searchsorted(columns, indices)] = data
-        dense.append(block)
-    return columns, dense
+def _block(first: int, last: int, matrix: csr_matrix) -> tuple[Array, Float]:
+    """Return the columns (c,) in which these rows of a matrix have entries, and the dense rows (rows, c) there."""
+    columns = np.unique(matrix.indices[slice(*matrix.indptr[[first, last]])])
+    return columns, matrix[first:last, columns].toarray()
 
 
-def _opening_modes(opening: Float, slip: Float) -> Float:
-    """(modes, m) the combinations of modes that open gaps: not those that slide."""
+def _opening_modes(opening: Float, reach: Float) -> Float:
+    """(modes, m) the combinations of modes that open gaps: not those that slide, or move both faces alike."""
     if not opening.size:
         return np.zeros((opening.shape[1], 0))
     _, size, basis = np.linalg.svd(opening, full_matrices=False)
-    return np.asarray(basis[size > LARGEST_GAP_OF_SLIDING * max(size[0], np.abs(slip).max())].T)
+    return np.asarray(basis[size > LARGEST_GAP_OF_SLIDING * max(size[0], reach.max())].T)
 
 
 def _largest_gap(gap: Float, motion: Float) -> tuple[Float, float, Float]:

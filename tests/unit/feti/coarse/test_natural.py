@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from mpi4py import MPI
-from scipy.sparse import diags, identity
+from scipy.sparse import diags, hstack, identity
 
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace
 from feti_homog.interface.contact.floating_bodies import place
@@ -46,8 +46,13 @@ def loose_fibres(weights=1.0):
     ]
     bodies.append(SimpleNamespace(R=np.zeros((0, 0)), submesh=SimpleNamespace(body=0, pinned=0)))
     dofs = [np.arange(len(body.R)) for body in bodies]
-    operators = SimpleNamespace(subdomains=bodies, dofs=dofs, B=diags(weights * np.ones(ROWS)).tocsr())
-    return NaturalCoarseSpace(MPI.COMM_SELF, SimpleNamespace(owned=(0, ROWS), rows=np.arange(ROWS)), operators)
+    return coarse_space(bodies, dofs, diags(weights * np.ones(ROWS)))
+
+
+def coarse_space(bodies, dofs, B):
+    """Natural coarse space of these bodies on one rank."""
+    operators, n = SimpleNamespace(subdomains=bodies, dofs=dofs, B=B.tocsr()), B.shape[0]
+    return NaturalCoarseSpace(MPI.COMM_SELF, SimpleNamespace(owned=(0, n), rows=np.arange(n)), operators)
 
 
 @pytest.fixture(scope="module")
@@ -108,3 +113,22 @@ def test_one_of_many_loose_fibres_that_overlaps_is_moved(coarse):
     assert jump[row].min() < 0.0 and not found.pressed.any()
     placed = (jump + found.jump(coarse))[row].reshape(FIBRES, NODES)
     assert placed.min() > 0.01 - 1e-9 and np.abs(np.delete(placed, moved, axis=0) - 0.01).max() < 1e-12
+
+
+def test_gaps_within_what_turns_as_one_move_nothing():
+    """A coating and its fibre, bonded at one node, turn as one: their own gaps and slips are rounding of that."""
+    n = 2 * NODES
+    outer, inner = np.split(np.linalg.qr(np.vstack([fibre_modes(1.0), 0.9 * fibre_modes(1.0)]))[0], 2)
+    kernels = np.zeros((2 * n, 0)), np.vstack([-outer, inner]), np.vstack([0 * outer, -inner])
+    bodies = [SimpleNamespace(R=R, submesh=SimpleNamespace(body=k, pinned=-(k > 0))) for k, R in enumerate(kernels)]
+    space = coarse_space(bodies, [np.arange(2 * n)] * 3, hstack([identity(2 * n)] * 3))
+    active, is_open = np.zeros(2 * n), np.zeros(n, bool)
+    active[::2], active[n + 1], is_open[-3:] = 1.0, 1.0, True
+    active[2 * np.flatnonzero(is_open)] = 0.0
+    space.activate(active)
+    assert space.unconstrained_modes.shape[1] == 1
+    nodes = SimpleNamespace(row=2 * np.arange(n), bodies=np.repeat([[0, 1], [1, 2]], NODES, axis=0))
+    jump = np.where(np.arange(2 * n) % 2, 0.0, -0.01)
+    found = place(MPI.COMM_SELF, space, nodes, is_open, SimpleNamespace(jump=jump), 1e-9)
+    assert not found.alpha.any() and not found.pressed.any()
+    space.destroy()
