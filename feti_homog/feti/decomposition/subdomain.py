@@ -12,7 +12,8 @@ from feti_homog.fem.assembly import assemble
 from feti_homog.fem.bubble import lame
 from feti_homog.fem.problem import PLANE, Problem
 from feti_homog.fem.void_boundary import void_integrals
-from feti_homog.feti.thresholds import KERNEL_TOLERANCE, SCALED_LAME
+from feti_homog.feti.thresholds import KERNEL_TOLERANCE, LEAST_ORDERED_DOFS, SCALED_LAME
+from feti_homog.mesh.elimination_order import elimination_order
 from feti_homog.mesh.mesh_fibres import unwrap
 from feti_homog.mesh.refinement import FineMesh, ReferenceLattice, refine
 from feti_homog.mesh.submesh import Submesh
@@ -156,6 +157,10 @@ class Subdomain:
             return 1.0
         first, shear = lame(self.L)
         return (min(first, SCALED_LAME * shear) + 3 * shear) / (first + 3 * shear)
+
+    def elimination_order(self) -> Int | None:
+        """(cn,) all dofs in an order of elimination; None where any order is as good."""
+        return self.problem.dofs(elimination_order(self.mesh)) if self.n_dofs >= LEAST_ORDERED_DOFS else None
 
     def take_stiffness(self) -> csr_matrix:
         """(cn, cn) K, which belongs to the caller: that of `build` the first time, then one assembled anew."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import weakref
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
 import numpy as np
@@ -29,6 +29,8 @@ MISSING_FACTOR = 92
 # With these CHOLMOD makes L L^T of small matrices too, which those that are indefinite do not have: D of its own
 # L D L^T may have any sign.
 DEFINITE = {"mat_cholmod_final_asis": False, "mat_cholmod_final_ll": True}
+# The order of rows is that of elimination, and CHOLMOD tries no other.
+ORDERED = {"pc_factor_mat_ordering_type": "natural", "mat_cholmod_nmethods": 1}
 
 
 def power_of_two(diagonal: Float, comm: MPI.Intracomm | None = None) -> float:
@@ -92,15 +94,15 @@ class DirectSolver:
 
     max_columns_one_by_one = CHOLMOD_COLUMNS_ONE_BY_ONE
 
-    def __init__(self, matrix: csr_matrix, prefix: str) -> None:
-        """Factorize.  Options under `prefix` (default: cholesky by CHOLMOD).
+    def __init__(self, matrix: csr_matrix, prefix: str, is_ordered: bool = False) -> None:
+        """Factorize.  Options under `prefix` (default: cholesky by CHOLMOD).  Arguments as of `factored`.
 
         Raises:
             LinAlgError, MemoryError, CaseError: as `factored`.
         """
         self._scale = power_of_two(matrix.diagonal())
         scaled = csr_matrix((self._scale * matrix.data, matrix.indices, matrix.indptr), shape=matrix.shape)
-        self._ksp = factored(sequential(scaled), prefix, PETSc.Mat.SolverType.CHOLMOD)
+        self._ksp = factored(sequential(scaled), prefix, PETSc.Mat.SolverType.CHOLMOD, is_ordered=is_ordered)
         self._x, self._b = self._ksp.getOperators()[0].createVecs()
         self._destroy = weakref.finalize(self, _destroy, self._ksp, self._x, self._b)
 
@@ -141,10 +143,13 @@ def solve_columns(ksp: PETSc.KSP, x: PETSc.Vec, b: PETSc.Vec, B: Float, one_by_o
     return X
 
 
-def factored(A: PETSc.Mat, prefix: str, library: str, near_kernel: Float | None = None) -> PETSc.KSP:
+def factored(
+    A: PETSc.Mat, prefix: str, library: str, near_kernel: Float | None = None, is_ordered: bool = False
+) -> PETSc.KSP:
     """Return a KSP with the Cholesky factorization of a symmetric definite matrix by this library.
 
-    Options under `prefix` may choose others. Collective where the matrix is.
+    Options under `prefix` may choose others. Rows that are ordered are eliminated one after the other. Collective where
+    the matrix is.
 
     Rows and columns should have similar size: MUMPS does not scale here, for its own scaling loses all digits of coarse
     problems with contrasts of 1e6.  Multigrid learns of the `near_kernel` (n, k), orthonormal vectors of little energy.
@@ -156,7 +161,7 @@ def factored(A: PETSc.Mat, prefix: str, library: str, near_kernel: Float | None 
     """
     _set_near_kernel(A, near_kernel)
     A.setOption(PETSc.Mat.Option.SPD, True)
-    with _refusing_indefinite(prefix):
+    with _unless_given(DEFINITE | ORDERED if is_ordered else DEFINITE, prefix):
         ksp = _direct_ksp(A, prefix, library)
         pc = ksp.getPC()
         if pc.getFactorSolverType() == PETSc.Mat.SolverType.MUMPS:
@@ -171,10 +176,10 @@ def factored(A: PETSc.Mat, prefix: str, library: str, near_kernel: Float | None 
 
 
 @contextmanager
-def _refusing_indefinite(prefix: str) -> Iterator[None]:
-    """Have the options DEFINITE, those that are given excepted."""
+def _unless_given(options: Mapping[str, bool | int | str], prefix: str) -> Iterator[None]:
+    """Have the options while the block lasts, those that are given excepted."""
     database = PETSc.Options(prefix)
-    added = {name: value for name, value in DEFINITE.items() if not database.hasName(name)}
+    added = {name: value for name, value in options.items() if not database.hasName(name)}
     for name, value in added.items():
         database.setValue(name, value)
     try:

@@ -194,7 +194,8 @@ class InterfaceOperators:
             return operator.interior
         if place in self.interiors:
             return self.interiors[place]
-        interior = Interior(self.subdomains[place].take_stiffness(), self.dofs[place])
+        s = self.subdomains[place]
+        interior = Interior(s.take_stiffness(), self.dofs[place], s.elimination_order())
         if keep:
             self.interiors[place] = interior
         return interior
@@ -206,7 +207,12 @@ class InterfaceOperators:
         """
         interior, s = self._interior(place, keep), self.subdomains[place]
         u = np.empty((s.n_dofs, *x.shape[1:]))
-        inside = s.Q[interior.dofs] @ loads if loads is not None and s.loads_inside else None
+        inside = None
+        if loads is not None and s.loads_inside:
+            if interior.answers is not None:  # of all of the subdomain
+                u[interior.dofs] = interior.answers @ loads
+                return u
+            inside = s.Q[interior.dofs] @ loads
         u[self.dofs[place]], u[interior.dofs] = x, interior.extend(x, inside)
         return u
 

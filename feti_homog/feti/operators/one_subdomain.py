@@ -158,8 +158,10 @@ class ImplicitInterfaceOperator:
         own = subdomain.problem.nodes(dofs)
         nodes = np.unique(own) if len(dofs) else np.arange(subdomain.mesh.n_classes)
         if not len(dofs) and not subdomain.R.shape[1]:
-            self.interior = Interior(K, dofs)  # all of it, and no forces come from outside
-            s, u = subdomain, self.interior.solve(-subdomain.Q)
+            self.interior = Interior(K, dofs, subdomain.elimination_order())  # all of it: no forces come from outside
+            s, u = subdomain, np.empty(subdomain.Q.shape)
+            self.interior.answers = self.interior.solve(-s.Q[self.interior.dofs])
+            u[self.interior.dofs] = self.interior.answers
             C = s.area * s.L + s.Q.T @ u
             self.condensed = CondensedLoads(s.Q[dofs], C, C + s.Q.T @ u + u.T @ (K @ u))
             return
@@ -168,7 +170,7 @@ class ImplicitInterfaceOperator:
     @cached_property
     def interior(self) -> Interior:
         """The interior, factored when first asked for; for that K is assembled again."""
-        return Interior(self._subdomain.take_stiffness(), self.dofs)
+        return Interior(self._subdomain.take_stiffness(), self.dofs, self._subdomain.elimination_order())
 
     @cached_property
     def condensed(self) -> CondensedLoads:
@@ -199,18 +201,24 @@ class Interior:
     """The dofs of one subdomain that no constraint acts on.
 
     Attributes:
-        dofs: their local numbers, sorted.
+        dofs: their local numbers, in the order of elimination if there is one, else sorted.
+        answers: (inner dofs, v) displacements under the unit loads, None where they are not kept.
     """
 
-    def __init__(self, K: csr_matrix, dofs: Int) -> None:
-        """Split K and factor K_ii; `dofs` (n,) are the boundary's.  Options under `feti_interior_`."""
+    answers: Float | None = None
+
+    def __init__(self, K: csr_matrix, dofs: Int, order: Int | None = None) -> None:
+        """Split K (cn, cn) and factor K_ii; `dofs` (n,) are the boundary's.  Options under `feti_interior_`.
+
+        Eliminated in the `order` (cn,) of all dofs if that is given, else in one of the library's.
+        """
         inside = np.ones(K.shape[0], bool)
         inside[dofs] = False
-        self.dofs = np.flatnonzero(inside)
+        self.dofs = np.flatnonzero(inside) if order is None else order[inside[order]]
         rows = K[self.dofs]
         self._Kib, self._Kbb = rows[:, dofs], K[dofs][:, dofs]
         if len(self.dofs):
-            self._solver = DirectSolver(rows[:, self.dofs].tocsr(), "feti_interior_")
+            self._solver = DirectSolver(rows[:, self.dofs].tocsr(), "feti_interior_", order is not None)
 
     @cached_property
     def coupling(self) -> csr_matrix:

@@ -13,7 +13,7 @@ from support import torn_cells
 
 from feti_homog.fem.problem import PLANE
 from feti_homog.feti.linalg.dense_matrices import schur_complement
-from feti_homog.feti.operators.one_subdomain import ExplicitInterfaceOperator, ImplicitInterfaceOperator
+from feti_homog.feti.operators.one_subdomain import ExplicitInterfaceOperator, ImplicitInterfaceOperator, Interior
 
 TIGHT = 1e-10
 
@@ -54,6 +54,17 @@ def test_apply_schur_is_the_schur_complement(parts, kind):
     for s, dofs, _, S in parts:
         found = applied(kind(s, s.take_stiffness(), dofs).apply_schur, np.eye(len(dofs)))
         assert np.abs(found - S).max() < TIGHT * np.abs(S).max()
+
+
+def test_the_order_of_elimination_changes_no_displacement(parts):
+    for _, dofs, K, _ in parts:
+        order = np.random.default_rng(2).permutation(len(K))
+        sorted_dofs, ordered = (Interior(csr_matrix(K), dofs, each) for each in (None, order))
+        assert np.array_equal(ordered.dofs, order[np.isin(order, sorted_dofs.dofs)])
+        x, found = np.random.default_rng(1).standard_normal((len(dofs), 2)), np.zeros((len(K), 2))
+        expected = found.copy()
+        expected[sorted_dofs.dofs], found[ordered.dofs] = sorted_dofs.extend(x), ordered.extend(x)
+        assert np.abs(found - expected).max() < TIGHT * np.abs(x).max()
 
 
 @pytest.mark.parametrize("kind", [ExplicitInterfaceOperator, ImplicitInterfaceOperator])
