@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from feti_homog.mesh.refinement import FineMesh, ReferenceLattice
-from feti_homog.typing import Float, Int
+from feti_homog.typing import Float, Int, Int32
 
 # Share of the triangles of a part by which a cut may be off the middle.
 OFF_THE_MIDDLE = 0.1
@@ -32,7 +32,7 @@ def _inside(lattice: ReferenceLattice) -> Int:
     return place
 
 
-def _dissected(centres: Float, nodes: Int, inside: Int) -> Int:
+def _dissected(centres: Float, nodes: Int | Int32, inside: Int) -> Int:
     """(n,) the n nodes in order; of triangles with `centres` (t, 2) and `nodes` (t, q), corners first.
 
     Nodes of one triangle alone are ordered by their places `inside` (q,).
@@ -44,10 +44,10 @@ def _dissected(centres: Float, nodes: Int, inside: Int) -> Int:
     last[node], first[node[::-1]], place[nodes] = of_leaf, of_leaf[::-1], inside
     height = np.frexp((first ^ last).astype(float))[1]  # above the leaves, of the smallest part with all its triangles
     end = (last >> height) + 1 << height
-    return np.lexsort((place, height, end))
+    return np.asarray(np.lexsort((place, height, end)))
 
 
-def _neighbours(corners: Int) -> tuple[Int, Int]:
+def _neighbours(corners: Int | Int32) -> tuple[Int, Int]:
     """Triangles (s,) on both sides of each side, of their `corners` (t, 3)."""
     size = int(corners.max()) + 1
     low, high = np.sort([corners, np.roll(corners, -1, axis=1)], axis=0).reshape(2, -1)

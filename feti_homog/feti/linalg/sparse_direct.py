@@ -21,6 +21,7 @@ from feti_homog.feti.thresholds import CHOLMOD_COLUMNS_ONE_BY_ONE, ITERATIVE_RTO
 from feti_homog.petsc.c_functions import error_words
 from feti_homog.typing import Float
 
+Options = Mapping[str, bool | int | str]
 # INFOG(1) of MUMPS where a pivot is zero.
 SINGULAR = -10
 LEAST_EXPONENT = -1000
@@ -28,9 +29,9 @@ LEAST_EXPONENT = -1000
 MISSING_FACTOR = 92
 # With these CHOLMOD makes L L^T of small matrices too, which those that are indefinite do not have: D of its own
 # L D L^T may have any sign.
-DEFINITE = {"mat_cholmod_final_asis": False, "mat_cholmod_final_ll": True}
+DEFINITE: Options = {"mat_cholmod_final_asis": False, "mat_cholmod_final_ll": True}
 # The order of rows is that of elimination, and CHOLMOD tries no other.
-ORDERED = {"pc_factor_mat_ordering_type": "natural", "mat_cholmod_nmethods": 1}
+ORDERED: Options = {"pc_factor_mat_ordering_type": "natural", "mat_cholmod_nmethods": 1}
 
 
 def power_of_two(diagonal: Float, comm: MPI.Intracomm | None = None) -> float:
@@ -161,7 +162,7 @@ def factored(
     """
     _set_near_kernel(A, near_kernel)
     A.setOption(PETSc.Mat.Option.SPD, True)
-    with _unless_given(DEFINITE | ORDERED if is_ordered else DEFINITE, prefix):
+    with _unless_given({**DEFINITE, **(ORDERED if is_ordered else {})}, prefix):
         ksp = _direct_ksp(A, prefix, library)
         pc = ksp.getPC()
         if pc.getFactorSolverType() == PETSc.Mat.SolverType.MUMPS:
@@ -176,7 +177,7 @@ def factored(
 
 
 @contextmanager
-def _unless_given(options: Mapping[str, bool | int | str], prefix: str) -> Iterator[None]:
+def _unless_given(options: Options, prefix: str) -> Iterator[None]:
     """Have the options while the block lasts, those that are given excepted."""
     database = PETSc.Options(prefix)
     added = {name: value for name, value in options.items() if not database.hasName(name)}
