@@ -8,26 +8,19 @@ reaches across an interface, where stresses jump.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import csc_matrix
 
 from feti_homog.fem import bubble
 from feti_homog.fem.assembly import ELEMENTS_AT_ONCE
+from feti_homog.fem.local_fits import Neighbours, gathered, linear_values, normalized, polynomials
 from feti_homog.fem.problem import Problem
 from feti_homog.fem.shape_functions import barycentric, gradients, shape_functions
 from feti_homog.mesh.refinement import FineMesh
-from feti_homog.typing import Bool, Float, Int, Int32
-
-# Weight of the elements around the neighbours of a vertex on the boundary, whose own are few, by the order of elements:
-# of `scripts/measure_mesh_error.py` over all its cells.
-NEIGHBOURS = {1: 0.1, 2: 0.001}
-# Of the moments of a fit, whose diagonal is 1: where all points lie on a line, a fit does not vary across it.
-RIDGE = 1e-9
+from feti_homog.typing import Float, Int, Int32
 
 
 @dataclass(frozen=True)
@@ -130,19 +123,25 @@ class RecoveredStress:
     @cached_property
     def fits(self) -> Float:
         """(vertices, p, m k) coefficients of the polynomials about each vertex, see `polynomials`; p = 1 of order 1."""
-        size = int(self.vertices.max()) + 1
-        moments, sums = np.zeros(()), np.zeros(())
-        # Matrices of one point are multiplied faster number by number.
-        product = np.multiply if self.order == 1 else np.matmul
+        neighbours = Neighbours.of(self.vertices, self.points[self.triangles[:, :3]])
+        if self.order == 1:
+            points, weights, stress = (
+                np.concatenate([getattr(own, name)[:, 0] for own in self.elements])
+                for name in ("points", "weights", "stress")
+            )
+            away = points[:, None] - self.points[self.triangles]
+            return linear_values(self.vertices, away, weights, stress.reshape(len(stress), -1), neighbours)[:, None]
+        moments, sums, size = np.zeros(()), np.zeros(()), int(self.vertices.max()) + 1
         for own in self.elements:
             corners = self.points[self.triangles[own.part, :3]]
             basis = polynomials(own.points[:, None] - corners[:, :, None], self.order)
             weighted = (basis * own.weights[:, None, :, None]).transpose(0, 1, 3, 2)
             stress = own.stress.reshape(len(corners), 1, own.points.shape[1], -1)
-            moments = moments + _gathered(self.vertices[own.part], product(weighted, basis), size)
-            sums = sums + _gathered(self.vertices[own.part], product(weighted, stress), size)
-        moments, sums = self._with_neighbours(moments, sums)
-        return _values(moments, sums) if self.order == 1 else _solved(moments, sums)
+            moments = moments + gathered(self.vertices[own.part], weighted @ basis, size)
+            sums = sums + gathered(self.vertices[own.part], weighted @ stress, size)
+        scaled, scale = normalized(neighbours.with_moments(moments, self.order))
+        sums = sums + neighbours.shared(sums, self.order)
+        return np.asarray(scale * np.linalg.solve(scaled, scale * sums))
 
     def recovered(self, part: Int | slice, lam: Float) -> Float:
         """(e, q, m, k) recovered stresses in the elements `part` at the barycentric coordinates lam (q, 3)."""
@@ -168,89 +167,25 @@ class RecoveredStress:
             flat = off.reshape(-1, m * k)
             total += flat.T @ flat
             if with_shares:
-                shares.append((self.flexibility @ off * off).sum(axis=(1, 2)))
+                shares.append((self.flexibility @ off * off).sum(axis=(0, 2)))
         return np.einsum("ab,akbl->kl", self.flexibility, total.reshape(m, k, m, k)), np.concatenate(shares)
 
     def _off(self, own: ElementStresses) -> Float:
-        """(e, q, m, k) recovered less own stress at places of the elements, times the root of their weights."""
+        """(q, e, m, k) recovered less own stress at places of the elements, times the root of their weights."""
         if self.order == 2:
-            return np.asarray((self.recovered(own.part, barycentric(6)) - own.stress) * _roots(own.weights))
-        # Linear less uniform stresses, in the middles of the sides.
-        off = self.fits[:, 0].reshape(-1, *own.stress.shape[2:])[self.vertices[own.part]] - own.stress
-        return np.asarray((off + np.roll(off, 1, axis=1)) * _roots(own.weights / 12))
-
-    def _with_neighbours(self, moments: Float, sums: Float) -> tuple[Float, Float]:
-        """Moments and sums of the vertices, at the boundary with a share of those of their neighbours."""
-        ends, vector, at_boundary = self._edges
-        wanted = np.concatenate([at_boundary[ends[:, 0]], at_boundary[ends[:, 1]]])
-        own, other = (np.concatenate([ends[:, k], ends[:, 1 - k]])[wanted] for k in (0, 1))
-        moved = _translations(np.concatenate([vector, -vector])[wanted], self.order)
-        share = NEIGHBOURS[self.order]
-        added = _gathered(own, moved @ moments[other] @ moved.transpose(0, 2, 1), len(moments))
-        return moments + share * added, sums + share * _gathered(own, moved @ sums[other], len(sums))
-
-    @cached_property
-    def _edges(self) -> tuple[Int, Float, Bool]:
-        """Vertices (n, 2) and vectors (n, 2) of the sides of elements, each side once, and vertices on the boundary.
-
-        Vectors go from the first vertex to the second; on the boundary sides have one element.
-        """
-        size, corners = int(self.vertices.max()) + 1, self.points[self.triangles[:, :3]]
-        ends = np.stack([self.vertices, np.roll(self.vertices, -1, axis=1)], axis=2).reshape(-1, 2)
-        vector = (np.roll(corners, -1, axis=1) - corners).reshape(-1, 2)
-        low, high = np.sort(ends, axis=1).T
-        _, first, count = np.unique(low * size + high, return_index=True, return_counts=True)
-        at_boundary = np.zeros(size, bool)
-        at_boundary[ends[first[count == 1]]] = True
-        return ends[first], vector[first], at_boundary
-
-
-def polynomials(x: Float, order: int) -> Float:
-    """(.., p) 1, x, y and of order 2 also x^2, x y, y^2 at the places x (.., 2)."""
-    one, first, second = np.ones(x.shape[:-1]), x[..., 0], x[..., 1]
-    quadratic = (first * first, first * second, second * second) if order == 2 else ()
-    return np.stack([one, first, second, *quadratic], axis=-1)
-
-
-def _translations(d: Float, order: int) -> Float:
-    """(n, p, p) T with polynomials(x + d) = T polynomials(x) for d (n, 2)."""
-    x, y = d.T
-    T = np.tile(np.eye(3 * order), (len(d), 1, 1))
-    T[:, 1, 0], T[:, 2, 0] = x, y
-    if order == 2:
-        T[:, 3, :2] = np.stack([x * x, 2 * x], axis=1)
-        T[:, 4, :3] = np.stack([x * y, y, x], axis=1)
-        T[:, 5, 0], T[:, 5, 2] = y * y, 2 * y
-    return T
+            return np.asarray((self.recovered(own.part, barycentric(6)) - own.stress) * _roots(own.weights)).swapaxes(
+                0, 1
+            )
+        # Linear less uniform stresses d: int d d = w/12 (sum_i d_i d_i + sum_i d_i sum_i d_i) of those at the vertices.
+        e, _, m, k = own.stress.shape
+        off = np.empty((4, e, m * k))
+        np.take(self.fits[:, 0], self.vertices[own.part].T, axis=0, out=off[:3], mode="clip")  # which needs no buffer
+        off[:3] -= own.stress.reshape(e, m * k)
+        np.sum(off[:3], axis=0, out=off[3])
+        off *= np.sqrt(own.weights / 12)
+        return off.reshape(4, e, m, k)
 
 
 def _roots(weights: Float) -> Float:
     """(e, q, 1, 1) roots of weights (e, q)."""
     return np.sqrt(weights)[..., None, None]
-
-
-def _gathered(place: Int, values: Float, size: int) -> Float:
-    """(size, ..) sums of the values (n, .., p, q) at the places (n, ..)."""
-    n, shape = place.size, values.shape[-2:]
-    sums = csc_matrix((np.ones(n), place.ravel(), np.arange(n + 1)), (size, n)) @ values.reshape(n, math.prod(shape))
-    return np.asarray(sums.reshape(size, *shape))
-
-
-def _normalized(moments: Float) -> tuple[Float, Float]:
-    """Moments (n, p, p) scaled to a diagonal of 1 and a little more, and the scales (n, p, 1)."""
-    scale = 1 / np.sqrt(np.einsum("nii->ni", moments))[..., None]
-    return moments * scale * scale.transpose(0, 2, 1) + RIDGE * np.eye(moments.shape[1]), scale
-
-
-def _solved(moments: Float, sums: Float) -> Float:
-    """(n, p, mk) coefficients."""
-    scaled, scale = _normalized(moments)
-    return np.asarray(scale * np.linalg.solve(scaled, scale * sums))
-
-
-def _values(moments: Float, sums: Float) -> Float:
-    """(n, 1, mk) the first coefficients alone, of linear fits."""
-    scaled, scale = _normalized(moments)
-    cofactors = np.cross(scaled[:, 1], scaled[:, 2])
-    row = cofactors / (cofactors * scaled[:, 0]).sum(axis=1, keepdims=True) * scale[:, :, 0] * scale[:, :1, 0]
-    return np.asarray(row[:, None] @ sums)

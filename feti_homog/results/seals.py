@@ -25,8 +25,8 @@ BLOCK = 1 << 26  # bytes
 
 def dumps(document: Mapping[str, Any]) -> str:
     """Return the text of a document with, as its last key, the checksum of the others. Raises ValueError for NaN."""
-    content = {key: value for key, value in document.items() if key != KEY}
-    return _text(content | {KEY: _checksum(content)}) + "\n"
+    text = _text({key: value for key, value in document.items() if key != KEY})
+    return _sealed(text, _checksum(text))
 
 
 def loads(text: str) -> dict[str, Any]:
@@ -41,7 +41,13 @@ def loads(text: str) -> dict[str, Any]:
         raise ValueError("it is nested too deeply") from error
     if not isinstance(document, dict):
         raise ValueError("it is damaged: no table of keys and values")
-    if KEY in document and document.pop(KEY) != _checksum(document):
+    if KEY not in document:
+        return document
+    found = document.pop(KEY)
+    end = _sealed("{\n}", found)[1:]
+    if text.endswith(end) and _checksum(text[: -len(end)] + "\n}") == found:  # as it was written
+        return document
+    if found != _checksum(_text(document)):
         raise ValueError("it is damaged: its checksum is wrong")
     return document
 
@@ -81,8 +87,14 @@ def check(path: Path, expected: FileSeal, block: int = BLOCK) -> None:
         raise CaseError(f"{path}: it is damaged, or of another run: its checksum is wrong")
 
 
-def _checksum(content: Mapping[str, Any]) -> str:
-    return f"{zlib.crc32(_text(content).encode('utf-8', 'surrogatepass')):08x}"
+def _checksum(text: str) -> str:
+    return f"{zlib.crc32(text.encode('utf-8', 'surrogatepass')):08x}"
+
+
+def _sealed(text: str, checksum: Any) -> str:
+    """Return the text of a document with a last key, as `_text` would write it."""
+    begin = "{" if text == "{}" else text.removesuffix("\n}") + ","
+    return f'{begin}\n "{KEY}": {json.dumps(checksum)}\n}}\n'
 
 
 def _text(content: Mapping[str, Any]) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.sparse import csr_matrix, diags
+from scipy.sparse import csr_matrix
 
 from feti_homog.errors import MeshError
 from feti_homog.fem.assembly import assemble
@@ -225,13 +225,16 @@ def label(submesh: Submesh) -> str:
 
 
 def _pinned(K: csr_matrix, problem: Problem, pinned: int) -> csr_matrix:
-    """K with the rows and columns of the node `pinned` those of a multiple of the identity; K itself for -1."""
+    """K, changed to have rows and columns of the node `pinned` of a multiple of the identity; as it is for -1."""
     if pinned < 0:
         return K
-    keep = np.ones(K.shape[0])
-    keep[problem.dofs(np.array([pinned]))] = 0.0
-    mask = diags(keep)
-    return (mask @ K @ mask + diags((1 - keep) * K.diagonal().max())).tocsr()
+    dofs, largest = problem.dofs(np.array([pinned])), K.diagonal().max()
+    K.data[np.isin(K.indices, dofs)] = 0.0
+    for dof in dofs:
+        own = slice(*K.indptr[dof : dof + 2])
+        K.data[own] = np.where(K.indices[own] == dof, largest, 0.0)
+    K.eliminate_zeros()
+    return K
 
 
 def _check_kernel(submesh: Submesh, K: csr_matrix, R: Float) -> None:

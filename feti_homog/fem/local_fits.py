@@ -1,0 +1,124 @@
+"""Polynomials fitted to values of the elements around each vertex, by least squares weighted with areas."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csc_matrix
+
+from feti_homog.typing import Float, Int
+
+# Weight of the elements around the neighbours of a vertex on the boundary, whose own are few, by the order of elements:
+# of `scripts/measure_mesh_error.py` over all its cells.
+NEIGHBOURS = {1: 0.1, 2: 0.001}
+# Of the moments of a fit, whose diagonal is 1: where all points lie on a line, a fit does not vary across it.
+RIDGE = 1e-9
+# Places in a symmetric matrix of its entries 00, 01, 02, 11, 12 and 22.
+SYMMETRIC = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
+
+
+@dataclass(frozen=True)
+class Neighbours:
+    """Pairs of neighbours, the first of which is on the boundary, where vertices have few elements of their own.
+
+    Attributes:
+        at, other: (n,) vertices.
+        vector: (n, 2) from the first to the second.
+    """
+
+    at: Int
+    other: Int
+    vector: Float
+
+    @classmethod
+    def of(cls, vertices: Int, corners: Float) -> Neighbours:
+        """Find those of elements with these vertices (e, 3) at `corners` (e, 3, 2); on the boundary sides have one."""
+        start, stop = vertices.ravel(), np.roll(vertices, -1, axis=1).ravel()
+        size = int(vertices.max()) + 1
+        # Elsewhere the sides around a vertex lead to the vertices that they come from; such numbers add up exactly.
+        mark = np.random.default_rng(0).integers(1 << 40, size=size).astype(float)
+        at_boundary = np.bincount(start, mark[stop]) != np.bincount(stop, mark[start])
+        near = np.flatnonzero(at_boundary[start] | at_boundary[stop])
+        low, high = np.minimum(start, stop)[near], np.maximum(start, stop)[near]
+        once = near[np.unique(low * size + high, return_index=True)[1]]
+        element, k = np.divmod(once, 3)
+        vector = corners[element, (k + 1) % 3] - corners[element, k]
+        at, other = np.concatenate([start[once], stop[once]]), np.concatenate([stop[once], start[once]])
+        wanted = at_boundary[at]
+        return cls(at[wanted], other[wanted], np.concatenate([vector, -vector])[wanted])
+
+    def shared(self, sums: Float, order: int) -> Float:
+        """(vertices, p, k) what vertices on the boundary get of the sums (vertices, p, k) of their neighbours."""
+        moved = _translations(self.vector, order) @ sums[self.other]
+        return NEIGHBOURS[order] * gathered(self.at, moved, len(sums))
+
+    def with_moments(self, moments: Float, order: int) -> Float:
+        """(vertices, p, p) moments and a share of those of neighbours."""
+        T = _translations(self.vector, order)
+        moved = T @ moments[self.other] @ T.transpose(0, 2, 1)
+        return moments + NEIGHBOURS[order] * gathered(self.at, moved, len(moments))
+
+
+def linear_values(vertices: Int, away: Float, weights: Float, values: Float, neighbours: Neighbours) -> Float:
+    """(vertices, k) values at the vertices of linear fits to uniform ones (e, k).
+
+    Each is a weighted mean of the values around it, so that sums over elements are not made, but where neighbours share
+    them.
+
+    Args:
+        vertices: (e, 3) of the elements.
+        away: (e, 3, 2) vectors from these to the middle of the element.
+        weights: (e,) areas.
+    """
+    at, size, e = vertices.ravel(), int(vertices.max()) + 1, len(vertices)
+    x, y = away.reshape(-1, 2).T.copy()
+    w = np.repeat(weights, 3)
+    basis = np.stack([w, w * x, w * y])
+    parts = (*basis, basis[1] * x, basis[1] * y, basis[2] * y)
+    moments = np.stack([np.bincount(at, part).astype(float) for part in parts], axis=1)
+    scaled, scale = normalized(neighbours.with_moments(moments[:, SYMMETRIC], 1))
+    cofactors = np.cross(scaled[:, 1], scaled[:, 2])
+    first = cofactors / (cofactors * scaled[:, 0]).sum(axis=1, keepdims=True) * scale[:, :, 0] * scale[:, :1, 0]
+    share = sum(row[at] * own for row, own in zip(first.T.copy(), basis, strict=True))
+    found = csc_matrix((share, at, np.arange(0, 3 * e + 1, 3)), (size, e)) @ values
+    is_shared = np.zeros(size, bool)
+    is_shared[neighbours.other] = True
+    near = np.flatnonzero(is_shared[at])
+    each, of_each = values[near // 3], np.arange(len(near) + 1)
+    sums = np.stack([csc_matrix((own[near], at[near], of_each), (size, len(near))) @ each for own in basis], axis=1)
+    moved = first[neighbours.at][:, None] @ _translations(neighbours.vector, 1) @ sums[neighbours.other]
+    return np.asarray(found + NEIGHBOURS[1] * gathered(neighbours.at, moved, size)[:, 0])
+
+
+def polynomials(x: Float, order: int) -> Float:
+    """(.., p) 1, x, y and of order 2 also x^2, x y, y^2 at the places x (.., 2)."""
+    one, first, second = np.ones(x.shape[:-1]), x[..., 0], x[..., 1]
+    quadratic = (first * first, first * second, second * second) if order == 2 else ()
+    return np.stack([one, first, second, *quadratic], axis=-1)
+
+
+def _translations(d: Float, order: int) -> Float:
+    """(n, p, p) T with polynomials(x + d) = T polynomials(x) for d (n, 2)."""
+    x, y = d.T
+    T = np.tile(np.eye(3 * order), (len(d), 1, 1))
+    T[:, 1, 0], T[:, 2, 0] = x, y
+    if order == 2:
+        T[:, 3, :2] = np.stack([x * x, 2 * x], axis=1)
+        T[:, 4, :3] = np.stack([x * y, y, x], axis=1)
+        T[:, 5, 0], T[:, 5, 2] = y * y, 2 * y
+    return T
+
+
+def gathered(place: Int, values: Float, size: int) -> Float:
+    """(size, ..) sums of the values (n, .., p, q) at the places (n, ..)."""
+    n, shape = place.size, values.shape[-2:]
+    sums = csc_matrix((np.ones(n), place.ravel(), np.arange(n + 1)), (size, n)) @ values.reshape(n, math.prod(shape))
+    return np.asarray(sums.reshape(size, *shape))
+
+
+def normalized(moments: Float) -> tuple[Float, Float]:
+    """Moments (n, p, p) scaled to a diagonal of 1 and a little more, and the scales (n, p, 1)."""
+    scale = 1 / np.sqrt(np.einsum("nii->ni", moments))[..., None]
+    return moments * scale * scale.transpose(0, 2, 1) + RIDGE * np.eye(moments.shape[1]), scale
