@@ -130,10 +130,11 @@ def _fibres_lines(case: Case, summary: CellSummary) -> list[str]:
     """Return how many fibres interfaces or a table have; of discs and ellipses their mean radius and fraction."""
     if case.interface is None and case.cell.table is None:
         return []
-    radii = np.sqrt(np.abs(np.linalg.det(summary.frames[summary.fibre_bodies])))
+    frames = summary.frames[summary.fibre_bodies]
     is_hollow = case.cell.table is not None and bool((case.cell.table.inner_radius > 0).any())
     sizes = ""
-    if len(radii) and np.isfinite(radii).all() and not is_hollow:
+    if len(frames) and np.isfinite(frames).all() and not is_hollow:  # polygons have none
+        radii = np.sqrt(np.abs(np.linalg.det(frames)))
         fraction = np.pi * (radii**2).sum() / (summary.width * summary.height)
         sizes = f", mean radius {radii.mean():.4g}, fraction {fraction:.4f}"
     return [f"fibres     {summary.fibres}, numbered from 1{sizes}"]

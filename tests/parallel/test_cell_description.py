@@ -20,16 +20,22 @@ COATED = (("mesh_size = 0.05", "mesh_size = 0.2\ncoating = 0.1"),)
 COATING = "[material.coating]\nyoung = 20.0\npoisson = 0.3\n"
 PATH = (("mesh_size = 0.05", "mesh_size = 0.2"), ('type = "stiffness"', 'type = "path"'))
 STRENGTH = "[path]\nstrain = [0.01, 0, 0]\n[interface]\nnormal_strength = 1.0\ntangential_strength = 1.0\n"
+SQUARE = """geometry = "table"
+width = 1.0
+height = 1.0
+fibre_list = [{x = 0.5, y = 0.5, radius = 0.35, sides = 4, angle = 45.0}]"""
 CASES = {
     "bonded": changed(("mesh_size = 0.05", "mesh_size = 0.2")),
     "cut": changed(("mesh_size = 0.05", "mesh_size = 0.05\nrefine = 1")),
     "coated": changed(*COATED, end=COATING),
     "path": changed(*PATH, end=STRENGTH),
     "coated, implicit": changed(*COATED, end=f'{COATING}[petsc]\nfeti_dual_operator = "implicit"\n'),
+    "polygon": changed(('geometry = "hexagonal"\nfibre_fraction = 0.4', SQUARE), ("= 0.05", "= 0.2")),
     "bonded, influence": changed(end='[petsc]\nfeti_pc_type = "influence"\n'),
 }
 
 
+@pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("name", CASES)
 def test_the_solver_is_the_one_that_is_reported(comm, name):
     case = Case.parse(tomllib.loads(CASES[name]))
