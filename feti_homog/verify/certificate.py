@@ -18,12 +18,12 @@ from feti_homog.verify.check_fields import (
     check_derived,
     check_fields,
     check_interface_state,
-    check_mesh_error,
     check_step_heat,
     check_tied_faces,
 )
 from feti_homog.verify.check_loads import StateNumbers, check_load
 from feti_homog.verify.check_mesh import check_arcs, check_interface, check_mesh
+from feti_homog.verify.check_mesh_error import check_mesh_error
 from feti_homog.verify.check_path import check_envelope, check_path
 from feti_homog.verify.check_points import check_points
 from feti_homog.verify.check_sensitivities import check_sensitivities

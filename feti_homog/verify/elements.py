@@ -64,6 +64,11 @@ class Elements:
         self._mesh, self._stiffnesses = mesh, stiffnesses
         self._mixed = mixed & (mesh.triangles.shape[1] == 6)
 
+    @property
+    def has_bubble(self) -> Bool:
+        """(phases,) whether elements have a bubble and a pressure."""
+        return self._mixed
+
     @cached_property
     def area(self) -> Float:
         """(m,) areas; negative where an element is inverted."""
@@ -93,15 +98,10 @@ class Elements:
         m, v = len(self._mesh.triangles), self._stiffnesses.shape[1]
         strain, stress, size = np.empty((m, v)), np.empty((m, v)), np.empty(m)
         force, terms, largest, energy = np.zeros_like(displacement), np.zeros_like(self._mesh.points), 0.0, 0.0
-        free = np.zeros((len(self._stiffnesses), v)) if free is None else free
-        for part, gradients, weights in self._parts():
-            nodes = self._mesh.triangles[part]
-            u, share = displacement[nodes], weights / weights.sum(axis=1)[:, None]
-            slope = np.einsum("eqad,eai->eqid", gradients, u)
-            local, own_free = _strains(slope, v, along), free[self._mesh.phase[part]]
-            excess = self._add_bubbles(part, gradients, weights, local, own_free)
-            answer = np.einsum("eij,eqj->eqi", self._stiffnesses[self._mesh.phase[part]], local - own_free[:, None])
-            answer[..., NORMAL[v]] += excess[..., None]
+        free = self._free(free)
+        for part, gradients, weights, slope, local, answer in self._responses(displacement, along, free):
+            nodes, share = self._mesh.triangles[part], weights / weights.sum(axis=1)[:, None]
+            own_free = free[self._mesh.phase[part]]
             strain[part], stress[part] = (np.einsum("eqi,eq->ei", field, share) for field in (local, answer))
             size[part] = np.einsum("eqad,eai->eq", np.abs(gradients), terms_of_u[nodes]).max(axis=1)
             size[part] += self._rounded_places(part, gradients, slope) + abs(along) + np.abs(own_free).max(axis=1)
@@ -113,6 +113,30 @@ class Elements:
             largest = max(largest, float(np.abs(own).max()))
             energy += float(np.einsum("eqi,eqi,eq->", answer, local, weights, optimize=True))
         return ElementFields(strain, stress, size, force, terms.max(axis=1), largest, energy)
+
+    def point_stresses(
+        self, displacement: Float, along: float, free: Float | None
+    ) -> Iterator[tuple[slice, Float, Float, Float]]:
+        """Quadratic elements in portions: places (q, 3), weights (e, q) and stresses (e, q, v); else as `fields`."""
+        for part, _, weights, _, _, answer in self._responses(displacement, along, self._free(free)):
+            yield part, _places(), weights, answer
+
+    def _free(self, free: Float | None) -> Float:
+        return np.zeros(self._stiffnesses.shape[:2]) if free is None else free
+
+    def _responses(
+        self, displacement: Float, along: float, free: Float
+    ) -> Iterator[tuple[slice, Float, Float, Float, Float, Float]]:
+        """Elements in portions: gradients, weights, du/dx of the nodes (e, q, c, 2), strains and stresses (e, q, v)."""
+        v = self._stiffnesses.shape[1]
+        for part, gradients, weights in self._parts():
+            phase = self._mesh.phase[part]
+            slope = np.einsum("eqad,eai->eqid", gradients, displacement[self._mesh.triangles[part]])
+            local, own_free = _strains(slope, v, along), free[phase]
+            excess = self._add_bubbles(part, gradients, weights, local, own_free)
+            answer = np.einsum("eij,eqj->eqi", self._stiffnesses[phase], local - own_free[:, None])
+            answer[..., NORMAL[v]] += excess[..., None]
+            yield part, gradients, weights, slope, local, answer
 
     def _add_bubbles(self, part: slice, gradients: Float, weights: Float, local: Float, free: Float) -> Float:
         """(e, q) pressure of mixed elements less lambda tr eps, 0 in others; adds the bubbles' strains to `local`."""

@@ -84,6 +84,7 @@ def delete_state(_, file):
 FALSE = {
     "one stress": ("bonded", scale("stress"), {"stress", "stress 33"}),
     "errors of the mesh": ("plane", errors_of_the_mesh, {"mesh error"}),
+    "errors of mixed elements": ("bonded", errors_of_the_mesh, {"mesh error"}),
     "one stress of a path": ("path", scale("stress", state=7), {"stress", "stress 33"}),
     "a stress out of the plane": ("bonded", scale("stress_33"), {"stress 33"}),
     "a vector of traction": ("bonded", scale("traction_vector"), {"vectors"}),
