@@ -145,15 +145,24 @@ LEAST_UNCONFIRMED_JUMP = 1e-6
 
 # Influence columns found at once: bounds the memory of their right-hand sides, (boundary dofs, this).
 INFLUENCE_CHUNK = 32
-# Changed rows after which the cell as it stands is factored in place of them: the default of `-feti_influence_columns`
-# (`scripts/benchmark_path --to-the-end`).
-INFLUENCE_COLUMNS = 400
+# Columns of a reference cell that have room at first.
+BUFFERED_COLUMNS = 2048
+# Changed rows after which the cell as it stands is factored in place of them: the default of `-feti_influence_columns`;
+# and rows of cells in which that never pays (`scripts/benchmark_path --to-the-end`).
+INFLUENCE_COLUMNS, NEVER_REFACTORED_ROWS = 1000, 2500
 # Influence columns that each rank finds together at least, with those of bonds near the one that breaks: fewer and
 # larger batches, but columns that may not be needed (`scripts/benchmark_path --to-the-end`).
 INFLUENCE_BATCH = 64
 # Rows that change at once up to which their columns are followed; columns that are followed at most, 8 bytes an owned
 # row each; changes that wait before all of these follow (`scripts/benchmark_path --to-the-end`).
 MOST_FOLLOWED, FOLLOWED_COLUMNS, WAITING_COLUMNS = 16, 1200, 32
+# Share of these columns that stay where there is no room for more.
+FOLLOWED_SHARE = 0.75
+# Error of columns that pass from one reference cell to the next, relative to the largest, above which they are found
+# anew: that of one is about 1e-14.
+KEPT_ERROR = 1e-11
+# Columns of a reference cell that are copied at once, 8 bytes an owned row each.
+KEPT_AT_ONCE = 256
 # Least singular value of the rows that turn, relative to their stiffness, with which columns are followed: they lose as
 # many digits.
 LEAST_FOLLOWED_PIVOT = 1e-6

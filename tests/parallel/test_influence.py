@@ -15,6 +15,7 @@ from support.coarse_space_cells import BREAKING, NARROW, solve_many
 
 from feti_homog.errors import CaseError
 from feti_homog.feti.operators.one_subdomain import ExplicitInterfaceOperator
+from feti_homog.feti.preconditioners.changed_reference import ChangedReference
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN
 
@@ -114,13 +115,24 @@ def test_springs_that_softened_while_their_rows_were_not_active_are_soft_when_th
         assert np.abs(gathered(cell, influence.multipliers(d, np.eye(3))) - expected @ gathered(cell, d)).max() < 1e-9
 
 
-def test_blocks_are_right_with_few_followed_columns(comm):
-    """Bonds break one after another all around a fibre; columns of all others go when there is no room for more."""
-    cell = torn_cells.tear(comm, geometry="square", petsc=INFLUENCE)
+@pytest.mark.parametrize("columns", [700, 20], ids=["one reference cell", "some"])
+def test_blocks_are_right_with_few_followed_columns(comm, columns, monkeypatch):
+    """Bonds break one after another all around a fibre; others' columns go when there is no room for more.
+
+    Those of active rows pass on to the next reference cell.
+    """
+    cell = torn_cells.tear(comm, geometry="square", petsc=INFLUENCE | {"feti_influence_columns": columns})
     dense, influence, d = DenseDual(cell), cell.solver.exact_inverse, cell.solver.d
     influence.most_followed, influence.batch = 14, 6
+    take = ChangedReference.take
+
+    def counted(changes, taken, found):
+        take(changes, taken, found)
+        passed.append((len(taken), len(changes.columns.rows)))
+
+    monkeypatch.setattr(ChangedReference, "take", counted)
     status = np.full(len(cell.solver.jump_operator.nodes.row), BONDED, np.int8)
-    rows, first, kept = influence.neighbours.rows, influence.neighbours.first, []
+    rows, first, kept, passed = influence.neighbours.rows, influence.neighbours.first, [], []
     for number in range(len(rows) - 3):
         own = number - first
         if 0 <= own < len(status):
@@ -139,6 +151,7 @@ def test_blocks_are_right_with_few_followed_columns(comm):
         for row, block in zip(rows[wanted], influence.inverse_blocks(rows[wanted, None] + np.arange(2)), strict=True):
             assert np.abs(block - expected[row : row + 2, row : row + 2]).max() < 1e-8 * influence.norm
         kept.append(influence._followed)
+    assert bool(passed) == (columns == 20) and all(found == offered > 0 for offered, found in passed)
     assert len(kept) > 12 and all(each is kept[0] for each in kept)
 
 

@@ -7,7 +7,7 @@ from typing import TypeVar
 
 import numpy as np
 from mpi4py import MPI
-from scipy.sparse import coo_matrix, csr_matrix, identity
+from scipy.sparse import coo_matrix, csr_matrix
 
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.subdomain import Subdomain
@@ -112,7 +112,11 @@ class InterfaceNeighbours:
         entries = np.ones(2 * len(a)), (np.concatenate([a, b]), np.concatenate([b, a]))
         self.adjacency: csr_matrix = coo_matrix(entries, shape=(n, n)).tocsr()
         self._components = jump_operator.components
-        self._reached = self.adjacency + identity(n, format="csr")
+        # (n, most neighbours + 1) each node, its neighbours, and itself again where there are fewer.
+        count = np.diff(self.adjacency.indptr)
+        self._reached = np.repeat(np.arange(n)[:, None], count.max(initial=0) + 1, axis=1)
+        within = np.arange(self.adjacency.nnz) - np.repeat(self.adjacency.indptr[:-1], count)
+        self._reached[np.repeat(np.arange(n), count), within] = self.adjacency.indices
 
     def rows_near(self, rows: Int, choose: Callable[[Int], Int], enough: int) -> Int:
         """Return global rows and those near them along the interfaces that `choose` returns, until they are enough."""
@@ -120,7 +124,7 @@ class InterfaceNeighbours:
         while True:
             near = (self.rows[bonds][:, None] + np.arange(self._components)).ravel()
             near = np.union1d(rows, choose(near))
-            reached = np.unique(self._reached[bonds].indices)
+            reached = np.unique(self._reached[bonds])
             if len(near) >= enough or len(reached) == len(bonds):
                 return near
             bonds = reached

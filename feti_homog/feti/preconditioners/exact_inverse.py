@@ -11,7 +11,7 @@ A spring whose compliance grew by dC is one of C, whose jump dC lam is prescribe
 
 Changes cost their columns of what `followed_response` keeps up.  N follows them, by borders, when new columns or a
 confirmation want it.  The reference cell stays, until there are more changes than an option allows: then the cell as it
-stands, but for what softened, takes its place.
+stands, but for what softened, takes its place, with the columns of rows that are still active.
 """
 
 from __future__ import annotations
@@ -26,19 +26,25 @@ from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.neighbours import InterfaceNeighbours
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
-from feti_homog.feti.preconditioners.bordered_inverse import BorderedInverse
+from feti_homog.feti.preconditioners.changed_reference import ChangedReference
 from feti_homog.feti.preconditioners.followed_response import FollowedResponse
 from feti_homog.feti.preconditioners.reference_cell import (
     BodyTies,
     ReferenceCell,
-    ResponseColumns,
     one_sided_jumps,
     stiffness_of_rows,
 )
 from feti_homog.feti.preconditioners.scaled import Preconditioner
-from feti_homog.feti.thresholds import FOLLOWED_COLUMNS, INFLUENCE_BATCH, INFLUENCE_COLUMNS, MOST_FOLLOWED, NORM_MARGIN
+from feti_homog.feti.thresholds import (
+    FOLLOWED_COLUMNS,
+    INFLUENCE_BATCH,
+    INFLUENCE_COLUMNS,
+    MOST_FOLLOWED,
+    NEVER_REFACTORED_ROWS,
+    NORM_MARGIN,
+)
 from feti_homog.parallel.distributed_arrays import gather_rows, scale_rows
-from feti_homog.typing import Float, Int
+from feti_homog.typing import Bool, Float, Int
 
 
 class ExactInverse(Preconditioner):
@@ -46,7 +52,6 @@ class ExactInverse(Preconditioner):
 
     Attributes:
         neighbours: which bonds lie beside each other.
-        reference: the reference cell.
         norm: |H| with all bonds intact, which is the largest, as the power method finds it, with a margin.
         stiffness: (all rows,) the most that each diagonal entry of H can be: that of a node of either side and of the
             spring between them, in a row, while all others are held.
@@ -57,6 +62,7 @@ class ExactInverse(Preconditioner):
 
     norm: float = np.inf
     is_exact = True
+    _changes: ChangedReference
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> None:
         """Factor the cell with all bonds intact; all boundary operators must be dense.  Collective.
@@ -69,7 +75,8 @@ class ExactInverse(Preconditioner):
         self.comm, self._jump_operator, self._operators = comm, jump_operator, operators
         self._first, end = jump_operator.owned
         self._rows = end - self._first
-        self._most_columns = PETSc.Options("feti_").getInt("influence_columns", INFLUENCE_COLUMNS)
+        most = NEVER_REFACTORED_ROWS if jump_operator.global_rows <= NEVER_REFACTORED_ROWS else INFLUENCE_COLUMNS
+        self._most_columns = PETSc.Options("feti_").getInt("influence_columns", most)
         if self._most_columns < 1:
             raise CaseError(f"-feti_influence_columns {self._most_columns}: expected a whole number above 0")
         self.stiffness = np.concatenate(comm.allgather(stiffness_of_rows(jump_operator, operators)))
@@ -88,6 +95,11 @@ class ExactInverse(Preconditioner):
         self._rebase(self._active)
         # Rows that leave make H smaller.
         self.norm = NORM_MARGIN * self.reference.largest_eigenvalue(self._first)
+
+    @property
+    def reference(self) -> ReferenceCell:
+        """The reference cell."""
+        return self._changes.cell
 
     @property
     def rounding(self) -> float:
@@ -136,16 +148,11 @@ class ExactInverse(Preconditioner):
         self._catch_up()
         if self._has_others(followed) or len(wanted) > followed.most:
             return False  # other bodies are free than those with pins, or there is no room
-        if not followed.has_room(rows := self._with_near(lacking, followed.lacking)):
-            followed.clear()
-            rows = near if followed.has_room(near := self._with_near(wanted, followed.lacking)) else wanted
-        self._columns.add(rows)
-        at, unit = self._columns.positions(rows), np.zeros((self._rows, len(rows)))
-        both = np.stack([self._held, self.reference.active], axis=1)
-        turned = -np.diff(gather_rows(self.comm, both, self._first, rows)).ravel()
-        mine = np.flatnonzero((rows >= self._first) & (rows < self._first + self._rows))
-        unit[rows[mine] - self._first, mine] = turned[mine]
-        followed.add(rows, self._response(np.where(turned == 0.0, self._columns.owned[:, at], unit)))
+        near = self._with_near(lacking, followed.lacking)
+        rows = near if len(np.union1d(wanted, near)) <= followed.most else lacking
+        followed.make_room(len(rows), wanted, self._is_active())
+        self._changes.columns.add(rows)
+        followed.add(rows, self._changes.present(rows, self._held))
         return True
 
     def _catch_up(self) -> None:
@@ -153,17 +160,14 @@ class ExactInverse(Preconditioner):
         if not self._is_behind:
             return
         self._is_behind = False
-        changed = self._changed()
+        changed = self._changed(self._held)
         if len(changed) > self._tied + self._most_columns:
-            # The memory of the old cell goes before the new one takes its own.
-            self.reference.destroy()
-            self._columns.clear()
             self._rebase(self._held)
-            changed = self._changed()
+            changed = self._changed(self._held)
             self._tied = len(changed)
         self._find(changed)
-        self._update_inverse(self._columns.positions(changed))
-        self._loose = self._columns.rows[self._inverse.dependent]
+        self._changes.update(changed, self._softened)
+        self._loose = self._changes.columns.rows[self._changes.inverse.dependent]
         self._held = self._with_pins(self._loose, self._held)
 
     def _has_others(self, followed: FollowedResponse) -> bool:
@@ -174,7 +178,7 @@ class ExactInverse(Preconditioner):
         """H r for r (owned rows,) or (owned rows, k); 0 on inactive rows.  Collective."""
         self._catch_up()
         y = self.reference.respond(scale_rows(self.reference.active, r))
-        return scale_rows(self._active, self._response(y + scale_rows(1.0 - self.reference.active, r)))
+        return scale_rows(self._active, self._changes.response(y + scale_rows(1.0 - self.reference.active, r)))
 
     def multipliers(self, d: Float, E: Float) -> Float:
         """H d E, but for rounding, for d (owned rows, v), the same at every call, and E (v, k).  Collective."""
@@ -207,7 +211,7 @@ class ExactInverse(Preconditioner):
             y = self.reference.respond(scale_rows(self.reference.active, d))
             self._answer = y + scale_rows(1.0 - self.reference.active, d)
         # Pins bear nothing, and stay.
-        answer = scale_rows(1.0 - self._held + self._active, self._response(self._answer))
+        answer = scale_rows(1.0 - self._held + self._active, self._changes.response(self._answer))
         if self._followed is None:
             arguments = self.stiffness, answer, self._loose, self.most_followed
             self._followed = FollowedResponse(self.comm, self._first, *arguments)
@@ -224,7 +228,8 @@ class ExactInverse(Preconditioner):
         self._catch_up()
         self._find(pairs.ravel())
         returned = gather_rows(self.comm, self.reference.active, self._first, pairs.ravel()) == 0
-        return self._inverse.blocks(self._columns.block, self._columns.positions(pairs.ravel()), returned)
+        found = self._changes.columns
+        return self._changes.inverse.blocks(found.block, found.positions(pairs.ravel()), returned)
 
     def columns(self, rows: Int) -> tuple[Float, Float]:
         """(owned rows, k) columns of H of the reference cell, and their (k, k) block, for the same global rows (k,).
@@ -232,14 +237,14 @@ class ExactInverse(Preconditioner):
         They are those of the bonded cell until rows are first restricted.  Collective.
         """
         self._find(rows)
-        at = self._columns.positions(rows)
-        return self._columns.owned[:, at], self._columns.block[at[:, None], at]
+        at = self._changes.columns.positions(rows)
+        return self._changes.columns.owned[:, at], self._changes.columns.block[at[:, None], at]
 
-    def _changed(self) -> Int:
-        """Return the global rows that are active here or in the reference cell, not both, and those that softened.
+    def _changed(self, held: Float) -> Int:
+        """Return the global rows that are `held` here or in the reference cell, not both, and those that softened.
 
         Collective."""
-        own = self._first + np.flatnonzero((self._held != self.reference.active) | (self._softened > 0.0))
+        own = self._first + np.flatnonzero((held != self.reference.active) | (self._softened > 0.0))
         return np.concatenate(self.comm.allgather(own))
 
     @property
@@ -251,50 +256,43 @@ class ExactInverse(Preconditioner):
 
     def _rebase(self, active: Float) -> None:
         """Take a cell with these active rows, and what it takes to hold its bodies, for the reference.  Collective."""
-        tied = self._ties.tied(active)
-        self.reference = ReferenceCell(self.comm, self._jump_operator, self._operators, self._BD, tied)
+        tied, kept = self._ties.tied(active), None
+        if self.factorizations:
+            kept = self._kept_columns(tied)
+            self._changes.destroy()  # before the new cell takes memory
+        cell = ReferenceCell(self.comm, self._jump_operator, self._operators, self._BD, tied)
         self.factorizations += 1
-        own = self._jump_operator.owned, self._jump_operator.global_rows
-        self._columns = ResponseColumns(self.comm, self.reference, *own)
-        self._inverse = BorderedInverse(self.comm)
+        self._changes = ChangedReference(self.comm, cell, self._jump_operator.owned, self.stiffness)
+        if kept is not None:
+            self._changes.take(*kept)
         self._answer, self._tied = None, 0
-        self._rounding = self.reference.force_of_rigid_motions(self.stiffness[self._first :][: self._rows])
+        self._rounding = cell.force_of_rigid_motions(self.stiffness[self._first :][: self._rows])
+
+    def _kept_columns(self, tied: Float) -> tuple[Int, Float] | None:
+        """Rows and columns of the cell with the active rows `tied`, as `ChangedReference.next_columns`.  Collective.
+
+        None where springs have softened, or where many rows have changed at once.
+        """
+        changed = self._changed(tied)
+        own = np.array([(self._more * self._active).any(), (tied != self._held).any()], np.int64)
+        self.comm.Allreduce(MPI.IN_PLACE, own, MPI.MAX)
+        soft, moved = own.tolist()
+        if soft or (self._changes.columns.positions(changed) < 0).sum() > self.batch:
+            return None
+        self._find(changed)
+        return self._changes.next_columns(tied, changed, None if moved else self._followed)
 
     def _find(self, rows: Int) -> None:
         """Find the columns of the reference cell that these rows lack, and some near them.  Collective."""
-        rows = rows[self._columns.positions(rows) < 0]
-        if len(rows):
-            self._columns.add(self._with_near(rows, lambda near: near[self._columns.positions(near) < 0]))
+        found = self._changes.columns
+        if len(lacking := rows[found.positions(rows) < 0]):
+            found.add(self._with_near(lacking, lambda near: near[found.positions(near) < 0]))
 
     def _with_near(self, rows: Int, lacking: Callable[[Int], Int]) -> Int:
         """Return rows and active ones near them, which break next: columns are cheaper together.  Collective."""
-        active = np.concatenate(self.comm.allgather(self._active)) > 0
-        return self.neighbours.rows_near(rows, lambda near: lacking(near[active[near]]), self.batch)
+        is_active = self._is_active()
+        return self.neighbours.rows_near(rows, lambda near: lacking(near[is_active[near]]), self.batch)
 
-    def _update_inverse(self, changed: Int) -> None:
-        """Let N be that of the columns `changed`, made anew where updates have lost too many digits.  Collective."""
-        ours = np.stack([self.reference.active, self._softened], axis=1)
-        active, softened = gather_rows(self.comm, ours, self._first, self._columns.rows[changed]).T
-        columns = self._columns.block, self.stiffness[self._columns.rows]
-        self._inverse.exchange(*columns, changed, active == 0, softened)
-        if not self._inverse.holds():
-            self._inverse = BorderedInverse(self.comm)
-            self._inverse.exchange(*columns, changed, active == 0, softened)
-
-    def _response(self, z: Float) -> Float:
-        """(owned rows,[ k]) H g on active rows, what of g is left on others; z = Gamma g_A + g_R.  Collective."""
-        members, z = self._inverse.members, z.copy()
-        if len(members):
-            rows = self._columns.rows[members]
-            c = self._inverse.solve(gather_rows(self.comm, z, self._first, rows))
-            whole = np.zeros((len(self._columns.rows), *z.shape[1:]))
-            whole[members] = c
-            z -= self._columns.owned @ whole
-            mine = np.flatnonzero((rows >= self._first) & (rows < self._first + self._rows))
-            own = rows[mine] - self._first
-            # A row that left opens by c, one that came bears -c.  Nothing cancels in D c, however soft the spring.
-            stretched = self._inverse.added[mine]
-            outside = self.reference.active[own] == 0.0
-            factor = np.where(outside, -1.0, np.where(stretched > 0, stretched, 1.0))
-            z[own] = scale_rows(factor, c[mine])
-        return z
+    def _is_active(self) -> Bool:
+        """(all rows,) which are active.  Collective."""
+        return np.asarray(np.concatenate(self.comm.allgather(self._active)) > 0.0)

@@ -23,17 +23,19 @@ from __future__ import annotations
 
 import numpy as np
 from mpi4py import MPI
+from scipy.linalg.blas import dgemm
 from scipy.linalg.lapack import dpstrf
 
 from feti_homog.feti.thresholds import (
     FOLLOWED_COLUMNS,
+    FOLLOWED_SHARE,
     LEAST_FOLLOWED_PIVOT,
     RIGID_SHARE,
     SINGULAR_PIVOT,
     WAITING_COLUMNS,
 )
 from feti_homog.parallel.distributed_arrays import allreduce_sum, gather_rows
-from feti_homog.typing import Float, Int
+from feti_homog.typing import Bool, Float, Int
 
 
 class FollowedResponse:
@@ -62,6 +64,8 @@ class FollowedResponse:
         self.answer, self.pins, self.most = answer, pins, most
         self._slot = np.full(len(stiffness), -1)
         self._rows: Int = np.zeros(0, np.int64)
+        # When each column was last used, counted in changes.
+        self._used, self._now = np.zeros(most, np.int64), 0
         # Memory is taken when columns come.
         self._buffer = np.zeros((len(answer), most), order="F")
         # What is taken off at changes that wait, and its factors in the columns of the rows K that are kept.
@@ -73,9 +77,36 @@ class FollowedResponse:
         """Return which of the global rows have no column."""
         return rows[self._slot[rows] < 0]
 
-    def has_room(self, rows: Int) -> bool:
-        """Return whether columns of so many more rows leave the others in place."""
-        return len(self._rows) + len(rows) <= self.most
+    def has_columns(self, rows: Int) -> Bool:
+        """(k,) which of the global rows have columns."""
+        return np.asarray(self._slot[rows] >= 0)
+
+    def make_room(self, more: int, wanted: Int, useful: Bool) -> None:
+        """Let columns go where there is no room for so many more: those longest unused.
+
+        Those of rows that are `useful` (all rows,) go last, those of `wanted` stay.
+        """
+        if len(self._rows) + more <= self.most:
+            return
+        # Some more at once, for the others move.
+        count = min(int(FOLLOWED_SHARE * self.most), self.most - more)
+        spared, is_useful = np.isin(self._rows, wanted), useful[self._rows]
+        order = np.lexsort([-self._used[: len(self._rows)], ~is_useful, ~spared])
+        stay = np.sort(order[: max(count, int(spared.sum()))])
+        kept, n = self._rows[stay], len(stay)
+        self._slot[self._rows] = -1
+        self._slot[kept] = np.arange(n)
+        self._rows, self._used[:n] = kept, self._used[stay]
+        for begin in range(0, n, WAITING_COLUMNS):
+            # Columns move to the left, so that none is lost.
+            part = slice(begin, min(begin + WAITING_COLUMNS, n))
+            self._buffer[:, part] = self._buffer[:, stay[part]]
+        self._factors[:n] = self._factors[stay]
+
+    def columns(self, rows: Int) -> Float:
+        """(owned rows, k) columns of the global rows (k,), which have them."""
+        at, n = self._slot[rows], self._count
+        return np.asarray(self._buffer[:, at] - self._waiting[:, :n] @ self._factors[at, :n].T)
 
     def blocks(self, pairs: Int) -> Float:
         """(m, 2, 2) diagonal blocks of Gamma at the pairs (m, 2) of global rows, which have columns.  Collective.
@@ -85,6 +116,7 @@ class FollowedResponse:
         if len(self.lacking(pairs)):
             raise ValueError("rows without columns have no blocks")
         own, at, n = pairs - self._first, self._slot[pairs], self._count
+        self._used[at] = self._now
         mine = ((own >= 0) & (own < len(self._buffer))).all(axis=1)
         own, at = own[mine], at[mine]
         blocks = np.zeros((len(pairs), 2, 2))
@@ -92,17 +124,13 @@ class FollowedResponse:
         blocks[mine] -= self._waiting[own, :n] @ self._factors[at, :n].transpose(0, 2, 1)
         return allreduce_sum(self._comm, blocks)
 
-    def clear(self) -> None:
-        """Let all columns go."""
-        self._slot[self._rows], self._rows, self._count = -1, self._rows[:0], 0
-
     def add(self, rows: Int, columns: Float) -> None:
         """Take the columns (owned rows, k) of these global rows (k,) in, for which there is room."""
         self._apply_waiting()
         old, new = len(self._rows), len(self._rows) + len(rows)
         self._slot[rows] = np.arange(old, new)
         self._rows = np.concatenate([self._rows, rows])
-        self._buffer[:, old:new] = columns
+        self._buffer[:, old:new], self._used[old:new] = columns, self._now
 
     def follow(self, rows: Int, turned: Float, gained: Float) -> bool:
         """Let the global rows (k,) leave (`turned` is 1), come (-1) or soften (0), their springs gain compliance (k,).
@@ -184,8 +212,9 @@ class FollowedResponse:
 
     def _present(self, rows: Int) -> tuple[Float, Float]:
         """(owned rows, k) columns, and (k + all columns, k + v) rows of them and of U on every rank.  Collective."""
-        n, at = self._count, self._slot[rows]
-        columns = self._buffer[:, at] - self._waiting[:, :n] @ self._factors[at, :n].T
+        self._now += 1
+        self._used[self._slot[rows]] = self._now
+        columns = self.columns(rows)
         everywhere = np.concatenate([rows, self._rows])
         return columns, gather_rows(self._comm, np.hstack([columns, self.answer]), self._first, everywhere)
 
@@ -202,8 +231,10 @@ class FollowedResponse:
 
     def _apply_waiting(self) -> None:
         n, k = self._count, len(self._rows)
-        if n:
-            self._buffer[:, :k] -= self._waiting[:, :n] @ self._factors[:k, :n].T
+        if n and k and len(self._buffer):
+            # In place: a product by itself would take as much memory as all columns.
+            product = -1.0, self._waiting[:, :n], self._factors[:k, :n]
+            dgemm(*product, beta=1.0, c=self._buffer[:, :k], trans_b=1, overwrite_c=1)
         self._count = 0
 
 

@@ -19,7 +19,7 @@ from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.assembled_schur import AssembledSchur
 from feti_homog.feti.preconditioners.spring_update import SpringUpdate
-from feti_homog.feti.thresholds import INFLUENCE_CHUNK, NORM_ITERATIONS, STIFF_FIBRES
+from feti_homog.feti.thresholds import BUFFERED_COLUMNS, INFLUENCE_CHUNK, NORM_ITERATIONS, STIFF_FIBRES
 from feti_homog.parallel.distributed_arrays import allreduce_sum, gather_rows, scale_rows
 from feti_homog.typing import Float, Int
 
@@ -175,9 +175,9 @@ class ResponseColumns:
         self._comm, self._cell, self._first = comm, cell, owned[0]
         self.rows: Int = np.zeros(0, np.int64)
         self._position = np.full(global_rows, -1)
-        # Both grow in place; a full buffer doubles.
-        self._columns = np.zeros((owned[1] - owned[0], INFLUENCE_CHUNK), order="F")
-        self._block = np.zeros((INFLUENCE_CHUNK, INFLUENCE_CHUNK))
+        # Both grow in place; a full buffer doubles.  Memory is taken when columns come.
+        room = min(global_rows, BUFFERED_COLUMNS)
+        self._columns, self._block = np.empty((owned[1] - owned[0], room), order="F"), np.empty((room, room))
 
     @property
     def owned(self) -> Float:
@@ -200,22 +200,24 @@ class ResponseColumns:
     def add(self, rows: Int) -> None:
         """Find the columns of those rows that have none.  Collective."""
         new = np.unique(rows[self._position[rows] < 0])
-        for start in range(0, len(new), INFLUENCE_CHUNK):
-            some = new[start : start + INFLUENCE_CHUNK]
+        # A few columns too many are cheaper with others than by themselves.
+        for some in np.array_split(new, max(round(len(new) / INFLUENCE_CHUNK), 1)) if len(new) else ():
             unit = np.zeros((len(self._columns), len(some)))
             mine = np.flatnonzero((some >= self._first) & (some < self._first + len(unit)))
             unit[some[mine] - self._first, mine] = 1.0
-            self._append(some, self._cell.respond(unit))
+            self.append(some, self._cell.respond(unit))
 
-    def _append(self, rows: Int, columns: Float) -> None:
+    def append(self, rows: Int, columns: Float) -> None:
+        """Take the columns (owned rows, k) of rows (k,) that have none.  Collective."""
         old = len(self.rows)
         self._position[rows] = old + np.arange(len(rows))
         self.rows = np.concatenate([self.rows, rows])
         n = len(self.rows)
         if n > len(self._block):
-            more = max(n, 2 * len(self._block)) - len(self._block)
-            self._columns = np.asfortranarray(np.pad(self._columns, ((0, 0), (0, more))))
-            self._block = np.pad(self._block, (0, more))
+            size = max(n, 2 * len(self._block))
+            columns_of, block = np.empty((len(self._columns), size), order="F"), np.empty((size, size))
+            columns_of[:, :old], block[:old, :old] = self._columns[:, :old], self._block[:old, :old]
+            self._columns, self._block = columns_of, block
         self._columns[:, old:n] = columns
         self._block[:n, old:n] = gather_rows(self._comm, columns, self._first, self.rows)
         self._block[old:n, :old] = self._block[:old, old:n].T

@@ -1,0 +1,124 @@
+"""A reference cell whose rows have changed: its response by the columns of these, and what the next cell keeps of them.
+
+See `exact_inverse` for the equations.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+
+from feti_homog.feti.preconditioners.bordered_inverse import BorderedInverse
+from feti_homog.feti.preconditioners.followed_response import FollowedResponse
+from feti_homog.feti.preconditioners.reference_cell import ReferenceCell, ResponseColumns
+from feti_homog.feti.thresholds import INFLUENCE_CHUNK, KEPT_AT_ONCE, KEPT_ERROR
+from feti_homog.parallel.distributed_arrays import gather_rows, scale_rows
+from feti_homog.typing import Float, Int
+
+
+class ChangedReference:
+    """A reference cell, columns of its response, and N of the rows that have changed.
+
+    Attributes:
+        cell: the reference cell.
+        columns: those of its response that were found.
+        inverse: N.
+    """
+
+    def __init__(self, comm: MPI.Intracomm, cell: ReferenceCell, owned: tuple[int, int], stiffness: Float) -> None:
+        """No columns yet; this rank owns the rows from owned[0] up to owned[1].
+
+        `stiffness` (all rows,) is the most that the diagonal of Gamma can be on active rows.
+        """
+        self._comm, self._first, self._rows, self._stiffness = comm, owned[0], owned[1] - owned[0], stiffness
+        self.cell, self.columns = cell, ResponseColumns(comm, cell, owned, len(stiffness))
+        self.inverse = BorderedInverse(comm)
+
+    def destroy(self) -> None:
+        """Free the cell and the columns."""
+        self.cell.destroy()
+        self.columns.clear()
+
+    def update(self, changed: Int, softened: Float) -> None:
+        """Let N be that of the global rows `changed`, which have columns; D is `softened` (owned rows,).
+
+        It is made anew where updates have lost too many digits.  Collective.
+        """
+        at, ours = self.columns.positions(changed), np.stack([self.cell.active, softened], axis=1)
+        active, D = gather_rows(self._comm, ours, self._first, changed).T
+        columns = self.columns.block, self._stiffness[self.columns.rows]
+        self.inverse.exchange(*columns, at, active == 0, D)
+        if not self.inverse.holds():
+            self.inverse = BorderedInverse(self._comm)
+            self.inverse.exchange(*columns, at, active == 0, D)
+
+    def response(self, z: Float) -> Float:
+        """(owned rows,[ k]) H g on active rows, what of g is left on others; z = Gamma g_A + g_R.  Collective."""
+        members, z = self.inverse.members, z.copy()
+        if len(members):
+            rows = self.columns.rows[members]
+            c = self.inverse.solve(gather_rows(self._comm, z, self._first, rows))
+            self._take_off(z, members, c)
+            mine = np.flatnonzero((rows >= self._first) & (rows < self._first + self._rows))
+            own = rows[mine] - self._first
+            # A row that left opens by c, one that came bears -c.  Nothing cancels in D c, however soft the spring.
+            stretched = self.inverse.added[mine]
+            outside = self.cell.active[own] == 0.0
+            factor = np.where(outside, -1.0, np.where(stretched > 0, stretched, 1.0))
+            z[own] = scale_rows(factor, c[mine])
+        return z
+
+    def _take_off(self, z: Float, members: Int, c: Float) -> None:
+        """Take Gamma[:, C] c off z (owned rows,[ k]) in place."""
+        columns, known = self.columns.owned, len(self.columns.rows)
+        if z.size < INFLUENCE_CHUNK * len(z) or 2 * len(members) > known:
+            # A product with all columns is cheaper than a copy of some.
+            whole = np.zeros((known, *z.shape[1:]))
+            whole[members] = c
+            z -= columns @ whole
+            return
+        for start in range(0, len(members), KEPT_AT_ONCE):
+            some = slice(start, start + KEPT_AT_ONCE)
+            z -= columns[:, members[some]] @ c[some]
+
+    def present(self, rows: Int, active: Float) -> Float:
+        """(owned rows, k) columns, of the cell with the `active` rows (owned rows,) that N is of, of rows (k,).
+
+        They have columns.  Collective.
+        """
+        both = np.stack([active, self.cell.active], axis=1)
+        turned = -np.diff(gather_rows(self._comm, both, self._first, rows)).ravel()
+        columns = self.columns.owned[:, self.columns.positions(rows)]
+        columns[:, turned != 0.0] = 0.0
+        mine = np.flatnonzero((turned != 0.0) & (rows >= self._first) & (rows < self._first + self._rows))
+        columns[rows[mine] - self._first, mine] = turned[mine]
+        return self.response(columns)
+
+    def next_columns(self, active: Float, changed: Int, followed: FollowedResponse | None) -> tuple[Int, Float]:
+        """Global rows (k,) and columns (owned rows, k) of the cell with these active rows, of those that have columns.
+
+        `active` (owned rows,) are the reference cell's but for the rows `changed`, which have columns; only rows that
+        are active in both count.  `followed` has columns of the present cell, if it is that one.  Collective.
+        """
+        known = self.columns.rows
+        both = gather_rows(self._comm, active * self.cell.active, self._first, known) > 0.0
+        is_followed = np.zeros(len(known), bool) if followed is None else followed.has_columns(known) & both
+        rest, parts = np.flatnonzero(both & ~is_followed), [np.zeros((self._rows, 0))]
+        if followed is not None:
+            parts.append(followed.columns(known[is_followed]))
+        if len(rest):
+            self.update(changed, np.zeros(self._rows))
+        for start in range(0, len(rest), KEPT_AT_ONCE):
+            parts.append(self.response(self.columns.owned[:, rest[start : start + KEPT_AT_ONCE]]))
+        return np.concatenate([known[is_followed], known[rest]]), np.hstack(parts)
+
+    def take(self, rows: Int, columns: Float) -> None:
+        """Take the columns (owned rows, k) of active rows (k,), unless a sum of them is not the cell's.  Collective."""
+        own, weights = slice(self._first, self._first + self._rows), np.zeros(len(self._stiffness))
+        weights[rows] = np.cos(rows)
+        sums = np.stack([self.cell.respond(weights[own]), columns @ weights[rows]], axis=1)
+        sums /= np.where(self.cell.active > 0.0, self._stiffness[own], 1.0)[:, None]
+        parts = np.abs([sums[:, 1], sums[:, 1] - sums[:, 0]]).max(axis=1, initial=0.0)
+        self._comm.Allreduce(MPI.IN_PLACE, parts, MPI.MAX)
+        if parts[1] <= KEPT_ERROR * parts[0]:
+            self.columns.append(rows, columns)
