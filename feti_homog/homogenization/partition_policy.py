@@ -41,8 +41,8 @@ class PartitionPolicy:
         tiles: of the coarse mesh.
         across_dofs: where nothing can part, cells up to this size are cut across materials, not body by body.
         across_piece_dofs: of such a piece, which has no more multipliers than one of a body; so it may be larger.
-        whole_dofs: such a cell on one rank is not cut up to this size: one sparse factor takes less than the dense
-            matrices of pieces.
+        whole_dofs: such a cell on one rank is not cut up to this size: one sparse factor takes less time than the dense
+            matrices of pieces do, and twice their memory.
 
     `scripts/benchmark scripts/cases/benchmark_1m.toml --tools feti` times the bonded ones, `scripts/benchmark_path`
     those of bodies that may part, and `scripts/benchmark --table small` the last three.
@@ -57,7 +57,7 @@ class PartitionPolicy:
     tiles: TilePolicy = DEFAULT_TILES
     across_dofs: int = 0
     across_piece_dofs: int = 7000
-    whole_dofs: int = 75_000
+    whole_dofs: int = 400_000
 
     def across_pieces(self, dofs: int, n_ranks: int) -> int:
         """Return into how many pieces a cell in which nothing can part is cut across materials; 0 for body by body.
