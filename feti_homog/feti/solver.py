@@ -28,17 +28,14 @@ from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.feti.krylov import ActiveRows, Krylov
 from feti_homog.feti.operators.interface_operators import DualOperator
 from feti_homog.feti.operators.one_subdomain import CondensedLoads
-from feti_homog.feti.thresholds import DEFAULTS, MAX_RESTARTS, Thresholds
+from feti_homog.feti.thresholds import DEFAULTS, MAX_RESTARTS, MOST_DOFS_UNTRIMMED, Thresholds
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.runtime import process_memory
 from feti_homog.typing import Float
 
 # What rounding can end in.
-BREAKDOWNS = (
-    PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_PC,
-    PETSc.KSP.ConvergedReason.DIVERGED_INDEFINITE_MAT,
-    PETSc.KSP.ConvergedReason.DIVERGED_BREAKDOWN,
-)
+REASON = PETSc.KSP.ConvergedReason
+BREAKDOWNS = (REASON.DIVERGED_INDEFINITE_PC, REASON.DIVERGED_INDEFINITE_MAT, REASON.DIVERGED_BREAKDOWN)
 
 
 class Iterate(NamedTuple):
@@ -94,7 +91,8 @@ class FetiSolver:
         self.exact_inverse = parts.exact_inverse
         self.natural, self.adaptive, self.coarse_dimension = parts.natural, parts.adaptive, parts.coarse_dimension
         self.operator = DualOperator(self.jump_operator, self.interface_operators, compliance)
-        process_memory.trim()
+        if sum(s.n_dofs for s in subdomains) > MOST_DOFS_UNTRIMMED:
+            process_memory.trim()
         self.active = ActiveRows(self.rows)
         self._jumps = ActiveJumps(comm, self.operator, self.natural, self.active)
         self._by_columns = None

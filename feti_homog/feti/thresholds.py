@@ -59,6 +59,8 @@ DEFAULTS = Thresholds()
 ITERATIVE_RTOL = 1e-10
 # Per cent more workspace than MUMPS estimates: its own 20 were too little for a matrix of 13 084 rows on two ranks.
 MUMPS_EXTRA_WORKSPACE_PERCENT = 100
+# Degrees of freedom of a rank up to which what its set-up leaves unused is not given back: it is used again.
+MOST_DOFS_UNTRIMMED = 100_000
 # Degrees of freedom of an interior from which on nested dissection by cuts of the mesh costs less than minimum degree,
 # CHOLMOD's own: of 12 000, 47 000, 67 000 and 73 000 order and factor take 1.16, 0.54, 0.42 and 0.41 of its time.
 LEAST_ORDERED_DOFS = 15_000

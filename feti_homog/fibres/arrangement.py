@@ -21,6 +21,10 @@ DECIMALS = 10
 MOST_GAPS, NARROWEST = 4, 0.7
 # Fibres beside each other have three pairs each; those on top of each other would fill the memory.
 MOST_PAIRS = 100_000_000
+# Distances that are computed one by one faster than a tree is made.
+FEW = 4000
+# Periods from a cell to those around it.
+STEPS = np.array([step for step in product((-1, 0, 1), repeat=2) if any(step)])
 
 
 @dataclass(frozen=True)
@@ -188,21 +192,28 @@ def neighbours(centres: Float, size: Float, reach: float) -> tuple[Int, Int, Flo
         MeshError: there are more than MOST_PAIRS.
     """
     inside = centres % size
-    points, owner = [inside], [np.arange(len(centres))]
-    for step in product((-1, 0, 1), repeat=2):
-        if any(step):
-            near = np.flatnonzero(_is_near(inside, np.array(step), size, reach))
-            points.append(inside[near] + np.array(step) * size)
-            owner.append(near)
-    place, who = np.concatenate(points), np.concatenate(owner)
+    images = inside + STEPS[:, None] * size
+    is_near = ((images > -reach) & (images < size + reach)) | (STEPS[:, None] == 0)
+    step, near = np.nonzero(is_near.all(axis=2))
+    place, who = np.concatenate([inside, images[step, near]]), np.concatenate([np.arange(len(centres)), near])
     _refuse_many(place, reach)
-    # A tree that is used once is not worth being balanced.
-    pairs = cKDTree(place, balanced_tree=False, compact_nodes=False).query_pairs(reach, output_type="ndarray")
-    first, second = pairs.T
+    first, second = _pairs(place, len(centres), reach)
     keep = np.flatnonzero((first < len(centres)) & (who[first] <= who[second]))
     keep = keep[np.argsort(first[keep] * len(place) + second[keep])]
     first, second = first[keep], second[keep]
     return who[first], who[second], place[second] - place[first]
+
+
+def _pairs(place: Float, count: int, reach: float) -> tuple[Int, Int]:
+    """Pairs i < j of places (n, 2) nearer than `reach`, of few places only those whose first is one of `count`."""
+    if count * len(place) <= FEW:
+        away = place - place[:count, None]
+        first, second = np.nonzero((away * away).sum(axis=2) <= reach * reach)
+        ascending = first < second
+        return first[ascending], second[ascending]
+    # A tree that is used once is not worth being balanced.
+    pairs = cKDTree(place, balanced_tree=False, compact_nodes=False).query_pairs(reach, output_type="ndarray")
+    return pairs[:, 0], pairs[:, 1]
 
 
 def _refuse_many(points: Float, reach: float) -> None:
@@ -220,12 +231,3 @@ def _refuse_many(points: Float, reach: float) -> None:
             f"[cell] about {count:.2g} pairs of fibres are nearer to each other than {reach:.2g}; expected at most "
             f"{MOST_PAIRS}: they lie on top of each other, or one is much larger than the others"
         )
-
-
-def _is_near(inside: Float, step: Int, size: Float, reach: float) -> Bool:
-    """(n,) which of the points (n, 2) have an image, by so many periods, that is nearer than `reach` to the cell."""
-    near = np.ones(len(inside), bool)
-    for axis in np.flatnonzero(step):
-        image = inside[:, axis] + step[axis] * size[axis]
-        near &= (image > -reach) & (image < size[axis] + reach)
-    return near

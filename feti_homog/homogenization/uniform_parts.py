@@ -17,6 +17,7 @@ from feti_homog.fem.problem import Problem
 from feti_homog.feti.decomposition.jump_operator import JumpOperator, NodeBlocks
 from feti_homog.feti.decomposition.shared_entities import SharedEntities, share_entities
 from feti_homog.feti.decomposition.subdomain import Subdomain
+from feti_homog.mesh.periodic_topology import present
 from feti_homog.mesh.refinement import FineMesh, ReferenceLattice, joined
 from feti_homog.mesh.submesh import SubdomainTable, Submesh, SubmeshesOfRank, joined_meshes, part
 from feti_homog.typing import Float, Int
@@ -62,9 +63,9 @@ def parts_of(subdomains: Sequence[Subdomain], phase_of: Sequence[str]) -> Iterat
 
 def _restricted(mesh: FineMesh, members: Int) -> tuple[FineMesh, Int]:
     """Return the coarse triangles `members` (t,) of a mesh as a mesh of its own, and (c,) the classes that it has."""
-    nodes, local = np.unique(mesh.nodes[members], return_inverse=True)
-    classes, node_class = np.unique(mesh.node_class[nodes], return_inverse=True)
-    own = local.reshape(len(members), -1).astype(np.int32), node_class.astype(np.int32)
+    nodes, local = present(mesh.nodes[members], len(mesh.points))
+    classes, node_class = present(mesh.node_class[nodes], mesh.n_classes)
+    own = local.astype(np.int32), node_class.astype(np.int32)
     return FineMesh(mesh.points[nodes], own[0], mesh.curved[members], own[1], len(classes), mesh.lattice), classes
 
 

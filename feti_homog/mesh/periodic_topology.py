@@ -19,6 +19,9 @@ from feti_homog.fibres.outlines.ellipses import Ellipses
 from feti_homog.mesh.coarse_mesh import CoarseMesh, paired_sides
 from feti_homog.typing import Bool, Float, Int, Int32
 
+# Numbers below a size, in proportion to it, below which sorting them costs less than an entry for each below it.
+FEW = 1 / 16
+
 
 @dataclass(frozen=True)
 class Torus:
@@ -218,6 +221,19 @@ def components(n: int, left: Int, right: Int) -> Int:
     """Return connected components of the graph on n vertices with edges (left, right): (n,) labels."""
     graph = coo_matrix((np.ones(len(left), np.int8), (left, right)), shape=(n, n))
     return np.asarray(connected_components(graph, directed=False)[1], np.int64)
+
+
+def present(numbers: Int | Int32, size: int) -> tuple[Int, Int]:
+    """(k,) the numbers, below `size`, that are present, ascending, and the place of each among them."""
+    if numbers.size < FEW * size:
+        kept, place = np.unique(numbers, return_inverse=True)
+        return np.asarray(kept), np.asarray(place.reshape(numbers.shape))
+    is_present = np.zeros(size, bool)
+    is_present[numbers] = True
+    kept = np.flatnonzero(is_present)
+    place = np.empty(size, np.int64)
+    place[kept] = np.arange(len(kept))
+    return kept, place[numbers]
 
 
 def renumber(label: Int, order: Int) -> Int:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from feti_homog.mesh.periodic_topology import Torus
+from feti_homog.mesh.periodic_topology import Torus, present
 from feti_homog.typing import Array, Bool, Float, Int
 
 
@@ -158,17 +158,17 @@ def cut_bodies(torus: Torus, members: Int) -> Iterator[Submesh]:
 
 def part(submesh: Submesh, members: Int) -> Submesh:
     """Return the coarse triangles `members` (m,) of a submesh, as a submesh of its own."""
-    vertices, triangles = np.unique(submesh.triangles[members], return_inverse=True)
-    edges, triangle_edges = np.unique(submesh.triangle_edges[members], return_inverse=True)
-    classes, vertex_class = np.unique(submesh.vertex_class[vertices], return_inverse=True)
-    torus_edges, edge_class = np.unique(submesh.edge_class[edges], return_inverse=True)
+    vertices, triangles = present(submesh.triangles[members], len(submesh.points))
+    edges, triangle_edges = present(submesh.triangle_edges[members], len(submesh.edges))
+    classes, vertex_class = present(submesh.vertex_class[vertices], len(submesh.class_keys))
+    torus_edges, edge_class = present(submesh.edge_class[edges], len(submesh.edge_keys))
     pinned_here = np.flatnonzero(classes == submesh.pinned)
     return replace(
         submesh,
         constituent=submesh.constituent[members],
         points=submesh.points[vertices],
-        triangles=triangles.reshape(-1, 3),
-        triangle_edges=triangle_edges.reshape(-1, 3),
+        triangles=triangles,
+        triangle_edges=triangle_edges,
         backwards=submesh.backwards[members],
         edges=np.searchsorted(vertices, submesh.edges[edges]),
         circles=submesh.circles[edges],
