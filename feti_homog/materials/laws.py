@@ -143,7 +143,7 @@ def _lame(material: Isotropic, plane: str) -> tuple[float, float]:
     """Lame's constant, in plane stress the reduced one, and the shear modulus."""
     state = PLANE_STATES[plane]
     if not state.is_sheet and material.poisson >= 0.5:
-        raise ValueError(f"poisson = {material.poisson}: expected less than 0.5 in {state.title}; 0.4999999 serves")
+        raise ValueError(f"poisson = {material.poisson}: expected less than 0.5 in {state.title}; 0.49999999 serves")
     shear = material.young / (2.0 * (1.0 + material.poisson))
     thickness = 1.0 - material.poisson if state.is_sheet else 1.0 - 2.0 * material.poisson
     return 2.0 * shear * material.poisson / thickness, shear
