@@ -31,7 +31,7 @@ def read_interfaces(document: Mapping[str, Any], reader: TableReader) -> tuple[I
     if any(interface is None for interface in read):
         return None
     interfaces = tuple(map(_completed, filter(None, read)))
-    reader.faults += _faults_between(interfaces)
+    reader.faults += _faults_between(interfaces, tables)
     for label, interface in zip(labels, interfaces, strict=True):
         reader.faults += [*_cohesive_faults(interface, label), *_friction_faults(interface, label)]
     return interfaces
@@ -43,8 +43,8 @@ def _completed(interface: InterfaceSection) -> InterfaceSection:
     return replace(named, **_of_table(named))
 
 
-def _faults_between(interfaces: tuple[InterfaceSection, ...]) -> list[str]:
-    """Faults of several sections: pairs that are missing or named twice, and keys that must agree."""
+def _faults_between(interfaces: tuple[InterfaceSection, ...], tables: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Faults of several sections, from these tables: pairs that are missing or named twice, keys that must agree."""
     faults: list[str] = []
     first: dict[frozenset[str], int] = {}
     for number, interface in enumerate(interfaces[: None if len(interfaces) > 1 else 0]):
@@ -60,7 +60,8 @@ def _faults_between(interfaces: tuple[InterfaceSection, ...]) -> list[str]:
             value, common = getattr(interface, name), getattr(interfaces[0], name)
             if value != common:
                 expected = f"expected {_written(common)}, as of [interface 1]"
-                faults.append(f"[{label}] {name} = {_written(value)}: {expected}: all interfaces agree in it")
+                word = "law" if name == "criterion" and name not in tables[number] else name
+                faults.append(f"[{label}] {word} = {_written(value)}: {expected}: all interfaces agree in it")
     return faults
 
 

@@ -73,7 +73,7 @@ class InterfaceSection:
     """Bonding of fibres and matrix: what is debonded from the start, and the tractions that debond more.
 
     Without this section bonding is perfect. Several sections [[interface]], each with its pair of phases, have the same
-    contact, criterion, growth and scatter.
+    contact, law, growth and scatter.
 
     A strength of None is unlimited.
     """

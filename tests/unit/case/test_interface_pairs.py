@@ -55,6 +55,10 @@ FAULTY = {
         [STRONG | {"between": OUTER}, STRONG | {"between": INNER, "criterion": "quadratic"}],
         '[interface 2] criterion = "quadratic": expected "max", as of [interface 1]',
     ),
+    "laws": (
+        [STRONG | {"between": OUTER}, STRONG | {"between": INNER, "law": "quadratic"}],
+        '[interface 2] law = "quadratic": expected "max", as of [interface 1]',
+    ),
     "growth": (
         [ENERGY | {"between": OUTER}, ENERGY | {"between": INNER, "growth": "springs"}],
         '[interface 2] growth = "springs": expected "released", as of [interface 1]',
@@ -90,7 +94,7 @@ def test_faults_name_their_section(name):
 
 @pytest.mark.parametrize("name", FAULTY)
 def test_the_schema_refuses_all_but_disagreements_of_sections(name):
-    agree = name not in ("the same pair", "contact", "criteria", "growth", "scatter")
+    agree = name not in ("the same pair", "contact", "criteria", "laws", "growth", "scatter")
     assert Draft202012Validator(json_schema()).is_valid(document(FAULTY[name][0])) != agree
 
 
