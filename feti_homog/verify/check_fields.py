@@ -14,6 +14,8 @@ from feti_homog.verify.findings import Findings, relative
 from feti_homog.verify.prescribed import damaged_at
 
 BONDED, CLOSED, OPEN = 0, 1, 2
+# Heat of an increment below this share of what is stored there is rounding.
+LEAST_HEAT = 1e-4
 
 
 def check_interface_state(findings: Findings, cell: DiscreteCell, state: State) -> None:
@@ -95,7 +97,8 @@ def check_tied_faces(findings: Findings, cell: DiscreteCell, before: State, stat
 def check_step_heat(findings: Findings, cell: DiscreteCell, before: State, state: State) -> None:
     """Check that an increment without breaks makes the heat of its slips under the tractions behind it.
 
-    The work of increments is booked as what is stored, lost or heat, so it does not bear witness to the heat.
+    It is relative to tractions times slips from the beginning on, of which the increment is a difference.  The work of
+    increments is booked as what is stored, lost or heat, so it does not bear witness to the heat.
     """
     files, at = cell.files, state.point
     points = files.document["path"]
@@ -107,7 +110,9 @@ def check_step_heat(findings: Findings, cell: DiscreteCell, before: State, state
     rubs = (state.status == CLOSED) & (friction_at(files) > 0.0)
     made = np.where(rubs, state.traction[:, 1] * (slips[1] - slips[0])[:, 1], 0.0) @ files.interface.length
     off = abs(made / cell.area - points[at]["friction_heat"] + points[before.point]["friction_heat"])
-    scale = max(point["stored"] for point in points) or 1e-300
+    sizes = sum(np.abs(slip[:, 1]) for slip in slips)
+    terms = np.where(rubs, np.abs(state.traction[:, 1]) * sizes, 0.0) @ files.interface.length / cell.area
+    scale = terms + LEAST_HEAT * max(abs(points[each]["stored"]) for each in (before.point, at)) or 1e-300
     findings.record("heat", off / scale, f"path[{at}].friction_heat")
 
 

@@ -155,7 +155,7 @@ def checks(rtol: float, users_mesh: bool, has_coatings: bool) -> tuple[Check, ..
         ("strength", "bonds that hold are within their strength, those that break are at it", STRENGTH),
         ("onset", "the load of every direction of an envelope is that at which the first bond breaks", ONSET),
         ("energy", "work = stored + dissipated along the path, relative to the largest energy", solver),
-        ("heat", "work = stored + dissipated + heat of friction, which grows, relative to the largest energy", 1e-8),
+        ("heat", "work = stored + dissipated + heat of friction, which grows, relative to the energies so far", 1e-8),
         ("cell", "areas, fractions and counts in result.json are those of the mesh", 1e-10),
         ("moduli", "moduli follow from the stiffness, relative to each", 1e-10),
         ("compliance", "compliance and expansion follow from stiffness and thermal stress, relative to each", 1e-10),

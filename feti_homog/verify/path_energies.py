@@ -37,6 +37,8 @@ from feti_homog.verify.prescribed import SAME_SHARE, TEMPERATURE, Prescribed, at
 SAME_RATIO = 1e-9
 # A share of the energy of the bonded cell below which what a parted one stores is rounding.
 NO_ENERGY = 1e-9
+# A share of the energies of a path up to a point below which those of a step are rounding.
+LEAST_STEP = 1e-6
 Point = Mapping[str, Any]
 UNLOADED = {"friction_heat": 0.0, "dissipated": 0.0, "broke": 0}
 
@@ -113,16 +115,18 @@ def _check_heat(
     """
     stored = {number: float(point["stored"]) for number, point in enumerate(points)}
     stored |= {state.point: state.stored for state in states}
-    scale = max(map(abs, stored.values())) or 1e-300
-    for number, point in enumerate(points):
-        off = point["work"] - stored[number] - point["dissipated"] - point["friction_heat"]
-        findings.record("heat", abs(off) / scale, f"path[{number}].work")
+    terms = np.array([[p["work"], stored[n], p["dissipated"], p["friction_heat"]] for n, p in enumerate(points)])
+    # Sums along the path have the rounding of what they were; its share in an increment is far less.
+    scale = np.maximum.accumulate(np.abs(terms).max(axis=1)) + np.finfo(float).tiny
+    of_step = np.abs(np.diff(terms, axis=0, prepend=0.0)).max(axis=1) + LEAST_STEP * scale
+    off = np.abs(terms @ [1.0, -1.0, -1.0, -1.0]) / scale
+    findings.record("heat", off, "path[{}].work".format)
     for number, (before, after) in enumerate(pairwise([UNLOADED, *points])):
         cooled = before["friction_heat"] - after["friction_heat"]
-        findings.record("heat", max(cooled, 0.0) / scale, f"path[{number}].friction_heat")
+        findings.record("heat", max(cooled, 0.0) / of_step[number], f"path[{number}].friction_heat")
         lost = after["dissipated"] - before["dissipated"]
-        off = 0.0 if damaged_at(before if by_events else after) else max(-lost, 0.0) if tied else abs(lost)
-        findings.record("heat", off / scale, f"path[{number}].dissipated")
+        left = 0.0 if damaged_at(before if by_events else after) else max(-lost, 0.0) if tied else abs(lost)
+        findings.record("heat", left / of_step[number], f"path[{number}].dissipated")
 
 
 def _numbers(cell: DiscreteCell, states: Sequence[StateNumbers], points: Sequence[Point]) -> list[PointNumbers]:
