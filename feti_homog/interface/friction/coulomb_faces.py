@@ -66,11 +66,7 @@ class CoulombFaces(FaceSystem):
             StuckError: there are none, or the determinant of the sliding faces has lost its sign.
         """
         given, status = Prescribed(by_stress, rate, np.zeros(self.nodes)), self._known(status)
-        allowed = self._at_limits(status, x)
-        status, v = self.search(status, allowed, given, np.zeros(len(x)))
-        if self.solver.sign(*self.free(status, by_stress)) < 0:
-            raise StuckError(INDEFINITE)
-        return status, v
+        return self._resisting(status, self._at_limits(status, x), given, np.zeros(len(x)))
 
     def step(self, status: Status, given: Prescribed, start: Float) -> tuple[Status, Float]:
         """Return the statuses (n,) and x (m,) of an implicit step to what is given, from a first guess and a start.
@@ -78,10 +74,24 @@ class CoulombFaces(FaceSystem):
         Raises:
             StuckError: as `rates`.
         """
-        status, x = self.search(status, self.all_allowed(), given, start)
-        if self.solver.sign(*self.free(status, given.by_stress)) < 0:
-            raise StuckError(INDEFINITE)
-        return status, x
+        return self._resisting(status, self.all_allowed(), given, start)
+
+    def _resisting(self, status: Status, allowed: Bool, given: Prescribed, start: Float) -> tuple[Status, Float]:
+        """Return admissible statuses whose determinant is not negative, and scaled x; arguments as of `search`.
+
+        A fibre that few faces pinch is jammed where they stick, and is pushed through by a negative stiffness where
+        one of them slides: both are admissible.
+
+        Raises:
+            StuckError: none was found, or with a negative determinant alone.
+        """
+        status, x = self.search(status, allowed, given, start)
+        if self.solver.sign(*self.free(status, given.by_stress)) >= 0:
+            return status, x
+        for found in StatusSearch(self, allowed, given, start).jammed(status):
+            if self.solver.sign(*self.free(found[0], given.by_stress)) > 0:
+                return found
+        raise StuckError(INDEFINITE)
 
     def _at_limits(self, status: Status, x: Float) -> Bool:
         """(n, 4) the statuses that nodes of a state may go on with: their own, and others where a limit is reached."""

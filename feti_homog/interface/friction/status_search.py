@@ -7,6 +7,7 @@ Lemke's method has the last word in small problems.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from copy import copy
 from dataclasses import dataclass, replace
 from itertools import product
@@ -68,18 +69,31 @@ class StatusSearch:
             status[chosen] = better[chosen]
         return None
 
+    def jammed(self, status: Status) -> Iterator[tuple[Status, Float]]:
+        """Yield others beside admissible statuses: from all faces that slide stuck, from each alone, and by trial."""
+        sliding = np.flatnonzero((np.abs(status) == 1) & self.allowed[:, STICK])
+        for stuck in (sliding, *sliding):
+            guess = status.copy()
+            guess[stuck] = STICK
+            if (found := self.by_pivots(guess, SOLVES_OF_A_STEP)) is not None:
+                yield found
+        yield from self._tried(status)
+
     def by_trial(self, status: Status) -> Found:
         """Return the admissible statuses that differ least from a guess, if there are few to try."""
+        return next(self._tried(status), None)
+
+    def _tried(self, status: Status) -> Iterator[tuple[Status, Float]]:
+        """Yield all admissible statuses, those first that differ least from a guess; none if there are many to try."""
         several = np.flatnonzero(self.allowed.sum(axis=1) > 1)
         if self.allowed[several].sum(axis=1).astype(float).prod() > MOST_TRIED:
-            return None
+            return
         choices = np.array(list(product(*(STATUSES[own] for own in self.allowed[several]))), np.int8)
         for choice in choices[np.argsort((choices != status[several]).sum(axis=1), kind="stable")]:
             tried = status.copy()
             tried[several] = choice
             if (found := self._checked(tried)) is not None:
-                return found
-        return None
+                yield found
 
     def by_continuation(self, status: Status) -> Found:
         """Return what pivots find with a share of mu that rises to 1, from where they found something last."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from scipy.linalg import lu_factor, lu_solve
 
@@ -15,8 +17,13 @@ STICK, FORWARD, OPEN_FACE, BACKWARD = 0, 1, 2, -1
 HELD = 1e-9
 # A smaller pivot is that of a free motion: its sign is rounding.
 LEAST_PIVOT = 1e-6
+# Free motions are looked for where a pivot is smaller, among a few more than such pivots, by inverse iteration, whose
+# steps leave HELD of what resists; their relative stiffness at most.
+SOFT_PIVOT, MORE_MOTIONS, INVERSE_ITERATIONS, UNRESISTED = 1e-3, 3, 3, 0.1 * HELD
 # Steps of refinement at most, until each row is left with this share of its terms.
 MOST_REFINEMENTS, ROUNDED = 20, 1e-14
+# What is left of rows, as a share of their terms, up to which no force drives a free motion.
+BALANCED = 1e-9
 
 
 def free_rows(status: Status, friction: Float, by_stress: Bool) -> tuple[Bool, Float]:
@@ -69,7 +76,7 @@ class StatusSystem:
         if self._factor is None:
             return 1
         lu, pivots = self._factor
-        if np.abs(lu.diagonal()).min() < LEAST_PIVOT:
+        if np.abs(lu.diagonal()).min() < LEAST_PIVOT or self._free_motions.shape[1]:
             return 0
         swaps = int((pivots != np.arange(len(pivots))).sum())
         return int(np.prod(np.sign(lu.diagonal()))) * (-1 if swaps % 2 else 1)
@@ -79,7 +86,7 @@ class StatusSystem:
 
         What nothing determines stays as it was at the start.
         """
-        x = x.copy()
+        start, x = x, x.copy()
         if self._factor is None:
             return x
         terms, rows = np.abs(self._rows), given[self.free]
@@ -89,4 +96,23 @@ class StatusSystem:
             if (np.abs(left) <= ROUNDED * (terms @ np.abs(x) + np.abs(rows))).all():
                 break
             x[self.free] += lu_solve(self._factor, left, check_finite=False)
-        return x
+        if not self._free_motions.shape[1]:
+            return x
+        # Where forces balance, rounding over what holds has driven free motions, otherwise on other numbers of ranks.
+        stays = x.copy()
+        stays[self.free] -= self._free_motions @ (self._free_motions.T @ (x - start)[self.free])
+        left = rows - self._rows @ stays
+        return stays if (np.abs(left) <= BALANCED * (terms @ np.abs(stays) + np.abs(rows))).all() else x
+
+    @cached_property
+    def _free_motions(self) -> Float:
+        """(free rows, k) orthonormal motions that nothing resists."""
+        rows = np.count_nonzero(self.free)
+        soft = 0 if self._factor is None else np.count_nonzero(np.abs(self._factor[0].diagonal()) < SOFT_PIVOT)
+        if not soft:
+            return np.zeros((rows, 0))
+        motions = np.random.default_rng(0).standard_normal((rows, min(soft + MORE_MOTIONS, rows)))
+        for _ in range(INVERSE_ITERATIONS):
+            motions = np.linalg.qr(lu_solve(self._factor, motions, check_finite=False))[0]
+        _, size, combined = np.linalg.svd(self._rows[:, self.free] @ motions, full_matrices=False)
+        return np.asarray(motions @ combined[size < UNRESISTED].T)
