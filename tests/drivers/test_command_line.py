@@ -49,7 +49,7 @@ def assert_pictures(folder):
         assert imread(folder / name)[..., :3].std() > 0.05, f"{name} is nearly blank"
 
 
-@pytest.mark.parametrize("ranks", [0, pytest.param(2, marks=pytest.mark.quick), 4])
+@pytest.mark.parametrize("ranks", [0, pytest.param(2, marks=pytest.mark.quick)])
 def test_run_writes_every_file_at_any_number_of_ranks(tmp_path, ranks):
     out = tmp_path / "new" / "results"
     job = command_line(ranks, "run", case_file(tmp_path, ""), "--out", out)

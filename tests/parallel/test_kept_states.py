@@ -30,7 +30,8 @@ PATHS: dict[str, dict[str, Any]] = {
 }
 STRENGTHS = {"normal_strength": 4.0, "tangential_strength": 3.0}
 ENERGY = {"normal_stiffness": 2000.0, "tangential_stiffness": 500.0, "criterion": "energy", "toughness": 0.01}
-STATES = (2, 5, "peaks")
+# Each path with a number of states, and with those of its peaks.
+STATES = [*zip(PATHS, (2, 5, 2, 5), strict=True), *((kind, "peaks") for kind in PATHS)]
 
 
 def case(kind: str, states: int | str, **path: Any) -> Case:
@@ -115,8 +116,7 @@ def whole(tmp_path_factory):
     return folder
 
 
-@pytest.mark.parametrize("states", STATES)
-@pytest.mark.parametrize("kind", PATHS)
+@pytest.mark.parametrize(("kind", "states"), STATES)
 def test_kept_states_are_those_of_a_run_that_keeps_all(comm, shared_path, whole, kind, states):
     result = run(case(kind, states), comm, out=shared_path)
     assert len(result.states) == states if states != "peaks" else 2 <= len(result.states) < len(result.path)

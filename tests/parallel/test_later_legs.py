@@ -77,8 +77,9 @@ def test_free_fibres_are_straight_between_points(torn, case, legs):
     solves = cell.solver.solves - solves
     assert all(p.state.solution.reason > 0 and max(p.state.certificate.values()) < 1e-8 for p in points)
     assert largest_bend(interface, points, len(waypoints)) < STRAIGHT
-    # A state at each change, one past it, and one ahead; pivots, and halvings where a fibre comes free.
-    assert solves < 10 * len(points)
+    # A state at each change, one past it, and one ahead, with a pivot now and then: no halvings, also where faces that
+    # touch without a force open on the way to a change.
+    assert solves < 4.5 * len(points)
 
 
 def test_partly_free_and_breaking_fibres_are_straight_between_points(comm):
