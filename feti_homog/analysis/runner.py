@@ -36,6 +36,9 @@ from feti_homog.runtime import process_memory
 from feti_homog.runtime.environment import require_report
 from feti_homog.runtime.progress import Progress
 
+# Freed bytes that stay for the next case of a process: to give them back and take them again costs a small one a tenth.
+KEPT = 256 << 20
+
 
 def run(
     case: Case, directory: Path, comm: MPI.Intracomm, quiet: bool, resume: bool = False, keep_fields: bool = False
@@ -126,7 +129,7 @@ def _warn(context: AnalysisContext) -> None:
 def _torn(case: Case, comm: MPI.Intracomm, progress: Progress) -> Iterator[TornCell]:
     """Provide the torn cell with the case's options set, while the block lasts."""
     PETSc.garbage_cleanup(comm)  # what earlier cases left: parallel objects are freed by all ranks together
-    process_memory.forget_peak()
+    process_memory.forget_peak(kept=KEPT)
     with case_options(case.petsc):
         cell = tear(case, comm, progress, policy=BY_COST)
         try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import math
 import resource
 from contextlib import suppress
 from pathlib import Path
@@ -25,9 +26,29 @@ def peak() -> int:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
-def forget_peak(clear_refs: Path = CLEAR_REFS) -> None:
-    """Trim, and let the peak begin anew; where the system refuses that, it stays that of the whole process."""
-    trim()
+class _Heap(ctypes.Structure):
+    """What glibc counts of its memory, mallinfo2(3)."""
+
+    _fields_ = tuple((f"field_{k}", ctypes.c_size_t) for k in range(10))
+
+
+def spare() -> float:
+    """Freed bytes that glibc keeps; infinite where it does not count them, before 2.33."""
+    try:
+        count = ctypes.CDLL(None).mallinfo2
+    except AttributeError:
+        return math.inf
+    count.restype = _Heap
+    return float(count().field_8)  # fordblks
+
+
+def forget_peak(clear_refs: Path = CLEAR_REFS, kept: int = 0) -> None:
+    """Trim, and let the peak begin anew; where the system refuses that, it stays that of the whole process.
+
+    Up to `kept` freed bytes stay for what comes, and in its peak.
+    """
+    if spare() > kept:
+        trim()
     with suppress(OSError):
         clear_refs.write_text(RESET_PEAK)
 
