@@ -16,7 +16,7 @@ import numpy as np
 from feti_homog.fem.stress_recovery import RecoveredStress
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.mesh.submesh import Submesh
-from feti_homog.typing import Float, Int
+from feti_homog.typing import Bool, Float, Int
 
 
 @dataclass(frozen=True)
@@ -29,6 +29,7 @@ class ArcSides:
         points: (f, p + 1, 2) these.
         normals: (f, p + 1, 2) unit normals of the arc at these, out of the body.
         area: (f,) between side and arc that the body lacks.
+        at_void: (f,) whether a void is on their right.
     """
 
     element: Int
@@ -37,6 +38,7 @@ class ArcSides:
     points: Float
     normals: Float
     area: Float
+    at_void: Bool
 
     @classmethod
     def of(cls, body: RecoveredStress, submeshes: Sequence[Submesh], lattice: ReferenceLattice) -> ArcSides:
@@ -69,7 +71,13 @@ class ArcSides:
         tangents = [first, *([last + first] if lattice.order == 2 else []), last]
         units = [t / np.hypot(*t.T)[:, None] for t in tangents]
         normals = np.stack([np.column_stack([t[:, 1], -t[:, 0]]) for t in units], axis=1)
-        return cls(element, side, nodes, points, normals, area)
+        at_void = np.concatenate([submesh.at_void[submesh.edge_class] for submesh in submeshes])
+        return cls(element, side, nodes, points, normals, area, at_void[edge])
+
+    @property
+    def ends(self) -> Int:
+        """(f, 2) corners of the elements, 0 to 2, at which they begin and end."""
+        return np.stack([self.side, (self.side + 1) % 3], axis=1)
 
 
 def arc_energy(body: RecoveredStress, sides: ArcSides) -> Float:

@@ -16,6 +16,7 @@ import numpy as np
 
 from feti_homog.fem import bubble
 from feti_homog.fem.assembly import ELEMENTS_AT_ONCE
+from feti_homog.fem.known_tractions import KnownTractions
 from feti_homog.fem.local_fits import Neighbours, gathered, linear_values, normalized, polynomials
 from feti_homog.fem.problem import Problem
 from feti_homog.fem.shape_functions import barycentric, gradients, shape_functions
@@ -48,6 +49,7 @@ class RecoveredStress:
         u: (classes, c, k) fluctuating displacements.
         loads: (v, k) the strains and other loads.
         is_mixed: whether the elements have a bubble and a pressure of their own.
+        known: tractions that the recovered stresses of linear elements obey.
     """
 
     points: Float
@@ -58,6 +60,7 @@ class RecoveredStress:
     u: Float
     loads: Float
     is_mixed: bool = False
+    known: KnownTractions | None = None
 
     @classmethod
     def on(
@@ -130,7 +133,11 @@ class RecoveredStress:
                 for name in ("points", "weights", "stress")
             )
             away = points[:, None] - self.points[self.triangles]
-            return linear_values(self.vertices, away, weights, stress.reshape(len(stress), -1), neighbours)[:, None]
+            values = linear_values(self.vertices, away, weights, stress.reshape(len(stress), -1), neighbours)
+            if self.known is not None:
+                tensors = values.reshape(-1, *stress.shape[1:])
+                values = self.known.imposed(tensors, self.problem.voigt, self.flexibility).reshape(values.shape)
+            return values[:, None]
         moments, sums, size = np.zeros(()), np.zeros(()), int(self.vertices.max()) + 1
         for own in self.elements:
             corners = self.points[self.triangles[own.part, :3]]

@@ -3,29 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from feti_homog.fem.arc_error import ArcSides, arc_energy
+from feti_homog.fem.known_tractions import KnownTractions
 from feti_homog.fem.stress_recovery import RecoveredStress
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.homogenization.averaging import Response
+from feti_homog.homogenization.boundary_tractions import boundary_tractions
 from feti_homog.homogenization.nested_interiors import groups, nested_interiors
 from feti_homog.homogenization.uniform_parts import UniformPart
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.mesh.refinement import FineMesh, joined
 from feti_homog.parallel.distributed_arrays import allreduce_sum
-from feti_homog.typing import Float
+from feti_homog.typing import Bool, Float, Int
 
 Members = list[Subdomain] | list[UniformPart]
-Displacements = Iterator[tuple[Members, FineMesh, Float]]
+Displacements = Iterator[tuple[Members, FineMesh, Float, Int]]
+# What is not on a boundary.
+INSIDE = -1
 # Errors of elements and of arcs over those of the mesh itself and of meshes refined once and twice less, by the order
 # of elements: once less by `scripts/measure_mesh_error.py`, twice less by four cells of two meshes each.
 NESTED = {1: ((1.0, 1.0), (0.26, 0.27), (0.07, 0.066)), 2: ((1.0, 1.0), (1 / 15, 1 / 14), (1 / 185, 1 / 255))}
-# The two parts may cancel; at least these shares of both are left, `scripts/measure_mesh_error.py`: in general, and of
-# a pair of states whose faces touch at different places, for which the energy is not bilinear.
-LEAST_SHARE, LEAST_SHARE_OF_CONTACT = 0.05, 1.0
+# The two parts may cancel; at least these shares of both are left, `scripts/measure_mesh_error.py`: on the diagonal; of
+# two states by the order of elements; with quadratic ones beside interfaces that may part; and where faces touch at
+# different places, for which the energy is not bilinear.
+LEAST_SHARE, LEAST_OF_TWO = 0.05, {1: 0.01, 2: 0.005}
+LEAST_OF_TWO_PARTED, LEAST_OF_TWO_TOUCHING = 0.05, 1.0
 
 
 @dataclass(frozen=True)
@@ -36,13 +42,13 @@ class EnergyErrors:
         elements: 1/|UC| int ds_i : S : ds_j of recovered stresses less those of elements: the stiffness is too high.
         arcs: what the sides of elements make of arcs, of either sign.
         shares: (m, k) what each element of this rank has of the first one's diagonal, none if they are not kept.
-        contact: whether states touch at different places.
+        least_of_two: share of both parts, as if they did not cancel, that is left at least off the diagonal.
     """
 
     elements: Float
     arcs: Float
     shares: Float
-    contact: bool
+    least_of_two: float = LEAST_OF_TWO[1]
 
     @property
     def signed(self) -> Float:
@@ -63,7 +69,7 @@ class EnergyErrors:
     def absolute(self) -> Float:
         """(k, k) estimates of |computed - exact|."""
         size = np.sqrt(np.abs(np.diag(self.elements)) + np.abs(np.diag(self.arcs)))
-        share = np.full((len(size),) * 2, LEAST_SHARE_OF_CONTACT if self.contact else LEAST_SHARE)
+        share = np.full((len(size),) * 2, self.least_of_two)
         np.fill_diagonal(share, LEAST_SHARE)
         return np.asarray(np.maximum(np.abs(self.signed), share * np.outer(size, size)))
 
@@ -86,13 +92,17 @@ def energy_errors(
     fewer = cell.lattice.halvings - lattice.halvings
     of_elements, of_arcs = NESTED[lattice.order][fewer]
     found, shares = np.zeros((2, k, k)), [np.zeros((0, k))]
-    for members, stress in _recovered(cell, responses, keep, nested):
+    tractions = boundary_tractions(cell, responses)
+    for members, stress, place in _recovered(cell, responses, keep, nested):
+        sides = ArcSides.of(stress, [s.submesh for s in members], lattice)
+        stress = _with_tractions(stress, sides, place, *tractions)
         total, each = stress.difference(keep)
-        arcs = arc_energy(stress, ArcSides.of(stress, [s.submesh for s in members], lattice))
+        arcs = arc_energy(stress, sides)
         found += of_elements * total, of_arcs * arcs
         shares.append(np.repeat(of_elements * each / 4**fewer, 4**fewer, axis=0))
     elements, arcs = allreduce_sum(cell.comm, found) / area
-    return EnergyErrors(elements, arcs, np.concatenate(shares) / area, contact)
+    least = LEAST_OF_TWO_PARTED if lattice.order == 2 and cell.case.interfaces else LEAST_OF_TWO[lattice.order]
+    return EnergyErrors(elements, arcs, np.concatenate(shares) / area, LEAST_OF_TWO_TOUCHING if contact else least)
 
 
 def is_nested(cell: TornCell, responses: Sequence[Response]) -> bool:
@@ -110,27 +120,57 @@ def is_nested(cell: TornCell, responses: Sequence[Response]) -> bool:
 
 def _recovered(
     cell: TornCell, responses: Sequence[Response], keep: bool, nested: bool
-) -> Iterator[tuple[Members, RecoveredStress]]:
-    """Yield some of this rank's subdomains after the other, those of each group of one phase, and their stresses."""
+) -> Iterator[tuple[Members, RecoveredStress, Int]]:
+    """Yield some of this rank's subdomains after the other, those of each group of one phase, and their stresses.
+
+    Behind them (classes,) places of nodes on boundaries, see `boundary_tractions`.
+    """
     u = np.stack([response.u for response in responses], axis=1)
     loads = np.stack([response.strain for response in responses], axis=1)
-    for members, mesh, own in (_nested if nested else _whole)(cell, u, loads, keep):
-        first = members[0]
-        yield members, RecoveredStress.on(mesh, first.L, first.problem, own, loads, first.is_mixed)
+    for members, mesh, own, place in (_nested if nested else _whole)(cell, u, loads, keep):
+        first, c = members[0], members[0].problem.components
+        yield members, RecoveredStress.on(mesh, first.L, first.problem, own, loads, first.is_mixed), place[::c]
 
 
 def _nested(cell: TornCell, u: Float, loads: Float, keep: bool) -> Displacements:
-    """Yield subdomains, their mesh that is refined less, and their displacements (classes, c, k) on it."""
+    """Yield subdomains, their mesh that is refined less, displacements (classes, c, k) on it, and (c classes,) places.
+
+    The latter are those of displacements among those of all boundaries.
+    """
     fresh = nested_interiors(cell.solver.interface_operators, cell.lattice, cell.nested_lattice)
     for interior in cell.nested_interiors if keep else fresh:
-        yield interior.members, interior.mesh, interior.displacement(u, loads)
+        found = interior.displacement(u, loads)
+        place = np.full(found.shape[0] * found.shape[1], INSIDE)
+        place[interior.known] = interior.place
+        yield interior.members, interior.mesh, found, place
 
 
 def _whole(cell: TornCell, u: Float, loads: Float, keep: bool) -> Displacements:
     """Yield the same on the mesh itself."""
-    displacements = cell.displacements(u, loads, keep)
+    boundary, displacements = cell.solver.interface_operators, cell.displacements(u, loads, keep)
+    of_all = [np.full(s.n_dofs, INSIDE) for s in cell.subdomains]
+    for place, dofs, first in zip(of_all, boundary.dofs, boundary.offsets, strict=False):
+        place[dofs] = first + np.arange(len(dofs))
     for group in groups(cell.parts, cell.lattice):
         members = [cell.parts[k] for k in group]
         own = np.concatenate([next(displacements)[1] for _ in group])
         own = own.reshape(-1, members[0].problem.components, u.shape[1])
-        yield members, joined([s.mesh for s in members]), own
+        place = np.concatenate([of_all[part.place][part.dofs] for part in members])
+        yield members, joined([part.mesh for part in members]), own, place
+
+
+def _with_tractions(
+    stress: RecoveredStress, sides: ArcSides, place: Int, traction: Float, known: Bool
+) -> RecoveredStress:
+    """Let recovered stresses of linear elements obey the tractions that are known on arcs, none at voids."""
+    if stress.order == 2 or not len(sides.element):
+        return stress
+    corners = sides.element[:, None], sides.ends
+    at = place[stress.node_class[stress.triangles[corners]]].ravel()
+    free = np.repeat(sides.at_void, 2)
+    own = np.flatnonzero(free | (np.append(known, False)[at]))
+    given = np.append(traction, np.zeros((1, traction.shape[1])), axis=0)
+    steps = np.arange(stress.problem.components)
+    values = np.where(free[own, None, None], 0.0, given[at[own, None] + steps])
+    normals = sides.normals[:, [0, -1]].reshape(-1, 2)
+    return replace(stress, known=KnownTractions.at(stress.vertices[corners].ravel()[own], normals[own], values))

@@ -76,14 +76,19 @@ class NestedInterior:
         return found.reshape(-1, problem.components, u.shape[1])
 
 
+def locks(subdomains: Sequence[Subdomain], comm: MPI.Intracomm) -> bool:
+    """Return whether linear elements of a phase of any rank hardly change their volume.  Collective."""
+    own = any(s.problem.components == 2 and s.L[0, 1] > LOCKING * s.L[2, 2] for s in subdomains)
+    return bool(comm.allreduce(own, MPI.LOR))
+
+
 def nested_lattice(lattice: ReferenceLattice, subdomains: Sequence[Subdomain], comm: MPI.Intracomm) -> ReferenceLattice:
     """Return the lattice of the coarser mesh: refined once less, or twice where that is often and no phase locks.
 
     Of the subdomains of all ranks.  Collective.
     """
-    own = any(s.problem.components == 2 and s.L[0, 1] > LOCKING * s.L[2, 2] for s in subdomains)
-    locks = comm.allreduce(own, MPI.LOR)
-    return lattice.coarser(2 if lattice.halvings >= REFINED_OFTEN and not locks else 1)
+    often = not locks(subdomains, comm) and lattice.halvings >= REFINED_OFTEN
+    return lattice.coarser(2 if often else 1)
 
 
 def nested_interiors(

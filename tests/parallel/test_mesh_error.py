@@ -57,10 +57,13 @@ def result(comm, geometry="hexagonal", phases=(MATRIX, FIBRE), plane="strain", *
 def test_true_errors_are_near_their_estimates(comm, order, known, interface):
     geometry = "square" if known in (VOID["square"], ELASTIC["square", 500, 500]) else "hexagonal"
     sections = {} if interface is None else {"interface": interface}
-    found = result(comm, geometry, cell={"order": order, "mesh_size": SIZES[order]}, **sections)
+    mesh = {"mesh_size": 0.1, "refine": 1} if order == 1 and interface else {"mesh_size": SIZES[order]}
+    found = result(comm, geometry, cell={"order": order} | mesh, **sections)
     true = np.abs(found.effective_stiffness - cubic(*known.value))
     ratio = true[[0, 0, 1, 2], [0, 1, 1, 2]] / found.mesh_error.effective_stiffness[[0, 0, 1, 2], [0, 1, 1, 2]]
-    assert (ratio > 0.5).all() and (ratio < 2.0).all()
+    # Without the tractions that multipliers give 0.73 is the least of linear elements.
+    least, most = (0.85, 1.1) if order == 1 and interface else (0.5, 2.0)
+    assert (ratio > least).all() and (ratio < most).all()
     assert found.mesh_error.energy > 0.5 * true[0, 0] / known.value[0]
 
 
@@ -264,7 +267,7 @@ def test_what_is_outside_its_bounds_by_more_than_its_error_is_a_fault(size, is_f
     context = SimpleNamespace(case=case, notes=notes, checks=SimpleNamespace(faults=faults))
     bounds = SimpleNamespace(hashin_shtrikman=SimpleNamespace(bulk=(1.0, 1.95), shear=(0.4, 0.5)))
     secants = {"effective_stiffness": cubic(2.5, 1.5, 0.5), "moduli": None, "bounds": bounds}
-    mesh_error(context, secants, [EnergyErrors(size * np.eye(3), np.zeros((3, 3)), np.zeros((0, 3)), False)], [])
+    mesh_error(context, secants, [EnergyErrors(size * np.eye(3), np.zeros((3, 3)), np.zeros((0, 3)))], [])
     (words,) = faults if is_fault else notes
     assert not (notes if is_fault else faults)
     assert words.startswith("bulk = 2 is outside its bounds, 1 and 1.95, by 5.0e-02")

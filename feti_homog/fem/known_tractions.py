@@ -1,0 +1,57 @@
+"""Recovered stresses that obey the tractions on a boundary where these are known.
+
+There fits have elements on one side alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from feti_homog.typing import Float, Int
+
+
+@dataclass(frozen=True)
+class KnownTractions:
+    """Tractions of k loads at n vertices.
+
+    Attributes:
+        vertex: (n,) these.
+        normal: (n, 2) unit vectors out of the body.
+        traction: (n, c, k).
+    """
+
+    vertex: Int
+    normal: Float
+    traction: Float
+
+    @classmethod
+    def at(cls, vertex: Int, normals: Float, traction: Float) -> KnownTractions:
+        """Make them of the ends of sides, of which a vertex has several; its normal is their mean."""
+        own, first, of = np.unique(vertex, return_index=True, return_inverse=True)
+        sums = np.stack([np.bincount(of, normal, len(own)) for normal in normals.T], axis=1)
+        return cls(own, sums / np.hypot(*sums.T)[:, None], traction[first])
+
+    def imposed(self, stress: Float, voigt: Int, flexibility: Float) -> Float:
+        """Return stresses (vertices, m, k) with these tractions, of components `voigt` (c, 2) and the flexibility S.
+
+        sigma + d n + n d - (d . n) n n + a t t in the plane, with d = traction - sigma n and a such that the strain
+        along the boundary stays, as it is known on both of its sides; along the fibres sigma + d n.
+        """
+        n, own = self.normal, stress[self.vertex]
+        d = self.traction - np.einsum("ncdk,nd->nck", own[:, voigt], n)
+        off = np.einsum("nck,nd->ncdk", d, n)
+        entries = [tuple(np.argwhere(voigt == number)[0]) for number in range(stress.shape[1])]
+        if len(voigt) == 2:
+            off += off.transpose(0, 2, 1, 3) - np.einsum("nck,nc,ni,nj->nijk", d, n, n, n)
+        found = np.stack([off[:, i, j] for i, j in entries], axis=1)
+        if len(voigt) == 2:
+            t = np.column_stack([-n[:, 1], n[:, 0]])
+            along = np.stack([t[:, i] * t[:, j] for i, j in entries], axis=1)
+            strain = along @ flexibility
+            share = np.einsum("nv,nvk->nk", strain, found) / (strain * along).sum(axis=1)[:, None]
+            found -= along[..., None] * share[:, None]
+        whole = stress.copy()
+        whole[self.vertex] += found
+        return whole
