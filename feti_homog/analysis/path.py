@@ -131,9 +131,16 @@ def _points(
             yield point, None
     except NotCarriedError as error:
         if count == 0:
-            raise
-        advice = "" if isinstance(error, StuckError) else "; prescribe strains there"
-        context.checks.faults.append(f"[path]: {error} beyond the last point{advice}")
+            raise _with_advice(error, "", path) from error
+        context.checks.faults.append(str(_with_advice(error, " beyond the last point", path)))
+
+
+def _with_advice(error: NotCarriedError, place: str, path: LoadPath) -> NotCarriedError:
+    """Return an error that ends a path, with its place, empty before the first point, and what may lead further."""
+    if isinstance(error, StuckError):
+        more = "" if path.method == "events" else " or more increments"
+        return StuckError(f"[path]: {error}{place}; a smaller friction{more} may lead further")
+    return NotCarriedError(f"[path]: {error}{place}; prescribe strains there") if place else error
 
 
 def _sliding_cell(context: AnalysisContext) -> SlidingCell:
