@@ -15,8 +15,9 @@ from math import ceil
 
 import numpy as np
 
-from feti_homog.case.bond_laws import laws_with
+from feti_homog.case.bond_laws import LAWS, laws_with
 from feti_homog.case.case import Case
+from feti_homog.case.interface_section import InterfaceSection
 from feti_homog.case.phase_names import COATING
 from feti_homog.fem.problem import AXIAL, Problem
 from feti_homog.homogenization import phase_laws
@@ -146,7 +147,9 @@ def fields_line(case: Case, nodes: int, elements: int, interface_nodes: int, ran
     return f"fields     {words}, {_size(mesh + count * state)} in result.h5, {_rounded(count * of_each)}"
 
 
-def events_lines(case: Case, multipliers: int, teeth: int, nodes: Sequence[int], seconds: float) -> list[str]:
+def events_lines(
+    case: Case, multipliers: int, fibres: int, teeth: int, nodes: Sequence[int], seconds: float
+) -> list[str]:
     """Return how many events a path may have and how long all of them take, in a line as `estimate_lines`.
 
     None of another analysis. There are at most as many events as bonds, times the teeth of each; nodes on cuts of
@@ -154,18 +157,30 @@ def events_lines(case: Case, multipliers: int, teeth: int, nodes: Sequence[int],
     """
     if not case.section.is_followed:
         return []
-    words = f"up to about {multipliers // 2} bonds break" + (f" in {teeth} teeth each" if teeth > 1 else "")
+    share = float(np.mean([_unbroken_share(each, fibres) for each in case.interfaces]))
+    bonds = round(multipliers // 2 * share)
+    words = f"up to about {bonds} bonds break" + (f" in {teeth} teeth each" if teeth > 1 else "")
     dofs = 2.0 * sum(nodes)
     event = EVENT_SECONDS + dofs * (EVENT_DOF_SECONDS + EVENT_RANK_DOF_SECONDS / len(nodes))
-    longest = _rounded(seconds + multipliers // 2 * teeth * event)
+    longest = _rounded(seconds + bonds * teeth * event)
+    time = f"{1e3 * event:.2g} ms or more for each"
     lines = [
-        f"events     {words}, {1e3 * event:.2g} ms or more for each: "
-        f"from {_rounded(seconds)} for few to {longest} or more for all"
+        f"events     {words}, {time}: from {_rounded(seconds)} for few to {longest} or more for all"
+        if bonds
+        else f"events     of contact alone, for no bond is left to break, {time}"
     ]
     faces = _size(FACE_PAIR_BYTES * multipliers**2)
-    return (
-        [*lines, f"friction   up to {faces} more on the first rank if all bonds break"] if case.has_friction else lines
-    )
+    when = f"up to {faces} more on the first rank if all bonds break" if bonds else f"{faces} more on the first rank"
+    return [*lines, f"friction   {when}"] if case.has_friction else lines
+
+
+def _unbroken_share(interface: InterfaceSection, fibres: int) -> float:
+    """Return the share of the bonds of an interface that may break, all of so many fibres alike."""
+    limits = LAWS[interface.criterion].limits
+    if limits and all(getattr(interface, name) is None for name in limits):
+        return 0.0
+    arcs = [(fibres if isinstance(arc.fibre, str) else len(arc.fibre), arc.angle or 0.0) for arc in interface.debonded]
+    return max(1.0 - sum(count * angle for count, angle in arcs) / (360.0 * fibres), 0.0)
 
 
 def estimate_lines(found: Estimate, n_ranks: int, across: bool = False) -> list[str]:

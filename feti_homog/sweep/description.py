@@ -82,13 +82,13 @@ def _described(
         *_mix_lines(case, summary),
         *_match_lines(case, summary),
         f"tearing    {summary.bodies} bodies, {_subdomains(summary.subdomains)}, {multipliers} multipliers",
-        f"solver     {plan.in_words}",
+        f"solver     {_solver(plan, multipliers)}",
         *(
             f"rank {rank:<5} {_subdomains(count)}, about {2 * n} degrees of freedom"
             for rank, (count, n) in enumerate(zip(own, nodes, strict=True))
         ),
         *cost_model.estimate_lines(taken, len(loads), summary.across),
-        *cost_model.events_lines(case, multipliers, teeth_of(case), nodes, taken.seconds),
+        *cost_model.events_lines(case, multipliers, summary.fibres, teeth_of(case), nodes, taken.seconds),
         *(
             [cost_model.fields_line(case, sum(nodes), elements, multipliers // 2, len(loads))]
             if case.output.fields
@@ -104,6 +104,10 @@ def _described(
 def _applications(case: Case, easy: bool) -> dict[int, int]:
     """Return for each problem, by its displacements of a node, how many times it applies its dual operator."""
     return {p.components: cost_model.applications(case, p, easy) for p in phase_laws.problems(case)}
+
+
+def _solver(plan: SolverPlan, multipliers: int) -> str:
+    return plan.in_words if multipliers else "one factor of the whole cell: no multipliers, no iterations"
 
 
 def _subdomains(count: int) -> str:
