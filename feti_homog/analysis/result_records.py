@@ -148,7 +148,8 @@ class PathPoint:
     )
     temperature: float | None = described(TEMPERATURE, default=None)
     mark: str | None = described(
-        "`first break`, `peak`, `after the peak` (the branch of the valley after it) or `end`, several joined by `and`",
+        "`first break`, `peak` or `largest so far`, `after the peak` (the branch of the valley after it) or `end`, "
+        "several joined by `and`",
         default=None,
     )
     broke: int = described("bonds that break at this event, or broke in the step to this increment")
@@ -232,6 +233,9 @@ class Peak:
         default=None,
     )
     event_left: int | None = described("number of the point on whose branch the valley is", default=None)
+    so_far: bool = described(
+        "true of a path that was cut off before such a fall: no peak, a longer path may go higher", default=False
+    )
     dissipated: float = described("energy lost to breaks before the peak, per area of the cell", STRESS)
 
 

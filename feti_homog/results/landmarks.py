@@ -22,6 +22,7 @@ from feti_homog.typing import Float
 # A fall of the stress, or a jump of the strain, by more than this share of the largest is a drop: saw teeth of single
 # nodes are none.
 LEAST_DROP = 0.01
+SO_FAR = "largest so far"
 
 
 def turning_points(values: Float, least: float) -> list[int]:
@@ -46,7 +47,8 @@ def peak_of(document: Document) -> dict[str, Any]:
     """Return the fields of `result_records.Peak` of a path that has points.
 
     The peak is the largest stress up to the deepest fall in which bonds break, or of the whole path if there is none:
-    once all fibres have come off, the matrix alone may carry more than the composite did.
+    once all fibres have come off, the matrix alone may carry more than the composite did.  Of a path that ended before
+    its end without a fall it is the largest `so_far`, and no peak.
     """
     points, component = document["path"], path_curves.leading_component(document)
     # 0.0 is added, for a zero may have a sign.
@@ -63,6 +65,8 @@ def peak_of(document: Document) -> dict[str, Any]:
         }
     if valley is not None:
         found |= {"stress_left": left, "event_left": valley}
+    elif points[-1]["load_factor"] < 1.0 - SAME_LOAD:
+        found["so_far"] = True
     found["dissipated"] = points[event].get("dissipated", 0.0)
     return {"strain_name": names[0], "stress_name": names[1], **found}
 
@@ -94,7 +98,8 @@ def _deepest_fall(document: Document, stress: Float) -> tuple[int, float, int | 
 def marks(document: Document) -> dict[int, str]:
     """Return what some points of a path are, by their rising numbers: first break, peak, valley after it and end."""
     peak = peak_of(document)
-    places = {"first break": "first_break_event", "peak": "event", "after the peak": "event_left"}
+    largest = SO_FAR if "so_far" in peak else "peak"
+    places = {"first break": "first_break_event", largest: "event", "after the peak": "event_left"}
     found = {words: peak[name] for words, name in places.items() if name in peak}
     found["end"] = len(document["path"]) - 1
     numbers = sorted({int(number) for number in found.values()})

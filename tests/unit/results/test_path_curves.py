@@ -73,7 +73,9 @@ def test_the_valley_after_a_peak_of_increments_is_a_point_and_saw_teeth_are_none
     found = peak_of(document("increments", 1, points))
     assert (found["event"], found["first_break_event"], found["event_left"]) == (1, 1, 4)
     assert found["stress_left"] == pytest.approx(0.5)
-    assert "event_left" not in peak_of(document("increments", 1, points[:4]))
+    cut = document("increments", 1, points[:4])
+    assert "event_left" not in peak_of(cut) and peak_of(cut)["so_far"] and "so_far" not in found
+    assert marks(cut) == {1: "first break and largest so far", 3: "end"}
 
 
 def test_the_peak_is_before_the_deepest_fall_in_which_bonds_break() -> None:
