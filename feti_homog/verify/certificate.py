@@ -134,9 +134,9 @@ def _of(directory: Path) -> Certificate:
 
 def _verified(files: ResultFiles, directory: Path) -> Certificate:
     rtol, users_mesh = float(files.document["solver"]["rtol"]), files.case["cell"]["geometry"] == "mesh"
-    findings = Findings(checks(rtol, users_mesh, has_coatings=COATING in files.case["material"]))
-    findings.record("files", len(files.altered), ", ".join(files.altered))
     cell = DiscreteCell.of(files)
+    findings = Findings(checks(rtol, users_mesh, COATING in files.case["material"], cell.elements.lame_ratio))
+    findings.record("files", len(files.altered), ", ".join(files.altered))
     check_mesh(findings, cell)
     check_interface(findings, cell)
     states, before = [], None

@@ -37,7 +37,7 @@ def _averaged(cell: DiscreteCell, state: State) -> float:
     weights, sums = np.zeros(len(mesh.points)), np.zeros((len(mesh.points), v))
     for part, r, w, stress in _stresses(cell, state):
         nodes, area = mesh.triangles[part], w.sum(axis=1)
-        at_nodes = _at_nodes(r, w, stress, nodes.shape[1]) * area[:, None, None]
+        at_nodes = _at_nodes(r, stress, nodes.shape[1]) * area[:, None, None]
         weights += np.bincount(nodes.ravel(), np.repeat(area, nodes.shape[1]), len(weights))
         for column, values in zip(sums.T, at_nodes.T, strict=True):
             column += np.bincount(nodes.ravel(), values.T.ravel(), len(weights))
@@ -69,12 +69,11 @@ def _stresses(cell: DiscreteCell, state: State) -> Iterator[tuple[slice, Float, 
         yield from elements.point_stresses(state.displacement, state.along, cell.free_strains(state))
 
 
-def _at_nodes(r: Float, w: Float, stress: Float, nodes: int) -> Float:
-    """(e, nodes, v) of the linear functions that are nearest to the stresses of each element."""
+def _at_nodes(r: Float, stress: Float, nodes: int) -> Float:
+    """(e, nodes, v) of the linear functions of r that are nearest to the stresses (e, q, v) of each element."""
     if nodes == 3:
         return stress
-    moments = np.einsum("eq,qa,qb->eab", w, r, r)
-    corners = np.linalg.solve(moments, np.einsum("eq,qa,eqi->eai", w, r, stress))
+    corners = np.linalg.pinv(r) @ stress
     return np.concatenate([corners, (corners + np.roll(corners, -1, axis=1)) / 2], axis=1)
 
 

@@ -69,6 +69,12 @@ class Elements:
         """(phases,) whether elements have a bubble and a pressure."""
         return self._mixed
 
+    @property
+    def lame_ratio(self) -> float:
+        """Largest lambda / mu of phases whose elements have a pressure."""
+        L = self._stiffnesses[self._mixed]
+        return float((L[:, 0, 1] / L[:, -1, -1]).max(initial=0.0))
+
     @cached_property
     def area(self) -> Float:
         """(m,) areas; negative where an element is inverted."""

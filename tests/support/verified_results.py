@@ -29,6 +29,7 @@ WAYPOINTS = [[0.2, 0.0, 0.0], [0.1, 0.05, 0.05], [0.0, 0.0, 0.0], [-0.1, 0.0, 0.
 
 CASES: dict[str, dict[str, Any]] = {
     "bonded": {"cell": HEXAGONAL | {"order": 2}, "decomposition": {"subdomains": 6}},
+    "rubber": {"cell": HEXAGONAL, "matrix": {"young": 0.1, "poisson": 0.49999999}},
     "plane": {"cell": HEXAGONAL | {"bodies": "plane", "refine": 1}, "plane": "stress"},
     "contact": {"cell": SQUARE | {"order": 2}, "interface": {"debonded": [ARC | {"angle": 110.0}]}},
     "overlap": {"cell": SQUARE, "interface": {"contact": False, "debonded": [ARC | {"angle": 200.0}]}},
