@@ -237,11 +237,11 @@ def _draw(directory: Path) -> list[Path]:
 
 def _print_summary(result: Result, progress: Progress) -> None:
     """Print the summary on rank 0; only a rank that prints it loads its tables.  Collective."""
-    document = replace(result, timings=progress.timings()).document
+    timings = progress.timings()
     if progress.prints:
         from feti_homog.report.text.summary import summary
 
-        progress.say(f"\n{summary(document)}")
+        progress.say(f"\n{summary(replace(result, timings=timings).document)}")
 
 
 def _report(directory: Path) -> list[Path]:
