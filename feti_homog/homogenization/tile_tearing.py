@@ -19,12 +19,13 @@ from feti_homog.homogenization import cell_remarks
 from feti_homog.homogenization.cell_remarks import subdomain_remarks, table_remarks
 from feti_homog.homogenization.coarse_meshes import deal_tiles, fill_own
 from feti_homog.homogenization.domain_partition import CellSummary, RankShare, in_cell, match_distance
-from feti_homog.homogenization.partition_policy import PartitionPolicy, wanted_pieces
+from feti_homog.homogenization.partition_policy import PartitionPolicy, can_be_cut_across, wanted_pieces
 from feti_homog.mesh.coarse_mesh import representatives
 from feti_homog.mesh.fill.gmsh_mesher import NodedCell
 from feti_homog.mesh.outline.curves import MATRIX
 from feti_homog.mesh.periodic_topology import Torus, components, places_by_depth
 from feti_homog.mesh.refinement import ReferenceLattice
+from feti_homog.mesh.sizes.element_estimate import ElementEstimate
 from feti_homog.mesh.submesh import SubdomainTable, SubmeshesOfRank, cut_for_ranks, joined, pinning
 from feti_homog.mesh.tiles.filling import arc_edges
 from feti_homog.mesh.tiles.tiles import FilledTile, NumberedTile, Regions, tile_torus
@@ -33,13 +34,18 @@ from feti_homog.parallel.mpi_errors import agree, on_root, on_root_only
 from feti_homog.typing import Float, Int
 
 
-def can_be_torn_by_tiles(case: Case, noded: NodedCell) -> bool:
-    """Return whether no choice of the case needs the whole mesh.
+def can_be_torn_by_tiles(case: Case, noded: NodedCell, lattice: ReferenceLattice, policy: PartitionPolicy) -> bool:
+    """Return whether nothing needs the whole mesh.
 
-    Such are tips of arcs, bodies cut by the sides, the matrix in fewer pieces than there are tiles.
+    Such are tips of arcs, bodies cut by the sides, the matrix in fewer pieces than there are tiles, and cuts across
+    materials, of cells that are expected to be small enough for these.
     """
     whole = case.arcs or case.cell.bodies == "plane" or case.decomposition.subdomains is not None
-    return len(noded.parts) > 1 and not whole
+    if len(noded.parts) < 2 or whole:
+        return False
+    triangles = ElementEstimate.of(case.cell, noded.arrangement).triangles
+    dofs = round(triangles * lattice.intervals**2)
+    return not (policy.across_pieces(dofs, 1) and can_be_cut_across(case))
 
 
 def tear_by_tiles(

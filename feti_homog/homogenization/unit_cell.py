@@ -255,7 +255,7 @@ def assemble_subdomains(
 def cut(case: Case, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: PartitionPolicy) -> RankShare:
     """Return this rank's share of the cell, meshed and cut.  Collective."""
     found = place_nodes(case, comm, policy.tiles)
-    if comm.bcast(isinstance(found, NodedCell) and can_be_torn_by_tiles(case, found)):
+    if comm.bcast(isinstance(found, NodedCell) and can_be_torn_by_tiles(case, found, lattice, policy)):
         assert not isinstance(found, CoarseMesh)
         return tear_by_tiles(case, found, lattice, comm, policy)
     mesh = fill_tiles(found, comm)

@@ -33,6 +33,7 @@ pytestmark = pytest.mark.parallel
 
 SMALL = TilePolicy(least_discs=16, discs=4)
 TILED = PartitionPolicy(tiles=SMALL)
+ACROSS = PartitionPolicy(tiles=SMALL, across_dofs=10**6, across_piece_dofs=2000, whole_dofs=0)
 LATTICE = ReferenceLattice.of(1, 1)
 KINDS = {
     "plain": {},
@@ -67,7 +68,7 @@ def test_the_mesh_is_that_of_one_rank(comm, keys):
 def share_of(case, comm):
     """Tear this rank's share of the cell by tiles."""
     noded = coarse_meshes.place_nodes(case, comm, SMALL)
-    assert noded is None or can_be_torn_by_tiles(case, noded)
+    assert noded is None or can_be_torn_by_tiles(case, noded, LATTICE, TILED)
     return tear_by_tiles(case, noded, LATTICE, comm, TILED)
 
 
@@ -104,9 +105,11 @@ def test_subdomains_are_those_of_one_rank(comm):
 
 
 @pytest.mark.quick
+@pytest.mark.parametrize("policy", [TILED, ACROSS], ids=["by tiles", "across materials"])
 @pytest.mark.parametrize("keys", KINDS.values(), ids=KINDS)
-def test_the_stiffness_is_that_of_a_direct_solve_on_the_mesh(comm, keys):
-    cell, L, _ = solve(case_of(**keys, refine=1), comm, policy=TILED)
+def test_the_stiffness_is_that_of_a_direct_solve_on_the_mesh(comm, keys, policy):
+    cell, L, _ = solve(case_of(**keys, refine=1), comm, policy=policy)
+    assert cell.summary.across == (policy is ACROSS)
     assert relative_error(L, monolithic_stiffness(cell)) < 1e-9
 
 
@@ -133,7 +136,7 @@ def test_what_needs_the_whole_mesh_is_torn_on_rank_0(comm):
     for more in ({"interface": contact}, {"decomposition": {"subdomains": 17}}, {"bodies": "plane"}):
         case = case_of(**more)
         noded = coarse_meshes.place_nodes(case, comm, SMALL)
-        assert noded is None or not can_be_torn_by_tiles(case, noded)
+        assert noded is None or not can_be_torn_by_tiles(case, noded, LATTICE, TILED)
     cell, *_ = solve(case_of(decomposition={"subdomains": 17}), comm, policy=TILED)
     assert cell.summary.subdomains == 17
 

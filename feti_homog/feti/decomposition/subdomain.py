@@ -159,8 +159,12 @@ class Subdomain:
         return (min(first, SCALED_LAME * shear) + 3 * shear) / (first + 3 * shear)
 
     def elimination_order(self) -> Int | None:
-        """(cn,) all dofs in an order of elimination; None where any order is as good."""
-        return self.problem.dofs(elimination_order(self.mesh)) if self.n_dofs >= LEAST_ORDERED_DOFS else None
+        """(cn,) all dofs in an order of elimination; None where the library finds one at less cost.
+
+        It does where there are no nodes but those of the coarse mesh, all of whose triangles are to be halved.
+        """
+        pays = self.n_dofs >= LEAST_ORDERED_DOFS and self.mesh.lattice.intervals > 1
+        return self.problem.dofs(elimination_order(self.mesh)) if pays else None
 
     def take_stiffness(self) -> csr_matrix:
         """(cn, cn) K, which belongs to the caller: that of `build` the first time, then one assembled anew."""
