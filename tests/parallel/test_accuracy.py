@@ -60,7 +60,7 @@ def energy_error(L, exact):
 def fine(name):
     """Solve by quadratic elements of another coarse mesh that is several times as fine, split once."""
     cell, phases, plane = CELLS[name]
-    mesh = {"mesh_size": 0.06, "refine": 1, "order": 2}
+    mesh = {"mesh_size": 0.09, "refine": 1, "order": 2}
     return stiffness(cell | mesh, phases, plane).effective_stiffness
 
 

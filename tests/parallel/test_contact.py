@@ -45,9 +45,9 @@ def stiffness(cell, status):
     return np.array([response(cell, False, strain, status)[0] for strain in STRAINS]).T
 
 
-@pytest.mark.parametrize("number", range(16))
+@pytest.mark.parametrize("number", range(10))
 def test_random_cells_equal_the_quadratic_programme(comm, number):
-    # Other cells on other numbers of ranks: 240 cases at 1, 2 and 4.
+    # Other cells on other numbers of ranks: 60 cases at 1, 2 and 4.
     rng = np.random.default_rng([comm.size, number])
     pc = ("dirichlet", "influence")[number % 2]
     case = torn_cells.build(comm, **random_cell(rng), petsc={"feti_pc_type": pc})

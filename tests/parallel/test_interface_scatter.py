@@ -32,7 +32,7 @@ PATH = {"to": {"E11": 0.1, "E22": 0.0, "gamma12": 0.02}}
 ENVELOPE = {"plane": ["S11", "S12"], "directions": 8}
 
 
-def case_of(interface, rows, mesh_size=0.14, **analysis):
+def case_of(interface, rows, mesh_size=0.2, **analysis):
     """Return a case of three fibres; `rows` is what their table has beside circles."""
     (kind,) = analysis
     circles = [{"x": x, "y": y, "radius": 0.7} for x, y in CENTRES]
