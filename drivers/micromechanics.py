@@ -25,13 +25,17 @@ from feti_homog import Case, Result, launch
 
 EPOXY = {"young": 3.45, "poisson": 0.35, "expansion": 54e-6}
 GLASS = {"poisson": 0.22, "expansion": 5e-6}
-NAMES = (
-    "E_axial", "E_transverse", "nu_axial", "nu_transverse", "G_axial", "G_transverse",
-    "expansion_axial", "expansion_transverse",
-)  # fmt: skip
+TITLES = {
+    f"{name}_{way}": f"{title[0]} {words}{title[1]}"
+    for name, title in {"E": ("$E$", " (GPa)"), "nu": (r"$\nu$", ""), "G": ("$G$", " (GPa)"),
+                        "expansion": (r"$\alpha$", " (1e-6/K)")}.items()
+    for way, words in (("axial", "along the fibres"), ("transverse", "across the fibres"))
+}  # fmt: skip
+NAMES = tuple(TITLES)
 METHODS = {
-    "rule_of_mixtures": ":", "chamis": (0, (1, 3)), "halpin_tsai": "-.", "mori_tanaka": "--",
-    "composite_cylinders": (0, (8, 2)), "self_consistent": "-",
+    "rule_of_mixtures": ("Rule of mixtures", ":"), "chamis": ("Chamis", (0, (1, 3))),
+    "halpin_tsai": ("Halpin and Tsai", "-."), "mori_tanaka": ("Mori and Tanaka", "--"),
+    "composite_cylinders": ("Composite cylinders", (0, (8, 2))), "self_consistent": ("Self-consistent", "-"),
 }  # fmt: skip
 MARKS = {"square": "s", "hexagonal": "h", "random": "o"}
 Table = dict[tuple[str, float, float], NDArray[np.float64]]
@@ -121,17 +125,17 @@ def _draw(
     figure = Figure(figsize=(12.0, 6.0), layout="constrained")
     for k, (name, axes) in enumerate(zip(NAMES, figure.subplots(2, 4).ravel(), strict=True)):
         scale = 1e-6 if name.startswith("expansion") else 1.0
-        for (method, style), ink in zip(METHODS.items(), (*INK, "0.5", "k"), strict=True):
+        for (method, (words, style)), ink in zip(METHODS.items(), (*INK, "0.5", "k"), strict=True):
             values = [estimates[method][contrast, c][k] / scale for c in fractions]
-            axes.plot(fractions, values, linestyle=style, color=ink, linewidth=1.4, label=method.replace("_", " "))
+            axes.plot(fractions, values, linestyle=style, color=ink, linewidth=1.4, label=words)
         for geometry, mark in MARKS.items():
             values = [cells[geometry, contrast, c][k] / scale for c in fractions]
-            axes.plot(fractions, values, mark, color="k", markerfacecolor="none", label=f"{geometry} cell")
-        axes.set(title=name.replace("_", " "), xlabel="fibre fraction")
+            axes.plot(fractions, values, mark, color="k", markerfacecolor="none", label=f"{geometry.capitalize()} cell")
+        axes.set(title=TITLES[name], xlabel="Fibre fraction")
         axes.grid(color="0.92", linewidth=0.6)
     handles, labels = axes.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=5, frameon=False)
-    figure.suptitle(f"E_fibre / E_matrix = {contrast:g}; moduli in GPa, expansions in 1e-6/K", fontsize=10)
+    figure.suptitle(f"$E_f / E_m$ = {contrast:g}", fontsize=10)
     figure.savefig(path)
 
 
