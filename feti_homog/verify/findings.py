@@ -123,9 +123,8 @@ def checks(rtol: float, users_mesh: bool, has_coatings: bool, lame_ratio: float 
         lame_ratio: largest lambda / mu of elements that have a pressure of their own.
     """
     lost = max(1.0, lame_ratio / LARGE_RATIO)
-    rounding = max(COATINGS if has_coatings else 0.0, WHOLE_BODIES * lost)
-    shape = USERS_MESH if users_mesh else OWN_MESH
-    solver = solver_limit(rtol)
+    each, sums, rounding = 1e-13 * lost, 1e-10 * lost, max(COATINGS if has_coatings else 0.0, WHOLE_BODIES * lost)
+    shape, solver = USERS_MESH if users_mesh else OWN_MESH, solver_limit(rtol)
     contact = min(max(CONTACT_PER_RTOL * rtol, LEAST_CONTACT), LARGEST_CHECK)
     rows = (
         ("files", "the files are unchanged since the run, by their checksums", 0.0),
@@ -133,17 +132,13 @@ def checks(rtol: float, users_mesh: bool, has_coatings: bool, lame_ratio: float 
         ("mesh", "elements have positive areas and fill the cell; torn sides meet in pairs", shape),
         ("interface", "interface nodes are where one fibre meets the matrix, with its normals and lengths", shape),
         ("arcs", "the initially debonded nodes are those of the case, in numbers of nodes", 0.0),
-        ("stress", "stresses of the elements follow from u and the case's materials", 1e-13 * lost),
-        ("stress 33", "stresses out of the plane follow from those in it and the case's materials", 1e-13 * lost),
+        ("stress", "stresses of the elements follow from u and the case's materials", each),
+        ("stress 33", "stresses out of the plane follow from those in it and the case's materials", each),
         ("mesh error", "errors of the elements add up to those of averaged stresses, by a factor less 1", 1.0),
         ("vectors", "vectors and the faces' displacements follow from tractions, jumps and displacements", 1e-13),
         ("periodicity", "u* is the same at the copies of a node in its subdomain, relative to the largest u", 1e-13),
         ("continuity", "u* is the same where subdomains are glued, relative to the largest u", solver),
-        (
-            "equilibrium",
-            "forces of the elements and tractions balance at every node, relative to the largest",
-            1e-10 * lost,
-        ),
+        ("equilibrium", "forces of the elements and tractions balance at every node, relative to the largest", sums),
         ("jump", "gap and slip are the differences of the faces' u*, relative to the largest u", rounding),
         ("bond", "bonded and closed faces part as their springs give way, relative to the largest u", solver),
         ("penetration", "debonded faces do not overlap, relative to the displacement imposed", contact),
@@ -155,7 +150,7 @@ def checks(rtol: float, users_mesh: bool, has_coatings: bool, lame_ratio: float 
             "friction opposes the slip of sliding faces, relative to the largest traction; tied ones keep theirs",
             contact,
         ),
-        ("mean stress", "the mean of the stresses is the state's, relative to the largest component", 1e-10 * lost),
+        ("mean stress", "the mean of the stresses is the state's, relative to the largest component", sums),
         ("mean strain", "the mean of the strains is E and the opening of the faces, relative to E", solver),
         ("Hill", "mean of stress : strain = mean stress : E less the interface's work, relative to it", solver),
         ("load", "the states have the strains and temperatures that the case asks for, relative to the largest", 1e-12),
@@ -169,12 +164,8 @@ def checks(rtol: float, users_mesh: bool, has_coatings: bool, lame_ratio: float 
         ("energy", "work = stored + dissipated along the path, relative to the largest energy", solver),
         ("heat", "work = stored + dissipated + heat of friction, which grows, relative to the energies so far", 1e-8),
         ("cell", "areas, fractions and counts in result.json are those of the mesh", 1e-10),
-        ("moduli", "moduli follow from the stiffness, relative to each", 1e-10 * lost),
-        (
-            "compliance",
-            "compliance and expansion follow from stiffness and thermal stress, relative to each",
-            1e-10 * lost,
-        ),
+        ("moduli", "moduli follow from the stiffness, relative to each", sums),
+        ("compliance", "compliance and expansion follow from stiffness and thermal stress, relative to each", sums),
         ("Levin", "thermal stress = - mean of expansion : stiffness : strain under unit strains, relative", solver),
         ("constants", "constants at fixed status are those of the fields, relative to each", solver),
         (
@@ -182,7 +173,7 @@ def checks(rtol: float, users_mesh: bool, has_coatings: bool, lame_ratio: float 
             "constants change with the materials and springs of the case as in the file, relative to each",
             max(SLOPE, solver),
         ),
-        ("bounds", "bounds follow from fractions and materials, and the stiffness is between them", 1e-10 * lost),
+        ("bounds", "bounds follow from fractions and materials, and the stiffness is between them", sums),
     )
     return tuple(Check(*row) for row in rows)
 
