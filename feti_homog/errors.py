@@ -64,14 +64,17 @@ class NotCarriedError(ConvergenceError):
 
 
 class CoarseMeshError(FetiHomogError):
-    """A mesh of elements split `refine` times errs by `energy`, more than the case asks for; `finer` times would do."""
+    """A mesh of elements split `refine` times errs by `energy`, more than the case asks for; `finer` times would do.
 
-    def __init__(self, words: str, energy: float, refine: int, finer: int) -> None:
+    `failure` is why these were not solved, if they were tried.
+    """
+
+    def __init__(self, words: str, energy: float, refine: int, finer: int, failure: str = "") -> None:
         super().__init__(words)
-        self.energy, self.refine, self.finer = energy, refine, finer
+        self.energy, self.refine, self.finer, self.failure = energy, refine, finer, failure
 
     def __reduce__(self) -> tuple[type[FetiHomogError], tuple[Any, ...]]:
-        return type(self), (*self.faults, self.energy, self.refine, self.finer)
+        return type(self), (*self.faults, self.energy, self.refine, self.finer, self.failure)
 
 
 class LibraryError(FetiHomogError):

@@ -12,6 +12,7 @@ from scipy.linalg import eigh
 
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result_records import MeshError
+from feti_homog.case.cell_section import Cell
 from feti_homog.case.element_sizes import MOST_REFINED
 from feti_homog.errors import CoarseMeshError, NotCarriedError
 from feti_homog.homogenization import phase_laws
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 Named = Mapping[str, Float]
 # Of errors of the energy by a halving of elements, at the least: a crack's is 2.
 LEAST_RATE = 2.0
+# Halvings that a repetition takes at most: 16 times the unknowns.
+MOST_HALVINGS = 2
 # Share of a bound by which rounding may leave a value outside.
 ROUNDING = 1e-9
 
@@ -92,17 +95,28 @@ def note_accuracy(context: AnalysisContext, energy: float) -> None:
     cell = context.case.cell
     if cell.accuracy is None or (energy := context.cell.comm.bcast(energy)) <= cell.accuracy:
         return
-    rate, before = 4.0**cell.order, context.earlier
-    if before is not None:  # at corners and tips errors fall more slowly than those of smooth fields
-        rate = min(rate, max(LEAST_RATE, (before.energy / energy) ** (1 / (cell.refine - before.refine))))
-    finer = cell.refine + math.ceil(math.log(energy / cell.accuracy, rate))
+    before = context.earlier
+    finer = cell.refine + math.ceil(math.log(energy / cell.accuracy, _rate(cell, energy, before)))
     words = f"[cell] accuracy = {cell.accuracy:g}: the estimated error of the strain energy is {energy:.1e}"
-    if cell.accuracy_check == "repeat" and finer <= MOST_REFINED and before is None:
+    repeats, halvings = cell.accuracy_check == "repeat", finer - cell.refine
+    if repeats and before is None and halvings <= MOST_HALVINGS and finer <= MOST_REFINED:
         words += f" with refine = {cell.refine}: solved once more with refine = {finer}"
         raise CoarseMeshError(words, energy, cell.refine, finer)
+    if repeats and before is None:
+        words += f", not solved once more with {4**halvings} times the unknowns"
+    elif before is not None and before.failure:
+        words += f", for with refine = {before.finer} it could not be solved: {before.failure}"
     context.notes.append(
         f"{words}; mesh_size = {cell.mesh_size:g}, refine = {finer} and order = {cell.order} in its place would do"
     )
+
+
+def _rate(cell: Cell, energy: float, before: CoarseMeshError | None) -> float:
+    """Factor by which a halving of elements lowers the error: at corners and tips less than that of smooth fields."""
+    halvings, smooth = 0 if before is None else cell.refine - before.refine, float(4**cell.order)
+    if before is None or not halvings:
+        return smooth
+    return min(smooth, max(LEAST_RATE, float((before.energy / energy) ** (1 / halvings))))
 
 
 def _note_bounds(

@@ -17,7 +17,7 @@ from feti_homog.analysis.registry import analysis_of
 from feti_homog.analysis.result import Result
 from feti_homog.analysis.state_recorder import StateRecorder
 from feti_homog.case.case import Case
-from feti_homog.errors import CoarseMeshError, ConvergenceError
+from feti_homog.errors import CoarseMeshError, ConvergenceError, MeshError
 from feti_homog.homogenization.partition_policy import BY_COST
 from feti_homog.homogenization.unit_cell import TornCell, tear
 from feti_homog.parallel.mpi_errors import all_raise, on_root, on_root_only
@@ -101,14 +101,22 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False, quiet: b
 def _accurate(case: Case, solved: Callable[[Case, CoarseMeshError | None], Result], progress: Progress) -> Result:
     """Return solved(case, fault of an earlier mesh), once more on the finer mesh that the case may ask for.
 
-    Collective.
+    If that fails, on the first mesh again.  Collective.
     """
     try:
         return solved(case, None)
     except CoarseMeshError as error:
         earlier = error
     progress.say(f"remark: {earlier}")
-    return solved(replace(case, cell=replace(case.cell, refine=earlier.finer)), earlier)
+    try:
+        finer = solved(replace(case, cell=replace(case.cell, refine=earlier.finer)), earlier)
+        failure = "; ".join(finer.faults)
+        if not failure:
+            return finer
+    except (MeshError, ConvergenceError) as error:
+        failure = str(error)
+    progress.say(f"remark: refine = {earlier.finer}: {failure}; solved with refine = {earlier.refine} again")
+    return solved(case, CoarseMeshError(str(earlier), earlier.energy, earlier.refine, earlier.finer, failure))
 
 
 def _begun(case: Case, comm: MPI.Intracomm, quiet: bool) -> Progress:

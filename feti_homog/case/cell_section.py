@@ -119,7 +119,7 @@ class Cell:
     accuracy_check: str | None = key(
         choice("remark", "repeat"),
         'What follows if the estimated error is more than accuracy. "remark": a remark that names the mesh that would '
-        'do; "repeat": the cell is solved once more, on that mesh.',
+        'do; "repeat": the cell is solved on it too, unless it has over 16 times the unknowns or that fails.',
         default=None, default_words='"remark" beside accuracy', only=MESHED,
     )  # fmt: skip
     element_size: float | None = key(

@@ -17,34 +17,37 @@ class KnownTractions:
     """Tractions of k loads at n vertices.
 
     Attributes:
-        vertex: (n,) these.
+        node: (n,) their classes of nodes.
         normal: (n, 2) unit vectors out of the body.
         traction: (n, c, k).
     """
 
-    vertex: Int
+    node: Int
     normal: Float
     traction: Float
 
     @classmethod
-    def at(cls, vertex: Int, normals: Float, traction: Float) -> KnownTractions:
+    def at(cls, node: Int, normals: Float, traction: Float) -> KnownTractions:
         """Make them of the ends of sides, of which a vertex has several; its normal is their mean."""
-        own, first, of = np.unique(vertex, return_index=True, return_inverse=True)
+        own, first, of = np.unique(node, return_index=True, return_inverse=True)
         sums = np.stack([np.bincount(of, normal, len(own)) for normal in normals.T], axis=1)
         return cls(own, sums / np.hypot(*sums.T)[:, None], traction[first])
 
-    def imposed(self, stress: Float, voigt: Int, flexibility: Float) -> Float:
-        """Return stresses (vertices, m, k) with these tractions, of components `voigt` (c, 2) and the flexibility S.
+    def imposed(self, stress: Float, vertex: Int, voigt: Int, flexibility: Float) -> Float:
+        """Return stresses (vertices, m, k) with these tractions at `vertex` (n,).
+
+        Of components `voigt` (c, 2) and a flexibility (m, m).
 
         sigma + d n + n d - (d . n) n n + a t t in the plane, with d = traction - sigma n and a such that the strain
         along the boundary stays, as it is known on both of its sides; along the fibres sigma + d n.
         """
-        n, own = self.normal, stress[self.vertex]
+        n, own = self.normal, stress[vertex]
         d = self.traction - np.einsum("ncdk,nd->nck", own[:, voigt], n)
         off = np.einsum("nck,nd->ncdk", d, n)
         entries = [tuple(np.argwhere(voigt == number)[0]) for number in range(stress.shape[1])]
         if len(voigt) == 2:
-            off += off.transpose(0, 2, 1, 3) - np.einsum("nck,nc,ni,nj->nijk", d, n, n, n)
+            both = n[:, :, None, None] * n[:, None, :, None]
+            off += off.transpose(0, 2, 1, 3) - both * np.einsum("nck,nc->nk", d, n)[:, None, None]
         found = np.stack([off[:, i, j] for i, j in entries], axis=1)
         if len(voigt) == 2:
             t = np.column_stack([-n[:, 1], n[:, 0]])
@@ -53,5 +56,5 @@ class KnownTractions:
             share = np.einsum("nv,nvk->nk", strain, found) / (strain * along).sum(axis=1)[:, None]
             found -= along[..., None] * share[:, None]
         whole = stress.copy()
-        whole[self.vertex] += found
+        whole[vertex] += found
         return whole

@@ -77,10 +77,14 @@ class RecoveredStress:
     @cached_property
     def vertices(self) -> Int:
         """(e, 3) vertices of the elements, numbered from 0; periodic images are one."""
-        corners = self.node_class[self.triangles[:, :3]]
+        return np.asarray(self._numbers[self.node_class[self.triangles[:, :3]]])
+
+    @cached_property
+    def _numbers(self) -> Int:
+        """(classes,) numbers of those that are vertices."""
         is_vertex = np.zeros(len(self.u), bool)
-        is_vertex[corners] = True
-        return np.asarray((np.cumsum(is_vertex) - 1)[corners])
+        is_vertex[self.node_class[self.triangles[:, :3]]] = True
+        return np.asarray(np.cumsum(is_vertex) - 1)
 
     @cached_property
     def flexibility(self) -> Float:
@@ -136,7 +140,8 @@ class RecoveredStress:
             values = linear_values(self.vertices, away, weights, stress.reshape(len(stress), -1), neighbours)
             if self.known is not None:
                 tensors = values.reshape(-1, *stress.shape[1:])
-                values = self.known.imposed(tensors, self.problem.voigt, self.flexibility).reshape(values.shape)
+                at = self._numbers[self.known.node]
+                values = self.known.imposed(tensors, at, self.problem.voigt, self.flexibility).reshape(values.shape)
             return values[:, None]
         moments, sums, size = np.zeros(()), np.zeros(()), int(self.vertices.max()) + 1
         for own in self.elements:

@@ -165,12 +165,14 @@ def _with_tractions(
     """Let recovered stresses of linear elements obey the tractions that are known on arcs, none at voids."""
     if stress.order == 2 or not len(sides.element):
         return stress
-    corners = sides.element[:, None], sides.ends
-    at = place[stress.node_class[stress.triangles[corners]]].ravel()
-    free = np.repeat(sides.at_void, 2)
-    own = np.flatnonzero(free | (np.append(known, False)[at]))
-    given = np.append(traction, np.zeros((1, traction.shape[1])), axis=0)
+    at = stress.node_class[stress.triangles[sides.element[:, None], sides.ends]].ravel()
+    free, first = np.repeat(sides.at_void, 2), place[at]
+    own = np.flatnonzero(free | ((first >= 0) & known[first]) if len(known) else free)
+    if not len(own):
+        return stress
     steps = np.arange(stress.problem.components)
-    values = np.where(free[own, None, None], 0.0, given[at[own, None] + steps])
+    values = np.zeros((len(own), len(steps), traction.shape[1]))
+    given = ~free[own]
+    values[given] = traction[first[own][given, None] + steps]
     normals = sides.normals[:, [0, -1]].reshape(-1, 2)
-    return replace(stress, known=KnownTractions.at(stress.vertices[corners].ravel()[own], normals[own], values))
+    return replace(stress, known=KnownTractions.at(at[own], normals[own], values))

@@ -9,7 +9,10 @@ import pytest
 from support.cases import FIBRE, MATRIX
 
 from feti_homog import Case, run
+from feti_homog.analysis import runner
 from feti_homog.analysis.mesh_errors import add_errors_of_breaks, note_accuracy
+from feti_homog.errors import CoarseMeshError, ConvergenceError
+from feti_homog.runtime.progress import Progress
 
 pytestmark = pytest.mark.parallel
 
@@ -31,6 +34,34 @@ def test_more_error_than_asked_for_is_remarked_with_a_mesh_that_would_do(comm):
     (note,) = context.notes
     # A fifth of the error takes two more halvings of linear elements.
     assert f"refine = {chosen.refine + 2} and order = 1" in note and "5.0e-03" in note
+
+
+def test_no_repetition_with_many_more_unknowns(comm):
+    case = Case.parse(ASKED | {"cell": ASKED["cell"] | {"accuracy_check": "repeat"}})
+    context = SimpleNamespace(case=case, notes=[], earlier=None, cell=SimpleNamespace(comm=comm))
+    with pytest.raises(CoarseMeshError):
+        note_accuracy(context, 15e-3)  # two halvings
+    note_accuracy(context, 60e-3)
+    assert "not solved once more with 64 times the unknowns" in context.notes[0]
+
+
+@pytest.mark.parametrize("raises", [True, False])
+def test_the_first_mesh_stays_if_the_finer_one_fails(comm, raises):
+    case = Case.parse(ASKED | {"cell": ASKED["cell"] | {"accuracy_check": "repeat"}})
+    first, notes = case.cell.refine, []
+
+    def solved(own, earlier):
+        context = SimpleNamespace(case=own, notes=notes, earlier=earlier, cell=SimpleNamespace(comm=comm))
+        if own.cell.refine > first:
+            if raises:
+                raise ConvergenceError("broke down")
+            return SimpleNamespace(faults=["broke down"])
+        note_accuracy(context, 5e-3)
+        return SimpleNamespace(faults=[], case=own)
+
+    found = runner._accurate(case, solved, Progress(comm, quiet=True))
+    assert found.case is case
+    assert f"for with refine = {first + 2} it could not be solved: broke down" in notes[0]
 
 
 @pytest.mark.parametrize("kind", ["stiffness", "load", "angle", "path"])

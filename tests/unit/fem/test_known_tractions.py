@@ -16,12 +16,12 @@ def test_tractions_are_obeyed_and_strains_along_the_boundary_stay(problem):
     stress, A = random.normal(size=(5, m, 3)), random.normal(size=(m, m))
     S, angle = A @ A.T + np.eye(m), random.uniform(0, 2 * np.pi, 6)
     # Two sides meet at each vertex.
-    vertex, normals = np.array([3, 1, 3, 1, 4, 4]), np.column_stack([np.cos(angle), np.sin(angle)])
+    node, normals = np.array([3, 1, 3, 1, 4, 4]), np.column_stack([np.cos(angle), np.sin(angle)])
     given = random.normal(size=(6, c, 3))
-    known = KnownTractions.at(vertex, normals, given)
-    found = known.imposed(stress, problem.voigt, S)
+    known = KnownTractions.at(node, normals, given)
+    found = known.imposed(stress, known.node, problem.voigt, S)
     np.testing.assert_array_equal(found[[0, 2]], stress[[0, 2]])
-    for vertex, n, t in zip(known.vertex, known.normal, known.traction, strict=True):
+    for vertex, n, t in zip(known.node, known.normal, known.traction, strict=True):
         np.testing.assert_allclose(np.einsum("cdk,d->ck", found[vertex][problem.voigt], n), t, atol=1e-12)
         if c == 2:
             along = np.array([n[1] ** 2, n[0] ** 2, -n[0] * n[1]])
