@@ -64,7 +64,7 @@ class NaturalCoarseSpace:
         self.G = assemble_owned_rows(comm, operators.B @ self.R, jump_operator.rows, columns, (owned, modes))
         self.factorizations, self._active = 0, np.ones(owned)
         self._diagonal = allreduce_sum(comm, np.asarray(self.G.power(2).sum(axis=0)).ravel())
-        self.unconstrained_modes = csc_matrix((self.kernel_dimension, 0))
+        self.unconstrained_modes = self._no_motions = csc_matrix((self.kernel_dimension, 0))
         self._reaching = np.union1d(self.G.indices, columns).astype(np.int64)
         self.solver = DistributedSolver(comm, self.kernel_dimension, "feti_natural_")
         self.factor()
@@ -137,7 +137,7 @@ class NaturalCoarseSpace:
             values.append(vectors[which, :, mode].ravel())
             columns += len(which)
         if not columns:
-            return csc_matrix((self.kernel_dimension, 0))
+            return self._no_motions
         entry = np.concatenate(values), (np.concatenate(rows), np.concatenate(numbers))
         Z = csc_matrix(entry, shape=(self.kernel_dimension, columns))
         Z.eliminate_zeros()

@@ -11,9 +11,12 @@ from mpi4py import MPI
 from feti_homog.feti.preconditioners.bordered_inverse import BorderedInverse
 from feti_homog.feti.preconditioners.followed_response import FollowedResponse
 from feti_homog.feti.preconditioners.reference_cell import ReferenceCell, ResponseColumns
-from feti_homog.feti.thresholds import INFLUENCE_CHUNK, KEPT_AT_ONCE, KEPT_ERROR
+from feti_homog.feti.thresholds import KEPT_AT_ONCE, KEPT_ERROR
 from feti_homog.parallel.distributed_arrays import gather_rows, scale_rows
 from feti_homog.typing import Float, Int
+
+# Columns of a product that pay a copy of the matrix.
+FEW_COLUMNS = 32
 
 
 class ChangedReference:
@@ -71,7 +74,7 @@ class ChangedReference:
     def _take_off(self, z: Float, members: Int, c: Float) -> None:
         """Take Gamma[:, C] c off z (owned rows,[ k]) in place."""
         columns, known = self.columns.owned, len(self.columns.rows)
-        if z.size < INFLUENCE_CHUNK * len(z) or 2 * len(members) > known:
+        if z.size < FEW_COLUMNS * len(z) or 2 * len(members) > known:
             # A product with all columns is cheaper than a copy of some.
             whole = np.zeros((known, *z.shape[1:]))
             whole[members] = c
@@ -94,23 +97,34 @@ class ChangedReference:
         columns[rows[mine] - self._first, mine] = turned[mine]
         return self.response(columns)
 
-    def next_columns(self, active: Float, changed: Int, followed: FollowedResponse | None) -> tuple[Int, Float]:
-        """Global rows (k,) and columns (owned rows, k) of the cell with these active rows, of those that have columns.
+    def next_columns(
+        self, held: Float, changed: Int, come: Int, followed: FollowedResponse | None
+    ) -> tuple[Int, Float]:
+        """Rows (k,) and columns (owned rows, k) of the cell with the active rows `held` and `come`.
 
-        `active` (owned rows,) are the reference cell's but for the rows `changed`, which have columns; only rows that
-        are active in both count.  `followed` has columns of the present cell, if it is that one.  Collective.
+        `held` (owned rows,) are the reference cell's but for the global rows `changed`; these and the rows that `come`
+        have columns.  Only rows count that are active in all three cells.  `followed` has columns of the cell with the
+        rows `held`.  Collective.
         """
         known = self.columns.rows
-        both = gather_rows(self._comm, active * self.cell.active, self._first, known) > 0.0
+        both = gather_rows(self._comm, held * self.cell.active, self._first, known) > 0.0
         is_followed = np.zeros(len(known), bool) if followed is None else followed.has_columns(known) & both
         rest, parts = np.flatnonzero(both & ~is_followed), [np.zeros((self._rows, 0))]
         if followed is not None:
             parts.append(followed.columns(known[is_followed]))
-        if len(rest):
+        if len(rest) or len(come):
             self.update(changed, np.zeros(self._rows))
         for start in range(0, len(rest), KEPT_AT_ONCE):
             parts.append(self.response(self.columns.owned[:, rest[start : start + KEPT_AT_ONCE]]))
-        return np.concatenate([known[is_followed], known[rest]]), np.hstack(parts)
+        columns = np.hstack(parts)
+        if len(come):
+            theirs = self.present(come, held)
+            both_there = gather_rows(self._comm, np.hstack([theirs, columns]), self._first, come)
+            x = self._comm.bcast(np.linalg.lstsq(both_there[:, : len(come)], both_there[:, len(come) :], rcond=None)[0])
+            columns -= theirs @ x
+            mine = np.flatnonzero((come >= self._first) & (come < self._first + self._rows))
+            columns[come[mine] - self._first] = -x[mine]
+        return np.concatenate([known[is_followed], known[rest]]), columns
 
     def take(self, rows: Int, columns: Float) -> None:
         """Take the columns (owned rows, k) of active rows (k,), unless a sum of them is not the cell's.  Collective."""

@@ -141,7 +141,7 @@ class ExactInverse(Preconditioner):
 
         Collective.
         """
-        wanted = np.union1d(wanted, followed.pins)
+        wanted = np.union1d(wanted, followed.pins) if len(followed.pins) else wanted
         lacking = followed.lacking(wanted)
         if not len(lacking):
             return True
@@ -273,14 +273,15 @@ class ExactInverse(Preconditioner):
 
         None where springs have softened, or where many rows have changed at once.
         """
-        changed = self._changed(tied)
-        own = np.array([(self._more * self._active).any(), (tied != self._held).any()], np.int64)
-        self.comm.Allreduce(MPI.IN_PLACE, own, MPI.MAX)
-        soft, moved = own.tolist()
-        if soft or (self._changes.columns.positions(changed) < 0).sum() > self.batch:
+        soft = bool((self._more * self._active).any())
+        changed, own = self._changed(self._held), self._first + np.flatnonzero(tied > self._held)
+        come = np.concatenate(self.comm.allgather(own))
+        concerned = np.union1d(changed, come)
+        lacking = int((self._changes.columns.positions(concerned) < 0).sum())
+        if self.comm.allreduce(soft, MPI.LOR) or lacking > self.batch:
             return None
-        self._find(changed)
-        return self._changes.next_columns(tied, changed, None if moved else self._followed)
+        self._find(concerned)
+        return self._changes.next_columns(self._held, changed, come, self._followed)
 
     def _find(self, rows: Int) -> None:
         """Find the columns of the reference cell that these rows lack, and some near them.  Collective."""

@@ -138,10 +138,11 @@ class FollowedResponse:
         False where columns, those of pins too, are lacking or lose too many digits; then this is of no state.
         Collective.
         """
-        soft, is_pin = turned == 0.0, np.isin(rows, self.pins)
+        soft, is_pin = turned == 0.0, (rows[:, None] == self.pins).any(axis=1)
         if len(self.lacking(np.concatenate([rows, self.pins]))) or (gained[soft] < 0.0).any():
             return False
-        self.pins = np.setdiff1d(self.pins, rows)
+        if is_pin.any():
+            self.pins = np.setdiff1d(self.pins, rows)
         softer = (soft | is_pin) & (gained != 0.0)
         if softer.any():
             self.soften(rows[softer], gained[softer])
@@ -179,15 +180,18 @@ class FollowedResponse:
             kept = np.concatenate([which, np.arange(k, len(values))])
             values = np.hstack([values[kept][:, which], values[kept, k:]])
             self._turn(rows[which], sign[which], gained[which], B, columns[:, which], values)
-        loose = np.setdiff1d(np.arange(k), which)
-        self.pins = np.union1d(np.setdiff1d(self.pins, moved), rows[loose])
-        own = self.pins[(self.pins >= self._first) & (self.pins < self._first + len(columns))] - self._first
-        self.answer = self.answer.copy()
-        self.answer[own] = 0.0
-        # Springs of pins have C_0, as of all rows that are not active.
-        if len(loose := loose[gained[loose] != 0.0]):
-            self.soften(rows[loose], gained[loose])
+        if len(moved) or len(which) < k or len(self.pins):
+            loose = np.setdiff1d(np.arange(k), which)
+            self._pin(np.union1d(np.setdiff1d(self.pins, moved), rows[loose]))
+            # Springs of pins have C_0, as of all rows that are not active.
+            if len(loose := loose[gained[loose] != 0.0]):
+                self.soften(rows[loose], gained[loose])
         return True
+
+    def _pin(self, pins: Int) -> None:
+        """Let these global rows be the pins, whose answer is 0."""
+        self.pins, self.answer = pins, self.answer.copy()
+        self.answer[pins[(pins >= self._first) & (pins < self._first + len(self.answer))] - self._first] = 0.0
 
     def _moved_pins(self, forces: Float) -> Int:
         """Return the pins that unit forces on rows that come press; `forces` (columns, k) of them on all columns."""

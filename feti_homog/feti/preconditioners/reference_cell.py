@@ -19,7 +19,7 @@ from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.assembled_schur import AssembledSchur
 from feti_homog.feti.preconditioners.spring_update import SpringUpdate
-from feti_homog.feti.thresholds import BUFFERED_COLUMNS, INFLUENCE_CHUNK, NORM_ITERATIONS, STIFF_FIBRES
+from feti_homog.feti.thresholds import BUFFERED_COLUMNS, CHUNK_RANKS, INFLUENCE_CHUNK, NORM_ITERATIONS, STIFF_FIBRES
 from feti_homog.parallel.distributed_arrays import allreduce_sum, gather_rows, scale_rows
 from feti_homog.typing import Float, Int
 
@@ -201,7 +201,8 @@ class ResponseColumns:
         """Find the columns of those rows that have none.  Collective."""
         new = np.unique(rows[self._position[rows] < 0])
         # A few columns too many are cheaper with others than by themselves.
-        for some in np.array_split(new, max(round(len(new) / INFLUENCE_CHUNK), 1)) if len(new) else ():
+        chunk = INFLUENCE_CHUNK * min(self._comm.size, CHUNK_RANKS)
+        for some in np.array_split(new, max(round(len(new) / chunk), 1)) if len(new) else ():
             unit = np.zeros((len(self._columns), len(some)))
             mine = np.flatnonzero((some >= self._first) & (some < self._first + len(unit)))
             unit[some[mine] - self._first, mine] = 1.0
