@@ -109,13 +109,14 @@ class ChangedReference:
         known = self.columns.rows
         both = gather_rows(self._comm, held * self.cell.active, self._first, known) > 0.0
         is_followed = np.zeros(len(known), bool) if followed is None else followed.has_columns(known) & both
-        rest, parts = np.flatnonzero(both & ~is_followed), [np.zeros((self._rows, 0))]
+        # Of the others, which cost more, the latest.
+        rest, parts = np.flatnonzero(both & ~is_followed)[-KEPT_AT_ONCE:], [np.zeros((self._rows, 0))]
         if followed is not None:
             parts.append(followed.columns(known[is_followed]))
         if len(rest) or len(come):
             self.update(changed, np.zeros(self._rows))
-        for start in range(0, len(rest), KEPT_AT_ONCE):
-            parts.append(self.response(self.columns.owned[:, rest[start : start + KEPT_AT_ONCE]]))
+        if len(rest):
+            parts.append(self.response(self.columns.owned[:, rest]))
         columns = np.hstack(parts)
         if len(come):
             theirs = self.present(come, held)
