@@ -113,8 +113,7 @@ def draw(given: argparse.Namespace, found: dict[float, Result], rows: Loop) -> N
     for axes in (left, middle, right):
         axes.grid(color="0.92", linewidth=0.6)
     for axes in (middle, right):
-        axes.set_xlim(left=0.0)
-        axes.set_ylim(bottom=0.0)
+        axes.set(xlim=(0.0, 1.05 * axes.dataLim.x1), ylim=(0.0, 1.05 * axes.dataLim.y1))
     middle.legend(frameon=False, fontsize=8, title="pressure")
     figure.suptitle(f"Glass/epoxy with debonded fibres, friction {given.friction:g}", fontsize=11)
     figure.savefig(given.out / "hysteresis.png")

@@ -261,7 +261,7 @@ def _limits(bond: Document, units: tuple[str, str]) -> str:
     symbols = [each for each in LAWS[criterion].symbols if bond.get(each[1])]
     given = [(symbol, key, units[0 if of_stress else 1]) for symbol, key, of_stress in symbols]
     words = [f"${symbol} = {bond[key]:g}$ {plain(label)}".rstrip() for symbol, key, label in given]
-    law = f"{criterion} law" if LAWS[criterion].softens else f"criterion {criterion}"
+    law = f"{criterion} law" if LAWS[criterion].softens else f"law {criterion}"
     return ", ".join([law, *words]) if words else "no debonding by load"
 
 

@@ -292,8 +292,8 @@ def test_several_interfaces_have_lines_of_the_title_that_are_within_the_picture(
 
 def test_what_breaks_the_bonds_is_in_the_title():
     case = {"interface": {"criterion": "quadratic", "normal_strength": 0.06}, "output": {"stress_unit": "GPa"}}
-    assert plot_helpers.bond_limits(case) == ["criterion quadratic, $R^\\mathrm{n} = 0.06$ GPa"]
+    assert plot_helpers.bond_limits(case) == ["law quadratic, $R^\\mathrm{n} = 0.06$ GPa"]
     assert plot_helpers.bond_limits({"interface": {"criterion": "energy", "toughness": 3e-5}}) == [
-        "criterion energy, $G_\\mathrm{Ic} = 3e-05$"
+        "law energy, $G_\\mathrm{Ic} = 3e-05$"
     ]
     assert plot_helpers.bond_limits({}) == ["no debonding by load"]
