@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from mpi4py import MPI
 
 from feti_homog.fem.arc_error import ArcSides, arc_energy
 from feti_homog.fem.known_tractions import KnownTractions
@@ -108,12 +109,16 @@ def energy_errors(
 def is_nested(cell: TornCell, responses: Sequence[Response]) -> bool:
     """Return whether a mesh refined less has the error: not where errors fall more slowly, at corners and tips.
 
-    Not of cells with fibres other than circles and ellipses, nor of debonded arcs with quadratic elements or with tips
-    to which the mesh is not graded: those of a given `tip_size`, and where bonds break.
+    Not of cells with fibres other than circles and ellipses or with voids that straight sides bound, nor of debonded
+    arcs with quadratic elements or with tips to which the mesh is not graded: those of a given `tip_size`, and where
+    bonds break.  Collective.
     """
     summary, lattice = cell.summary, cell.lattice
     if summary.across or not lattice.halvings or np.isnan(summary.frames[summary.fibre_bodies]).any():
         return False  # interiors across materials are factored anyway
+    parts = (s.submesh for s in cell.subdomains)
+    if cell.comm.allreduce(any(bool((p.at_void[p.edge_class] & (p.turns == 0)).any()) for p in parts), MPI.LOR):
+        return False
     graded = cell.case.cell.tip_size is None and not cell.case.section.breaks
     return (lattice.order == 1 and graded) or not any(response.debonded for response in responses)
 
