@@ -171,8 +171,11 @@ class SolvedAnew:
         stored = entry.get("stored") if entry else None
         least = self._least(load) * _largest(load)
         off = 0.0 if stored is None else abs(energy / area - stored) / max(abs(stored), least)
-        contact = self._contact(status, jump, pull.reshape(-1, 3), entry)
-        return Twin(float(np.abs(found - stress).max() / size), off, contact, self._rubbing(state, pull.reshape(-1, 3)))
+        forces = pull.reshape(-1, 3)
+        # Where faces bear next to nothing, as of a fibre that one of them touches, their forces are rounding.
+        largest = max(np.abs(forces).max(initial=0.0), LEAST * size * self.length.max(initial=0.0)) or 1.0
+        contact, rubbing = self._contact(status, jump, forces / largest, entry), self._rubbing(state, forces / largest)
+        return Twin(float(np.abs(found - stress).max() / size), off, contact, rubbing)
 
     def _loads(self, state: Any) -> tuple[np.ndarray, np.ndarray]:
         strain, stress = (np.array(state.attrs[name], float) for name in ("strain", "stress"))
@@ -213,14 +216,13 @@ class SolvedAnew:
         return block_diag([one] * 3).tocsr()[_interleaved(self.n)][:, _interleaved(count)]
 
     def _contact(self, status: Any, jump: Any, pull: Any, entry: Any) -> float:
-        """Compute overlap / largest jump of open faces and pull / largest force of closed ones, without free fibres."""
+        """Compute overlap / largest jump of open faces, and relative pull of closed ones, without free fibres."""
         contact = any(section.get("contact", False) for section in sections(self.document["case"]))
         if not contact or not self.k or not entry or entry.get("free_motions", 0):
             return 0.0
         gap, normal = jump.reshape(-1, 3)[:, 0], pull[:, 0]
-        largest_gap, largest_pull = np.abs(jump).max(initial=0.0), np.abs(pull).max(initial=0.0)
-        overlap = float(np.max(-gap[status == OPEN], initial=0.0)) / (largest_gap or 1.0)
-        return max(overlap, float(np.max(normal[status == CLOSED], initial=0.0)) / (largest_pull or 1.0))
+        overlap = float(np.max(-gap[status == OPEN], initial=0.0)) / (np.abs(jump).max(initial=0.0) or 1.0)
+        return max(overlap, float(np.max(normal[status == CLOSED], initial=0.0)))
 
     def _jump(self, state: Any) -> np.ndarray:
         """(k, 3) jumps that a result has."""
@@ -228,13 +230,13 @@ class SolvedAnew:
         return np.column_stack([state["jump"][()], along])
 
     def _rubbing(self, state: Any, pull: np.ndarray) -> float:
-        """Compute what shear exceeds mu p, or differs from it where faces slide, / largest force."""
+        """Compute what shear exceeds mu p, or differs from it where faces slide, of relative forces (k, 3)."""
         if not self.friction.any():
             return 0.0
         shear, limit = pull[:, 1], self.friction * np.maximum(-pull[:, 0], 0.0)
         closed, sign = (state["status"][()] == CLOSED) & (self.friction > 0.0), state["sliding"][()]
         off = np.where(sign != 0, np.abs(sign * shear - limit), np.maximum(np.abs(shear) - limit, 0.0))
-        return float(off[closed].max(initial=0.0) / (np.abs(pull).max(initial=0.0) or 1.0))
+        return float(off[closed].max(initial=0.0))
 
 
 def _largest(load: np.ndarray) -> float:
