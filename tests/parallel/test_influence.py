@@ -155,6 +155,21 @@ def test_blocks_are_right_with_few_followed_columns(comm, columns, monkeypatch):
     assert len(kept) > 12 and all(each is kept[0] for each in kept)
 
 
+@pytest.mark.parametrize("unit", [1.0, 1e20, 1e-20])
+def test_columns_of_which_one_is_wrong_by_a_little_do_not_pass_on(comm, unit):
+    fibre, matrix = ({"young": young * unit, "poisson": 0.3} for young in (3.0, 1.0))
+    cell = torn_cells.tear(comm, geometry="square", fibre=fibre, matrix=matrix, petsc=INFLUENCE)
+    influence, (first, end) = cell.solver.exact_inverse, cell.solver.jump_operator.owned
+    rows, arguments = np.arange(len(influence.stiffness)), (influence.reference, (first, end), influence.stiffness)
+    columns, _ = influence.columns(rows)
+    for wrong in (*rows, None):
+        changes, offered = ChangedReference(comm, *arguments), columns.copy()
+        if wrong is not None and first <= 7 < end:
+            offered[7 - first, wrong] += 1e-9 * influence.stiffness[7]
+        changes.take(rows, offered)
+        assert list(changes.columns.rows) == (list(rows) if wrong is None else [])
+
+
 @CELLS
 def test_influence_columns_leave_nothing_to_iterate(comm, case):
     cell = torn_cells.tear(comm, **case, petsc=INFLUENCE)

@@ -80,8 +80,7 @@ class ChangedReference:
             whole[members] = c
             z -= columns @ whole
             return
-        for start in range(0, len(members), KEPT_AT_ONCE):
-            some = slice(start, start + KEPT_AT_ONCE)
+        for some in _parts(len(members)):
             z -= columns[:, members[some]] @ c[some]
 
     def present(self, rows: Int, active: Float) -> Float:
@@ -110,30 +109,43 @@ class ChangedReference:
         both = gather_rows(self._comm, held * self.cell.active, self._first, known) > 0.0
         is_followed = np.zeros(len(known), bool) if followed is None else followed.has_columns(known) & both
         # Of the others, which cost more, the latest.
-        rest, parts = np.flatnonzero(both & ~is_followed)[-KEPT_AT_ONCE:], [np.zeros((self._rows, 0))]
+        rest = np.flatnonzero(both & ~is_followed)[-KEPT_AT_ONCE:]
+        rows, count = np.concatenate([known[is_followed], known[rest]]), int(is_followed.sum())
+        # A few at once, for at no other time is so much memory taken.
+        columns = np.empty((self._rows, len(rows)), order="F")
         if followed is not None:
-            parts.append(followed.columns(known[is_followed]))
+            for some in _parts(count):
+                columns[:, some] = followed.columns(rows[some])
         if len(rest) or len(come):
             self.update(changed, np.zeros(self._rows))
         if len(rest):
-            parts.append(self.response(self.columns.owned[:, rest]))
-        columns = np.hstack(parts)
+            columns[:, count:] = self.response(self.columns.owned[:, rest])
         if len(come):
             theirs = self.present(come, held)
-            both_there = gather_rows(self._comm, np.hstack([theirs, columns]), self._first, come)
-            x = self._comm.bcast(np.linalg.lstsq(both_there[:, : len(come)], both_there[:, len(come) :], rcond=None)[0])
-            columns -= theirs @ x
+            block, across = (gather_rows(self._comm, x, self._first, come) for x in (theirs, columns))
+            x = self._comm.bcast(np.linalg.lstsq(block, across, rcond=None)[0])
+            for some in _parts(len(rows)):
+                columns[:, some] -= theirs @ x[:, some]
             mine = np.flatnonzero((come >= self._first) & (come < self._first + self._rows))
             columns[come[mine] - self._first] = -x[mine]
-        return np.concatenate([known[is_followed], known[rest]]), columns
+        return rows, columns
 
     def take(self, rows: Int, columns: Float) -> None:
-        """Take the columns (owned rows, k) of active rows (k,), unless a sum of them is not the cell's.  Collective."""
+        """Take the columns (owned rows, k) of active rows (k,), unless a sum of them is not the cell's.  Collective.
+
+        Jumps of 1 make forces of up to `stiffness`, so that one wrong column shows beside all others.
+        """
         own, weights = slice(self._first, self._first + self._rows), np.zeros(len(self._stiffness))
-        weights[rows] = np.cos(rows)
+        # At random, so that errors do not cancel, and none near 0.
+        weights[rows] = np.random.default_rng(len(rows)).uniform(1.0, 2.0, len(rows))
         sums = np.stack([self.cell.respond(weights[own]), columns @ weights[rows]], axis=1)
         sums /= np.where(self.cell.active > 0.0, self._stiffness[own], 1.0)[:, None]
-        parts = np.abs([sums[:, 1], sums[:, 1] - sums[:, 0]]).max(axis=1, initial=0.0)
-        self._comm.Allreduce(MPI.IN_PLACE, parts, MPI.MAX)
-        if parts[1] <= KEPT_ERROR * parts[0]:
+        sizes = np.abs([sums[:, 1], sums[:, 1] - sums[:, 0]]).max(axis=1, initial=0.0)
+        self._comm.Allreduce(MPI.IN_PLACE, sizes, MPI.MAX)
+        if sizes[1] <= KEPT_ERROR * sizes[0]:
             self.columns.append(rows, columns)
+
+
+def _parts(count: int) -> list[slice]:
+    """Divide so many columns into slices that are copied at once."""
+    return [slice(start, min(start + KEPT_AT_ONCE, count)) for start in range(0, count, KEPT_AT_ONCE)]
