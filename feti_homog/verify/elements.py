@@ -75,6 +75,12 @@ class Elements:
         L = self._stiffnesses[self._mixed]
         return float((L[:, 0, 1] / L[:, -1, -1]).max(initial=0.0))
 
+    @property
+    def shear_contrast(self) -> float:
+        """Largest mu of all phases over the least of those whose elements have a pressure; 0 without such."""
+        mu = self._stiffnesses[:, -1, -1]
+        return float((mu.max() / mu[self._mixed]).max(initial=0.0))
+
     @cached_property
     def area(self) -> Float:
         """(m,) areas; negative where an element is inverted."""

@@ -34,9 +34,10 @@ ONSET = 1e-9
 OWN_MESH, USERS_MESH = 1e-9, 1e-5
 # Thin coatings bend by the rounding of the forces on their two faces: measured 4e-9 at a hundredth of the radius.
 WHOLE_BODIES, COATINGS = 1e-11, 1e-7
-# Nearly incompressible phases lose digits with lambda / mu beyond this: at 5e6 and 5e7, with contrasts of 1e-3 to 1e6,
-# violations are a quarter of the limits at most.
-LARGE_RATIO = 1e5
+# Nearly incompressible phases lose digits with lambda / mu beyond this, and stresses, which stiff phases beside them
+# raise, with the contrast of mu beyond the others: at 1e5 to 5e8, with contrasts of 1e-3 to 1e6, violations are a
+# quarter of the limits at most.
+LARGE_RATIO, LARGE_CONTRAST, LARGE_OF_PRESSURE, PRESSURE = 1e5, 50.0, 250.0, 50.0
 
 
 @dataclass(frozen=True)
@@ -116,14 +117,23 @@ def same_state_limit(rtol: float) -> float:
     return max(STRENGTH, 10.0 * solver_limit(rtol))
 
 
-def checks(rtol: float, users_mesh: bool, has_coatings: bool, lame_ratio: float = 0.0) -> tuple[Check, ...]:
+def _lost_digits(ratio: float, contrast: float) -> tuple[float, float, float]:
+    """Return factors of limits: of what is computed from stiffnesses, of forces, and of stresses with a pressure."""
+    of_balance, of_pressure = min(ratio, contrast / LARGE_CONTRAST), min(PRESSURE * ratio, contrast / LARGE_OF_PRESSURE)
+    return max(1.0, ratio), max(1.0, of_balance), max(1.0, of_pressure)
+
+
+def checks(
+    rtol: float, users_mesh: bool, has_coatings: bool, lame_ratio: float = 0.0, contrast: float = 0.0
+) -> tuple[Check, ...]:
     """List the checks of a result whose dual problems were solved to the relative tolerance `rtol`.
 
     Args:
         lame_ratio: largest lambda / mu of elements that have a pressure of their own.
+        contrast: largest mu over theirs.
     """
-    lost = max(1.0, lame_ratio / LARGE_RATIO)
-    each, sums, rounding = 1e-13 * lost, 1e-10 * lost, max(COATINGS if has_coatings else 0.0, WHOLE_BODIES * lost)
+    lost, of_balance, of_pressure = _lost_digits(lame_ratio / LARGE_RATIO, contrast)
+    sums, balance, rounding = 1e-10 * lost, 1e-10 * of_balance, max(COATINGS * has_coatings, WHOLE_BODIES * lost)
     shape, solver = USERS_MESH if users_mesh else OWN_MESH, solver_limit(rtol)
     contact = min(max(CONTACT_PER_RTOL * rtol, LEAST_CONTACT), LARGEST_CHECK)
     rows = (
@@ -132,13 +142,13 @@ def checks(rtol: float, users_mesh: bool, has_coatings: bool, lame_ratio: float 
         ("mesh", "elements have positive areas and fill the cell; torn sides meet in pairs", shape),
         ("interface", "interface nodes are where one fibre meets the matrix, with its normals and lengths", shape),
         ("arcs", "the initially debonded nodes are those of the case, in numbers of nodes", 0.0),
-        ("stress", "stresses of the elements follow from u and the case's materials", each),
-        ("stress 33", "stresses out of the plane follow from those in it and the case's materials", each),
+        ("stress", "stresses of the elements follow from u and the case's materials", 1e-13 * of_pressure),
+        ("stress 33", "stresses out of the plane follow from those in it and the case's materials", 1e-13),
         ("mesh error", "errors of the elements add up to those of averaged stresses, by a factor less 1", 1.5),
         ("vectors", "vectors and the faces' displacements follow from tractions, jumps and displacements", 1e-13),
         ("periodicity", "u* is the same at the copies of a node in its subdomain, relative to the largest u", 1e-13),
         ("continuity", "u* is the same where subdomains are glued, relative to the largest u", solver),
-        ("equilibrium", "forces of the elements and tractions balance at every node, relative to the largest", sums),
+        ("equilibrium", "forces of the elements and tractions balance at every node, relative to the largest", balance),
         ("jump", "gap and slip are the differences of the faces' u*, relative to the largest u", rounding),
         ("bond", "bonded and closed faces part as their springs give way, relative to the largest u", solver),
         ("penetration", "debonded faces do not overlap, relative to the displacement imposed", contact),
@@ -150,7 +160,7 @@ def checks(rtol: float, users_mesh: bool, has_coatings: bool, lame_ratio: float 
             "friction opposes the slip of sliding faces, relative to the largest traction; tied ones keep theirs",
             contact,
         ),
-        ("mean stress", "the mean of the stresses is the state's, relative to the largest component", sums),
+        ("mean stress", "the mean of the stresses is the state's, relative to the largest component", balance),
         ("mean strain", "the mean of the strains is E and the opening of the faces, relative to E", solver),
         ("Hill", "mean of stress : strain = mean stress : E less the interface's work, relative to it", solver),
         ("load", "the states have the strains and temperatures that the case asks for, relative to the largest", 1e-12),

@@ -100,6 +100,7 @@ FALSE = {
         "rubber", shift("displacement"), {"stress", "periodicity", "jump", "equilibrium", "mean stress"},
     ),
     "one traction": ("bonded", scale("traction"), {"equilibrium", "vectors"}),
+    "one traction on rubber": ("rubber", scale("traction", 1.02), {"equilibrium", "vectors"}),
     "one traction of a path": ("path", scale("traction", state=7), {"equilibrium", "vectors"}),
     "a damage": ("softening", shift("damage", 0.01, state=3), {"bond", "breaks", "energy", "strength"}),
     "bonds that softened": ("softening", document("path", 3, "softened", to=9), {"breaks", "strength"}),
