@@ -38,6 +38,7 @@ WHOLE_BODIES, COATINGS = 1e-11, 1e-7
 # raise, with the contrast of mu beyond the others: at 1e5 to 5e8, with contrasts of 1e-3 to 1e6, violations are a
 # quarter of the limits at most.
 LARGE_RATIO, LARGE_CONTRAST, LARGE_OF_PRESSURE, PRESSURE = 1e5, 50.0, 250.0, 50.0
+Pair = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -123,16 +124,13 @@ def _lost_digits(ratio: float, contrast: float) -> tuple[float, float, float]:
     return max(1.0, ratio), max(1.0, of_balance), max(1.0, of_pressure)
 
 
-def checks(
-    rtol: float, users_mesh: bool, has_coatings: bool, lame_ratio: float = 0.0, contrast: float = 0.0
-) -> tuple[Check, ...]:
+def checks(rtol: float, users_mesh: bool, has_coatings: bool, mixed: Pair = (0.0, 0.0)) -> tuple[Check, ...]:
     """List the checks of a result whose dual problems were solved to the relative tolerance `rtol`.
 
     Args:
-        lame_ratio: largest lambda / mu of elements that have a pressure of their own.
-        contrast: largest mu over theirs.
+        mixed: largest lambda / mu of elements that have a pressure of their own, and largest mu over theirs.
     """
-    lost, of_balance, of_pressure = _lost_digits(lame_ratio / LARGE_RATIO, contrast)
+    lost, of_balance, of_pressure = _lost_digits(mixed[0] / LARGE_RATIO, mixed[1])
     sums, balance, rounding = 1e-10 * lost, 1e-10 * of_balance, max(COATINGS * has_coatings, WHOLE_BODIES * lost)
     shape, solver = USERS_MESH if users_mesh else OWN_MESH, solver_limit(rtol)
     contact = min(max(CONTACT_PER_RTOL * rtol, LEAST_CONTACT), LARGEST_CHECK)
