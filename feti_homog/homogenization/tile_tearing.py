@@ -20,7 +20,7 @@ from feti_homog.homogenization.cell_remarks import subdomain_remarks, table_rema
 from feti_homog.homogenization.coarse_meshes import deal_tiles, fill_own
 from feti_homog.homogenization.domain_partition import CellSummary, RankShare, in_cell, match_distance
 from feti_homog.homogenization.partition_policy import PartitionPolicy, can_be_cut_across, wanted_pieces
-from feti_homog.mesh.coarse_mesh import representatives
+from feti_homog.mesh.coarse_mesh import CoarseMesh, representatives
 from feti_homog.mesh.fill.gmsh_mesher import NodedCell
 from feti_homog.mesh.outline.curves import MATRIX
 from feti_homog.mesh.periodic_topology import Torus, components, places_by_depth
@@ -34,16 +34,18 @@ from feti_homog.parallel.mpi_errors import agree, on_root, on_root_only
 from feti_homog.typing import Float, Int
 
 
-def can_be_torn_by_tiles(case: Case, noded: NodedCell, lattice: ReferenceLattice, policy: PartitionPolicy) -> bool:
+def can_be_torn_by_tiles(
+    case: Case, found: NodedCell | CoarseMesh | None, lattice: ReferenceLattice, policy: PartitionPolicy
+) -> bool:
     """Return whether nothing needs the whole mesh.
 
     Such are tips of arcs, bodies cut by the sides, the matrix in fewer pieces than there are tiles, and cuts across
-    materials, of cells that are expected to be small enough for these.
+    materials, of cells that are expected to be small enough for these. A user's mesh is whole already.
     """
     whole = case.arcs or case.cell.bodies == "plane" or case.decomposition.subdomains is not None
-    if len(noded.parts) < 2 or whole:
+    if not isinstance(found, NodedCell) or len(found.parts) < 2 or whole:
         return False
-    triangles = ElementEstimate.of(case.cell, noded.arrangement).triangles
+    triangles = ElementEstimate.of(case.cell, found.arrangement).triangles
     dofs = round(triangles * lattice.intervals**2)
     return not (policy.across_pieces(dofs, 1) and can_be_cut_across(case))
 

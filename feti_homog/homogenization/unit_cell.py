@@ -28,11 +28,10 @@ from feti_homog.homogenization.uniform_parts import ForcesBetweenParts, UniformP
 from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.tips import debonded_arcs
 from feti_homog.mesh.coarse_mesh import CoarseMesh
-from feti_homog.mesh.fill.gmsh_mesher import NodedCell
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.mesh.submesh import SubdomainTable, Submesh, SubmeshesOfRank
 from feti_homog.parallel.distributed_arrays import scatter
-from feti_homog.parallel.mpi_errors import agree, on_root_only
+from feti_homog.parallel.mpi_errors import agree, on_root, on_root_only
 from feti_homog.runtime.progress import Progress
 from feti_homog.typing import Bool, Float, Int
 
@@ -255,7 +254,7 @@ def assemble_subdomains(
 def cut(case: Case, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: PartitionPolicy) -> RankShare:
     """Return this rank's share of the cell, meshed and cut.  Collective."""
     found = place_nodes(case, comm, policy.tiles)
-    if comm.bcast(isinstance(found, NodedCell) and can_be_torn_by_tiles(case, found, lattice, policy)):
+    if on_root(comm, can_be_torn_by_tiles, case, found, lattice, policy):
         assert not isinstance(found, CoarseMesh)
         return tear_by_tiles(case, found, lattice, comm, policy)
     mesh = fill_tiles(found, comm)
