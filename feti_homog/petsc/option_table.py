@@ -64,7 +64,12 @@ OPTIONS = (
         "rigid-body motions only, or soft modes of the subdomains too",
     ),
     Option("feti_coarse_threshold", "<real>", "0.35", "softer modes join the coarse space; fewer iterations if larger"),
-    Option("feti_influence_columns", "<integer>", "1000", "changed rows after which another cell is factored"),
+    Option(
+        "feti_influence_columns",
+        "<integer>",
+        "1000",
+        "changed rows after which another cell is factored; by default never with up to 2500 rows",
+    ),
     Option("feti_view", "", "", "print subdomains, coarse space and estimated condition numbers"),
     Option("feti_schur_mat_mumps_icntl_7", "0|2|3|4|5|6|7", "7", "MUMPS' ordering in the partial factorizations"),
     Option("feti_schur_mat_mumps_icntl_14", "<integer>", "20", "MUMPS' extra workspace there, in per cent"),
