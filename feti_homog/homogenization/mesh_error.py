@@ -14,7 +14,7 @@ from feti_homog.fem.stress_recovery import RecoveredStress
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.boundary_tractions import boundary_tractions
-from feti_homog.homogenization.nested_interiors import groups, nested_interiors
+from feti_homog.homogenization.nested_interiors import groups, locks, nested_interiors
 from feti_homog.homogenization.uniform_parts import UniformPart
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.mesh.refinement import FineMesh, joined
@@ -109,15 +109,17 @@ def energy_errors(
 def is_nested(cell: TornCell, responses: Sequence[Response]) -> bool:
     """Return whether a mesh refined less has the error: not where errors fall more slowly, at corners and tips.
 
-    Not of cells with fibres other than circles and ellipses or with voids that straight sides bound, nor of debonded
-    arcs with quadratic elements or with tips to which the mesh is not graded: those of a given `tip_size`, and where
-    bonds break.  Collective.
+    Not of cells with fibres other than circles and ellipses or with voids that straight sides bound, nor of quadratic
+    elements with a phase that locks, nor of debonded arcs with quadratic elements or with tips to which the mesh is not
+    graded: those of a given `tip_size`, and where bonds break.  Collective.
     """
     summary, lattice = cell.summary, cell.lattice
     if summary.across or not lattice.halvings or np.isnan(summary.frames[summary.fibre_bodies]).any():
         return False  # interiors across materials are factored anyway
     parts = (s.submesh for s in cell.subdomains)
     if cell.comm.allreduce(any(bool((p.at_void[p.edge_class] & (p.turns == 0)).any()) for p in parts), MPI.LOR):
+        return False
+    if lattice.order == 2 and locks(cell.subdomains, cell.comm):
         return False
     graded = cell.case.cell.tip_size is None and not cell.case.section.breaks
     return (lattice.order == 1 and graded) or not any(response.debonded for response in responses)
