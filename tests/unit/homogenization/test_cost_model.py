@@ -59,6 +59,8 @@ def test_more_work_takes_more_time_and_memory():
     base = estimate()
     assert estimate(applications=72).seconds > base.seconds and estimate(dofs=(200_000,)).memory > base.memory
     assert estimate(columns=10_000).memory - base.memory == pytest.approx(10_000 * cost_model.COLUMN_BYTES)
+    factor = estimate(subdomains=(1,)).memory - base.memory
+    assert factor == pytest.approx(100_000 * cost_model.FACTOR_BYTES)
     halves = estimate(dofs=(50_000, 50_000), subdomains=(5, 4))
     assert halves.seconds < base.seconds and halves.memory < base.memory and halves.ranks == base.ranks
 
