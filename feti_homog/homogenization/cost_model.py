@@ -125,10 +125,7 @@ def estimate(
     in_one_factor = max(problems) * max(nodes) if sum(subdomains) == 1 else 0
     return Estimate(
         seconds=START_SECONDS + coarse_triangles * MESH_SECONDS + slowest + columns / len(nodes) * COLUMN_SECONDS,
-        memory=BASE_BYTES
-        + max(dofs) * DOF_BYTES
-        + in_one_factor * FACTOR_BYTES
-        + columns / len(nodes) * COLUMN_BYTES,
+        memory=BASE_BYTES + max(dofs) * DOF_BYTES + in_one_factor * FACTOR_BYTES + columns / len(nodes) * COLUMN_BYTES,
         ranks=max(1, min(bodies, ceil(sum(dofs) / DOFS_OF_A_RANK))),
     )
 
