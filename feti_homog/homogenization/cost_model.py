@@ -156,12 +156,13 @@ def events_lines(
 ) -> list[str]:
     """Return how many events a path may have and how long all of them take, in a line as `estimate_lines`.
 
-    None of another analysis. There are at most as many events as bonds, times the teeth of each; nodes on cuts of
-    bodies are counted with them. `nodes` are those of each rank, `seconds` the estimate for few events.
+    None of another analysis, or of a cell without interfaces. There are at most as many events as bonds, times the
+    teeth of each; nodes on cuts of bodies are counted with them. `nodes` are those of each rank, `seconds` the estimate
+    for few events.
     """
-    if not case.section.is_followed:
+    if not (case.section.is_followed and case.interfaces):
         return []
-    share = float(np.mean([_unbroken_share(each, fibres) for each in case.interfaces]))
+    share = float(np.mean([_unbroken_share(each, max(fibres, 1)) for each in case.interfaces]))
     bonds = round(multipliers // 2 * share)
     words = f"up to about {bonds} bonds break" + (f" in {teeth} teeth each" if teeth > 1 else "")
     dofs = 2.0 * sum(nodes)

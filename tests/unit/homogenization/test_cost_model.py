@@ -111,7 +111,8 @@ def test_paths_name_their_bonds_and_teeth():
     )
     assert "up to about 24 bonds break, 3.6 ms or more for each: from 2 s for few to 2.1 s or more" in lines[1][0]
     assert "to 110 s or more" in cost_model.events_lines(toothed, 48, 1, 640, (1000, 1000), 55.0)[0]
-    assert cost_model.events_lines(make_case(), 48, 1, 1, (1000,), 2.0) == []
+    for without in (make_case(), Case.parse(document)):
+        assert cost_model.events_lines(without, 48, 1, 1, (1000,), 2.0) == []
     rubbing = Case.parse(document | {"interface": {"normal_strength": 1.0, "friction": 0.3}})
     assert cost_model.events_lines(rubbing, 10_000, 1, 1, (1000,), 2.0)[1:] == [
         "friction   up to 4.5 GiB more on the first rank if all bonds break"
