@@ -171,6 +171,8 @@ def _check_peak(findings: Findings, peak: Point | None, points: Sequence[Point])
     findings.record("tables", max(before - float(abs(stress[event])), 0.0) / (size or 1.0), "peak.event")
     findings.record("tables", relative(np.array(peak["strain"] - strain[event]), np.abs(strain).max()), "peak.strain")
     broken = [number for number, point in enumerate(points) if point["broke"]]
+    cut = "event_left" not in peak and points[-1]["load_factor"] < 1.0 - SAME_SHARE
+    findings.record("tables", 0.0 if peak.get("so_far", cut) == cut else np.inf, "peak.so_far")
     given = peak.get("first_break_event")
     findings.record("tables", 0.0 if given == next(iter(broken), None) else np.inf, "peak.first_break_event")
 

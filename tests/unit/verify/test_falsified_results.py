@@ -141,6 +141,7 @@ FALSE = {
         both(attribute("load_factor", state=3), document("path", 3, "load_factor")),
         {"load"},
     ),
+    "a peak of a whole path": ("path", document("peak", "so_far", to=True), {"tables"}),
     "a stress of a point": ("path", document("path", 4, "stress", 0), {"tables"}),
     "bonds that broke": ("path", document("path", 4, "broke", factor=2), {"breaks", "strength"}),
     "a count of bonds": ("path", document("path", 4, "bonded", factor=2), {"tables", "breaks"}),
