@@ -101,7 +101,7 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False, quiet: b
 def _accurate(case: Case, solved: Callable[[Case, CoarseMeshError | None], Result], progress: Progress) -> Result:
     """Return solved(case, fault of an earlier mesh), once more on the finer mesh that the case may ask for.
 
-    If that fails, on the first mesh again.  Collective.
+    If that fails, on one rank also for want of memory, on the first mesh again.  Collective.
     """
     try:
         return solved(case, None)
@@ -115,6 +115,10 @@ def _accurate(case: Case, solved: Callable[[Case, CoarseMeshError | None], Resul
             return finer
     except (MeshError, ConvergenceError) as error:
         failure = str(error)
+    except MemoryError as error:
+        if progress.comm.size > 1:
+            raise  # one rank may have met it alone
+        failure = f"no memory left: {error}"
     progress.say(f"remark: refine = {earlier.finer}: {failure}; solved with refine = {earlier.refine} again")
     return solved(case, CoarseMeshError(str(earlier), earlier.energy, earlier.refine, earlier.finer, failure))
 

@@ -116,13 +116,17 @@ def is_nested(cell: TornCell, responses: Sequence[Response]) -> bool:
     summary, lattice = cell.summary, cell.lattice
     if summary.across or not lattice.halvings or np.isnan(summary.frames[summary.fibre_bodies]).any():
         return False  # interiors across materials are factored anyway
-    parts = (s.submesh for s in cell.subdomains)
-    if cell.comm.allreduce(any(bool((p.at_void[p.edge_class] & (p.turns == 0)).any()) for p in parts), MPI.LOR):
-        return False
-    if lattice.order == 2 and locks(cell.subdomains, cell.comm):
+    if _has_straight_voids(cell) or (lattice.order == 2 and locks(cell.subdomains, cell.comm)):
         return False
     graded = cell.case.cell.tip_size is None and not cell.case.section.breaks
     return (lattice.order == 1 and graded) or not any(response.debonded for response in responses)
+
+
+def _has_straight_voids(cell: TornCell) -> bool:
+    """Return whether straight sides bound a void.  Collective."""
+    parts = (s.submesh for s in cell.subdomains)
+    own = any(bool((p.at_void[p.edge_class] & (p.turns == 0)).any()) for p in parts)
+    return bool(cell.comm.allreduce(own, MPI.LOR))
 
 
 def _recovered(

@@ -27,6 +27,8 @@ SINGULAR = -10
 LEAST_EXPONENT = -1000
 # PETSc's error code for a factorization that the chosen library does not have (PETSC_ERR_MISSING_FACTOR).
 MISSING_FACTOR = 92
+# How PETSc's words for it end.
+CHOLMOD_OUT_OF_MEMORY = "failed with status -2"
 # With these CHOLMOD makes L L^T of small matrices too, which those that are indefinite do not have: D of its own
 # L D L^T may have any sign.
 DEFINITE: Options = {"mat_cholmod_final_asis": False, "mat_cholmod_final_ll": True}
@@ -157,7 +159,7 @@ def factored(
 
     Raises:
         LinAlgError: the matrix is not positive definite, or too near to one that is singular.
-        MemoryError: MUMPS could not factor.
+        MemoryError: MUMPS could not factor, or CHOLMOD had no memory left.
         CaseError: the library that the options name has no such factorization.
     """
     _set_near_kernel(A, near_kernel)
@@ -171,9 +173,16 @@ def factored(
         try:
             ksp.setUp()
         except PETSc.Error as error:
-            raise np.linalg.LinAlgError(f"not positive definite ({error_words(error)})") from error
+            raise _failure(error_words(error)) from error
     check_factor(ksp.getPC())
     return ksp
+
+
+def _failure(words: str) -> Exception:
+    """Return the error of a factorization for which PETSc has these words."""
+    if words.endswith(CHOLMOD_OUT_OF_MEMORY):
+        return MemoryError(words)
+    return np.linalg.LinAlgError(f"not positive definite ({words})")
 
 
 @contextmanager
