@@ -27,7 +27,7 @@ def peak() -> int:
 
 
 class _Heap(ctypes.Structure):
-    """What glibc counts of its memory, mallinfo2(3)."""
+    """Counts of glibc about its memory, mallinfo2(3)."""
 
     _fields_ = tuple((f"field_{k}", ctypes.c_size_t) for k in range(10))
 

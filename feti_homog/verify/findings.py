@@ -36,7 +36,7 @@ OWN_MESH, USERS_MESH = 1e-9, 1e-5
 WHOLE_BODIES, COATINGS = 1e-11, 1e-7
 # Nearly incompressible phases lose digits with lambda / mu beyond this, and stresses, which stiff phases beside them
 # raise, with the contrast of mu beyond the others: at 1e5 to 5e8, with contrasts of 1e-3 to 1e6, violations are a
-# quarter of the limits at most.
+# quarter of the limits at most, 0.9 of that of jumps.
 LARGE_RATIO, LARGE_CONTRAST, LARGE_OF_PRESSURE, PRESSURE = 1e5, 50.0, 250.0, 50.0
 Pair = tuple[float, float]
 

@@ -52,7 +52,7 @@ def test_fill_is_below_that_of_minimum_degree(n, refine, periodic):
 
 
 def test_the_last_nodes_are_those_of_the_cut_that_crosses_fewest_sides():
-    """Of a grid it goes across the longer side, however the nodes lie."""
+    """The first cut of a grid goes across its longer side, however the nodes lie."""
     mesh = grid(4, 16, 0, False)
     x, y = mesh.points.T
     order = elimination_order(replace(mesh, points=np.stack([100 * x, y], axis=1)))

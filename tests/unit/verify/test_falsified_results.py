@@ -269,7 +269,7 @@ def test_displacements_that_fit_their_stresses_break_equilibrium_alone(results, 
 
 
 def test_the_held_place_may_collect_the_rounding_of_all_others_and_no_more(results):
-    """As beside a phase that is far stiffer than it is strained: terms are large, forces are not."""
+    """Terms are large and forces are not, as beside a phase that is far stiffer than it is strained."""
     rng, limits = np.random.default_rng(1), []
     with opened(results("bonded")) as files:
         cell, state = DiscreteCell.of(files), next(files.states())
