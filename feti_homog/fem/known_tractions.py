@@ -11,6 +11,10 @@ import numpy as np
 
 from feti_homog.typing import Float, Int
 
+# Length of the mean of the normals of the sides at a vertex below which it has no direction: sides meet in a cusp, as
+# where two fibres touch.
+NO_NORMAL = 0.1
+
 
 @dataclass(frozen=True)
 class KnownTractions:
@@ -28,10 +32,15 @@ class KnownTractions:
 
     @classmethod
     def at(cls, node: Int, normals: Float, traction: Float) -> KnownTractions:
-        """Make them of the ends of sides, of which a vertex has several; its normal is their mean."""
-        own, first, of = np.unique(node, return_index=True, return_inverse=True)
-        sums = np.stack([np.bincount(of, normal, len(own)) for normal in normals.T], axis=1)
-        return cls(own, sums / np.hypot(*sums.T)[:, None], traction[first])
+        """Make them of the ends of sides, of which a vertex has several; its normal is their mean.
+
+        Vertices at which the normals cancel are left out.
+        """
+        own, first, of, count = np.unique(node, return_index=True, return_inverse=True, return_counts=True)
+        mean = np.stack([np.bincount(of, normal, len(own)) for normal in normals.T], axis=1) / count[:, None]
+        length = np.hypot(*mean.T)
+        kept = length > NO_NORMAL
+        return cls(own[kept], mean[kept] / length[kept, None], traction[first[kept]])
 
     def imposed(self, stress: Float, vertex: Int, voigt: Int, flexibility: Float) -> Float:
         """Return stresses (vertices, m, k) with these tractions at `vertex` (n,).

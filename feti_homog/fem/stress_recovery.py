@@ -185,9 +185,8 @@ class RecoveredStress:
     def _off(self, own: ElementStresses) -> Float:
         """(q, e, m, k) recovered less own stress at places of the elements, times the root of their weights."""
         if self.order == 2:
-            return np.asarray((self.recovered(own.part, barycentric(6)) - own.stress) * _roots(own.weights)).swapaxes(
-                0, 1
-            )
+            off = (self.recovered(own.part, barycentric(6)) - own.stress) * _roots(own.weights)
+            return np.asarray(off.swapaxes(0, 1))
         # Linear less uniform stresses d: int d d = w/12 (sum_i d_i d_i + sum_i d_i sum_i d_i) of those at the vertices.
         e, _, m, k = own.stress.shape
         off = np.empty((4, e, m * k))

@@ -62,7 +62,7 @@ MUMPS_EXTRA_WORKSPACE_PERCENT = 100
 # Degrees of freedom of a rank up to which what its set-up leaves unused is not given back: it is used again.
 MOST_DOFS_UNTRIMMED = 100_000
 # Degrees of freedom of an interior from which on nested dissection by cuts of the mesh costs less than minimum degree,
-# CHOLMOD's own: of 12 000, 47 000, 67 000 and 73 000 order and factor take 1.16, 0.54, 0.42 and 0.41 of its time.
+# CHOLMOD's own, order and factor together.
 LEAST_ORDERED_DOFS = 15_000
 # Entries of dense blocks that wait to be added to a sparse sum, at least: 16 bytes each.
 MAX_BUFFERED_ENTRIES = 4_000_000
@@ -146,8 +146,7 @@ LEAST_UNCONFIRMED_JUMP = 1e-6
 # preconditioners
 
 # Influence columns that a rank finds at once, and ranks up to which all are found together: bounds the memory of their
-# right-hand sides, (boundary dofs, both).  A column by CHOLMOD takes 13.4 ms of 32, 11.8 of 64 and 10.2 of 128
-# (`drivers/hundred_fibres.toml` with 46 044 shared dofs).
+# right-hand sides, (boundary dofs, both).  A column takes CHOLMOD the less, the more are found at once.
 INFLUENCE_CHUNK, CHUNK_RANKS = 64, 4
 # Columns of a reference cell that have room at first.
 BUFFERED_COLUMNS = 2048

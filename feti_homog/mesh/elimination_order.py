@@ -2,7 +2,7 @@
 
 George (SIAM J. Numer. Anal. 10 (1973) 345): nodes on a cut follow those of both sides, so that fill stays within them.
 Coarse triangles are halved again and again along x or y, each time about the middle where the cut crosses fewest sides;
-their refined nodes follow.  Takes a tenth of METIS' time for the same fill, and half of the fill of minimum degree.
+their refined nodes follow.  The fill is less than that of minimum degree.
 """
 
 from __future__ import annotations

@@ -141,7 +141,7 @@ class ChangedReference:
         sums = np.stack([self.cell.respond(weights[own]), columns @ weights[rows]], axis=1)
         sums /= np.where(self.cell.active > 0.0, self._stiffness[own], 1.0)[:, None]
         sizes = np.abs([sums[:, 1], sums[:, 1] - sums[:, 0]]).max(axis=1, initial=0.0)
-        self._comm.Allreduce(MPI.IN_PLACE, sizes, MPI.MAX)
+        sizes = np.max(self._comm.allgather(sizes), axis=0)  # keeps NaN, which MPI.MAX may lose
         if sizes[1] <= KEPT_ERROR * sizes[0]:
             self.columns.append(rows, columns)
 

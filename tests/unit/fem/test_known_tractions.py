@@ -26,3 +26,11 @@ def test_tractions_are_obeyed_and_strains_along_the_boundary_stay(problem):
         if c == 2:
             along = np.array([n[1] ** 2, n[0] ** 2, -n[0] * n[1]])
             np.testing.assert_allclose(along @ S @ (found - stress)[vertex], 0.0, atol=1e-12)
+
+
+def test_a_vertex_at_which_normals_cancel_has_no_tractions():
+    """Two fibres touch at vertex 2, from left and right of it; rounding would choose a normal."""
+    normals = np.array([[1.0, 0.0], [-1.0, 1e-17], [0.0, 1.0]])
+    known = KnownTractions.at(np.array([2, 2, 5]), normals, np.ones((3, 2, 1)))
+    np.testing.assert_array_equal(known.node, [5])
+    np.testing.assert_array_equal(known.normal, [[0.0, 1.0]])
