@@ -62,11 +62,11 @@ def plane_constants(S: Array) -> dict[str, Any]:
 def isotropic_part(stiffness: ArrayLike) -> tuple[float, float]:
     """Plane bulk modulus k and shear modulus mu of the isotropic stiffness nearest in the Frobenius norm.
 
-    k = (C11 + C22 + 2 C12)/4, mu = (C11 + C22 - 2 C12 + 4 C33)/8; both are the same in all axes.
+    k = (C11 + C22 + C12 + C21)/4, mu = (C11 + C22 - C12 - C21 + 4 C33)/8; both are the same in all axes.
     """
     c = np.asarray(stiffness, dtype=float)
-    bulk = (c[0, 0] + c[1, 1] + 2 * c[0, 1]) / 4
-    shear = (c[0, 0] + c[1, 1] - 2 * c[0, 1] + 4 * c[2, 2]) / 8
+    bulk = (c[0, 0] + c[1, 1] + c[0, 1] + c[1, 0]) / 4
+    shear = (c[0, 0] + c[1, 1] - c[0, 1] - c[1, 0] + 4 * c[2, 2]) / 8
     return float(bulk), float(shear)
 
 

@@ -98,16 +98,18 @@ def constants_along_axes(S: Array) -> dict[str, Any]:
 def constants_about_fibres(C: Array) -> dict[str, Any]:
     """Constants of the transversely isotropic stiffness about x3 nearest to C, (6, 6) real or complex.
 
-    Nearest in the Frobenius norm of the tensors is the mean of C over all turns about x3, in Hill's moduli
+    Nearest in the Frobenius norm of the tensors is the mean of C and C^T over all turns about x3, in Hill's moduli
 
         k = (C11 + C22 + 2 C12)/4,  l = (C13 + C23)/2,  n = C33,  m = (C11 + C22 - 2 C12 + 4 C66)/8,  p = (C44 + C55)/2,
 
-    which are the same in all axes turned about x3; E_axial = n - l^2/k, nu_axial = l/(2 k), G_axial = p,
-    G_transverse = m, K_transverse = k (Hill 1964).
+    where Cij is the mean of Cij and Cji: between nearly incompressible phases what rounding leaves of C12 - C21 is not
+    small beside m.  They are the same in all axes turned about x3; E_axial = n - l^2/k, nu_axial = l/(2 k),
+    G_axial = p, G_transverse = m, K_transverse = k (Hill 1964).
     """
-    k = (C[0, 0] + C[1, 1] + 2 * C[0, 1]) / 4
-    m = (C[0, 0] + C[1, 1] - 2 * C[0, 1] + 4 * C[5, 5]) / 8
-    across = (C[0, 2] + C[1, 2]) / 2
+    off = C[0, 1] + C[1, 0]
+    k = (C[0, 0] + C[1, 1] + off) / 4
+    m = (C[0, 0] + C[1, 1] - off + 4 * C[5, 5]) / 8
+    across = (C[0, 2] + C[1, 2] + C[2, 0] + C[2, 1]) / 4
     E, nu = C[2, 2] - across**2 / k, across / (2 * k)
     E_transverse, nu_transverse = transverse_constants(E, nu, k, m)
     return {

@@ -100,7 +100,7 @@ def moduli(stiffness: Float) -> dict[str, float]:
 
 def _isotropic_part(c: Float) -> tuple[float, float]:
     """Moduli k, mu of the nearest isotropic stiffness: its invariants C_iijj / 4 and (C_ijij - C_iijj / 2) / 4."""
-    spherical, full = c[0, 0] + c[1, 1] + 2 * c[0, 1], c[0, 0] + c[1, 1] + 2 * c[2, 2]
+    spherical, full = c[:2, :2].sum(), c[0, 0] + c[1, 1] + 2 * c[2, 2]
     return float(spherical / 4), float((full - spherical / 2) / 4)
 
 
