@@ -148,6 +148,8 @@ LEAST_UNCONFIRMED_JUMP = 1e-6
 # Influence columns that a rank finds at once, and ranks up to which all are found together: bounds the memory of their
 # right-hand sides, (boundary dofs, both).  A column takes CHOLMOD the less, the more are found at once.
 INFLUENCE_CHUNK, CHUNK_RANKS = 64, 4
+# Freed bytes that stay after a reference cell is factored, for what comes.
+SPARE_BYTES = 64 << 20
 # Columns of a reference cell that have room at first.
 BUFFERED_COLUMNS = 2048
 # Changed rows after which the cell as it stands is factored in place of them: the default of `-feti_influence_columns`;

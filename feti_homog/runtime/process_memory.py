@@ -16,9 +16,13 @@ CLEAR_REFS, RESET_PEAK = Path("/proc/self/clear_refs"), "5"
 STACK, ADDRESSES = 1 << 20, 1 << 30
 
 
-def trim() -> None:
-    """Give freed memory back to the system, which glibc keeps where it lies between blocks in use."""
-    ctypes.CDLL(None).malloc_trim(0)
+def trim(kept: int = 0) -> None:
+    """Give freed memory back to the system, which glibc keeps where it lies between blocks in use.
+
+    Up to `kept` freed bytes stay for what comes.
+    """
+    if spare() > kept:
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 def peak() -> int:
@@ -47,8 +51,7 @@ def forget_peak(clear_refs: Path = CLEAR_REFS, kept: int = 0) -> None:
 
     Up to `kept` freed bytes stay for what comes, and in its peak.
     """
-    if spare() > kept:
-        trim()
+    trim(kept)
     with suppress(OSError):
         clear_refs.write_text(RESET_PEAK)
 

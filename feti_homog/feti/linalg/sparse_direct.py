@@ -107,6 +107,8 @@ class DirectSolver:
         scaled = csr_matrix((self._scale * matrix.data, matrix.indices, matrix.indptr), shape=matrix.shape)
         self._ksp = factored(sequential(scaled), prefix, PETSc.Mat.SolverType.CHOLMOD, is_ordered=is_ordered)
         self._x, self._b = self._ksp.getOperators()[0].createVecs()
+        if _is_by_cholmod(self._ksp):
+            _free_matrix(self._ksp)
         self._destroy = weakref.finalize(self, _destroy, self._ksp, self._x, self._b)
 
     def solve(self, B: Float) -> Float:
@@ -236,6 +238,23 @@ def _direct_ksp(A: PETSc.Mat, prefix: str, library: str) -> PETSc.KSP:
             f"of a matrix {where}; mumps has"
         ) from error
     return ksp
+
+
+def _is_by_cholmod(ksp: PETSc.KSP) -> bool:
+    """Return whether a solver applies a factor of CHOLMOD's, which needs its matrix no more."""
+    pc = ksp.getPC()
+    is_cholesky = pc.getType() == PETSc.PC.Type.CHOLESKY
+    return is_cholesky and pc.getFactorSolverType() == PETSc.Mat.SolverType.CHOLMOD and is_direct(ksp)
+
+
+def _free_matrix(ksp: PETSc.KSP) -> None:
+    """Free the matrix of a solver that applies its factor alone: an empty one of its size takes its place."""
+    A = ksp.getOperators()[0]
+    empty = PETSc.Mat().createAIJ(A.getSizes(), nnz=0, comm=A.comm)
+    empty.assemble()
+    ksp.getPC().setReusePreconditioner(True)
+    ksp.setOperators(empty)
+    A.destroy()
 
 
 def _destroy(ksp: PETSc.KSP, *vectors: PETSc.Vec) -> None:

@@ -11,7 +11,9 @@ from feti_homog.feti.linalg.sparse_direct import DirectSolver
 from feti_homog.feti.linalg.sparse_matrices import DenseBlockSum, allreduce_sparse
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.operators.with_springs import is_dense
+from feti_homog.feti.thresholds import SPARE_BYTES
 from feti_homog.parallel.distributed_arrays import share_columns
+from feti_homog.runtime import process_memory
 from feti_homog.typing import Float
 
 # Entries of Z, which are cosines of angles or their products, that rounding leaves of zero.
@@ -50,6 +52,7 @@ class AssembledSchur:
             stiffness.add(columns, columns, T @ (T @ operator.S).T)
         self._solver = DirectSolver(allreduce_sparse(comm, stiffness.matrix()), "feti_bonded_")
         self._Z, self._ZT = Z, Z.T.tocsr()
+        process_memory.trim(kept=SPARE_BYTES)
 
     def relieving_displacement(self, forces: Float) -> Float:
         """-Z (Z^T S Z)^-1 Z^T f for boundary forces f (n,) or (n, k): it takes them off the shared nodes.

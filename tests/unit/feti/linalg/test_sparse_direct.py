@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -64,6 +65,17 @@ def test_nothing_is_left_of_a_factor(make):
         make(A)
     # A hundred matrices alone would be 20 MB.
     assert resident() - before < 8 * MEGABYTE
+
+
+def test_a_factor_does_not_keep_its_matrix():
+    """A dense matrix is twice as large as its factor."""
+    A = csr_matrix(np.eye(400) + np.ones((400, 400)))
+    tracemalloc.start()
+    solver = DirectSolver(A, "test_")
+    kept = tracemalloc.get_traced_memory()[0]
+    tracemalloc.stop()
+    assert kept < 0.1 * A.data.nbytes
+    np.testing.assert_allclose(solver.solve(A @ np.ones((400, 40))), 1.0, rtol=1e-10)
 
 
 def test_a_factor_can_be_freed_before_its_owner():
