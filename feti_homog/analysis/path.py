@@ -12,7 +12,7 @@ from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.criteria import criterion_of
 from feti_homog.analysis.event_progress import BARS, EventProgress
 from feti_homog.analysis.mesh_errors import add_errors_of_breaks, check_accuracy, state_error
-from feti_homog.analysis.path_events import Work, holding, restored, stored
+from feti_homog.analysis.path_events import Work, averages, found_again, holding, is_confirmed, restored, stored
 from feti_homog.analysis.registry import Analysis
 from feti_homog.analysis.result_records import PathPoint, Peak
 from feti_homog.analysis.tip_records import TipRecorder
@@ -26,6 +26,7 @@ from feti_homog.interface.path.path_following import events, increments
 from feti_homog.interface.path.path_points import Energies, Point, unloaded
 from feti_homog.interface.path.sliding_increments import sliding_increments
 from feti_homog.interface.path.sliding_path import sliding_events
+from feti_homog.results.checkpoint_file import is_whole
 from feti_homog.results.landmarks import kept, marks, peak_of
 
 
@@ -46,8 +47,7 @@ def follow(context: AnalysisContext, path: LoadPath, law: BondLaw) -> dict[str, 
     work, entries, last = Work(), list[dict[str, Any]](), None
     progress = EventProgress(context.progress, BARS[path.method], context.events)
     with context.checkpoint, progress as shown:
-        for number, (point, energies) in enumerate(_points(context, path, law, known)):
-            responses = context.loads.responses(point.state, point.scale, brief=True)
+        for number, (point, energies, responses) in enumerate(_points(context, path, law, known)):
             place = f"at {point.load_factor:.6f}, {responses[0].leading}"
             place += "" if energies is None else ", from the checkpoint"
             if energies is not None:
@@ -56,8 +56,9 @@ def follow(context: AnalysisContext, path: LoadPath, law: BondLaw) -> dict[str, 
                 work.arrive(point)
                 if point.state.converged:
                     # Teeth are many and found again at once.
-                    event = stored(point, work, context.loads.interfaces)
-                    context.checkpoint.write(number, *event, light=point.broke == 0 < point.softened)
+                    light, settled = point.broke == 0 < point.softened, is_confirmed(point)
+                    event = stored(point, responses, work, context.loads.interfaces)
+                    context.checkpoint.write(number, *event, light=light, settled=settled)
             _report(context, shown, f"{_label(path, number)} {place}", responses)
             entries.append(_entry(context, law, point, responses, work))
             shown.advance(point.load_factor, f"{len(entries)} {path.method}, {_counts(entries[-1])}")
@@ -104,8 +105,8 @@ def _known(context: AnalysisContext) -> int:
 
 def _points(
     context: AnalysisContext, path: LoadPath, law: BondLaw, known: int
-) -> Iterator[tuple[Point, tuple[Energies, float] | None]]:
-    """Yield the points of the checkpoint with the energies up to each, then those still to be found.
+) -> Iterator[tuple[Point, tuple[Energies, float] | None, list[Response]]]:
+    """Yield the points of the checkpoint with the energies up to each, then those still to be found, and all responses.
 
     Where nothing carries the stresses any more, or faces with friction cannot go on, the path ends with a fault.
 
@@ -115,9 +116,10 @@ def _points(
     cell, waypoints = context.loads.interfaces, [context.loads.load(target) for target in context.case.targets]
     begin = unloaded(cell, context.bonds(None))
     for number in range(known):
-        point, energies = restored(context.checkpoint.read(number), cell)
+        event = context.checkpoint.read(number)
+        point, energies = restored(event, cell)
         begin = point.after
-        yield point, energies
+        yield point, energies, averages(event, point, context.loads)
     by_events, steps = path.method == "events", (path.increments or 1, path.release == "worst", begin)
     if not context.case.has_friction:
         whole = events(cell, law, waypoints, begin) if by_events else increments(cell, law, waypoints, *steps)
@@ -128,7 +130,7 @@ def _points(
     count = known
     try:
         for count, point in enumerate(whole, known + 1):  # noqa: B007
-            yield point, None
+            yield point, None, context.loads.responses(point.state, point.scale, brief=True)
     except NotCarriedError as error:
         if count == 0:
             raise _with_advice(error, "", path) from error
@@ -221,8 +223,7 @@ def _kept(
     tips = TipRecorder(context.cell, context.loads.interfaces, law) if law.has_tips else None
     with context.progress.stage("states") as words:
         for number in context.progress.bar(numbers, "states"):
-            is_last = number == len(entries) - 1
-            point = last if is_last else restored(context.checkpoint.read(number), context.loads.interfaces)[0]
+            point = last if number == len(entries) - 1 else _read(context, law, number)
             point, responses = _checked(context, point, _label(path, number))
             if tips is not None:
                 entries[number]["tips"] = tips.of(point)
@@ -233,6 +234,13 @@ def _kept(
         words.append(f"{len(numbers)} of {len(entries)} points")
     add_errors_of_breaks(entries)
     return {"states": numbers} if context.states.has_place else {}
+
+
+def _read(context: AnalysisContext, law: BondLaw, number: int) -> Point:
+    """Return a point of the checkpoint, with its equilibrium also if the event is lean.  Collective."""
+    event, cell = context.checkpoint.read(number), context.loads.interfaces
+    point, _ = restored(event, cell)
+    return point if is_whole(event) else found_again(point, cell, law)
 
 
 def _checked(context: AnalysisContext, point: Point, name: str) -> tuple[Point, Sequence[Response]]:

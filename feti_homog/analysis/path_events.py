@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 
-from feti_homog.analysis.context import AnalysisContext
+from feti_homog.analysis.context import AnalysisContext, CellLoads
 from feti_homog.feti.dual_solution import DualSolution
+from feti_homog.homogenization.averaging import Response
 from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BondState, Equilibrium
+from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.loads.load import Load, Macroscopic
-from feti_homog.interface.path.path_points import NO_ENERGIES, Energies, PathState, Point
+from feti_homog.interface.path.path_points import NO_ENERGIES, Energies, PathState, Point, most_utilised
 from feti_homog.results.checkpoint_file import Arrays
 
 # Conditions of contact; the last is known only with friction.
 KKT_LAWS = ("kkt_complementarity", "kkt_penetration", "kkt_tension", "kkt_friction")
+# Laws whose errors a response may have.
+LAWS = ("strain", "hill", "jump", "stress", *KKT_LAWS)
+UNCHECKED = -1.0  # the error of a law that was not checked
+EMPTY = np.zeros(0)
 # Behind the names of what belongs to each problem.
 SUFFIXES = ("", "_axial")
 
@@ -53,8 +60,10 @@ class Work:
         self._load, self._largest_load = point.load_factor, max(point.load_factor, self._largest_load)
 
 
-def stored(point: Point, work: Work, cell: CoupledInterfaces) -> tuple[dict[str, Any], Arrays]:
-    """Return a point as plain numbers and distributed arrays, for the checkpoint.
+def stored(
+    point: Point, responses: Sequence[Response], work: Work, cell: CoupledInterfaces
+) -> tuple[dict[str, Any], Arrays]:
+    """Return a point with its responses as plain numbers and distributed arrays, for the checkpoint.
 
     A path goes on from the multipliers of its last state.
     """
@@ -67,15 +76,19 @@ def stored(point: Point, work: Work, cell: CoupledInterfaces) -> tuple[dict[str,
         "stretched": after.stretched,
     }
     distributed: Arrays = {"used": point.used} | _bonds_apart(after.bonds, "_after")
-    for suffix, each, state in zip(SUFFIXES, cell.problems, point.state.problems, strict=False):
+    for suffix, each, response, state in zip(SUFFIXES, cell.problems, responses, point.state.problems, strict=False):
         numbers, arrays = _taken_apart(state, each.solver.natural.kernel_dimension)
+        numbers |= _averages(response)
         whole |= {f"{name}{suffix}": value for name, value in numbers.items()}
         distributed |= {f"{name}{suffix}": value for name, value in arrays.items()}
     return whole, distributed
 
 
 def restored(event: Arrays, cell: CoupledInterfaces) -> tuple[Point, tuple[Energies, float]]:
-    """Put together what `stored` took apart of an event of a cell: the point, and the energies up to it."""
+    """Put together what `stored` took apart of an event of a cell: the point, and the energies up to it.
+
+    Of a lean event the arrays that `found_again` fills are empty.
+    """
     load_factor, scale, leg, position, *counts = event["path"].tolist()
     energies = event["energies"].tolist()
     pairs = zip(cell.problems, SUFFIXES, strict=False)
@@ -95,8 +108,37 @@ def restored(event: Arrays, cell: CoupledInterfaces) -> tuple[Point, tuple[Energ
     )
     broke, softened = map(int, counts)
     own = len(NO_ENERGIES)
-    point = Point(load_factor, scale, state, broke, softened, Energies(*energies[:own]), event["used"], after)
+    used = event.get("used", EMPTY)
+    point = Point(load_factor, scale, state, broke, softened, Energies(*energies[:own]), used, after)
     return point, (Energies(*energies[own : 2 * own]), energies[2 * own])
+
+
+def averages(event: Arrays, point: Point, loads: CellLoads) -> list[Response]:
+    """Return the responses of a restored event, as they were when it was stored.  Collective."""
+    found = list[Response]()
+    for suffix, problem, state in zip(SUFFIXES, loads.problems, point.state.problems, strict=False):
+        strain, stress = event[f"means{suffix}"]
+        (stored, in_springs), errors = (event[f"{name}{suffix}"].tolist() for name in ("energies_of", "errors"))
+        checks = {law: error for law, error in zip(LAWS, errors, strict=True) if error != UNCHECKED}
+        counts, damage = problem.counts(state.status), problem.damage(state.bonds)
+        means = strain, stress, point.scale, stored, in_springs
+        found.append(Response(*means, state, EMPTY, checks, counts, damage))
+    return found
+
+
+def found_again(point: Point, cell: CoupledInterfaces, law: BondLaw) -> Point:
+    """Return the point of a lean event with the equilibrium of its load and bonds.  Collective."""
+    known = point.state
+    state = cell.equilibrium(_load(known), known.bonds, cell.no_multipliers())
+    # An equilibrium under the whole load is scaled, and so is what it uses.
+    used = point.scale * most_utilised(cell, law, state)[0]
+    return replace(point, state=state, used=used, after=replace(point.after, lam=state.multipliers))
+
+
+def _load(state: Equilibrium) -> Load:
+    """Return the load of all problems."""
+    values, by_stress = zip(*((each.load.values, each.load.by_stress) for each in state.problems), strict=True)
+    return Load(np.concatenate(values), np.concatenate(by_stress))
 
 
 def holding(context: AnalysisContext, known: int) -> int:
@@ -105,7 +147,7 @@ def holding(context: AnalysisContext, known: int) -> int:
     Those after the last that F lambda confirmed are confirmed here, up to one whose checks fail.  Collective.
     """
     cell, first = context.loads.interfaces, known
-    while first and not _is_confirmed(restored(context.checkpoint.read(first - 1), cell)[0]):
+    while first and not _is_confirmed(context.checkpoint.read(first - 1)):
         first -= 1
     for number in range(first, known):
         point, _ = restored(context.checkpoint.read(number), cell)
@@ -115,8 +157,23 @@ def holding(context: AnalysisContext, known: int) -> int:
     return known
 
 
-def _is_confirmed(point: Point) -> bool:
+def _is_confirmed(event: Arrays) -> bool:
+    """Return whether F lambda confirmed the event, or one after it: only before such a one events are lean."""
+    return not any(np.isnan(event[name]).any() for name in ("alpha", "alpha_axial") if name in event)
+
+
+def is_confirmed(point: Point) -> bool:
+    """Return whether F lambda confirmed the state of a point."""
     return all(state.solution.alpha is not None for state in point.state.problems)
+
+
+def _averages(response: Response) -> dict[str, Any]:
+    """Return the numbers of a response that follow from the multipliers."""
+    return {
+        "means": np.stack([response.strain, response.stress]),
+        "energies_of": [response.stored, response.in_springs],
+        "errors": [response.checks.get(law, UNCHECKED) for law in LAWS],
+    }
 
 
 def _taken_apart(state: Equilibrium, kernel: int) -> tuple[dict[str, Any], Arrays]:
@@ -135,7 +192,8 @@ def _taken_apart(state: Equilibrium, kernel: int) -> tuple[dict[str, Any], Array
 
 def _put_together(event: Arrays, interface: ContactProblem, suffix: str) -> Equilibrium:
     """Rebuild the equilibrium from the parts of `_taken_apart`."""
-    strain, lam, jump, alpha = (event[f"{name}{suffix}"] for name in ("strain", "lam", "jump", "alpha"))
+    lam, jump, alpha = (event.get(f"{name}{suffix}", EMPTY) for name in ("lam", "jump", "alpha"))
+    strain = event[f"strain{suffix}"]
     iterations, solves, free_motions, last, reason = event[f"numbers{suffix}"].tolist()
     errors = zip(KKT_LAWS, event[f"certificate{suffix}"].tolist(), strict=True)
     certificate = {law: error for law, error in errors if not np.isnan(error)}

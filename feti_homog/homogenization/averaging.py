@@ -166,9 +166,13 @@ class Homogenization:
         counts = self.counts(state.status)
         means = scale * state.solution.strain, scale * stress
         energies = scale**2 * energy / 2, scale**2 * self._stretched(state) / 2
-        damage = self.law.damage(state.bonds)
-        damage = (state.status != BONDED).astype(float) if damage is None else damage
-        return Response(*means, scale, *energies, state, scale * u, checks | state.certificate, counts, damage)
+        checks, damage = checks | state.certificate, self.damage(state.bonds)
+        return Response(*means, scale, *energies, state, scale * u, checks, counts, damage)
+
+    def damage(self, bonds: BondState) -> Float:
+        """(k,) damage of the bonds, 0 intact to 1 broken."""
+        damage = self.law.damage(bonds)
+        return (bonds.status != BONDED).astype(float) if damage is None else damage
 
     def _rubbing(self, state: Equilibrium) -> float:
         """Return the sum of force times slip of faces with friction, per area: what the loads do not store.

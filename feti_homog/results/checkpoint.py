@@ -1,15 +1,17 @@
-"""Checkpoints of a path: small HDF5 files of an event, or of some that are of little weight, whole or not at all.
+"""Checkpoints of a path: HDF5 files of an event, or of some of little weight, each there in full or not at all.
 
 Rank 0 writes what the ranks' parts add up to; it concerns the interfaces only.  A file has the number of its first
 event, and there are no gaps; each carries the run that it belongs to and, ahead of what HDF5 reads, the format and a
 checksum.
+
+The last events are whole, for a path goes on from one.  From older ones is left out what a solve finds again, once the
+files of whole events take WHOLE_BYTES: a file of such lean events replaces those that it has them from.
 """
 
 from __future__ import annotations
 
 import bisect
 import contextlib
-import re
 from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
@@ -23,11 +25,12 @@ from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.parallel.mpi_errors import on_root, on_root_only
 from feti_homog.results import atomic, checkpoint_file
 from feti_homog.results.checkpoint_file import Arrays
+from feti_homog.results.checkpoint_folder import FOLDER, remove
 
-FOLDER, DROPPED = "checkpoint", "checkpoint.dropped"  # the second while it is removed
 # Light events that a file has at most; as many a killed run has to find again.
 EVENTS_AT_ONCE = 64
-EVENT_FILE = re.compile(r"\d{6,}\.h5(\..+\.\d+\.part)?")  # also of a writer that was killed
+# Bytes that whole events may take.
+WHOLE_BYTES = 64 * 2**20
 
 
 class Checkpoint:
@@ -37,14 +40,18 @@ class Checkpoint:
 
     Attributes:
         signature: text that an event must carry to belong to this run: case, subdomains and ranks.
+        room: bytes that whole events may take; None if none may become lean.
     """
 
-    def __init__(self, directory: Path, comm: MPI.Intracomm, signature: str) -> None:
-        self.folder, self.comm, self.signature = directory / FOLDER, comm, signature
+    def __init__(self, directory: Path, comm: MPI.Intracomm, signature: str, room: int | None = WHOLE_BYTES) -> None:
+        self.folder, self.comm, self.signature, self.room = directory / FOLDER, comm, signature, room
         # Of rank 0: events that wait, the first events of the files and one after the last, and the file read last.
         self._waiting: list[Arrays] = []
         self._starts = [0]
         self._read: tuple[int, Arrays] = (-1, {})
+        # The events of whole files, lean, and the bytes of these files; the last event that is settled.
+        self._lean: list[Arrays] = []
+        self._bytes, self._settled = 0, -1
 
     def __enter__(self) -> Self:
         return self
@@ -86,17 +93,23 @@ class Checkpoint:
         return own
 
     def write(
-        self, number: int, whole: Mapping[str, Any], distributed: Mapping[str, NDArray[Any]], light: bool = False
+        self,
+        number: int,
+        whole: Mapping[str, Any],
+        distributed: Mapping[str, NDArray[Any]],
+        light: bool = False,
+        settled: bool = False,
     ) -> None:
         """Add event `number`: numbers that all ranks share, and arrays of which each has a part.
 
         A `light` event waits for others whose arrays have the same shapes, up to EVENTS_AT_ONCE or one of weight.
+        Before a `settled` one nothing is gone back to: earlier events may become lean.
 
         Raises:
             FetiHomogError: the file cannot be written.
         """
         gathered = {name: self.comm.gather(part) for name, part in distributed.items()}
-        on_root(self.comm, self._write, number, whole, gathered, light)
+        on_root(self.comm, self._write, number, whole, gathered, light, settled)
 
     def flush(self) -> None:
         """Write the events that wait.  Raises as `write`."""
@@ -107,12 +120,19 @@ class Checkpoint:
         on_root(self.comm, self._keep, count)
 
     def _clear(self) -> int:
-        files = self._files()
+        count = end = 0
         # Whatever another run left there.
-        count = sum(map(checkpoint_file.events_in, files))
+        for path in self._files():
+            if path >= self._file(end):
+                events = checkpoint_file.events_in(path)
+                count, end = count + events, int(path.stem) + events
         remove(self.folder.parent)
-        self._waiting, self._starts, self._read = [], [0], (-1, {})
+        self._begin_anew()
         return count
+
+    def _begin_anew(self) -> None:
+        self._waiting, self._starts, self._read = [], [0], (-1, {})
+        self._lean, self._bytes, self._settled = [], 0, -1
 
     def _files(self) -> list[Path]:
         return sorted(self.folder.glob("[0-9]*.h5")) if self.folder.is_dir() else []
@@ -121,13 +141,23 @@ class Checkpoint:
         return self.folder / f"{number:06d}.h5"
 
     def _count_checked(self) -> int:
-        self._starts = [0]
+        self._begin_anew()
         for path in self._files():
-            if path != self._file(self._starts[-1]):
-                raise CaseError(f"event {self._starts[-1]:06d} is missing in {self.folder}")
-            events = self._read_file(self._starts[-1])
-            self._starts.append(self._starts[-1] + checkpoint_file.length(events))
+            end = self._starts[-1]
+            if path < self._file(end):  # a run was killed when it had replaced it
+                continue
+            if path != self._file(end):
+                raise CaseError(f"event {end:06d} is missing in {self.folder}")
+            events = self._read_file(end)
+            self._add(end, [checkpoint_file.row(events, number) for number in range(checkpoint_file.length(events))])
         return self._starts[-1]
+
+    def _add(self, start: int, events: list[Arrays]) -> None:
+        """Take note of the file of these events."""
+        self._starts.append(start + len(events))
+        if self.room is not None and checkpoint_file.is_whole(events[0]):
+            self._lean += map(checkpoint_file.lean, events)
+            self._bytes += self._file(start).stat().st_size
 
     def _read_event(self, number: int) -> Arrays:
         if number >= self._starts[-1]:
@@ -135,7 +165,7 @@ class Checkpoint:
         start = self._starts[bisect.bisect_right(self._starts, number) - 1]
         if self._read[0] != start:
             self._read = start, self._read_file(start)
-        return {name: table[number - start] for name, table in self._read[1].items()}
+        return checkpoint_file.row(self._read[1], number - start)
 
     def _read_file(self, start: int) -> Arrays:
         """(events, ...) arrays of the file whose first event is `start`."""
@@ -148,7 +178,12 @@ class Checkpoint:
         return events
 
     def _write(
-        self, number: int, whole: Mapping[str, Any], gathered: Mapping[str, list[NDArray[Any]]], light: bool
+        self,
+        number: int,
+        whole: Mapping[str, Any],
+        gathered: Mapping[str, list[NDArray[Any]]],
+        light: bool,
+        settled: bool,
     ) -> None:
         event = {name: np.asarray(value) for name, value in whole.items()}
         event |= {name: np.concatenate(parts) for name, parts in gathered.items()}
@@ -157,6 +192,7 @@ class Checkpoint:
             self._flush()
         self._starts[-1] = number - len(self._waiting)
         self._waiting.append(event)
+        self._settled = number if settled else self._settled
         if not light or len(self._waiting) == EVENTS_AT_ONCE:
             self._flush()
 
@@ -164,11 +200,30 @@ class Checkpoint:
         if not self._waiting:
             return
         start, events = self._starts[-1], self._waiting
-        together = {name: np.stack([event[name] for event in events]) for name in events[0]}
-
-        atomic.replace(self._file(start), lambda part: checkpoint_file.write(part, together, self.signature, start))
-        self._starts.append(start + len(events))
+        self._write_file(start, events)
+        self._add(start, events)
         self._waiting = []
+        if self.room is not None and self._bytes > self.room:
+            self._make_lean()
+
+    def _write_file(self, start: int, events: list[Arrays]) -> None:
+        together = {name: np.stack([event[name] for event in events]) for name in events[0]}
+        atomic.replace(self._file(start), lambda part: checkpoint_file.write(part, together, self.signature, start))
+
+    def _make_lean(self) -> None:
+        """Replace the whole files before that of the last settled event by one of lean events."""
+        first = self._starts[-1] - len(self._lean)
+        starts = [start for start in self._starts if first <= start <= self._settled]
+        if len(starts) < 2:
+            return
+        count = starts[-1] - first
+        self._write_file(first, self._lean[:count])
+        with atomic.file_errors("remove", self.folder):
+            for start in starts[1:-1]:
+                self._file(start).unlink()
+        self._starts = [start for start in self._starts if start not in starts[1:-1]]
+        self._lean, self._read = self._lean[count:], (-1, {})
+        self._bytes = sum(self._file(start).stat().st_size for start in self._starts[:-1] if start >= starts[-1])
 
     def _keep(self, count: int) -> None:
         start = self._starts[bisect.bisect_right(self._starts, count) - 1]
@@ -178,96 +233,9 @@ class Checkpoint:
             for path in reversed(self._files()):
                 if path > self._file(start) or (path == self._file(start) and not kept):
                     path.unlink()
-        self._starts = [*(first for first in self._starts if first < start), start]
-        self._waiting, self._read = kept, (-1, {})
-        self._flush()
-
-
-class NoCheckpoint(Checkpoint):
-    """Keeps nothing, for runs that leave no files."""
-
-    def __init__(self, comm: MPI.Intracomm) -> None:
-        super().__init__(Path(), comm, "")
-
-    def clear(self) -> int:
-        return 0
-
-    def count(self) -> int:
-        return 0
-
-    def write(
-        self, number: int, whole: Mapping[str, Any], distributed: Mapping[str, NDArray[Any]], light: bool = False
-    ) -> None:
-        """Nothing."""
-
-    def flush(self) -> None:
-        """Nothing."""
-
-
-class EventsInMemory(NoCheckpoint):
-    """Keeps the events for fields in memory, for runs that leave no files: what stands on the interfaces, by rank."""
-
-    def __init__(self, comm: MPI.Intracomm) -> None:
-        super().__init__(comm)
-        self._events: dict[int, Arrays] = {}
-
-    def read(self, number: int) -> Arrays:
-        return self._events[number]
-
-    def write(
-        self, number: int, whole: Mapping[str, Any], distributed: Mapping[str, NDArray[Any]], light: bool = False
-    ) -> None:
-        self._events[number] = {name: np.asarray(value) for name, value in {**whole, **distributed}.items()}
-
-
-def refuse_others(directory: Path) -> None:
-    """Check that a run may write its events to `directory`/checkpoint, and remove them.  Call on one rank.
-
-    Raises:
-        CaseError: it is no folder, or something else than events stands in it.
-        OSError: it cannot be read.
-    """
-    for folder in (directory / FOLDER, directory / DROPPED):
-        if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
-            kind = "link" if folder.is_symlink() else "file"
-            raise CaseError(
-                f"--out {directory}: {folder.name} is a {kind} there, and a run makes a folder of that name"
-            )
-        others = [path.name for path in folder.iterdir() if not _is_event(path)] if folder.is_dir() else []
-        if others:
-            raise CaseError(
-                f"--out {directory}: no run of this program wrote {folder.name}/{min(others)}, and a run removes "
-                f"{folder.name}; move it away or choose another folder"
-            )
-
-
-def remove(directory: Path) -> None:
-    """Remove the events in `directory`: under its own name their folder is there as a whole or not at all.
-
-    Call on one rank.
-
-    Raises:
-        FetiHomogError: the folder cannot be renamed.
-    """
-    folder, dropped = directory / FOLDER, directory / DROPPED
-    _remove_events(dropped)
-    if folder.is_dir():
-        with atomic.file_errors("remove", folder):
-            atomic.rename(folder, dropped)
-        _remove_events(dropped)
-
-
-def _remove_events(folder: Path) -> None:
-    """Remove events as far as it can be: what stays, the next run removes."""
-    with contextlib.suppress(OSError):
-        for path in folder.iterdir():
-            if _is_event(path):
-                path.unlink()
-        folder.rmdir()
-
-
-def _is_event(path: Path) -> bool:
-    return EVENT_FILE.fullmatch(path.name) is not None and path.is_file()
+        if kept:
+            self._write_file(start, kept)
+        self._count_checked()
 
 
 def _shapes(event: Arrays) -> dict[str, tuple[int, ...]]:

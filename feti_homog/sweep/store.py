@@ -21,7 +21,7 @@ import tomli_w
 
 from feti_homog.case.case import Case
 from feti_homog.errors import CaseError, FetiHomogError
-from feti_homog.results import atomic, checkpoint, output_folder, result_json, seals
+from feti_homog.results import atomic, checkpoint_folder, output_folder, result_json, seals
 from feti_homog.runtime import input_files
 from feti_homog.runtime.file_locks import Lock, LockHeld, is_locked
 from feti_homog.sweep.plan import Sweep, SweepCase, identity_of
@@ -178,7 +178,7 @@ def reset(directory: Path, entry: SweepCase, status: Status) -> None:
         (folder / ERROR_FILE).unlink(missing_ok=True)
     except OSError as error:
         raise FetiHomogError(f"cannot write {folder}: {error.strerror}") from error
-    checkpoint.remove(folder)
+    checkpoint_folder.remove(folder)
     set_aside(directory, entry, status)
 
 

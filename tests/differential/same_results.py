@@ -81,8 +81,8 @@ def resume(setting: Setting) -> Compared:
     last = int(setting.rng.integers(events))
     write = Checkpoint.write
 
-    def written(checkpoint: Checkpoint, number: int, *arrays: Any, light: bool) -> None:
-        write(checkpoint, number, *arrays, light=light)
+    def written(checkpoint: Checkpoint, number: int, *arrays: Any, **kind: bool) -> None:
+        write(checkpoint, number, *arrays, **kind)
         if number == last:
             raise Killed(f"at event {number}")
 

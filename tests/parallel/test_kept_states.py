@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import h5py
 import numpy as np
@@ -13,10 +14,11 @@ from mpi4py import MPI
 from support.ranks import PIECES, parallel_assert
 
 from feti_homog import Case, run
+from feti_homog.analysis import runner
 from feti_homog.errors import ConvergenceError
 from feti_homog.materials.voigt import STRAINS, STRESSES
 from feti_homog.parallel.mpi_errors import on_root
-from feti_homog.results import field_file
+from feti_homog.results import checkpoint_file, field_file
 from feti_homog.verify.certificate import verify
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks, pytest.mark.usefixtures("shared_interfaces")]
@@ -30,23 +32,47 @@ PATHS: dict[str, dict[str, Any]] = {
 }
 STRENGTHS = {"normal_strength": 4.0, "tangential_strength": 3.0}
 ENERGY = {"normal_stiffness": 2000.0, "tangential_stiffness": 500.0, "criterion": "energy", "toughness": 0.01}
+# With history, unconfirmed events, and slip along the fibres.
+SOFTENING = {
+    "law": "bilinear",
+    "normal_stiffness": 4000.0,
+    "tangential_stiffness": 3000.0,
+    "normal_toughness": 0.01,
+    "tangential_toughness": 0.02,
+    "teeth": 3,
+    **STRENGTHS,
+}
+OTHER_PATHS: dict[str, dict[str, Any]] = {
+    "softening": {
+        "interface": SOFTENING,
+        "path": {"waypoints": [{"E11": 0.08, "S22": 0.0, "S12": 0.0}, {"E11": -0.02, "S22": 0.0, "S12": 0.0}]},
+        "petsc": {"feti_pc_type": "influence"},
+    },
+    "released": {
+        "interface": ENERGY | {"growth": "released"},
+        "path": {"waypoints": [{"E11": 0.1, "S13": 3.0}, {"E11": -0.05, "S13": 1.0}]},
+        "analysis": {"type": "path", "plane": "generalized"},
+        "petsc": {"feti_pc_type": "influence"},
+    },
+}
+SOLVED_AGAIN = 1e-7  # what a solve to the default tolerance leaves
 # Each path with a number of states, and with those of its peaks.
 STATES = [*zip(PATHS, (2, 5, 2, 5), strict=True), *((kind, "peaks") for kind in PATHS)]
 
 
 def case(kind: str, states: int | str, **path: Any) -> Case:
-    return Case.parse(
-        {
-            "name": kind,
-            "cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.3},
-            "material": {"matrix": {"young": 100.0, "poisson": 0.4}, "fibre": {"young": 500.0, "poisson": 0.2}},
-            "analysis": {"type": "path", "plane": "stress"},
-            "interface": ENERGY if kind == "energy" else STRENGTHS,
-            "path": PATHS[kind] | path,
-            "decomposition": PIECES,
-            "output": {"pictures": False, "states": states},
-        }
-    )
+    written = {
+        "name": kind,
+        "cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.3},
+        "material": {"matrix": {"young": 100.0, "poisson": 0.4}, "fibre": {"young": 500.0, "poisson": 0.2}},
+        "analysis": {"type": "path", "plane": "stress"},
+        "interface": ENERGY if kind == "energy" else STRENGTHS,
+        "path": PATHS.get(kind, {}),
+        "decomposition": PIECES,
+        "output": {"pictures": False, "states": states},
+    }
+    written |= OTHER_PATHS.get(kind, {})
+    return Case.parse(written | {"path": written["path"] | path})
 
 
 def states_of(folder: Path) -> list[dict[str, Any]]:
@@ -68,7 +94,7 @@ def document(folder: Path) -> dict[str, Any]:
     return content
 
 
-def assert_kept_of(folder: Path, whole: Path) -> None:
+def assert_kept_of(folder: Path, whole: Path, exact: float = EXACT) -> None:
     """On one rank: the states of a folder are the same points' of a run that kept all, and so is the curve.
 
     A field is measured by its largest value on the whole path: the jumps of a point where all is bonded are rounding.
@@ -84,7 +110,7 @@ def assert_kept_of(folder: Path, whole: Path) -> None:
                 assert np.array_equal(values, expected[name]), name
             else:
                 scale = max(np.nanmax(np.abs(each[name]), initial=0.0) for each in every if name in each)
-                np.testing.assert_allclose(values, expected[name], rtol=0, atol=EXACT * scale, err_msg=name)
+                np.testing.assert_allclose(values, expected[name], rtol=0, atol=exact * scale, err_msg=name)
     curves = [document(each)["path"] for each in (folder, whole)]
     for number, (point, expected) in enumerate(zip(*curves, strict=True)):
         assert point.keys() - OF_KEPT == expected.keys() - OF_KEPT
@@ -94,11 +120,13 @@ def assert_kept_of(folder: Path, whole: Path) -> None:
         numbers_of = point.keys() - {"tips", "iterations", "mark", "dissipated_mesh_error"}
         for value, wanted in [*tips, *((point[name], expected[name]) for name in numbers_of)]:
             # After an interruption influence columns are found in another order, which changes rounding.
-            assert value == pytest.approx(wanted, rel=1e-9, abs=EXACT)
-    log = (folder / "events.log").read_text().splitlines()[1:]
+            assert value == pytest.approx(wanted, rel=1e-9, abs=exact)
+    lines = (folder / "events.log").read_text().splitlines()[1:]
+    log = [line for line in lines if ", along the fibres:" not in line]
     for line, point in zip(log, curves[0], strict=True):
-        k = int(np.abs(point["strain"]).argmax())
-        reached = f"{STRAINS[k]} {point['strain'][k]:.4g}, {STRESSES[k]} {point['stress'][k]:.4g}"
+        strain, stress = (np.take(point[name], [0, 1, -1]) for name in ("strain", "stress"))  # of the plane
+        k = int(np.abs(strain).argmax())
+        reached = f"{STRAINS[k]} {strain[k]:.4g}, {STRESSES[k]} {stress[k]:.4g}"
         assert f", {reached}" in line
 
 
@@ -138,6 +166,27 @@ def test_an_interrupted_path_keeps_the_same_states(comm, shared_path, whole, kin
     assert result.resumed == 9
     expected = whole(kind)
     on_root(comm, assert_kept_of, shared_path, expected)
+
+
+@pytest.mark.parametrize("kind", OTHER_PATHS)
+def test_states_of_lean_events_are_solved_again(comm, shared_path, whole, kind):
+    """Events have no multipliers as soon as a later one is confirmed; the path is ended and goes on, too."""
+    known, expected = len(document(whole(kind))["path"]) * 2 // 3, whole(kind)
+    with mock.patch.object(runner, "_room", return_value=0):
+        with pytest.raises(ConvergenceError, match="max_events"):
+            run(case(kind, 5, max_events=known), comm, out=shared_path, resume=False)
+        files = on_root(comm, lambda: [*map(checkpoint_file.read, (shared_path / "checkpoint").iterdir())])
+        parallel_assert(comm, any(not checkpoint_file.is_whole(events) for events, _, _ in files))
+        result = run(case(kind, 5), comm, out=shared_path, resume=True)
+        in_memory = run(case(kind, 5), comm, fields=True)
+    assert result.resumed == known and in_memory.states == result.states
+    on_root(comm, assert_kept_of, shared_path, expected, SOLVED_AGAIN)
+    parallel_assert(comm, verify(shared_path).holds if comm.rank == 0 else True)
+    fields = in_memory.fields.gathered()
+    if comm.rank == 0:
+        for state, other in zip(fields.states, states_of(shared_path), strict=True):
+            scale = np.abs(other["stress"]).max()
+            np.testing.assert_allclose(state.stress, other["stress"], rtol=0, atol=SOLVED_AGAIN * scale)
 
 
 def test_states_in_memory_are_those_of_the_files(comm, whole):

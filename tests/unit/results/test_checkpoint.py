@@ -12,8 +12,10 @@ from mpi4py import MPI
 
 from feti_homog.errors import CaseError, ConvergenceError
 from feti_homog.results import atomic
-from feti_homog.results.checkpoint import EVENTS_AT_ONCE, Checkpoint, refuse_others
+from feti_homog.results.checkpoint import EVENTS_AT_ONCE, Checkpoint
 from feti_homog.results.checkpoint_file import FORMAT, USER_BLOCK
+from feti_homog.results.checkpoint_folder import refuse_others
+from feti_homog.results.events_in_memory import EventsInMemory
 
 EVENTS = 4
 
@@ -66,6 +68,54 @@ def test_light_events_are_kept_where_all_ranks_raise(tmp_path, error, kept):
         raise error("off")
     resumed = Checkpoint(tmp_path, MPI.COMM_SELF, "this run")
     assert resumed.count() == kept and same(map(resumed.read, range(kept)))
+
+
+def write_for_lean(checkpoint: Checkpoint, number: int) -> None:
+    """Events 2, 6, 10, ... are settled, and so are 3, 7, ...; every other one is light."""
+    event = {"path": [0.1 * number], "alpha": [1.0]}, {"lam": np.arange(50.0) + number, "status": np.arange(5) * number}
+    checkpoint.write(number, *event, light=number % 2 == 0, settled=number % 4 > 1)
+
+
+def assert_lean(checkpoint: Checkpoint, count: int, first_whole: int) -> None:
+    for number in range(count):
+        event = checkpoint.read(number)
+        assert event["path"] == [0.1 * number] and (event["status"] == np.arange(5) * number).all()
+        assert ("alpha" in event) == ("lam" in event) == (number >= first_whole)
+        assert number < first_whole or (event["lam"] == np.arange(50.0) + number).all()
+
+
+@pytest.mark.parametrize(("files", "first_whole"), [(0.5, 10), (3.5, 6), (None, 0)])
+def test_old_events_become_lean(tmp_path, files, first_whole):
+    """There is room for so many whole files, of two events each; that of the last settled event stays whole."""
+    room = None
+    if files is not None:
+        one = Checkpoint(tmp_path / "one", MPI.COMM_SELF, "this run")
+        for number in range(2):
+            write_for_lean(one, number)
+        room = int(files * (one.folder / "000000.h5").stat().st_size)
+    checkpoint = Checkpoint(tmp_path, MPI.COMM_SELF, "this run", room)
+    for number in range(10):
+        write_for_lean(checkpoint, number)
+    replaced = (checkpoint.folder / "000008.h5").read_bytes()
+    for number in range(10, 12):
+        write_for_lean(checkpoint, number)
+    assert_lean(checkpoint, 12, first_whole)
+    # As if killed before it was removed.
+    (checkpoint.folder / "000008.h5").write_bytes(replaced)
+    resumed = Checkpoint(tmp_path, MPI.COMM_SELF, "this run", room)
+    assert resumed.count() == 12
+    assert_lean(resumed, 12, first_whole)
+    for number in range(12, 16):
+        write_for_lean(resumed, number)
+    assert_lean(resumed, 16, {10: 14, 6: 14, 0: 0}[first_whole])
+    assert resumed.clear() == 16
+
+
+def test_events_in_memory_become_lean():
+    events = EventsInMemory(MPI.COMM_SELF, room=0)
+    for number in range(12):
+        write_for_lean(events, number)
+    assert_lean(events, 12, 11)
 
 
 @pytest.mark.parametrize("count", [0, 2, 3, 5, 7, 8])
