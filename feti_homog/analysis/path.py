@@ -29,6 +29,8 @@ from feti_homog.interface.path.sliding_path import sliding_events
 from feti_homog.results.checkpoint_file import is_whole
 from feti_homog.results.landmarks import kept, marks, peak_of
 
+MOST_NAMED = 8  # fibres in a remark
+
 
 def run(context: AnalysisContext) -> dict[str, Any]:
     """Return the path of the case, until its bonds break; see `follow`."""
@@ -72,11 +74,22 @@ def follow(context: AnalysisContext, path: LoadPath, law: BondLaw) -> dict[str, 
         states = _kept(context, path, law, entries, last)
     else:
         _checked(context, last, _label(path, len(entries) - 1))
+    if context.case.has_friction and (loose := context.fibre_interfaces.loose(last.after.bonds.status)):
+        context.notes.append(
+            f"[path] no bond of {_fibres(loose)} holds: with friction such a fibre may have several equilibria under "
+            "one load, and the path has one of them, by the order of nodes"
+        )
     document = _document(context, entries)
     for number, words in marks(document).items():
         entries[number]["mark"] = words
     points = tuple(PathPoint(**entry) for entry in entries)
     return {"path": points, "peak": Peak(**peak_of(document)), "resumed": known} | states
+
+
+def _fibres(numbers: Sequence[int]) -> str:
+    """Return fibres in words, the first of many."""
+    shown = ", ".join(map(str, numbers[:MOST_NAMED])) + (", ..." if len(numbers) > MOST_NAMED else "")
+    return f"{len(numbers)} fibres ({shown})" if len(numbers) > 1 else f"fibre {shown}"
 
 
 def _document(context: AnalysisContext, entries: Sequence[dict[str, Any]]) -> dict[str, Any]:

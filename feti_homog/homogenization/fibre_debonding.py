@@ -38,6 +38,11 @@ class FibreInterfaces:
         """
         return self._sums(self._nodes.length * ((damage > 0.0) & (damage < 1.0)))
 
+    def loose(self, status: Status) -> list[int]:
+        """Numbers, from 1, of the fibres of which no bond holds.  Collective."""
+        held = self._sums(self._nodes.length * (status == BONDED))
+        return [int(number) for number in np.flatnonzero((held == 0.0) & (self._length > 0.0)) + 1]
+
     def angle(self, length: Float) -> Float:
         """(f,) degrees of arc of lengths (f,).
 

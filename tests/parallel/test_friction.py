@@ -28,7 +28,9 @@ def test_one_fibre_slides_as_in_a_prototype(comm):
     """Stresses at the waypoints within 0.3 % of the largest, heat within 2 % on elements of 1.3."""
     cell = {"geometry": "square", "fibre_radius": 7.5, "mesh_size": 0.08, "interface_size": 0.06, "refine": 1}
     path = {"waypoints": [list(point) for point in RUBBING_WAYPOINTS]}
-    points = solved(comm, cell=cell, phases=PHASES, plane="strain", interface=WHOLE | {"friction": 0.2}, path=path).path
+    found = solved(comm, cell=cell, phases=PHASES, plane="strain", interface=WHOLE | {"friction": 0.2}, path=path)
+    points = found.path
+    assert sum("[path] no bond of fibre 1 holds: with friction" in remark for remark in found.remarks) == 1
     ends = [point for point in points if is_end(point, len(RUBBING_WAYPOINTS))]
     for point, stress, heat in zip(ends, RUBBING_STRESSES[0.21], RUBBING_HEATS[0.21].value, strict=True):
         np.testing.assert_allclose(point.stress, stress.value, atol=3e-3 * 92.0)
@@ -50,7 +52,9 @@ def test_paths_are_those_of_a_slow_twin(comm, waypoints, springs):
     case = {"cell": {"mesh_size": 0.3}, "phases": EPOXY_GLASS, "plane": "strain", "path": {"waypoints": waypoints}}
     twin = LoadedTwin(comm, **case, interface=interface)
     expected = on_root(comm, lambda: FrictionPath(RubbingFaces.of(twin.cell, twin.bonded, 0.4)).follow(twin.loads))
-    found = solved(comm, **case, interface=interface | {"friction": 0.4}).path
+    result = solved(comm, **case, interface=interface | {"friction": 0.4})
+    assert not any("no bond of" in remark for remark in result.remarks)
+    found = result.path
     known = np.array([point.load_factor for point in expected])
     most = max(np.abs(point.state.stress).max() for point in expected)
     assert len(found) > len(waypoints) + 2
