@@ -74,11 +74,7 @@ def follow(context: AnalysisContext, path: LoadPath, law: BondLaw) -> dict[str, 
         states = _kept(context, path, law, entries, last)
     else:
         _checked(context, last, _label(path, len(entries) - 1))
-    if context.case.has_friction and (loose := context.fibre_interfaces.loose(last.after.bonds.status)):
-        context.notes.append(
-            f"[path] no bond of {_fibres(loose)} holds: with friction such a fibre may have several equilibria under "
-            "one load, and the path has one of them, by the order of nodes"
-        )
+    _remark_loose_fibres(context, last)
     document = _document(context, entries)
     for number, words in marks(document).items():
         entries[number]["mark"] = words
@@ -86,10 +82,15 @@ def follow(context: AnalysisContext, path: LoadPath, law: BondLaw) -> dict[str, 
     return {"path": points, "peak": Peak(**peak_of(document)), "resumed": known} | states
 
 
-def _fibres(numbers: Sequence[int]) -> str:
-    """Return fibres in words, the first of many."""
-    shown = ", ".join(map(str, numbers[:MOST_NAMED])) + (", ..." if len(numbers) > MOST_NAMED else "")
-    return f"{len(numbers)} fibres ({shown})" if len(numbers) > 1 else f"fibre {shown}"
+def _remark_loose_fibres(context: AnalysisContext, last: Point) -> None:
+    """Remark the fibres that no bond holds in the end, the first of many, if faces have friction.  Collective."""
+    if context.case.has_friction and (loose := context.fibre_interfaces.loose(last.after.bonds.status)):
+        shown = ", ".join(map(str, loose[:MOST_NAMED])) + (", ..." if len(loose) > MOST_NAMED else "")
+        fibres = f"{len(loose)} fibres ({shown})" if len(loose) > 1 else f"fibre {shown}"
+        context.notes.append(
+            f"[path] no bond of {fibres} holds: with friction such a fibre may have several equilibria under one load, "
+            "and the path has one of them, by the order of nodes"
+        )
 
 
 def _document(context: AnalysisContext, entries: Sequence[dict[str, Any]]) -> dict[str, Any]:
