@@ -29,7 +29,7 @@ from feti_homog.results import (
     result_json,
     xdmf,
 )
-from feti_homog.results.checkpoint import WHOLE_BYTES, Checkpoint
+from feti_homog.results.checkpoint import Checkpoint, room_of
 from feti_homog.results.events_in_memory import EventsInMemory
 from feti_homog.results.field_file import FieldFile
 from feti_homog.results.output_folder import EventLog
@@ -88,7 +88,7 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False, quiet: b
             states = StateRecorder(cell, None, keep_fields, progress.say)
             context = AnalysisContext.of(cell, progress, states, earlier)
             if keep_fields or context.plane.law.has_toughness:
-                context = replace(context, checkpoint=EventsInMemory(comm, _room(case)))
+                context = replace(context, checkpoint=EventsInMemory(comm, room_of(case)))
             _warn(context)
             return result_builder.result(context, _analyse(context), states.kept())
 
@@ -216,15 +216,7 @@ def _checkpoint(cell: TornCell, directory: Path) -> Checkpoint:
     plan, multipliers = cell.summary, cell.solver.jump_operator.global_rows
     parts = f"{plan.subdomains} subdomains on {cell.comm.size} ranks, {multipliers} multipliers"
     signature = f"case {on_root(cell.comm, cell.case.digest)}, {parts}"
-    return Checkpoint(directory, cell.comm, signature, _room(cell.case))
-
-
-def _room(case: Case) -> int | None:
-    """Return the bytes that whole events of a path may take; None if all fields are wanted, or states have a past.
-
-    With friction many states are in equilibrium under one load.
-    """
-    return None if case.has_friction or case.output.states == "all" else WHOLE_BYTES
+    return Checkpoint(directory, cell.comm, signature, room_of(cell.case))
 
 
 def _is_finished(directory: Path, case: Case) -> bool:

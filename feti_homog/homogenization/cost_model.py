@@ -20,6 +20,7 @@ from feti_homog.case.case import Case
 from feti_homog.case.interface_section import InterfaceSection
 from feti_homog.case.phase_names import COATING
 from feti_homog.fem.problem import AXIAL, Problem
+from feti_homog.feti.thresholds import INFLUENCE_COLUMNS, NEVER_REFACTORED_ROWS
 from feti_homog.homogenization import phase_laws
 from feti_homog.materials.plane_state import PLANE_STATES
 
@@ -40,6 +41,10 @@ BASE_BYTES, DOF_BYTES, COLUMN_BYTES = 1.8e8, 1.5e3, 2.0e4
 # Bytes more for each displacement of the largest problem of a cell that is one factor: of nine bonded cells of 66 000
 # to 335 000 degrees of freedom, of order 1 and 2, estimates are 0.89 to 1.13 times what runs took.
 FACTOR_BYTES = 6.0e2
+# Bytes more of a path to complete debonding with influence columns: in any case, and for each pair of a rank's
+# multiplier and a column, of which a cell that is factored anew has `INFLUENCE_COLUMNS`. Of four paths of 10 to 50
+# fibres, 872 to 4 110 multipliers, on one rank, estimates are 0.97 to 1.11 times what runs took.
+PATH_BYTES, PAIR_BYTES = 7e7, 70
 # Bytes for each pair of jumps of debonded faces with friction: six dense matrices (`interface.friction`).
 FACE_PAIR_BYTES = 48
 # Bytes of result.h5: of a state for each node, element and interface node in the plane, and what is along the fibres
@@ -130,6 +135,12 @@ def estimate(
     )
 
 
+def memory_to_the_end(found: Estimate, columns: int, ranks: int) -> float:
+    """Bytes of the rank that needs most when all bonds have broken, of a path with so many influence columns."""
+    pairs = columns / ranks * (columns if columns <= NEVER_REFACTORED_ROWS else INFLUENCE_COLUMNS)
+    return found.memory + (columns > 0) * PATH_BYTES + pairs * PAIR_BYTES
+
+
 def fields_line(case: Case, nodes: int, elements: int, interface_nodes: int, ranks: int) -> str:
     """Return how many states result.h5 has, its size, and the time that they take, in a line as `estimate_lines`."""
     asked = case.output.states
@@ -152,13 +163,13 @@ def fields_line(case: Case, nodes: int, elements: int, interface_nodes: int, ran
 
 
 def events_lines(
-    case: Case, multipliers: int, fibres: int, teeth: int, nodes: Sequence[int], seconds: float
+    case: Case, multipliers: int, fibres: int, teeth: int, nodes: Sequence[int], seconds: float, memory: float
 ) -> list[str]:
     """Return how many events a path may have and how long all of them take, in a line as `estimate_lines`.
 
     None of another analysis, or of a cell without interfaces. There are at most as many events as bonds, times the
     teeth of each; nodes on cuts of bodies are counted with them. `nodes` are those of each rank, `seconds` the estimate
-    for few events.
+    for few events, `memory` the bytes of the rank that needs most for all.
     """
     if not (case.section.is_followed and case.interfaces):
         return []
@@ -170,13 +181,19 @@ def events_lines(
     longest = _rounded(seconds + bonds * teeth * event)
     time = f"{1e3 * event:.2g} ms or more for each"
     lines = [
-        f"events     {words}, {time}: from {_rounded(seconds)} for few to {longest} or more for all"
+        f"events     {words}, {time}: from {_rounded(seconds)} for few to {longest} or more "
+        f"and {_size(memory)} on the largest rank for all"
         if bonds
         else f"events     of contact alone, for no bond is left to break, {time}"
     ]
     faces = _size(FACE_PAIR_BYTES * multipliers**2)
     when = f"up to {faces} more on the first rank if all bonds break" if bonds else f"{faces} more on the first rank"
     return [*lines, f"friction   {when}"] if case.has_friction else lines
+
+
+def checkpoint_line(size: float) -> str:
+    """Return how many bytes the checkpoint of a path may take, in a line as `estimate_lines`."""
+    return f"checkpoint up to {_size(size)} while the path is followed"
 
 
 def _unbroken_share(interface: InterfaceSection, fibres: int) -> float:

@@ -28,6 +28,7 @@ from feti_homog.homogenization.unit_cell import cut
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.parallel.mpi_errors import on_root, on_root_only
 from feti_homog.petsc.options import case_options
+from feti_homog.results import checkpoint
 from feti_homog.sweep import plan
 from feti_homog.sweep.plan import Sweep, case_names
 
@@ -88,7 +89,7 @@ def _described(
             for rank, (count, n) in enumerate(zip(own, nodes, strict=True))
         ),
         *cost_model.estimate_lines(taken, len(loads), summary.across),
-        *cost_model.events_lines(case, multipliers, summary.fibres, teeth_of(case), nodes, taken.seconds),
+        *_path_lines(case, summary, multipliers, nodes, taken, columns),
         *(
             [cost_model.fields_line(case, sum(nodes), elements, multipliers // 2, len(loads))]
             if case.output.fields
@@ -99,6 +100,16 @@ def _described(
         "the case is valid",
     ]
     return "\n".join(lines)
+
+
+def _path_lines(
+    case: Case, summary: CellSummary, multipliers: int, nodes: Sequence[int], taken: cost_model.Estimate, columns: int
+) -> list[str]:
+    """Return the lines about the events of a path; none of another analysis, or of a cell without interfaces."""
+    teeth, memory = teeth_of(case), cost_model.memory_to_the_end(taken, columns, len(nodes))
+    lines = cost_model.events_lines(case, multipliers, summary.fibres, teeth, nodes, taken.seconds, memory)
+    size = checkpoint.bytes_at_most(case, multipliers, multipliers // 2 * teeth)
+    return [*lines, cost_model.checkpoint_line(size)] if lines else []
 
 
 def _applications(case: Case, easy: bool) -> dict[int, int]:

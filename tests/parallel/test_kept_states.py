@@ -172,7 +172,7 @@ def test_an_interrupted_path_keeps_the_same_states(comm, shared_path, whole, kin
 def test_states_of_lean_events_are_solved_again(comm, shared_path, whole, kind):
     """Events have no multipliers as soon as a later one is confirmed; the path is ended and goes on, too."""
     known, expected = len(document(whole(kind))["path"]) * 2 // 3, whole(kind)
-    with mock.patch.object(runner, "_room", return_value=0):
+    with mock.patch.object(runner, "room_of", return_value=0):
         with pytest.raises(ConvergenceError, match="max_events"):
             run(case(kind, 5, max_events=known), comm, out=shared_path, resume=False)
         files = on_root(comm, lambda: [*map(checkpoint_file.read, (shared_path / "checkpoint").iterdir())])

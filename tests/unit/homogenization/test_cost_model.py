@@ -105,21 +105,36 @@ def test_paths_name_their_bonds_and_teeth():
     document = {"cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.1}, "material": material,
                 "analysis": {"type": "path", "plane": "strain"}, "path": {"strain": [0.01, 0, 0]}}  # fmt: skip
     toothed, brittle = (Case.parse(document | {"interface": own}) for own in (law, {"normal_strength": 1.0}))
-    lines = [cost_model.events_lines(own, 48, 1, teeth_of(own), (1000, 1000), 2.0) for own in (toothed, brittle)]
+    lines = [cost_model.events_lines(own, 48, 1, teeth_of(own), (1000, 1000), 2.0, 2e9) for own in (toothed, brittle)]
     assert (
         "up to about 24 bonds break in 7 teeth each, 3.6 ms or more for each: from 2 s for few to 2.6 s" in lines[0][0]
     )
     assert "up to about 24 bonds break, 3.6 ms or more for each: from 2 s for few to 2.1 s or more" in lines[1][0]
-    assert "to 110 s or more" in cost_model.events_lines(toothed, 48, 1, 640, (1000, 1000), 55.0)[0]
+    assert "to 110 s or more" in cost_model.events_lines(toothed, 48, 1, 640, (1000, 1000), 55.0, 2e9)[0]
+    assert all(own[0].endswith(" and 1.9 GiB on the largest rank for all") for own in lines)
     for without in (make_case(), Case.parse(document)):
-        assert cost_model.events_lines(without, 48, 1, 1, (1000,), 2.0) == []
+        assert cost_model.events_lines(without, 48, 1, 1, (1000,), 2.0, 2e9) == []
     rubbing = Case.parse(document | {"interface": {"normal_strength": 1.0, "friction": 0.3}})
-    assert cost_model.events_lines(rubbing, 10_000, 1, 1, (1000,), 2.0)[1:] == [
+    assert cost_model.events_lines(rubbing, 10_000, 1, 1, (1000,), 2.0, 2e9)[1:] == [
         "friction   up to 4.5 GiB more on the first rank if all bonds break"
     ]
     for keys, left in (({"normal_strength": 1.0}, "up to about 12 bonds break"), ({}, "no bond is left to break")):
         parted = keys | {"debonded": [{"fibre": 1, "angle": 180.0}]}
-        assert left in cost_model.events_lines(Case.parse(document | {"interface": parted}), 48, 1, 1, (1000,), 2.0)[0]
+        assert (
+            left
+            in cost_model.events_lines(Case.parse(document | {"interface": parted}), 48, 1, 1, (1000,), 2.0, 2e9)[0]
+        )
+
+
+# 10 fibres of teeth, 20 with released energy, 30 with strengths, 50 with energy, each to complete debonding.
+@pytest.mark.parametrize(
+    ("multipliers", "few", "measured"),
+    [(872, 200, 334e6), (1676, 224, 454e6), (2172, 237, 670e6), (4110, 290, 685e6)],
+)
+def test_memory_of_paths_to_the_end(multipliers, few, measured):
+    """Within a third of what four paths took; `few` is the estimate for few events in MiB."""
+    found = cost_model.memory_to_the_end(cost_model.Estimate(1.0, few * 2**20, 1), multipliers, 1)
+    assert 0.75 < found / measured < 4 / 3
 
 
 def test_coatings_with_influence_columns_take_columns_in_place_of_iterations():
