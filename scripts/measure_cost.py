@@ -36,7 +36,8 @@ COATED = (
     {"geometry": "random", "fibre_fraction": 0.5, "mesh_size": 0.1, "fibres": 10, "coating": 0.05},
     {"geometry": "random", "fibre_fraction": 0.5, "mesh_size": 0.05, "fibres": 30, "coating": 0.1},
 )
-REFINEMENTS, OF_COATED = (0, 1, 2, 3), (0, 1, 2)
+REFINEMENTS, OF_COATED, OF_ONE_FACTOR = (0, 1, 2, 3), (0, 1, 2), (2, 3)
+BODIES = {"cut": "bodies"}
 WITHOUT_FIELDS, WITH_FIELDS = STIFFNESS["output"] | {"mesh_error": False}, {"pictures": False}
 WITH_ERRORS = STIFFNESS["output"]
 COATING = {"young": 20.0, "poisson": 0.3}
@@ -49,7 +50,7 @@ def main() -> None:
     estimated = [document(cell, refine, WITH_ERRORS) for cell in CELLS for refine in REFINEMENTS]
     written = [document(cell, refine, WITH_FIELDS) for cell in CELLS for refine in REFINEMENTS]
     coated = [document(cell, refine, WITH_FIELDS) for cell in COATED for refine in OF_COATED]
-    found = fits(runs) | error_fit(runs, estimated) | memory_fit(written, coated)
+    found = fits(runs) | error_fit(runs, estimated) | memory_fit(written, coated) | factor_fit()
     for names, (constants, ratios) in found.items():
         for name, value in zip(names.split(", "), constants, strict=True):
             print(f"{name} = {value:.1e}")
@@ -88,13 +89,25 @@ def memory_fit(runs: list[dict[str, Any]], coated: list[dict[str, Any]]) -> dict
     return {"BASE_BYTES, DOF_BYTES, COLUMN_BYTES": fitted(memory, np.ones(len(memory)), dofs, columns)}
 
 
-def document(cell: dict[str, Any], refine: int, output: Any = WITHOUT_FIELDS) -> dict[str, Any]:
-    """result.json of one run with this section [output]; times, and `whole`, in seconds of the processor."""
+def factor_fit() -> dict[str, tuple[Any, Any]]:
+    """Return the same for what a cell of one factor takes besides the constants of `cost_model`."""
+    runs = [document(cell, refine, WITH_FIELDS, {}) for cell in CELLS for refine in OF_ONE_FACTOR]
+    runs = [run for run in runs if run["solver"]["subdomains"] == 1]
+    memory, dofs = np.array([(run["memory"], 2 * run["cell"]["nodes"]) for run in runs]).T
+    others = cost_model.BASE_BYTES + cost_model.DOF_BYTES * dofs
+    constant = np.median((memory - others) / dofs)
+    return {"FACTOR_BYTES": ([constant], (others + constant * dofs) / memory)}
+
+
+def document(
+    cell: dict[str, Any], refine: int, output: Any = WITHOUT_FIELDS, decomposition: Any = BODIES
+) -> dict[str, Any]:
+    """result.json of one run with these sections; times, and `whole`, in seconds of the processor."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "case.toml"
         materials = STIFFNESS["material"] | ({"coating": COATING} if "coating" in cell else {})
         own = {"cell": cell | {"refine": refine}, "material": materials, "output": output}
-        path.write_text(tomli_w.dumps(STIFFNESS | own | {"decomposition": {"cut": "bodies"}}))
+        path.write_text(tomli_w.dumps(STIFFNESS | own | {"decomposition": decomposition}))
         words = ["-m", "feti_homog", "run", path, "--out", folder, "--quiet"]
         start, used = time.perf_counter(), processor_seconds()
         subprocess.run([sys.executable, *map(str, words)], check=True)

@@ -38,9 +38,9 @@ COLUMN_SECONDS = 1.4e-4
 ERROR_SECONDS = 1.3e-6
 # Bytes of a rank without degrees of freedom, for each of these, and for each multiplier that has influence columns.
 BASE_BYTES, DOF_BYTES, COLUMN_BYTES = 1.8e8, 1.5e3, 2.0e4
-# Bytes more for each displacement of the largest problem of a cell that is one factor: of nine bonded cells of 66 000
-# to 335 000 degrees of freedom, of order 1 and 2, estimates are 0.89 to 1.13 times what runs took.
-FACTOR_BYTES = 6.0e2
+# Bytes more for each displacement of the largest problem of a cell that is one factor: of seven bonded cells of 31 000
+# to 271 000 degrees of freedom estimates are 0.93 to 1.07 times what runs took.
+FACTOR_BYTES = 2.9e2
 # Bytes more of a path to complete debonding with influence columns: in any case, and for each pair of a rank's
 # multiplier and a column, of which a cell that is factored anew has `INFLUENCE_COLUMNS`. Of four paths of 10 to 50
 # fibres, 872 to 4 110 multipliers, on one rank, estimates are 0.97 to 1.11 times what runs took.
