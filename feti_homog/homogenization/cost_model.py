@@ -39,12 +39,12 @@ ERROR_SECONDS = 1.3e-6
 # Bytes of a rank without degrees of freedom, for each of these, and for each multiplier that has influence columns.
 BASE_BYTES, DOF_BYTES, COLUMN_BYTES = 1.8e8, 1.5e3, 2.0e4
 # Bytes more for each displacement of the largest problem of a cell that is one factor: of seven bonded cells of 31 000
-# to 271 000 degrees of freedom estimates are 0.93 to 1.07 times what runs took.
+# to 271 000 degrees of freedom estimates are 0.93 to 1.07 times what runs took, of two of order 2 0.85 times.
 FACTOR_BYTES = 2.9e2
-# Bytes more of a path to complete debonding with influence columns: in any case, and for each pair of a rank's
-# multiplier and a column, of which a cell that is factored anew has `INFLUENCE_COLUMNS`. Of four paths of 10 to 50
-# fibres, 872 to 4 110 multipliers, on one rank, estimates are 0.97 to 1.11 times what runs took.
-PATH_BYTES, PAIR_BYTES = 7e7, 70
+# Bytes more of a path to complete debonding with influence columns: for each multiplier of a rank, and for each pair of
+# one and a column, of which a cell that is factored anew has `INFLUENCE_COLUMNS`. Of five paths of 1 to 50 fibres, 120
+# to 4 110 multipliers, on one rank, estimates are 0.93 to 1.17 times what runs took.
+PATH_BYTES, PAIR_BYTES = 7e4, 50
 # Bytes for each pair of jumps of debonded faces with friction: six dense matrices (`interface.friction`).
 FACE_PAIR_BYTES = 48
 # Bytes of result.h5: of a state for each node, element and interface node in the plane, and what is along the fibres
@@ -137,8 +137,8 @@ def estimate(
 
 def memory_to_the_end(found: Estimate, columns: int, ranks: int) -> float:
     """Bytes of the rank that needs most when all bonds have broken, of a path with so many influence columns."""
-    pairs = columns / ranks * (columns if columns <= NEVER_REFACTORED_ROWS else INFLUENCE_COLUMNS)
-    return found.memory + (columns > 0) * PATH_BYTES + pairs * PAIR_BYTES
+    kept = columns if columns <= NEVER_REFACTORED_ROWS else INFLUENCE_COLUMNS
+    return found.memory + columns / ranks * (PATH_BYTES + kept * PAIR_BYTES)
 
 
 def fields_line(case: Case, nodes: int, elements: int, interface_nodes: int, ranks: int) -> str:
