@@ -197,7 +197,6 @@ def rising(exact, loads):
     return loads * (exact[:, 1] / exact[:, 0])[first]
 
 
-@pytest.mark.quick
 def test_a_path_goes_on_from_any_of_its_points_with_the_same_events(comm):
     case = torn_cells.build(comm, **SQUARE)
     law, waypoints = MaxStrength(20.0, 30.0), [[0.7, -0.8, 0.5], [0.0, 0.0, 0.0], [-1.0, 1.0, 1.5]]

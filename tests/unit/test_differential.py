@@ -113,6 +113,7 @@ def put(document, path, place=0):
     return wrong
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wanted", [is_load, is_small_path])
 def test_every_number_that_is_wrong_is_noticed(solved, wanted):
     _, folder = solved(wanted)

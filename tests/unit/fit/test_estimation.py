@@ -31,6 +31,7 @@ def test_values_without_noise_return_the_truth():
     assert found.at_bound.tolist() == [0, 0] and found.rank == 2 and found.undetermined == []
 
 
+@pytest.mark.slow
 def test_intervals_cover_the_truth_as_often_as_they_claim():
     """Cover 95 +- 1.5 % of 2000 samples with noise for each unknown; residuals have the claimed distribution."""
     noise = np.random.default_rng(7).normal(0.0, 0.01, (2000, len(TIMES)))

@@ -55,6 +55,7 @@ def test_two_flat_ones_share_the_move_across():
     assert moved == pytest.approx(np.array([[0.0, half], [0.0, -half]]), abs=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_a_window_is_made_periodic_by_small_moves(seed):
     own = crowd(seed)

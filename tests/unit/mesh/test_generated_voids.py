@@ -141,6 +141,7 @@ def test_too_many_voids_are_reported():
         arrange(circular(fraction=0.5, gap=0.05, voids=0.4))
 
 
+@pytest.mark.slow
 def test_the_folder_of_a_result_has_the_table_of_its_case(tmp_path):
     case = case_of(tmp_path, RANDOM | {"fibres": 3, "voids": 0.05, "mesh_size": 0.2})
     (tmp_path / "case.toml").write_text(_toml(case))

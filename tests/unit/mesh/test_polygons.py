@@ -121,6 +121,7 @@ def test_rows_in_any_order_and_any_unit_give_one_mesh():
     assert np.abs(large.points / 50 - one.points).max() < 1e-9 and np.array_equal(one.triangles, large.triangles)
 
 
+@pytest.mark.slow
 def test_the_table_of_polygons_gives_the_cell_again(tmp_path):
     case = case_of(*ROWS)
     document = {k: v for k, v in case.resolved().items() if k in ("cell", "material", "analysis")}

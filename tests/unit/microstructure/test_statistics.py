@@ -94,6 +94,7 @@ def test_cells_called_whole_stay_as_they_are_whatever_is_outside():
     assert 30 < np.count_nonzero(cells.whole) < 80
 
 
+@pytest.mark.slow
 def test_weights_of_a_window_keep_voronoi_areas_unbiased():
     """The mean area of cells is 1 / density; of those that are whole, without weights, it is less."""
     cells = [voronoi_cells(poisson_points(100, 10.0, seed, periodic=False)) for seed in range(200)]

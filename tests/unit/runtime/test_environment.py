@@ -63,6 +63,7 @@ def words_of(tmp_path: Path, program: str) -> tuple[str, str]:
     return run.stdout, run.stderr
 
 
+@pytest.mark.slow
 def test_matplotlib_finds_its_own_toolkits(tmp_path: Path) -> None:
     _, warning = words_of(tmp_path, BOUND_TO_ANOTHER + CHECK)
     assert "Unable to import Axes3D" in warning
@@ -70,6 +71,7 @@ def test_matplotlib_finds_its_own_toolkits(tmp_path: Path) -> None:
     assert (warning, shown) == ("", "True\n")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("start", ["api.start(lambda words, comm: 0, [])", "api._started(None)"])
 def test_every_start_of_the_program_pairs_them(tmp_path: Path, start: str) -> None:
     shown, warning = words_of(tmp_path, f"{BOUND_TO_ANOTHER}from feti_homog import api; {start}\n{CHECK}")

@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import fcntl
+import os
+
 import pytest
 from support.verified_results import write
 
 
 @pytest.fixture(scope="session")
 def results(tmp_path_factory):
-    """kind -> folder of a result, computed when first asked for."""
-    folders = {}
+    """kind -> folder of a result, computed when first asked for, by one of the processes that run these tests."""
+    own = tmp_path_factory.getbasetemp()
+    common = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "results"
+    common.mkdir(exist_ok=True)
 
     def folder(kind):
-        if kind not in folders:
-            folders[kind] = write(kind, tmp_path_factory.mktemp(kind) / "result")
-        return folders[kind]
+        with open(common / f"{kind}.lock", "w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
+            result = common / kind
+            return result if (result / "result.json").exists() else write(kind, result)
 
     return folder

@@ -11,6 +11,8 @@ from support.verified_results import CARBON, FIBRE, HEXAGONAL, MATRIX, SPRINGS, 
 from feti_homog import Case, run
 from feti_homog.verify.certificate import verify
 
+pytestmark = pytest.mark.slow
+
 INCOMPRESSIBLE = {"young": 3.0, "poisson": 0.45}
 SIZING = {"young": 120.0, "poisson": 0.25, "expansion": 3e-5}
 TOUCHING = {"contact": True, "debonded": [{"fibre": "all", "centre": 20.0, "angle": 90.0}]}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+
 import h5py
 import meshio
 import numpy as np
@@ -60,11 +62,12 @@ def test_fields_that_follow_are_those_of_other_elements(results, kind):
 
 
 @pytest.fixture(scope="module", params=["contact", "spatial contact"])
-def folder(request, results):
-    """Provide a result with its fields in both formats."""
+def folder(request, results, tmp_path_factory):
+    """Provide a copy of a result with its fields in both formats."""
+    copy = shutil.copytree(results(request.param), tmp_path_factory.mktemp("fields") / "copy")
     for kind in ("vtu", "vtkhdf"):
-        assert main(["fields", str(results(request.param)), "--format", kind]) == 0
-    return results(request.param)
+        assert main(["fields", str(copy), "--format", kind]) == 0
+    return copy
 
 
 def test_meshio_reads_every_state(folder):

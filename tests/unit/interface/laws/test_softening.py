@@ -133,6 +133,7 @@ def test_the_onset_of_damage_is_the_quadratic_criterion():
     np.testing.assert_allclose(law.share(traction), law.onset().share(traction), rtol=1e-4)
 
 
+@pytest.mark.slow
 def test_a_tolerance_that_takes_too_many_teeth_is_refused():
     with pytest.raises(CaseError, match="softening_tolerance = 1e-09: with 10000 teeth, the most, the first exceeds"):
         made("bilinear", None, tolerance=1e-9)

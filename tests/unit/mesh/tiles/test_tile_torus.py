@@ -37,6 +37,7 @@ def are_one_to_one(a, b):
     return all(len(np.unique(side)) == len(side) for side in pairs)
 
 
+@pytest.mark.slow
 @named
 def test_all_tiles_are_the_cell(name):
     (torus, tile), whole = torus_of(name), Torus.of(mesh_of(name))

@@ -42,6 +42,7 @@ def test_tiles_make_one_mesh_of_the_torus(name):
     assert set(mesh.triangles.ravel()) == set(range(len(mesh.points)))
 
 
+@pytest.mark.slow
 @named
 def test_tiles_have_the_areas_and_circles_of_the_cell_at_once(name):
     mesh = mesh_of(name)

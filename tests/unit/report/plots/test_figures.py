@@ -107,6 +107,7 @@ def test_all_pictures_are_made(tmp_path: Path, order: int, refine: int) -> None:
         assert min(picture.shape[:2]) > 500 and picture[..., :3].std() > 0.1
 
 
+@pytest.mark.slow
 def test_texts_of_the_user_are_no_formulas(tmp_path: Path, recwarn: pytest.WarningsRecorder) -> None:
     example = sample(4)
     header = replace(example.header, title="costs $\\frac{1$ or 纤维", stress_unit="$$GPa$$", length_unit="$")

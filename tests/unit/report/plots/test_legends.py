@@ -27,6 +27,8 @@ from feti_homog.report.plots.path_picture import figure as path_picture
 from feti_homog.results.field_file import FieldFile
 from feti_homog.results.result_json import SCHEMA
 
+pytestmark = pytest.mark.slow
+
 DRAWING = (figures, deformed_panels, response_curves, traction_plots)
 
 
@@ -74,7 +76,6 @@ def entries(figure: Figure) -> list[str]:
     return [text.get_text() for legend in legends(figure) for text in legend.get_texts()]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("document", [None, path_of([0.5, 0.2, 1.0])], ids=["load cases", "path"])
 def test_legends_cover_nothing(tmp_path: Path, monkeypatch: Any, document: dict[str, Any] | None) -> None:
     write(tmp_path, sample(4), document)
