@@ -22,6 +22,7 @@ from feti_homog.typing import Float
 
 EITHER, EITHER_STIFFNESS = "(3,) or (6,)", "(3, 3) or (6, 6)"
 ENERGY = f"{STRESS} times that of the cell"
+PER_DEGREE = f"{STRESS} per unit of temperature"
 TEMPERATURE = "change of temperature, in generalized plane strain with expansions"
 DEBONDED_ANGLE = (
     "the same in degrees of arc, `debonded_length` / radius; of a fibre that is not round, or whose coating has an "
@@ -40,14 +41,9 @@ class MeshError:
     effective_stiffness_compression: Float | None = described(
         "the same under minus the unit strains, with contact", STRESS, EITHER_STIFFNESS, default=None
     )
-    thermal_stress: Float | None = described(
-        "error of each entry", f"{STRESS} per unit of temperature", "(6,)", default=None
-    )
+    thermal_stress: Float | None = described("error of each entry", PER_DEGREE, "(6,)", default=None)
     thermal_stress_compression: Float | None = described(
-        "the same under minus a unit of temperature, with contact",
-        f"{STRESS} per unit of temperature",
-        "(6,)",
-        default=None,
+        "the same under minus a unit of temperature, with contact", PER_DEGREE, "(6,)", default=None
     )
     thermal_expansion: Float | None = described("error of each entry", "1 / temperature", "(6,)", default=None)
     constants: Mapping[str, float] = described(
@@ -110,7 +106,7 @@ class AnglePoint:
     )
     thermal_stress: Float | None = described(
         "stress under a unit of temperature at no strain, of generalized plane strain",
-        f"{STRESS} per unit of temperature",
+        PER_DEGREE,
         "(6,)",
         tuple(f"thermal_{name}" for name in SPATIAL_STRESSES),
         default=None,
@@ -159,6 +155,11 @@ class PathPoint:
     stored_in_springs: float = described("the share of elastic interfaces in it", STRESS)
     mesh_error: float | None = described(
         "estimated relative error of `stored` by the mesh, at the points that `states` in [output] chooses",
+        default=None,
+    )
+    load_mesh_error: float | None = described(
+        "estimated relative error by the mesh of the load at which bonds break at an event of the first leg, at the "
+        "same points; absent with friction, beside damaged bonds, and at tips and corners of rigid bonds",
         default=None,
     )
     dissipated_mesh_error: float | None = described(
@@ -218,9 +219,7 @@ class Peak:
 
     stress_name: str = described("name of the component")
     strain_name: str = described("name of its strain")
-    stress: float = described(
-        "the largest in magnitude up to that fall, or of all points without one, with its sign", STRESS
-    )
+    stress: float = described("the largest in magnitude up to that fall, or of all without one, with its sign", STRESS)
     strain: float = described("macroscopic strain there")
     event: int = described("number of its point in `path`, from 0")
     first_break_stress: float | None = described("stress where the first bonds break", STRESS, default=None)
@@ -275,6 +274,9 @@ class EnvelopePoint:
         "load at onset, in the unit of the axes: their values are `factor` times cosine and sine of `angle`; 0 if the "
         "change of temperature alone breaks a bond",
         default=None,
+    )
+    mesh_error: float | None = described(
+        "estimated relative error of `factor` by the mesh; absent at tips and corners of rigid bonds", default=None
     )
     strain: Float | None = described(
         "macroscopic strain at onset", "", EITHER, STRAINS, spatial_components=SPATIAL_STRAINS, default=None

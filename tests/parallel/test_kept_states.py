@@ -86,7 +86,7 @@ def states_of(folder: Path) -> list[dict[str, Any]]:
 
 
 # Of kept points; the last is a sum whose terms are interpolated between them.
-OF_KEPT = {"tips", "mesh_error", "dissipated_mesh_error"}
+OF_KEPT = {"tips", "mesh_error", "load_mesh_error", "dissipated_mesh_error"}
 
 
 def document(folder: Path) -> dict[str, Any]:

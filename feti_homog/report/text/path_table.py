@@ -97,9 +97,10 @@ def _peak_lines(document: Document, peak: Mapping[str, Any], label: str) -> list
         "the first break": peak.get("first_break_event"),
         f"the {_largest(peak)[1]}": peak["event"],
     }
-    errors = {words: document["path"][event].get("mesh_error") for words, event in events.items() if event is not None}
-    known = [f"{error:.1e} at {words}" for words, error in errors.items() if error is not None]
-    text += f"; mesh error, of the energy, {', '.join(known)}" if known else ""
+    for name, of in (("mesh_error", "energy"), ("load_mesh_error", "load")):
+        errors = {words: document["path"][event].get(name) for words, event in events.items() if event is not None}
+        known = [f"{error:.1e} at {words}" for words, error in errors.items() if error is not None]
+        text += f"; mesh error, of the {of}, {', '.join(known)}" if known else ""
     lines = wrap(text, WIDTH, subsequent_indent="  ")
     if path_curves.scales_with_toughness(document):
         lines.append("Scaling: strains and stresses of the path are as the root of the toughness")
