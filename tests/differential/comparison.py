@@ -26,7 +26,7 @@ ENERGIES = {
 }  # fmt: skip
 RATES = {"G", "G_I", "G_II"}
 DIRECTIONS = {"angle", "bond_angle", "psi"}
-COUNTS = {"broke", "bonded", "open", "closed", "free_motions", "fibre", "interface", "number", "elements"}
+COUNTS = {"broke", "softened", "bonded", "open", "closed", "free_motions", "fibre", "interface", "number", "elements"}
 PLACES = "fibres[].centre"  # on the torus
 # Of moduli, measured by 1: they may vanish.
 RATIOS = {"eta1", "eta2", "deviation", "anisotropy", "nu12", "nu21", "nu13", "nu23", "nu_axial", "nu_transverse"}

@@ -19,6 +19,7 @@ import tomli_w
 
 from differential.paths import document_of
 from differential.random_cases import ON_ALL_RANKS, RELATIONS, Drawn, draw, stream
+from differential.random_softening import softens
 from differential.relations import ALWAYS, DRAWN, RANKS, Relation, Setting
 from feti_homog import run
 from feti_homog.errors import CaseError, FetiHomogError, MeshError, NotCarriedError
@@ -47,15 +48,21 @@ class Row:
     note: str = ""
 
 
-def examine(comm: Any, seed: int, numbers: Sequence[int], folder: Path, of_each: int = DRAWN_PER_CASE) -> list[Row]:
-    """Return the rows of all cases, on every rank. Collective; `folder` is one that all ranks see."""
+def examine(
+    comm: Any, seed: int, numbers: Sequence[int], folder: Path, of_each: int = DRAWN_PER_CASE, soft: bool = False
+) -> list[Row]:
+    """Return the rows of all cases, if `soft` of those whose bonds soften, on every rank.
+
+    Collective; `folder` is one that all ranks see.
+    """
     from mpi4py import MPI
 
     own: list[Row] = []
     for number in numbers:
         if _claimed(folder, number):
-            found = _alone(MPI.COMM_SELF, seed, number, folder / f"case-{number}", of_each)
-            report(seed, found, folder)
+            found = _alone(MPI.COMM_SELF, seed, number, folder / f"case-{number}", of_each, soft)
+            if found:
+                report(seed, found, folder)
             own += found
     rows = [row for of_rank in comm.allgather(own) for row in of_rank]
     ran = sorted(row.number for row in rows if row.relation == RUNS and row.verdict == HELD)
@@ -80,11 +87,13 @@ def _claimed(folder: Path, number: int) -> bool:
     return True
 
 
-def _alone(comm: Any, seed: int, number: int, folder: Path, of_each: int) -> list[Row]:
-    """Return the rows of a case on one rank."""
+def _alone(comm: Any, seed: int, number: int, folder: Path, of_each: int, soft: bool) -> list[Row]:
+    """Return the rows of a case on one rank, none of one that is not wanted."""
     folder.mkdir()
     try:
         drawn = draw(seed, number, folder)
+        if soft and not softens(drawn.document):
+            return []
         run(drawn.case, comm, out=folder / "out")
     except Exception as error:
         return [_of_error(number, RUNS, error, (CaseError, MeshError, NotCarriedError))]

@@ -9,13 +9,17 @@ import numpy as np
 
 from differential import comparison, transforms
 from differential.comparison import apart, envelopes_apart
-from differential.paths import keyed
+from differential.paths import changed, keyed
 from differential.random_cases import Drawn
 from differential.random_loads import NAMES, components
 from differential.random_phases import Document
+from differential.random_softening import softens
 from differential.setting import Compared, Setting
+from differential.transforms import sections
+from feti_homog.case.bond_laws import COHESIVE, STIFFNESSES
 
 FAR = 2.0  # times the load at onset
+KEPT = {"contact", "debonded", "between", "scatter", "axial_stiffness", *STIFFNESSES, *COHESIVE[:2]}
 
 
 def split_way(setting: Setting) -> Compared:
@@ -57,7 +61,7 @@ def _joined(path: list[Any], legs: int, leg: int, share: float) -> list[Any]:
     points, cut = [], (leg + 1) / (legs + 1)
     for point in path:
         place = point["load_factor"] * (legs + 1)
-        if abs(point["load_factor"] - cut) < 1e-12 and not point["broke"]:
+        if abs(point["load_factor"] - cut) < 1e-12 and not changed(point):
             continue
         if place > leg + 1:
             place = max(place - 1, leg + share + (1 - share) * (place - leg - 1))
@@ -136,7 +140,7 @@ def onset(setting: Setting) -> Compared:
         way.append(ray | {"temperature": section["temperature"]})
     for name, part in zip(section["plane"], (np.cos(angle), np.sin(angle)), strict=True):
         ray[name] = float(FAR * point["factor"] * part)
-    document |= {"path": {"waypoints": [*way, ray], "max_events": 100_000}}
+    document = _of_onset(document) | {"path": {"waypoints": [*way, ray], "max_events": 100_000}}
     document["analysis"] = document["analysis"] | {"type": "path"}
     first = _first_break(setting, document)
     if first is None:
@@ -146,6 +150,25 @@ def onset(setting: Setting) -> Compared:
     both = [[own | {"factor": x["factor"]} for own in [{k: p[k] for k in ("strain", "stress")}]]
             for x, p in ((point, point), (found, first))]  # fmt: skip
     return Compared(*max(envelopes_apart(*both)))
+
+
+def _of_onset(document: Document) -> Document:
+    """Return a case whose bonds break, by both strengths, where those that soften are first damaged: before teeth."""
+    if not softens(document):
+        return document
+    found = []
+    for section in sections(document):
+        of_table = {} if "openings" not in section else {
+            "normal_strength": section["tractions"][0],
+            "normal_stiffness": section["tractions"][0] / section["openings"][0],
+        }  # fmt: skip
+        own = {key: section[key] for key in KEPT & section.keys()} | of_table | {"criterion": "quadratic"}
+        if "axial_stiffness" in own:
+            # All shear counts by its energy.
+            share = own["axial_stiffness"] / own["tangential_stiffness"]
+            own["axial_strength"] = own["tangential_strength"] * share**0.5
+        found.append(own)
+    return document | {"interface": found if isinstance(document["interface"], list) else found[0]}
 
 
 def _first_break(setting: Setting, document: Document) -> Any:

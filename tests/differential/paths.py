@@ -7,11 +7,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 
 from differential.comparison import DIFFERENT, apart
 from differential.transforms import sections, waypoints
+from feti_homog.verify.bonds import held_traction, law_at
+from feti_homog.verify.reading import opened
 
 # Bonds break together up to UTILISATION_TIE; between these shares of it the solver's error decides.
 TIE = 1e-5
@@ -27,12 +28,17 @@ def keyed(path: Sequence[Point], legs: int, by_steps: bool) -> dict[tuple[Any, .
     for number, point in enumerate(path):
         if by_steps:
             found["step", number] = point
-        elif point["broke"]:
+        elif changed(point):
             found["break", broken] = point
         elif abs(leg := point["load_factor"] * legs - round(point["load_factor"] * legs)) < LEG_END:
             found["end", round(point["load_factor"] * legs - leg)] = point
-        broken += point["broke"]
+        broken += changed(point)
     return found
+
+
+def changed(point: Point) -> int:
+    """Count the bonds that break, or lose a tooth, at a point."""
+    return int(point["broke"]) + int(point.get("softened") or 0)
 
 
 def paths_apart(base: Any, other: Any, folder: Path) -> tuple[list[tuple[float, str]], str]:
@@ -55,7 +61,7 @@ def paths_apart(base: Any, other: Any, folder: Path) -> tuple[list[tuple[float, 
 
 
 def _alike(ours: Point, theirs: Point | None) -> bool:
-    return theirs is not None and all(ours[name] == theirs[name] for name in ("broke", "bonded"))
+    return theirs is not None and all(ours.get(name) == theirs.get(name) for name in ("broke", "softened", "bonded"))
 
 
 def _points_apart(ours: Any, theirs: Any) -> list[tuple[float, str]]:
@@ -70,37 +76,12 @@ def ties(document: Any, folder: Path, number: int) -> bool:
     states = document.get("states") or []
     if number not in states:
         return False
-    with h5py.File(folder / "result.h5", "r") as file:
-        state = file[f"state/{states.index(number)}"]
-        traction, status = state["traction"][()], state["status"][()]
-        along = state["axial_traction"][()] if "axial_traction" in state else np.zeros(len(status))
-        pair = file["interface/pair"][()] if "interface/pair" in file else np.zeros(len(status), int)
+    with opened(folder) as files:
+        state = next(state for k, state in enumerate(files.states()) if k == states.index(number))
+        used = law_at(files, damage=state.damage).utilisation(held_traction(files, state))[state.status == 0]
     point = document["path"][number]
-    used = [_used(section, np.column_stack([traction, along])[(pair == k) & (status == 0)])
-            for k, section in enumerate(sections(document["case"]))]  # fmt: skip
-    close = np.abs(np.concatenate([*used, _used_by_tips(document["case"], point)]) - 1) < TIE
-    return bool(np.count_nonzero(close) > point["broke"])
-
-
-def _used(section: Any, traction: np.ndarray) -> np.ndarray:
-    """(k,) share of their strength, or root of that of their toughness, that tractions (k, 3) use."""
-    pulls = np.column_stack([np.maximum(traction[:, 0], 0.0), np.abs(traction[:, 1:])])
-    if section["criterion"] == "energy":
-        n, t = (float(section[f"{side}_stiffness"]) for side in ("normal", "tangential"))
-        rates = pulls**2 / (2 * np.array([n, t, float(section.get("axial_stiffness") or t)]))
-        return _root_of_share(section, rates[:, 0], rates[:, 1] + rates[:, 2])
-    n, t = (float(section.get(f"{side}_strength") or np.inf) for side in ("normal", "tangential"))
-    shares = pulls / np.array([n, t, float(section.get("axial_strength") or t)])
-    return np.asarray(
-        shares.max(axis=1, initial=0.0) if section["criterion"] == "max" else np.hypot.reduce(shares, axis=1)
-    )
-
-
-def _root_of_share(section: Any, opening: Any, shear: Any) -> np.ndarray:
-    """(k,) root of G / G_c of rates G_I and G_II."""
-    psi = np.arctan2(np.sqrt(shear), np.sqrt(opening))
-    toughness = section["toughness"] * (1 + np.tan((1 - section["mode_sensitivity"]) * psi) ** 2)
-    return np.asarray(np.sqrt((opening + shear) / toughness))
+    close = np.abs(np.concatenate([used, _used_by_tips(document["case"], point)]) - 1) < TIE
+    return bool(np.count_nonzero(close) > changed(point))
 
 
 def _used_by_tips(case: Any, point: Point) -> np.ndarray:
@@ -110,6 +91,13 @@ def _used_by_tips(case: Any, point: Point) -> np.ndarray:
         return np.zeros(0)
     rates = zip(tips.get("interface", [1] * len(tips["fibre"])), tips["G_I"], tips["G_II"], strict=True)
     return np.array([_root_of_share(found[i - 1], opening, shear) for i, opening, shear in rates])
+
+
+def _root_of_share(section: Any, opening: Any, shear: Any) -> np.ndarray:
+    """(k,) root of G / G_c of rates G_I and G_II."""
+    psi = np.arctan2(np.sqrt(shear), np.sqrt(opening))
+    toughness = section["toughness"] * (1 + np.tan((1 - section["mode_sensitivity"]) * psi) ** 2)
+    return np.asarray(np.sqrt((opening + shear) / toughness))
 
 
 def document_of(folder: Path) -> Any:

@@ -10,6 +10,7 @@ import numpy as np
 from differential.random_cells import random_cell
 from differential.random_loads import random_bonds, random_friction, random_loads
 from differential.random_phases import Document, random_phases
+from differential.random_softening import random_rubbing, random_scatter, random_softening
 from differential.transforms import sections
 from feti_homog import Case
 
@@ -29,7 +30,7 @@ DECOMPOSITIONS: tuple[Document, ...] = (
     {"decomposition": {"max_dofs": 200}},
 )
 # Streams of random numbers of a case: those of one do not depend on how many others draw.
-CASE, RELATIONS, ON_ALL_RANKS, FRICTION = 0, 1, 2, 3
+CASE, RELATIONS, ON_ALL_RANKS, FRICTION, RUBBING, SOFTENING, SCATTER = range(7)
 
 
 @dataclass(frozen=True)
@@ -94,6 +95,9 @@ def draw(seed: int, number: int, folder: Path) -> Drawn:
     document |= DECOMPOSITIONS[rng.choice(len(DECOMPOSITIONS), p=[0.6, 0.2, 0.15, 0.05])]
     if analysis in ("stiffness", "load") and rng.random() < 0.4:
         document["petsc"] |= SOLVERS[rng.integers(len(SOLVERS))]
+    random_softening(stream(seed, number, SOFTENING), document, length)
+    random_scatter(stream(seed, number, SCATTER), document)
     if analysis == "path":
         random_friction(stream(seed, number, FRICTION), sections(document), plane)
+        random_rubbing(stream(seed, number, RUBBING), document)
     return Drawn(seed, number, document, folder)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from differential import other_results, same_results
+from differential.brute_force import by_brute_force, is_affordable
 from differential.comparison import DIFFERENT
 from differential.random_cases import Drawn
 from differential.setting import Compared, Setting
@@ -97,6 +98,7 @@ DRAWN = (
     Relation("influence columns", same_results.influence_columns, _has_interface, weight=1),
     Relation("split way", other_results.split_way, _is_path_of_events, weight=4),
     Relation("resume", same_results.resume, _is_path, weight=4),
+    Relation("brute force", by_brute_force, is_affordable, weight=4),
     Relation("stress back", other_results.stress_back, _is_linear, weight=2, refusals=(NotCarriedError,)),
     Relation("onset", other_results.onset, _is_envelope, weight=6),
 )

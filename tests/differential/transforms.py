@@ -45,7 +45,8 @@ def reordered(rng: np.random.Generator, document: Document) -> tuple[Document, l
     Of each fibre, and of each section, the place that it had.
     """
     case = copy.deepcopy(document)
-    fibres, places = _shuffled_rows(rng, case["cell"])
+    scattered = any("scatter" in section for section in sections(case))
+    fibres, places = _shuffled_rows(rng, case["cell"], scattered)
     for section in sections(case):
         if "between" in section:
             section["between"] = section["between"][::-1]
@@ -61,9 +62,12 @@ def reordered(rng: np.random.Generator, document: Document) -> tuple[Document, l
     return _reversed_keys(case), fibres, order
 
 
-def _shuffled_rows(rng: np.random.Generator, cell: Document) -> tuple[list[int], list[int]]:
-    """Reorder the rows of a table; of each fibre the number, from 0, that it had, twice."""
-    rows = cell.get("fibre_list", [])
+def _shuffled_rows(rng: np.random.Generator, cell: Document, scattered: bool) -> tuple[list[int], list[int]]:
+    """Reorder the rows of a table; of each fibre the number, from 0, that it had, twice.
+
+    Strengths that are drawn belong to the numbers: such rows keep their order.
+    """
+    rows = [] if scattered else cell.get("fibre_list", [])
     order = rng.permutation(len(rows)).tolist()
     if rows:
         cell["fibre_list"] = [rows[k] for k in order]

@@ -80,8 +80,8 @@ class SolvedAnew:
         of_phase = np.zeros(n, int)
         of_phase[self.triangles] = self.phase[:, None]
         alike = pairs[of_phase[pairs[:, 0]] == of_phase[pairs[:, 1]]]
-        self.place = _components(n, pairs)
-        self.node = _components(n, alike)
+        self.place = components_of(n, pairs)
+        self.node = components_of(n, alike)
         self.n = int(self.node.max()) + 1
 
     def _assemble(self) -> None:
@@ -125,9 +125,11 @@ class SolvedAnew:
         self.joined = np.where(parted, np.arange(self.n), first[place_of])
         pair = own["pair"][()] if "pair" in own else np.zeros(self.k, int)
         self.springs = self._springs()[pair] if self.k else np.zeros((0, 3))
-        rubbing = [(each.get("friction", 0.0), each.get("axial_friction") == "prevented")
+        rubbing = [(each.get("friction", 0.0), each.get("axial_friction") == "prevented",
+                    each.get("friction_on_damage", False))
                    for each in sections(self.document["case"]) or [{}]]  # fmt: skip
-        self.friction, tied = np.array(rubbing, float)[pair].T if self.k else np.zeros((2, 0))
+        self.friction, tied, on_damage = np.array(rubbing, float)[pair].T if self.k else np.zeros((3, 0))
+        self.rubs_on_damage = (on_damage > 0.0) & (self.friction > 0.0)
         self.tied = (tied > 0.0) & (self.friction > 0.0)
 
     def _springs(self) -> np.ndarray:
@@ -145,10 +147,16 @@ class SolvedAnew:
         load, stress = self._loads(state)
         holds = np.column_stack([status != OPEN, status == BONDED, status == BONDED])
         rubs = np.column_stack([np.zeros(self.k, bool), self.friction > 0.0, self.tied]) & (status == CLOSED)[:, None]
+        damage = state["damage"][()]
+        softened = (status == BONDED) & (damage > 0.0)
+        rubs[:, 1] |= softened & self.rubs_on_damage
         glued, sprung = holds & np.isinf(self.springs), holds & np.isfinite(self.springs)
         whole = glued.all(axis=1)
         jumps = self._jumps()
-        springs = (np.where(sprung, self.springs, 0.0) * self.length[:, None]).ravel()
+        pulled = state["traction"][:, 0] > 0.0
+        kept = np.where(softened, 1.0 - damage, 1.0)
+        kept = np.column_stack([np.where(pulled, kept, 1.0), kept, kept])
+        springs = (np.where(sprung, kept * self.springs, 0.0) * self.length[:, None]).ravel()
         T = self._together(whole)
         held = (rubs | glued & ~whole[:, None]).ravel()
         C = (jumps[held] @ T).tocsr()
@@ -157,12 +165,15 @@ class SolvedAnew:
         u, force = _solved((T.T @ K @ T).tocsr(), C, -T.T @ (self.Q @ load), slip)
         u = T @ u
         jump = jumps @ u
-        pull = springs * jump
-        pull[held] -= force
+        pull, rubbing = springs * jump, np.zeros(3 * self.k)
+        rubbing[held] -= force
+        pull += rubbing
         area = float(self.size.prod())
         found = (self.mean @ load + self.Q.T @ u) / area
-        # Springs are in series with faces that rub.
-        rubbed = np.where(rubs, pull.reshape(-1, 3) ** 2 / self.springs, 0.0).sum(axis=1)
+        # Springs are in series with faces, and damaged shares of bonds, that rub.
+        share = np.where(rubs, damage[:, None], 1.0)
+        rubbing = np.where(rubs, rubbing.reshape(-1, 3), 0.0)
+        rubbed = (rubbing**2 / (share * self.springs)).sum(axis=1)
         energy = (load @ self.mean @ load + u @ (K @ u) + (rubbed / self.length).sum()) / 2 + load @ self.Q.T @ u
         v = len(stress)
         found = found[:6] if v == 6 else found[IN_PLANE]
@@ -174,8 +185,10 @@ class SolvedAnew:
         forces = pull.reshape(-1, 3)
         # Where faces bear next to nothing, as of a fibre that one of them touches, their forces are rounding.
         largest = max(np.abs(forces).max(initial=0.0), LEAST * size * self.length.max(initial=0.0)) or 1.0
-        contact, rubbing = self._contact(status, jump, forces / largest, entry), self._rubbing(state, forces / largest)
-        return Twin(float(np.abs(found - stress).max() / size), off, contact, rubbing)
+        contact = self._contact(status, jump, forces / largest, entry)
+        pressed = np.where(pulled, -forces[:, 0], forces[:, 0])[softened].max(initial=0.0) / largest
+        sheared = self._rubbing(state, rubs, rubbing[:, 1] / largest, share[:, 1] * forces[:, 0] / largest)
+        return Twin(float(np.abs(found - stress).max() / size), off, max(contact, float(pressed)), sheared)
 
     def _loads(self, state: Any) -> tuple[np.ndarray, np.ndarray]:
         strain, stress = (np.array(state.attrs[name], float) for name in ("strain", "stress"))
@@ -210,7 +223,7 @@ class SolvedAnew:
         pairs = np.concatenate(
             [np.column_stack([np.arange(self.n), self.joined]), np.column_stack([self.fibre, self.matrix])[whole]]
         )
-        number = _components(self.n, pairs)
+        number = components_of(self.n, pairs)
         count = int(number.max()) + 1
         one = csr_matrix((np.ones(self.n), (np.arange(self.n), number)), shape=(self.n, count))
         return block_diag([one] * 3).tocsr()[_interleaved(self.n)][:, _interleaved(count)]
@@ -229,21 +242,19 @@ class SolvedAnew:
         along = state["axial_jump"][()] if "axial_jump" in state else np.zeros(self.k)
         return np.column_stack([state["jump"][()], along])
 
-    def _rubbing(self, state: Any, pull: np.ndarray) -> float:
-        """Compute what shear exceeds mu p, or differs from it where faces slide, of relative forces (k, 3)."""
-        if not self.friction.any():
-            return 0.0
-        shear, limit = pull[:, 1], self.friction * np.maximum(-pull[:, 0], 0.0)
-        closed, sign = (state["status"][()] == CLOSED) & (self.friction > 0.0), state["sliding"][()]
+    def _rubbing(self, state: Any, rubs: np.ndarray, shear: np.ndarray, pull: np.ndarray) -> float:
+        """Compute what shear exceeds mu p, or differs from it where faces slide, of relative forces (k,) that rub."""
+        limit, own = self.friction * np.maximum(-pull, 0.0), rubs[:, 1]
+        sign = state["sliding"][()]
         off = np.where(sign != 0, np.abs(sign * shear - limit), np.maximum(np.abs(shear) - limit, 0.0))
-        return float(off[closed].max(initial=0.0))
+        return float(off[own].max(initial=0.0))
 
 
 def _largest(load: np.ndarray) -> float:
     return float(np.abs(load[:6]).max()) or 1.0
 
 
-def _components(n: int, pairs: np.ndarray) -> np.ndarray:
+def components_of(n: int, pairs: np.ndarray) -> np.ndarray:
     """(n,) number of the connected component of each of n."""
     ones = np.ones(len(pairs))
     return np.asarray(connected_components(coo_matrix((ones, pairs.T), shape=(n, n)), directed=False)[1])

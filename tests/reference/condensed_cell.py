@@ -62,7 +62,7 @@ class State:
 
 
 class CondensedCell:
-    """The cell of a programme with bonds of glue, or of the `springs` (d,) per length.
+    """The cell of a programme with bonds of glue, or of the `springs` (d,) per length, or (k, d) of each.
 
     `contact` keeps debonded faces from overlapping.
     """
@@ -74,7 +74,7 @@ class CondensedCell:
         self.k, self.m = len(programme.key), programme.Q.shape[1]
         self.d = programme.K.shape[0] // programme.n
         self.n = self.k * self.d
-        stiffness = np.zeros(self.d) if springs is None else np.asarray(springs)[: self.d]
+        stiffness = np.zeros(self.d) if springs is None else np.asarray(springs)[..., : self.d]
         self.glued, self.springs = springs is None, self.lengths[:, None] * stiffness
         self.A = self._condensed()
         self.scale = self.A.diagonal().max()

@@ -34,8 +34,9 @@ APART = {"case", "digest", "version", "timings", "memory", "checksum", "result_h
 OF_CASE = {
     r"young|E\d|E_\w+|G\d\d|G_\w+|stiffness|\w+_strength|S\d\d|stress": (1, 0, 0),
     r"(normal|tangential|axial)_stiffness": (1, -1, 0),
-    r"toughness\w*": (1, 1, 0),
-    r"width|height|(fibre_|inner_)?radius|x|y|a|b": (0, 1, 0),
+    r"tractions": (1, 0, 0),
+    r"\w*toughness": (1, 1, 0),
+    r"width|height|openings|(fibre_|inner_)?radius|x|y|a|b": (0, 1, 0),
     r"expansion\w*": (0, 0, -1),
     r"temperature": (0, 0, 1),
 }

@@ -11,10 +11,12 @@ import numpy as np
 import pytest
 from differential import transforms
 from differential.__main__ import CASES, SEED
+from differential.brute_force import followed, is_affordable, points_compared
 from differential.comparison import DIFFERENT, apart, envelopes_apart, leaves
 from differential.paths import document_of, keyed, paths_apart
 from differential.random_cases import draw, stream
 from differential.random_loads import STEPS
+from differential.random_softening import SOFTENING
 from differential.twin import SolvedAnew
 from mpi4py import MPI
 from support import dimensions
@@ -22,8 +24,9 @@ from support.dimensions import Units
 
 from feti_homog import run
 
-WRONG = 1e-6
+WRONG, LESS = 1e-6, 0.99
 STATE, LAST = "state/0", STEPS - 1
+COHESIVE = {"teeth", "softening_tolerance", "mixing_exponent", "friction_on_damage", "scatter"}
 SHAPES = {"ellipses": "a", "polygons": "sides", "hollow fibres": "inner_radius", "coatings": "coating"}
 
 
@@ -35,10 +38,12 @@ def kinds(drawn):
     has = {cell["geometry"], drawn.analysis, f"plane {drawn.plane}", f"order {cell['order']}", cell["bodies"]}
     has |= {name for name, key in SHAPES.items() if key in cell or any(key in row for row in rows)}
     has |= {"voids"} if "voids" in cell or any(row.get("phase") == "void" for row in rows) else set()
+    has |= {"own strengths"} & {"own strengths" * any("strength" in row for row in rows)}
     has |= {"refined"} & {"refined" * cell.get("refine", 0)}
     has |= {"pieces"} & {"pieces" * ("decomposition" in document)}
     for section in sections:
-        has |= {f"contact {section['contact']}", str(section.get("criterion")), str(section.get("growth"))}
+        law = str(section.get("law", section.get("criterion")))
+        has |= {f"contact {section['contact']}", law, str(section.get("growth")), *(COHESIVE & section.keys())}
         has |= {"friction"} if section.get("friction") else set()
         has |= {f"axial friction {section['axial_friction']}"} if "axial_friction" in section else set()
         has |= {"springs" if "normal_stiffness" in section else "glue", "arcs" * bool(section.get("debonded"))}
@@ -62,7 +67,7 @@ def test_the_cases_of_ci_cover_the_language(tmp_path):
         "plane strain", "plane stress", "plane generalized", "order 1", "order 2", "torus", "plane", *SHAPES, "voids",
         "refined", "pieces", "contact True", "contact False", "max", "quadratic", "energy", "released", "springs",
         "glue", "arcs", "bonded", "1 interfaces", "2 interfaces", "events", "increments", "legs", "stresses",
-        "temperature", "friction", "axial friction prevented",
+        "temperature", "friction", "axial friction prevented", *SOFTENING, *COHESIVE, "own strengths",
     }  # fmt: skip
     assert expected <= found.keys(), expected - found.keys()
 
@@ -98,6 +103,11 @@ def is_load(drawn):
 def rubs(drawn):
     """Return True for increments with friction; their states are all kept."""
     return drawn.document.get("path", {}).get("method") == "increments" and "friction" in kinds(drawn)
+
+
+def is_soft(drawn):
+    """Return True for a leg along which many bonds soften, without friction."""
+    return {"events", "teeth", "contact False"} <= kinds(drawn) and not {"friction", "legs"} & kinds(drawn)
 
 
 def put(document, path, place=0):
@@ -188,6 +198,37 @@ def test_the_solve_by_scipy_notices_faces_that_slide_otherwise(solved, part, fac
         assert (max(vars(found).values()) < 1e-8) == expected and (getattr(found, noticed) < 1e-4) == expected
 
 
+def test_the_solve_by_scipy_notices_other_damage(solved):
+    _, folder = solved(is_soft)
+    with h5py.File(folder / "result.h5", "r+") as file:
+        partly = {
+            n: np.count_nonzero((d > 0) & (d < 1)) for n in file["state"] for d in [file[f"state/{n}/damage"][()]]
+        }
+        number = max(partly, key=partly.get)
+        assert partly[number] > 5
+        damage = file[f"state/{number}/damage"]
+        for factor, noticed in ((1.0, False), (LESS, True), (1 / LESS, False)):
+            damage[...] = damage[()] * factor
+            file.flush()
+            cell = SolvedAnew(folder)
+            found = cell.compare(int(number))
+            cell.file.close()
+            assert (max(found.stress, found.energy) > 1e-8) == noticed
+
+
+def test_brute_force_notices_a_wrong_path(solved):
+    drawn, folder = solved(is_soft)
+    base = document_of(folder)
+    assert is_affordable(drawn, base)
+    points = followed(drawn, base, folder)
+    assert points_compared(base, points, folder).deviation < 1e-11
+    for name in ("stress", "fracture_energy", "dissipated"):
+        wrong = put(base, f"path[].{name}", len(base["path"]) - 1)
+        assert points_compared(wrong, points, folder).deviation > 1e-5 * WRONG, name
+    fewer = base | {"path": [base["path"][0] | {"softened": base["path"][0]["softened"] + 1}, *base["path"][1:]]}
+    assert points_compared(fewer, points, folder).deviation == DIFFERENT
+
+
 def test_streams_of_a_case_do_not_depend_on_others():
     assert stream(1, 2, 0).random() == stream(1, 2, 0).random() != stream(1, 2, 1).random()
 
@@ -201,5 +242,10 @@ def test_a_case_in_other_units_and_in_another_order(tmp_path: Path):
     assert other["cell"]["fibre_list"][0] == {"x": 100.0, "a": 50.0} and other["cell"]["width"] == 200.0
     assert other["interface"]["toughness"] == 3000.0 and other["interface"]["normal_stiffness"] == 0.5
     assert other["interface"]["debonded"] == document["interface"]["debonded"]
+    table = {"openings": [2.0, 3.0], "tractions": [4.0, 0.0], "normal_toughness": 5.0, "mixing_exponent": 6.0}
+    found = transforms.in_units(document | {"interface": table}, Units(10.0, 100.0))["interface"]
+    assert found == {
+        "openings": [200.0, 300.0], "tractions": [40.0, 0.0], "normal_toughness": 5000.0, "mixing_exponent": 6.0,
+    }  # fmt: skip
     same, fibres, _ = transforms.reordered(np.random.default_rng(1), document)
     assert fibres == [0] and same["interface"]["debonded"][0]["fibre"] == 1
