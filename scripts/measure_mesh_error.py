@@ -1,16 +1,23 @@
 """Measures how good the estimated errors of the mesh are: true error / estimate, on one rank.
 
     .venv/bin/python scripts/measure_mesh_error.py [--only WORDS] [--refine N] [--nested]
+    .venv/bin/python scripts/measure_mesh_error.py --factors [--only WORDS] [--refine N]
 
 For each cell, each order of elements and each of three refinements the least and the largest ratio over the entries of
 the stiffness that are above 1e-3 of its largest; then over all cells how many lie between 0.5 and 2.  Exact values are
 spectral (tests/reference/references.py) or of quadratic elements refined twice more.
+
+`--factors` prints what `NESTED`, `LOCKED` and `SAMPLED` of feti_homog/homogenization/mesh_error.py hold: errors of
+elements and of arcs by the mesh itself over those by the mesh refined less, of the diagonal, cells cut by bodies and
+across materials.
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +29,12 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from reference.references import ARC_OF_120_DEGREES_FINE, AXIAL_SHEAR, BONDED, ELASTIC, VOID
 
 from feti_homog import Case, run
+from feti_homog.analysis.context import AnalysisContext
+from feti_homog.homogenization.mesh_error import energy_errors, factors, is_nested
+from feti_homog.homogenization.nested_interiors import locks
+from feti_homog.homogenization.partition_policy import BY_COST
+from feti_homog.homogenization.unit_cell import tear
+from feti_homog.runtime.progress import Progress
 from feti_homog.typing import Float
 
 SIZES = {1: (0.1, 0.05, 0.025), 2: (0.2, 0.1, 0.05)}
@@ -52,6 +65,11 @@ def case(cell: dict[str, Any], phases: Any = PAPER, interface: Any = None, plane
 def springs(normal: float, tangential: float) -> dict[str, Any]:
     """Return an interface on springs."""
     return {"contact": False, "normal_stiffness": float(normal), "tangential_stiffness": float(tangential)}
+
+
+def locking(poisson: float, contrast: float) -> dict[str, Any]:
+    """Return the phases of a composite whose matrix hardly changes its volume."""
+    return {"matrix": {"young": 1.0, "poisson": poisson}, "fibre": {"young": contrast, "poisson": 0.3}}
 
 
 def orthotropic(C11: float, C12: float, C33: float, C22: float | None = None) -> Float:
@@ -107,6 +125,11 @@ def twins() -> list[Known]:
         "arc of 180 degrees": case(lattice("square"), GLASS, arc(180.0, centre=45.0)),
         "arc with contact": case(lattice("square"), interface=arc(120.0, contact=True)),
         "nu = 0.45": case(lattice("hexagonal", 0.6), GLASS | {"matrix": {"young": 3.0, "poisson": 0.45}}),
+        "locking hexagonal 0.49": case(lattice("hexagonal", 0.6), locking(0.49, 10)),
+        "locking random 0.49": case(lattice("random", 0.5, **cell), locking(0.49, 1000)),
+        "locking hexagonal 0.4999": case(lattice("hexagonal"), locking(0.4999, 1000)),
+        "locking square 0.4999": case(lattice("square", 0.3), locking(0.4999, 100)),
+        "locking random 0.4999": case(lattice("random", 0.5, **cell), locking(0.4999, 10)),
     }
     return [(name, document, None) for name, document in cases.items()]
 
@@ -128,24 +151,73 @@ def ratios(document: dict[str, Any], exact: Float, order: int, size: float, argu
     return np.asarray(np.abs(found - exact)[matters] / estimate[matters])
 
 
-def main() -> None:
-    """One line a cell and order."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--only", default="", metavar="WORDS", help="cells whose names begin so")
-    parser.add_argument("--refine", type=int, default=1, help="halvings of coarser meshes; 0 of none")
-    parser.add_argument("--nested", action="store_true", help="the solved coarser level in place of recovered stresses")
-    arguments = parser.parse_args()
+def orders(document: dict[str, Any]) -> list[int]:
+    """Return the orders of elements that a case may have: linear ones lock beyond 0.49."""
+    return [order for order in SIZES if order == 2 or document["material"]["matrix"]["poisson"] <= 0.49]
+
+
+def both_errors(case: Case) -> Iterator[tuple[str, Float]]:
+    """Yield, of each problem of a case, what the factors are of and (2, k) errors over those of the coarser mesh."""
+    cell = tear(case, MPI.COMM_SELF, Progress(MPI.COMM_SELF, quiet=True), policy=BY_COST)
+    context = AnalysisContext.of(cell, Progress(MPI.COMM_SELF, quiet=True))
+    responses = context.unit_responses("", context.bonds(None), context.loads.zero_multipliers(), 1.0)[1]
+    for own in (each.cell for each in context.loads.problems):
+        k = len(own.solver.problem.loads)
+        if is_nested(own, responses[:k]):
+            fewer = own.lattice.halvings - own.nested_lattice.halvings
+            known = np.array(factors(own, fewer))[:, None]
+            whole, nested = (energy_errors(own, responses[:k], nested=less) for less in (False, True))
+            diagonals = (np.array([np.diag(each.elements), np.diag(each.arcs)]) for each in (whole, nested))
+            name = "sampled" if own.summary.across else "locked" if locks(own.subdomains, own.comm) else "nested"
+            bubbles = ", bubbles" if any(s.is_mixed for s in own.subdomains) else ""
+            yield f"{name}, order {own.lattice.order}, {fewer} less{bubbles}", known * np.divide(*diagonals)
+        responses = responses[k:]
+    cell.destroy()
+
+
+def print_factors(arguments: argparse.Namespace) -> None:
+    """Print geometric means over all cells and meshes, and between which nine tenths lie."""
+    found: dict[str, list[Float]] = {}
+    for name, document, _ in (each for each in spectral() + twins() if each[0].startswith(arguments.only)):
+        for order, cut in itertools.product(orders(document), ("auto", "bodies")):
+            for size in SIZES[order]:
+                mesh = {"mesh_size": min(0.5, size * 2**arguments.refine), "order": order, "refine": arguments.refine}
+                own = document | {"cell": document["cell"] | mesh, "decomposition": {"cut": cut}}
+                for words, each in both_errors(Case.parse(own)):
+                    found.setdefault(words, []).append(each)
+        print(name, file=sys.stderr)
+    for words, ratios in sorted(found.items()):
+        for part, own in zip(("elements", "arcs"), np.concatenate(ratios, axis=1), strict=True):
+            own = own[own > 0]
+            low, high = np.percentile(own, [5, 95])
+            mean = np.exp(np.log(own).mean())
+            print(f"{words:36} {part:8} {mean:.4f} (1/{1 / mean:.1f}), {low:.4f} to {high:.4f}, {len(own)} entries")
+
+
+def print_ratios(arguments: argparse.Namespace) -> None:
+    """One line a cell and order, and the shares of all entries."""
     of_all: dict[int, list[float]] = {order: [] for order in SIZES}
     for name, document, known in (each for each in spectral() + twins() if each[0].startswith(arguments.only)):
         exact = solved(document, **EXACT)[0] if known is None else known
-        for order, sizes in SIZES.items():
-            found = [ratios(document, exact, order, size, arguments) for size in sizes]
+        for order in orders(document):
+            found = [ratios(document, exact, order, size, arguments) for size in SIZES[order]]
             of_all[order] += np.concatenate(found).tolist()
             words = ", ".join(f"{own.min():.2f} to {own.max():.2f}" for own in found)
             print(f"{name:26} order {order}: {words}", flush=True)
     for order, own in ((order, np.array(each)) for order, each in of_all.items()):
         shares = ", ".join(f"{np.mean(own > x):.1%} above {x:g}" for x in (5.0, 2.0, 0.5, 0.2))
         print(f"order {order}: {len(own)} entries, {shares}")
+
+
+def main() -> None:
+    """Print ratios, or factors."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--only", default="", metavar="WORDS", help="cells whose names begin so")
+    parser.add_argument("--refine", type=int, default=1, help="halvings of coarser meshes; 0 of none")
+    parser.add_argument("--nested", action="store_true", help="the solved coarser level in place of recovered stresses")
+    parser.add_argument("--factors", action="store_true", help="of the mesh itself over the mesh refined less")
+    arguments = parser.parse_args()
+    (print_factors if arguments.factors else print_ratios)(arguments)
 
 
 if __name__ == "__main__":

@@ -91,7 +91,7 @@ def arc_energy(body: RecoveredStress, sides: ArcSides) -> Float:
     """
     if not len(sides.element):
         return np.zeros((body.loads.shape[1],) * 2)
-    rate = np.einsum("f,fkl->kl", sides.area, _rate(body, sides))
+    rate = _rate(body, sides)
     chord = sides.points[:, -1] - sides.points[:, 0]
     order, last = body.order, len(sides.nodes[0]) - 1
     stress = np.stack([_at(body, sides, place) for place in np.arange(last + 1) / last], axis=1)
@@ -99,12 +99,12 @@ def arc_energy(body: RecoveredStress, sides: ArcSides) -> Float:
     imposed = np.einsum("cdk,fpd->fpck", _macroscopic(body), sides.points)
     u = np.diff(body.u[body.node_class[sides.nodes]] + imposed, n=order, axis=1)[:, 0]
     share = np.hypot(*chord.T) / {1: 12, 2: 60}[order]
-    between = np.einsum("f,fik,fil->kl", share, tractions, u)
+    between = _summed(share, tractions, u)
     return -np.asarray(rate + between + between.T)
 
 
 def _rate(body: RecoveredStress, sides: ArcSides) -> Float:
-    """(f, k, k) sigma_i : eps_j - t_i . du_j/dn - t_j . du_i/dn in the middle of each side."""
+    """(k, k) sum over the sides of area (sigma_i : eps_j - t_i . du_j/dn - t_j . du_i/dn) in their middle."""
     m, stress = body.problem.strains, _at(body, sides, 0.5)
     loads = np.tile(body.loads, (len(stress), 1, 1))
     loads[:, :m] = body.flexibility @ (stress - body.L[:m, m:] @ body.loads[m:])
@@ -118,12 +118,12 @@ def _rate(body: RecoveredStress, sides: ArcSides) -> Float:
         gradient[:, [0, 1], [1, 0]] /= 2
         u = body.u[body.node_class[sides.nodes]]
         along = (u[:, -1] - u[:, 0]) / h[..., None] + np.einsum("cdk,fd->fck", _macroscopic(body), tangent)
-        turn = np.einsum("fc,fck->fk", normal, along - np.einsum("fcdk,fd->fck", gradient, tangent))
-        gradient[:, 0, 1] += turn * (normal[:, 0] * tangent[:, 1] - normal[:, 1] * tangent[:, 0])[:, None]
-        gradient[:, 1, 0] -= turn * (normal[:, 0] * tangent[:, 1] - normal[:, 1] * tangent[:, 0])[:, None]
-    across = np.einsum("fcdk,fd->fck", gradient, normal)
-    work = np.einsum("fck,fcl->fkl", traction, across)
-    return np.asarray(np.einsum("fvk,vw,fwl->fkl", loads, body.L, loads) - work - work.transpose(0, 2, 1))
+        turn = (normal[..., None] * (along - _along(gradient, tangent))).sum(axis=1)
+        turn *= (normal[:, 0] * tangent[:, 1] - normal[:, 1] * tangent[:, 0])[:, None]
+        gradient[:, 0, 1] += turn
+        gradient[:, 1, 0] -= turn
+    work = _summed(sides.area, traction, _along(gradient, normal))
+    return _summed(sides.area, loads, body.L @ loads) - work - work.T
 
 
 def _at(body: RecoveredStress, sides: ArcSides, place: float) -> Float:
@@ -138,7 +138,19 @@ def _at(body: RecoveredStress, sides: ArcSides, place: float) -> Float:
 
 def _tractions(body: RecoveredStress, stress: Float, normal: Float) -> Float:
     """(f, p, c, k) tractions of stresses (f, p, m, k) on normals (f, p, 2)."""
-    return np.asarray(np.einsum("fpcdk,fpd->fpck", stress[:, :, body.problem.voigt], normal))
+    return _along(stress[:, :, body.problem.voigt], normal)
+
+
+def _along(tensors: Float, vectors: Float) -> Float:
+    """(.., c, k) tensors (.., c, 2, k) times vectors (.., 2)."""
+    x, y = vectors[..., None, 0, None], vectors[..., None, 1, None]
+    return np.asarray(tensors[..., 0, :] * x + tensors[..., 1, :] * y)
+
+
+def _summed(weights: Float, left: Float, right: Float) -> Float:
+    """(k, k) sum_f w_f left_f^T right_f of (f, c, k) each."""
+    k = left.shape[2]
+    return np.asarray((left * weights[:, None, None]).reshape(-1, k).T @ right.reshape(-1, k))
 
 
 def _macroscopic(body: RecoveredStress) -> Float:

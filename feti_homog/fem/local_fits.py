@@ -39,7 +39,8 @@ class Neighbours:
         size = int(vertices.max()) + 1
         # Elsewhere the sides around a vertex lead to the vertices that they come from; such numbers add up exactly.
         mark = np.random.default_rng(0).integers(1 << 40, size=size).astype(float)
-        at_boundary = np.bincount(start, mark[stop]) != np.bincount(stop, mark[start])
+        around = mark[vertices]
+        at_boundary = np.bincount(start, (np.roll(around, -1, axis=1) - np.roll(around, 1, axis=1)).ravel()) != 0.0
         near = np.flatnonzero(at_boundary[start] | at_boundary[stop])
         low, high = np.minimum(start, stop)[near], np.maximum(start, stop)[near]
         once = near[np.unique(low * size + high, return_index=True)[1]]
@@ -53,6 +54,13 @@ class Neighbours:
         """(vertices, p, k) what vertices on the boundary get of the sums (vertices, p, k) of their neighbours."""
         moved = _translations(self.vector, order) @ sums[self.other]
         return NEIGHBOURS[order] * gathered(self.at, moved, len(sums))
+
+    def shared_moments(self, entries: Float) -> Float:
+        """(6, vertices) what vertices on the boundary get of the moments of neighbours, entries (6, vertices)."""
+        T = _translations(self.vector, 1)
+        moved = T @ entries.T[self.other][:, SYMMETRIC] @ T.transpose(0, 2, 1)
+        own = moved[:, *np.triu_indices(3)].T
+        return NEIGHBOURS[1] * np.stack([np.bincount(self.at, row, entries.shape[1]) for row in own])
 
     def with_moments(self, moments: Float, order: int) -> Float:
         """(vertices, p, p) moments and a share of those of neighbours."""
@@ -77,10 +85,8 @@ def linear_values(vertices: Int, away: Float, weights: Float, values: Float, nei
     w = np.repeat(weights, 3)
     basis = np.stack([w, w * x, w * y])
     parts = (*basis, basis[1] * x, basis[1] * y, basis[2] * y)
-    moments = np.stack([np.bincount(at, part).astype(float) for part in parts], axis=1)
-    scaled, scale = normalized(neighbours.with_moments(moments[:, SYMMETRIC], 1))
-    cofactors = np.cross(scaled[:, 1], scaled[:, 2])
-    first = cofactors / (cofactors * scaled[:, 0]).sum(axis=1, keepdims=True) * scale[:, :, 0] * scale[:, :1, 0]
+    moments = np.stack([np.bincount(at, part).astype(float) for part in parts])
+    first = _first_rows(moments + neighbours.shared_moments(moments))
     share = sum(row[at] * own for row, own in zip(first.T.copy(), basis, strict=True))
     found = csc_matrix((share, at, np.arange(0, 3 * e + 1, 3)), (size, e)) @ values
     is_shared = np.zeros(size, bool)
@@ -90,6 +96,16 @@ def linear_values(vertices: Int, away: Float, weights: Float, values: Float, nei
     sums = np.stack([csc_matrix((own[near], at[near], of_each), (size, len(near))) @ each for own in basis], axis=1)
     moved = first[neighbours.at][:, None] @ _translations(neighbours.vector, 1) @ sums[neighbours.other]
     return np.asarray(found + NEIGHBOURS[1] * gathered(neighbours.at, moved, size)[:, 0])
+
+
+def _first_rows(moments: Float) -> Float:
+    """(n, 3) the first row of the inverse of each normalized symmetric matrix of these entries (6, n)."""
+    scale = 1 / np.sqrt(moments[[0, 3, 5]])
+    xx = yy = 1.0 + RIDGE
+    x, y, xy = (moments[k] * scale[i] * scale[j] for k, i, j in ((1, 0, 1), (2, 0, 2), (4, 1, 2)))
+    cofactors = np.stack([xx * yy - xy * xy, xy * y - x * yy, x * xy - xx * y])
+    determinant = (1.0 + RIDGE) * cofactors[0] + x * cofactors[1] + y * cofactors[2]
+    return np.asarray((cofactors * scale * (scale[0] / determinant)).T)
 
 
 def polynomials(x: Float, order: int) -> Float:

@@ -92,13 +92,6 @@ class RecoveredStress:
         m = self.problem.strains
         return np.asarray(np.linalg.inv(self.L[:m, :m]))
 
-    def gradient(self, part: Int | slice, g: Float) -> Float:
-        """(e, q, c, 2, k) gradients of u in the elements `part` from those of the shape functions g (e, q, a, 2)."""
-        u = self.u[self.node_class[self.triangles[part]]]
-        (e, a, c, k), q = u.shape, g.shape[1]
-        flat = g.transpose(0, 1, 3, 2).reshape(e, 2 * q, a) @ u.reshape(e, a, c * k)
-        return np.asarray(flat.reshape(e, q, 2, c, k).transpose(0, 1, 3, 2, 4))
-
     @cached_property
     def elements(self) -> list[ElementStresses]:
         """The stresses of the elements at their points of integration, in chunks."""
@@ -111,7 +104,8 @@ class RecoveredStress:
             corners = self.points[self.triangles[part]]
             fluctuating, w = self._fluctuating(part, corners)
             stress = fluctuating + self.L[:m] @ self.loads
-            yield ElementStresses(part, shape_functions(corners.shape[1], lam) @ corners, w, stress)
+            points = corners.mean(axis=1)[:, None] if self.order == 1 else shape_functions(6, lam) @ corners
+            yield ElementStresses(part, points, w, stress)
 
     def _fluctuating(self, part: slice, corners: Float) -> tuple[Float, Float]:
         """(e, q, m, k) stresses that u makes in the elements `part` of nodes (e, a, 2), and weights (e, q)."""
@@ -120,12 +114,31 @@ class RecoveredStress:
             return elements.stress(
                 elements.with_bubble(self.u[self.node_class[self.triangles[part]]])
             ), elements.weights
-        g, w = gradients(corners)
-        gradient, m = self.gradient(part, g), self.problem.strains
-        strain = np.zeros((*w.shape, m, self.loads.shape[1]))
+        if self.order == 1:
+            return self._uniform(part, corners)
+        (g, w), u = gradients(corners), self.u[self.node_class[self.triangles[part]]]
+        (e, a, c, k), q, m = u.shape, g.shape[1], self.problem.strains
+        flat = g.transpose(0, 1, 3, 2).reshape(e, 2 * q, a) @ u.reshape(e, a, c * k)
+        gradient, strain = flat.reshape(e, q, 2, c, k), np.zeros((e, q, m, k))
         for number, (i, d) in enumerate(np.nonzero(self.problem.voigt == n) for n in range(m)):
-            strain[:, :, number] = gradient[:, :, i, d].sum(axis=2)
+            strain[:, :, number] = gradient[:, :, d, i].sum(axis=2)
         return self.L[:m, :m] @ strain, w
+
+    def _uniform(self, part: slice, corners: Float) -> tuple[Float, Float]:
+        """Return the same of linear elements, computed with one element after the other in memory."""
+        (c, k), m = self.u.shape[1:], self.problem.strains
+        at = self.node_class[self.triangles[part]].T
+        by_node = self.u.reshape(-1, c * k).T.copy()
+        zero = by_node[:, at[0]]
+        first, second = by_node[:, at[1]] - zero, by_node[:, at[2]] - zero
+        (x1, x2), (y1, y2) = (own[1:] - own[0] for own in corners.transpose(2, 1, 0).copy())
+        doubled = x1 * y2 - x2 * y1
+        by_place = (y2 * first - y1 * second) / doubled, (x1 * second - x2 * first) / doubled
+        gradient, strain = [own.reshape(c, k, -1) for own in by_place], np.zeros((m, k, len(doubled)))
+        for (i, d), number in np.ndenumerate(self.problem.voigt):
+            strain[number] += gradient[d][i]
+        stress = (self.L[:m, :m] @ strain.reshape(m, -1)).reshape(m * k, -1)
+        return np.ascontiguousarray(stress.T).reshape(-1, 1, m, k), doubled[:, None] / 2
 
     @cached_property
     def fits(self) -> Float:

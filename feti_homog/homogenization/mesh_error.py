@@ -14,10 +14,10 @@ from feti_homog.fem.stress_recovery import RecoveredStress
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.boundary_tractions import boundary_tractions
-from feti_homog.homogenization.nested_interiors import groups, locks, nested_interiors
-from feti_homog.homogenization.uniform_parts import UniformPart
+from feti_homog.homogenization.nested_interiors import ELEMENTS_AT_ONCE, groups, locks, nested_interiors
+from feti_homog.homogenization.uniform_parts import UniformPart, parts_of_phases
 from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.mesh.refinement import FineMesh, joined
+from feti_homog.mesh.refinement import FineMesh, ReferenceLattice, joined
 from feti_homog.parallel.distributed_arrays import allreduce_sum
 from feti_homog.typing import Bool, Float, Int
 
@@ -25,9 +25,12 @@ Members = list[Subdomain] | list[UniformPart]
 Displacements = Iterator[tuple[Members, FineMesh, Float, Int]]
 # What is not on a boundary.
 INSIDE = -1
-# Errors of elements and of arcs over those of the mesh itself and of meshes refined once and twice less, by the order
-# of elements: once less by `scripts/measure_mesh_error.py`, twice less by four cells of two meshes each.
-NESTED = {1: ((1.0, 1.0), (0.26, 0.27), (0.07, 0.066)), 2: ((1.0, 1.0), (1 / 15, 1 / 14), (1 / 185, 1 / 255))}
+# Errors of elements and of arcs over those of meshes refined once and twice less, by the order of elements, all by
+# `scripts/measure_mesh_error.py --factors`; in cells with a phase that locks, of quadratic elements by true errors; and
+# of the mesh refined once less with the displacements of the mesh itself at its nodes, by whether there are bubbles.
+NESTED = {1: ((0.26, 0.27), (0.07, 0.066)), 2: ((1 / 15, 1 / 14), (1 / 185, 1 / 255))}
+LOCKED = {1: (0.31, 0.34), 2: (0.1, 0.065)}
+SAMPLED = {False: (0.066, 0.065), True: (0.052, 0.065)}
 # The two parts may cancel; at least these shares of both are left, `scripts/measure_mesh_error.py`: on the diagonal; of
 # two states by the order of elements; with quadratic ones beside interfaces that may part; and where faces touch at
 # different places, for which the energy is not bilinear.
@@ -91,9 +94,8 @@ def energy_errors(
     nested = is_nested(cell, responses) if nested is None else nested
     lattice = cell.nested_lattice if nested else cell.lattice
     fewer = cell.lattice.halvings - lattice.halvings
-    of_elements, of_arcs = NESTED[lattice.order][fewer]
     found, shares = np.zeros((2, k, k)), [np.zeros((0, k))]
-    tractions = boundary_tractions(cell, responses)
+    tractions, (of_elements, of_arcs) = boundary_tractions(cell, responses), factors(cell, fewer)
     for members, stress, place in _recovered(cell, responses, keep, nested):
         sides = ArcSides.of(stress, [s.submesh for s in members], lattice)
         stress = _with_tractions(stress, sides, place, *tractions)
@@ -106,18 +108,28 @@ def energy_errors(
     return EnergyErrors(elements, arcs, np.concatenate(shares) / area, LEAST_OF_TWO_TOUCHING if contact else least)
 
 
+def factors(cell: TornCell, fewer: int) -> tuple[float, float]:
+    """Return the errors of elements and of arcs over those of the mesh with so many halvings less.  Collective."""
+    order = cell.lattice.order
+    if cell.summary.across and fewer:
+        return SAMPLED[any(s.is_mixed for s in cell.subdomains)]
+    if locks(cell.subdomains, cell.comm) and fewer:
+        return LOCKED[order]
+    return NESTED[order][fewer - 1] if fewer else (1.0, 1.0)
+
+
 def is_nested(cell: TornCell, responses: Sequence[Response]) -> bool:
     """Return whether a mesh refined less has the error: not where errors fall more slowly, at corners and tips.
 
-    Not of cells with fibres other than circles and ellipses or with voids that straight sides bound, nor of quadratic
-    elements with a phase that locks, nor of debonded arcs with quadratic elements or with tips to which the mesh is not
-    graded: those of a given `tip_size`, and where bonds break.  Collective.
+    Not of cells with fibres other than circles and ellipses or with voids that straight sides bound, nor of debonded
+    arcs with quadratic elements or with tips to which the mesh is not graded: those of a given `tip_size`, and where
+    bonds break.  Collective.
     """
     summary, lattice = cell.summary, cell.lattice
-    if summary.across or not lattice.halvings or np.isnan(summary.frames[summary.fibre_bodies]).any():
-        return False  # interiors across materials are factored anyway
-    if _has_straight_voids(cell) or (lattice.order == 2 and locks(cell.subdomains, cell.comm)):
+    if not lattice.halvings or np.isnan(summary.frames[summary.fibre_bodies]).any() or _has_straight_voids(cell):
         return False
+    if summary.across:
+        return lattice.order == 2  # with linear ones elements and arcs cancel too often
     graded = cell.case.cell.tip_size is None and not cell.case.section.breaks
     return (lattice.order == 1 and graded) or not any(response.debonded for response in responses)
 
@@ -138,7 +150,11 @@ def _recovered(
     """
     u = np.stack([response.u for response in responses], axis=1)
     loads = np.stack([response.strain for response in responses], axis=1)
-    for members, mesh, own, place in (_nested if nested else _whole)(cell, u, loads, keep):
+    if cell.summary.across:
+        displacements = _sampled(cell, u, loads, keep, cell.nested_lattice if nested else cell.lattice)
+    else:
+        displacements = (_nested if nested else _whole)(cell, u, loads, keep)
+    for members, mesh, own, place in displacements:
         first, c = members[0], members[0].problem.components
         yield members, RecoveredStress.on(mesh, first.L, first.problem, own, loads, first.is_mixed), place[::c]
 
@@ -168,6 +184,18 @@ def _whole(cell: TornCell, u: Float, loads: Float, keep: bool) -> Displacements:
         own = own.reshape(-1, members[0].problem.components, u.shape[1])
         place = np.concatenate([of_all[part.place][part.dofs] for part in members])
         yield members, joined([part.mesh for part in members]), own, place
+
+
+def _sampled(cell: TornCell, u: Float, loads: Float, keep: bool, lattice: ReferenceLattice) -> Displacements:
+    """Yield the same of subdomains across materials at the nodes of a lattice of no more halvings.
+
+    Those hold hardly less of the error than displacements in equilibrium on its mesh, and no place is known on arcs.
+    """
+    at, own = -1, np.zeros(0)
+    for part in parts_of_phases(cell.subdomains, lattice, ELEMENTS_AT_ONCE):
+        if part.place != at:
+            at, own = part.place, cell.solver.extended(part.place, u, loads, keep)
+        yield [part], part.mesh, own.reshape(-1, part.problem.components, u.shape[1]), np.full(len(own), INSIDE)
 
 
 def _with_tractions(

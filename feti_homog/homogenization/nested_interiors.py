@@ -82,12 +82,14 @@ def locks(subdomains: Sequence[Subdomain], comm: MPI.Intracomm) -> bool:
     return bool(comm.allreduce(own, MPI.LOR))
 
 
-def nested_lattice(lattice: ReferenceLattice, subdomains: Sequence[Subdomain], comm: MPI.Intracomm) -> ReferenceLattice:
+def nested_lattice(
+    lattice: ReferenceLattice, subdomains: Sequence[Subdomain], comm: MPI.Intracomm, across: bool
+) -> ReferenceLattice:
     """Return the lattice of the coarser mesh: refined once less, or twice where that is often and no phase locks.
 
-    Of the subdomains of all ranks.  Collective.
+    Of the subdomains of all ranks; not twice if they reach across materials.  Collective.
     """
-    often = not locks(subdomains, comm) and lattice.halvings >= REFINED_OFTEN
+    often = not locks(subdomains, comm) and lattice.halvings >= REFINED_OFTEN and not across
     return lattice.coarser(2 if often else 1)
 
 

@@ -61,6 +61,41 @@ def parts_of(subdomains: Sequence[Subdomain], phase_of: Sequence[str]) -> Iterat
             yield UniformPart(place, submesh, mesh, s.problem.dofs(classes), law, s.problem, s.is_mixed)
 
 
+def parts_of_phases(subdomains: Sequence[Subdomain], lattice: ReferenceLattice, elements: int) -> Iterator[UniformPart]:
+    """Yield the parts of subdomains across materials in the same order, several bodies of one phase together.
+
+    So many that a part has no more than `elements`, and none that touch.  They keep all nodes and edges of the
+    subdomain; their elements are those of a `lattice` of no more halvings than its own.
+    """
+    for place, s in enumerate(subdomains):
+        assert s.material is not None
+        corners = s.submesh.vertex_class[s.submesh.triangles]
+        order = np.lexsort((s.submesh.constituent, s.material))
+        bodies = np.split(order, np.flatnonzero(np.diff(s.submesh.constituent[order])) + 1)
+        for members in _apart(bodies, corners, s.material, elements // len(lattice.triangles)):
+            names = ("constituent", "triangles", "triangle_edges", "backwards")
+            submesh = replace(s.submesh, **{name: getattr(s.submesh, name)[members] for name in names})
+            nodes = s.mesh.nodes[members]
+            nodes = nodes if lattice is s.mesh.lattice else nodes[:, lattice.within(s.mesh.lattice)]
+            mesh = replace(s.mesh, nodes=nodes, curved=s.mesh.curved[members], lattice=lattice)
+            law, dofs = s.laws[s.material[members[0]]], np.arange(s.n_dofs)
+            yield UniformPart(place, submesh, mesh, dofs, law, s.problem, s.is_mixed)
+
+
+def _apart(bodies: Sequence[Int], corners: Int, material: Int, most: int) -> Iterator[Int]:
+    """Yield the triangles of bodies, of several if they are of one material, touch nowhere and are at most `most`."""
+    group, size, seen = list[Int](), 0, np.full(int(corners.max()) + 1, -1)
+    for number, own in enumerate(bodies):
+        touches = (seen[corners[own]] >= number - len(group)).any()
+        if group and (touches or size + len(own) > most or material[own[0]] != material[group[0][0]]):
+            yield np.concatenate(group)
+            group, size = [], 0
+        seen[corners[own]] = number
+        group.append(own)
+        size += len(own)
+    yield np.concatenate(group)
+
+
 def _restricted(mesh: FineMesh, members: Int) -> tuple[FineMesh, Int]:
     """Return the coarse triangles `members` (t,) of a mesh as a mesh of its own, and (c,) the classes that it has."""
     nodes, local = present(mesh.nodes[members], len(mesh.points))

@@ -138,7 +138,7 @@ class TornCell:
     @cached_property
     def nested_lattice(self) -> ReferenceLattice:
         """The lattice of the mesh that is refined less.  Collective when first read."""
-        return nested_lattice(self.lattice, self.subdomains, self.comm)
+        return nested_lattice(self.lattice, self.subdomains, self.comm, self.summary.across)
 
     @cached_property
     def nested_interiors(self) -> list[NestedInterior]:

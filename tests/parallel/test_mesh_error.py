@@ -12,9 +12,10 @@ from support.cases import FIBRE, MATRIX, make_case, solve
 
 from feti_homog import Case, run
 from feti_homog.analysis.mesh_errors import mesh_error
-from feti_homog.fem.arc_error import ArcSides
+from feti_homog.fem.arc_error import ArcSides, arc_energy
 from feti_homog.fem.stress_recovery import RecoveredStress
 from feti_homog.homogenization.mesh_error import EnergyErrors, energy_errors
+from feti_homog.homogenization.partition_policy import BY_COST
 
 pytestmark = pytest.mark.parallel
 
@@ -182,6 +183,32 @@ def test_the_mesh_refined_less_tells_nearly_the_same_errors(comm, order, refine)
     )
     assert np.corrcoef(*map(np.concatenate, parents))[0, 1] > 0.5
     np.testing.assert_array_equal(energy_errors(cell, responses).elements, nested.elements)
+    cell.destroy()
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_bodies_of_a_phase_together_have_the_errors_of_each(comm, order):
+    cell, _, responses = solve(make_case(order=order, mesh_size=0.2, refine=1), comm, policy=BY_COST)
+    assert cell.summary.across
+    found = energy_errors(cell, responses, nested=False)
+    u, loads = (np.stack([getattr(each, name) for each in responses], axis=1) for name in ("u", "strain"))
+    elements, arcs, shares = np.zeros((3, 3)), np.zeros((3, 3)), [np.zeros((0, 3))]
+    for part, own in cell.displacements(u, loads):
+        body = RecoveredStress.on(part.mesh, part.L, part.problem, own.reshape(-1, 2, 3), loads, part.is_mixed)
+        total, each = body.difference()
+        elements += total / cell.summary.area
+        shares.append(each / cell.summary.area)
+        arcs += arc_energy(body, ArcSides.of(body, [part.submesh], cell.lattice)) / cell.summary.area
+    size = found.elements.max()
+    np.testing.assert_allclose(found.elements, comm.allreduce(elements), atol=1e-9 * size)
+    np.testing.assert_allclose(found.arcs, comm.allreduce(arcs), atol=1e-9 * size)
+    np.testing.assert_allclose(found.shares, np.concatenate(shares), atol=1e-9 * size)
+    sampled = energy_errors(cell, responses)
+    if order == 2:
+        np.testing.assert_allclose(np.diag(sampled.elements), np.diag(found.elements), rtol=0.2)
+    else:
+        np.testing.assert_array_equal(sampled.elements, found.elements)
+    assert sampled.shares.shape == found.shares.shape
     cell.destroy()
 
 
