@@ -12,7 +12,12 @@ from feti_homog.feti.coarse.natural import NaturalCoarseSpace
 from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.feti.operators.interface_operators import DualOperator
 from feti_homog.feti.preconditioners.exact_inverse import ExactInverse
-from feti_homog.feti.thresholds import LEAST_UNCONFIRMED_JUMP, MOST_UNCONFIRMED, MOST_UNCONFIRMED_ERROR
+from feti_homog.feti.thresholds import (
+    LEAST_UNCONFIRMED_JUMP,
+    MOST_FOLLOWED_ERROR,
+    MOST_UNCONFIRMED,
+    MOST_UNCONFIRMED_ERROR,
+)
 from feti_homog.parallel.distributed_arrays import allreduce_sum
 from feti_homog.typing import Float
 
@@ -33,7 +38,8 @@ class InfluenceSolutions:
     ) -> None:
         self._comm, self._inverse, self._operator, self._natural, self._jumps = comm, inverse, operator, natural, jumps
         self._granted = self._left = 0
-        self._expected: Float | None = None
+        # Multipliers and jumps on inactive rows, (owned rows, k) each, that F lambda comes to confirm.
+        self._expected: tuple[Float, Float] | None = None
         self._residual, self._squares = 0.0, np.zeros((2, 0, 0))
 
     def solutions(self, strains: Float, d: Float) -> list[DualSolution] | None:
@@ -53,12 +59,19 @@ class InfluenceSolutions:
             return None
         lam, jumps = found
         if not self._left:
-            self._expected = lam
+            self._expected = lam, jumps
             return None
         self._left -= 1
         reason, C = int(PETSc.KSP.ConvergedReason.CONVERGED_RTOL), self._operator.compliance
         rows = zip(strains, lam.T.copy(), jumps.T.copy(), strict=True)
         return [DualSolution(E, x, jump, None, 0, reason, self._residual, C) for E, x, jump in rows]
+
+    def closing(self, d: Float, E: Float, weights: Float) -> Float:
+        """H d E, but for rounding, of loads E (v, k) of a solve with `weights` (k,), for F lambda to confirm.
+
+        It is that which is followed, if there is one: so what is confirmed costs no columns.  Collective.
+        """
+        return self._inverse.multipliers(d, E) if self._expected is None else self._expected[0] * weights
 
     def record(self, solutions: list[DualSolution], d: Float) -> None:
         """Record solutions that F lambda confirmed, or that iterations had to improve; none of loads that are unseen.
@@ -70,11 +83,13 @@ class InfluenceSolutions:
                 pass.
         """
         if solutions and self._expected is not None:
-            off = self._error(self._expected, solutions)
+            off, drift = self._errors(*self._expected, solutions)
             if not off <= MOST_UNCONFIRMED_ERROR:
                 raise ConvergenceError(
                     f"influence columns: multipliers of the last {self._granted} solves: {off:.1e} off"
                 )
+            if not max(off, drift) <= MOST_FOLLOWED_ERROR:
+                self._inverse.renew_answer(d)
         confirmed = bool(solutions) and all(each.iterations == 0 and each.reason > 0 for each in solutions)
         self._granted = min(2 * self._granted + 1, MOST_UNCONFIRMED) if confirmed else 0
         self._left, self._residual = self._granted, max((each.residual for each in solutions), default=0.0)
@@ -82,12 +97,15 @@ class InfluenceSolutions:
             seen = self._jumps.projected(d, self._jumps.norms(d))
             self._squares = allreduce_sum(self._comm, np.stack([seen.T @ seen, d.T @ d]))
 
-    def _error(self, expected: Float, solutions: list[DualSolution]) -> float:
-        """Return how far multipliers (owned rows, k) are off those found, relative to the largest of each load.
+    def _errors(self, expected: Float, jumps: Float, solutions: list[DualSolution]) -> tuple[float, float]:
+        """Return how far multipliers and jumps on inactive rows, (owned rows, k) each, are off those found.
 
-        Collective.
+        They are relative to the largest of each load; jumps count where no body is free, which may be anywhere.
+        Multipliers that F lambda confirms are off by no less than their residuals.  Collective.
         """
-        lam = np.stack([each.lam for each in solutions], axis=1)
-        parts = np.abs([expected - lam, lam]).max(axis=1, initial=0.0)
+        lam, opening = (np.stack(x, axis=1) for x in zip(*((s.lam, s.jump) for s in solutions), strict=True))
+        is_open = (jumps != 0.0) * (self._natural.unconstrained_modes.shape[1] == 0)
+        parts = np.abs([expected - lam, lam, is_open * (jumps - opening), opening]).max(axis=1, initial=0.0)
         self._comm.Allreduce(MPI.IN_PLACE, parts, MPI.MAX)
-        return float((parts[0] / np.where(parts[1] > 0.0, parts[1], 1.0)).max())
+        off, drift = (parts[::2] / np.where(parts[1::2] > 0.0, parts[1::2], 1.0)).max(axis=1)
+        return max(float(off), *(each.residual for each in solutions)), float(drift)

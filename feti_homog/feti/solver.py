@@ -202,8 +202,9 @@ class FetiSolver:
         is_seen = jump > rounding
         scale = np.where(is_seen, jump, 1.0)
         right = np.where(is_seen, right, 0.0) / scale
-        E, inverse = np.where(is_seen, strains.T, 0.0) / scale, self.exact_inverse
-        closing = self.preconditioner.closing_forces(right) if inverse is None else inverse.multipliers(self.d, E)
+        E, columns = np.where(is_seen, strains.T, 0.0) / scale, self._by_columns
+        forces = self.preconditioner.closing_forces
+        closing = forces(right) if columns is None else columns.closing(self.d, E, is_seen / scale)
         closing = self.natural.project(closing)
         krylov.test.set_scales(float(np.sqrt(is_seen.sum())), float(np.linalg.norm(self._jumps.norms(closing))))
         starts = np.where(is_seen, self.natural.project(self.active.restrict(starts)), 0.0) / scale

@@ -140,6 +140,8 @@ ZERO_JUMP, SMALL_JUMP, ROUNDING_MARGIN = 1e-13, 1e-8, 100.0
 MOST_UNCONFIRMED = 32
 # Error of their multipliers, when F lambda comes to confirm them, above which a run ends: that of its checks.
 MOST_UNCONFIRMED_ERROR = 1e-5
+# Error, as F lambda shows it, of followed multipliers and jumps above which they are found anew from the reference cell.
+MOST_FOLLOWED_ERROR = 1e-11
 # Jump that active rows see, relative to that of the torn cell, below which F lambda confirms every solve.
 LEAST_UNCONFIRMED_JUMP = 1e-6
 

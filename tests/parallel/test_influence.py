@@ -13,7 +13,7 @@ from scipy.linalg import null_space
 from support import torn_cells
 from support.coarse_space_cells import BREAKING, NARROW, solve_many
 
-from feti_homog.errors import CaseError
+from feti_homog.errors import CaseError, ConvergenceError
 from feti_homog.feti.operators.one_subdomain import ExplicitInterfaceOperator
 from feti_homog.feti.preconditioners.changed_reference import ChangedReference
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
@@ -153,6 +153,29 @@ def test_blocks_are_right_with_few_followed_columns(comm, columns, monkeypatch):
         kept.append(influence._followed)
     assert bool(passed) == (columns == 20) and all(found == offered > 0 for offered, found in passed)
     assert len(kept) > 12 and all(each is kept[0] for each in kept)
+
+
+@pytest.mark.parametrize("on_active", [True, False], ids=["multipliers", "jumps"])
+def test_f_lambda_finds_errors_of_a_followed_answer(comm, on_active):
+    cell = torn_cells.tear(comm, geometry="square", petsc=INFLUENCE)
+    solver, influence, E = cell.solver, cell.solver.exact_inverse, np.array([1.0, 0.2, -0.3])
+    activate(cell, states(cell)[1])
+    whole = influence.multipliers(solver.d, np.eye(3)) * solver.active.mask[:, None]
+    for size, ends in ((1e-9, False), (1e-2, on_active)):
+        # F lambda confirms, is spared, confirms again.
+        for _ in range(2):
+            solver.solve(E, np.zeros(solver.rows))
+        right = influence._followed.answer
+        wrong = (solver.active.mask == on_active)[:, None] * size * right
+        influence._followed.answer = right + wrong
+        if ends:
+            with pytest.raises(ConvergenceError, match="off"):
+                solver.solve(E, np.zeros(solver.rows))
+            continue
+        solver.solve(E, np.zeros(solver.rows))
+        error = np.abs(influence._followed.answer - right).max(initial=0.0)
+        assert comm.allreduce(float(error), MPI.MAX) < 1e-12 * comm.allreduce(float(np.abs(whole).max()), MPI.MAX)
+        solver._by_columns.record([], solver.d)
 
 
 @pytest.mark.parametrize("unit", [1.0, 1e20, 1e-20])

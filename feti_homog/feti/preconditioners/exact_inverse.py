@@ -197,6 +197,12 @@ class ExactInverse(Preconditioner):
         lam = scale_rows(self._active, whole)
         return lam, whole - lam
 
+    def renew_answer(self, d: Float) -> None:
+        """Let what is followed of the multipliers H d, of d (owned rows, v), be without rounding of the updates.
+
+        Collective."""
+        self._whole_answer(d)
+
     def _forget(self) -> None:
         """Follow nothing, so that pins are found anew."""
         self._followed, self._held, self._is_behind = None, self._active, True
