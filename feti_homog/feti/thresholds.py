@@ -140,7 +140,7 @@ ZERO_JUMP, SMALL_JUMP, ROUNDING_MARGIN = 1e-13, 1e-8, 100.0
 MOST_UNCONFIRMED = 32
 # Error of their multipliers, when F lambda comes to confirm them, above which a run ends: that of its checks.
 MOST_UNCONFIRMED_ERROR = 1e-5
-# Error, as F lambda shows it, of followed multipliers and jumps above which they are found anew from the reference cell.
+# Error, as F lambda shows it, of followed multipliers and jumps above which they are made anew.
 MOST_FOLLOWED_ERROR = 1e-11
 # Jump that active rows see, relative to that of the torn cell, below which F lambda confirms every solve.
 LEAST_UNCONFIRMED_JUMP = 1e-6
@@ -157,6 +157,10 @@ BUFFERED_COLUMNS = 2048
 # Changed rows after which the cell as it stands is factored in place of them: the default of `-feti_influence_columns`;
 # and rows of cells in which that never pays (`scripts/benchmark_path --to-the-end`).
 INFLUENCE_COLUMNS, NEVER_REFACTORED_ROWS = 1000, 2500
+# The next reference cell is made in parts, at events without new columns; at once where by this part more rows changed.
+LATEST_RENEWAL = 4
+# Parts of its assembly, and changes of the bonds from one part to the next: an event has one to three.
+ASSEMBLED_PARTS, RENEWAL_PAUSE = 2, 3
 # Influence columns that each rank finds together at least, with those of bonds near the one that breaks: fewer and
 # larger batches, but columns that may not be needed (`scripts/benchmark_path --to-the-end`).
 INFLUENCE_BATCH = 64

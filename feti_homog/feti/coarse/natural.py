@@ -122,12 +122,22 @@ class NaturalCoarseSpace:
         movable = np.flatnonzero(self.body != self.pinned_body)
         return [(members, self._gram.places(members)) for members in self._gram.groups(movable)]
 
+    @cached_property
+    def _eigenpairs(self) -> list[tuple[Float, Float, Float]]:
+        """Blocks of the groups, their eigenvalues and eigenvectors, as they were last."""
+        shapes = [places.shape for _, places in self._groups]
+        return [(np.full(shape, np.nan), np.empty(shape[:2]), np.empty(shape)) for shape in shapes]
+
     def _null_space(self, entries: Float) -> csc_matrix:
         """(m, z) orthonormal null space of G^T G with these entries: eigenvectors whose eigenvalues are rounding."""
         padded, columns, none = np.append(entries, 0.0), 0, np.zeros(0, np.int64)
         rows, numbers, values = [none], [none], [np.zeros(0)]
-        for members, places in self._groups:
-            eigenvalues, vectors = np.linalg.eigh(padded[places])
+        for (members, places), (blocks, eigenvalues, vectors) in zip(self._groups, self._eigenpairs, strict=True):
+            now = padded[places]
+            # A break changes one group or two.
+            if len(other := np.flatnonzero((now != blocks).any(axis=(1, 2)))):
+                eigenvalues[other], vectors[other] = np.linalg.eigh(now[other])
+                blocks[other] = now[other]
             tolerance = UNCONSTRAINED_EIGENVALUE * self._diagonal[members].max(axis=1, keepdims=True)
             which, mode = np.nonzero(eigenvalues <= tolerance)
             if not len(which):

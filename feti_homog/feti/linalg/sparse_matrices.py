@@ -49,7 +49,8 @@ class DenseBlockSum:
         # A product sums faster than a conversion from coordinates, which sorts.
         stacked = csr_matrix((values, columns, np.r_[0, np.cumsum(counts)]), shape=(len(rows), n))
         place = csr_matrix((np.ones(len(rows)), (rows, np.arange(len(rows)))), shape=(m, len(rows)))
-        self._sum = self._sum + place @ stacked
+        # Sums copy both, an empty one too.
+        self._sum = self._sum + place @ stacked if self._sum.nnz else csr_matrix(place @ stacked)
 
 
 def scaled(A: csr_matrix, weights: Float) -> csr_matrix:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
+
 import numpy as np
 from mpi4py import MPI
 from scipy.sparse import csr_matrix, diags, hstack
@@ -11,9 +13,8 @@ from feti_homog.feti.linalg.sparse_direct import DirectSolver
 from feti_homog.feti.linalg.sparse_matrices import DenseBlockSum, allreduce_sparse
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.operators.with_springs import is_dense
-from feti_homog.feti.thresholds import SPARE_BYTES
+from feti_homog.feti.thresholds import ASSEMBLED_PARTS
 from feti_homog.parallel.distributed_arrays import share_columns
-from feti_homog.runtime import process_memory
 from feti_homog.typing import Float
 
 # Entries of Z, which are cosines of angles or their products, that rounding leaves of zero.
@@ -29,30 +30,14 @@ class AssembledSchur:
         size: columns of Z, on all ranks.
     """
 
-    def __init__(
-        self, comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators, active: Float
-    ) -> None:
-        """Assemble and factor for the owned rows of which `active` is 1; they must leave no rigid-body motion free.
+    def __init__(self, comm: MPI.Intracomm, Z: csr_matrix, stiffness: csr_matrix) -> None:
+        """Factor, with the arguments of `assembled_stiffness`.
 
-        Options under `feti_bonded_` (default: cholesky by CHOLMOD). Collective.
-
-        Raises:
-            TypeError: a boundary operator is not dense.
+        Options under `feti_bonded_` (default: cholesky by CHOLMOD).
         """
-        self.comm = comm
-        together = _copies_together(comm, jump_operator, operators)
-        Z = _released(comm, jump_operator, operators, together, active)
-        self.size = Z.shape[1]
-        stiffness = DenseBlockSum((self.size, self.size))
-        for operator, span in zip(operators.with_springs, operators.slices, strict=True):
-            if not is_dense(operator):
-                raise TypeError("the assembled Schur complement needs dense boundary operators")
-            columns = np.unique(Z[span].indices)
-            T = Z[span][:, columns].T.tocsr()
-            stiffness.add(columns, columns, T @ (T @ operator.S).T)
-        self._solver = DirectSolver(allreduce_sparse(comm, stiffness.matrix()), "feti_bonded_")
+        self.comm, self.size = comm, Z.shape[1]
+        self._solver = DirectSolver(stiffness, "feti_bonded_")
         self._Z, self._ZT = Z, Z.T.tocsr()
-        process_memory.trim(kept=SPARE_BYTES)
 
     def relieving_displacement(self, forces: Float) -> Float:
         """-Z (Z^T S Z)^-1 Z^T f for boundary forces f (n,) or (n, k): it takes them off the shared nodes.
@@ -66,6 +51,32 @@ class AssembledSchur:
     def destroy(self) -> None:
         """Free the factor."""
         self._solver.destroy()
+
+
+def assembled_stiffness(
+    comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators, active: Float
+) -> Generator[None, None, tuple[csr_matrix, csr_matrix]]:
+    """Z (n, columns) and Z^T S Z of all ranks, in ASSEMBLED_PARTS parts.  Collective.
+
+    They are of the owned rows of which `active` is 1, which must leave no rigid-body motion free, for that to be
+    factored.
+
+    Raises:
+        TypeError: a boundary operator is not dense.
+    """
+    together = _copies_together(comm, jump_operator, operators)
+    Z = _released(comm, jump_operator, operators, together, active)
+    stiffness = DenseBlockSum((Z.shape[1], Z.shape[1]))
+    for part in np.array_split(np.arange(len(operators.slices)), ASSEMBLED_PARTS):
+        for place in part:
+            operator, span = operators.with_springs[place], operators.slices[place]
+            if not is_dense(operator):
+                raise TypeError("the assembled Schur complement needs dense boundary operators")
+            columns = np.unique(Z[span].indices)
+            T = Z[span][:, columns].T.tocsr()
+            stiffness.add(columns, columns, T @ (T @ operator.S).T)
+        yield
+    return Z, allreduce_sparse(comm, stiffness.matrix())
 
 
 def shared_dofs(comm: MPI.Intracomm, jump_operator: JumpOperator) -> int:

@@ -96,31 +96,22 @@ class ChangedReference:
         columns[rows[mine] - self._first, mine] = turned[mine]
         return self.response(columns)
 
-    def next_columns(
-        self, held: Float, changed: Int, come: Int, followed: FollowedResponse | None
-    ) -> tuple[Int, Float]:
+    def next_columns(self, held: Float, changed: Int, come: Int, followed: FollowedResponse) -> tuple[Int, Float]:
         """Rows (k,) and columns (owned rows, k) of the cell with the active rows `held` and `come`.
 
         `held` (owned rows,) are the reference cell's but for the global rows `changed`; these and the rows that `come`
-        have columns.  Only rows count that are active in all three cells.  `followed` has columns of the cell with the
-        rows `held`.  Collective.
+        have columns.  Rows are those of columns of `followed`, of the cell with the rows `held`, that are active in all
+        three cells: others cost more than they save.  Collective.
         """
         known = self.columns.rows
         both = gather_rows(self._comm, held * self.cell.active, self._first, known) > 0.0
-        is_followed = np.zeros(len(known), bool) if followed is None else followed.has_columns(known) & both
-        # Of the others, which cost more, the latest.
-        rest = np.flatnonzero(both & ~is_followed)[-KEPT_AT_ONCE:]
-        rows, count = np.concatenate([known[is_followed], known[rest]]), int(is_followed.sum())
+        rows = known[followed.has_columns(known) & both]
         # A few at once, for at no other time is so much memory taken.
         columns = np.empty((self._rows, len(rows)), order="F")
-        if followed is not None:
-            for some in _parts(count):
-                columns[:, some] = followed.columns(rows[some])
-        if len(rest) or len(come):
-            self.update(changed, np.zeros(self._rows))
-        if len(rest):
-            columns[:, count:] = self.response(self.columns.owned[:, rest])
+        for some in _parts(len(rows)):
+            columns[:, some] = followed.columns(rows[some])
         if len(come):
+            self.update(changed, np.zeros(self._rows))
             theirs = self.present(come, held)
             block, across = (gather_rows(self._comm, x, self._first, come) for x in (theirs, columns))
             x = self._comm.bcast(np.linalg.lstsq(block, across, rcond=None)[0])

@@ -16,53 +16,37 @@ stands, but for what softened, takes its place, with the columns of rows that ar
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
 from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
-from feti_homog.feti.decomposition.neighbours import InterfaceNeighbours
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
-from feti_homog.feti.preconditioners.changed_reference import ChangedReference
 from feti_homog.feti.preconditioners.followed_response import FollowedResponse
-from feti_homog.feti.preconditioners.reference_cell import (
-    BodyTies,
-    ReferenceCell,
-    one_sided_jumps,
-    stiffness_of_rows,
-)
+from feti_homog.feti.preconditioners.renewed_reference import RenewedReference
 from feti_homog.feti.preconditioners.scaled import Preconditioner
 from feti_homog.feti.thresholds import (
     FOLLOWED_COLUMNS,
-    INFLUENCE_BATCH,
     INFLUENCE_COLUMNS,
     MOST_FOLLOWED,
     NEVER_REFACTORED_ROWS,
     NORM_MARGIN,
 )
 from feti_homog.parallel.distributed_arrays import gather_rows, scale_rows
-from feti_homog.typing import Bool, Float, Int
+from feti_homog.typing import Float, Int
 
 
-class ExactInverse(Preconditioner):
+class ExactInverse(RenewedReference, Preconditioner):
     """z = H r on the active rows, H the inverse of the dual operator there: nothing is left to iterate.
 
     Attributes:
-        neighbours: which bonds lie beside each other.
         norm: |H| with all bonds intact, which is the largest, as the power method finds it, with a margin.
-        stiffness: (all rows,) the most that each diagonal entry of H can be: that of a node of either side and of the
-            spring between them, in a row, while all others are held.
-        factorizations: reference cells so far.
-        batch: columns found at once at least.
         most_followed: columns at most that are followed, from the next time that none are.
     """
 
     norm: float = np.inf
     is_exact = True
-    _changes: ChangedReference
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> None:
         """Factor the cell with all bonds intact; all boundary operators must be dense.  Collective.
@@ -72,34 +56,15 @@ class ExactInverse(Preconditioner):
         Raises:
             CaseError: the option has no such value.
         """
-        self.comm, self._jump_operator, self._operators = comm, jump_operator, operators
-        self._first, end = jump_operator.owned
-        self._rows = end - self._first
         most = NEVER_REFACTORED_ROWS if jump_operator.global_rows <= NEVER_REFACTORED_ROWS else INFLUENCE_COLUMNS
-        self._most_columns = PETSc.Options("feti_").getInt("influence_columns", most)
-        if self._most_columns < 1:
-            raise CaseError(f"-feti_influence_columns {self._most_columns}: expected a whole number above 0")
-        self.stiffness = np.concatenate(comm.allgather(stiffness_of_rows(jump_operator, operators)))
-        self._BD = one_sided_jumps(comm, jump_operator, operators)
-        self._ties = BodyTies(comm, jump_operator)
-        self.neighbours = InterfaceNeighbours(comm, jump_operator, operators.subdomains)
-        self.batch, self.most_followed = INFLUENCE_BATCH * comm.size, FOLLOWED_COLUMNS
-        # Columns without which the reference cell is not the one at hand.
-        self.factorizations = self._tied = 0
-        self._answer: Float | None = None
-        self._followed: FollowedResponse | None = None
-        # `_held` has the pins of free bodies, too.
-        self._held = self._active = np.ones(self._rows)
-        self._more = self._next = np.zeros(self._rows)
-        self._is_behind, self._loose = False, np.zeros(0, np.int64)
-        self._rebase(self._active)
+        most = PETSc.Options("feti_").getInt("influence_columns", most)
+        if most < 1:
+            raise CaseError(f"-feti_influence_columns {most}: expected a whole number above 0")
+        super().__init__(comm, jump_operator, operators, most)
+        self.most_followed = FOLLOWED_COLUMNS
+        self._next, self._loose = self._more, np.zeros(0, np.int64)
         # Rows that leave make H smaller.
         self.norm = NORM_MARGIN * self.reference.largest_eigenvalue(self._first)
-
-    @property
-    def reference(self) -> ReferenceCell:
-        """The reference cell."""
-        return self._changes.cell
 
     @property
     def rounding(self) -> float:
@@ -118,8 +83,12 @@ class ExactInverse(Preconditioner):
         """Restrict to the rows where `active` is 1.  Collective."""
         if self._followed is not None and not self._follow(self._followed, active):
             self._followed = None
-        self._active, self._more, self._is_behind = active, self._next, True
+        is_quiet, self._is_behind = self._is_behind, True
+        self._active, self._more = active, self._next
         self._held = active if self._followed is None else self._with_pins(self._followed.pins, active)
+        # Columns cost as much as a part of the next reference cell.
+        if self._followed is not None and is_quiet:
+            self._renew_a_part()
 
     def _follow(self, followed: FollowedResponse, active: Float) -> bool:
         """Keep what is followed up with the rows that soften, leave or come, if it can be.  Collective."""
@@ -159,12 +128,9 @@ class ExactInverse(Preconditioner):
         """Let the reference cell and N be those of the present state.  Collective."""
         if not self._is_behind:
             return
+        self._renew_if_due()
         self._is_behind = False
         changed = self._changed(self._held)
-        if len(changed) > self._tied + self._most_columns:
-            self._rebase(self._held)
-            changed = self._changed(self._held)
-            self._tied = len(changed)
         self._find(changed)
         self._changes.update(changed, self._softened)
         self._loose = self._changes.columns.rows[self._changes.inverse.dependent]
@@ -245,61 +211,3 @@ class ExactInverse(Preconditioner):
         self._find(rows)
         at = self._changes.columns.positions(rows)
         return self._changes.columns.owned[:, at], self._changes.columns.block[at[:, None], at]
-
-    def _changed(self, held: Float) -> Int:
-        """Return the global rows that are `held` here or in the reference cell, not both, and those that softened.
-
-        Collective."""
-        own = self._first + np.flatnonzero((held != self.reference.active) | (self._softened > 0.0))
-        return np.concatenate(self.comm.allgather(own))
-
-    @property
-    def _softened(self) -> Float:
-        """(owned rows,) D: of springs that softened 1 / dC, or -dC where they came; 0 of all others."""
-        holds, came = self._held * self.reference.active > 0.0, self._held > self.reference.active
-        more = self._more * self._active
-        return np.divide(1.0, more, out=-more * came, where=holds & (more > 0.0))
-
-    def _rebase(self, active: Float) -> None:
-        """Take a cell with these active rows, and what it takes to hold its bodies, for the reference.  Collective."""
-        tied, kept = self._ties.tied(active), None
-        if self.factorizations:
-            kept = self._kept_columns(tied)
-            self._changes.destroy()  # before the new cell takes memory
-        cell = ReferenceCell(self.comm, self._jump_operator, self._operators, self._BD, tied)
-        self.factorizations += 1
-        self._changes = ChangedReference(self.comm, cell, self._jump_operator.owned, self.stiffness)
-        if kept is not None:
-            self._changes.take(*kept)
-        self._answer, self._tied = None, 0
-        self._rounding = cell.force_of_rigid_motions(self.stiffness[self._first :][: self._rows])
-
-    def _kept_columns(self, tied: Float) -> tuple[Int, Float] | None:
-        """Rows and columns of the cell with the active rows `tied`, as `ChangedReference.next_columns`.  Collective.
-
-        None where springs have softened, or where many rows have changed at once.
-        """
-        soft = bool((self._more * self._active).any())
-        changed, own = self._changed(self._held), self._first + np.flatnonzero(tied > self._held)
-        come = np.concatenate(self.comm.allgather(own))
-        concerned = np.union1d(changed, come)
-        lacking = int((self._changes.columns.positions(concerned) < 0).sum())
-        if self.comm.allreduce(soft, MPI.LOR) or lacking > self.batch:
-            return None
-        self._find(concerned)
-        return self._changes.next_columns(self._held, changed, come, self._followed)
-
-    def _find(self, rows: Int) -> None:
-        """Find the columns of the reference cell that these rows lack, and some near them.  Collective."""
-        found = self._changes.columns
-        if len(lacking := rows[found.positions(rows) < 0]):
-            found.add(self._with_near(lacking, lambda near: near[found.positions(near) < 0]))
-
-    def _with_near(self, rows: Int, lacking: Callable[[Int], Int]) -> Int:
-        """Return rows and active ones near them, which break next: columns are cheaper together.  Collective."""
-        is_active = self._is_active()
-        return self.neighbours.rows_near(rows, lambda near: lacking(near[is_active[near]]), self.batch)
-
-    def _is_active(self) -> Bool:
-        """(all rows,) which are active.  Collective."""
-        return np.asarray(np.concatenate(self.comm.allgather(self._active)) > 0.0)

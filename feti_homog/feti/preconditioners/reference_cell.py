@@ -71,14 +71,15 @@ class ReferenceCell:
         operators: InterfaceOperators,
         one_sided: csr_matrix,
         active: Float,
+        assembled: AssembledSchur,
     ) -> None:
-        """Factor the cell; A must leave no rigid-body motion free.  `one_sided` is B_D.  Collective."""
+        """`one_sided` is B_D, and `assembled` has the same active rows.  Collective."""
         self._comm, self.active = comm, active
         self._jump_operator, self._operators = jump_operator, operators
         self._BD, self._BDT = one_sided, one_sided.T.tocsr()
         reached = self._BDT.getnnz(axis=1) > 0
         self._reached = [bool(reached[own].any()) for own in operators.slices]
-        self.assembled = AssembledSchur(comm, jump_operator, operators, active)
+        self.assembled = assembled
         self._is_bonded = not comm.allreduce(bool((active == 0).any()), MPI.LOR)
         first = jump_operator.owned[0]
         self._springs = SpringUpdate(comm, first, active * operators.compliance, self._without_springs)

@@ -1,0 +1,170 @@
+"""The reference cell of a state of the bonds, and the next ones, which take its place where many rows have changed.
+
+A new one costs its factor: it is made in parts, between which the bonds go on to break, so that no event pays all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from mpi4py import MPI
+
+from feti_homog.feti.decomposition.jump_operator import JumpOperator
+from feti_homog.feti.decomposition.neighbours import InterfaceNeighbours
+from feti_homog.feti.operators.interface_operators import InterfaceOperators
+from feti_homog.feti.preconditioners.assembled_schur import AssembledSchur, assembled_stiffness
+from feti_homog.feti.preconditioners.changed_reference import ChangedReference
+from feti_homog.feti.preconditioners.followed_response import FollowedResponse
+from feti_homog.feti.preconditioners.reference_cell import (
+    BodyTies,
+    ReferenceCell,
+    one_sided_jumps,
+    stiffness_of_rows,
+)
+from feti_homog.feti.thresholds import INFLUENCE_BATCH, LATEST_RENEWAL, RENEWAL_PAUSE, SPARE_BYTES
+from feti_homog.runtime import process_memory
+from feti_homog.typing import Bool, Float, Int
+
+
+class RenewedReference:
+    """The reference cell with columns of its response, beside the present state of the bonds.
+
+    Attributes:
+        neighbours: which bonds lie beside each other.
+        stiffness: (all rows,) the most that each diagonal entry of H can be: that of a node of either side and of the
+            spring between them, in a row, while all others are held.
+        factorizations: reference cells so far.
+        batch: columns found at once at least.
+    """
+
+    _changes: ChangedReference
+
+    def __init__(
+        self, comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators, most: int
+    ) -> None:
+        """Factor the cell with all bonds intact, the reference until over `most` rows have changed.  Collective."""
+        self.comm, self._jump_operator, self._operators, self._most_columns = comm, jump_operator, operators, most
+        self._first, end = jump_operator.owned
+        self._rows = end - self._first
+        self.stiffness = np.concatenate(comm.allgather(stiffness_of_rows(jump_operator, operators)))
+        self._BD = one_sided_jumps(comm, jump_operator, operators)
+        self._ties = BodyTies(comm, jump_operator)
+        self.neighbours = InterfaceNeighbours(comm, jump_operator, operators.subdomains)
+        self.batch = INFLUENCE_BATCH * comm.size
+        # Columns without which the reference cell is not the one at hand.
+        self.factorizations = self._tied = 0
+        # The present state; `_held` has the pins of free bodies, too.
+        self._held = self._active = np.ones(self._rows)
+        self._more = np.zeros(self._rows)
+        self._answer: Float | None = None
+        self._followed: FollowedResponse | None = None
+        # N is of a state before; parts of the next reference cell, and columns of it, that wait.
+        self._is_behind = False
+        self._renewal: Iterator[None] | None = None
+        self._pause = 0
+        self._kept: tuple[Int, Float] | None = None
+        self._rebase()
+
+    @property
+    def reference(self) -> ReferenceCell:
+        """The reference cell."""
+        return self._changes.cell
+
+    def _changed(self, held: Float) -> Int:
+        """Return the global rows that are `held` here or in the reference cell, not both, and those that softened.
+
+        Collective."""
+        own = self._first + np.flatnonzero((held != self.reference.active) | (self._softened > 0.0))
+        return np.concatenate(self.comm.allgather(own))
+
+    @property
+    def _softened(self) -> Float:
+        """(owned rows,) D: of springs that softened 1 / dC, or -dC where they came; 0 of all others."""
+        holds, came = self._held * self.reference.active > 0.0, self._held > self.reference.active
+        more = self._more * self._active
+        return np.divide(1.0, more, out=-more * came, where=holds & (more > 0.0))
+
+    def _renew_if_due(self) -> None:
+        """Renew the reference cell at once where nothing is followed or it is late, else in parts.  Collective."""
+        more = len(self._changed(self._held)) - self._tied - self._most_columns
+        if more > 0 and (self._followed is None or more > self._most_columns // LATEST_RENEWAL):
+            self._rebase()
+        elif more > 0 and self._renewal is None:
+            self._renewal = self._renewed()
+
+    def _renew_a_part(self) -> None:
+        """Make a part of the next reference cell, if that has begun and enough calls have passed.  Collective."""
+        if self._renewal is None:
+            return
+        self._pause = (self._pause or RENEWAL_PAUSE) - 1
+        if not self._pause and next(self._renewal, True):
+            self._renewal = None
+
+    def _rebase(self) -> None:
+        """Take the present cell, and what it takes to hold its bodies, for the reference at once.  Collective."""
+        self._renewal, self._kept = None, None
+        for _ in self._renewed():
+            pass
+
+    def _renewed(self) -> Iterator[None]:
+        """Do that in parts, between which the cell may change: no event pays all.  Collective."""
+        held, kept = self._held, None
+        tied = self._ties.tied(held)
+        if self.factorizations:
+            kept = self._kept_columns(tied)
+            yield
+        parts = yield from assembled_stiffness(self.comm, self._jump_operator, self._operators, tied)
+        yield
+        if self.factorizations:
+            self._changes.destroy()  # before the new cell takes memory
+        assembled = AssembledSchur(self.comm, *parts)
+        del parts
+        process_memory.trim(kept=SPARE_BYTES)
+        cell = ReferenceCell(self.comm, self._jump_operator, self._operators, self._BD, tied, assembled)
+        self.factorizations += 1
+        self._changes = ChangedReference(self.comm, cell, self._jump_operator.owned, self.stiffness)
+        self._answer, self._kept, self._is_behind, kept = None, kept, True, None
+        self._tied = len(self._changed(held))
+        self._rounding = cell.force_of_rigid_motions(self.stiffness[self._first :][: self._rows])
+        yield
+        self._take_kept()
+
+    def _take_kept(self) -> None:
+        """Take the columns that pass from one reference cell to the next, if they wait.  Collective."""
+        if self._kept is not None:
+            self._changes.take(*self._kept)
+            self._kept = None
+
+    def _kept_columns(self, tied: Float) -> tuple[Int, Float] | None:
+        """Rows and columns of the cell with the active rows `tied`, as `ChangedReference.next_columns`.  Collective.
+
+        None where springs have softened, nothing is followed, or many rows have changed at once.
+        """
+        if self._followed is None:
+            return None
+        soft = bool((self._more * self._active).any())
+        changed, own = self._changed(self._held), self._first + np.flatnonzero(tied > self._held)
+        come = np.concatenate(self.comm.allgather(own))
+        concerned = np.union1d(changed, come)
+        lacking = int((self._changes.columns.positions(concerned) < 0).sum())
+        if self.comm.allreduce(soft, MPI.LOR) or lacking > self.batch:
+            return None
+        self._find(concerned)
+        return self._changes.next_columns(self._held, changed, come, self._followed)
+
+    def _find(self, rows: Int) -> None:
+        """Find the columns of the reference cell that these rows lack, and some near them.  Collective."""
+        self._take_kept()
+        found = self._changes.columns
+        if len(lacking := rows[found.positions(rows) < 0]):
+            found.add(self._with_near(lacking, lambda near: near[found.positions(near) < 0]))
+
+    def _with_near(self, rows: Int, lacking: Callable[[Int], Int]) -> Int:
+        """Return rows and active ones near them, which break next: columns are cheaper together.  Collective."""
+        is_active = self._is_active()
+        return self.neighbours.rows_near(rows, lambda near: lacking(near[is_active[near]]), self.batch)
+
+    def _is_active(self) -> Bool:
+        """(all rows,) which are active.  Collective."""
+        return np.asarray(np.concatenate(self.comm.allgather(self._active)) > 0.0)
