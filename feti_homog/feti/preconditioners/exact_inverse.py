@@ -9,9 +9,9 @@ A spring whose compliance grew by dC is one of C, whose jump dC lam is prescribe
 
     N = (Gamma_CC + D)^-1,  lam_C = D c on such rows,  D = dC^-1 there, -dC where bonds came, 0 where they left.
 
-Changes cost their columns of what `followed_response` keeps up.  N follows them, by borders, when new columns or a
-confirmation want it.  The reference cell stays, until there are more changes than an option allows: then the cell as it
-stands, but for what softened, takes its place, with the columns of rows that are still active.
+Changes cost their columns of what `followed_response` keeps up.  N follows them, by borders, when new columns want it,
+or where F lambda finds an error.  The reference cell stays, until there are more changes than an option allows: then
+the cell as it stands, but for what softened, takes its place, see `renewed_reference`.
 """
 
 from __future__ import annotations

@@ -123,14 +123,21 @@ class ReferenceCell:
         """
         operators, jump_operator = self._operators, self._jump_operator
         g, f = scale_rows(self.active, x), scale_rows(1.0 - self.active, x)
+        is_pulled = not self._is_bonded and self._comm.allreduce(bool(f.any()), MPI.LOR)
+        pulled = operators.BT @ jump_operator.gather(f) if is_pulled else 0.0
+
+        def forces_by(u: Float) -> Float:
+            forces = operators.apply_some_with_springs(self._reached, u)
+            return forces - pulled if is_pulled else forces
+
         u = self._BDT @ jump_operator.gather(g)
-        pulled = 0.0 if self._is_bonded else operators.BT @ jump_operator.gather(f)
-        u = u + self.assembled.relieving_displacement(operators.apply_some_with_springs(self._reached, u) - pulled)
-        forces = operators.apply_some_with_springs(self._reached, u) - pulled
-        lam = scale_rows(self.active, jump_operator.sum(self._BD @ forces))
+        u += self.assembled.relieving_displacement(forces_by(u))
+        lam = scale_rows(self.active, jump_operator.sum(self._BD @ forces_by(u)))
         if self._is_bonded:
             return lam
-        gap = -jump_operator.sum(operators.B @ u) - scale_rows(operators.compliance, f)
+        gap = -jump_operator.sum(operators.B @ u)
+        if is_pulled:
+            gap -= scale_rows(operators.compliance, f)
         return lam + scale_rows(1.0 - self.active, gap)
 
 
