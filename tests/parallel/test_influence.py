@@ -16,6 +16,7 @@ from support.coarse_space_cells import BREAKING, NARROW, solve_many
 from feti_homog.errors import CaseError, ConvergenceError
 from feti_homog.feti.operators.one_subdomain import ExplicitInterfaceOperator
 from feti_homog.feti.preconditioners.changed_reference import ChangedReference
+from feti_homog.feti.preconditioners.renewed_reference import RenewedReference
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN
 
@@ -115,22 +116,29 @@ def test_springs_that_softened_while_their_rows_were_not_active_are_soft_when_th
         assert np.abs(gathered(cell, influence.multipliers(d, np.eye(3))) - expected @ gathered(cell, d)).max() < 1e-9
 
 
-@pytest.mark.parametrize("columns", [700, 20], ids=["one reference cell", "some"])
-def test_blocks_are_right_with_few_followed_columns(comm, columns, monkeypatch):
+@pytest.mark.parametrize(
+    ("columns", "slack"), [(700, 0), (20, 0), (4, 999)], ids=["one reference cell", "some", "some in parts"]
+)
+def test_blocks_are_right_with_few_followed_columns(comm, columns, slack, monkeypatch):
     """Bonds break one after another all around a fibre; others' columns go when there is no room for more.
 
     Those of active rows pass on to the next reference cell.
     """
     cell = torn_cells.tear(comm, geometry="square", petsc=INFLUENCE | {"feti_influence_columns": columns})
     dense, influence, d = DenseDual(cell), cell.solver.exact_inverse, cell.solver.d
-    influence.most_followed, influence.batch = 14, 6
+    influence.most_followed, influence.batch, influence.pause, influence.slack = 14, 6, 1, slack
     take = ChangedReference.take
 
     def counted(changes, taken, found):
         take(changes, taken, found)
         passed.append((len(taken), len(changes.columns.rows)))
 
+    def at_once(renewed):
+        raise AssertionError("a reference cell is made at once")
+
     monkeypatch.setattr(ChangedReference, "take", counted)
+    if slack:
+        monkeypatch.setattr(RenewedReference, "_rebase", at_once)
     status = np.full(len(cell.solver.jump_operator.nodes.row), BONDED, np.int8)
     rows, first, kept, passed = influence.neighbours.rows, influence.neighbours.first, [], []
     for number in range(len(rows) - 3):
@@ -151,7 +159,7 @@ def test_blocks_are_right_with_few_followed_columns(comm, columns, monkeypatch):
         for row, block in zip(rows[wanted], influence.inverse_blocks(rows[wanted, None] + np.arange(2)), strict=True):
             assert np.abs(block - expected[row : row + 2, row : row + 2]).max() < 1e-8 * influence.norm
         kept.append(influence._followed)
-    assert bool(passed) == (columns == 20) and all(found == offered > 0 for offered, found in passed)
+    assert bool(passed) == (columns < 700) and all(found == offered > 0 for offered, found in passed)
     assert len(kept) > 12 and all(each is kept[0] for each in kept)
 
 

@@ -61,7 +61,7 @@ class ExactInverse(RenewedReference, Preconditioner):
         if most < 1:
             raise CaseError(f"-feti_influence_columns {most}: expected a whole number above 0")
         super().__init__(comm, jump_operator, operators, most)
-        self.most_followed = FOLLOWED_COLUMNS
+        self.most_followed, self._has_added = FOLLOWED_COLUMNS, False
         self._next, self._loose = self._more, np.zeros(0, np.int64)
         # Rows that leave make H smaller.
         self.norm = NORM_MARGIN * self.reference.largest_eigenvalue(self._first)
@@ -81,13 +81,13 @@ class ExactInverse(RenewedReference, Preconditioner):
 
     def activate(self, active: Float) -> None:
         """Restrict to the rows where `active` is 1.  Collective."""
+        self._has_added = False
         if self._followed is not None and not self._follow(self._followed, active):
             self._followed = None
-        is_quiet, self._is_behind = self._is_behind, True
-        self._active, self._more = active, self._next
+        self._active, self._more, self._is_behind = active, self._next, True
         self._held = active if self._followed is None else self._with_pins(self._followed.pins, active)
         # Columns cost as much as a part of the next reference cell.
-        if self._followed is not None and is_quiet:
+        if self._followed is not None and not self._has_added:
             self._renew_a_part()
 
     def _follow(self, followed: FollowedResponse, active: Float) -> bool:
@@ -114,6 +114,7 @@ class ExactInverse(RenewedReference, Preconditioner):
         lacking = followed.lacking(wanted)
         if not len(lacking):
             return True
+        self._has_added = True
         self._catch_up()
         if self._has_others(followed) or len(wanted) > followed.most:
             return False  # other bodies are free than those with pins, or there is no room

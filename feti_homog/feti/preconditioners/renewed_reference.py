@@ -36,6 +36,8 @@ class RenewedReference:
             spring between them, in a row, while all others are held.
         factorizations: reference cells so far.
         batch: columns found at once at least.
+        pause: changes of the bonds from one part of the next reference cell to the next.
+        slack: changed rows above `most` with which it is made at once.
     """
 
     _changes: ChangedReference
@@ -51,7 +53,7 @@ class RenewedReference:
         self._BD = one_sided_jumps(comm, jump_operator, operators)
         self._ties = BodyTies(comm, jump_operator)
         self.neighbours = InterfaceNeighbours(comm, jump_operator, operators.subdomains)
-        self.batch = INFLUENCE_BATCH * comm.size
+        self.batch, self.pause, self.slack = INFLUENCE_BATCH * comm.size, RENEWAL_PAUSE, most // LATEST_RENEWAL
         # Columns without which the reference cell is not the one at hand.
         self.factorizations = self._tied = 0
         # The present state; `_held` has the pins of free bodies, too.
@@ -62,7 +64,7 @@ class RenewedReference:
         # N is of a state before; parts of the next reference cell, and columns of it, that wait.
         self._is_behind = False
         self._renewal: Iterator[None] | None = None
-        self._pause = 0
+        self._left = 0
         self._kept: tuple[Int, Float] | None = None
         self._rebase()
 
@@ -88,7 +90,7 @@ class RenewedReference:
     def _renew_if_due(self) -> None:
         """Renew the reference cell at once where nothing is followed or it is late, else in parts.  Collective."""
         more = len(self._changed(self._held)) - self._tied - self._most_columns
-        if more > 0 and (self._followed is None or more > self._most_columns // LATEST_RENEWAL):
+        if more > 0 and (self._followed is None or more > self.slack):
             self._rebase()
         elif more > 0 and self._renewal is None:
             self._renewal = self._renewed()
@@ -97,8 +99,8 @@ class RenewedReference:
         """Make a part of the next reference cell, if that has begun and enough calls have passed.  Collective."""
         if self._renewal is None:
             return
-        self._pause = (self._pause or RENEWAL_PAUSE) - 1
-        if not self._pause and next(self._renewal, True):
+        self._left = (self._left or self.pause) - 1
+        if not self._left and next(self._renewal, True):
             self._renewal = None
 
     def _rebase(self) -> None:
