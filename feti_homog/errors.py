@@ -77,6 +77,10 @@ class CoarseMeshError(FetiHomogError):
         return type(self), (*self.faults, self.energy, self.refine, self.finer, self.failure)
 
 
+class NoMemoryError(FetiHomogError):
+    """A rank has no memory left, of which all ranks know."""
+
+
 class LibraryError(FetiHomogError):
     """A library that pip does not bring is missing or does not fit; each fault gives the remedy."""
 

@@ -17,7 +17,7 @@ from feti_homog.analysis.registry import analysis_of
 from feti_homog.analysis.result import Result
 from feti_homog.analysis.state_recorder import StateRecorder
 from feti_homog.case.case import Case
-from feti_homog.errors import CoarseMeshError, ConvergenceError, MeshError
+from feti_homog.errors import CaseError, CoarseMeshError, ConvergenceError, MeshError, NoMemoryError
 from feti_homog.homogenization.partition_policy import BY_COST
 from feti_homog.homogenization.unit_cell import TornCell, tear
 from feti_homog.parallel.mpi_errors import all_raise, on_root, on_root_only
@@ -64,11 +64,11 @@ def run(
     on_root(comm, output_folder.refuse_files_of_others, directory)
     with output_folder.held(directory, comm, progress.say):
 
-        def solved(case: Case, earlier: CoarseMeshError | None) -> Result:
+        def solved(case: Case, earlier: CoarseMeshError | None, resume: bool) -> Result:
             with _torn(case, comm, progress) as cell:
                 return _run_and_write(cell, directory, progress, resume, keep_fields, earlier)
 
-        result = _accurate(case, solved, progress)
+        result = _accurate(case, solved, progress, resume)
     if result.faults:
         raise ConvergenceError(*result.faults)
     return result
@@ -83,7 +83,7 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False, quiet: b
     """
     progress = _begun(case, comm, quiet)
 
-    def solved(case: Case, earlier: CoarseMeshError | None) -> Result:
+    def solved(case: Case, earlier: CoarseMeshError | None, resume: bool) -> Result:
         with _torn(case, comm, progress) as cell:
             states = StateRecorder(cell, None, keep_fields, progress.say)
             context = AnalysisContext.of(cell, progress, states, earlier)
@@ -99,29 +99,42 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False, quiet: b
     return result
 
 
-def _accurate(case: Case, solved: Callable[[Case, CoarseMeshError | None], Result], progress: Progress) -> Result:
-    """Return solved(case, fault of an earlier mesh), once more on the finer mesh that the case may ask for.
+def _accurate(
+    case: Case,
+    solved: Callable[[Case, CoarseMeshError | None, bool], Result],
+    progress: Progress,
+    resume: bool = False,
+) -> Result:
+    """Return solved(case, fault of an earlier mesh, resume), once more on the finer mesh that the case may ask for.
 
-    If that fails, on one rank also for want of memory, on the first mesh again.  Collective.
+    If that fails, also for want of memory of which all ranks know, on the first mesh again.  To resume finds the
+    checkpoint of either; that of the first mesh is left by a run that could not solve the finer one.  Collective.
     """
     try:
-        return solved(case, None)
+        return solved(case, None, resume)
     except CoarseMeshError as error:
         earlier = error
     progress.say(f"remark: {earlier}")
+    of_first = False
     try:
-        finer = solved(replace(case, cell=replace(case.cell, refine=earlier.finer)), earlier)
+        finer = solved(replace(case, cell=replace(case.cell, refine=earlier.finer)), earlier, resume)
         failure = "; ".join(finer.faults)
         if not failure:
             return finer
-    except (MeshError, ConvergenceError) as error:
+    except (MeshError, ConvergenceError, NoMemoryError) as error:
         failure = str(error)
+    except CaseError as error:
+        if not resume:
+            raise
+        failure, of_first = f"an earlier run failed ({error})", True
     except MemoryError as error:
         if progress.comm.size > 1:
             raise  # one rank may have met it alone
         failure = f"no memory left: {error}"
+    failure = progress.comm.bcast(failure)
     progress.say(f"remark: refine = {earlier.finer}: {failure}; solved with refine = {earlier.refine} again")
-    return solved(case, CoarseMeshError(str(earlier), earlier.energy, earlier.refine, earlier.finer, failure))
+    again = CoarseMeshError(str(earlier), earlier.energy, earlier.refine, earlier.finer, failure)
+    return solved(case, again, of_first)
 
 
 def _begun(case: Case, comm: MPI.Intracomm, quiet: bool) -> Progress:

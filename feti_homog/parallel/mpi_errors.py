@@ -9,7 +9,7 @@ from array import array
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
-from feti_homog.errors import EXIT_DEFECT, FetiHomogError
+from feti_homog.errors import EXIT_DEFECT, FetiHomogError, NoMemoryError
 from feti_homog.runtime.standard_streams import complain
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def on_root(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any
     result: T
     result, message = comm.bcast((own, _portable(comm, error)), root=0)
     if message is not None:
-        raise error or message
+        raise message if isinstance(error, MemoryError) else error or message
     return result
 
 
@@ -43,20 +43,21 @@ def on_root_only(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs
     result, error = _attempt(function, *args, **kwargs) if comm.rank == 0 else (None, None)
     message = comm.bcast(_portable(comm, error), root=0)
     if message is not None:
-        raise error or message
+        raise message if isinstance(error, MemoryError) else error or message
     return result
 
 
 def agree(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any) -> T:
     """Return function(...) of each rank on that rank; if it raises on any, every rank raises.
 
-    A rank that met a defect raises that; all others raise that of the first such rank or, if there was none,
-    the FetiHomogError of the first rank that met one. Collective; `function` must not communicate.
+    A rank that met a defect raises that; all others raise that of the first such rank or, if there was none, the
+    FetiHomogError of the first rank that met one, NoMemoryError of one without memory. Collective; `function` must not
+    communicate.
     """
     result, error = _attempt(function, *args, **kwargs)
     messages = [message for message in comm.allgather(_portable(comm, error)) if message is not None]
     if messages:
-        if error is not None and not isinstance(error, FetiHomogError):
+        if error is not None and not isinstance(error, FetiHomogError | MemoryError):
             raise error
         raise next((message for message in messages if isinstance(message, RemoteError)), messages[0])
     return result  # type: ignore[return-value]
@@ -113,11 +114,11 @@ def end_job(comm: Comm, error: BaseException) -> NoReturn:
     abort(comm, EXIT_DEFECT)
 
 
-def _without_memory(comm: Comm, error: MemoryError) -> FetiHomogError:
+def _without_memory(comm: Comm, error: MemoryError) -> NoMemoryError:
     """Return the error in a line for the user."""
     words = f": {error}" if str(error) else ""
     hint = "`feti-homog check` estimates what a case needs, and more ranks share it"
-    return FetiHomogError(f"rank {comm.rank} of {comm.size} has no memory left{words}; {hint}")
+    return NoMemoryError(f"rank {comm.rank} of {comm.size} has no memory left{words}; {hint}")
 
 
 def abort(comm: Comm, exit_code: int) -> NoReturn:

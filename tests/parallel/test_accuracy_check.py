@@ -12,8 +12,8 @@ from support.pixel_images import pixel_mesh
 from feti_homog import Case, run
 from feti_homog.analysis import runner
 from feti_homog.analysis.mesh_errors import add_errors_of_breaks, note_accuracy
-from feti_homog.errors import CoarseMeshError, ConvergenceError
-from feti_homog.parallel.mpi_errors import on_root
+from feti_homog.errors import CaseError, CoarseMeshError, ConvergenceError
+from feti_homog.parallel.mpi_errors import agree, on_root
 from feti_homog.runtime.progress import Progress
 
 pytestmark = pytest.mark.parallel
@@ -52,7 +52,7 @@ def test_the_first_mesh_stays_if_the_finer_one_fails(comm, raises):
     case = Case.parse(ASKED | {"cell": ASKED["cell"] | {"accuracy_check": "repeat"}})
     first, notes = case.cell.refine, []
 
-    def solved(own, earlier):
+    def solved(own, earlier, resume):
         context = SimpleNamespace(case=own, notes=notes, earlier=earlier, cell=SimpleNamespace(comm=comm))
         if own.cell.refine > first:
             if raises:
@@ -69,6 +69,30 @@ def test_the_first_mesh_stays_if_the_finer_one_fails(comm, raises):
     why = "no memory left: broke down" if raises is MemoryError else "broke down"
     assert found.case is case
     assert f"for with refine = {first + 2} it could not be solved: {why}" in notes[0]
+
+
+@pytest.mark.parametrize("resume", [False, True])
+def test_a_rank_without_memory_or_a_checkpoint_of_the_first_mesh_leaves_the_first_mesh(comm, resume):
+    case = Case.parse(ASKED | {"cell": ASKED["cell"] | {"accuracy_check": "repeat"}})
+    notes, resumed = [], []
+
+    def fail():
+        if not resume and comm.rank == comm.size - 1:
+            raise MemoryError("none left")
+
+    def solved(own, earlier, resumes):
+        context = SimpleNamespace(case=own, notes=notes, earlier=earlier, cell=SimpleNamespace(comm=comm))
+        if own.cell.refine > case.cell.refine:
+            agree(comm, fail)
+            raise CaseError("--resume: of another run")
+        resumed.append(resumes)
+        note_accuracy(context, 5e-3)
+        return SimpleNamespace(faults=[], case=own)
+
+    assert runner._accurate(case, solved, Progress(comm, quiet=True), resume).case is case
+    assert resumed == [resume, resume]  # the checkpoint of a finer mesh that fails is of no use to the first
+    last = comm.size - 1
+    assert ("of another run" if resume else f"rank {last} of {last + 1} has no memory left") in notes[0]
 
 
 @pytest.mark.parametrize("kind", ["stiffness", "load", "angle", "path"])
