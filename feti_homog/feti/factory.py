@@ -16,7 +16,7 @@ from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.assembled_schur import shared_dofs
 from feti_homog.feti.preconditioners.scaled import Dirichlet, Identity, Lumped, Preconditioner
-from feti_homog.feti.solver_plan import ProblemSizes, SolverOptions, choose
+from feti_homog.feti.solver_plan import BONDED, ProblemSizes, SolverOptions, choose
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.parallel.mpi_errors import agree
 from feti_homog.typing import Float
@@ -32,13 +32,20 @@ def _influence(comm: MPI.Intracomm, jump_operator: JumpOperator, operators: Inte
     return ExactInverse(comm, jump_operator, operators)
 
 
+def _bonded(comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> Preconditioner:
+    from feti_homog.feti.preconditioners.bonded_inverse import BondedInverse  # with two of these modules
+
+    return BondedInverse(comm, jump_operator, operators)
+
+
 CLASSES: dict[str, Callable[[MPI.Intracomm, JumpOperator, InterfaceOperators], Preconditioner]] = {
     "none": lambda *_: Identity(),
     "lumped": Lumped,
     "dirichlet": Dirichlet,
     "influence": _influence,
+    BONDED: _bonded,
 }
-"""What makes the preconditioner of each name of `PRECONDITIONERS` but auto."""
+"""What makes each preconditioner that `choose` may choose."""
 
 
 @dataclass(frozen=True)
@@ -118,6 +125,7 @@ def build(
     """
     options = database_options(thresholds)
     soft = options.want_soft_modes(_are_cut(comm, subdomains))
+    one_each = _has_one_each(comm, subdomains)
     springs = jump_operator.gather(compliance) if comm.allreduce(bool(compliance.any()), MPI.LOR) else None
     with PETSc.Log.Event("FETISubdomains"):
         operators = agree(
@@ -125,13 +133,13 @@ def build(
             InterfaceOperators,
             jump_operator,
             subdomains,
-            options.operator,
+            "explicit" if one_each and options.operator == "auto" else options.operator,
             applications,
             soft,
             thresholds,
             springs,
         )
-    plan = choose(_sizes(comm, jump_operator, operators, applications), options, thresholds)
+    plan = choose(_sizes(comm, jump_operator, operators, applications, one_each), options, thresholds)
     preconditioner = CLASSES[plan.preconditioner](comm, jump_operator, operators)
     with PETSc.Log.Event("FETINatural"):
         natural = NaturalCoarseSpace(comm, jump_operator, operators)
@@ -155,7 +163,11 @@ def build(
 
 
 def _sizes(
-    comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators, applications: int
+    comm: MPI.Intracomm,
+    jump_operator: JumpOperator,
+    operators: InterfaceOperators,
+    applications: int,
+    one_each: bool,
 ) -> ProblemSizes:
     """Return those of a torn cell; collective."""
     dense = [o.is_dense for o in operators.operators]
@@ -166,7 +178,15 @@ def _sizes(
         all_searchable=comm.allreduce(all(np.logical_or(dense, operators.facewise)), MPI.LAND),
         shared_dofs=shared_dofs(comm, jump_operator),
         has_thin=comm.allreduce(any(s.is_thin for s in operators.subdomains), MPI.LOR),
+        one_each=one_each,
     )
+
+
+def _has_one_each(comm: MPI.Intracomm, subdomains: Sequence[Subdomain]) -> bool:
+    """Return whether each of several ranks has one subdomain, and these reach across materials.  Collective."""
+    own = len(subdomains) == 1, any(s.material is not None for s in subdomains)
+    each, across = (comm.allreduce(*pair) for pair in zip(own, (MPI.LAND, MPI.LOR), strict=True))
+    return comm.size > 1 and each and across
 
 
 def _are_cut(comm: MPI.Intracomm, subdomains: Sequence[Subdomain]) -> bool:

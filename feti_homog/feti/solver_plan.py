@@ -10,6 +10,8 @@ from feti_homog.feti.operators.choice import KINDS
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 
 PRECONDITIONERS = ("auto", "none", "lumped", "dirichlet", "influence")
+BONDED = "bonded"
+"""The preconditioner of cells of few large subdomains in which nothing parts: no option asks for it."""
 COARSE_SPACES = ("auto", "natural", "adaptive")
 WITHOUT_INVERSE = (
     f"[interface] friction: needs influence columns, which are taken up to {DEFAULTS.assembled_schur_dofs} degrees of "
@@ -82,6 +84,7 @@ class ProblemSizes:
         has_thin: whether some bodies are thin.  Such a ring bends easily and resists to change its thickness, which
             no scaling meets: with the Dirichlet preconditioner thin ones take hundreds of iterations, or do not
             converge.
+        one_each: whether each of several ranks has a single subdomain, and these reach across materials.
     """
 
     applications: int
@@ -90,6 +93,7 @@ class ProblemSizes:
     all_searchable: bool
     shared_dofs: int
     has_thin: bool = False
+    one_each: bool = False
 
 
 @dataclass(frozen=True)
@@ -97,7 +101,7 @@ class SolverPlan:
     """Chosen parts of the solver.
 
     Attributes:
-        preconditioner: of PRECONDITIONERS, not auto.
+        preconditioner: of PRECONDITIONERS, not auto; or BONDED.
         adaptive: whether the coarse space has soft modes beside the rigid-body motions.
     """
 
@@ -109,6 +113,8 @@ class SolverPlan:
         """For the lines of `check`."""
         if self.preconditioner == "influence":
             return "influence columns, an inverse of the bonded cell"
+        if self.preconditioner == BONDED:
+            return "inverse of the assembled Schur complement, no iterations"
         return f"{self.preconditioner} preconditioner, {'adaptive' if self.adaptive else 'natural'} coarse space"
 
 
@@ -124,8 +130,7 @@ def choose(sizes: ProblemSizes, options: SolverOptions, thresholds: Thresholds =
     if preconditioner == "influence" and not sizes.all_dense:
         raise CaseError("-feti_pc_type influence: needs -feti_dual_operator explicit")
     if preconditioner == "auto":
-        pays = options.coarse_space != "adaptive" and _influence_pays(sizes, thresholds)
-        preconditioner = "influence" if pays else "dirichlet"
+        preconditioner = _fastest(sizes, options.coarse_space, thresholds)
     can_balance = sizes.all_searchable and preconditioner == "dirichlet"
     _check_adaptive(sizes, options, can_balance)
     return SolverPlan(preconditioner, can_balance and options.want_soft_modes(sizes.bodies_are_cut))
@@ -135,6 +140,14 @@ def _check_adaptive(sizes: ProblemSizes, options: SolverOptions, can_balance: bo
     """Raise CaseError if a cell with multipliers cannot have the adaptive coarse space that is asked for."""
     if options.coarse_space == "adaptive" and sizes.shared_dofs and not can_balance:
         raise CaseError("-feti_coarse_space adaptive: needs -feti_pc_type dirichlet, -feti_dual_operator not implicit")
+
+
+def _fastest(sizes: ProblemSizes, coarse_space: str, thresholds: Thresholds) -> str:
+    """Return the preconditioner where no option names one."""
+    if coarse_space != "adaptive" and _influence_pays(sizes, thresholds):
+        return "influence"
+    is_small = 0 < sizes.shared_dofs <= thresholds.dense_boundary_dofs
+    return BONDED if coarse_space == "auto" and sizes.one_each and sizes.all_dense and is_small else "dirichlet"
 
 
 def _influence_pays(sizes: ProblemSizes, thresholds: Thresholds) -> bool:

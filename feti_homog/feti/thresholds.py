@@ -73,6 +73,8 @@ CHOLMOD_COLUMNS_ONE_BY_ONE, MUMPS_COLUMNS_ONE_BY_ONE = 2, 1
 # milliseconds; one factor of all ranks waits for messages. With 1 812 unknowns on two ranks both cost alike
 # (`scripts/benchmark scripts/cases/benchmark_1m.toml`, with and without `-feti_coarse_pc_type cholesky`).
 REPLICATED_UNKNOWNS = 2000
+# Share of the entries of an assembled Schur complement from which on it is factored as a dense matrix, and most rows.
+DENSE_SHARE, MOST_DENSE_ROWS = 0.5, 6000
 # Rows up to which LAPACK's dtrtri inverts a triangle faster than halving it.
 TRIANGLE_INVERSE_ROWS = 48
 # Rows of the blocks in which a triangle is mirrored, so that they fit the cache.
@@ -85,6 +87,9 @@ MIRRORED_BLOCK_ROWS = 64
 LENGTH_CLASSES = 100
 # Load of the fullest rank, relative to that of the most even assignment, that is accepted to keep neighbours together.
 MAX_IMBALANCE = 1.03
+# Share of the triangles by which the strips into which a cell is halved may differ from half of it, and how many widths
+# are tried.
+STRIP_SLACK, STRIP_WIDTHS = 0.01, 33
 # Largest |K R| relative to |K|.  Rounding leaves about 1e-16; a rotation that is wrong by 1 % gives 1e-7 and more.
 KERNEL_TOLERANCE = 1e-10
 

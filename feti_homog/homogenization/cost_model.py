@@ -127,7 +127,7 @@ def estimate(
     of_subdomain = len(problems) * SUBDOMAIN_SECONDS
     slowest = max(n * of_node + k * of_subdomain for n, k in zip(nodes, subdomains, strict=True))
     dofs = [sum(problems) * n for n in nodes]
-    in_one_factor = max(problems) * max(nodes) if sum(subdomains) == 1 else 0
+    in_one_factor = max(problems) * max(nodes) if max(subdomains) == 1 else 0
     return Estimate(
         seconds=START_SECONDS + coarse_triangles * MESH_SECONDS + slowest + columns / len(nodes) * COLUMN_SECONDS,
         memory=BASE_BYTES + max(dofs) * DOF_BYTES + in_one_factor * FACTOR_BYTES + columns / len(nodes) * COLUMN_BYTES,

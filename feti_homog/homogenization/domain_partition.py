@@ -8,7 +8,7 @@ import numpy as np
 
 from feti_homog.case.case import Case
 from feti_homog.errors import CaseError
-from feti_homog.feti.decomposition.partition import Decomposition, decompose
+from feti_homog.feti.decomposition.partition import Decomposition, decompose, halves
 from feti_homog.fibres.outlines.ellipses import Ellipses
 from feti_homog.homogenization import arc_selection, cell_remarks, process_zone
 from feti_homog.homogenization.arc_selection import InterfaceNodes
@@ -203,6 +203,9 @@ def _cut_across(
     pieces = policy.across_pieces(triangles * lattice.intervals**2, n_ranks) if can_be_cut_across(case) else 0
     if not 0 < pieces <= triangles:
         return None
+    is_large = triangles * lattice.intervals**2 >= policy.strip_dofs
+    if pieces == n_ranks == 2 and is_large and (found := halves(torus)):
+        return found
     found = decompose(torus, np.zeros(triangles, np.int64), np.array([pieces]), n_ranks)
     return found if len(found.rank) >= n_ranks else None  # METIS leaves some pieces empty
 

@@ -43,9 +43,13 @@ class PartitionPolicy:
         across_piece_dofs: of such a piece, which has no more multipliers than one of a body; so it may be larger.
         whole_dofs: such a cell on one rank is not cut up to this size: one sparse factor takes less time than the dense
             matrices of pieces do, and twice their memory.
+        whole_ranks: on up to so many ranks each has one piece of such a cell, whose Schur complements are factored
+            together; they are too large for more ranks.
+        strip_dofs: cells from this size on are halved into strips: below, boundaries are short anyway, and estimates of
+            errors, which leave boundaries as they are, depend less on the direction of METIS' cuts.
 
     `scripts/benchmark scripts/cases/benchmark_1m.toml --tools feti` times the bonded ones, `scripts/benchmark_path`
-    those of bodies that may part, and `scripts/benchmark --table small` the last three.
+    those of bodies that may part, and `scripts/benchmark --table small` the last five.
     """
 
     piece_dofs: int = 2200
@@ -58,6 +62,8 @@ class PartitionPolicy:
     across_dofs: int = 0
     across_piece_dofs: int = 7000
     whole_dofs: int = 400_000
+    whole_ranks: int = 2
+    strip_dofs: int = 30_000
 
     def across_pieces(self, dofs: int, n_ranks: int) -> int:
         """Return into how many pieces a cell in which nothing can part is cut across materials; 0 for body by body.
@@ -66,8 +72,8 @@ class PartitionPolicy:
         """
         if dofs > self.across_dofs:
             return 0
-        if n_ranks == 1 and dofs <= self.whole_dofs:
-            return 1
+        if n_ranks <= self.whole_ranks and dofs <= self.whole_dofs:
+            return n_ranks
         return n_ranks * max(1, round(dofs / (n_ranks * self.across_piece_dofs)))
 
 

@@ -61,7 +61,7 @@ def _described(
     own = [subdomains for subdomains, _ in loads]
     nodes = [triangles * lattice.intervals**2 // 2 for _, triangles in loads]
     elements = summary.coarse_triangles * len(lattice.triangles)
-    plan = _plan(case, summary, multipliers, max(_applications(case, summary.across).values()), options)
+    plan = _plan(case, summary, multipliers, max(_applications(case, summary.across).values()), options, own)
     columns = multipliers if plan.preconditioner == "influence" else 0
     problems = _applications(case, summary.across or columns > 0)
     errors = cost_model.has_errors(case)
@@ -125,16 +125,25 @@ def _subdomains(count: int) -> str:
     return "1 subdomain" if count == 1 else f"{count} subdomains"
 
 
-def _plan(case: Case, summary: CellSummary, multipliers: int, applications: int, options: SolverOptions) -> SolverPlan:
+def _plan(
+    case: Case,
+    summary: CellSummary,
+    multipliers: int,
+    applications: int,
+    options: SolverOptions,
+    own: Sequence[int],
+) -> SolverPlan:
     """Plan of the plane problem, if its operators are of the kind asked for; pieces are dense by default.
+
+    `own` are the subdomains of each rank.
 
     Raises:
         CaseError: as `solver_plan.choose`; or with friction there are no influence columns.
     """
     dense = options.operator != "implicit"
-    sizes = ProblemSizes(
-        applications, summary.is_cut, dense, dense, multipliers, COATING in case.materials and not summary.across
-    )
+    has_thin = COATING in case.materials and not summary.across
+    one_each = summary.across and len(own) > 1 and set(own) == {1}
+    sizes = ProblemSizes(applications, summary.is_cut, dense, dense, multipliers, has_thin, one_each)
     found = solver_plan.choose(sizes, options)
     if case.has_friction and found.preconditioner != "influence":
         raise CaseError(solver_plan.WITHOUT_INVERSE)

@@ -9,10 +9,10 @@ import numpy as np
 import pymetis
 from scipy.sparse import coo_matrix, csr_matrix
 
-from feti_homog.feti.thresholds import LENGTH_CLASSES, MAX_IMBALANCE
+from feti_homog.feti.thresholds import LENGTH_CLASSES, MAX_IMBALANCE, STRIP_SLACK, STRIP_WIDTHS
 from feti_homog.mesh.periodic_topology import Torus, components, renumber
 from feti_homog.parallel.dividing import balanced
-from feti_homog.typing import Int
+from feti_homog.typing import Bool, Int
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,41 @@ def decompose(
     apart = subdomain[left] != subdomain[right]
     neighbours = subdomain[left[apart]], subdomain[right[apart]]
     return Decomposition(subdomain, assign_ranks(np.bincount(subdomain), *neighbours, n_ranks))
+
+
+def halves(torus: Torus) -> Decomposition | None:
+    """Cut a whole cell into two strips, one for each of two ranks; None if these are not connected.
+
+    Of all strips along x or y that hold about half of the triangles, those that fewest edges separate. On the torus
+    METIS' halves have boundaries up to half as long again.
+    """
+    left, right, _ = torus.sides
+    centres = torus.mesh.points[torus.mesh.triangles].mean(axis=1) / torus.mesh.period % 1.0
+    strips = [_strip(np.argsort(x, kind="stable"), left, right) for x in centres.T]
+    piece = min(strips, key=lambda strip: int((strip[left] != strip[right]).sum())).astype(np.int64)
+    together = piece[left] == piece[right]
+    connected = components(len(piece), left[together], right[together])
+    sizes = np.bincount(connected)
+    main = [np.argmax(np.where(np.bincount(connected, piece) == sizes * k, sizes, 0)) for k in range(2)]
+    piece ^= ~np.isin(connected, main)  # islands go to the half around them
+    together = piece[left] == piece[right]
+    is_whole = components(len(piece), left[together], right[together]).max() == 1
+    return Decomposition(piece, np.arange(2)) if is_whole else None
+
+
+def _strip(order: Int, left: Int, right: Int) -> Bool:
+    """(m,) which triangles are in a strip of the cyclic `order`; fewest sides (left, right) cross its ends."""
+    m = len(order)
+    place = np.empty(m, np.int64)
+    place[order] = np.arange(m)
+    low, high = np.sort([place[left], place[right]], axis=0)
+    low, high = np.where(high - low > m / 2, (high, low + m), (low, high))
+    crossed = np.bincount(low + 1, minlength=2 * m) - np.bincount(high + 1, minlength=2 * m)
+    crossed = np.cumsum(crossed).reshape(2, m).sum(axis=0)
+    ends = m // 2 + np.unique((STRIP_SLACK * m * np.linspace(-1.0, 1.0, STRIP_WIDTHS)).astype(np.int64))
+    sums = np.stack([crossed + np.roll(crossed, -end) for end in ends])
+    end, first = np.unravel_index(sums.argmin(), sums.shape)
+    return np.asarray((place - first) % m < ends[end])
 
 
 def cut_into_pieces(torus: Torus, parts: Int, pieces: Int, longest: float, length_classes: int = LENGTH_CLASSES) -> Int:

@@ -1,11 +1,11 @@
-"""Dense symmetric matrices: Schur complements by MUMPS, Cholesky factorizations by LAPACK, copies of one triangle."""
+"""Dense symmetric matrices: Schur complements by sparse elimination, Cholesky by LAPACK, copies of one triangle."""
 
 from __future__ import annotations
 
 import numpy as np
 from petsc4py import PETSc
 from scipy.linalg.blas import dtrmm
-from scipy.linalg.lapack import dlauum, dpotrf, dtrtri
+from scipy.linalg.lapack import dlauum, dpotrf, dpotrs, dtrtri
 from scipy.sparse import bmat, csr_matrix
 
 from feti_homog.feti.linalg.sparse_direct import check_factor, mumps_error, power_of_two
@@ -17,17 +17,20 @@ from feti_homog.typing import Float, Int
 TOO_SMALL, MORE_WORKSPACE = (-8, -9), (None, 100, 1000)
 
 
-def schur_complement(matrix: csr_matrix, rows: Int) -> Float:
+def schur_complement(matrix: csr_matrix, rows: Int, order: Int | None = None) -> Float:
     """(n, n) Schur complement of a matrix on `rows`, in Fortran order; the rest of the matrix has to be SPD.
 
-    Options have the prefix `feti_schur_`.
+    By CHOLMOD in an `order` (dofs,) of elimination, where there is one, of a matrix with a positive diagonal. By MUMPS
+    otherwise, and where there are options, which have the prefix `feti_schur_`.
 
     Raises:
         LinAlgError: the rest of the matrix is not positive definite, or has entries that are not finite.
-        MemoryError: MUMPS cannot factor it, for want of memory as a rule.
+        MemoryError: the library cannot factor it, for want of memory as a rule.
     """
     if len(rows) == matrix.shape[0]:
         return np.asarray(matrix.toarray(order="F"))
+    if order is not None and _can_be_ordered():
+        return _by_cholmod(matrix, rows, np.zeros((matrix.shape[0], 0)), order)[0]
     scale = power_of_two(matrix.diagonal())
     matrix.sort_indices()
     # In place and back, which changes no digit: a copy would be as large as the matrix.
@@ -40,17 +43,48 @@ def schur_complement(matrix: csr_matrix, rows: Int) -> Float:
     return schur
 
 
-def schur_complement_with_loads(matrix: csr_matrix, rows: Int, loads: Float) -> tuple[Float, Float, Float]:
+def schur_complement_with_loads(
+    matrix: csr_matrix, rows: Int, loads: Float, order: Int | None = None
+) -> tuple[Float, Float, Float]:
     """Return S (n, n) as `schur_complement`, and the loads Q (dofs, v) condensed to the `rows` by the same elimination.
 
     They are q = Q_b - K_bi K_ii^-1 Q_i and -Q_i^T K_ii^-1 Q_i, for the columns of Q border the matrix.
     """
+    if order is not None and _can_be_ordered():
+        return _by_cholmod(matrix, rows, loads, order)
     v, n = loads.shape[1], len(rows)
     corner = csr_matrix((np.zeros(v), np.arange(v), np.arange(v + 1)), shape=(v, v))  # MUMPS expects a diagonal
     Q = csr_matrix(loads)
     bordered = bmat([[matrix, Q], [Q.T, corner]], format="csr")
     all_of_it = schur_complement(bordered, np.r_[rows, matrix.shape[0] + np.arange(v)])
     return np.asfortranarray(all_of_it[:n, :n]), all_of_it[:n, n:].copy(), all_of_it[n:, n:].copy()
+
+
+def _can_be_ordered() -> bool:
+    """Return whether CHOLMOD can leave a Schur complement, and nothing is asked of MUMPS."""
+    from feti_homog.petsc import partial_cholesky  # of large subdomains alone
+
+    return partial_cholesky.is_available() and not PETSc.Options("feti_schur_").getAll()
+
+
+def _by_cholmod(matrix: csr_matrix, rows: Int, loads: Float, order: Int) -> tuple[Float, Float, Float]:
+    """Return the results of `schur_complement_with_loads` from K + D = L L^T.
+
+    D > 0 on `rows` alone, so that these have a factor, too: S + D = L_bb L_bb^T, q = L_bb y_b of y = L^-1 Q.
+    """
+    from feti_homog.petsc import partial_cholesky  # as before
+
+    n, shift = len(rows), matrix.diagonal()[rows]
+    D = csr_matrix((shift, (rows, rows)), shape=matrix.shape)
+    U, y = partial_cholesky.last_rows(csr_matrix(matrix + D), rows, order, loads)
+    inner, last = y[:-n], y[-n:]
+    q = dtrmm(1.0, U, last[::-1])[::-1].copy()
+    if not np.isfinite(U.diagonal()).all():
+        raise np.linalg.LinAlgError("not positive definite (entries that are not finite)")
+    check_lapack("dlauum", dlauum(U, lower=0, overwrite_c=1)[1])
+    S = full_from_lower(U[::-1, ::-1]).T
+    S[np.diag_indices(n)] -= shift
+    return S, q, -inner.T @ inner
 
 
 def _by_mumps(matrix: csr_matrix, rows: Int) -> Float:
@@ -118,6 +152,28 @@ def cholesky(A: Float, lower: bool = True, clean: bool = True) -> Float:
     if not np.isfinite(L[-1, -1]):
         raise np.linalg.LinAlgError("not positive definite (entries that are not finite)")
     return np.asarray(L)
+
+
+class DenseSolver:
+    """X = A^-1 B for one SPD matrix A (n, n), in whose memory the factor is if A is in Fortran order."""
+
+    def __init__(self, A: Float) -> None:
+        """Factorize.
+
+        Raises:
+            LinAlgError: as `cholesky`.
+        """
+        self._L = cholesky(A, clean=False)
+
+    def solve(self, B: Float) -> Float:
+        """A^-1 B for B (n,) or (n, k)."""
+        X, info = dpotrs(self._L, B, lower=1)
+        check_lapack("dpotrs", info)
+        return np.asarray(X)
+
+    def destroy(self) -> None:
+        """Free the factor now."""
+        self._L = self._L[:0, :0].copy()
 
 
 def check_lapack(routine: str, info: int) -> None:

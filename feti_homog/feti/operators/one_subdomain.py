@@ -50,11 +50,12 @@ class ExplicitInterfaceOperator:
         self._fixed = np.searchsorted(dofs, fixed)
         self.n = len(dofs)
         s, q, C = subdomain, subdomain.Q[dofs], subdomain.area * subdomain.L
+        order = s.elimination_order()
         if s.loads_inside:
-            both, q, condensed = schur_complement_with_loads(K, dofs, s.Q)
+            both, q, condensed = schur_complement_with_loads(K, dofs, s.Q, order)
             C = C + condensed
         else:
-            both = schur_complement(K, dofs)
+            both = schur_complement(K, dofs, order)
         self.condensed = CondensedLoads(q, C, C)
         self._schur_diagonal = both.diagonal().copy()
         # S stays below the diagonal; the inverse of the regularised S comes above it.

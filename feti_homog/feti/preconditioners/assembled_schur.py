@@ -9,11 +9,12 @@ from mpi4py import MPI
 from scipy.sparse import csr_matrix, diags, hstack
 
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
+from feti_homog.feti.linalg.dense_matrices import DenseSolver
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
 from feti_homog.feti.linalg.sparse_matrices import DenseBlockSum, allreduce_sparse
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.operators.with_springs import is_dense
-from feti_homog.feti.thresholds import ASSEMBLED_PARTS
+from feti_homog.feti.thresholds import ASSEMBLED_PARTS, DENSE_SHARE, MOST_DENSE_ROWS
 from feti_homog.parallel.distributed_arrays import share_columns
 from feti_homog.typing import Float
 
@@ -33,10 +34,13 @@ class AssembledSchur:
     def __init__(self, comm: MPI.Intracomm, Z: csr_matrix, stiffness: csr_matrix) -> None:
         """Factor, with the arguments of `assembled_stiffness`.
 
-        Options under `feti_bonded_` (default: cholesky by CHOLMOD).
+        By LAPACK where most entries are there. Options under `feti_bonded_` (default: cholesky by CHOLMOD) are of
+        other matrices.
         """
         self.comm, self.size = comm, Z.shape[1]
-        self._solver = DirectSolver(stiffness, "feti_bonded_")
+        is_full = stiffness.nnz >= DENSE_SHARE * self.size**2 and self.size <= MOST_DENSE_ROWS
+        self._solver: DirectSolver | DenseSolver
+        self._solver = DenseSolver(stiffness.toarray(order="F")) if is_full else DirectSolver(stiffness, "feti_bonded_")
         self._Z, self._ZT = Z, Z.T.tocsr()
 
     def relieving_displacement(self, forces: Float) -> Float:

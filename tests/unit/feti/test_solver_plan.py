@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from feti_homog.errors import CaseError
-from feti_homog.feti.solver_plan import PRECONDITIONERS, ProblemSizes, SolverOptions, SolverPlan, choose
+from feti_homog.feti.solver_plan import BONDED, PRECONDITIONERS, ProblemSizes, SolverOptions, SolverPlan, choose
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 
 PATH = ProblemSizes(
@@ -35,6 +35,9 @@ def read(**given):
         (replace(STIFFNESS, bodies_are_cut=False), NATURAL),
         (replace(STIFFNESS, all_dense=False), ADAPTIVE),
         (replace(STIFFNESS, all_dense=False, all_searchable=False), NATURAL),
+        (replace(STIFFNESS, one_each=True), SolverPlan(BONDED, False)),
+        (replace(STIFFNESS, one_each=True, shared_dofs=0), ADAPTIVE),
+        (replace(STIFFNESS, one_each=True, all_dense=False), ADAPTIVE),
         (PATH, INFLUENCE),
         (replace(PATH, bodies_are_cut=False), INFLUENCE),
         (replace(PATH, applications=DEFAULTS.influence_applications - 1), ADAPTIVE),

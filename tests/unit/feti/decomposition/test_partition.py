@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from feti_homog.case.cell_section import Cell
-from feti_homog.feti.decomposition.partition import decompose, pieces_for_count, pieces_for_size
+from feti_homog.feti.decomposition.partition import decompose, halves, pieces_for_count, pieces_for_size
 from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.mesh.periodic_topology import Torus, components, edge_pairs
 from feti_homog.mesh.submesh import SubdomainTable, cut_for_ranks, pinned_class
@@ -45,6 +45,15 @@ def test_pieces_are_connected_and_within_one_body(torus):
     assert parts.max() == subdomain.max()
     bodies = np.unique(np.stack([subdomain, torus.constituent]), axis=1)
     assert bodies.shape[1] == subdomain.max() + 1
+
+
+def test_halves_are_connected_even_and_shorter_around_than_those_of_metis(torus):
+    left, right, _ = torus.sides
+    found, metis = halves(torus), decompose(torus, np.zeros(len(torus.constituent), np.int64), np.array([2]), 2)
+    inside = found.subdomain[left] == found.subdomain[right]
+    assert components(len(found.subdomain), left[inside], right[inside]).max() == 1
+    assert abs(found.subdomain.mean() - 0.5) < 0.03
+    assert (~inside).sum() < (metis.subdomain[left] != metis.subdomain[right]).sum()
 
 
 def test_pieces_have_the_wanted_size(torus):

@@ -1,4 +1,4 @@
-"""Schur complements by MUMPS against dense algebra; what MUMPS cannot make is no zeros."""
+"""Schur complements by MUMPS and CHOLMOD against dense algebra; what MUMPS cannot make is no zeros."""
 
 from __future__ import annotations
 
@@ -16,20 +16,43 @@ def laplacian(n: int) -> csr_matrix:
     return csr_matrix(kron(one, identity(n)) + kron(identity(n), one))
 
 
-def test_it_is_that_of_dense_algebra():
-    A, rows = laplacian(12), np.arange(0, 144, 7)
+def shuffled(n: int) -> np.ndarray:
+    """(n,) an order of elimination."""
+    return np.random.default_rng(0).permutation(n)
+
+
+@pytest.mark.parametrize("order", [None, shuffled(144)], ids=["mumps", "cholmod"])
+@pytest.mark.parametrize("rows", [np.arange(0, 144, 7), np.arange(40), np.array([77])], ids=["some", "block", "one"])
+def test_it_is_that_of_dense_algebra(rows, order):
+    A = laplacian(12)
     rest = np.setdiff1d(np.arange(144), rows)
     D = A.toarray()
     expected = D[np.ix_(rows, rows)] - D[np.ix_(rows, rest)] @ np.linalg.solve(D[np.ix_(rest, rest)], D[rest][:, rows])
-    np.testing.assert_allclose(schur_complement(A, rows), expected, atol=1e-12)
+    np.testing.assert_allclose(schur_complement(A, rows, order), expected, atol=1e-12)
 
 
-def test_loads_are_condensed_with_it():
+def test_a_singular_matrix_has_one():
+    """The rest of it is definite: of two squares that nothing couples, both float."""
+    one = laplacian(8) - diags(np.asarray(laplacian(8).sum(axis=1)).ravel())
+    A, rows = csr_matrix(kron(identity(2), one)), np.array([3, 40, 70, 127])
+    found = [schur_complement(A, rows, order) for order in (None, shuffled(128))]
+    np.testing.assert_allclose(found[1], found[0], atol=1e-12)
+    np.testing.assert_allclose(found[1].sum(axis=1), 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("scale, words", [(-1.0, "pivot"), (np.nan, "finite|pivot")])
+def test_cholmod_refuses_a_rest_that_is_not_definite(scale, words):
+    with pytest.raises(np.linalg.LinAlgError, match=words):
+        schur_complement(csr_matrix(laplacian(6) @ diags(np.r_[1.0, scale, np.ones(34)])), np.array([0]), shuffled(36))
+
+
+@pytest.mark.parametrize("order", [None, shuffled(144)], ids=["mumps", "cholmod"])
+def test_loads_are_condensed_with_it(order):
     A, rows = laplacian(12), np.arange(0, 144, 7)
     rest, loads = np.setdiff1d(np.arange(144), rows), np.random.default_rng(1).normal(size=(144, 3))
     D = A.toarray()
     inside = np.linalg.solve(D[np.ix_(rest, rest)], loads[rest])
-    S, q, C = schur_complement_with_loads(A, rows, loads)
+    S, q, C = schur_complement_with_loads(A, rows, loads, order)
     np.testing.assert_allclose(S, schur_complement(A, rows), atol=1e-12)
     np.testing.assert_allclose(q, loads[rows] - D[np.ix_(rows, rest)] @ inside, atol=1e-12)
     np.testing.assert_allclose(C, -loads[rest].T @ inside, atol=1e-12)

@@ -1,0 +1,194 @@
+"""Partial Cholesky factorizations by the CHOLMOD that PETSc is linked with; PETSc's interface to it has none.
+
+MUMPS' takes three times as long where many rows stay, for it chooses the order of the others without regard to them.
+CHOLMOD's own functions get a whole order. Its structures are those of its manual, which every version since 2 has.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Iterator
+from contextlib import contextmanager
+from ctypes import POINTER, byref, c_double, c_int, c_size_t, c_void_p
+from functools import cache
+from typing import Any
+
+import numpy as np
+from petsc4py import PETSc
+from scipy.sparse import csr_matrix
+
+from feti_homog.typing import Array, Float, Int
+
+# Bytes for `cholmod_common`, which has less than 4 KiB, and whose members are not touched.
+COMMON_BYTES = 2**16
+GIVEN, FORWARD = 1, 4  # an order of rows, and the solve with L
+LOWER, REAL, PATTERN = -1, 1, 0
+KNOWN_VERSIONS = range(2, 6)
+
+
+class _Sparse(ctypes.Structure):
+    """`cholmod_sparse`."""
+
+    _fields_ = (
+        *((name, c_size_t) for name in ("nrow", "ncol", "nzmax")),
+        *((name, c_void_p) for name in ("p", "i", "nz", "x", "z")),
+        *((name, c_int) for name in ("stype", "itype", "xtype", "dtype", "sorted", "packed")),
+    )
+
+
+class _Dense(ctypes.Structure):
+    """`cholmod_dense`."""
+
+    _fields_ = (
+        *((name, c_size_t) for name in ("nrow", "ncol", "nzmax", "d")),
+        *((name, c_void_p) for name in ("x", "z")),
+        *((name, c_int) for name in ("xtype", "dtype")),
+    )
+
+
+class _Factor(ctypes.Structure):
+    """`cholmod_factor`."""
+
+    _fields_ = (
+        *((name, c_size_t) for name in ("n", "minor")),
+        *((name, c_void_p) for name in ("Perm", "ColCount", "IPerm")),
+        ("nzmax", c_size_t),
+        *((name, c_void_p) for name in ("p", "i", "x", "z", "nz", "next", "prev")),
+        *((name, c_size_t) for name in ("nsuper", "ssize", "xsize", "maxcsize", "maxesize")),
+        *((name, c_void_p) for name in ("super", "pi", "px", "s")),
+        *((name, c_int) for name in ("ordering", "is_ll", "is_super", "is_monotonic")),
+        *((name, c_int) for name in ("itype", "xtype", "dtype", "useGPU")),
+    )
+
+
+@cache
+def is_available() -> bool:
+    """Return whether PETSc is linked with a CHOLMOD whose structures are known."""
+    version = (c_int * 3)()
+    try:
+        _library().cholmod_version(version)
+    except AttributeError:
+        return False
+    return version[0] in KNOWN_VERSIONS
+
+
+def last_rows(A: csr_matrix, rows: Int, order: Int, loads: Float) -> tuple[Float, Float]:
+    """Return what L L^T = A has on `rows` (m,), which are eliminated last: U (m, m) and L^-1 B for the loads B (n, k).
+
+    Others are eliminated in the `order` (n,) of all. U is that part of L in reverse, so that it is an upper triangle:
+    entry (m - 1 - i, m - 1 - j) is L's of rows i and j of `rows`. Below its diagonal there is anything. L^-1 B has the
+    other rows first, in some order, and `rows` at the end.
+
+    Raises:
+        LinAlgError: A is not positive definite.
+        MemoryError: CHOLMOD could not factor, for want of memory as a rule.
+    """
+    n, is_last = A.shape[0], np.zeros(A.shape[0], bool)
+    is_last[rows] = True
+    A.sort_indices()
+    arrays = A.indptr.astype(np.int32, copy=False), A.indices.astype(np.int32, copy=False), A.data
+    matrix = _Sparse(n, n, A.nnz, *map(_address, arrays[:2]), None, _address(A.data), None, LOWER, 0, REAL, 0, 1, 1)
+    with _common() as common:
+        factor = _library().cholmod_allocate_factor(c_size_t(n), common)
+        try:
+            place = _analyse(matrix, np.r_[order[~is_last[order]], rows].astype(np.int32), factor, common)
+            if not _library().cholmod_factorize(byref(matrix), factor, common):
+                raise MemoryError("CHOLMOD could not factor")
+            if factor.contents.minor < n:
+                raise np.linalg.LinAlgError(f"not positive definite (cholmod: pivot {factor.contents.minor})")
+            U = _block(factor.contents, place[n - len(rows) :])
+            return U, _forward(factor, loads[order[~is_last[order]]], loads[rows], place, common)
+        finally:
+            _library().cholmod_free_factor(byref(factor), common)
+
+
+def _analyse(matrix: _Sparse, order: Int, factor: Any, common: Any) -> Int:
+    """Lay out a factor in an equivalent order, a postordering of the tree; return the place (n,) of each of `order`."""
+    n, library = len(order), _library()
+    parent, post, count, *work = np.empty((5, n), np.int32)
+    done = library.cholmod_analyze_ordering(
+        byref(matrix), GIVEN, *map(_address, (order,)), None, c_size_t(0),
+        *map(_address, (parent, post, count, *work)), common,
+    )  # fmt: skip
+    if not (done and factor):
+        raise MemoryError("CHOLMOD could not analyse the matrix")
+    place = np.empty(n, np.int64)
+    place[post] = np.arange(n)
+    parent = np.where(parent[post] < 0, -1, place[parent[post]]).astype(np.int32)
+    order = np.ascontiguousarray(order[post])
+    _array(factor.contents.Perm, n, c_int)[:] = order
+    _array(factor.contents.ColCount, n, c_int)[:] = count[post]
+    factor.contents.ordering = GIVEN
+    upper = library.cholmod_ptranspose(byref(matrix), PATTERN, _address(order), None, c_size_t(0), common)
+    done = upper and library.cholmod_super_symbolic(upper, None, _address(parent), factor, common)
+    library.cholmod_free_sparse(byref(upper), common)
+    if not done:
+        raise MemoryError("CHOLMOD could not analyse the matrix")
+    return place
+
+
+def _block(factor: _Factor, place: Int) -> Float:
+    """Return U of `last_rows` of the rows in these places (m,) of a supernodal factor."""
+    m, k = len(place), factor.nsuper
+    first, rows, values = (_array(pointer, k + 1, c_int) for pointer in (factor.super, factor.pi, factor.px))
+    row, value = _array(factor.s, factor.ssize, c_int), _array(factor.x, factor.xsize, c_double)
+    at = np.full(factor.n, -1)
+    at[place] = np.arange(m)[::-1]
+    U = np.zeros((m, m), order="F")
+    for j in np.unique(np.searchsorted(first, place, "right") - 1).tolist():
+        i, columns = at[row[rows[j] : rows[j + 1]]], at[first[j] : first[j + 1]]
+        block = value[values[j] : values[j + 1]].reshape(len(columns), len(i))
+        if i.min() < 0 or columns.min() < 0:
+            block, columns, i = block[columns >= 0][:, i >= 0], columns[columns >= 0], i[i >= 0]
+        if all((np.diff(each) == -1).all() for each in (columns, i)):  # as a rule: one block
+            U.T[columns[-1] : columns[0] + 1, i[-1] : i[0] + 1] = block[::-1, ::-1]
+        else:
+            U.T[np.ix_(columns, i)] = block
+    return U
+
+
+def _forward(factor: Any, inner: Float, last: Float, place: Int, common: Any) -> Float:
+    """(n, k) L^-1 of loads (n - m, k) and (m, k), of rows in these places (n,)."""
+    found = np.vstack([inner, last])
+    if not found.shape[1]:
+        return found
+    B = np.empty(found.shape, order="F")
+    B[place] = found
+    right = _Dense(len(B), B.shape[1], B.size, len(B), _address(B), None, REAL, 0)
+    solved = _library().cholmod_solve(FORWARD, factor, byref(right), common)
+    if not solved:
+        raise MemoryError("CHOLMOD could not solve")
+    columns = _array(solved.contents.x, B.size, c_double).reshape(B.shape[::-1]).T
+    found[:] = columns[place]
+    _library().cholmod_free_dense(byref(solved), common)
+    return found
+
+
+@contextmanager
+def _common() -> Iterator[Any]:
+    """Have CHOLMOD's workspace while the block lasts."""
+    common = ctypes.create_string_buffer(COMMON_BYTES)
+    _library().cholmod_start(common)
+    try:
+        yield common
+    finally:
+        _library().cholmod_finish(common)
+
+
+def _address(values: Array) -> c_void_p:
+    return c_void_p(values.ctypes.data)
+
+
+def _array(pointer: int, size: int, kind: Any) -> Array:
+    """Return `size` numbers in memory as an array, without a copy."""
+    return np.ctypeslib.as_array(ctypes.cast(pointer, POINTER(kind)), (size,))
+
+
+@cache
+def _library() -> ctypes.CDLL:
+    """Return CHOLMOD as petsc4py's extension module finds it."""
+    library = ctypes.CDLL(PETSc.__file__)
+    library.cholmod_allocate_factor.restype = POINTER(_Factor)
+    library.cholmod_ptranspose.restype = POINTER(_Sparse)
+    library.cholmod_solve.restype = POINTER(_Dense)
+    return library
