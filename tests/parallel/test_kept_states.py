@@ -189,6 +189,30 @@ def test_states_of_lean_events_are_solved_again(comm, shared_path, whole, kind):
             np.testing.assert_allclose(state.stress, other["stress"], rtol=0, atol=SOLVED_AGAIN * scale)
 
 
+def test_a_path_goes_on_from_a_lean_event(comm, shared_path, whole):
+    """The files after the last lean event are gone, as where a user removes one that is damaged."""
+    kind, expected = "released", whole("released")
+    known = len(document(expected)["path"]) * 2 // 3
+    with mock.patch.object(runner, "room_of", return_value=0), pytest.raises(ConvergenceError, match="max_events"):
+        run(case(kind, 5, max_events=known), comm, out=shared_path, resume=False)
+    left = on_root(comm, remove_whole_files, shared_path / "checkpoint")
+    result = run(case(kind, 5), comm, out=shared_path, resume=True)
+    assert 0 < result.resumed == left < known
+    on_root(comm, assert_kept_of, shared_path, expected, SOLVED_AGAIN)
+
+
+def remove_whole_files(folder: Path) -> int:
+    """Return how many events are left."""
+    lean = 0
+    for path in sorted(folder.iterdir()):
+        events, _, _ = checkpoint_file.read(path)
+        if checkpoint_file.is_whole(events):
+            path.unlink()
+        else:
+            lean += checkpoint_file.length(events)
+    return lean
+
+
 def test_states_in_memory_are_those_of_the_files(comm, whole):
     result = run(case("legs", 4), comm, fields=True)
     gathered = result.fields.gathered()
