@@ -170,26 +170,27 @@ class _Finder:
     ) -> list[dict[str, float]]:
         """Entries `mesh_error` of some rays with the least of the factors (n, k).
 
-        Of the bonds that break together, and of tips beside them, the largest.  Collective.
+        Of the bonds that break together, and of tips beside them, the largest; each under its own load.  Collective.
         """
         if self._errors is None:
             return [{}] * len(least)
         ahead = self._unit_loads(rays.strain[rows], 0.0, names)
         energy = np.abs(np.einsum("nl,lm,nm->n", ahead, self._energy_errors, ahead))
         energy /= np.einsum("nm,nm->n", rays.strain[rows], rays.stress[rows])
-        ahead *= np.where(np.isfinite(least), least, 0.0)[:, None]
-        loads = ahead + self._unit_loads(rays.strain_before[None], rays.temperature, names)
         breaks = (least > 0.0) & np.isfinite(least)
         first = (factors <= least[:, None] * (1.0 + UTILISATION_TIE)) | (np.isfinite(factors) & self._tips)
         ray, node = np.nonzero(breaks[:, None] & first)
+        own = factors[ray, node]
+        ahead = own[:, None] * ahead[ray]
+        loads = ahead + self._unit_loads(rays.strain_before[None], rays.temperature, names)
         stencil = self._errors.stencil(node, self._bonded)
-        traction = np.einsum("pl,pslc->psc", loads[ray], self._everywhere[stencil])
-        along = np.einsum("pl,plc->pc", ahead[ray], self._everywhere[stencil[:, 2]])
-        error, rate = self._errors.relative(node, stencil, traction, energy[ray], along)
+        traction = np.einsum("pl,pslc->psc", loads, self._everywhere[stencil])
+        along = np.einsum("pl,plc->pc", ahead, self._everywhere[stencil[:, 2]])
+        error = self._errors.relative(node, stencil, traction, energy[ray], along)
         found = np.zeros(len(least))
-        np.maximum.at(found, ray, least[ray] / factors[ray, node] * (1.0 + error / np.abs(rate)) - 1.0)
+        np.maximum.at(found, ray, least[ray] / own * (1.0 + error) - 1.0)
         self._comm.Allreduce(MPI.IN_PLACE, found, MPI.MAX)
-        return [{"mesh_error": float(own)} if own > 0.0 else {} for own in found]
+        return [{"mesh_error": float(largest)} if largest > 0.0 else {} for largest in found]
 
     def _tractions(self, strain: Float, temperature: float, names: Sequence[str]) -> Float:
         """(n, k, c) under strains (n, m) of these names and a change of temperature."""

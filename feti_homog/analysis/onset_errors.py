@@ -10,7 +10,7 @@ The first is by how much a mean over the length of a node departs from the value
 what is rough from node to node; r how far a parabola between the nodes rises above the largest utilisation; the last
 what the elements in the bodies err.  At tips, the tractions beyond are those of the other side; what breaks release
 there is smooth, but tractions rise towards the tip, by a factor q from the next node to it, and e is k (q - 1) instead
-of all but the last part.
+of all but the last part.  No e is more than 1: nothing is known of such a load.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ class OnsetErrors:
         bonded = self.bonded(bonds)
         node = np.flatnonzero((point.used >= 1.0 - UTILISATION_TIE) | self.are_tips(bonded))
         stencil = self.stencil(node, bonded)
-        error, _ = self.relative(node, stencil, traction[stencil], energy)
+        error = self.relative(node, stencil, traction[stencil], energy)
         error = point.used[node] * (1.0 + error) - 1.0
         return float(self._comm.allreduce(error.max(initial=0.0), MPI.MAX))
 
@@ -134,11 +134,11 @@ class OnsetErrors:
 
     def relative(
         self, node: Int, stencil: Int, traction: Float, energy: float | Float, ahead: Float | None = None
-    ) -> tuple[Float, Float]:
-        """(p,) relative errors of the utilisation of nodes (p,) of this rank under tractions (p, 5, c) of stencils.
+    ) -> Float:
+        """(p,) relative errors, at most 1, of the loads of nodes (p,) of this rank; stencils have tractions (p, 5, c).
 
-        And (p,) its relative change by a traction `ahead` (p, c), by default that of the node, for which it is 1.
-        `energy` or (p,) is the relative error of the energy of the state.
+        The load brings a traction `ahead` (p, c), by default all of it.  `energy` or (p,) is the relative error of the
+        energy of the state.
         """
         law, x = self._law.at(node), self._in_frame_of_middle(stencil, traction)
         t = x[:, 2]
@@ -153,10 +153,11 @@ class OnsetErrors:
         is_tip = stencil[:, 1] == stencil[:, 3]
         weights = self._weights[is_tip.astype(int)]
         if not isinstance(self._law, ReleasedEnergy):
-            parts[0, is_tip] = self._of_rise * np.maximum(here / after - 1.0, 0.0)[is_tip]
+            parts[0, is_tip] = self._of_rise * np.maximum(_ratio(here, after) - 1.0, 0.0)[is_tip]
             weights[is_tip, :3] = 1.0, 0.0, 0.0
         e = np.sqrt(np.einsum("pk,kp->p", weights, parts**2))
-        return e, np.ones(len(e)) if ahead is None else change(ahead)
+        rate = np.ones(len(e)) if ahead is None else np.abs(change(ahead))
+        return np.asarray(np.divide(e, rate, out=np.ones(len(e)), where=rate > e))
 
     def _in_frame_of_middle(self, stencil: Int, traction: Float) -> Float:
         """(p, 5, c) tractions of stencils along normal and tangent of their middle node, and along the fibres."""
@@ -183,15 +184,20 @@ def _stencil(neighbours: InterfaceNeighbours) -> Int:
 
 
 def _relative_change(share: Callable[[Float], Float], t: Float, step: Float) -> Float:
-    """(p,) relative change of `share` at tractions t (p, c) by small steps (p, c), linear in these."""
+    """(p,) relative change of `share` at tractions t (p, c) by small steps (p, c), linear in these; 1 of no share."""
     size, length = np.linalg.norm(t, axis=1), np.linalg.norm(step, axis=1)
     scale = (STEP * size / np.where(length > 0.0, length, 1.0))[:, None]
     here, off = share(t.copy()), share(t + scale * step) - share(t - scale * step)
-    return np.asarray(off / (2.0 * scale[:, 0] * here))
+    return np.asarray(np.divide(off, 2.0 * scale[:, 0] * here, out=np.ones_like(off), where=here > 0.0))
 
 
 def _rise(before: Float, here: Float, after: Float) -> Float:
     """(p,) how far the parabola through three values rises above the middle one, the largest, relative to it."""
     bend, slope = np.maximum(2.0 * here - before - after, 0.0), (after - before) / 2.0
     rise = np.divide(slope**2, 2.0 * bend, out=np.zeros_like(here), where=bend > 0.0)
-    return np.asarray(np.minimum(rise, bend / 8.0) / here)
+    return np.asarray(np.divide(np.minimum(rise, bend / 8.0), here, out=np.ones_like(here), where=here > 0.0))
+
+
+def _ratio(here: Float, after: Float) -> Float:
+    """(p,) here / after, finite also where `after` is zero, as of pressed bonds beside one that is pulled."""
+    return np.asarray(np.divide(here, after, out=np.full_like(here, 1.0 / STEP), where=after > STEP * here))

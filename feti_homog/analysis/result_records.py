@@ -158,8 +158,8 @@ class PathPoint:
         default=None,
     )
     load_mesh_error: float | None = described(
-        "estimated relative error by the mesh of the load at which bonds break at an event of the first leg, at the "
-        "same points; absent with friction, beside damaged bonds, and at tips and corners of rigid bonds",
+        "estimated relative error by the mesh, at most 1, of the load at which bonds break at an event of the first "
+        "leg, at the same points; absent with friction, beside damaged bonds, and at tips and corners of rigid bonds",
         default=None,
     )
     dissipated_mesh_error: float | None = described(
@@ -276,7 +276,8 @@ class EnvelopePoint:
         default=None,
     )
     mesh_error: float | None = described(
-        "estimated relative error of `factor` by the mesh; absent at tips and corners of rigid bonds", default=None
+        "estimated relative error of `factor` by the mesh, at most 1; absent at tips and corners of rigid bonds",
+        default=None,
     )
     strain: Float | None = described(
         "macroscopic strain at onset", "", EITHER, STRAINS, spatial_components=SPATIAL_STRAINS, default=None

@@ -29,9 +29,9 @@ def case(bonds: dict[str, Any], kind: str, mesh: dict[str, Any], plane: str = "s
     return Case.parse(document | {"analysis": {"type": kind, "plane": plane}} | more)
 
 
-def envelope(comm, bonds, mesh, plane="strain", **more):
-    section = {"envelope": {"plane": ["E11", "gamma12"], "directions": 4, **more}}
-    return run(case(bonds, "envelope", mesh, plane, **section), comm)
+def envelope(comm, bonds, mesh, state="strain", **more):
+    section = {"envelope": {"plane": ["E11", "gamma12"], "directions": 4} | more}
+    return run(case(bonds, "envelope", mesh, state, **section), comm)
 
 
 @pytest.mark.parametrize("plane", ["strain", "generalized"])
@@ -63,3 +63,14 @@ def test_tips_of_rigid_bonds_have_no_limit(comm):
     found = envelope(comm, arc, {})
     assert all(point.mesh_error is None and point.factor is not None for point in found.envelope)
     assert sum("no error of the loads" in remark for remark in found.remarks) == 1
+
+
+def test_tips_that_are_not_pulled_have_no_part_in_errors(comm):
+    # Without a tangential strength pressed bonds use nothing, those beside a tip and tips themselves.
+    arc = SPRINGS | {"normal_strength": 5.0, "debonded": [{"fibre": "all", "angle": 90.0}], "contact": False}
+    mesh = {"order": 2, "mesh_size": 0.3}
+    found = envelope(comm, arc, mesh, plane=["E11", "E22"], directions=24).envelope
+    assert all(0.0 < point.mesh_error <= 1.0 for point in found if point.factor is not None)
+    keys = {"path": {"strain": [0.0, 0.0, 0.1]}, "output": {"states": "all"}}
+    points = [point for point in run(case(arc, "path", mesh, **keys), comm, fields=True).path if point.broke]
+    assert points and all(0.0 < point.load_mesh_error <= 1.0 for point in points)
