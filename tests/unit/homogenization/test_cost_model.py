@@ -14,6 +14,7 @@ from feti_homog.case.load_section import Angle, LoadPath
 from feti_homog.homogenization import cost_model
 from feti_homog.homogenization.bonds import teeth_of
 from feti_homog.homogenization.phase_laws import problems
+from feti_homog.results.checkpoint import bytes_at_most
 from feti_homog.results.field_layout import SpatialStatePart, StatePart, rows_of, tables
 
 
@@ -135,6 +136,19 @@ def test_memory_of_paths_to_the_end(multipliers, few, measured):
     """Within a third of what five paths took; `few` is the estimate for few events in MiB."""
     found = cost_model.memory_to_the_end(cost_model.Estimate(1.0, few * 2**20, 1), multipliers, 1)
     assert 0.75 < found / measured < 4 / 3
+
+
+# Two fibres in plane stress and in generalized plane strain, and one with friction.
+@pytest.mark.parametrize(
+    ("plane", "friction", "multipliers", "measured"),
+    [("stress", 0.0, 436, 16_880), ("generalized", 0.0, 164, 12_876), ("strain", 0.3, 304, 19_152)],
+)
+def test_size_of_an_event(plane, friction, multipliers, measured):
+    """What the last event of three paths takes in the checkpoint, within a tenth."""
+    bonds = InterfaceSection(normal_strength=4.0, friction=friction)
+    case = replace(make_case(plane=plane), interfaces=(bonds,))
+    assert case.has_friction == (friction > 0.0)
+    assert 1.0 <= bytes_at_most(case, multipliers, 1) / measured < 1.1
 
 
 def test_coatings_with_influence_columns_take_columns_in_place_of_iterations():
