@@ -38,8 +38,9 @@ class InfluenceSolutions:
     ) -> None:
         self._comm, self._inverse, self._operator, self._natural, self._jumps = comm, inverse, operator, natural, jumps
         self._granted = self._left = 0
-        # Multipliers and jumps on inactive rows, (owned rows, k) each, that F lambda comes to confirm.
-        self._expected: tuple[Float, Float] | None = None
+        # Multipliers and jumps on inactive rows, (owned rows, k) each, that F lambda comes to confirm, and how large
+        # the multipliers of single strains are that make them up.
+        self._expected: tuple[Float, Float, Float] | None = None
         self._residual, self._squares = 0.0, np.zeros((2, 0, 0))
 
     def solutions(self, strains: Float, d: Float) -> list[DualSolution] | None:
@@ -54,12 +55,15 @@ class InfluenceSolutions:
         seen, torn = np.einsum("ki,nij,kj->nk", strains, self._squares, strains)
         if not (seen > LEAST_UNCONFIRMED_JUMP**2 * torn).all():
             return None
-        found = self._inverse.answer(d, strains.T, self._natural.unconstrained_modes.shape[1])
+        free = self._natural.unconstrained_modes.shape[1]
+        found = self._inverse.answer(d, strains.T, free)
         if found is None:
             return None
         lam, jumps = found
         if not self._left:
-            self._expected = lam, jumps
+            whole = self._inverse.answer(d, np.eye(d.shape[1]), free)
+            assert whole is not None
+            self._expected = lam, jumps, np.abs(whole[0]) @ np.abs(strains.T)
             return None
         self._left -= 1
         reason, C = int(PETSc.KSP.ConvergedReason.CONVERGED_RTOL), self._operator.compliance
@@ -97,15 +101,20 @@ class InfluenceSolutions:
             seen = self._jumps.projected(d, self._jumps.norms(d))
             self._squares = allreduce_sum(self._comm, np.stack([seen.T @ seen, d.T @ d]))
 
-    def _errors(self, expected: Float, jumps: Float, solutions: list[DualSolution]) -> tuple[float, float]:
+    def _errors(
+        self, expected: Float, jumps: Float, terms: Float, solutions: list[DualSolution]
+    ) -> tuple[float, float]:
         """Return how far multipliers and jumps on inactive rows, (owned rows, k) each, are off those found.
 
         They are relative to the largest of each load; jumps count where no body is free, which may be anywhere.
-        Multipliers that F lambda confirms are off by no less than their residuals.  Collective.
+        Multipliers of a load may cancel, as where bonds come to be pressed: then a share of their `terms` (owned rows,
+        k) is what they are measured by.  Those that F lambda confirms are off by no less than their residuals.
+        Collective.
         """
         lam, opening = (np.stack(x, axis=1) for x in zip(*((s.lam, s.jump) for s in solutions), strict=True))
         is_open = (jumps != 0.0) * (self._natural.unconstrained_modes.shape[1] == 0)
-        parts = np.abs([expected - lam, lam, is_open * (jumps - opening), opening]).max(axis=1, initial=0.0)
+        sizes = np.maximum(np.abs(lam), LEAST_UNCONFIRMED_JUMP * terms)
+        parts = np.abs([expected - lam, sizes, is_open * (jumps - opening), opening]).max(axis=1, initial=0.0)
         self._comm.Allreduce(MPI.IN_PLACE, parts, MPI.MAX)
         off, drift = (parts[::2] / np.where(parts[1::2] > 0.0, parts[1::2], 1.0)).max(axis=1)
         return max(float(off), *(each.residual for each in solutions)), float(drift)

@@ -182,8 +182,28 @@ def test_f_lambda_finds_errors_of_a_followed_answer(comm, on_active):
             continue
         solver.solve(E, np.zeros(solver.rows))
         error = np.abs(influence._followed.answer - right).max(initial=0.0)
-        assert comm.allreduce(float(error), MPI.MAX) < 1e-12 * comm.allreduce(float(np.abs(whole).max()), MPI.MAX)
+        largest = comm.allreduce(float(np.abs(whole).max(initial=0.0)), MPI.MAX)
+        assert comm.allreduce(float(error), MPI.MAX) < 1e-12 * largest
         solver._by_columns.record([], solver.d)
+
+
+def test_multipliers_that_cancel_are_measured_by_those_of_single_strains(comm):
+    """Two bonds hold the fibre: no more than one force in equilibrium, which some loads take to zero."""
+    cell = torn_cells.tear(comm, geometry="square", petsc=INFLUENCE)
+    solver, influence, nodes = cell.solver, cell.solver.exact_inverse, cell.solver.jump_operator.nodes
+    number = influence.neighbours.first + np.arange(len(nodes.row))
+    status = np.where(np.isin(number, [0, len(influence.neighbours.rows) // 2]), BONDED, OPEN).astype(np.int8)
+    for _ in range(2):
+        solver.solve(np.array([1.0, 0.2, -0.3]), np.zeros(solver.rows))
+    activate(cell, status)
+    U = gathered(cell, influence.multipliers(solver.d, np.eye(3)))
+    assert np.linalg.matrix_rank(U, 1e-9 * np.abs(U).max()) == 1
+    right = influence._followed.answer
+    influence._followed.answer = right * np.array([1.0, 1.0 + 1e-11, 1.0])
+    _, _, unseen = np.linalg.svd(U)
+    solution = solver.solve(unseen[1] + unseen[2] + 1e-8 * unseen[0], np.zeros(solver.rows))
+    assert solver._by_columns._expected is not None and solution.reason > 0 and gathered(cell, solution.lam).any()
+    assert np.abs(influence._followed.answer - right).max(initial=0.0) < 1e-14 * np.abs(gathered(cell, right)).max()
 
 
 @pytest.mark.parametrize("unit", [1.0, 1e20, 1e-20])
