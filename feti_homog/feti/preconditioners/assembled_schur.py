@@ -6,6 +6,7 @@ from collections.abc import Generator
 
 import numpy as np
 from mpi4py import MPI
+from petsc4py import PETSc
 from scipy.sparse import csr_matrix, diags, hstack
 
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
@@ -34,11 +35,12 @@ class AssembledSchur:
     def __init__(self, comm: MPI.Intracomm, Z: csr_matrix, stiffness: csr_matrix) -> None:
         """Factor, with the arguments of `assembled_stiffness`.
 
-        By LAPACK where most entries are there. Options under `feti_bonded_` (default: cholesky by CHOLMOD) are of
-        other matrices.
+        By LAPACK where most entries are there and there are no options, which have the prefix `feti_bonded_` (default:
+        cholesky by CHOLMOD).
         """
         self.comm, self.size = comm, Z.shape[1]
         is_full = stiffness.nnz >= DENSE_SHARE * self.size**2 and self.size <= MOST_DENSE_ROWS
+        is_full = is_full and not PETSc.Options("feti_bonded_").getAll()
         self._solver: DirectSolver | DenseSolver
         self._solver = DenseSolver(stiffness.toarray(order="F")) if is_full else DirectSolver(stiffness, "feti_bonded_")
         self._Z, self._ZT = Z, Z.T.tocsr()
