@@ -17,7 +17,7 @@ from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.operators.with_springs import is_dense
 from feti_homog.feti.thresholds import ASSEMBLED_PARTS, DENSE_SHARE, MOST_DENSE_ROWS
 from feti_homog.parallel.distributed_arrays import share_columns
-from feti_homog.typing import Float
+from feti_homog.typing import Float, Int
 
 # Entries of Z, which are cosines of angles or their products, that rounding leaves of zero.
 DIRECTION_ROUNDING = 1e-14
@@ -32,17 +32,17 @@ class AssembledSchur:
         size: columns of Z, on all ranks.
     """
 
-    def __init__(self, comm: MPI.Intracomm, Z: csr_matrix, stiffness: csr_matrix) -> None:
+    def __init__(self, comm: MPI.Intracomm, Z: csr_matrix, stiffness: csr_matrix | Float) -> None:
         """Factor, with the arguments of `assembled_stiffness`.
 
-        By LAPACK where most entries are there and there are no options, which have the prefix `feti_bonded_` (default:
-        cholesky by CHOLMOD).
+        Dense matrices by LAPACK; options of sparse ones have the prefix `feti_bonded_` (default: cholesky by CHOLMOD).
         """
         self.comm, self.size = comm, Z.shape[1]
-        is_full = stiffness.nnz >= DENSE_SHARE * self.size**2 and self.size <= MOST_DENSE_ROWS
-        is_full = is_full and not PETSc.Options("feti_bonded_").getAll()
         self._solver: DirectSolver | DenseSolver
-        self._solver = DenseSolver(stiffness.toarray(order="F")) if is_full else DirectSolver(stiffness, "feti_bonded_")
+        if isinstance(stiffness, np.ndarray):
+            self._solver = DenseSolver(stiffness)
+        else:
+            self._solver = DirectSolver(stiffness, "feti_bonded_")
         self._Z, self._ZT = Z, Z.T.tocsr()
 
     def relieving_displacement(self, forces: Float) -> Float:
@@ -61,8 +61,8 @@ class AssembledSchur:
 
 def assembled_stiffness(
     comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators, active: Float
-) -> Generator[None, None, tuple[csr_matrix, csr_matrix]]:
-    """Z (n, columns) and Z^T S Z of all ranks, in ASSEMBLED_PARTS parts.  Collective.
+) -> Generator[None, None, tuple[csr_matrix, csr_matrix | Float]]:
+    """Z (n, columns) and Z^T S Z of all ranks, as `block_sum` has it, in ASSEMBLED_PARTS parts.  Collective.
 
     They are of the owned rows of which `active` is 1, which must leave no rigid-body motion free, for that to be
     factored.
@@ -72,7 +72,7 @@ def assembled_stiffness(
     """
     together = _copies_together(comm, jump_operator, operators)
     Z = _released(comm, jump_operator, operators, together, active)
-    stiffness = DenseBlockSum((Z.shape[1], Z.shape[1]))
+    stiffness = block_sum(comm, Z.shape[1], [len(np.unique(Z[span].indices)) for span in operators.slices])
     for part in np.array_split(np.arange(len(operators.slices)), ASSEMBLED_PARTS):
         for place in part:
             operator, span = operators.with_springs[place], operators.slices[place]
@@ -82,7 +82,37 @@ def assembled_stiffness(
             T = Z[span][:, columns].T.tocsr()
             stiffness.add(columns, columns, T @ (T @ operator.S).T)
         yield
+    if isinstance(stiffness, DenseSum):
+        return Z, stiffness.of_all_ranks(comm)
     return Z, allreduce_sparse(comm, stiffness.matrix())
+
+
+class DenseSum:
+    """The dense sum of dense symmetric blocks."""
+
+    def __init__(self, size: int) -> None:
+        self._sum = np.zeros((size, size))
+
+    def add(self, rows: Int, columns: Int, values: Float) -> None:
+        """Add the block `values` (rows, columns)."""
+        self._sum[rows[:, None], columns] += values
+
+    def of_all_ranks(self, comm: MPI.Intracomm) -> Float:
+        """(size, size) the sum over ranks, in Fortran order.  Collective."""
+        comm.Allreduce(MPI.IN_PLACE, self._sum)
+        return self._sum.T
+
+
+def block_sum(comm: MPI.Intracomm, size: int, sizes: list[int]) -> DenseSum | DenseBlockSum:
+    """Return an empty sum (size, size) for square blocks of these `sizes` on this rank.  Collective.
+
+    It is dense where all ranks' blocks fill most of it and there are no options `feti_bonded_`, sparse otherwise.
+    """
+    entries = comm.allreduce(sum(n**2 for n in sizes))
+    is_full = entries >= DENSE_SHARE * size**2 and size <= MOST_DENSE_ROWS
+    if is_full and not PETSc.Options("feti_bonded_").getAll():
+        return DenseSum(size)
+    return DenseBlockSum((size, size))
 
 
 def shared_dofs(comm: MPI.Intracomm, jump_operator: JumpOperator) -> int:

@@ -9,7 +9,7 @@ from scipy.sparse import csr_matrix, identity
 
 from feti_homog.feti.linalg.dense_matrices import DenseSolver
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
-from feti_homog.feti.preconditioners.assembled_schur import AssembledSchur
+from feti_homog.feti.preconditioners.assembled_schur import AssembledSchur, block_sum
 from feti_homog.petsc.options import case_options
 
 
@@ -21,12 +21,19 @@ from feti_homog.petsc.options import case_options
         (False, {}, DirectSolver),
     ],
 )
-def test_full_matrices_without_options_are_factored_as_dense_ones(full, options, kind):
-    half = np.random.default_rng(0).normal(size=(20, 20))
-    S = half @ half.T + np.eye(20) if full else np.diag(np.arange(1.0, 21.0))
+def test_full_sums_without_options_are_factored_as_dense_ones(full, options, kind):
+    rng, S = np.random.default_rng(0), np.zeros((20, 20))
+    blocks = [np.arange(20)] * 2 if full else np.arange(20).reshape(10, 2)
     with case_options(options):
-        own = AssembledSchur(MPI.COMM_SELF, csr_matrix(identity(20)), csr_matrix(S))
+        found = block_sum(MPI.COMM_SELF, 20, [len(rows) for rows in blocks])
+        for rows in blocks:
+            half = rng.normal(size=(len(rows), len(rows)))
+            block = half @ half.T + np.eye(len(rows))
+            found.add(rows, rows, block)
+            S[np.ix_(rows, rows)] += block
+        total = found.of_all_ranks(MPI.COMM_SELF) if full and not options else found.matrix()
+        own = AssembledSchur(MPI.COMM_SELF, csr_matrix(identity(20)), total)
     assert type(own._solver) is kind
-    forces = np.random.default_rng(1).normal(size=(20, 3))
+    forces = rng.normal(size=(20, 3))
     np.testing.assert_allclose(own.relieving_displacement(forces), -np.linalg.solve(S, forces), rtol=1e-9, atol=1e-12)
     own.destroy()
