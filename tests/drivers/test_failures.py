@@ -129,7 +129,7 @@ def test_no_convergence_ends_with_3_and_keeps_what_was_computed(tmp_path, ranks)
 def test_loose_tolerance(tmp_path):
     """A loose tolerance is reported, and the checks that it breaks are marked."""
     out = tmp_path / "results"
-    job = command_line(2, "run", case_file(tmp_path), "--out", out, "-feti_ksp_rtol", "0.3")
+    job = command_line(2, "run", case_file(tmp_path), "--out", out, "-feti_ksp_rtol", "0.3", *IMPLICIT)
     document = json.loads((out / "result.json").read_text())
     assert job.stdout.count("warning: -feti_ksp_rtol 0.3 asks for less") == 1
     assert any("-feti_ksp_rtol 0.3" in warning for warning in document["warnings"])
