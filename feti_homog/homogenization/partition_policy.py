@@ -18,8 +18,8 @@ from feti_homog.typing import Int
 # Poisson's ratio up to which single nodes of mixed elements are hardly stiffer than mu makes them (`SCALED_LAME`).
 MOST_POISSON = 0.45
 # Ratio of stiffnesses up to which subdomains may have several phases: above, rounding in their dense matrices costs
-# accuracy (4e-7 at 1e6) and then convergence.
-MOST_CONTRAST = 1e4
+# accuracy (4e-7 at 1e6, 2e-10 at 9e3) and then convergence.
+MOST_CONTRAST = 1e3
 # Options of the solver that only set how exact it is: others ask for a dual problem, which one subdomain has not.
 TOLERANCES = {"feti_ksp_rtol", "feti_ksp_atol", "feti_ksp_max_it"}
 
