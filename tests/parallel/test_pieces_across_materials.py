@@ -25,7 +25,7 @@ CELLS = {
     "linear": {"refine": 1},
     "quadratic": {"order": 2},
     "voids": {"voids": 0.1, "fibre_fraction": 0.2},
-    "stiff": {"matrix": {"young": 1.0, "poisson": 0.3}, "fibre": {"young": 1e4, "poisson": 0.2}},
+    "stiff": {"matrix": {"young": 1.0, "poisson": 0.3}, "fibre": {"young": 900.0, "poisson": 0.2}},
 }
 SOFT = {"young": 20.0, "poisson": 0.3}
 POLICIES = {
