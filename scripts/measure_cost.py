@@ -90,7 +90,7 @@ def memory_fit(runs: list[dict[str, Any]], coated: list[dict[str, Any]]) -> dict
 
 
 def factor_fit() -> dict[str, tuple[Any, Any]]:
-    """Return the same for what a cell of one factor takes besides the constants of `cost_model`."""
+    """Fit the memory that a cell of one factor takes beyond the other constants of `cost_model`."""
     runs = [document(cell, refine, WITH_FIELDS, {}) for cell in CELLS for refine in OF_ONE_FACTOR]
     runs = [run for run in runs if run["solver"]["subdomains"] == 1]
     memory, dofs = np.array([(run["memory"], 2 * run["cell"]["nodes"]) for run in runs]).T

@@ -13,7 +13,7 @@ from feti_homog.analysis.criteria import criterion_of
 from feti_homog.analysis.event_progress import BARS, EventProgress
 from feti_homog.analysis.mesh_errors import add_errors_of_breaks, check_accuracy, state_error
 from feti_homog.analysis.onset_errors import OnsetErrors
-from feti_homog.analysis.path_events import Work, averages, found_again, holding, is_confirmed, restored, stored
+from feti_homog.analysis.path_events import Work, averages, found_again, holding, last_confirmed, restored, stored
 from feti_homog.analysis.registry import Analysis
 from feti_homog.analysis.result_records import PathPoint, Peak
 from feti_homog.analysis.tip_records import TipRecorder
@@ -48,20 +48,22 @@ def follow(context: AnalysisContext, path: LoadPath, law: BondLaw) -> dict[str, 
     check_accuracy(context)
     known = _known(context)
     work, entries, last = Work(), list[dict[str, Any]](), None
+    confirmed = [-1] * len(context.loads.problems)
     progress = EventProgress(context.progress, BARS[path.method], context.events)
     with context.checkpoint, progress as shown:
         for number, (point, energies, responses) in enumerate(_points(context, path, law, known)):
             place = f"at {point.load_factor:.6f}, {responses[0].leading}"
             place += "" if energies is None else ", from the checkpoint"
+            confirmed = last_confirmed(confirmed, number, point)
             if energies is not None:
                 work.resume_from(*energies, point)
             else:
                 work.arrive(point)
                 if point.state.converged:
                     # Teeth are many and found again at once.
-                    light, settled = point.broke == 0 < point.softened, is_confirmed(point)
+                    light = point.broke == 0 < point.softened
                     event = stored(point, responses, work, context.loads.interfaces)
-                    context.checkpoint.write(number, *event, light=light, settled=settled)
+                    context.checkpoint.write(number, *event, light=light, settled=min(confirmed))
             _report(context, shown, f"{_label(path, number)} {place}", responses)
             entries.append(_entry(context, law, point, responses, work))
             shown.advance(point.load_factor, f"{len(entries)} {path.method}, {_counts(entries[-1])}")

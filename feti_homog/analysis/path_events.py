@@ -27,6 +27,7 @@ UNCHECKED = -1.0  # the error of a law that was not checked
 EMPTY = np.zeros(0)
 # Behind the names of what belongs to each problem.
 SUFFIXES = ("", "_axial")
+AMPLITUDES = tuple(f"alpha{suffix}" for suffix in SUFFIXES)
 
 
 @dataclass
@@ -144,10 +145,11 @@ def _load(state: Equilibrium) -> Load:
 def holding(context: AnalysisContext, known: int) -> int:
     """Return how many of the known events of the checkpoint hold.
 
-    Those after the last that F lambda confirmed are confirmed here, up to one whose checks fail.  Collective.
+    Those after the last before which F lambda confirmed all problems, each at an event of its own or at one after it,
+    are confirmed here, up to one whose checks fail.  Collective.
     """
-    cell, first = context.loads.interfaces, known
-    while first and not _is_confirmed(context.checkpoint.read(first - 1)):
+    cell, first, waiting = context.loads.interfaces, known, set(AMPLITUDES)
+    while first and (waiting := waiting - _confirmed(context.checkpoint.read(first - 1))):
         first -= 1
     for number in range(first, known):
         point, _ = restored(context.checkpoint.read(number), cell)
@@ -157,14 +159,15 @@ def holding(context: AnalysisContext, known: int) -> int:
     return known
 
 
-def _is_confirmed(event: Arrays) -> bool:
-    """Return whether F lambda confirmed the event, or one after it: only before such a one events are lean."""
-    return not any(np.isnan(event[name]).any() for name in ("alpha", "alpha_axial") if name in event)
+def _confirmed(event: Arrays) -> set[str]:
+    """Return the amplitudes of the problems that F lambda confirmed at an event, or of a lean one after it."""
+    return {name for name in AMPLITUDES if not np.isnan(event.get(name, EMPTY)).any()}
 
 
-def is_confirmed(point: Point) -> bool:
-    """Return whether F lambda confirmed the state of a point."""
-    return all(state.solution.alpha is not None for state in point.state.problems)
+def last_confirmed(before: Sequence[int], number: int, point: Point) -> list[int]:
+    """Return the last event at which F lambda confirmed each problem: `number`, of this point, or those `before`."""
+    states = zip(before, point.state.problems, strict=True)
+    return [last if state.solution.alpha is None else number for last, state in states]
 
 
 def _averages(response: Response) -> dict[str, Any]:

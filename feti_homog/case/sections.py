@@ -146,8 +146,9 @@ class Output:
     mesh_error: bool = key(
         boolean,
         "Estimate the error that the mesh makes of every constant: about a tenth of a run where refine >= 1, a "
-        "twentieth from 3 on, a quarter in cells cut across materials; else, with polygons, and beside debonded arcs "
-        "with elements of order 2 or a tip_size, up to three fifths of one that writes no fields.",
+        "twentieth from 3 on, a fifth in small cells cut across materials, an eighth there with elements of order 2; "
+        "else, with polygons, and beside debonded arcs with elements of order 2 or a tip_size, up to three fifths of "
+        "one that writes no fields.",
         default=True,
     )
     sensitivities: bool = key(

@@ -125,7 +125,7 @@ class RecoveredStress:
         return self.L[:m, :m] @ strain, w
 
     def _uniform(self, part: slice, corners: Float) -> tuple[Float, Float]:
-        """Return the same of linear elements, computed with one element after the other in memory."""
+        """Stresses and weights of linear elements, as `_fluctuating`; loops of NumPy run over the elements."""
         (c, k), m = self.u.shape[1:], self.problem.strains
         at = self.node_class[self.triangles[part]].T
         by_node = self.u.reshape(-1, c * k).T.copy()

@@ -92,7 +92,7 @@ class InfluenceSolutions:
                 raise ConvergenceError(
                     f"influence columns: multipliers of the last {self._granted} solves: {off:.1e} off"
                 )
-            if not max(off, drift) <= MOST_FOLLOWED_ERROR:
+            if not (off <= MOST_FOLLOWED_ERROR and drift <= MOST_FOLLOWED_ERROR):
                 self._inverse.renew_answer(d)
         confirmed = bool(solutions) and all(each.iterations == 0 and each.reason > 0 for each in solutions)
         self._granted = min(2 * self._granted + 1, MOST_UNCONFIRMED) if confirmed else 0
@@ -115,6 +115,6 @@ class InfluenceSolutions:
         is_open = (jumps != 0.0) * (self._natural.unconstrained_modes.shape[1] == 0)
         sizes = np.maximum(np.abs(lam), LEAST_UNCONFIRMED_JUMP * terms)
         parts = np.abs([expected - lam, sizes, is_open * (jumps - opening), opening]).max(axis=1, initial=0.0)
-        self._comm.Allreduce(MPI.IN_PLACE, parts, MPI.MAX)
+        parts = np.max(self._comm.allgather(parts), axis=0)  # keeps NaN, which MPI.MAX may lose
         off, drift = (parts[::2] / np.where(parts[1::2] > 0.0, parts[1::2], 1.0)).max(axis=1)
-        return max(float(off), *(each.residual for each in solutions)), float(drift)
+        return float(np.max([off, *(each.residual for each in solutions)])), float(drift)

@@ -45,7 +45,7 @@ CLASSES: dict[str, Callable[[MPI.Intracomm, JumpOperator, InterfaceOperators], P
     "influence": _influence,
     BONDED: _bonded,
 }
-"""What makes each preconditioner that `choose` may choose."""
+"""Constructor of each preconditioner that `choose` may choose."""
 
 
 @dataclass(frozen=True)

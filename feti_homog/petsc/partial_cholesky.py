@@ -1,6 +1,6 @@
 """Partial Cholesky factorizations by the CHOLMOD that PETSc is linked with; PETSc's interface to it has none.
 
-MUMPS' takes three times as long where many rows stay, for it chooses the order of the others without regard to them.
+MUMPS chooses the order of the other rows without regard to those that stay, and takes longer where these are many.
 CHOLMOD's own functions get a whole order. Its structures are those of its manual, which every version since 2 has.
 """
 
@@ -107,7 +107,7 @@ def _analyse(matrix: _Sparse, order: Int, factor: Any, common: Any) -> Int:
     n, library = len(order), _library()
     parent, post, count, *work = np.empty((5, n), np.int32)
     done = library.cholmod_analyze_ordering(
-        byref(matrix), GIVEN, *map(_address, (order,)), None, c_size_t(0),
+        byref(matrix), GIVEN, _address(order), None, c_size_t(0),
         *map(_address, (parent, post, count, *work)), common,
     )  # fmt: skip
     if not (done and factor):

@@ -103,12 +103,12 @@ class Checkpoint:
         whole: Mapping[str, Any],
         distributed: Mapping[str, NDArray[Any]],
         light: bool = False,
-        settled: bool = False,
+        settled: int = -1,
     ) -> None:
         """Add event `number`: numbers that all ranks share, and arrays of which each has a part.
 
         A `light` event waits for others whose arrays have the same shapes, up to EVENTS_AT_ONCE or one of weight.
-        Before a `settled` one nothing is gone back to: earlier events may become lean.
+        Nothing is gone back to before event `settled`: earlier ones may become lean.
 
         Raises:
             FetiHomogError: the file cannot be written.
@@ -188,7 +188,7 @@ class Checkpoint:
         whole: Mapping[str, Any],
         gathered: Mapping[str, list[NDArray[Any]]],
         light: bool,
-        settled: bool,
+        settled: int,
     ) -> None:
         event = {name: np.asarray(value) for name, value in whole.items()}
         event |= {name: np.concatenate(parts) for name, parts in gathered.items()}
@@ -197,7 +197,7 @@ class Checkpoint:
             self._flush()
         self._starts[-1] = number - len(self._waiting)
         self._waiting.append(event)
-        self._settled = number if settled else self._settled
+        self._settled = max(self._settled, settled)
         if not light or len(self._waiting) == EVENTS_AT_ONCE:
             self._flush()
 

@@ -35,7 +35,7 @@ class NoCheckpoint(Checkpoint):
         whole: Mapping[str, Any],
         distributed: Mapping[str, NDArray[Any]],
         light: bool = False,
-        settled: bool = False,
+        settled: int = -1,
     ) -> None:
         """Nothing."""
 
@@ -67,14 +67,15 @@ class EventsInMemory(NoCheckpoint):
         whole: Mapping[str, Any],
         distributed: Mapping[str, NDArray[Any]],
         light: bool = False,
-        settled: bool = False,
+        settled: int = -1,
     ) -> None:
         self._whole[number] = {name: np.asarray(value) for name, value in {**whole, **distributed}.items()}
         self._bytes += _size(self._whole[number])
-        if settled and self.room is not None and self.comm.allreduce(self._bytes) > self.room:
-            for earlier in range(len(self._packed), number):
-                self._packed.append(zlib.compress(pickle.dumps(checkpoint_file.lean(self._whole.pop(earlier))), 1))
-            self._bytes = _size(self._whole[number])
+        if self.room is not None and self.comm.allreduce(self._bytes) > self.room:
+            for earlier in range(len(self._packed), settled):
+                event = self._whole.pop(earlier)
+                self._bytes -= _size(event)
+                self._packed.append(zlib.compress(pickle.dumps(checkpoint_file.lean(event)), 1))
 
 
 def _size(event: Arrays) -> int:

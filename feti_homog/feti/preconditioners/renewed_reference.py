@@ -110,7 +110,7 @@ class RenewedReference:
             pass
 
     def _renewed(self) -> Iterator[None]:
-        """Do that in parts, between which the cell may change: no event pays all.  Collective."""
+        """Make the next reference cell in parts, between which the cell may change: no event pays all.  Collective."""
         held, kept = self._held, None
         tied = self._ties.tied(held)
         if self.factorizations:

@@ -62,12 +62,12 @@ def figure(cell: DrawnCell) -> Figure:
 
 
 def partition(cell: DrawnCell) -> Figure:
-    """Return the subdomains into which the bodies are cut."""
+    """Return the parts into which the bodies are cut; a subdomain across materials has one in each body."""
     drawn = cell.drawn
-    subdomains = drawn.subdomain.max() + 1
-    picture, axes = _outlined(cell, _distinct(subdomains)[drawn.subdomain])
+    parts = drawn.subdomain.max() + 1
+    picture, axes = _outlined(cell, _distinct(parts)[drawn.subdomain])
     draw_segments(axes, drawn.points[outline_edges(drawn, drawn.subdomain)], "black", 0.5)
-    words = f"{_count(drawn.body.max() + 1, 'body', 'bodies')} in {_count(subdomains, 'subdomain', 'subdomains')}"
+    words = f"{_count(drawn.body.max() + 1, 'body', 'bodies')} in {_count(parts, 'part', 'parts')}"
     axes.set_title(_title(cell.file.attrs, words))
     return picture
 

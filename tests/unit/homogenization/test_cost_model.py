@@ -144,7 +144,7 @@ def test_memory_of_paths_to_the_end(multipliers, few, measured):
     [("stress", 0.0, 436, 16_880), ("generalized", 0.0, 164, 12_876), ("strain", 0.3, 304, 19_152)],
 )
 def test_size_of_an_event(plane, friction, multipliers, measured):
-    """What the last event of three paths takes in the checkpoint, within a tenth."""
+    """The estimate is at most a tenth above the bytes of the last event of three paths."""
     bonds = InterfaceSection(normal_strength=4.0, friction=friction)
     case = replace(make_case(plane=plane), interfaces=(bonds,))
     assert case.has_friction == (friction > 0.0)

@@ -73,7 +73,7 @@ def test_light_events_are_kept_where_all_ranks_raise(tmp_path, error, kept):
 def write_for_lean(checkpoint: Checkpoint, number: int) -> None:
     """Events 2, 6, 10, ... are settled, and so are 3, 7, ...; every other one is light."""
     event = {"path": [0.1 * number], "alpha": [1.0]}, {"lam": np.arange(50.0) + number, "status": np.arange(5) * number}
-    checkpoint.write(number, *event, light=number % 2 == 0, settled=number % 4 > 1)
+    checkpoint.write(number, *event, light=number % 2 == 0, settled=number if number % 4 > 1 else -1)
 
 
 def assert_lean(checkpoint: Checkpoint, count: int, first_whole: int) -> None:
