@@ -29,7 +29,10 @@ DIRECTIONS = {"angle", "bond_angle", "psi"}
 COUNTS = {"broke", "softened", "bonded", "open", "closed", "free_motions", "fibre", "interface", "number", "elements"}
 PLACES = "fibres[].centre"  # on the torus
 # Of moduli, measured by 1: they may vanish.
-RATIOS = {"eta1", "eta2", "deviation", "anisotropy", "nu12", "nu21", "nu13", "nu23", "nu_axial", "nu_transverse"}
+RATIOS = {
+    "eta1", "eta2", "deviation", "anisotropy", "nu12", "nu21", "nu13", "nu23", "nu31", "nu32", "nu_axial",
+    "nu_transverse",
+}  # fmt: skip
 # Modes of tips are less sure where the rate is a smaller share of the largest.
 LEAST_RATE = 1e-2
 DIFFERENT = math.inf  # deviation of counts and words

@@ -23,6 +23,7 @@ from support import dimensions
 from support.dimensions import Units
 
 from feti_homog import run
+from feti_homog.report.text.constant_tables import RATIOS
 
 WRONG, LESS = 1e-6, 0.99
 STATE, LAST = "state/0", STEPS - 1
@@ -142,6 +143,14 @@ def test_every_number_that_is_wrong_is_noticed(solved, wanted):
         less = document | {"path": [p | {"broke": p["broke"] + 1} for p in document["path"]]}
         assert max(paths_apart(document, less, folder)[0])[0] == DIFFERENT
     assert noticed > 5
+
+
+def test_estimates_of_ratios_that_nearly_vanish_are_measured_by_one():
+    """That of nu31 is the difference of larger errors: bodies cut at the sides of a cell had 13 times as much."""
+    names = [*RATIOS, *RATIOS.values()]
+    less, more = ({"mesh_error": {"constants": dict.fromkeys(names, error)}} for error in (2e-5, 3e-4))
+    assert len({*names}) == len(apart(less, more)) == 4
+    assert [off for off, _ in apart(less, more)] == pytest.approx([2.8e-4] * len(names))
 
 
 def test_contact_that_changes_as_a_leg_begins_is_not_the_end_of_the_leg_before():
