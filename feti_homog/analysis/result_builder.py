@@ -13,6 +13,7 @@ from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result import Fields, Result
 from feti_homog.case.case import Case
 from feti_homog.fibres.outlines.ellipses import Ellipses
+from feti_homog.homogenization.uniform_parts import nodes_of_parts
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.parallel.mpi_errors import on_root
 from feti_homog.version import __version__
@@ -72,8 +73,8 @@ def _cell_info(cell: TornCell, fractions: dict[str, float]) -> CellInfo:
         fibre_fraction=sum(f for phase, f in fractions.items() if phase not in AROUND_FIBRES),
         fractions=fractions,
         porosity=1.0 - sum(fractions.values()) if cell.summary.voids else 0.0,
-        elements=cell.sum_over_ranks(sum(len(part.mesh.triangles) for part in cell.parts)),
-        nodes=cell.sum_over_ranks(sum(len(part.mesh.points) for part in cell.parts)),
+        elements=cell.sum_over_ranks(sum(len(s.mesh.triangles) for s in cell.subdomains)),
+        nodes=cell.sum_over_ranks(sum(map(nodes_of_parts, cell.subdomains))),
         mesh_size=None if cell.case.cell.has_own_mesh else cell.case.cell.mesh_size,
         refine=cell.case.cell.refine,
         match_distance=cell.summary.match_distance,

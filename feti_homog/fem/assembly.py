@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.sparse import coo_matrix, csr_matrix
+from scipy.sparse import bsr_matrix, csc_matrix, csr_matrix
 
 from feti_homog.fem import bubble
 from feti_homog.fem.problem import PLANE, Problem
@@ -74,7 +74,7 @@ def assemble(
         nodes = classes[members].ravel()
         own = np.stack([np.bincount(nodes, loads[members, :, k].ravel(), n) for k in range(2)], axis=1)
         # sum_k int dN/dx_k L[(i,k), :]
-        Q += np.einsum("ck,ikv->civ", own, L[problem.voigt]).reshape(Q.shape)
+        Q += (own @ np.concatenate(L[problem.voigt], axis=1)).reshape(Q.shape)
         slopes += own
     return Assembly(_sparse(couples, classes[:, macro.rows], classes[:, macro.columns], n), Q, slopes, areas)
 
@@ -149,13 +149,17 @@ def _tensor(L: Float, problem: Problem) -> Float:
 
 def _sparse(couples: Float, rows: Int32, columns: Int32, n_classes: int) -> csr_matrix:
     """(c n, c n) sum of the couples (t, p, c^2) of classes `rows` and `columns` (t, p)."""
-    c = math.isqrt(couples.shape[-1])
-    i, j = np.empty((2, *rows.shape, c, c), np.int32)
-    for k in range(c):
-        i[..., k, :] = (c * rows + k)[..., None]
-        j[..., k] = (c * columns + k)[..., None]
-    n = c * n_classes
-    return coo_matrix((couples.ravel(), (i.ravel(), j.ravel())), shape=(n, n)).tocsr()
+    c, size = math.isqrt(couples.shape[-1]), rows.size
+    by_row = csc_matrix((columns.ravel(), rows.ravel(), np.arange(size + 1)), shape=(n_classes, size)).tocsr()
+    places = csr_matrix((by_row.indices, by_row.data, by_row.indptr), shape=(n_classes, n_classes))
+    places.sort_indices()
+    is_first = np.diff(places.indices, prepend=-1) != 0
+    is_first[places.indptr[:-1]] = True  # each class has couples
+    first = np.flatnonzero(is_first)
+    sums = csr_matrix((np.ones(size), places.data, np.append(first, size)), shape=(len(first), size))
+    blocks = (sums @ couples.reshape(size, c * c)).reshape(-1, c, c)
+    begin = np.searchsorted(first, places.indptr)
+    return bsr_matrix((blocks, places.indices[first], begin), shape=(c * n_classes,) * 2).tocsr()
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,6 @@ from feti_homog.typing import Float, Int
 NEIGHBOURS = {1: 0.1, 2: 0.001}
 # Of the moments of a fit, whose diagonal is 1: where all points lie on a line, a fit does not vary across it.
 RIDGE = 1e-9
-# Places in a symmetric matrix of its entries 00, 01, 02, 11, 12 and 22.
-SYMMETRIC = np.array([[0, 1, 2], [1, 3, 4], [2, 4, 5]])
 
 
 @dataclass(frozen=True)
@@ -35,16 +33,16 @@ class Neighbours:
     @classmethod
     def of(cls, vertices: Int, corners: Float) -> Neighbours:
         """Find those of elements with these vertices (e, 3) at `corners` (e, 3, 2); on the boundary sides have one."""
-        start, stop = vertices.ravel(), np.roll(vertices, -1, axis=1).ravel()
-        size = int(vertices.max()) + 1
+        start, stop = vertices.T.ravel(), vertices.T[[1, 2, 0]].ravel()
+        size, e = int(vertices.max()) + 1, len(vertices)
         # Elsewhere the sides around a vertex lead to the vertices that they come from; such numbers add up exactly.
         mark = np.random.default_rng(0).integers(1 << 40, size=size).astype(float)
-        around = mark[vertices]
-        at_boundary = np.bincount(start, (np.roll(around, -1, axis=1) - np.roll(around, 1, axis=1)).ravel()) != 0.0
-        near = np.flatnonzero(at_boundary[start] | at_boundary[stop])
+        around = np.take(mark, vertices.T)
+        at_boundary = np.bincount(start, (around[[1, 2, 0]] - around[[2, 0, 1]]).ravel()) != 0.0
+        near = np.flatnonzero(np.take(at_boundary, start) | np.take(at_boundary, stop))
         low, high = np.minimum(start, stop)[near], np.maximum(start, stop)[near]
         once = near[np.unique(low * size + high, return_index=True)[1]]
-        element, k = np.divmod(once, 3)
+        k, element = np.divmod(once, e)
         vector = corners[element, (k + 1) % 3] - corners[element, k]
         at, other = np.concatenate([start[once], stop[once]]), np.concatenate([stop[once], start[once]])
         wanted = at_boundary[at]
@@ -55,12 +53,13 @@ class Neighbours:
         moved = _translations(self.vector, order) @ sums[self.other]
         return NEIGHBOURS[order] * gathered(self.at, moved, len(sums))
 
-    def shared_moments(self, entries: Float) -> Float:
-        """(6, vertices) what vertices on the boundary get of the moments of neighbours, entries (6, vertices)."""
-        T = _translations(self.vector, 1)
-        moved = T @ entries.T[self.other][:, SYMMETRIC] @ T.transpose(0, 2, 1)
-        own = moved[:, *np.triu_indices(3)].T
-        return NEIGHBOURS[1] * np.stack([np.bincount(self.at, row, entries.shape[1]) for row in own])
+    def shared_moments(self, moments: Float) -> Float:
+        """(6, vertices) what vertices on the boundary get of the moments (6, vertices) of neighbours."""
+        one, x, y, xx, xy, yy = moments[:, self.other]
+        a, b = self.vector.T
+        moved_x, moved_y = x + a * one, y + b * one
+        moved = one, moved_x, moved_y, xx + a * (x + moved_x), xy + a * y + b * moved_x, yy + b * (y + moved_y)
+        return NEIGHBOURS[1] * np.stack([np.bincount(self.at, row, moments.shape[1]) for row in moved])
 
     def with_moments(self, moments: Float, order: int) -> Float:
         """(vertices, p, p) moments and a share of those of neighbours."""
@@ -76,36 +75,38 @@ def linear_values(vertices: Int, away: Float, weights: Float, values: Float, nei
     them.
 
     Args:
-        vertices: (e, 3) of the elements.
-        away: (e, 3, 2) vectors from these to the middle of the element.
+        vertices: (3, e) of the elements.
+        away: (2, 3, e) vectors from these to the middle of the element.
         weights: (e,) areas.
     """
-    at, size, e = vertices.ravel(), int(vertices.max()) + 1, len(vertices)
-    x, y = away.reshape(-1, 2).T.copy()
-    w = np.repeat(weights, 3)
-    basis = np.stack([w, w * x, w * y])
+    at, size, e = vertices.ravel(), int(vertices.max()) + 1, len(weights)
+    x, y = away
+    basis = np.broadcast_to(weights, x.shape), weights * x, weights * y
     parts = (*basis, basis[1] * x, basis[1] * y, basis[2] * y)
-    moments = np.stack([np.bincount(at, part).astype(float) for part in parts])
+    moments = np.stack([np.bincount(at, part.ravel()) for part in parts])
     first = _first_rows(moments + neighbours.shared_moments(moments))
-    share = sum(row[at] * own for row, own in zip(first.T.copy(), basis, strict=True))
-    found = csc_matrix((share, at, np.arange(0, 3 * e + 1, 3)), (size, e)) @ values
+    share = sum(np.take(row, vertices) * own for row, own in zip(first, basis, strict=True))
+    found = csc_matrix((share.T.ravel(), vertices.T.ravel(), np.arange(0, 3 * e + 1, 3)), (size, e)) @ values
     is_shared = np.zeros(size, bool)
     is_shared[neighbours.other] = True
-    near = np.flatnonzero(is_shared[at])
-    each, of_each = values[near // 3], np.arange(len(near) + 1)
-    sums = np.stack([csc_matrix((own[near], at[near], of_each), (size, len(near))) @ each for own in basis], axis=1)
-    moved = first[neighbours.at][:, None] @ _translations(neighbours.vector, 1) @ sums[neighbours.other]
-    return np.asarray(found + NEIGHBOURS[1] * gathered(neighbours.at, moved, size)[:, 0])
+    near = np.flatnonzero(np.take(is_shared, at))
+    each = np.stack([own.ravel()[near] for own in basis], axis=1)
+    rows = at[near, None] + size * np.arange(3)
+    sums = csc_matrix((each.ravel(), rows.ravel(), np.arange(0, 3 * len(near) + 1, 3)), (3 * size, len(near)))
+    zero, one, two = (sums @ values[near % e]).reshape(3, size, -1)[:, neighbours.other]
+    (a, b), (f, g, h) = neighbours.vector.T, first[:, neighbours.at]
+    moved = (f + a * g + b * h)[:, None] * zero + g[:, None] * one + h[:, None] * two
+    return np.asarray(found + NEIGHBOURS[1] * gathered(neighbours.at, moved[:, None], size)[:, 0])
 
 
 def _first_rows(moments: Float) -> Float:
-    """(n, 3) the first row of the inverse of each normalized symmetric matrix of these entries (6, n)."""
+    """(3, n) the first row of the inverse of each normalized symmetric matrix of these entries (6, n)."""
     scale = 1 / np.sqrt(moments[[0, 3, 5]])
     xx = yy = 1.0 + RIDGE
     x, y, xy = (moments[k] * scale[i] * scale[j] for k, i, j in ((1, 0, 1), (2, 0, 2), (4, 1, 2)))
     cofactors = np.stack([xx * yy - xy * xy, xy * y - x * yy, x * xy - xx * y])
     determinant = (1.0 + RIDGE) * cofactors[0] + x * cofactors[1] + y * cofactors[2]
-    return np.asarray((cofactors * scale * (scale[0] / determinant)).T)
+    return np.asarray(cofactors * scale * (scale[0] / determinant))
 
 
 def polynomials(x: Float, order: int) -> Float:

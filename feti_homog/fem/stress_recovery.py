@@ -23,6 +23,9 @@ from feti_homog.fem.shape_functions import barycentric, gradients, shape_functio
 from feti_homog.mesh.refinement import FineMesh
 from feti_homog.typing import Float, Int, Int32
 
+# Linear elements that are looked at together: few enough for the processor's cache.
+LINEAR_AT_ONCE = 1 << 12
+
 
 @dataclass(frozen=True)
 class ElementStresses:
@@ -75,9 +78,24 @@ class RecoveredStress:
         return 1 if self.triangles.shape[1] == 3 else 2
 
     @cached_property
+    def _rows(self) -> Int:
+        """(3, e) plane vertices of the elements."""
+        return np.ascontiguousarray(self.triangles[:, :3].T, np.int64)
+
+    @cached_property
+    def _coordinates(self) -> Float:
+        """(2, n) of the plane nodes."""
+        return self.points.T.copy()
+
+    @cached_property
+    def _by_node(self) -> Float:
+        """(c k, classes) fluctuating displacements."""
+        return self.u.reshape(len(self.u), -1).T.copy()
+
+    @cached_property
     def vertices(self) -> Int:
         """(e, 3) vertices of the elements, numbered from 0; periodic images are one."""
-        return np.asarray(self._numbers[self.node_class[self.triangles[:, :3]]])
+        return np.asarray(np.take(self._numbers, np.take(self.node_class, self._rows)).T)
 
     @cached_property
     def _numbers(self) -> Int:
@@ -98,14 +116,17 @@ class RecoveredStress:
         return list(self._elements())
 
     def _elements(self) -> Iterator[ElementStresses]:
-        m, lam = self.problem.strains, barycentric(self.triangles.shape[1])
-        for first in range(0, len(self.triangles), ELEMENTS_AT_ONCE):
-            part = slice(first, min(first + ELEMENTS_AT_ONCE, len(self.triangles)))
-            corners = self.points[self.triangles[part]]
-            fluctuating, w = self._fluctuating(part, corners)
-            stress = fluctuating + self.L[:m] @ self.loads
-            points = corners.mean(axis=1)[:, None] if self.order == 1 else shape_functions(6, lam) @ corners
-            yield ElementStresses(part, points, w, stress)
+        at_once = LINEAR_AT_ONCE if self.order == 1 else ELEMENTS_AT_ONCE
+        for first in range(0, len(self.triangles), at_once):
+            part = slice(first, min(first + at_once, len(self.triangles)))
+            yield self._uniform(part) if self.order == 1 else self._varying(part)
+
+    def _varying(self, part: slice) -> ElementStresses:
+        """Return the stresses of quadratic elements."""
+        corners = self.points[self.triangles[part]]
+        fluctuating, w = self._fluctuating(part, corners)
+        stress = fluctuating + self.L[: self.problem.strains] @ self.loads
+        return ElementStresses(part, shape_functions(6, barycentric(6)) @ corners, w, stress)
 
     def _fluctuating(self, part: slice, corners: Float) -> tuple[Float, Float]:
         """(e, q, m, k) stresses that u makes in the elements `part` of nodes (e, a, 2), and weights (e, q)."""
@@ -114,8 +135,6 @@ class RecoveredStress:
             return elements.stress(
                 elements.with_bubble(self.u[self.node_class[self.triangles[part]]])
             ), elements.weights
-        if self.order == 1:
-            return self._uniform(part, corners)
         (g, w), u = gradients(corners), self.u[self.node_class[self.triangles[part]]]
         (e, a, c, k), q, m = u.shape, g.shape[1], self.problem.strains
         flat = g.transpose(0, 1, 3, 2).reshape(e, 2 * q, a) @ u.reshape(e, a, c * k)
@@ -124,33 +143,34 @@ class RecoveredStress:
             strain[:, :, number] = gradient[:, :, d, i].sum(axis=2)
         return self.L[:m, :m] @ strain, w
 
-    def _uniform(self, part: slice, corners: Float) -> tuple[Float, Float]:
-        """Stresses and weights of linear elements, as `_fluctuating`; loops of NumPy run over the elements."""
-        (c, k), m = self.u.shape[1:], self.problem.strains
-        at = self.node_class[self.triangles[part]].T
-        by_node = self.u.reshape(-1, c * k).T.copy()
-        zero = by_node[:, at[0]]
-        first, second = by_node[:, at[1]] - zero, by_node[:, at[2]] - zero
-        (x1, x2), (y1, y2) = (own[1:] - own[0] for own in corners.transpose(2, 1, 0).copy())
+    def _uniform(self, part: slice) -> ElementStresses:
+        """Return the stresses of linear elements; loops of NumPy run over the elements."""
+        (c, k), m, triangles = self.u.shape[1:], self.problem.strains, self._rows[:, part]
+        (x, y), at = (np.take(own, triangles) for own in self._coordinates), np.take(self.node_class, triangles)
+        zero, first, second = (np.take(self._by_node, own, axis=1) for own in at)
+        first -= zero
+        second -= zero
+        (x1, x2), (y1, y2) = x[1:] - x[0], y[1:] - y[0]
         doubled = x1 * y2 - x2 * y1
         by_place = (y2 * first - y1 * second) / doubled, (x1 * second - x2 * first) / doubled
         gradient, strain = [own.reshape(c, k, -1) for own in by_place], np.zeros((m, k, len(doubled)))
         for (i, d), number in np.ndenumerate(self.problem.voigt):
             strain[number] += gradient[d][i]
         stress = (self.L[:m, :m] @ strain.reshape(m, -1)).reshape(m * k, -1)
-        return np.ascontiguousarray(stress.T).reshape(-1, 1, m, k), doubled[:, None] / 2
+        stress += (self.L[:m] @ self.loads).reshape(-1, 1)
+        points = np.stack([own.sum(axis=0) / 3 for own in (x, y)], axis=1)
+        return ElementStresses(
+            part, points[:, None], doubled[:, None] / 2, np.ascontiguousarray(stress.T).reshape(-1, 1, m, k)
+        )
 
     @cached_property
     def fits(self) -> Float:
         """(vertices, p, m k) coefficients of the polynomials about each vertex, see `polynomials`; p = 1 of order 1."""
         neighbours = Neighbours.of(self.vertices, self.points[self.triangles[:, :3]])
         if self.order == 1:
-            points, weights, stress = (
-                np.concatenate([getattr(own, name)[:, 0] for own in self.elements])
-                for name in ("points", "weights", "stress")
-            )
-            away = points[:, None] - self.points[self.triangles]
-            values = linear_values(self.vertices, away, weights, stress.reshape(len(stress), -1), neighbours)
+            points, weights, stress = (self._of_all(name) for name in ("points", "weights", "stress"))
+            away = np.stack([own - np.take(x, self._rows) for own, x in zip(points.T, self._coordinates, strict=True)])
+            values = linear_values(self.vertices.T, away, weights, stress.reshape(len(stress), -1), neighbours)
             if self.known is not None:
                 tensors = values.reshape(-1, *stress.shape[1:])
                 at = self._numbers[self.known.node]
@@ -167,6 +187,11 @@ class RecoveredStress:
         scaled, scale = normalized(neighbours.with_moments(moments, self.order))
         sums = sums + neighbours.shared(sums, self.order)
         return np.asarray(scale * np.linalg.solve(scaled, scale * sums))
+
+    def _of_all(self, name: str) -> Float:
+        """Return an array of uniform stresses for all elements."""
+        found = [getattr(own, name)[:, 0] for own in self.elements]
+        return found[0] if len(found) == 1 else np.concatenate(found)
 
     def recovered(self, part: Int | slice, lam: Float) -> Float:
         """(e, q, m, k) recovered stresses in the elements `part` at the barycentric coordinates lam (q, 3)."""
@@ -200,14 +225,14 @@ class RecoveredStress:
         if self.order == 2:
             off = (self.recovered(own.part, barycentric(6)) - own.stress) * _roots(own.weights)
             return np.asarray(off.swapaxes(0, 1))
-        # Linear less uniform stresses d: int d d = w/12 (sum_i d_i d_i + sum_i d_i sum_i d_i) of those at the vertices.
+        # Linear less uniform stresses d, of which d_i at the vertices have the sum s:
+        # int d d = w/12 (sum_i d_i d_i + s s) = w/12 sum_i (d_i + s/3)^2.
         e, _, m, k = own.stress.shape
-        off = np.empty((4, e, m * k))
-        np.take(self.fits[:, 0], self.vertices[own.part].T, axis=0, out=off[:3], mode="clip")  # which needs no buffer
-        off[:3] -= own.stress.reshape(e, m * k)
-        np.sum(off[:3], axis=0, out=off[3])
+        off = np.empty((3, e, m * k))
+        np.take(self.fits[:, 0], self.vertices[own.part].T, axis=0, out=off, mode="clip")  # which needs no buffer
+        off += (off[0] + off[1] + off[2]) / 3 - 2 * own.stress.reshape(e, m * k)
         off *= np.sqrt(own.weights / 12)
-        return off.reshape(4, e, m, k)
+        return off.reshape(3, e, m, k)
 
 
 def _roots(weights: Float) -> Float:

@@ -14,7 +14,7 @@ from feti_homog.fem.stress_recovery import RecoveredStress
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.boundary_tractions import boundary_tractions
-from feti_homog.homogenization.nested_interiors import ELEMENTS_AT_ONCE, groups, locks, nested_interiors
+from feti_homog.homogenization.nested_interiors import groups, locks, nested_interiors
 from feti_homog.homogenization.uniform_parts import UniformPart, parts_of_phases
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.mesh.refinement import FineMesh, ReferenceLattice, joined
@@ -23,6 +23,8 @@ from feti_homog.typing import Bool, Float, Int
 
 Members = list[Subdomain] | list[UniformPart]
 Displacements = Iterator[tuple[Members, FineMesh, Float, Int]]
+# Elements of one phase that are looked at together, where subdomains are across materials.
+SAMPLED_AT_ONCE = 1 << 15
 # What is not on a boundary.
 INSIDE = -1
 # Errors of elements and of arcs over those of meshes refined once and twice less, by the order of elements, all by
@@ -192,7 +194,7 @@ def _sampled(cell: TornCell, u: Float, loads: Float, keep: bool, lattice: Refere
     Those hold hardly less of the error than displacements in equilibrium on its mesh, and no place is known on arcs.
     """
     at, own = -1, np.zeros(0)
-    for part in parts_of_phases(cell.subdomains, lattice, ELEMENTS_AT_ONCE):
+    for part in parts_of_phases(cell.subdomains, lattice, SAMPLED_AT_ONCE):
         if part.place != at:
             at, own = part.place, cell.solver.extended(part.place, u, loads, keep)
         yield [part], part.mesh, own.reshape(-1, part.problem.components, u.shape[1]), np.full(len(own), INSIDE)

@@ -61,6 +61,15 @@ def parts_of(subdomains: Sequence[Subdomain], phase_of: Sequence[str]) -> Iterat
             yield UniformPart(place, submesh, mesh, s.problem.dofs(classes), law, s.problem, s.is_mixed)
 
 
+def nodes_of_parts(s: Subdomain) -> int:
+    """Return the number of plane nodes of all parts of a subdomain; those of several count for each."""
+    body, nodes = np.repeat(s.submesh.constituent, s.mesh.nodes.shape[1]), s.mesh.nodes.ravel()
+    one = np.empty(len(s.mesh.points), np.int64)
+    one[nodes] = body
+    others = np.flatnonzero(one[nodes] != body)
+    return len(one) + len(np.unique(nodes[others].astype(np.int64) * (int(body.max()) + 1) + body[others]))
+
+
 def parts_of_phases(subdomains: Sequence[Subdomain], lattice: ReferenceLattice, elements: int) -> Iterator[UniformPart]:
     """Yield the parts of subdomains across materials in the same order, several bodies of one phase together.
 

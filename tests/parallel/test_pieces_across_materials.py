@@ -13,6 +13,7 @@ from feti_homog import Case, run
 from feti_homog.feti.operators.one_subdomain import Interior
 from feti_homog.homogenization.averaging import Homogenization
 from feti_homog.homogenization.partition_policy import PartitionPolicy
+from feti_homog.homogenization.uniform_parts import nodes_of_parts
 from feti_homog.parallel.mpi_errors import on_root
 from feti_homog.runtime.records import plain
 
@@ -42,6 +43,7 @@ def test_stiffness_is_the_monolithic_one(comm, cell, policy):
     assert relative_error(L, monolithic_stiffness(torn)) < 1e-8
     assert max(max(r.checks.values()) for r in responses) < 1e-7
     assert all(r.state.iterations < 40 for r in responses)
+    assert sum(map(nodes_of_parts, torn.subdomains)) == sum(len(part.mesh.points) for part in torn.parts)
 
 
 @pytest.mark.parametrize("fault", ["strain", "hill"])
@@ -98,6 +100,7 @@ def test_interface_nodes_are_those_by_bodies_if_one_is_pinned(comm, shared_path)
     across, bodies = (run(Case.parse(pixels | {"decomposition": {"cut": cut}}), comm) for cut in ("auto", "bodies"))
     assert across.solver.subdomains == comm.size and bodies.solver.subdomains >= 2
     assert across.solver.interface_nodes == bodies.solver.interface_nodes > 0
+    assert across.cell.nodes == bodies.cell.nodes or comm.size > 1
 
 
 def test_porous_cells_of_one_phase_have_fields_and_no_interface(comm, shared_path):

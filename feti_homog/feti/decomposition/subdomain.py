@@ -115,7 +115,7 @@ class Subdomain:
         m, slopes = self.problem.strains, self.slopes
         if self.submesh.at_void.any():
             slopes = slopes + void_integrals(self.submesh, self.mesh)
-        return np.asarray(np.einsum("ck,ikm->cim", slopes, np.eye(m)[self.problem.voigt]).reshape(-1, m)[dofs])
+        return np.asarray((slopes @ np.concatenate(np.eye(m)[self.problem.voigt], axis=1)).reshape(-1, m)[dofs])
 
     @property
     def area(self) -> float:

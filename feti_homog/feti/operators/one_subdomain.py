@@ -218,8 +218,15 @@ class Interior:
         self.dofs = np.flatnonzero(inside) if order is None else order[inside[order]]
         rows = K[self.dofs]
         self._Kib, self._Kbb = rows[:, dofs], K[dofs][:, dofs]
-        if len(self.dofs):
-            self._solver = DirectSolver(rows[:, self.dofs].tocsr(), "feti_interior_", order is not None)
+        if not len(self.dofs):
+            return
+        if len(dofs):
+            A = rows[:, self.dofs].tocsr()
+        else:  # all columns, in another order
+            place = np.empty(K.shape[0], rows.indices.dtype)
+            place[self.dofs] = np.arange(len(place))
+            A = csr_matrix((rows.data, place[rows.indices], rows.indptr), shape=K.shape)
+        self._solver = DirectSolver(A, "feti_interior_", order is not None)
 
     @cached_property
     def coupling(self) -> csr_matrix:

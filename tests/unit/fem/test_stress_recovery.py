@@ -1,0 +1,66 @@
+"""Stresses recovered from linear elements against least squares about one vertex after the other."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial import Delaunay
+
+from feti_homog.fem.local_fits import NEIGHBOURS
+from feti_homog.fem.problem import AXIAL, PLANE
+from feti_homog.fem.stress_recovery import LINEAR_AT_ONCE, RecoveredStress
+
+
+def fit_at(points, triangles, stress, v):
+    """Return the fit (m k,) at vertex v to the stresses (e, m k) around it, on the boundary also around neighbours."""
+    corners = points[triangles]
+    areas, middles = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 2, corners.mean(axis=1)
+    sides = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    edges, count = np.unique(sides, axis=0, return_counts=True)
+    own = edges[(edges == v).any(axis=1)]
+    groups = [(1.0, v)]
+    if (count[(edges == v).any(axis=1)] == 1).any():
+        groups += [(NEIGHBOURS[1], w) for w in own[own != v]]
+    chosen = [(share * areas[e], e) for share, w in groups for e in np.flatnonzero((triangles == w).any(axis=1))]
+    roots, at = np.sqrt([weight for weight, _ in chosen]), [e for _, e in chosen]
+    basis = np.column_stack([np.ones(len(at)), middles[at] - points[v]])
+    return np.linalg.lstsq(roots[:, None] * basis, roots[:, None] * stress[at], rcond=None)[0][0]
+
+
+@pytest.mark.parametrize("problem", [PLANE, AXIAL], ids=["plane", "axial"])
+def test_difference_is_that_of_fits_about_each_vertex(problem):
+    rng = np.random.default_rng(3)
+    points = rng.random((60, 2))
+    triangles = Delaunay(points).simplices
+    c, m, k = problem.components, problem.strains, 2
+    u, loads, root = rng.random((len(points), c, k)), rng.random((m, k)), rng.random((m, m))
+    L = root @ root.T + np.eye(m)
+    body = RecoveredStress(points, triangles, np.arange(len(points)), L, problem, u, loads)
+    sides = np.concatenate([np.ones((len(triangles), 3, 1)), points[triangles]], axis=2)
+    gradient = np.einsum("edx,exck->ecdk", np.linalg.inv(sides)[:, 1:], u[triangles])
+    strain = np.stack([gradient[:, problem.voigt == n].sum(axis=1) for n in range(m)], axis=1)
+    stress = (L @ (strain + loads)).reshape(len(triangles), -1)
+    at = np.stack([fit_at(points, triangles, stress, v) for v in range(len(points))])[triangles]
+    off = ((at + np.roll(at, 1, axis=1)) / 2 - stress[:, None]).reshape(-1, 3, m, k)  # in the middles of the sides
+    areas = np.abs(np.linalg.det(sides)) / 2
+    expected = np.einsum("e,eqak,ab,eqbl->kl", areas / 3, off, np.linalg.inv(L), off)
+    total, shares = body.difference()
+    np.testing.assert_allclose(total, expected, rtol=1e-6)
+    np.testing.assert_allclose(shares.sum(axis=0), np.diag(expected), rtol=1e-6)
+
+
+def test_many_bodies_have_the_sum_of_their_differences():
+    rng, copies = np.random.default_rng(4), 60
+    points, u, loads = rng.random((60, 2)), rng.random((60, 2, 1)), rng.random((3, 1))
+    triangles = Delaunay(points).simplices
+    first = 60 * np.arange(copies)[:, None, None]
+    assert copies * len(triangles) > LINEAR_AT_ONCE
+    one, many = (
+        RecoveredStress(
+            np.tile(points, (k, 1)), (triangles + first[:k]).reshape(-1, 3), np.arange(60 * k), np.eye(3), PLANE,
+            np.tile(u, (k, 1, 1)), loads,
+        ).difference()
+        for k in (1, copies)
+    )  # fmt: skip
+    np.testing.assert_allclose(many[0], copies * one[0], rtol=1e-12)
+    np.testing.assert_allclose(many[1], np.tile(one[1], (copies, 1)), rtol=1e-9)
