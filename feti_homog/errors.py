@@ -47,6 +47,10 @@ class CaseError(FetiHomogError):
     exit_code = EXIT_INPUT
 
 
+class CheckpointError(CaseError):
+    """What `--resume` found is missing, unreadable or of another run."""
+
+
 class MeshError(FetiHomogError):
     """The cell cannot be meshed, or a user's mesh is faulty; each fault names nodes or elements."""
 

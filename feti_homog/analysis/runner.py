@@ -17,7 +17,7 @@ from feti_homog.analysis.registry import analysis_of
 from feti_homog.analysis.result import Result
 from feti_homog.analysis.state_recorder import StateRecorder
 from feti_homog.case.case import Case
-from feti_homog.errors import CaseError, CoarseMeshError, ConvergenceError, MeshError, NoMemoryError
+from feti_homog.errors import CheckpointError, CoarseMeshError, ConvergenceError, MeshError, NoMemoryError
 from feti_homog.homogenization.partition_policy import BY_COST
 from feti_homog.homogenization.unit_cell import TornCell, tear
 from feti_homog.parallel.mpi_errors import all_raise, on_root, on_root_only
@@ -123,9 +123,7 @@ def _accurate(
             return finer
     except (MeshError, ConvergenceError, NoMemoryError) as error:
         failure = str(error)
-    except CaseError as error:
-        if not resume:
-            raise
+    except CheckpointError as error:
         failure, of_first = f"an earlier run failed ({error})", True
     except MemoryError as error:
         if progress.comm.size > 1:

@@ -83,7 +83,7 @@ def linear_values(vertices: Int, away: Float, weights: Float, values: Float, nei
     x, y = away
     basis = np.broadcast_to(weights, x.shape), weights * x, weights * y
     parts = (*basis, basis[1] * x, basis[1] * y, basis[2] * y)
-    moments = np.stack([np.bincount(at, part.ravel()) for part in parts])
+    moments = np.stack([np.bincount(at, part.ravel()).astype(float) for part in parts])
     first = _first_rows(moments + neighbours.shared_moments(moments))
     share = sum(np.take(row, vertices) * own for row, own in zip(first, basis, strict=True))
     found = csc_matrix((share.T.ravel(), vertices.T.ravel(), np.arange(0, 3 * e + 1, 3)), (size, e)) @ values

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from ctypes import POINTER, byref, c_double, c_int, c_size_t, c_void_p
 from functools import cache
 from typing import Any
@@ -191,4 +191,9 @@ def _library() -> ctypes.CDLL:
     library.cholmod_allocate_factor.restype = POINTER(_Factor)
     library.cholmod_ptranspose.restype = POINTER(_Sparse)
     library.cholmod_solve.restype = POINTER(_Dense)
+    try:  # its warnings go to the user's screen, and are raised
+        library.SuiteSparse_config_printf_func_set(None)
+    except AttributeError:  # before SuiteSparse 6 the function is the fifth of a structure
+        with suppress(ValueError):
+            (c_void_p * 5).in_dll(library, "SuiteSparse_config")[4] = None
     return library

@@ -22,7 +22,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from feti_homog.case.case import Case
-from feti_homog.errors import CaseError, FetiHomogError
+from feti_homog.errors import CaseError, CheckpointError, FetiHomogError
 from feti_homog.homogenization import phase_laws
 from feti_homog.parallel.mpi_errors import on_root, on_root_only
 from feti_homog.results import atomic, checkpoint_file
@@ -79,12 +79,12 @@ class Checkpoint:
         """Return how many events there are, each of which is checked.
 
         Raises:
-            CaseError: an event is missing, unreadable or of another run.
+            CheckpointError: an event is missing, unreadable or of another run.
         """
         try:
             return on_root(self.comm, self._count_checked)
         except CaseError as error:
-            raise CaseError(*(f"--resume: {fault}" for fault in error.faults)) from error
+            raise CheckpointError(*(f"--resume: {fault}" for fault in error.faults)) from error
 
     def read(self, number: int) -> Arrays:
         """Return an event: this rank's part of distributed arrays, all of the others.

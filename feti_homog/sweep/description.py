@@ -108,8 +108,10 @@ def _path_lines(
     """Return the lines about the events of a path; none of another analysis, or of a cell without interfaces."""
     teeth, memory = teeth_of(case), cost_model.memory_to_the_end(taken, columns, len(nodes))
     lines = cost_model.events_lines(case, multipliers, summary.fibres, teeth, nodes, taken.seconds, memory)
-    size = checkpoint.bytes_at_most(case, multipliers, multipliers // 2 * teeth)
-    return [*lines, cost_model.checkpoint_line(size)] if lines else []
+    if not lines or case.path is None:
+        return []
+    events = case.path.increments or multipliers // 2 * teeth
+    return [*lines, cost_model.checkpoint_line(checkpoint.bytes_at_most(case, multipliers, events))]
 
 
 def _applications(case: Case, easy: bool) -> dict[int, int]:

@@ -12,7 +12,7 @@ from support.pixel_images import pixel_mesh
 from feti_homog import Case, run
 from feti_homog.analysis import runner
 from feti_homog.analysis.mesh_errors import add_errors_of_breaks, note_accuracy
-from feti_homog.errors import CaseError, CoarseMeshError, ConvergenceError
+from feti_homog.errors import CaseError, CheckpointError, CoarseMeshError, ConvergenceError
 from feti_homog.parallel.mpi_errors import agree, on_root
 from feti_homog.runtime.progress import Progress
 
@@ -84,7 +84,7 @@ def test_a_rank_without_memory_or_a_checkpoint_of_the_first_mesh_leaves_the_firs
         context = SimpleNamespace(case=own, notes=notes, earlier=earlier, cell=SimpleNamespace(comm=comm))
         if own.cell.refine > case.cell.refine:
             agree(comm, fail)
-            raise CaseError("--resume: of another run")
+            raise CheckpointError("--resume: of another run")
         resumed.append(resumes)
         note_accuracy(context, 5e-3)
         return SimpleNamespace(faults=[], case=own)
@@ -93,6 +93,20 @@ def test_a_rank_without_memory_or_a_checkpoint_of_the_first_mesh_leaves_the_firs
     assert resumed == [resume, resume]  # the checkpoint of a finer mesh that fails is of no use to the first
     last = comm.size - 1
     assert ("of another run" if resume else f"rank {last} of {last + 1} has no memory left") in notes[0]
+
+
+@pytest.mark.parametrize("resume", [False, True])
+def test_a_case_that_the_finer_mesh_refuses_is_no_earlier_run(comm, resume):
+    case = Case.parse(ASKED | {"cell": ASKED["cell"] | {"accuracy_check": "repeat"}})
+
+    def solved(own, earlier, resumes):
+        if own.cell.refine > case.cell.refine:
+            raise CaseError("no node lies on the arc")
+        context = SimpleNamespace(case=own, notes=[], earlier=earlier, cell=SimpleNamespace(comm=comm))
+        note_accuracy(context, 5e-3)
+
+    with pytest.raises(CaseError, match=r"^no node lies on the arc$"):
+        runner._accurate(case, solved, Progress(comm, quiet=True), resume)
 
 
 @pytest.mark.parametrize("kind", ["stiffness", "load", "angle", "path"])

@@ -48,6 +48,21 @@ def test_the_solver_is_the_one_that_is_reported(comm, name):
     cell.destroy()
 
 
+def test_increments_are_what_a_checkpoint_holds(comm):
+    few, many = (
+        changed(*PATH, end=STRENGTH.replace("[int", f'method = "increments"\nincrements = {n}\n[int'))
+        for n in (3, 3000)
+    )
+    sizes = []
+    for text in (few, many):
+        case = Case.parse(tomllib.loads(text))
+        lines = comm.bcast(describe(case, comm)).splitlines()
+        (line,) = [line for line in lines if line.startswith("checkpoint")]
+        number, unit = line.split()[3:5]
+        sizes.append(float(number) * {"KiB": 1, "MiB": 1024}[unit])
+    assert sizes[1] > 100 * sizes[0]
+
+
 @pytest.mark.parametrize("option", ['feti_pc_type = "lumped"', 'feti_dual_operator = "implicit"'])
 def test_friction_without_influence_columns_is_refused_by_both(comm, option):
     case = Case.parse(tomllib.loads(changed(*PATH, end=f"{STRENGTH}friction = 0.3\n[petsc]\n{option}\n")))
