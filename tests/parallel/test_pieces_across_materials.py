@@ -140,3 +140,37 @@ def test_fields_and_derivatives_are_those_by_bodies(comm, plane):
         assert len(ours[0]) == across.solver.interface_nodes and off.max() < 1e-12
         for own, their in zip(ours[1:], theirs[1:], strict=True):
             np.testing.assert_allclose(own, their[place], atol=1e-7 * np.abs(their).max() + 1e-9)
+
+
+STRIPS = {
+    "coated": {
+        "geometry": "random", "fibres": 3, "fibre_fraction": 0.3, "mesh_size": 0.04, "refine": 2, "coating": 0.2,
+    },
+    "hollow": {
+        "geometry": "table", "width": 1.0, "height": 1.0, "mesh_size": 0.07, "refine": 3,
+        "fibre_list": [
+            {"x": 0.3, "y": 0.3, "radius": 0.2, "inner_radius": 0.1}, {"x": 0.75, "y": 0.8, "radius": 0.15},
+        ],
+    },
+}  # fmt: skip
+
+
+@pytest.mark.few_ranks
+@pytest.mark.parametrize(("kind", "plane"), [("coated", "generalized"), ("hollow", "strain")])
+def test_strips_of_two_ranks_give_what_bodies_of_one_give(comm, kind, plane):
+    """Each rank condenses half of a larger cell to its boundary by CHOLMOD."""
+    if comm.size != 2:
+        pytest.skip("on two ranks")
+    case = document("auto") | {"cell": STRIPS[kind], "analysis": {"type": "stiffness", "plane": plane}}
+    case["output"] = {"fields": False, "sensitivities": True}
+    if kind != "coated":
+        del case["material"]["coating"]
+    across = run(Case.parse(case), comm)
+    bodies = run(Case.parse(case | {"decomposition": {"cut": "bodies"}}), MPI.COMM_SELF)
+    assert across.solver.subdomains == 2 < bodies.solver.subdomains
+    assert across.solver.dofs > PartitionPolicy().strip_dofs
+    for name in ("effective_stiffness", "thermal_expansion"):
+        if (expected := getattr(bodies, name)) is not None:
+            np.testing.assert_allclose(getattr(across, name), expected, atol=1e-9 * np.abs(expected).max())
+    values = across.sensitivities.derivatives, bodies.sensitivities.derivatives
+    np.testing.assert_allclose(*values, rtol=1e-7, atol=1e-9 * np.abs(values[1]).max())
