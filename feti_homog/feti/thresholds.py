@@ -167,8 +167,9 @@ LATEST_RENEWAL = 4
 # Parts of its assembly, and changes of the bonds from one part to the next: an event has one to three.
 ASSEMBLED_PARTS, RENEWAL_PAUSE = 2, 3
 # Influence columns that each rank finds together at least, with those of bonds near the one that breaks: fewer and
-# larger batches, but columns that may not be needed (`scripts/benchmark_path --to-the-end`).
-INFLUENCE_BATCH = 64
+# larger batches, but columns that may not be needed (`scripts/benchmark_path --to-the-end`).  Share of them to which
+# batches shrink where most columns go unused, for many cracks grow a little each.
+INFLUENCE_BATCH, LEAST_BATCH_SHARE = 64, 0.125
 # Rows that change at once up to which their columns are followed; columns that are followed at most, 8 bytes an owned
 # row each; changes that wait before all of these follow (`scripts/benchmark_path --to-the-end`).
 MOST_FOLLOWED, FOLLOWED_COLUMNS, WAITING_COLUMNS = 16, 1200, 32

@@ -120,7 +120,7 @@ class ExactInverse(RenewedReference, Preconditioner):
             return False  # other bodies are free than those with pins, or there is no room
         near = self._with_near(lacking, followed.lacking)
         rows = near if len(np.union1d(wanted, near)) <= followed.most else lacking
-        followed.make_room(len(rows), wanted, self._is_active())
+        self._adapt_batch(followed.make_room(len(rows), wanted, self._is_active()))
         self._changes.columns.add(rows)
         followed.add(rows, self._changes.present(rows, self._held))
         return True

@@ -64,8 +64,9 @@ class FollowedResponse:
         self.answer, self.pins, self.most = answer, pins, most
         self._slot = np.full(len(stiffness), -1)
         self._rows: Int = np.zeros(0, np.int64)
-        # When each column was last used, counted in changes.
+        # When each column was last used, and when it came, counted in changes.
         self._used, self._now = np.zeros(most, np.int64), 0
+        self._came = np.zeros(most, np.int64)
         # Memory is taken when columns come.
         self._buffer = np.zeros((len(answer), most), order="F")
         # What is taken off at changes that wait, and its factors in the columns of the rows K that are kept.
@@ -81,27 +82,33 @@ class FollowedResponse:
         """(k,) which of the global rows have columns."""
         return np.asarray(self._slot[rows] >= 0)
 
-    def make_room(self, more: int, wanted: Int, useful: Bool) -> None:
+    def make_room(self, more: int, wanted: Int, useful: Bool) -> Bool:
         """Let columns go where there is no room for so many more: those longest unused.
 
         Those of rows that are `useful` (all rows,) go last, those of `wanted` stay.
+
+        Returns:
+            Which of those that went were ever used.
         """
         if len(self._rows) + more <= self.most:
-            return
+            return np.zeros(0, bool)
         # Some more at once, for the others move.
         count = min(int(FOLLOWED_SHARE * self.most), self.most - more)
         spared, is_useful = np.isin(self._rows, wanted), useful[self._rows]
         order = np.lexsort([-self._used[: len(self._rows)], ~is_useful, ~spared])
-        stay = np.sort(order[: max(count, int(spared.sum()))])
+        stay, go = np.split(order, [max(count, int(spared.sum()))])
+        was_used = np.asarray(self._used[go] > self._came[go])
+        stay = np.sort(stay)
         kept, n = self._rows[stay], len(stay)
         self._slot[self._rows] = -1
         self._slot[kept] = np.arange(n)
-        self._rows, self._used[:n] = kept, self._used[stay]
+        self._rows, self._used[:n], self._came[:n] = kept, self._used[stay], self._came[stay]
         for begin in range(0, n, WAITING_COLUMNS):
             # Columns move to the left, so that none is lost.
             part = slice(begin, min(begin + WAITING_COLUMNS, n))
             self._buffer[:, part] = self._buffer[:, stay[part]]
         self._factors[:n] = self._factors[stay]
+        return was_used
 
     def columns(self, rows: Int) -> Float:
         """(owned rows, k) columns of the global rows (k,), which have them."""
@@ -130,7 +137,7 @@ class FollowedResponse:
         old, new = len(self._rows), len(self._rows) + len(rows)
         self._slot[rows] = np.arange(old, new)
         self._rows = np.concatenate([self._rows, rows])
-        self._buffer[:, old:new], self._used[old:new] = columns, self._now
+        self._buffer[:, old:new], self._used[old:new], self._came[old:new] = columns, self._now, self._now
 
     def follow(self, rows: Int, turned: Float, gained: Float) -> bool:
         """Let the global rows (k,) leave (`turned` is 1), come (-1) or soften (0), their springs gain compliance (k,).

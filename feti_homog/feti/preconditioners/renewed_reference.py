@@ -22,7 +22,7 @@ from feti_homog.feti.preconditioners.reference_cell import (
     one_sided_jumps,
     stiffness_of_rows,
 )
-from feti_homog.feti.thresholds import INFLUENCE_BATCH, LATEST_RENEWAL, RENEWAL_PAUSE, SPARE_BYTES
+from feti_homog.feti.thresholds import INFLUENCE_BATCH, LATEST_RENEWAL, LEAST_BATCH_SHARE, RENEWAL_PAUSE, SPARE_BYTES
 from feti_homog.runtime import process_memory
 from feti_homog.typing import Bool, Float, Int
 
@@ -35,7 +35,7 @@ class RenewedReference:
         stiffness: (all rows,) the most that each diagonal entry of H can be: that of a node of either side and of the
             spring between them, in a row, while all others are held.
         factorizations: reference cells so far.
-        batch: columns found at once at least.
+        batch: columns found at once at least, as long as most of them are used.
         pause: changes of the bonds from one part of the next reference cell to the next.
         slack: changed rows above `most` with which it is made at once.
     """
@@ -54,6 +54,7 @@ class RenewedReference:
         self._ties = BodyTies(comm, jump_operator)
         self.neighbours = InterfaceNeighbours(comm, jump_operator, operators.subdomains)
         self.batch, self.pause, self.slack = INFLUENCE_BATCH * comm.size, RENEWAL_PAUSE, most // LATEST_RENEWAL
+        self._share = 1.0
         # Columns without which the reference cell is not the one at hand.
         self.factorizations = self._tied = 0
         # The present state; `_held` has the pins of free bodies, too.
@@ -163,9 +164,18 @@ class RenewedReference:
             found.add(self._with_near(lacking, lambda near: near[found.positions(near) < 0]))
 
     def _with_near(self, rows: Int, lacking: Callable[[Int], Int]) -> Int:
-        """Return rows and active ones near them, which break next: columns are cheaper together.  Collective."""
+        """Return rows and active ones near them, which break next: columns are cheaper together.  Collective.
+
+        Where only rows lack that have left, none: faces touch here and there.
+        """
         is_active = self._is_active()
-        return self.neighbours.rows_near(rows, lambda near: lacking(near[is_active[near]]), self.batch)
+        most = int(self._share * self.batch) if is_active[rows].any() else 0
+        return self.neighbours.rows_near(rows, lambda near: lacking(near[is_active[near]]), most)
+
+    def _adapt_batch(self, was_used: Bool) -> None:
+        """Find fewer columns at once where most of those that made room were never used, more where most were."""
+        if len(was_used):
+            self._share = float(np.clip(self._share * (2.0 if was_used.mean() > 0.5 else 0.5), LEAST_BATCH_SHARE, 1.0))
 
     def _is_active(self) -> Bool:
         """(all rows,) which are active.  Collective."""
