@@ -125,3 +125,20 @@ def test_answers_follow_bodies_that_come_free_and_are_caught(scale=1e-3):
         free.append(4 - np.linalg.matrix_rank(G[active > 0.0]))
         assert len(followed.pins) == free[-1]
     assert len(set(free)) > 3 and (np.diff(free) < 0).sum() > 3
+
+
+def test_columns_that_make_room_are_those_unused_longest():
+    _, F, d = cell(5)
+    U, Gamma = response(F, d, np.ones(N), np.zeros(N))
+    followed = FollowedResponse(MPI.COMM_SELF, 0, 1.0 / F.diagonal(), U, NO_PINS, most=8)
+    followed.add(np.arange(8), Gamma[:, :8])
+    assert len(followed.make_room(0, NO_PINS, np.ones(N, bool))) == 0
+    for row in (0, 3, 5):
+        followed.soften(np.array([row]), np.array([0.1]))
+    useful = np.arange(N) != 5
+    # Six stay: the wanted one, and useful ones before others. Row 5 was used, 7 and the rest never.
+    was_used = followed.make_room(2, np.array([1]), useful)
+    assert was_used.tolist() == [False, True] and followed.lacking(np.arange(8)).tolist() == [5, 7]
+    followed.add(np.array([8, 9]), Gamma[:, 8:10])
+    assert followed.make_room(4, np.array([1, 8, 9]), np.ones(N, bool)).tolist() == [True, False, False, False]
+    assert np.isin([1, 3, 8, 9], followed.lacking(np.arange(N)), invert=True).all()
