@@ -157,8 +157,9 @@ LEAST_UNCONFIRMED_JUMP = 1e-6
 INFLUENCE_CHUNK, CHUNK_RANKS = 64, 4
 # Freed bytes that stay after a reference cell is factored, for what comes.
 SPARE_BYTES = 64 << 20
-# Columns of a reference cell that have room at first; more are copied, at the worst of times.
-BUFFERED_COLUMNS = 4096
+# Columns of a reference cell that have room at first, which takes no memory until they come; for more all are copied,
+# at the worst of times.
+BUFFERED_COLUMNS = 8192
 # Changed rows after which the cell as it stands is factored in place of them: the default of `-feti_influence_columns`;
 # and rows of cells in which that never pays (`scripts/benchmark_path --to-the-end`).
 INFLUENCE_COLUMNS, NEVER_REFACTORED_ROWS = 1000, 2500
