@@ -15,8 +15,8 @@ from feti_homog.feti.thresholds import KEPT_AT_ONCE, KEPT_ERROR
 from feti_homog.parallel.distributed_arrays import gather_rows, scale_rows
 from feti_homog.typing import Float, Int
 
-# Columns of a product that pay a copy of the matrix.
-FEW_COLUMNS = 32
+# A copy of a matrix takes as long as its product with so many columns.
+COPIED_COLUMNS = 20
 
 
 class ChangedReference:
@@ -74,7 +74,8 @@ class ChangedReference:
     def _take_off(self, z: Float, members: Int, c: Float) -> None:
         """Take Gamma[:, C] c off z (owned rows,[ k]) in place."""
         columns, known = self.columns.owned, len(self.columns.rows)
-        if z.size < FEW_COLUMNS * len(z) or 2 * len(members) > known:
+        k = 1 if z.ndim == 1 else z.shape[1]
+        if len(members) * (k + COPIED_COLUMNS) > known * k:
             # A product with all columns is cheaper than a copy of some.
             whole = np.zeros((known, *z.shape[1:]))
             whole[members] = c
