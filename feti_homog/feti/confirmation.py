@@ -14,6 +14,7 @@ from feti_homog.feti.operators.interface_operators import DualOperator
 from feti_homog.feti.preconditioners.exact_inverse import ExactInverse
 from feti_homog.feti.thresholds import (
     LEAST_UNCONFIRMED_JUMP,
+    MOST_CONFIRMED_ROUNDING,
     MOST_FOLLOWED_ERROR,
     MOST_UNCONFIRMED,
     MOST_UNCONFIRMED_ERROR,
@@ -41,7 +42,7 @@ class InfluenceSolutions:
         # Multipliers and jumps on inactive rows, (owned rows, k) each, that F lambda comes to confirm, and how large
         # the multipliers of single strains are that make them up.
         self._expected: tuple[Float, Float, Float] | None = None
-        self._residual, self._squares = 0.0, np.zeros((2, 0, 0))
+        self._residual, self._rounding, self._squares = 0.0, 0.0, np.zeros((2, 0, 0))
 
     def solutions(self, strains: Float, d: Float) -> list[DualSolution] | None:
         """Return those of the loads (k, v), with jumps d (owned rows, v) of the torn cell; None if F lambda is due.
@@ -87,13 +88,16 @@ class InfluenceSolutions:
                 pass.
         """
         if solutions and self._expected is not None:
-            off, drift = self._errors(*self._expected, solutions)
+            lam, opening = (np.stack(x, axis=1) for x in zip(*((s.lam, s.jump) for s in solutions), strict=True))
+            off, drift = self._errors(lam, opening)
+            # Multipliers that F lambda confirms are off by no less than their residuals.
+            off = float(np.max([off, *(each.residual for each in solutions)]))
             if not off <= MOST_UNCONFIRMED_ERROR:
                 raise ConvergenceError(
                     f"influence columns: multipliers of the last {self._granted} solves: {off:.1e} off"
                 )
-            if not (off <= MOST_FOLLOWED_ERROR and drift <= MOST_FOLLOWED_ERROR):
-                self._inverse.renew_answer(d)
+            if not (error := float(np.max([off, drift]))) <= max(MOST_FOLLOWED_ERROR, 2.0 * self._rounding):
+                self._renew(d, solutions, error)
         confirmed = bool(solutions) and all(each.iterations == 0 and each.reason > 0 for each in solutions)
         self._granted = min(2 * self._granted + 1, MOST_UNCONFIRMED) if confirmed else 0
         self._left, self._residual = self._granted, max((each.residual for each in solutions), default=0.0)
@@ -101,20 +105,26 @@ class InfluenceSolutions:
             seen = self._jumps.projected(d, self._jumps.norms(d))
             self._squares = allreduce_sum(self._comm, np.stack([seen.T @ seen, d.T @ d]))
 
-    def _errors(
-        self, expected: Float, jumps: Float, terms: Float, solutions: list[DualSolution]
-    ) -> tuple[float, float]:
-        """Return how far multipliers and jumps on inactive rows, (owned rows, k) each, are off those found.
+    def _renew(self, d: Float, solutions: list[DualSolution], error: float) -> None:
+        """Make what is followed anew; where that changes nothing, the `error` is rounding of F lambda.  Collective."""
+        self._inverse.renew_answer(d)
+        strains = np.stack([each.strain for each in solutions], axis=1)
+        again = self._inverse.answer(d, strains, self._natural.unconstrained_modes.shape[1])
+        is_same = again is not None and float(np.max(self._errors(*again))) <= MOST_FOLLOWED_ERROR
+        self._rounding = min(error, MOST_CONFIRMED_ROUNDING) if is_same else 0.0
+
+    def _errors(self, lam: Float, opening: Float) -> tuple[float, float]:
+        """Return how far the expected multipliers and jumps on inactive rows are off these, (owned rows, k) each.
 
         They are relative to the largest of each load; jumps count where no body is free, which may be anywhere.
-        Multipliers of a load may cancel, as where bonds come to be pressed: then a share of their `terms` (owned rows,
-        k) is what they are measured by.  Those that F lambda confirms are off by no less than their residuals.
-        Collective.
+        Multipliers of a load may cancel, as where bonds come to be pressed: then a share of those of single strains is
+        what they are measured by.  Collective.
         """
-        lam, opening = (np.stack(x, axis=1) for x in zip(*((s.lam, s.jump) for s in solutions), strict=True))
+        assert self._expected is not None
+        expected, jumps, terms = self._expected
         is_open = (jumps != 0.0) * (self._natural.unconstrained_modes.shape[1] == 0)
         sizes = np.maximum(np.abs(lam), LEAST_UNCONFIRMED_JUMP * terms)
         parts = np.abs([expected - lam, sizes, is_open * (jumps - opening), opening]).max(axis=1, initial=0.0)
         parts = np.max(self._comm.allgather(parts), axis=0)  # keeps NaN, which MPI.MAX may lose
         off, drift = (parts[::2] / np.where(parts[1::2] > 0.0, parts[1::2], 1.0)).max(axis=1)
-        return float(np.max([off, *(each.residual for each in solutions)])), float(drift)
+        return float(off), float(drift)

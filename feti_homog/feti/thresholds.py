@@ -145,8 +145,9 @@ ZERO_JUMP, SMALL_JUMP, ROUNDING_MARGIN = 1e-13, 1e-8, 100.0
 MOST_UNCONFIRMED = 32
 # Error of their multipliers, when F lambda comes to confirm them, above which a run ends: that of its checks.
 MOST_UNCONFIRMED_ERROR = 1e-5
-# Error, as F lambda shows it, of followed multipliers and jumps above which they are made anew.
-MOST_FOLLOWED_ERROR = 1e-11
+# Error, as F lambda shows it, of followed multipliers and jumps above which they are made anew; and the
+# largest of which twice is taken for rounding of F lambda, where that changed nothing.
+MOST_FOLLOWED_ERROR, MOST_CONFIRMED_ROUNDING = 1e-11, 1e-9
 # Jump that active rows see, relative to that of the torn cell, below which F lambda confirms every solve.
 LEAST_UNCONFIRMED_JUMP = 1e-6
 
@@ -173,14 +174,16 @@ ASSEMBLED_PARTS, RENEWAL_PAUSE = 2, 3
 INFLUENCE_BATCH, LEAST_BATCH_SHARE = 64, 0.125
 # Rows that change at once up to which their columns are followed; columns that are followed at most, 8 bytes an owned
 # row each; changes that wait before all of these follow (`scripts/benchmark_path --to-the-end`).
-MOST_FOLLOWED, FOLLOWED_COLUMNS, WAITING_COLUMNS = 16, 1200, 32
-# Share of these columns that stay where there is no room for more.
-FOLLOWED_SHARE = 0.75
-# Error of columns that pass from one reference cell to the next, relative to the largest, above which they are found
-# anew: that of one is about 1e-14.
-KEPT_ERROR = 1e-11
-# Columns of a reference cell that are copied at once, 8 bytes an owned row each.
-KEPT_AT_ONCE = 256
+MOST_FOLLOWED, FOLLOWED_COLUMNS, WAITING_COLUMNS = 16, 2400, 32
+# Share of these columns that stay where there is no room for more, and changes of the bonds for which columns that no
+# longer need to be followed are, lest they come again: faces close.
+FOLLOWED_SHARE, LATE_CHANGES = 0.75, 300
+# Columns of each batch of which the entries are compared with those that are followed, and the error, relative to the
+# largest, above which nothing is followed any more.
+CHECKED_COLUMNS, MOST_ASYMMETRY = 4, 1e-9
+# Columns that are copied at once, 8 bytes an owned row each; and of how many columns a product takes as long as a copy
+# of its matrix.
+COPIED_AT_ONCE, COPIED_COLUMNS = 256, 20
 # Least singular value of the rows that turn, relative to their stiffness, with which columns are followed: they lose as
 # many digits.
 LEAST_FOLLOWED_PIVOT = 1e-6

@@ -189,7 +189,7 @@ class NaturalCoarseSpace:
 
 
 class GramMatrix:
-    """Entries of G^T A G in the pattern of G^T G, for active rows A = diag(a): Q a with a matrix Q that is made once.
+    """Entries of G^T A G in the pattern of G^T G, for active rows A = diag(a): sums of products that are made once.
 
     And which of its diagonal blocks are not coupled with each other.
     """
@@ -206,12 +206,24 @@ class GramMatrix:
         diagonal = np.arange(self._m) * (self._m + 1)
         self._keys = np.unique(np.concatenate([diagonal, *comm.allgather(np.unique(key))]))
         entry = np.searchsorted(self._keys, key)
-        self._Q = csr_matrix((G.data[a] * G.data[b], (entry, row)), shape=(len(self._keys), G.shape[0]))
+        # Of each row its products, and the entries that they are parts of.
+        self._first, self._count = np.cumsum(count**2) - count**2, count**2
+        self._entry, self._product = entry, G.data[a] * G.data[b]
+        self._active, self._own = np.zeros(G.shape[0]), np.zeros(len(self._keys))
         self._rows, self._columns = np.divmod(self._keys, self._m)
 
     def entries(self, active: Float) -> Float:
-        """(entries,) of G^T A G for the owned rows of which `active` is 1, row by row.  Collective."""
-        return allreduce_sum(self._comm, self._Q @ active)
+        """(entries,) of G^T A G for the owned rows of which `active` is 1, row by row.  Collective.
+
+        Those of the call before change by the rows that do.
+        """
+        changed = np.flatnonzero(active != self._active)
+        count = self._count[changed]
+        at = np.arange(count.sum()) + np.repeat(self._first[changed] - np.cumsum(count) + count, count)
+        products = self._product[at] * np.repeat((active - self._active)[changed], count)
+        self._own = self._own + np.bincount(self._entry[at], products, len(self._own))
+        self._active = active
+        return allreduce_sum(self._comm, self._own)
 
     def groups(self, some: Int) -> list[Int]:
         """Return the numbers `some` in groups that G^T G couples: of each size, (groups, size)."""

@@ -1,4 +1,4 @@
-"""A reference cell whose rows have changed: its response by the columns of these, and what the next cell keeps of them.
+"""A reference cell whose rows have changed: its response by the columns of these.
 
 See `exact_inverse` for the equations.
 """
@@ -9,14 +9,10 @@ import numpy as np
 from mpi4py import MPI
 
 from feti_homog.feti.preconditioners.bordered_inverse import BorderedInverse
-from feti_homog.feti.preconditioners.followed_response import FollowedResponse
 from feti_homog.feti.preconditioners.reference_cell import ReferenceCell, ResponseColumns
-from feti_homog.feti.thresholds import KEPT_AT_ONCE, KEPT_ERROR
+from feti_homog.feti.thresholds import COPIED_AT_ONCE, COPIED_COLUMNS
 from feti_homog.parallel.distributed_arrays import gather_rows, scale_rows
 from feti_homog.typing import Float, Int
-
-# A copy of a matrix takes as long as its product with so many columns.
-COPIED_COLUMNS = 20
 
 
 class ChangedReference:
@@ -97,47 +93,7 @@ class ChangedReference:
         columns[rows[mine] - self._first, mine] = turned[mine]
         return self.response(columns)
 
-    def next_columns(self, held: Float, changed: Int, come: Int, followed: FollowedResponse) -> tuple[Int, Float]:
-        """Rows (k,) and columns (owned rows, k) of the cell with the active rows `held` and `come`.
-
-        `held` (owned rows,) are the reference cell's but for the global rows `changed`; these and the rows that `come`
-        have columns.  Rows are those of columns of `followed`, of the cell with the rows `held`, that are active in all
-        three cells: others cost more than they save.  Collective.
-        """
-        known = self.columns.rows
-        both = gather_rows(self._comm, held * self.cell.active, self._first, known) > 0.0
-        rows = known[followed.has_columns(known) & both]
-        # A few at once, for at no other time is so much memory taken.
-        columns = np.empty((self._rows, len(rows)), order="F")
-        for some in _parts(len(rows)):
-            columns[:, some] = followed.columns(rows[some])
-        if len(come):
-            self.update(changed, np.zeros(self._rows))
-            theirs = self.present(come, held)
-            block, across = (gather_rows(self._comm, x, self._first, come) for x in (theirs, columns))
-            x = self._comm.bcast(np.linalg.lstsq(block, across, rcond=None)[0])
-            for some in _parts(len(rows)):
-                columns[:, some] -= theirs @ x[:, some]
-            mine = np.flatnonzero((come >= self._first) & (come < self._first + self._rows))
-            columns[come[mine] - self._first] = -x[mine]
-        return rows, columns
-
-    def take(self, rows: Int, columns: Float) -> None:
-        """Take the columns (owned rows, k) of active rows (k,), unless a sum of them is not the cell's.  Collective.
-
-        Jumps of 1 make forces of up to `stiffness`, so that one wrong column shows beside all others.
-        """
-        own, weights = slice(self._first, self._first + self._rows), np.zeros(len(self._stiffness))
-        # At random, so that errors do not cancel, and none near 0.
-        weights[rows] = np.random.default_rng(len(rows)).uniform(1.0, 2.0, len(rows))
-        sums = np.stack([self.cell.respond(weights[own]), columns @ weights[rows]], axis=1)
-        sums /= np.where(self.cell.active > 0.0, self._stiffness[own], 1.0)[:, None]
-        sizes = np.abs([sums[:, 1], sums[:, 1] - sums[:, 0]]).max(axis=1, initial=0.0)
-        sizes = np.max(self._comm.allgather(sizes), axis=0)  # keeps NaN, which MPI.MAX may lose
-        if sizes[1] <= KEPT_ERROR * sizes[0]:
-            self.columns.append(rows, columns)
-
 
 def _parts(count: int) -> list[slice]:
     """Divide so many columns into slices that are copied at once."""
-    return [slice(start, min(start + KEPT_AT_ONCE, count)) for start in range(0, count, KEPT_AT_ONCE)]
+    return [slice(start, min(start + COPIED_AT_ONCE, count)) for start in range(0, count, COPIED_AT_ONCE)]

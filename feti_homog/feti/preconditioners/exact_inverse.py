@@ -9,9 +9,10 @@ A spring whose compliance grew by dC is one of C, whose jump dC lam is prescribe
 
     N = (Gamma_CC + D)^-1,  lam_C = D c on such rows,  D = dC^-1 there, -dC where bonds came, 0 where they left.
 
-Changes cost their columns of what `followed_response` keeps up.  N follows them, by borders, when new columns want it,
-or where F lambda finds an error.  The reference cell stays, until there are more changes than an option allows: then
-the cell as it stands, but for what softened, takes its place, see `renewed_reference`.
+Changes cost their columns of what `followed_response` keeps up, which gives new ones, too (`followed_changes`).  N
+follows the changes, by borders, where these columns are not at hand.  The reference cell stays, until there are more
+changes than an option allows: then the cell as it stands, but for what softened, takes its place, see
+`renewed_reference`.
 """
 
 from __future__ import annotations
@@ -23,12 +24,14 @@ from petsc4py import PETSc
 from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
+from feti_homog.feti.preconditioners.followed_changes import FollowedChanges
 from feti_homog.feti.preconditioners.followed_response import FollowedResponse
 from feti_homog.feti.preconditioners.renewed_reference import RenewedReference
 from feti_homog.feti.preconditioners.scaled import Preconditioner
 from feti_homog.feti.thresholds import (
     FOLLOWED_COLUMNS,
     INFLUENCE_COLUMNS,
+    MOST_ASYMMETRY,
     MOST_FOLLOWED,
     NEVER_REFACTORED_ROWS,
     NORM_MARGIN,
@@ -61,7 +64,7 @@ class ExactInverse(RenewedReference, Preconditioner):
         if most < 1:
             raise CaseError(f"-feti_influence_columns {most}: expected a whole number above 0")
         super().__init__(comm, jump_operator, operators, most)
-        self.most_followed, self._has_added = FOLLOWED_COLUMNS, False
+        self.most_followed, self._has_added = max(FOLLOWED_COLUMNS, 2 * most), False
         self._next, self._loose = self._more, np.zeros(0, np.int64)
         # Rows that leave make H smaller.
         self.norm = NORM_MARGIN * self.reference.largest_eigenvalue(self._first)
@@ -111,19 +114,35 @@ class ExactInverse(RenewedReference, Preconditioner):
         Collective.
         """
         wanted = np.union1d(wanted, followed.pins) if len(followed.pins) else wanted
-        lacking = followed.lacking(wanted)
-        if not len(lacking):
+        if not len(followed.lacking(wanted)):
             return True
         self._has_added = True
-        self._catch_up()
-        if self._has_others(followed) or len(wanted) > followed.most:
+        changes = self._up_to_date()
+        if (changes is None and self._has_others(followed)) or len(wanted) > followed.most:
             return False  # other bodies are free than those with pins, or there is no room
-        near = self._with_near(lacking, followed.lacking)
+        near = self._with_near(lacking := followed.lacking(wanted), followed.lacking)
         rows = near if len(np.union1d(wanted, near)) <= followed.most else lacking
-        self._adapt_batch(followed.make_room(len(rows), wanted, self._is_active()))
-        self._changes.columns.add(rows)
-        followed.add(rows, self._changes.present(rows, self._held))
+        if changes is None:
+            self._changes.columns.add(rows)
+            columns = self._changes.present(rows, self._held)
+        else:
+            columns = changes.present(self._changes.columns.found(rows))
+            if not changes.error(rows, columns, self.stiffness) <= MOST_ASYMMETRY:
+                self._forget()
+                return False
+        # Without columns of what has changed, N is wanted.
+        spared = np.union1d(wanted, self._changed(self._held))
+        spared = spared if len(np.union1d(spared, rows)) <= followed.most else wanted
+        self._adapt_batch(followed.make_room(len(rows), spared, self._is_active()))
+        followed.add(rows, columns)
         return True
+
+    def _up_to_date(self) -> FollowedChanges | None:
+        """Return the changes of the reference cell if all are followed, else None with N up to date.  Collective."""
+        self._renew_if_due()
+        if (changes := self._followed_changes()) is None:
+            self._catch_up()
+        return changes
 
     def _catch_up(self) -> None:
         """Let the reference cell and N be those of the present state.  Collective."""
@@ -143,9 +162,15 @@ class ExactInverse(RenewedReference, Preconditioner):
 
     def apply(self, r: Float) -> Float:
         """H r for r (owned rows,) or (owned rows, k); 0 on inactive rows.  Collective."""
-        self._catch_up()
-        y = self.reference.respond(scale_rows(self.reference.active, r))
-        return scale_rows(self._active, self._changes.response(y + scale_rows(1.0 - self.reference.active, r)))
+        changes = self._up_to_date()
+        z = self._of_reference(r if r.ndim == 2 else r[:, None])
+        found = self._changes.response(z) if changes is None else changes.refined(z)
+        return scale_rows(self._active, found.reshape(r.shape))
+
+    def _of_reference(self, g: Float) -> Float:
+        """(owned rows, k) Gamma g_A + g_R.  Collective."""
+        at_rest = scale_rows(1.0 - self.reference.active, g)
+        return self.reference.respond(scale_rows(self.reference.active, g)) + at_rest
 
     def multipliers(self, d: Float, E: Float) -> Float:
         """H d E, but for rounding, for d (owned rows, v), the same at every call, and E (v, k).  Collective."""
@@ -176,15 +201,15 @@ class ExactInverse(RenewedReference, Preconditioner):
 
     def _whole_answer(self, d: Float) -> Float:
         """(owned rows, v) U, from which updates go on.  Collective."""
-        self._catch_up()
-        if self._followed is not None and self._has_others(self._followed):
+        changes = self._up_to_date()
+        if changes is None and self._followed is not None and self._has_others(self._followed):
             self._forget()
             self._catch_up()
         if self._answer is None:
-            y = self.reference.respond(scale_rows(self.reference.active, d))
-            self._answer = y + scale_rows(1.0 - self.reference.active, d)
+            self._answer = self._of_reference(d)
+        answer = self._changes.response(self._answer) if changes is None else changes.refined(self._answer)
         # Pins bear nothing, and stay.
-        answer = scale_rows(1.0 - self._held + self._active, self._changes.response(self._answer))
+        answer = scale_rows(1.0 - self._held + self._active, answer)
         if self._followed is None:
             arguments = self.stiffness, answer, self._loose, self.most_followed
             self._followed = FollowedResponse(self.comm, self._first, *arguments)

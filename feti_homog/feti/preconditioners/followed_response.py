@@ -27,8 +27,11 @@ from scipy.linalg.blas import dgemm
 from scipy.linalg.lapack import dpstrf
 
 from feti_homog.feti.thresholds import (
+    COPIED_AT_ONCE,
+    COPIED_COLUMNS,
     FOLLOWED_COLUMNS,
     FOLLOWED_SHARE,
+    LATE_CHANGES,
     LEAST_FOLLOWED_PIVOT,
     RIGID_SHARE,
     SINGULAR_PIVOT,
@@ -78,17 +81,10 @@ class FollowedResponse:
         """Return which of the global rows have no column."""
         return rows[self._slot[rows] < 0]
 
-    def has_columns(self, rows: Int) -> Bool:
-        """(k,) which of the global rows have columns."""
-        return np.asarray(self._slot[rows] >= 0)
-
     def make_room(self, more: int, wanted: Int, useful: Bool) -> Bool:
-        """Let columns go where there is no room for so many more: those longest unused.
+        """Let columns go where there is no room for so many more, and return which of them were ever used.
 
-        Those of rows that are `useful` (all rows,) go last, those of `wanted` stay.
-
-        Returns:
-            Which of those that went were ever used.
+        Those longest unused go first, those of rows that are `useful` (all rows,) last, those of `wanted` stay.
         """
         if len(self._rows) + more <= self.most:
             return np.zeros(0, bool)
@@ -98,22 +94,49 @@ class FollowedResponse:
         order = np.lexsort([-self._used[: len(self._rows)], ~is_useful, ~spared])
         stay, go = np.split(order, [max(count, int(spared.sum()))])
         was_used = np.asarray(self._used[go] > self._came[go])
-        stay = np.sort(stay)
+        self._retain(np.sort(stay))
+        return was_used
+
+    def keep(self, useful: Bool) -> None:
+        """Let columns go but those of rows that are `useful` (all rows,) or were used lately."""
+        self._retain(np.flatnonzero(useful[self._rows] | (self._used[: len(self._rows)] >= self._now - LATE_CHANGES)))
+
+    def _retain(self, stay: Int) -> None:
+        """Let columns go but those at the places `stay` (n,), ascending."""
         kept, n = self._rows[stay], len(stay)
         self._slot[self._rows] = -1
         self._slot[kept] = np.arange(n)
         self._rows, self._used[:n], self._came[:n] = kept, self._used[stay], self._came[stay]
-        for begin in range(0, n, WAITING_COLUMNS):
+        for part in np.array_split(np.arange(n), n // WAITING_COLUMNS + 1):
             # Columns move to the left, so that none is lost.
-            part = slice(begin, min(begin + WAITING_COLUMNS, n))
             self._buffer[:, part] = self._buffer[:, stay[part]]
         self._factors[:n] = self._factors[stay]
-        return was_used
 
     def columns(self, rows: Int) -> Float:
         """(owned rows, k) columns of the global rows (k,), which have them."""
         at, n = self._slot[rows], self._count
         return np.asarray(self._buffer[:, at] - self._waiting[:, :n] @ self._factors[at, :n].T)
+
+    def product(self, rows: Int, x: Float) -> Float:
+        """(owned rows, k) columns of the global rows (c,), which have them, times x (c, k)."""
+        at, n, known = self._slot[rows], self._count, len(self._rows)
+        product: Float = self._waiting[:, :n] @ (self._factors[at, :n].T @ -x)
+        if len(rows) * (x.shape[1] + COPIED_COLUMNS) > known * x.shape[1]:
+            # A product with all columns is cheaper than a copy of some.
+            whole = np.zeros((known, x.shape[1]))
+            whole[at] = x
+            return product + self._buffer[:, :known] @ whole
+        for some in np.array_split(np.arange(len(at)), len(at) // COPIED_AT_ONCE + 1):
+            product += self._buffer[:, at[some]] @ x[some]
+        return product
+
+    def entries(self, rows: Int, of: Int) -> Float:
+        """(k, c) entries at the global rows (k,) of the columns of the global rows `of` (c,).  Collective."""
+        at, n, own = self._slot[of], self._count, rows - self._first
+        mine = np.flatnonzero((own >= 0) & (own < len(self._buffer)))
+        own, found = own[mine], np.zeros((len(rows), len(of)))
+        found[mine] = self._buffer[own[:, None], at] - self._waiting[own, :n] @ self._factors[at, :n].T
+        return allreduce_sum(self._comm, found)
 
     def blocks(self, pairs: Int) -> Float:
         """(m, 2, 2) diagonal blocks of Gamma at the pairs (m, 2) of global rows, which have columns.  Collective.

@@ -208,15 +208,26 @@ class ResponseColumns:
     def add(self, rows: Int) -> None:
         """Find the columns of those rows that have none.  Collective."""
         new = np.unique(rows[self._position[rows] < 0])
+        for some in self._chunks(new):
+            self._append(some, self._of_units(some))
+
+    def found(self, rows: Int) -> Float:
+        """(owned rows, k) columns of global rows (k,), which are not kept.  Collective."""
+        return np.hstack([self._of_units(some) for some in self._chunks(rows)])
+
+    def _chunks(self, rows: Int) -> list[Int]:
+        """Divide rows into those whose columns are found at once."""
         # A few columns too many are cheaper with others than by themselves.
         chunk = INFLUENCE_CHUNK * min(self._comm.size, CHUNK_RANKS)
-        for some in np.array_split(new, max(round(len(new) / chunk), 1)) if len(new) else ():
-            unit = np.zeros((len(self._columns), len(some)))
-            mine = np.flatnonzero((some >= self._first) & (some < self._first + len(unit)))
-            unit[some[mine] - self._first, mine] = 1.0
-            self.append(some, self._cell.respond(unit))
+        return np.array_split(rows, max(round(len(rows) / chunk), 1)) if len(rows) else []
 
-    def append(self, rows: Int, columns: Float) -> None:
+    def _of_units(self, rows: Int) -> Float:
+        unit = np.zeros((len(self._columns), len(rows)))
+        mine = np.flatnonzero((rows >= self._first) & (rows < self._first + len(unit)))
+        unit[rows[mine] - self._first, mine] = 1.0
+        return self._cell.respond(unit)
+
+    def _append(self, rows: Int, columns: Float) -> None:
         """Take the columns (owned rows, k) of rows (k,) that have none.  Collective."""
         old = len(self.rows)
         self._position[rows] = old + np.arange(len(rows))

@@ -15,6 +15,7 @@ from feti_homog.feti.decomposition.neighbours import InterfaceNeighbours
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.assembled_schur import AssembledSchur, assembled_stiffness
 from feti_homog.feti.preconditioners.changed_reference import ChangedReference
+from feti_homog.feti.preconditioners.followed_changes import FollowedChanges
 from feti_homog.feti.preconditioners.followed_response import FollowedResponse
 from feti_homog.feti.preconditioners.reference_cell import (
     BodyTies,
@@ -23,6 +24,7 @@ from feti_homog.feti.preconditioners.reference_cell import (
     stiffness_of_rows,
 )
 from feti_homog.feti.thresholds import INFLUENCE_BATCH, LATEST_RENEWAL, LEAST_BATCH_SHARE, RENEWAL_PAUSE, SPARE_BYTES
+from feti_homog.parallel.distributed_arrays import gather_rows
 from feti_homog.runtime import process_memory
 from feti_homog.typing import Bool, Float, Int
 
@@ -66,7 +68,6 @@ class RenewedReference:
         self._is_behind = False
         self._renewal: Iterator[None] | None = None
         self._left = 0
-        self._kept: tuple[Int, Float] | None = None
         self._rebase()
 
     @property
@@ -80,6 +81,17 @@ class RenewedReference:
         Collective."""
         own = self._first + np.flatnonzero((held != self.reference.active) | (self._softened > 0.0))
         return np.concatenate(self.comm.allgather(own))
+
+    def _followed_changes(self) -> FollowedChanges | None:
+        """Return the rows that have changed, if all of them have followed columns.  Collective."""
+        if self._followed is None:
+            return None
+        rows = self._changed(self._held)
+        if len(self._followed.lacking(rows)):
+            return None
+        kinds = np.stack([self.reference.active - self._held, self._more * self._active], axis=1)
+        kinds = gather_rows(self.comm, kinds, self._first, rows)
+        return FollowedChanges(self.comm, self._first, self.reference, self._followed, rows, kinds)
 
     @property
     def _softened(self) -> Float:
@@ -106,17 +118,13 @@ class RenewedReference:
 
     def _rebase(self) -> None:
         """Take the present cell, and what it takes to hold its bodies, for the reference at once.  Collective."""
-        self._renewal, self._kept = None, None
+        self._renewal = None
         for _ in self._renewed():
             pass
 
     def _renewed(self) -> Iterator[None]:
         """Make the next reference cell in parts, between which the cell may change: no event pays all.  Collective."""
-        held, kept = self._held, None
-        tied = self._ties.tied(held)
-        if self.factorizations:
-            kept = self._kept_columns(tied)
-            yield
+        tied = self._ties.tied(held := self._held)
         parts = yield from assembled_stiffness(self.comm, self._jump_operator, self._operators, tied)
         yield
         if self.factorizations:
@@ -127,38 +135,17 @@ class RenewedReference:
         cell = ReferenceCell(self.comm, self._jump_operator, self._operators, self._BD, tied, assembled)
         self.factorizations += 1
         self._changes = ChangedReference(self.comm, cell, self._jump_operator.owned, self.stiffness)
-        self._answer, self._kept, self._is_behind, kept = None, kept, True, None
+        self._answer, self._is_behind = None, True
         self._tied = len(self._changed(held))
-        self._rounding = cell.force_of_rigid_motions(self.stiffness[self._first :][: self._rows])
         yield
-        self._take_kept()
-
-    def _take_kept(self) -> None:
-        """Take the columns that pass from one reference cell to the next, if they wait.  Collective."""
-        if self._kept is not None:
-            self._changes.take(*self._kept)
-            self._kept = None
-
-    def _kept_columns(self, tied: Float) -> tuple[Int, Float] | None:
-        """Rows and columns of the cell with the active rows `tied`, as `ChangedReference.next_columns`.  Collective.
-
-        None where springs have softened, nothing is followed, or many rows have changed at once.
-        """
-        if self._followed is None:
-            return None
-        soft = bool((self._more * self._active).any())
-        changed, own = self._changed(self._held), self._first + np.flatnonzero(tied > self._held)
-        come = np.concatenate(self.comm.allgather(own))
-        concerned = np.union1d(changed, come)
-        lacking = int((self._changes.columns.positions(concerned) < 0).sum())
-        if self.comm.allreduce(soft, MPI.LOR) or lacking > self.batch:
-            return None
-        self._find(concerned)
-        return self._changes.next_columns(self._held, changed, come, self._followed)
+        self._rounding = cell.force_of_rigid_motions(self.stiffness[self._first :][: self._rows])
+        if self._followed is not None:
+            useful = np.concatenate(self.comm.allgather(self._held)) > 0.0
+            useful[self._changed(self._held)] = True
+            self._followed.keep(useful)
 
     def _find(self, rows: Int) -> None:
         """Find the columns of the reference cell that these rows lack, and some near them.  Collective."""
-        self._take_kept()
         found = self._changes.columns
         if len(lacking := rows[found.positions(rows) < 0]):
             found.add(self._with_near(lacking, lambda near: near[found.positions(near) < 0]))

@@ -1,11 +1,14 @@
-"""The answer and the columns that follow softening, breaking and closing bonds, against a dense cell."""
+"""The answer and columns that follow softening, breaking and closing bonds, and others by them, in dense cells."""
 
 from __future__ import annotations
+
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
+from feti_homog.feti.preconditioners.followed_changes import FollowedChanges
 from feti_homog.feti.preconditioners.followed_response import FollowedResponse
 
 N, NO_PINS = 12, np.zeros(0, np.int64)
@@ -142,3 +145,51 @@ def test_columns_that_make_room_are_those_unused_longest():
     followed.add(np.array([8, 9]), Gamma[:, 8:10])
     assert followed.make_room(4, np.array([1, 8, 9]), np.ones(N, bool)).tolist() == [True, False, False, False]
     assert np.isin([1, 3, 8, 9], followed.lacking(np.arange(N)), invert=True).all()
+
+
+def of_reference(seed, scale, off=0.0):
+    """Change a cell three times since its reference; followed columns are `off` by a share.
+
+    Return the changes, active rows among the others, U and Gamma of the reference and of the cell, and active rows.
+    """
+    rng, F, d = cell(seed, scale)
+    before, more = np.ones(N), np.zeros(N)
+    before[[2, 5]] = 0.0
+    U_before, Gamma_before = response(F, d, before, more)
+    active = before
+    for _ in range(3):
+        active, more = changed(rng, active, more, scale)
+    U, Gamma = response(F, d, active, more)
+    reference = SimpleNamespace(active=before, respond=lambda x: Gamma_before @ x)
+    kinds = np.stack([before - active, more * active], axis=1)
+    rows = np.flatnonzero(kinds.any(axis=1))
+    followed = FollowedResponse(MPI.COMM_SELF, 0, 1.0 / F.diagonal(), U, NO_PINS)
+    followed.add(rows[::-1], (Gamma * (1.0 + off * rng.uniform(-1.0, 1.0, Gamma.shape)))[:, rows[::-1]])
+    changes = FollowedChanges(MPI.COMM_SELF, 0, reference, followed, rows, kinds[rows])
+    assert set(kinds[:, 0]) == {-1.0, 0.0, 1.0} and (kinds[kinds[:, 0] == 0.0, 1] > 0.0).any()
+    assert (kinds[kinds[:, 0] < 0.0, 1] > 0.0).any() and len(rows) < N
+    return changes, np.setdiff1d(np.flatnonzero(active), rows), (U_before, U), (Gamma_before, Gamma), active
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-10])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_columns_and_answers_are_those_of_the_changed_cell(seed, scale):
+    changes, others, (U_before, U), (Gamma_before, Gamma), active = of_reference(seed, scale)
+    # Multipliers and jumps by their own units.
+    unit = np.where(active > 0.0, scale, 1.0)[:, None]
+    found, expected = changes.present(Gamma_before[:, others]), Gamma[:, others]
+    np.testing.assert_allclose(unit * found, unit * expected, atol=1e-11 * np.abs(unit * expected).max())
+    for answer in (changes.present(U_before), changes.refined(U_before)):
+        np.testing.assert_allclose(unit * answer, unit * U, atol=1e-11 * np.abs(unit * U).max())
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_refinement_and_the_check_see_what_is_wrong_in_followed_columns(seed):
+    changes, others, (U_before, U), (Gamma_before, Gamma), _ = of_reference(seed, 1.0, off=1e-7)
+    size = np.abs(U).max()
+    rough, refined = changes.present(U_before), changes.refined(U_before)
+    assert 1e-9 * size < np.abs(rough - U).max() and np.abs(refined - U).max() < 1e-11 * size
+    columns, stiffness = changes.present(Gamma_before[:, others]), np.ones(N)
+    assert 1e-9 < changes.error(others, columns, stiffness) < 1e-5
+    right, *_ = of_reference(seed, 1.0)
+    assert right.error(others, Gamma[:, others], stiffness) < 1e-12
