@@ -114,6 +114,14 @@ def test_an_unloaded_cell_keeps_slips_and_resumes_between_changes(comm, shared_p
     parallel_assert(comm, certificate is None or certificate.holds, certificate and certificate.text)
 
 
+@pytest.mark.parametrize(("friction", "under_pressure"), [({}, 1), ({"friction": 0.3}, 0)], ids=["smooth", "friction"])
+def test_a_fibre_that_nothing_touches_moves_freely_and_one_under_pressure_turns(comm, friction, under_pressure):
+    case = {"cell": {"mesh_size": 0.3}, "phases": EPOXY_GLASS, "plane": "strain", "interface": WHOLE | friction}
+    waypoints = [{"E11": sign * 0.01, "E22": sign * 0.01} for sign in (1, -1)]
+    points = solved(comm, **case, path={"waypoints": waypoints}).path
+    assert [p.free_motions for p in points if is_end(p, 2)] == [3, under_pressure]
+
+
 def numbers_at_ends(points, legs):
     return np.array([[*p.stress, p.friction_heat] for p in points if is_end(p, legs)])
 

@@ -14,6 +14,7 @@ import numpy as np
 from mpi4py import MPI
 from scipy.linalg import block_diag
 
+from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.interface.contact.contact_certificate import coulomb_errors
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, Equilibrium, Status
@@ -214,8 +215,17 @@ class SlidingCell:
             certificate = problem.interface.certificate(bonds, solution)
             states.append(Equilibrium(own, bonds, solution, 0, 1, 0, certificate))
         plane, *axial = states
+        plane = replace(plane, free_motions=self._free_motions(bonds, plane.solution))
         excess = {"kkt_friction": self._excess(bonds, states, x)}
         return replace(plane, certificate=plane.certificate | excess, axial=next(iter(axial), None))
+
+    def _free_motions(self, bonds: BondState, solution: DualSolution) -> int:
+        """Count rigid motions that neither a bond nor a compressed face resists, nor its friction.  Collective."""
+        row, is_closed = self.interface.nodes.row, bonds.status == CLOSED
+        is_pressed = is_closed & (solution.lam[row] < -self.interface.scales.force_noise(solution))
+        active = self.interface.active(np.where(is_closed & ~is_pressed, OPEN, bonds.status).astype(np.int8))
+        active[row[is_pressed & (self.friction > 0.0)] + 1] = 1.0
+        return int(self.solver.natural.free_motions(active).shape[1])
 
     def _excess(self, bonds: BondState, states: Sequence[Equilibrium], x: Float) -> float:
         """Return the largest of `coulomb_errors` of scaled x, relative to the largest traction.  Collective."""
