@@ -114,5 +114,6 @@ def test_a_case_that_is_solved_once_more_is_collected_with_its_finer_mesh(comm, 
     once_more = next(remark for remark in apart["remarks"] if "solved once more" in remark)
     first, finer = map(int, re.findall(r"refine = (\d)", once_more))
     assert apart["cell"]["refine"] == finer > first and apart["case"]["cell"]["accuracy"] == 2e-3
+    assert table.outputs["refine"].tolist() == [alike["cell"]["refine"], finer]
     elements, ratio = table.outputs["elements"], 4 ** (finer - alike["cell"]["refine"])
     assert elements[1] == ratio * elements[0] > elements[0]

@@ -59,7 +59,7 @@ def _cell(cell: Mapping[str, Any]) -> dict[str, float]:
         found |= {f"fraction_{phase}": share for phase, share in fractions.items()}
     if cell.get("porosity"):
         found["porosity"] = cell["porosity"]
-    return found | ({"match_distance": cell["match_distance"]} if "match_distance" in cell else {})
+    return found | {name: cell[name] for name in ("refine", "match_distance") if name in cell}
 
 
 def _entries(stiffness: Any, numbers: Sequence[int], suffix: str = "") -> dict[str, float]:
