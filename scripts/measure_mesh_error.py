@@ -4,12 +4,14 @@
     .venv/bin/python scripts/measure_mesh_error.py --factors [--only WORDS] [--refine N]
 
 For each cell, each order of elements and each of three refinements the least and the largest ratio over the entries of
-the stiffness that are above 1e-3 of its largest; then over all cells how many lie between 0.5 and 2.  Exact values are
-spectral (tests/reference/references.py) or of quadratic elements refined twice more.
+the stiffness that are above 1e-3 of its largest and whose estimate is above the error of the exact value; then over
+all cells how many lie between 0.5 and 2.  Exact values are spectral (tests/reference/references.py) or of quadratic
+elements refined twice more.
 
 `--factors` prints what `NESTED`, `LOCKED` and `SAMPLED` of feti_homog/homogenization/mesh_error.py hold: errors of
 elements and of arcs by the mesh itself over those by the mesh refined less, of the diagonal, cells cut by bodies and
-across materials.
+across materials; with quadratic elements in phases that lock also true errors, less those of arcs, over those of
+elements.
 """
 
 from __future__ import annotations
@@ -43,7 +45,11 @@ PAPER = {"matrix": {"young": 88.0, "poisson": 0.299}, "fibre": {"young": 200.0, 
 GLASS = {"matrix": {"young": 3.45, "poisson": 0.35}, "fibre": {"young": 73.0, "poisson": 0.22}}
 BORON = {"matrix": {"young": 68.3, "poisson": 0.3}, "fibre": {"young": 379.3, "poisson": 0.1}}
 INCOMPRESSIBLE = {0.35: (3.304196, 1.312082, 0.671171), 0.49: (29.16768, 26.55517, 0.624632)}
-Known = tuple[str, dict[str, Any], Float | None]
+INCOMPRESSIBLE_ERROR = 5e-6
+PARTS = "elements", "arcs", "true"
+LOCKS_ABOVE = 0.4  # Poisson's ratio
+# Name, case, stiffness if it is known, and its absolute error.
+Known = tuple[str, dict[str, Any], Float | None, float]
 
 
 def lattice(geometry: str, fraction: float = 0.4, **more: Any) -> dict[str, Any]:
@@ -81,22 +87,26 @@ def spectral() -> list[Known]:
     """Cells whose stiffness is known."""
     found: list[Known] = []
     for (cell, plane), known in BONDED.items():
-        found.append((f"bonded {cell} {plane}", case(lattice(cell), plane=plane), orthotropic(*known.value)))
+        found.append(
+            (f"bonded {cell} {plane}", case(lattice(cell), plane=plane), orthotropic(*known.value), known.error)
+        )
     for cell, known in VOID.items():
-        found.append((f"debonded {cell}", case(lattice(cell), interface=arc(360.0)), orthotropic(*known.value)))
+        debonded = case(lattice(cell), interface=arc(360.0))
+        found.append((f"debonded {cell}", debonded, orthotropic(*known.value), known.error))
     for (cell, normal, tangential), known in ELASTIC.items():
         document = case(lattice(cell), interface=springs(normal, tangential))
-        found.append((f"springs {cell} {normal} {tangential}", document, orthotropic(*known.value)))
-    C11, C22, C12, C33 = ARC_OF_120_DEGREES_FINE.value[:4]
-    found.append(("arc of 120 degrees", case(lattice("square"), interface=arc(120.0)), orthotropic(C11, C12, C33, C22)))
+        found.append((f"springs {cell} {normal} {tangential}", document, orthotropic(*known.value), known.error))
+    (C11, C22, C12, C33), error = ARC_OF_120_DEGREES_FINE.value[:4], ARC_OF_120_DEGREES_FINE.error
+    with_arc = case(lattice("square"), interface=arc(120.0))
+    found.append(("arc of 120 degrees", with_arc, orthotropic(C11, C12, C33, C22), error))
     for poisson, values in INCOMPRESSIBLE.items():
         phases = {"matrix": {"young": 1.0, "poisson": poisson}, "fibre": {"young": 1000.0, "poisson": 0.3}}
-        found.append((f"nu = {poisson}", case(lattice("square"), phases), orthotropic(*values)))
+        found.append((f"nu = {poisson}", case(lattice("square"), phases), orthotropic(*values), INCOMPRESSIBLE_ERROR))
     phases = {name: {"young": young, "poisson": 0.25} for name, young in (("matrix", 2.5), ("fibre", 25.0))}
     for (cell, fraction), known in AXIAL_SHEAR.items():
         axial = np.diag([0, 0, 0, known.value[1], known.value[1], 0])
         document = case(lattice(cell, fraction), phases, plane="generalized")
-        found.append((f"axial shear {cell} {fraction}", document, axial))
+        found.append((f"axial shear {cell} {fraction}", document, axial, known.error))
     return found
 
 
@@ -131,7 +141,7 @@ def twins() -> list[Known]:
         "locking square 0.4999": case(lattice("square", 0.3), locking(0.4999, 100)),
         "locking random 0.4999": case(lattice("random", 0.5, **cell), locking(0.4999, 10)),
     }
-    return [(name, document, None) for name, document in cases.items()]
+    return [(name, document, None, 0.0) for name, document in cases.items()]
 
 
 def solved(document: dict[str, Any], **mesh: Any) -> tuple[Float, Float]:
@@ -141,13 +151,15 @@ def solved(document: dict[str, Any], **mesh: Any) -> tuple[Float, Float]:
     return result.effective_stiffness, result.mesh_error.effective_stiffness
 
 
-def ratios(document: dict[str, Any], exact: Float, order: int, size: float, arguments: argparse.Namespace) -> Float:
-    """Ratios of true errors to their estimates, of the entries that matter."""
+def ratios(
+    document: dict[str, Any], exact: Float, error: float, order: int, size: float, arguments: argparse.Namespace
+) -> Float:
+    """Ratios of true errors to their estimates, of the entries that matter and whose estimate is above `error`."""
     mesh = {"mesh_size": size * 2**arguments.refine, "order": order}
     found, estimate = solved(document, **mesh, refine=arguments.refine)
     if arguments.nested:
         estimate = np.abs(solved(document, **mesh, refine=arguments.refine - 1)[0] - found) / (4**order - 1)
-    matters = np.abs(exact) > 1e-3 * np.abs(exact).max()
+    matters = (np.abs(exact) > 1e-3 * np.abs(exact).max()) & (estimate > error)
     return np.asarray(np.abs(found - exact)[matters] / estimate[matters])
 
 
@@ -156,21 +168,29 @@ def orders(document: dict[str, Any]) -> list[int]:
     return [order for order in SIZES if order == 2 or document["material"]["matrix"]["poisson"] <= 0.49]
 
 
-def both_errors(case: Case) -> Iterator[tuple[str, Float]]:
-    """Yield, of each problem of a case, what the factors are of and (2, k) errors over those of the coarser mesh."""
+def both_errors(case: Case, exact: Float | None = None) -> Iterator[tuple[str, Float]]:
+    """Yield, of each problem of a case, what the factors are of and (2, k) errors over those of the coarser mesh.
+
+    (3, k) with an exact stiffness in the plane: of elements, of arcs, and true errors less those of arcs over those of
+    elements.
+    """
     cell = tear(case, MPI.COMM_SELF, Progress(MPI.COMM_SELF, quiet=True), policy=BY_COST)
     context = AnalysisContext.of(cell, Progress(MPI.COMM_SELF, quiet=True))
-    responses = context.unit_responses("", context.bonds(None), context.loads.zero_multipliers(), 1.0)[1]
+    columns, responses = context.unit_responses("", context.bonds(None), context.loads.zero_multipliers(), 1.0)
     for own in (each.cell for each in context.loads.problems):
         k = len(own.solver.problem.loads)
         if is_nested(own, responses[:k]):
             fewer = own.lattice.halvings - own.nested_lattice.halvings
             known = np.array(factors(own, fewer))[:, None]
             whole, nested = (energy_errors(own, responses[:k], nested=less) for less in (False, True))
-            diagonals = (np.array([np.diag(each.elements), np.diag(each.arcs)]) for each in (whole, nested))
+            of_nested = np.array([np.diag(nested.elements), np.diag(nested.arcs)]) / known
+            found = np.array([np.diag(whole.elements), np.diag(whole.arcs)]) / of_nested
+            if exact is not None:
+                true = np.diag(columns["stiffness"] - exact) - np.diag(nested.arcs)
+                found = np.concatenate([found, true[None] / of_nested[:1]])
             name = "sampled" if own.summary.across else "locked" if locks(own.subdomains, own.comm) else "nested"
             bubbles = ", bubbles" if any(s.is_mixed for s in own.subdomains) else ""
-            yield f"{name}, order {own.lattice.order}, {fewer} less{bubbles}", known * np.divide(*diagonals)
+            yield f"{name}, order {own.lattice.order}, {fewer} less{bubbles}", found
         responses = responses[k:]
     cell.destroy()
 
@@ -178,18 +198,22 @@ def both_errors(case: Case) -> Iterator[tuple[str, Float]]:
 def print_factors(arguments: argparse.Namespace) -> None:
     """Print geometric means over all cells and meshes, and between which nine tenths lie."""
     found: dict[str, list[Float]] = {}
-    for name, document, _ in (each for each in spectral() + twins() if each[0].startswith(arguments.only)):
+    for name, document, known, _ in (each for each in spectral() + twins() if each[0].startswith(arguments.only)):
+        matrix = document["material"]["matrix"]["poisson"]
+        exact = solved(document, **EXACT)[0] if known is None and matrix > LOCKS_ABOVE else known
         for order, cut in itertools.product(orders(document), ("auto", "bodies")):
+            of_true = exact if order == 2 and cut == "bodies" and matrix > LOCKS_ABOVE else None
             for size in SIZES[order]:
                 mesh = {"mesh_size": min(0.5, size * 2**arguments.refine), "order": order, "refine": arguments.refine}
                 own = document | {"cell": document["cell"] | mesh, "decomposition": {"cut": cut}}
-                for words, each in both_errors(Case.parse(own)):
+                for words, each in both_errors(Case.parse(own), of_true):
                     found.setdefault(words, []).append(each)
         print(name, file=sys.stderr)
     for words, ratios in sorted(found.items()):
-        for part, own in zip(("elements", "arcs"), np.concatenate(ratios, axis=1), strict=True):
+        for row, part in enumerate(PARTS[: max(map(len, ratios))]):
+            own = np.concatenate([each[row] for each in ratios if len(each) > row])
             own = own[own > 0]
-            low, high = np.percentile(own, [5, 95])
+            low, high = (float(np.percentile(own, share)) for share in (5, 95))
             mean = np.exp(np.log(own).mean())
             print(f"{words:36} {part:8} {mean:.4f} (1/{1 / mean:.1f}), {low:.4f} to {high:.4f}, {len(own)} entries")
 
@@ -197,10 +221,10 @@ def print_factors(arguments: argparse.Namespace) -> None:
 def print_ratios(arguments: argparse.Namespace) -> None:
     """One line a cell and order, and the shares of all entries."""
     of_all: dict[int, list[float]] = {order: [] for order in SIZES}
-    for name, document, known in (each for each in spectral() + twins() if each[0].startswith(arguments.only)):
+    for name, document, known, error in (each for each in spectral() + twins() if each[0].startswith(arguments.only)):
         exact = solved(document, **EXACT)[0] if known is None else known
         for order in orders(document):
-            found = [ratios(document, exact, order, size, arguments) for size in SIZES[order]]
+            found = [ratios(document, exact, error, order, size, arguments) for size in SIZES[order]]
             of_all[order] += np.concatenate(found).tolist()
             words = ", ".join(f"{own.min():.2f} to {own.max():.2f}" for own in found)
             print(f"{name:26} order {order}: {words}", flush=True)

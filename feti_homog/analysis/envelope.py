@@ -17,7 +17,7 @@ from feti_homog.analysis.constants import constants
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.criteria import criterion_of
 from feti_homog.analysis.mesh_errors import mesh_error, unit_errors
-from feti_homog.analysis.onset_errors import OnsetErrors
+from feti_homog.analysis.onset_errors import MOST, OnsetErrors
 from feti_homog.analysis.registry import Analysis
 from feti_homog.analysis.result_records import EnvelopePoint
 from feti_homog.analysis.tip_records import DIRECTION_DIGITS, bond_directions
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from feti_homog.homogenization.mesh_error import EnergyErrors
 
 # Bonds times directions that are looked at together.
-CHUNK = 500_000
+CHUNK = 200_000
 # A cosine that is smaller than this is what rounding leaves of zero.
 COSINE_ROUNDING = 1e-15
 
@@ -136,7 +136,6 @@ class _Finder:
         if onset_errors is not None:
             self._energy_errors = block_diag(*(each.signed for each in errors))
             self._bonded = np.concatenate(cell.comm.allgather(onset.bonded))
-            self._tips = onset_errors.are_tips(self._bonded)
             self._everywhere = np.concatenate(cell.comm.allgather(self._unit.swapaxes(0, 1)))
         self._most = max(1, self._comm.allreduce(self._unit.shape[1], MPI.MAX))
         nodes = cell.solver.jump_operator.nodes
@@ -170,7 +169,7 @@ class _Finder:
     ) -> list[dict[str, float]]:
         """Entries `mesh_error` of some rays with the least of the factors (n, k).
 
-        Of the bonds that break together, and of tips beside them, the largest; each under its own load.  Collective.
+        The largest utilisation that a bond has with its own error, each under its own load.  Collective.
         """
         if self._errors is None:
             return [{}] * len(least)
@@ -178,15 +177,15 @@ class _Finder:
         energy = np.abs(np.einsum("nl,lm,nm->n", ahead, self._energy_errors, ahead))
         energy /= np.einsum("nm,nm->n", rays.strain[rows], rays.stress[rows])
         breaks = (least > 0.0) & np.isfinite(least)
-        first = (factors <= least[:, None] * (1.0 + UTILISATION_TIE)) | (np.isfinite(factors) & self._tips)
-        ray, node = np.nonzero(breaks[:, None] & first)
+        ray, node = np.nonzero(breaks[:, None] & (factors <= least[:, None] * (1.0 + MOST)))
         own = factors[ray, node]
         ahead = own[:, None] * ahead[ray]
         loads = ahead + self._unit_loads(rays.strain_before[None], rays.temperature, names)
         stencil = self._errors.stencil(node, self._bonded)
         traction = np.einsum("pl,pslc->psc", loads, self._everywhere[stencil])
         along = np.einsum("pl,plc->pc", ahead, self._everywhere[stencil[:, 2]])
-        error = self._errors.relative(node, stencil, traction, energy[ray], along)
+        whole = bool(self._bonded.all())
+        error = self._errors.relative(self._onset.bonds.at(node), stencil, traction, energy[ray], whole, along)
         found = np.zeros(len(least))
         np.maximum.at(found, ray, least[ray] / own * (1.0 + error) - 1.0)
         self._comm.Allreduce(MPI.IN_PLACE, found, MPI.MAX)

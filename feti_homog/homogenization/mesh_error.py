@@ -28,7 +28,7 @@ SAMPLED_AT_ONCE = 1 << 15
 # What is not on a boundary.
 INSIDE = -1
 # Errors of elements and of arcs over those of meshes refined once and twice less, by the order of elements, all by
-# `scripts/measure_mesh_error.py --factors`; in cells with a phase that locks, of quadratic elements by true errors; and
+# `scripts/measure_mesh_error.py --factors`; in cells with a phase that locks, of quadratic ones by "true" there; and
 # of the mesh refined once less with the displacements of the mesh itself at its nodes, by whether there are bubbles.
 NESTED = {1: ((0.26, 0.27), (0.07, 0.066)), 2: ((1 / 15, 1 / 14), (1 / 185, 1 / 255))}
 LOCKED = {1: (0.31, 0.34), 2: (0.1, 0.065)}
