@@ -152,30 +152,6 @@ def test_blocks_are_right_with_few_followed_columns(comm, columns, slack, monkey
     assert len(kept) > 12 and all(each is kept[0] for each in kept)
 
 
-def test_batches_shrink_where_columns_go_unused(comm):
-    """Bonds far from each other are wanted in turn, and none beside them; then one after the other."""
-    cell = torn_cells.tear(comm, geometry="square", petsc=INFLUENCE)
-    influence, status = cell.solver.exact_inverse, np.full(len(cell.solver.jump_operator.nodes.row), BONDED, np.int8)
-    influence.most_followed, influence.batch = 24, 16
-    rows = influence.neighbours.rows
-    if influence.neighbours.first == 0 and len(status):
-        status[0] = OPEN
-    activate(cell, status)
-    influence.multipliers(cell.solver.d, np.eye(3))
-    columns, counts = influence._changes.columns, []
-    for number in (7 * np.arange(1, len(rows))) % len(rows):
-        before = len(columns.rows)
-        influence.inverse_blocks(rows[[max(number, 1)], None] + np.arange(2))
-        counts.append(len(columns.rows) - before)
-    found = np.array([count for count in counts if count])
-    assert found[0] >= 16 and influence._share == 0.125
-    # Rows that have left are found alone.
-    assert len(influence._with_near(rows[:1], lambda near: near)) == 1
-    assert len(influence._with_near(rows[1:2], lambda near: near)) > 1
-    influence._adapt_batch(np.array([True, True, False]))
-    assert influence._share == 0.25
-
-
 @pytest.mark.parametrize("on_active", [True, False], ids=["multipliers", "jumps"])
 def test_f_lambda_finds_errors_of_a_followed_answer(comm, on_active):
     cell = torn_cells.tear(comm, geometry="square", petsc=INFLUENCE)
