@@ -195,19 +195,26 @@ def both_errors(case: Case, exact: Float | None = None) -> Iterator[tuple[str, F
     cell.destroy()
 
 
+def all_errors(
+    document: dict[str, Any], known: Float | None, arguments: argparse.Namespace
+) -> Iterator[tuple[str, Float]]:
+    """Yield `both_errors` of a cell on all meshes, with an exact stiffness where quadratic elements lock."""
+    may_lock = document["material"]["matrix"]["poisson"] > LOCKS_ABOVE
+    exact = solved(document, **EXACT)[0] if known is None and may_lock else known
+    for order, cut in itertools.product(orders(document), ("auto", "bodies")):
+        of_true = exact if order == 2 and cut == "bodies" and may_lock else None
+        for size in SIZES[order]:
+            mesh = {"mesh_size": min(0.5, size * 2**arguments.refine), "order": order, "refine": arguments.refine}
+            own = document | {"cell": document["cell"] | mesh, "decomposition": {"cut": cut}}
+            yield from both_errors(Case.parse(own), of_true)
+
+
 def print_factors(arguments: argparse.Namespace) -> None:
     """Print geometric means over all cells and meshes, and between which nine tenths lie."""
     found: dict[str, list[Float]] = {}
     for name, document, known, _ in (each for each in spectral() + twins() if each[0].startswith(arguments.only)):
-        matrix = document["material"]["matrix"]["poisson"]
-        exact = solved(document, **EXACT)[0] if known is None and matrix > LOCKS_ABOVE else known
-        for order, cut in itertools.product(orders(document), ("auto", "bodies")):
-            of_true = exact if order == 2 and cut == "bodies" and matrix > LOCKS_ABOVE else None
-            for size in SIZES[order]:
-                mesh = {"mesh_size": min(0.5, size * 2**arguments.refine), "order": order, "refine": arguments.refine}
-                own = document | {"cell": document["cell"] | mesh, "decomposition": {"cut": cut}}
-                for words, each in both_errors(Case.parse(own), of_true):
-                    found.setdefault(words, []).append(each)
+        for words, each in all_errors(document, known, arguments):
+            found.setdefault(words, []).append(each)
         print(name, file=sys.stderr)
     for words, ratios in sorted(found.items()):
         for row, part in enumerate(PARTS[: max(map(len, ratios))]):

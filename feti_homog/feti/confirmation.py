@@ -88,22 +88,27 @@ class InfluenceSolutions:
                 pass.
         """
         if solutions and self._expected is not None:
-            lam, opening = (np.stack(x, axis=1) for x in zip(*((s.lam, s.jump) for s in solutions), strict=True))
-            off, drift = self._errors(lam, opening)
-            # Multipliers that F lambda confirms are off by no less than their residuals.
-            off = float(np.max([off, *(each.residual for each in solutions)]))
-            if not off <= MOST_UNCONFIRMED_ERROR:
-                raise ConvergenceError(
-                    f"influence columns: multipliers of the last {self._granted} solves: {off:.1e} off"
-                )
-            if not (error := float(np.max([off, drift]))) <= max(MOST_FOLLOWED_ERROR, 2.0 * self._rounding):
-                self._renew(d, solutions, error)
+            self._check(d, solutions)
         confirmed = bool(solutions) and all(each.iterations == 0 and each.reason > 0 for each in solutions)
         self._granted = min(2 * self._granted + 1, MOST_UNCONFIRMED) if confirmed else 0
         self._left, self._residual = self._granted, max((each.residual for each in solutions), default=0.0)
         if confirmed:
             seen = self._jumps.projected(d, self._jumps.norms(d))
             self._squares = allreduce_sum(self._comm, np.stack([seen.T @ seen, d.T @ d]))
+
+    def _check(self, d: Float, solutions: list[DualSolution]) -> None:
+        """Make what is followed anew where solutions that F lambda confirms show more than rounding.
+
+        Collective; raises as `record`.
+        """
+        lam, opening = (np.stack(x, axis=1) for x in zip(*((s.lam, s.jump) for s in solutions), strict=True))
+        off, drift = self._errors(lam, opening)
+        # Multipliers that F lambda confirms are off by no less than their residuals.
+        off = float(np.max([off, *(each.residual for each in solutions)]))
+        if not off <= MOST_UNCONFIRMED_ERROR:
+            raise ConvergenceError(f"influence columns: multipliers of the last {self._granted} solves: {off:.1e} off")
+        if not (error := float(np.max([off, drift]))) <= max(MOST_FOLLOWED_ERROR, 2.0 * self._rounding):
+            self._renew(d, solutions, error)
 
     def _renew(self, d: Float, solutions: list[DualSolution], error: float) -> None:
         """Make what is followed anew; where that changes nothing, the `error` is rounding of F lambda.  Collective."""
