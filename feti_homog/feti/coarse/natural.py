@@ -222,7 +222,7 @@ class GramMatrix:
         at = np.arange(count.sum()) + np.repeat(self._first[changed] - np.cumsum(count) + count, count)
         products = self._product[at] * np.repeat((active - self._active)[changed], count)
         self._own = self._own + np.bincount(self._entry[at], products, len(self._own))
-        self._active = active
+        self._active = active.copy()
         return allreduce_sum(self._comm, self._own)
 
     def groups(self, some: Int) -> list[Int]:
