@@ -54,7 +54,7 @@ def test_whole_paths_are_those_of_brute_force(comm, built, growth):
         assert relative_error(stress, np.array([e.stress for e in expected])) < 1e-8
         assert all(p.state.solution.reason > 0 and max(p.state.certificate.values()) < 1e-8 for p in points)
         # With few columns the cell is factored anew on the way.
-        assert (case.cell.solver.exact_inverse.factorizations > 2) == (columns < 100)
+        assert (case.cell.solver.exact_inverse.factorizations > 1) == (columns < 100)
 
 
 def test_a_path_goes_on_from_its_middle_as_if_it_had_not_stopped(comm):
