@@ -29,3 +29,12 @@ def test_batches_shrink_where_columns_go_unused(comm):
     assert len(influence._with_near(rows[:1], lambda near: near)) == 1
     influence._adapt_batch(np.array([True, True, False]))
     assert influence._share == 0.25
+
+
+def test_columns_have_room_for_those_of_all_rows_at_most(comm):
+    """Any number of changes may be asked for, so that the first reference cell is the only one."""
+    petsc = {"feti_pc_type": "influence", "feti_influence_columns": 10**9}
+    cell = torn_cells.tear(comm, geometry="square", petsc=petsc)
+    influence = cell.solver.exact_inverse
+    assert np.abs(influence.multipliers(cell.solver.d, np.eye(3))).max(initial=0.0) < np.inf
+    assert influence.most_followed == len(influence.stiffness)

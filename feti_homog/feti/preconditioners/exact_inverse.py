@@ -64,7 +64,8 @@ class ExactInverse(RenewedReference, Preconditioner):
         if most < 1:
             raise CaseError(f"-feti_influence_columns {most}: expected a whole number above 0")
         super().__init__(comm, jump_operator, operators, most)
-        self.most_followed, self._has_added = max(FOLLOWED_COLUMNS, 2 * most), False
+        self.most_followed = min(max(FOLLOWED_COLUMNS, 2 * most), jump_operator.global_rows)
+        self._has_added = False
         self._next, self._loose = self._more, np.zeros(0, np.int64)
         # Rows that leave make H smaller.
         self.norm = NORM_MARGIN * self.reference.largest_eigenvalue(self._first)

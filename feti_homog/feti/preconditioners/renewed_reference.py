@@ -64,7 +64,7 @@ class RenewedReference:
         self._more = np.zeros(self._rows)
         self._answer: Float | None = None
         self._followed: FollowedResponse | None = None
-        # N is of a state before; parts of the next reference cell, and columns of it, that wait.
+        # N is of a state before; parts of the next reference cell that wait.
         self._is_behind = False
         self._renewal: Iterator[None] | None = None
         self._left = 0
