@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError
 from feti_homog.parallel.mpi_errors import ARRIVAL_TIMEOUT_S, on_root, on_root_only, others_come
-from feti_homog.runtime.file_locks import Lock, LockHeld
+from feti_homog.runtime.file_locks import LOCK_TIMEOUT_S, Lock, LockHeld
 from feti_homog.runtime.standard_streams import complain, say
 from feti_homog.sweep import store
 from feti_homog.sweep.description import check_options
@@ -113,14 +113,18 @@ def _group(comm: Intracomm, ranks: int) -> Any:
 
 
 def _run_free_cases(runner: CaseRunner, sweep: Sweep) -> FetiHomogError | None:
-    """Run whatever case is free until none is; returns what made the group stop before.  Collective in the group."""
-    some_computed = True
+    """Run whatever case is free until none is; returns what made the group stop before.  Collective in the group.
+
+    Cases that others have are passed over at once; only at last they are waited for as long as somebody may look.
+    """
+    timeouts = [0.0, LOCK_TIMEOUT_S]
     try:
-        while some_computed:
+        while timeouts:
             some_computed = False
             for entry, case in zip(sweep.entries, sweep.cases, strict=True):
-                outcome, _ = runner.run(entry, case, len(sweep.entries))
+                outcome, _ = runner.run(entry, case, len(sweep.entries), timeouts[0])
                 some_computed = some_computed or outcome is Outcome.COMPUTED
+            timeouts = timeouts if some_computed else timeouts[1:]
     except FetiHomogError as error:
         if not others_come(runner.comm, ARRIVAL_TIMEOUT_S):
             raise
@@ -183,13 +187,13 @@ class CaseRunner:
     retry: bool
     quiet: bool
 
-    def run(self, entry: SweepCase, case: Case, total: int) -> tuple[Outcome, str]:
-        """Run a case unless it is finished, failed before, or another process has it.  Collective.
+    def run(self, entry: SweepCase, case: Case, total: int, timeout: float = LOCK_TIMEOUT_S) -> tuple[Outcome, str]:
+        """Run a case unless it is finished, failed before, or another has it for `timeout` seconds.  Collective.
 
         Returns what came of it, and which process has the case if another one has.  Raises FetiHomogError if the
         folder cannot be written.
         """
-        lock = Lock(self.directory / entry.folder / LOCK_FILE)
+        lock = Lock(self.directory / entry.folder / LOCK_FILE, timeout=timeout)
         try:
             outcome, holder = on_root(self.comm, self._claim, lock, entry, case)
             if outcome is not Outcome.COMPUTED:
