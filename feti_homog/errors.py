@@ -48,7 +48,7 @@ class CaseError(FetiHomogError):
 
 
 class CheckpointError(CaseError):
-    """What `--resume` found is missing, unreadable or of another run."""
+    """Events of a checkpoint are missing, unreadable or of another run."""
 
 
 class MeshError(FetiHomogError):

@@ -172,8 +172,9 @@ ASSEMBLED_PARTS, RENEWAL_PAUSE = 2, 3
 # larger batches, but columns that may not be needed (`scripts/benchmark_path --to-the-end`).  Share of them to which
 # batches shrink where most columns go unused, for many cracks grow a little each.
 INFLUENCE_BATCH, LEAST_BATCH_SHARE = 64, 0.125
-# Rows that change at once up to which their columns are followed; columns that are followed at most, 8 bytes an owned
-# row each; changes that wait before all of these follow (`scripts/benchmark_path --to-the-end`).
+# Rows that change at once up to which their columns are followed; columns that are followed at most, or twice as many
+# as `-feti_influence_columns`, 8 bytes an owned row each; changes that wait before all of these follow
+# (`scripts/benchmark_path --to-the-end`).
 MOST_FOLLOWED, FOLLOWED_COLUMNS, WAITING_COLUMNS = 16, 2400, 32
 # Share of these columns that stay where there is no room for more, and changes of the bonds for which columns that no
 # longer need to be followed are, lest they come again: faces close.

@@ -71,7 +71,7 @@ class EventsInMemory(NoCheckpoint):
     ) -> None:
         self._whole[number] = {name: np.asarray(value) for name, value in {**whole, **distributed}.items()}
         self._bytes += _size(self._whole[number])
-        if self.room is not None and self.comm.allreduce(self._bytes) > self.room:
+        if self.room is not None and settled > len(self._packed) and self.comm.allreduce(self._bytes) > self.room:
             for earlier in range(len(self._packed), settled):
                 event = self._whole.pop(earlier)
                 self._bytes -= _size(event)

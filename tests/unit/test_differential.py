@@ -146,7 +146,7 @@ def test_every_number_that_is_wrong_is_noticed(solved, wanted):
 
 
 def test_estimates_of_ratios_that_nearly_vanish_are_measured_by_one():
-    """That of nu31 is the difference of larger errors: bodies cut at the sides of a cell had 13 times as much."""
+    """Errors cancel in the estimate of nu31: bodies cut at the sides of a cell had 13 times as much."""
     names = [*RATIOS, *RATIOS.values()]
     less, more = ({"mesh_error": {"constants": dict.fromkeys(names, error)}} for error in (2e-5, 3e-4))
     assert len({*names}) == len(apart(less, more)) == 4

@@ -215,7 +215,7 @@ class GramMatrix:
     def entries(self, active: Float) -> Float:
         """(entries,) of G^T A G for the owned rows of which `active` is 1, row by row.  Collective.
 
-        Those of the call before change by the rows that do.
+        Products of rows that changed since the call before are added or taken off.
         """
         changed = np.flatnonzero(active != self._active)
         count = self._count[changed]

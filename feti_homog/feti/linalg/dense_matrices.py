@@ -9,7 +9,7 @@ from scipy.linalg.lapack import dlauum, dpotrf, dpotrs, dtrtri
 from scipy.sparse import bmat, csr_matrix
 
 from feti_homog.feti.linalg.sparse_direct import check_factor, mumps_error, power_of_two
-from feti_homog.feti.thresholds import MIRRORED_BLOCK_ROWS, TRIANGLE_INVERSE_ROWS
+from feti_homog.feti.thresholds import COPIED_AT_ONCE, COPIED_COLUMNS, MIRRORED_BLOCK_ROWS, TRIANGLE_INVERSE_ROWS
 from feti_homog.petsc import c_functions
 from feti_homog.typing import Float, Int
 
@@ -227,3 +227,17 @@ def full_from_lower(A: Float, block: int = MIRRORED_BLOCK_ROWS) -> Float:
         corner = whole[some, some]
         whole[some, some] = np.where(lower[: len(corner), : len(corner)], corner, corner.T)
     return np.asarray(whole.T)
+
+
+def product_with_some(columns: Float, at: Int, x: Float) -> Float:
+    """columns[:, at] x of (n, m) columns, for x (c,) or (c, k), with a copy of a few of them at a time at most."""
+    k = x.size // max(len(x), 1)
+    if len(at) * (k + COPIED_COLUMNS) > columns.shape[1] * k:
+        # A product with all columns is cheaper than a copy of some.
+        whole = np.zeros((columns.shape[1], *x.shape[1:]))
+        whole[at] = x
+        return np.asarray(columns @ whole)
+    product = np.zeros((len(columns), *x.shape[1:]))
+    for some in np.array_split(np.arange(len(at)), len(at) // COPIED_AT_ONCE + 1):
+        product += columns[:, at[some]] @ x[some]
+    return product

@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 from mpi4py import MPI
 
+from feti_homog.feti.linalg.dense_matrices import product_with_some
 from feti_homog.feti.preconditioners.bordered_inverse import BorderedInverse
 from feti_homog.feti.preconditioners.reference_cell import ReferenceCell, ResponseColumns
-from feti_homog.feti.thresholds import COPIED_AT_ONCE, COPIED_COLUMNS
 from feti_homog.parallel.distributed_arrays import gather_rows, scale_rows
 from feti_homog.typing import Float, Int
 
@@ -57,7 +57,7 @@ class ChangedReference:
         if len(members):
             rows = self.columns.rows[members]
             c = self.inverse.solve(gather_rows(self._comm, z, self._first, rows))
-            self._take_off(z, members, c)
+            z -= product_with_some(self.columns.owned, members, c)
             mine = np.flatnonzero((rows >= self._first) & (rows < self._first + self._rows))
             own = rows[mine] - self._first
             # A row that left opens by c, one that came bears -c.  Nothing cancels in D c, however soft the spring.
@@ -66,19 +66,6 @@ class ChangedReference:
             factor = np.where(outside, -1.0, np.where(stretched > 0, stretched, 1.0))
             z[own] = scale_rows(factor, c[mine])
         return z
-
-    def _take_off(self, z: Float, members: Int, c: Float) -> None:
-        """Take Gamma[:, C] c off z (owned rows,[ k]) in place."""
-        columns, known = self.columns.owned, len(self.columns.rows)
-        k = 1 if z.ndim == 1 else z.shape[1]
-        if len(members) * (k + COPIED_COLUMNS) > known * k:
-            # A product with all columns is cheaper than a copy of some.
-            whole = np.zeros((known, *z.shape[1:]))
-            whole[members] = c
-            z -= columns @ whole
-            return
-        for some in _parts(len(members)):
-            z -= columns[:, members[some]] @ c[some]
 
     def present(self, rows: Int, active: Float) -> Float:
         """(owned rows, k) columns, of the cell with the `active` rows (owned rows,) that N is of, of rows (k,).
@@ -92,8 +79,3 @@ class ChangedReference:
         mine = np.flatnonzero((turned != 0.0) & (rows >= self._first) & (rows < self._first + self._rows))
         columns[rows[mine] - self._first, mine] = turned[mine]
         return self.response(columns)
-
-
-def _parts(count: int) -> list[slice]:
-    """Divide so many columns into slices that are copied at once."""
-    return [slice(start, min(start + COPIED_AT_ONCE, count)) for start in range(0, count, COPIED_AT_ONCE)]

@@ -132,7 +132,7 @@ class ExactInverse(RenewedReference, Preconditioner):
                 self._forget()
                 return False
         # Without columns of what has changed, N is wanted.
-        spared = np.union1d(wanted, self._changed(self._held))
+        spared = np.union1d(wanted, self._changed(self._held) if changes is None else changes.rows)
         spared = spared if len(np.union1d(spared, rows)) <= followed.most else wanted
         self._adapt_batch(followed.make_room(len(rows), spared, self._is_active()))
         followed.add(rows, columns)

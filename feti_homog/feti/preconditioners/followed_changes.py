@@ -1,8 +1,8 @@
 """The present response from that of the reference cell, by followed columns of the rows C that changed since.
 
 With W = s of rows that left (1) or came (-1), and dC of those whose springs gained compliance, the transforms of
-`followed_response` say of the present response Gamma' that Gamma_:C B = Gamma'_:C W.  So all other columns, and answers
-U, follow from those of the reference cell by one product:
+`followed_response` give Gamma_:C B = Gamma'_:C W with the present response Gamma'.  So all other columns, and
+answers U, follow from those of the reference cell by one product:
 
     U' = U - Gamma'_:C W U_C,  U 0 before on rows that left or came.
 """
@@ -20,7 +20,11 @@ from feti_homog.typing import Float, Int
 
 
 class FollowedChanges:
-    """The rows C of a reference cell that have changed, all of which have followed columns."""
+    """The rows C of a reference cell that have changed, all of which have followed columns.
+
+    Attributes:
+        rows: (c,) C, global numbers.
+    """
 
     def __init__(
         self, comm: MPI.Intracomm, first: int, cell: ReferenceCell, followed: FollowedResponse, rows: Int, kinds: Float
@@ -29,7 +33,7 @@ class FollowedChanges:
 
         This rank's rows begin at `first`.
         """
-        self._comm, self._first, self._cell, self._followed, self._rows = comm, first, cell, followed, rows
+        self._comm, self._first, self._cell, self._followed, self.rows = comm, first, cell, followed, rows
         self._turned, self._more = kinds.T[:, :, None]
         self._weights = np.where(self._turned != 0.0, self._turned, self._more)
         own = rows - first
@@ -40,7 +44,7 @@ class FollowedChanges:
         """(owned rows, k) U' of U (owned rows, k).  Collective."""
         found = columns.copy()
         found[self._own[self._turned[self._mine, 0] != 0.0]] = 0.0
-        found -= self._followed.product(self._rows, self._weights * self._gathered(columns))
+        found -= self._followed.product(self.rows, self._weights * self._gathered(columns))
         return found
 
     def refined(self, columns: Float) -> Float:
@@ -65,15 +69,15 @@ class FollowedChanges:
         Collective.
         """
         rows, columns = rows[:CHECKED_COLUMNS], columns[:, :CHECKED_COLUMNS]
-        theirs, ours = self._gathered(columns), self._followed.entries(rows, self._rows).T
+        theirs, ours = self._gathered(columns), self._followed.entries(rows, self.rows).T
         holds = self._turned[:, 0] <= 0.0, gather_rows(self._comm, self._cell.active, self._first, rows) > 0.0
-        pairs = zip(holds, (np.sqrt(stiffness[each]) for each in (self._rows, rows)), strict=True)
+        pairs = zip(holds, (np.sqrt(stiffness[each]) for each in (self.rows, rows)), strict=True)
         units = np.multiply.outer(*(np.where(own, 1.0 / root, root) for own, root in pairs))
         off, largest = (np.abs(units * x).max(initial=0.0) for x in (theirs - ours, theirs))
         return float(self._comm.bcast(off / max(largest, 1.0)))
 
     def _gathered(self, x: Float) -> Float:
-        return gather_rows(self._comm, x, self._first, self._rows)
+        return gather_rows(self._comm, x, self._first, self.rows)
 
     def _spread(self, values: Float) -> Float:
         """(owned rows, k) these (c, k) on C, 0 elsewhere."""

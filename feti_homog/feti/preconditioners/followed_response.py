@@ -26,9 +26,8 @@ from mpi4py import MPI
 from scipy.linalg.blas import dgemm
 from scipy.linalg.lapack import dpstrf
 
+from feti_homog.feti.linalg.dense_matrices import product_with_some
 from feti_homog.feti.thresholds import (
-    COPIED_AT_ONCE,
-    COPIED_COLUMNS,
     FOLLOWED_COLUMNS,
     FOLLOWED_SHARE,
     LATE_CHANGES,
@@ -120,15 +119,8 @@ class FollowedResponse:
     def product(self, rows: Int, x: Float) -> Float:
         """(owned rows, k) columns of the global rows (c,), which have them, times x (c, k)."""
         at, n, known = self._slot[rows], self._count, len(self._rows)
-        product: Float = self._waiting[:, :n] @ (self._factors[at, :n].T @ -x)
-        if len(rows) * (x.shape[1] + COPIED_COLUMNS) > known * x.shape[1]:
-            # A product with all columns is cheaper than a copy of some.
-            whole = np.zeros((known, x.shape[1]))
-            whole[at] = x
-            return product + self._buffer[:, :known] @ whole
-        for some in np.array_split(np.arange(len(at)), len(at) // COPIED_AT_ONCE + 1):
-            product += self._buffer[:, at[some]] @ x[some]
-        return product
+        waiting = self._waiting[:, :n] @ (self._factors[at, :n].T @ x)
+        return product_with_some(self._buffer[:, :known], at, x) - waiting
 
     def entries(self, rows: Int, of: Int) -> Float:
         """(k, c) entries at the global rows (k,) of the columns of the global rows `of` (c,).  Collective."""
