@@ -11,14 +11,17 @@ from scipy.spatial import cKDTree
 
 from feti_homog.case.phase_names import COATING, MATRIX, VOID
 from feti_homog.errors import MeshError
+from feti_homog.fibres.outlines.convex_sums import ConvexSums
 from feti_homog.fibres.outlines.ellipses import Discs
-from feti_homog.fibres.outlines.outlines import Outlines
+from feti_homog.fibres.outlines.outlines import Outlines, directions
 from feti_homog.typing import Bool, Float, Int
 
 # Decimals in which lengths / width of the cell are compared.
 DECIMALS = 10
 # Gaps between tangents that are looked at, and the narrowest of them / the widest.
 MOST_GAPS, NARROWEST = 4, 0.7
+# Lines, one of which parts a place without from a convex outline.
+NORMALS = 360
 # Fibres beside each other have three pairs each; those on top of each other would fill the memory.
 MOST_PAIRS = 100_000_000
 # Distances that are computed one by one faster than a tree is made.
@@ -157,23 +160,51 @@ def clear_shift(arrangement: Arrangement) -> Arrangement:
     Along each axis the candidates are the middles of the widest gaps between the positions where a boundary
     line touches an outline; among their combinations the one whose corner is farthest from an outline is taken. In
     cells with a symmetry, as any two discs have, several are as good but for rounding: it is the first of them, so that
-    the choice does not hang on the unit of length.
+    the choice does not hang on the unit of length. Corners in voids are left out (`in_voids`).
     """
-    size, lines = arrangement.size, []
-    for axis, places in enumerate(_tangents(arrangement).transpose(1, 0, 2)):
-        lines.append(_widest_gaps(places.ravel(), size[axis]))
-    corners, half, outlines = np.array(list(product(*lines))), size / 2, arrangement.shells[0]
-    offset = (outlines.centres - corners[:, None] + half) % size - half
-    corner = corners[np.argmax(outlines.distances(-offset).min(axis=1).round(DECIMALS))]
+    size, outlines = arrangement.size, arrangement.shells[0]
+    for narrowest in (NARROWEST, 0.0):
+        corners = _clear_corners(arrangement, narrowest)
+        inside = in_voids(arrangement, corners)
+        if not inside.all():
+            corners = corners[~inside]
+            break
+    nearest = outlines.distances(-_away(outlines, corners, size)).min(axis=1)
+    corner = corners[np.argmax(nearest.round(DECIMALS))]
     return replace(arrangement, outlines=arrangement.outlines.at((arrangement.centres - corner) % size))
 
 
-def _widest_gaps(touching: Float, period: float) -> Float:
+def in_voids(arrangement: Arrangement, corners: Float) -> Bool:
+    """(n,) which corners (n, 2) are in voids where meshes need a node: beside polygons."""
+    if not isinstance(arrangement.outlines, ConvexSums):
+        return np.zeros(len(corners), bool)
+    voids = arrangement.outlines[arrangement.is_void | arrangement.is_hollow]
+    normal = directions(np.linspace(0.0, 2 * np.pi, NORMALS, endpoint=False))
+    reach = voids.support(np.broadcast_to(normal, (len(voids), *normal.shape)))
+    beyond = -_away(voids, corners, arrangement.size) @ normal.T > reach
+    return np.asarray(~beyond.any(axis=2).all(axis=1))
+
+
+def _away(outlines: Outlines, places: Float, size: Float) -> Float:
+    """(n, k, 2) vectors from places (n, 2) to the nearest image of the centre of each outline."""
+    return np.asarray((outlines.centres - places[:, None] + size / 2) % size - size / 2)
+
+
+def _clear_corners(arrangement: Arrangement, narrowest: float) -> Float:
+    """(n, 2) corners whose sides are in the middle of the widest gaps between tangents."""
+    tangents = _tangents(arrangement).transpose(1, 0, 2)
+    lines = [
+        _widest_gaps(places.ravel(), own, narrowest) for places, own in zip(tangents, arrangement.size, strict=True)
+    ]
+    return np.array(list(product(*lines)))
+
+
+def _widest_gaps(touching: Float, period: float, narrowest: float) -> Float:
     """Middles (m,) of the widest gaps between positions (k,) at which a side touches something."""
     places = np.sort(touching % period)
     gaps = np.diff(places, append=places[0] + period)
     wide = np.argsort(-gaps.round(DECIMALS), kind="stable")[:MOST_GAPS]
-    wide = wide[gaps[wide] > NARROWEST * gaps[wide[0]]]
+    wide = wide[gaps[wide] > narrowest * gaps[wide[0]]]
     return np.asarray(places[wide] + gaps[wide] / 2)
 
 

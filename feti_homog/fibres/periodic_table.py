@@ -10,7 +10,7 @@ from feti_homog.case.cell_section import Cell
 from feti_homog.case.fibre_table import FibreTable
 from feti_homog.errors import MeshError
 from feti_homog.fibres import cut_window
-from feti_homog.fibres.arrangement import Arrangement, clear_shift, clearance, neighbours
+from feti_homog.fibres.arrangement import Arrangement, clear_shift, clearance, in_voids, neighbours
 from feti_homog.fibres.outlines.ellipses import Discs
 from feti_homog.fibres.outlines.outlines import Outlines, directions
 from feti_homog.fibres.outlines.shapes import SHAPES, with_parts
@@ -42,10 +42,10 @@ def table_arrangement(cell: Cell) -> Arrangement:
     Periodic images are one, the first of them. In a window that is cut out of something larger, fibres that overlap
     across its border are moved apart.
 
-    A table that gives the corner of its cell keeps it, if the sides are clear of tangency with its discs; the
-    table of a cell gives the mesh of that cell. Else all is shifted (`clear_shift`), rounded and meshed in the order of
-    the coordinates, so that tables that differ by a shift, by the order of rows or by units have one mesh. Outlines
-    that are not round are rounded wherever they are.
+    A table that gives the corner of its cell keeps it, if the sides are clear of tangency with its discs and the corner
+    in no void (`in_voids`); the table of a cell gives the mesh of that cell. Else all is shifted (`clear_shift`),
+    rounded and meshed in the order of the coordinates, so that tables that differ by a shift, by the order of rows or
+    by units have one mesh. Outlines that are not round are rounded wherever they are.
 
     Raises:
         MeshError: rows lie outside, come twice, overlap or touch; a line for each fault.
@@ -63,7 +63,7 @@ def table_arrangement(cell: Cell) -> Arrangement:
     shifted = clear_shift(fibres)
     is_placed = table.left is not None and table.bottom is not None
     clear = min(LEAST_CLEARANCE * float(fibres.radii.mean()), clearance(shifted))
-    if not is_placed or clearance(fibres) < clear:
+    if not is_placed or clearance(fibres) < clear or in_voids(fibres, np.zeros((1, 2))).all():
         return _in_mesh_order(_rounded(shifted))
     return fibres if isinstance(fibres.outlines, Discs) else _rounded(fibres)
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from differential.job import DRAWN_PER_CASE, FAILED, REFUSED, ROWS, RUNS, Row, examine, table
-from differential.relations import ALWAYS, DRAWN, RANKS
+from differential.relations import ALWAYS, DRAWN, RANKS, STRESS_BACK
 from feti_homog.api import launch
 from feti_homog.parallel.mpi_errors import on_root
 
@@ -52,17 +52,20 @@ def main(words: argparse.Namespace, comm: Any) -> None:
         comm.barrier()
         if comm.rank == 0:
             print(table(rows), flush=True)
-    faults = too_little(rows, sum(row.relation == RUNS for row in rows), comm.size)
+    faults = too_little(rows, sum(row.relation == RUNS for row in rows), comm.size, words.soft)
     if comm.rank == 0 and faults:
         print("\n".join(faults))
     if faults or any(row.verdict == FAILED for row in rows):
         raise SystemExit(1)
 
 
-def too_little(rows: Sequence[Row], cases: int, ranks: int) -> list[str]:
-    """List the relations that so many cases left out, and too many refusals."""
+def too_little(rows: Sequence[Row], cases: int, ranks: int, soft: bool = False) -> list[str]:
+    """List the relations that so many cases left out, and too many refusals; `soft` cases are none of `stress back`."""
     refused = sum(row.relation == RUNS and row.verdict == REFUSED for row in rows)
-    missing = {relation.name for relation in (*ALWAYS, *DRAWN, *[RANKS][: ranks - 1])} - {row.relation for row in rows}
+    asked = {relation.name for relation in (*ALWAYS, *DRAWN, *[RANKS][: ranks - 1])} - (
+        {STRESS_BACK} if soft else set()
+    )
+    missing = asked - {row.relation for row in rows}
     faults = [f"{refused} of {cases} cases were refused"] if refused > MOST_REFUSED * cases + 1 else []
     return faults + [f"no case was compared: {name}" for name in sorted(missing) if cases >= CASES]
 

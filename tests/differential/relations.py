@@ -89,7 +89,7 @@ class Relation:
 
 
 ALWAYS = (Relation("verify", certificate, exact=True), Relation("solved anew by SciPy", solved_anew))
-RANKS = Relation("ranks", same_results.ranks)
+RANKS, STRESS_BACK = Relation("ranks", same_results.ranks), "stress back"
 DRAWN = (
     Relation("unit of stress", same_results.unit_of_stress, weight=1),
     Relation("unit of length", same_results.unit_of_length, weight=1),
@@ -99,6 +99,6 @@ DRAWN = (
     Relation("split way", other_results.split_way, _is_path_of_events, weight=4),
     Relation("resume", same_results.resume, _is_path, weight=4),
     Relation("brute force", by_brute_force, is_affordable, weight=4),
-    Relation("stress back", other_results.stress_back, _is_linear, weight=2, refusals=(NotCarriedError,)),
+    Relation(STRESS_BACK, other_results.stress_back, _is_linear, weight=2, refusals=(NotCarriedError,)),
     Relation("onset", other_results.onset, _is_envelope, weight=6),
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -161,6 +162,19 @@ def test_a_core_of_two_corners_is_a_stadium():
     arrangement = Arrangement(1.0, 1.0, outlines, ("fibre",), np.zeros(1), np.zeros(1, bool))
     mesh = mesh_outlines(arrangement, MeshSizes.uniform(0.03), 1.0)
     assert areas(mesh.points, mesh.triangles)[mesh.precedence == 1].sum() == pytest.approx(area, rel=4e-3)
+
+
+@pytest.mark.parametrize("place", [{}, {"left": 0.0, "bottom": 0.0}], ids=["any origin", "placed"])
+@pytest.mark.parametrize("radius", [0.27, 0.4])
+def test_corners_of_cells_are_in_no_void(radius, place):
+    """The widest gaps between tangents are within the void; so is the corner of the table that is placed."""
+    case = case_of(SQUARE | {"radius": 0.12}, {"x": 0.0, "y": 0.0, "radius": radius, "phase": "void"})
+    arrangement = arrange(replace(case.cell, table=replace(case.cell.table, **place)))
+    void = arrangement.centres[arrangement.is_void]
+    assert np.linalg.norm((void + 0.5) % 1.0 - 0.5, axis=1) > radius
+    mesh = mesh_outlines(arrangement, MeshSizes.uniform(0.05), 1.0)
+    assert areas(mesh.points, mesh.triangles).sum() == pytest.approx(1.0 - np.pi * radius**2, rel=5e-3)
+    assert voids(mesh) == 1
 
 
 def test_a_cut_window_moves_polygons():
