@@ -145,10 +145,9 @@ class Output:
     )
     mesh_error: bool = key(
         boolean,
-        "Estimate the error that the mesh makes of every constant: about a tenth of a run where refine >= 1, a "
-        "twentieth from 3 on, a fifth in small cells cut across materials, an eighth there with elements of order 2; "
-        "else, with polygons, and beside debonded arcs with elements of order 2 or a tip_size, up to three fifths of "
-        "one that writes no fields.",
+        "Estimate the error that the mesh makes of every constant: about a twentieth of a run where refine >= 1, a "
+        "tenth with elements of order 2, a seventh of a case in sweeps of small cells; else, with polygons, and beside "
+        "debonded arcs with elements of order 2 or a tip_size, up to three fifths of one that writes no fields.",
         default=True,
     )
     sensitivities: bool = key(

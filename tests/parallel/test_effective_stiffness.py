@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from reference.closed_forms import hill_bulk, homogeneous
@@ -11,6 +13,7 @@ from feti_homog.homogenization import cost_model
 
 pytestmark = pytest.mark.parallel
 
+MESHES = Path(__file__).parents[2] / "meshes"
 TIGHT = 1e-9
 
 
@@ -33,6 +36,12 @@ def test_torn_cell_has_the_monolithic_stiffness(comm, cell, pieces, bodies):
     assert relative_error(L, monolithic_stiffness(torn)) < TIGHT
     assert all(r.state.solution.reason > 0 for r in responses)
     assert max(max(r.checks.values()) for r in responses) < 1e-8
+
+
+def test_a_users_mesh_in_plane_stress_has_the_monolithic_stiffness(comm):
+    case = make_case(geometry="mesh", file="two_fibres.msh", folder=MESHES, refine=3, plane="stress")
+    torn, L, _ = solve(case, comm)
+    assert relative_error(L, monolithic_stiffness(torn)) < TIGHT
 
 
 @pytest.mark.parametrize("preconditioner", ["none", "lumped"])
