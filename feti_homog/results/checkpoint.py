@@ -127,10 +127,10 @@ class Checkpoint:
     def _clear(self) -> int:
         count = end = 0
         # Whatever another run left there.
-        for path in self._files():
-            if path >= self._file(end):
-                events = checkpoint_file.events_in(path)
-                count, end = count + events, int(path.stem) + events
+        for start in self._starts_of_files():
+            if start >= end:
+                events = checkpoint_file.events_in(self._file(start))
+                count, end = count + events, start + events
         remove(self.folder.parent)
         self._begin_anew()
         return count
@@ -139,19 +139,21 @@ class Checkpoint:
         self._waiting, self._starts, self._read = [], [0], (-1, {})
         self._lean, self._bytes, self._settled = [], 0, -1
 
-    def _files(self) -> list[Path]:
-        return sorted(self.folder.glob("[0-9]*.h5")) if self.folder.is_dir() else []
+    def _starts_of_files(self) -> list[int]:
+        """Numbers of the first events of the files, ascending."""
+        found = self.folder.glob("[0-9]*.h5") if self.folder.is_dir() else ()
+        return sorted(int(path.stem) for path in found if path.stem.isdecimal())
 
     def _file(self, number: int) -> Path:
         return self.folder / f"{number:06d}.h5"
 
     def _count_checked(self) -> int:
         self._begin_anew()
-        for path in self._files():
+        for start in self._starts_of_files():
             end = self._starts[-1]
-            if path < self._file(end):  # a run was killed when it had replaced it
+            if start < end:  # a run was killed when it had replaced it
                 continue
-            if path != self._file(end):
+            if start != end:
                 raise CaseError(f"event {end:06d} is missing in {self.folder}")
             events = self._read_file(end)
             self._add(end, [checkpoint_file.row(events, number) for number in range(checkpoint_file.length(events))])
@@ -235,9 +237,9 @@ class Checkpoint:
         kept = [self._read_event(number) for number in range(start, count)]
         with atomic.file_errors("remove", self.folder):
             # The last first: what a killed run leaves has no gaps.
-            for path in reversed(self._files()):
-                if path > self._file(start) or (path == self._file(start) and not kept):
-                    path.unlink()
+            for own in reversed(self._starts_of_files()):
+                if own > start or (own == start and not kept):
+                    self._file(own).unlink()
         if kept:
             self._write_file(start, kept)
         self._count_checked()

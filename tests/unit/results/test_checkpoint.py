@@ -11,7 +11,7 @@ import pytest
 from mpi4py import MPI
 
 from feti_homog.errors import CaseError, ConvergenceError
-from feti_homog.results import atomic
+from feti_homog.results import atomic, checkpoint_file
 from feti_homog.results.checkpoint import EVENTS_AT_ONCE, Checkpoint
 from feti_homog.results.checkpoint_file import FORMAT, USER_BLOCK
 from feti_homog.results.checkpoint_folder import refuse_others
@@ -41,6 +41,18 @@ def test_what_was_written_is_read(tmp_path):
     assert checkpoint.count() == EVENTS and same(map(checkpoint.read, range(EVENTS)))
     assert checkpoint.clear() == EVENTS and checkpoint.count() == 0 and checkpoint.clear() == 0
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_million_events_are_read_in_their_order(tmp_path):
+    """Names have six digits, or seven."""
+    checkpoint = Checkpoint(tmp_path, MPI.COMM_SELF, "this run")
+    checkpoint.folder.mkdir()
+    for start, end in ((0, 999_999), (999_999, 1_000_000), (1_000_000, 1_000_002)):
+        events = {"number": np.arange(start, end)}
+        checkpoint_file.write(checkpoint.folder / f"{start:06d}.h5", events, "this run", start)
+    assert checkpoint.count() == 1_000_002 and checkpoint.read(1_000_001)["number"] == 1_000_001
+    checkpoint.keep(1_000_001)
+    assert checkpoint.count() == 1_000_001 and checkpoint.clear() == 1_000_001
 
 
 def test_light_events_are_written_together(tmp_path):
