@@ -20,7 +20,7 @@ from feti_homog.typing import Bool, Float, Int
 DECIMALS = 10
 # Gaps between tangents that are looked at, and the narrowest of them / the widest.
 MOST_GAPS, NARROWEST = 4, 0.7
-# Lines, one of which parts a place without from a convex outline.
+# Directions of the lines that may part a place from a convex outline.
 NORMALS = 360
 # Fibres beside each other have three pairs each; those on top of each other would fill the memory.
 MOST_PAIRS = 100_000_000
@@ -175,14 +175,16 @@ def clear_shift(arrangement: Arrangement) -> Arrangement:
 
 
 def in_voids(arrangement: Arrangement, corners: Float) -> Bool:
-    """(n,) which corners (n, 2) are in voids where meshes need a node: beside polygons."""
-    if not isinstance(arrangement.outlines, ConvexSums):
-        return np.zeros(len(corners), bool)
-    voids = arrangement.outlines[arrangement.is_void | arrangement.is_hollow]
-    normal = directions(np.linspace(0.0, 2 * np.pi, NORMALS, endpoint=False))
-    reach = voids.support(np.broadcast_to(normal, (len(voids), *normal.shape)))
-    beyond = -_away(voids, corners, arrangement.size) @ normal.T > reach
-    return np.asarray(~beyond.any(axis=2).all(axis=1))
+    """(n,) which corners (n, 2) of cells with polygons are in voids; meshes of others need no node at a corner."""
+    found = np.zeros(len(corners), bool)
+    if isinstance(arrangement.outlines, ConvexSums):
+        voids = arrangement.outlines[arrangement.is_void | arrangement.is_hollow]
+        away = _away(voids, corners, arrangement.size)
+        corner, own = np.nonzero((np.abs(away) < voids.extents.max(axis=2)).all(axis=2))
+        normal = directions(np.linspace(0.0, 2 * np.pi, NORMALS, endpoint=False))
+        reach = voids[own].support(np.broadcast_to(normal, (len(own), *normal.shape)))
+        found[corner[(-away[corner, own] @ normal.T < reach).all(axis=1)]] = True
+    return found
 
 
 def _away(outlines: Outlines, places: Float, size: Float) -> Float:

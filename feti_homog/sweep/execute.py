@@ -115,7 +115,7 @@ def _group(comm: Intracomm, ranks: int) -> Any:
 def _run_free_cases(runner: CaseRunner, sweep: Sweep) -> FetiHomogError | None:
     """Run whatever case is free until none is; returns what made the group stop before.  Collective in the group.
 
-    Cases that others have are passed over at once; only at last they are waited for as long as somebody may look.
+    The group passes over cases that others have at once; in a last round it waits for each as `Lock` does.
     """
     timeouts = [0.0, LOCK_TIMEOUT_S]
     try:
