@@ -113,10 +113,12 @@ def build(
     compliance: Float,
     soften: bool,
     thresholds: Thresholds = DEFAULTS,
+    recovers: bool = False,
 ) -> SolverParts:
     """Factor the subdomains and set up what the options and sizes ask for.  Collective.
 
-    `compliance` (owned rows,) is C, which may grow if the springs `soften`.
+    `compliance` (owned rows,) is C, which may grow if the springs `soften`. Where displacements inside will be asked
+    for, `recovers`, the factor of a rank's only subdomain is kept: it would be the largest at that time anyway.
 
     Options: `feti_dual_operator`, `feti_pc_type`, `feti_coarse_space`, `feti_coarse_threshold`.
 
@@ -138,6 +140,7 @@ def build(
             soft,
             thresholds,
             springs,
+            recovers and one_each,
         )
     plan = choose(_sizes(comm, jump_operator, operators, applications, one_each), options, thresholds)
     preconditioner = CLASSES[plan.preconditioner](comm, jump_operator, operators)

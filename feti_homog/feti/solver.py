@@ -76,16 +76,17 @@ class FetiSolver:
         thresholds: Thresholds = DEFAULTS,
         springs: InterfaceSprings = GLUE,
         problem: Problem = PLANE,
+        recovers: bool = False,
     ) -> None:
-        """Set up; `applications` is how many times the dual operator is expected to be applied.  Collective.
+        """Set up; `applications` is how often the dual operator is expected to be applied, `recovers` as of `build`.
 
-        Raises:
+        Collective. Raises:
             CaseError: an option has no such value, or two exclude each other.
         """
         self.comm, self.subdomains, self.problem = comm, subdomains, problem
         self.jump_operator = JumpOperator(comm, shared, subdomains, lattice, problem)
         self.intact_compliance = compliance = springs.compliance(self.jump_operator)
-        options = applications, compliance, springs.soften, thresholds
+        options = applications, compliance, springs.soften, thresholds, recovers
         parts = factory.build(comm, self.jump_operator, subdomains, *options)
         self.interface_operators, self.preconditioner = parts.operators, parts.preconditioner
         self.exact_inverse = parts.exact_inverse

@@ -196,10 +196,10 @@ def tear(
     """
     own, shared, lattice, subdomains = assemble_subdomains(case, comm, progress, policy)
     summary, table = own.summary, own.table
-    problem = phase_laws.plane_problem(case)
+    problem, recovers = phase_laws.plane_problem(case), case.output.mesh_error or case.output.fields
     with progress.stage("factor") as words:
         applications, springs = cost_model.applications(case, problem, summary.across), bonds.springs(case)
-        solver = FetiSolver(comm, shared, subdomains, lattice, applications, thresholds, springs, problem)
+        solver = FetiSolver(comm, shared, subdomains, lattice, applications, thresholds, springs, problem, recovers)
         multipliers, dimension = solver.jump_operator.global_rows, solver.coarse_dimension
         words.append(f"{multipliers} multipliers, coarse dimension {dimension}")
     cell = TornCell(comm, case, summary, lattice, table, subdomains, solver)
@@ -210,7 +210,7 @@ def tear(
         words.append(f"{comm.allreduce(sum(s.n_dofs for s in axial))} degrees of freedom along the fibres")
     with progress.stage("axial"):
         applications, springs = cost_model.applications(case, AXIAL, summary.across), bonds.axial_springs(case)
-        solver = FetiSolver(comm, shared, axial, lattice, applications, thresholds, springs, AXIAL)
+        solver = FetiSolver(comm, shared, axial, lattice, applications, thresholds, springs, AXIAL, recovers)
     return replace(cell, axial=TornCell(comm, case, summary, lattice, table, axial, solver))
 
 

@@ -7,8 +7,8 @@ CHOLMOD's own functions get a whole order. Its structures are those of its manua
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+import weakref
+from contextlib import suppress
 from ctypes import POINTER, byref, c_double, c_int, c_size_t, c_void_p
 from functools import cache
 from typing import Any
@@ -21,7 +21,8 @@ from feti_homog.typing import Array, Float, Int
 
 # Bytes for `cholmod_common`, which has less than 4 KiB, and whose members are not touched.
 COMMON_BYTES = 2**16
-GIVEN, FORWARD = 1, 4  # an order of rows, and the solve with L
+GIVEN = 1  # an order of rows
+WHOLE, FORWARD = 0, 4  # the solves with A, and with L
 LOWER, REAL, PATTERN = -1, 1, 0
 KNOWN_VERSIONS = range(2, 6)
 
@@ -72,34 +73,68 @@ def is_available() -> bool:
     return version[0] in KNOWN_VERSIONS
 
 
-def last_rows(A: csr_matrix, rows: Int, order: Int, loads: Float) -> tuple[Float, Float]:
-    """Return what L L^T = A has on `rows` (m,), which are eliminated last: U (m, m) and L^-1 B for the loads B (n, k).
+class PartialFactor:
+    """L L^T = A (n, n) with `rows` (m,) eliminated last, the others in the `order` (n,) of all.
 
-    Others are eliminated in the `order` (n,) of all. U is that part of L in reverse, so that it is an upper triangle:
-    entry (m - 1 - i, m - 1 - j) is L's of rows i and j of `rows`. Below its diagonal there is anything. L^-1 B has the
-    other rows first, in some order, and `rows` at the end.
-
-    Raises:
-        LinAlgError: A is not positive definite.
-        MemoryError: CHOLMOD could not factor, for want of memory as a rule.
+    The factor is freed with this object.
     """
-    n, is_last = A.shape[0], np.zeros(A.shape[0], bool)
-    is_last[rows] = True
-    A.sort_indices()
-    arrays = A.indptr.astype(np.int32, copy=False), A.indices.astype(np.int32, copy=False), A.data
-    matrix = _Sparse(n, n, A.nnz, *map(_address, arrays[:2]), None, _address(A.data), None, LOWER, 0, REAL, 0, 1, 1)
-    with _common() as common:
-        factor = _library().cholmod_allocate_factor(c_size_t(n), common)
+
+    def __init__(self, A: csr_matrix, rows: Int, order: Int) -> None:
+        """Factor.
+
+        Raises:
+            LinAlgError: A is not positive definite.
+            MemoryError: CHOLMOD could not factor, for want of memory as a rule.
+        """
+        n, is_last = A.shape[0], np.zeros(A.shape[0], bool)
+        is_last[rows] = True
+        A.sort_indices()
+        arrays = A.indptr.astype(np.int32, copy=False), A.indices.astype(np.int32, copy=False), A.data
+        matrix = _Sparse(n, n, A.nnz, *map(_address, arrays[:2]), None, _address(A.data), None, LOWER, 0, REAL, 0, 1, 1)
+        self._order, self._m = np.r_[order[~is_last[order]], rows], len(rows)
+        self._common, library = ctypes.create_string_buffer(COMMON_BYTES), _library()
+        library.cholmod_start(self._common)
+        self._factor = library.cholmod_allocate_factor(c_size_t(n), self._common)
+        weakref.finalize(self, _free, self._factor, self._common)
+        self._place = _analyse(matrix, self._order.astype(np.int32), self._factor, self._common)
+        if not library.cholmod_factorize(byref(matrix), self._factor, self._common):
+            raise MemoryError("CHOLMOD could not factor")
+        if self._factor.contents.minor < n:
+            raise np.linalg.LinAlgError(f"not positive definite (cholmod: pivot {self._factor.contents.minor})")
+
+    def last_block(self) -> Float:
+        """(m, m) part of L on `rows`, in reverse, so that it is an upper triangle.
+
+        Entry (m - 1 - i, m - 1 - j) is L's of rows i and j of `rows`. Below the diagonal there is anything.
+        """
+        return _block(self._factor.contents, self._place[len(self._place) - self._m :])
+
+    def forward(self, B: Float) -> Float:
+        """(n, k) L^-1 B for B (n, k), the other rows first, in the order of elimination, and `rows` at the end."""
+        if not B.shape[1]:
+            return B
+        permuted = np.empty(B.shape, order="F")
+        permuted[self._place] = B[self._order]
+        return self._solve(FORWARD, permuted)[self._place]
+
+    def solve(self, B: Float) -> Float:
+        """A^-1 B for B (n,) or (n, k)."""
+        return self._solve(WHOLE, np.asfortranarray(B.reshape(len(B), -1))).reshape(B.shape)
+
+    def _solve(self, system: int, B: Float) -> Float:
+        """(n, k) solution of one of CHOLMOD's systems, for B (n, k) in Fortran order.
+
+        Raises:
+            MemoryError: there is none left.
+        """
+        right = _Dense(len(B), B.shape[1], B.size, len(B), _address(B), None, REAL, 0)
+        solved = _library().cholmod_solve(system, self._factor, byref(right), self._common)
+        if not solved:
+            raise MemoryError("CHOLMOD could not solve")
         try:
-            place = _analyse(matrix, np.r_[order[~is_last[order]], rows].astype(np.int32), factor, common)
-            if not _library().cholmod_factorize(byref(matrix), factor, common):
-                raise MemoryError("CHOLMOD could not factor")
-            if factor.contents.minor < n:
-                raise np.linalg.LinAlgError(f"not positive definite (cholmod: pivot {factor.contents.minor})")
-            U = _block(factor.contents, place[n - len(rows) :])
-            return U, _forward(factor, loads[order[~is_last[order]]], loads[rows], place, common)
+            return _array(solved.contents.x, B.size, c_double).reshape(B.shape[::-1]).T.copy(order="F")
         finally:
-            _library().cholmod_free_factor(byref(factor), common)
+            _library().cholmod_free_dense(byref(solved), self._common)
 
 
 def _analyse(matrix: _Sparse, order: Int, factor: Any, common: Any) -> Int:
@@ -128,7 +163,7 @@ def _analyse(matrix: _Sparse, order: Int, factor: Any, common: Any) -> Int:
 
 
 def _block(factor: _Factor, place: Int) -> Float:
-    """Return U of `last_rows` of the rows in these places (m,) of a supernodal factor."""
+    """Return `last_block` of the rows in these places (m,) of a supernodal factor."""
     m, k = len(place), factor.nsuper
     first, rows, values = (_array(pointer, k + 1, c_int) for pointer in (factor.super, factor.pi, factor.px))
     row, value = _array(factor.s, factor.ssize, c_int), _array(factor.x, factor.xsize, c_double)
@@ -147,32 +182,10 @@ def _block(factor: _Factor, place: Int) -> Float:
     return U
 
 
-def _forward(factor: Any, inner: Float, last: Float, place: Int, common: Any) -> Float:
-    """(n, k) L^-1 of loads (n - m, k) and (m, k), of rows in these places (n,)."""
-    found = np.vstack([inner, last])
-    if not found.shape[1]:
-        return found
-    B = np.empty(found.shape, order="F")
-    B[place] = found
-    right = _Dense(len(B), B.shape[1], B.size, len(B), _address(B), None, REAL, 0)
-    solved = _library().cholmod_solve(FORWARD, factor, byref(right), common)
-    if not solved:
-        raise MemoryError("CHOLMOD could not solve")
-    columns = _array(solved.contents.x, B.size, c_double).reshape(B.shape[::-1]).T
-    found[:] = columns[place]
-    _library().cholmod_free_dense(byref(solved), common)
-    return found
-
-
-@contextmanager
-def _common() -> Iterator[Any]:
-    """Have CHOLMOD's workspace while the block lasts."""
-    common = ctypes.create_string_buffer(COMMON_BYTES)
-    _library().cholmod_start(common)
-    try:
-        yield common
-    finally:
-        _library().cholmod_finish(common)
+def _free(factor: Any, common: Any) -> None:
+    """Free a factor, and then CHOLMOD's workspace."""
+    _library().cholmod_free_factor(byref(factor), common)
+    _library().cholmod_finish(common)
 
 
 def _address(values: Array) -> c_void_p:

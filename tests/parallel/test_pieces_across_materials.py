@@ -12,9 +12,11 @@ from support.pixel_images import pixel_mesh
 from feti_homog import Case, run
 from feti_homog.feti.operators.one_subdomain import Interior
 from feti_homog.homogenization.averaging import Homogenization
-from feti_homog.homogenization.partition_policy import PartitionPolicy
+from feti_homog.homogenization.partition_policy import BY_COST, PartitionPolicy
 from feti_homog.homogenization.uniform_parts import nodes_of_parts
+from feti_homog.homogenization.unit_cell import tear
 from feti_homog.parallel.mpi_errors import on_root
+from feti_homog.runtime.progress import Progress
 from feti_homog.runtime.records import plain
 
 pytestmark = pytest.mark.parallel
@@ -144,7 +146,7 @@ def test_fields_and_derivatives_are_those_by_bodies(comm, plane):
 
 STRIPS = {
     "coated": {
-        "geometry": "random", "fibres": 3, "fibre_fraction": 0.3, "mesh_size": 0.04, "refine": 2, "coating": 0.2,
+        "geometry": "random", "fibres": 3, "fibre_fraction": 0.3, "mesh_size": 0.035, "refine": 2, "coating": 0.2,
     },
     "hollow": {
         "geometry": "table", "width": 1.0, "height": 1.0, "mesh_size": 0.07, "refine": 3,
@@ -174,3 +176,26 @@ def test_strips_of_two_ranks_give_what_bodies_of_one_give(comm, kind, plane):
             np.testing.assert_allclose(getattr(across, name), expected, atol=1e-9 * np.abs(expected).max())
     values = across.sensitivities.derivatives, bodies.sensitivities.derivatives
     np.testing.assert_allclose(*values, rtol=1e-7, atol=1e-9 * np.abs(values[1]).max())
+
+
+@pytest.mark.few_ranks
+@pytest.mark.parametrize("kind", STRIPS)
+def test_displacements_of_kept_factors_are_those_of_interiors(comm, kind):
+    if comm.size != 2:
+        pytest.skip("on two ranks")
+    case = document("auto") | {"cell": STRIPS[kind]}
+    if kind != "coated":
+        del case["material"]["coating"]
+    rng, progress = np.random.default_rng(comm.rank), Progress(comm, quiet=True)
+    asked, unasked = (
+        tear(Case.parse(case | {"output": {"fields": False, "mesh_error": on}}), comm, progress, policy=BY_COST)
+        for on in (True, False)
+    )
+    (kept,), (freed,) = (cell.solver.interface_operators.operators for cell in (asked, unasked))
+    assert kept.factor is not None and freed.factor is None
+    u, loads = rng.normal(size=(kept.n, 3)), rng.normal(size=(len(asked.solver.problem.loads), 3))
+    for given in (loads, None):
+        found, expected = (cell.solver.interface_operators.extend(0, u, given) for cell in (asked, unasked))
+        np.testing.assert_allclose(found, expected, atol=1e-11 * np.abs(expected).max())
+    asked.destroy()
+    unasked.destroy()

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
 import numpy as np
 from petsc4py import PETSc
 from scipy.linalg.blas import dtrmm
@@ -12,6 +15,9 @@ from feti_homog.feti.linalg.sparse_direct import check_factor, mumps_error, powe
 from feti_homog.feti.thresholds import COPIED_AT_ONCE, COPIED_COLUMNS, MIRRORED_BLOCK_ROWS, TRIANGLE_INVERSE_ROWS
 from feti_homog.petsc import c_functions
 from feti_homog.typing import Float, Int
+
+if TYPE_CHECKING:
+    from feti_homog.petsc.partial_cholesky import PartialFactor
 
 # MUMPS' status of a workspace that is too small, and per cent more than its estimate that it then gets.
 TOO_SMALL, MORE_WORKSPACE = (-8, -9), (None, 100, 1000)
@@ -30,7 +36,7 @@ def schur_complement(matrix: csr_matrix, rows: Int, order: Int | None = None) ->
     if len(rows) == matrix.shape[0]:
         return np.asarray(matrix.toarray(order="F"))
     if order is not None and _can_be_ordered():
-        return _by_cholmod(matrix, rows, np.zeros((matrix.shape[0], 0)), order)[0]
+        return _by_cholmod(matrix, rows, np.zeros((matrix.shape[0], 0)), order).S
     scale = power_of_two(matrix.diagonal())
     matrix.sort_indices()
     # In place and back, which changes no digit: a copy would be as large as the matrix.
@@ -43,13 +49,42 @@ def schur_complement(matrix: csr_matrix, rows: Int, order: Int | None = None) ->
     return schur
 
 
-def schur_complement_with_loads(
-    matrix: csr_matrix, rows: Int, loads: Float, order: Int | None = None
-) -> tuple[Float, Float, Float]:
-    """Return S (n, n) as `schur_complement`, and the loads Q (dofs, v) condensed to the `rows` by the same elimination.
+@dataclass(frozen=True)
+class ShiftedFactor:
+    """K + D = L L^T of a condensed matrix K (dofs, dofs), with D > 0 on `rows` (n,) alone: it may be singular."""
 
-    They are q = Q_b - K_bi K_ii^-1 Q_i and -Q_i^T K_ii^-1 Q_i, for the columns of Q border the matrix.
+    factor: PartialFactor
+    rows: Int
+    D: Float
+
+    def solution(self, f: Float, x: Float) -> Float:
+        """(dofs, k) u of K u = f (dofs, k), which is known to be x (n, k) on the `rows`: (K + D) u = f + D x."""
+        right = f.copy(order="F")
+        right[self.rows] += (self.D * x.T).T
+        u = self.factor.solve(right)
+        u[self.rows] = x
+        return u
+
+
+@dataclass(frozen=True)
+class CondensedMatrix:
+    """A matrix K and loads Q (dofs, v) condensed to n rows.
+
+    Attributes:
+        S: (n, n) Schur complement, in Fortran order.
+        q: (n, v) Q_b - K_bi K_ii^-1 Q_i.
+        C: (v, v) -Q_i^T K_ii^-1 Q_i.
+        factor: of all of K, None of a library that leaves none.
     """
+
+    S: Float
+    q: Float
+    C: Float
+    factor: ShiftedFactor | None = None
+
+
+def condensed_with_loads(matrix: csr_matrix, rows: Int, loads: Float, order: Int | None = None) -> CondensedMatrix:
+    """Condense a matrix as `schur_complement`, and the loads Q (dofs, v), which border it, by the same elimination."""
     if order is not None and _can_be_ordered():
         return _by_cholmod(matrix, rows, loads, order)
     v, n = loads.shape[1], len(rows)
@@ -57,7 +92,7 @@ def schur_complement_with_loads(
     Q = csr_matrix(loads)
     bordered = bmat([[matrix, Q], [Q.T, corner]], format="csr")
     all_of_it = schur_complement(bordered, np.r_[rows, matrix.shape[0] + np.arange(v)])
-    return np.asfortranarray(all_of_it[:n, :n]), all_of_it[:n, n:].copy(), all_of_it[n:, n:].copy()
+    return CondensedMatrix(np.asfortranarray(all_of_it[:n, :n]), all_of_it[:n, n:].copy(), all_of_it[n:, n:].copy())
 
 
 def _can_be_ordered() -> bool:
@@ -67,16 +102,17 @@ def _can_be_ordered() -> bool:
     return partial_cholesky.is_available() and not PETSc.Options("feti_schur_").getAll()
 
 
-def _by_cholmod(matrix: csr_matrix, rows: Int, loads: Float, order: Int) -> tuple[Float, Float, Float]:
-    """Return the results of `schur_complement_with_loads` from K + D = L L^T.
+def _by_cholmod(matrix: csr_matrix, rows: Int, loads: Float, order: Int) -> CondensedMatrix:
+    """Return the result of `condensed_with_loads` from K + D = L L^T.
 
     D > 0 on `rows` alone, so that these have a factor, too: S + D = L_bb L_bb^T, q = L_bb y_b of y = L^-1 Q.
     """
-    from feti_homog.petsc import partial_cholesky  # as before
+    from feti_homog.petsc.partial_cholesky import PartialFactor  # as before
 
     n, shift = len(rows), matrix.diagonal()[rows]
     D = csr_matrix((shift, (rows, rows)), shape=matrix.shape)
-    U, y = partial_cholesky.last_rows(csr_matrix(matrix + D), rows, order, loads)
+    factor = PartialFactor(csr_matrix(matrix + D), rows, order)
+    U, y = factor.last_block(), factor.forward(loads)
     inner, last = y[:-n], y[-n:]
     q = dtrmm(1.0, U, last[::-1])[::-1].copy()
     if not np.isfinite(U.diagonal()).all():
@@ -84,7 +120,7 @@ def _by_cholmod(matrix: csr_matrix, rows: Int, loads: Float, order: Int) -> tupl
     check_lapack("dlauum", dlauum(U, lower=0, overwrite_c=1)[1])
     S = full_from_lower(U[::-1, ::-1]).T
     S[np.diag_indices(n)] -= shift
-    return S, q, -inner.T @ inner
+    return CondensedMatrix(S, q, -inner.T @ inner, ShiftedFactor(factor, rows, shift))
 
 
 def _by_mumps(matrix: csr_matrix, rows: Int) -> Float:

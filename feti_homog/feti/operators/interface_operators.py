@@ -81,11 +81,12 @@ class InterfaceOperators:
         soft_modes: bool,
         thresholds: Thresholds = DEFAULTS,
         compliance: Float | None = None,
+        keep: bool = False,
     ) -> None:
         """Factor every subdomain, once, as `choose` chooses; takes the stiffness of each.  Arguments as of `choose`.
 
-        `compliance` (local rows,) is that of the springs of the interfaces, None where no rank has any.  Nothing is
-        communicated: a rank may fail alone.
+        `compliance` (local rows,) is that of the springs of the interfaces, None where no rank has any.  `keep` factors
+        for displacements inside.  Nothing is communicated: a rank may fail alone.
         """
         self.subdomains, self._loads = subdomains, len(jump_operator.problem.loads)
         self.dofs = _constrained_dofs(jump_operator.B, subdomains)
@@ -111,7 +112,7 @@ class InterfaceOperators:
         self.interiors: dict[int, Interior] = {}
         bodies, diagonals = [np.zeros(0)], [np.zeros(0)]
         for subdomain, dofs, choice, root in zip(subdomains, self.dofs, chosen, roots, strict=True):
-            operator, diagonal = _factor(subdomain, dofs, choice.explicit)
+            operator, diagonal = _factor(subdomain, dofs, choice.explicit, keep)
             self.operators.append(operator)
             self.with_springs.append(operator if root is None else WithSprings(operator, root, subdomain.R[dofs]))
             bodies.append(diagonal)
@@ -203,9 +204,13 @@ class InterfaceOperators:
     def extend(self, place: int, x: Float, loads: Float | None = None, keep: bool = True) -> Float:
         """(dofs, k) displacements of one subdomain under loads (v, k), if there are any, x (n_s, k) on its boundary.
 
-        The first call factors the interior, each one if it is not to be kept.
+        By the factor of the subdomain if that was kept; else the first call factors the interior, each one if it is not
+        to be kept.
         """
-        interior, s = self._interior(place, keep), self.subdomains[place]
+        operator, s = self.operators[place], self.subdomains[place]
+        if isinstance(operator, ExplicitInterfaceOperator) and operator.factor is not None:
+            return operator.extend(x, loads)
+        interior = self._interior(place, keep)
         u = np.empty((s.n_dofs, *x.shape[1:]))
         inside = None
         if loads is not None and s.loads_inside:
@@ -217,17 +222,21 @@ class InterfaceOperators:
         return u
 
 
-def _factor(subdomain: Subdomain, dofs: Int, explicit: bool) -> tuple[InterfaceOperator, Float]:
+def _factor(subdomain: Subdomain, dofs: Int, explicit: bool, keep: bool) -> tuple[InterfaceOperator, Float]:
     """Return the boundary operator of a subdomain and the diagonal of K on its boundary `dofs`.
 
-    K is freed at the end.
+    K is freed at the end; a dense operator may `keep` its factor.
 
     Raises:
         MeshError: rounding leaves K no factor.
     """
     K = subdomain.take_stiffness()
+    operator: InterfaceOperator
     try:
-        operator = (ExplicitInterfaceOperator if explicit else ImplicitInterfaceOperator)(subdomain, K, dofs)
+        if explicit:
+            operator = ExplicitInterfaceOperator(subdomain, K, dofs, keep)
+        else:
+            operator = ImplicitInterfaceOperator(subdomain, K, dofs)
     except np.linalg.LinAlgError as error:
         faults = f"its stiffness cannot be factored, {error}; its elements are degenerate"
         raise MeshError(f"{label(subdomain.submesh)}: {faults}") from error

@@ -1,8 +1,8 @@
 """Boundary operators of a subdomain, its Schur complement S and flexibility S+: dense matrices, or sparse factors.
 
 Dense ones are symmetric and share one square array, so that a product reads n^2 / 2 numbers.  S comes from one partial
-factorization (MUMPS) whose factors are not kept: all that the dual problem needs lives on the boundary, since the load
-of a macroscopic strain vanishes inside a uniform body.  Sparse ones serve where these matrices would be too large.
+factorization, whose factors are kept for displacements inside alone: all that the dual problem needs lives on the
+boundary.  Sparse ones serve where these matrices would be too large.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from scipy.sparse import csr_matrix
 
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.linalg.dense_matrices import (
+    condensed_with_loads,
     full_from_lower,
     invert_upper,
     schur_complement,
-    schur_complement_with_loads,
 )
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
 from feti_homog.feti.thresholds import (
@@ -36,12 +36,17 @@ class ExplicitInterfaceOperator:
     """S and S+ of one subdomain on its n boundary dofs, and its unit loads there, `condensed`.
 
     With the fixing nodes on the boundary, the inverse of S + rho Rf Rf^T is the boundary part of K+.
+
+    Attributes:
+        factor: of the subdomain, if it is kept and the library leaves one.
     """
 
     is_dense = True
 
-    def __init__(self, subdomain: Subdomain, K: csr_matrix, dofs: Int) -> None:
+    def __init__(self, subdomain: Subdomain, K: csr_matrix, dofs: Int, keep: bool = False) -> None:
         """Condense K (2c, 2c) to `dofs` (n,), which are sorted local numbers.  Options under `feti_schur_`.
+
+        `keep` the factor of a subdomain with loads inside.
 
         Raises:
             LinAlgError: the Schur complement is not positive definite on the complement of the kernel.
@@ -50,10 +55,12 @@ class ExplicitInterfaceOperator:
         self._fixed = np.searchsorted(dofs, fixed)
         self.n = len(dofs)
         s, q, C = subdomain, subdomain.Q[dofs], subdomain.area * subdomain.L
-        order = s.elimination_order()
+        order, self._subdomain, self.factor = s.elimination_order(), subdomain, None
         if s.loads_inside:
-            both, q, condensed = schur_complement_with_loads(K, dofs, s.Q, order)
-            C = C + condensed
+            condensed = condensed_with_loads(K, dofs, s.Q, order)
+            both, q, C = condensed.S, condensed.q, C + condensed.C
+            self.factor = condensed.factor if keep else None
+            del condensed  # with the factor
         else:
             both = schur_complement(K, dofs, order)
         self.condensed = CondensedLoads(q, C, C)
@@ -105,6 +112,15 @@ class ExplicitInterfaceOperator:
                 np.multiply(diagonal, column, out=result)
                 result[:] = dsymv(1.0, A, column, beta=1.0, y=result, overwrite_y=1, lower=lower)
         return out
+
+    def extend(self, x: Float, loads: Float | None) -> Float:
+        """(dofs, k) displacements under loads (v, k), if any, that are x (n, k) on the boundary, by the kept factor."""
+        assert self.factor is not None
+        forces, reactions = np.zeros((self._subdomain.n_dofs, *x.shape[1:])), self.apply_schur(x)
+        if loads is not None:
+            forces, reactions = -self._subdomain.Q @ loads, reactions + self.condensed.boundary @ loads
+        forces[self.factor.rows] += reactions
+        return self.factor.solution(forces, x)
 
     @property
     def S(self) -> Float:

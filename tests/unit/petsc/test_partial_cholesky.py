@@ -6,24 +6,28 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix
 
-from feti_homog.petsc.partial_cholesky import is_available, last_rows
+from feti_homog.petsc.partial_cholesky import PartialFactor, is_available
 
 pytestmark = pytest.mark.skipif(not is_available(), reason="CHOLMOD's structures are those of other versions")
 
 
-def test_last_rows_are_those_of_the_dense_factor():
+def test_the_factor_is_the_dense_one():
     rng = np.random.default_rng(1)
     root, loads, order, rows = rng.random((9, 9)), rng.random((9, 2)), rng.permutation(9), np.array([2, 5, 7])
     A = root @ root.T + np.eye(9)
-    U, found = last_rows(csr_matrix(A), rows, order, loads)
+    factor = PartialFactor(csr_matrix(A), rows, order)
+    U, found = factor.last_block(), factor.forward(loads)
     whole = np.r_[order[~np.isin(order, rows)], rows]
     L = np.linalg.cholesky(A[np.ix_(whole, whole)])
     np.testing.assert_allclose(np.triu(U), L[-3:, -3:][::-1, ::-1], rtol=1e-12)
     np.testing.assert_allclose(found[-3:], np.linalg.solve(L, loads[whole])[-3:], rtol=1e-12)
+    for B in (loads, loads[:, 0], loads[:, :1]):
+        np.testing.assert_allclose(factor.solve(B), np.linalg.solve(A, B), rtol=1e-11)
+    assert factor.forward(loads[:, :0]).shape == (9, 0)
 
 
 def test_a_matrix_that_is_not_definite_is_refused_without_a_word(capfd):
     A = csr_matrix(np.array([[1.0, 2.0, 0.0], [2.0, 1.0, 0.0], [0.0, 0.0, 1.0]]))
     with pytest.raises(np.linalg.LinAlgError, match="not positive definite"):
-        last_rows(A, np.array([2]), np.arange(3), np.zeros((3, 1)))
+        PartialFactor(A, np.array([2]), np.arange(3))
     assert capfd.readouterr() == ("", "")

@@ -7,7 +7,7 @@ import pytest
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix, diags, identity, kron
 
-from feti_homog.feti.linalg.dense_matrices import schur_complement, schur_complement_with_loads
+from feti_homog.feti.linalg.dense_matrices import condensed_with_loads, schur_complement
 
 
 def laplacian(n: int) -> csr_matrix:
@@ -52,10 +52,24 @@ def test_loads_are_condensed_with_it(order):
     rest, loads = np.setdiff1d(np.arange(144), rows), np.random.default_rng(1).normal(size=(144, 3))
     D = A.toarray()
     inside = np.linalg.solve(D[np.ix_(rest, rest)], loads[rest])
-    S, q, C = schur_complement_with_loads(A, rows, loads, order)
-    np.testing.assert_allclose(S, schur_complement(A, rows), atol=1e-12)
-    np.testing.assert_allclose(q, loads[rows] - D[np.ix_(rows, rest)] @ inside, atol=1e-12)
-    np.testing.assert_allclose(C, -loads[rest].T @ inside, atol=1e-12)
+    found = condensed_with_loads(A, rows, loads, order)
+    np.testing.assert_allclose(found.S, schur_complement(A, rows), atol=1e-12)
+    np.testing.assert_allclose(found.q, loads[rows] - D[np.ix_(rows, rest)] @ inside, atol=1e-12)
+    np.testing.assert_allclose(found.C, -loads[rest].T @ inside, atol=1e-12)
+    assert (found.factor is None) == (order is None)
+
+
+def test_a_kept_factor_has_displacements_of_a_singular_matrix():
+    rng, rows, n = np.random.default_rng(3), np.arange(0, 144, 5), 144
+    A = csr_matrix(laplacian(12) - diags(np.asarray(laplacian(12).sum(axis=1)).ravel()))
+    u = rng.normal(size=(n, 2))
+    factor = condensed_with_loads(A, rows, np.ones((n, 1)), shuffled(n)).factor
+    forces = A @ u
+    for columns in (slice(None), 0):
+        before = forces[:, columns].copy()
+        found = factor.solution(forces[:, columns], u[rows][:, columns])
+        np.testing.assert_allclose(found, u[:, columns], atol=1e-12)
+        assert (found[rows] == u[rows][:, columns]).all() and (forces[:, columns] == before).all()
 
 
 def test_a_failure_of_mumps_is_reported():
