@@ -162,10 +162,10 @@ def _factorized(solver: Document) -> list[str]:
 
 
 def _iterations(counts: Sequence[int]) -> list[str]:
+    if not any(counts):
+        return [f"none: {_number(len(counts), 'state')} solved directly"]
     if len(counts) <= LISTED:
         return [str(count) for count in counts]
-    if not any(counts):
-        return [f"0 in each of {len(counts)} states, for the preconditioner is an inverse"]
     return [f"{min(counts)} to {max(counts)} a state", f"{sum(counts)} for {len(counts)} states"]
 
 
