@@ -150,12 +150,14 @@ def fields_line(case: Case, nodes: int, elements: int, interface_nodes: int, ran
     mesh = int(rows @ MESH_BYTES) + 3 * case.cell.order * CORNER_BYTES * elements
     if case.section.is_followed and isinstance(asked, str):
         return f"fields     {_size(mesh)} of result.h5, and {_size(state)} for each state"
-    contact = case.interface is not None and case.interface.contact and bool(case.arcs)
+    may_open = bool(case.arcs) or case.cell.has_own_mesh  # by its curve "debonded", if it has one
+    contact = case.interface is not None and case.interface.contact and may_open
+    is_most = case.section.is_followed or (contact and not case.arcs)
     loads = sum(len(problem.loads) for problem in phase_laws.problems(case))
     count = asked if case.section.is_followed else case.section.solves(loads, contact)
     assert isinstance(count, int)
     noun = "state" if count == 1 else "states"
-    words = f"{'at most ' if case.section.is_followed else ''}{count} {noun} of {_size(state)}"
+    words = f"{'at most ' if is_most else ''}{count} {noun} of {_size(state)}"
     of_each = STATE_SECONDS + elements / ranks * STATE_ELEMENT_SECONDS
     if case.section.is_followed:
         of_each = POINT_SECONDS + elements / ranks * POINT_ELEMENT_SECONDS

@@ -92,6 +92,8 @@ def test_the_size_of_result_h5_is_that_of_its_tables(plane):
 def test_kept_states_are_reported():
     case = make_case(plane="generalized")
     assert "6 states of 6.1 MiB, 41 MiB in" in cost_model.fields_line(case, 50_000, 100_000, 0, 1)
+    mesh = replace(case, cell=replace(case.cell, geometry="mesh", file="m.msh"), interfaces=(InterfaceSection(),))
+    assert "at most 12 states of" in cost_model.fields_line(mesh, 50_000, 100_000, 3000, 1)
     path = replace(case, analysis=replace(case.analysis, type="path"), path=LoadPath(to={"E11": 1.0}))
     assert "at most 20 states of 6.5 MiB, 136 MiB in" in cost_model.fields_line(path, 50_000, 100_000, 3000, 1)
     every = replace(path, output=replace(path.output, states="all"))
