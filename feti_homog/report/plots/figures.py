@@ -65,7 +65,7 @@ IN_LEGEND = 2  # entries of a legend in a line: four are wider than a narrow cel
 def plot(directory: Path) -> list[Path]:
     """Draws the pictures of `directory`/result.h5 and result.json beside them and returns their paths.
 
-    - cell.png: materials; partition.png: subdomains; mesh_error.png: where the estimated error of the mesh is;
+    - cell.png: materials; partition.png: parts of bodies; mesh_error.png: where the estimated error of the mesh is;
     - of each load case case_E11.png, case_minus_E11.png, ... (unit strains), case_temperature.png or state_K.png;
       that of the temperature expands freely if its expansion is known, else it is held;
     - sensitivities.png, if the case asks for them;
