@@ -134,7 +134,8 @@ def _within(table: FibreTable) -> FibreTable:
         return table
     kept, rows = table.rows(np.flatnonzero(~outside)), table.row[outside]
     listed = ", ".join(map(str, rows[:MOST_LISTED])) + (", ..." if len(rows) > MOST_LISTED else "")
-    line = f'[cell] window = "cut": {len(rows)} rows with centres outside are left out: {listed}'
+    left = "1 row with its centre" if len(rows) == 1 else f"{len(rows)} rows with centres"
+    line = f'[cell] window = "cut": leaves out {left} outside: {listed}'
     return replace(kept, remarks=(*table.remarks, line))
 
 

@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from feti_homog.case.phase_names import PHASE
+from feti_homog.case.phase_names import PHASE, VOID
 from feti_homog.errors import MeshError
 from feti_homog.mesh.coarse_mesh import areas
 from feti_homog.mesh.readers.raw_mesh import DEBONDED, RawMesh, first_of
@@ -17,6 +17,7 @@ from feti_homog.schema.wording import toml_key, toml_value
 
 NUMBER = re.compile("number [0-9]+")
 """Groups that have no other name."""
+HOLE = "expected no elements in a void, which is a hole in the mesh"
 Selectors = Mapping[str, tuple[str | int, ...]]
 
 
@@ -66,11 +67,11 @@ def unknown_phases(mesh: RawMesh) -> list[str]:
     """Physical surfaces whose name is not a phase, and a missing matrix."""
     names = list(dict.fromkeys(name for group in mesh.groups for name in group))
     has_matrix = "matrix" in names
-    known = 'expected "matrix", "fibre", "glass", ... of letters, digits, _ and -, "fibre:2", not "void"'
+    known = 'expected "matrix", "fibre", "glass", ... of letters, digits, _ and -, "fibre:2"'
     strange = [name for name in names if not PHASE.fullmatch(name)]
     # Without a matrix all groups are named anew, and numbers need no further word.
     faults = [
-        f'{mesh.container} "{name}" is not a phase: {known}'
+        f'{mesh.container} "{name}" is not a phase: {HOLE if name == VOID else known}'
         for name in strange
         if has_matrix or not NUMBER.fullmatch(name)
     ]
@@ -86,7 +87,8 @@ def _way_out(mesh: RawMesh) -> str:
     with np.errstate(all="ignore"):  # coordinates are judged later
         sizes = np.bincount(mesh.group, np.abs(areas(mesh.points[:, :2], mesh.triangles)), len(mesh.groups))
         percent = 100 * sizes / sizes.sum()
-    named = {_as_selected(names[0]): share for names, share in zip(mesh.groups, percent, strict=True) if names}
+    groups = zip(mesh.groups, percent, strict=True)
+    named = {_as_selected(names[0]): share for names, share in groups if names and names[0] != VOID}
     if not named:
         return ""
     entries = ", ".join(f"{phase} = {own}" for phase, own in zip(("matrix", "fibre"), named, strict=False))

@@ -14,7 +14,10 @@ from feti_homog.sweep.report.sweep_table import Series, SweepTable
 
 COLOURS = ("#1f4e9c", "#c44e00", "#2a7f3f", "#7a3e9d", "#8c6d1f", "#c2185b")
 MARKERS = ("o", "s", "^", "D", "v", "P")
-REALISATION_STYLE: dict[str, Any] = {"markersize": 3.5, "alpha": 0.4, "markeredgewidth": 0}
+REALISATION_STYLE: dict[str, Any] = {"markersize": 3.5, "alpha": 0.4, "markeredgewidth": 0, "label": "realisations"}
+CONFIDENCE_STYLE: dict[str, Any] = {
+    "fmt": "none", "elinewidth": 1.2, "capsize": 2.5, "label": "95 % confidence of the mean",
+}  # fmt: skip
 MESH_ERROR_STYLE: dict[str, Any] = {
     "fmt": "none", "elinewidth": 7.0, "alpha": 0.35, "zorder": 1, "label": "estimated error of the mesh",
 }  # fmt: skip
@@ -48,10 +51,9 @@ def plot_series(axes: Axes, table: SweepTable, series: Series, name: str, style:
         if len(rows) > 1:
             axes.plot([x * x_factor] * len(rows), values[rows], marker, **REALISATION_STYLE, color=colour)
     mean, spread = statistics.mean[numbers], np.nan_to_num(statistics.ci95[numbers])
-    axes.errorbar(
-        series.x, mean, spread, color=colour, marker=marker, markersize=4.5, linewidth=1.2,
-        capsize=2.5, label=series.label or None,
-    )  # fmt: skip
+    axes.plot(series.x, mean, color=colour, marker=marker, markersize=4.5, linewidth=1.2, label=series.label or None)
+    if spread.any():
+        axes.errorbar(series.x, mean, spread, ecolor=colour, **CONFIDENCE_STYLE)
     if (errors := table.statistics.get(f"{name}_mesh_error")) is not None:
         axes.errorbar(series.x, mean, np.nan_to_num(errors.mean[numbers]), ecolor=colour, **MESH_ERROR_STYLE)
 

@@ -100,7 +100,7 @@ def test_a_cut_window_leaves_out_centres_outside(tmp_path):
     text = "# width = 8, height = 6, left = 0, bottom = 0\nx,y,r\n2,2,1\n-0.5,3,1\n5,4,1.2\n4,7,1\n"
     read = case(tmp_path / "t.csv", text, window="cut")
     is_expected(read.cell.table)
-    assert read.remarks() == ('[cell] window = "cut": 2 rows with centres outside are left out: 4, 6',)
+    assert read.remarks() == ('[cell] window = "cut": leaves out 2 rows with centres outside: 4, 6',)
 
 
 TOUCHING = "x,y,r\n2,2,1\n3.995,2,1\n6,4,0.5\n"

@@ -212,7 +212,8 @@ def test_bars_are_the_mean_errors_of_the_mesh():
     documents = [each | {"mesh_error": error} for each, error in zip(documents, errors, strict=True)]
     table = collected({"cell.fibre_fraction": [0.2, 0.4] * 2}, documents, [1, 2] * 2, [1, 1, 2, 2])
     assert "nu31_mesh_error" not in table.outputs  # of a constant that has no column
-    panel = moduli.figure(table).axes[moduli.PANELS.index("bulk")]
+    panel = (figure := moduli.figure(table)).axes[moduli.PANELS.index("bulk")]
+    assert {"realisations", "95 % confidence of the mean"} <= {each.get_text() for each in figure.legends[0].texts}
     (bars,) = (each for each in panel.containers if each.get_label() == "estimated error of the mesh")
     (ends,) = (lines.get_segments() for lines in bars.lines[2])
     assert [end[:, 1].tolist() for end in ends] == [pytest.approx([96.0, 99.0]), pytest.approx([106.0, 113.0])]

@@ -181,6 +181,14 @@ def test_refused_names_are_listed_with_the_way_out(tmp_path):
         read(tmp_path / "a.msh", phases={"matrix": (1,), "fibre": ("Glas",)})
 
 
+def test_a_meshed_void_is_no_phase_to_be_named(tmp_path):
+    replace(grid(), names={1: "void", 2: "resin"}).write(tmp_path / "a.msh")
+    with pytest.raises(MeshError) as error:
+        read(tmp_path / "a.msh")
+    assert "expected no elements in a void" in error.value.faults[0]
+    assert 'phases = {matrix = "resin"}' in error.value.faults[-1]
+
+
 def test_an_element_of_two_phases_is_refused(tmp_path):
     calculix(tmp_path / "a.inp")
     with pytest.raises(MeshError, match="is in 2 element sets: fibre, matrix"):
