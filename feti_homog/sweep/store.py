@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -24,6 +25,7 @@ from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.results import atomic, checkpoint_folder, output_folder, result_json, seals
 from feti_homog.runtime import input_files
 from feti_homog.runtime.file_locks import Lock, LockHeld, is_locked
+from feti_homog.schema.values import INF
 from feti_homog.sweep.plan import Sweep, SweepCase, identity_of
 from feti_homog.version import __version__
 
@@ -97,7 +99,7 @@ def prepare_folder(directory: Path, sweep: Sweep) -> None:
             atomic.remove_unfinished(directory, re.compile(rf"{INDEX_FILE}|{TABLE_FILE}"))
             if known != sweep.entries:
                 document = {"version": __version__, "name": sweep.name, "stress_unit": sweep.stress_unit}
-                entries = [asdict(entry) for entry in sweep.entries]
+                entries = [_replaced(asdict(entry), math.inf, INF) for entry in sweep.entries]
                 atomic.replace_text(directory / INDEX_FILE, seals.dumps(document | {"cases": entries}))
             atomic.replace_text(directory / TABLE_FILE, _table(sweep.entries))
     except LockHeld as error:
@@ -113,7 +115,7 @@ def read_index(directory: Path) -> SweepIndex:
     path = directory / INDEX_FILE
     try:
         document = seals.loads(input_files.read(path).decode("utf-8"))
-        entries = tuple(SweepCase(**entry) for entry in document["cases"])
+        entries = tuple(SweepCase(**_replaced(entry, INF, math.inf)) for entry in document["cases"])
         if not all(isinstance(e.number, int) and isinstance(e.inputs, dict) for e in entries):
             raise TypeError("a case has no number or no inputs")
         return SweepIndex(document["name"], document["stress_unit"], entries)
@@ -122,6 +124,15 @@ def read_index(directory: Path) -> SweepIndex:
     except (ValueError, KeyError, TypeError) as error:
         words = str(error).removeprefix("it is damaged: ")
         raise CaseError(f"{path} is damaged: {words}; move it away and start the sweep again") from error
+
+
+def _replaced(value: Any, old: Any, new: Any) -> Any:
+    """Return the value with `new` in place of `old` in all its tables and lists: JSON has no infinite numbers."""
+    if isinstance(value, dict):
+        return {key: _replaced(item, old, new) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_replaced(item, old, new) for item in value]
+    return new if value == old else value
 
 
 def case_state(directory: Path, entry: SweepCase) -> CaseState:

@@ -113,3 +113,12 @@ def test_the_folder_of_a_sweep_is_made_whole_again(tmp_path):
         "statistics.csv": "collected",
     }
     assert store.read_index(out).entries == sweep.entries
+
+
+def test_bonds_that_never_break_are_values_of_a_sweep(tmp_path):
+    """JSON has no infinite numbers, and the list of cases is such a file."""
+    axes = '"interface.debonded" = [[]]\n"interface.normal_stiffness" = [2.0, inf]\n'
+    sweep, out = plan.load(sweep_file(tmp_path, axes)), tmp_path / "out"
+    store.prepare_folder(out, sweep)
+    assert store.read_index(out).entries == sweep.entries
+    store.prepare_folder(out, sweep)
