@@ -217,7 +217,7 @@ def _read_sections(document: dict[str, Any], folder: Path | None) -> tuple[dict[
     cell = _read_section(document, "cell", reader)
     sections = {
         "cell": None if "cell" in foreign or cell is None or not folder else checked_cell(cell, folder, faults),
-        "materials": read_materials(document.get("material"), document.get("cell"), selected[PLANE], reader),
+        "materials": read_materials(document, selected[PLANE], reader),
         "analysis": _read_section(document, "analysis", reader),
         "decomposition": _read_section(document, "decomposition", reader),
         "interfaces": read_interfaces(document, reader),

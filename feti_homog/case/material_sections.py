@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
+from typing import Any
 
 from feti_homog.case.cell_section import CIRCULAR, GEOMETRY, Cell
 from feti_homog.case.phase_names import COATING, FIBRE, MATRIX, PHASE
@@ -17,18 +18,19 @@ SUGGESTED = (MATRIX, FIBRE, COATING, "fibre:2")  # of phases that may have any n
 CONSTANTS = frozenset(name for form in MATERIAL_FORMS.values() for name in keys_of(form))
 
 
-def read_materials(table: object, cell: object, plane: str | None, reader: TableReader) -> dict[str, Material]:
+def read_materials(document: Mapping[str, Any], plane: str | None, reader: TableReader) -> dict[str, Material]:
     """Return the materials by phase; what depends on a geometry, mix or plane state that is faulty is not checked.
 
-    `cell` is the section [cell] as it stands in the document.
+    Empty without a section [material]: that is a fault of the whole document.
     """
-    if table is None:
+    if "material" not in document:
         return {}
+    table = document["material"]
     if not isinstance(table, dict):
         reader.faults.append(f"material = {toml_value(table)}: expected sections [material.matrix], [material.fibre]")
         return {}
     geometry = reader.selected[GEOMETRY]
-    fibres = fibre_phases(cell) if geometry in CIRCULAR else None
+    fibres = fibre_phases(document.get("cell")) if geometry in CIRCULAR else None
     known = None if fibres is None else (MATRIX, *fibres, COATING)
     materials = {}
     for phase, constants in table.items():

@@ -101,7 +101,7 @@ def _bounds(table: SweepTable) -> PanelBounds | None:
     case = table.finished[0]["case"]
     plane = case["analysis"]["plane"]
     reader = TableReader({GEOMETRY: case["cell"]["geometry"]})
-    materials = read_materials(case["material"], case["cell"], plane, reader)
+    materials = read_materials(case, plane, reader)
     phases = [stiffness_of(materials[phase], plane) for phase in ("matrix", "fibre")]
     c = _fractions([float(document["cell"]["fibre_fraction"]) for document in table.finished])
     spatial = PLANE_STATES[plane].is_spatial

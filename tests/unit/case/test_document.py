@@ -96,6 +96,7 @@ FAULTY: dict[str, tuple[dict[Any, Any], str]] = {
     "array as section": ({"cell": np.zeros(2)}, "cell = [0.0, 0.0]: expected a section [cell]"),
     "pairs as section": ({"cell": [("order", 1)]}, 'cell = [["order", 1]]: expected a section [cell]'),
     "none as section": ({"analysis": None}, "analysis = null: expected a section [analysis]"),
+    "none as materials": ({"material": None}, "material = null: expected sections [material.matrix], [material.fibre]"),
     "set as list": ({"angle": {"values": {1}}}, '[angle] values = "{1}": expected a rising list'),
     "complex": ({"cell": {"mesh_size": 1j}}, '[cell] mesh_size = "1j": expected a number'),
     "array of wrong shape": ({"path": {"strain": np.zeros((3, 1))}}, "[path] strain = [[0.0], [0.0], [0.0]]: expected"),
