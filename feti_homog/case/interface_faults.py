@@ -32,8 +32,8 @@ def read_interfaces(document: Mapping[str, Any], reader: TableReader) -> tuple[I
         return None
     interfaces = tuple(map(_completed, filter(None, read)))
     reader.faults += _faults_between(interfaces, tables)
-    for label, interface in zip(labels, interfaces, strict=True):
-        reader.faults += [*_cohesive_faults(interface, label), *_friction_faults(interface, label)]
+    for label, interface, table in zip(labels, interfaces, tables, strict=True):
+        reader.faults += [*_cohesive_faults(interface, table, label), *_friction_faults(interface, label)]
     return interfaces
 
 
@@ -85,17 +85,17 @@ def _of_table(interface: InterfaceSection) -> dict[str, Any]:
     return {name: own for name, own in zip(names, numbers, strict=True) if getattr(interface, name) is None}
 
 
-def _cohesive_faults(interface: InterfaceSection, label: str) -> list[str]:
-    """List what is wrong with the numbers of a law that softens, a line each; keys that are missing are not."""
+def _cohesive_faults(interface: InterfaceSection, table: Mapping[str, Any], label: str) -> list[str]:
+    """List what is wrong with the numbers of a law that softens, a line each; keys that `table` lacks are not."""
     law = LAWS[interface.criterion]
     if not law.softens:
         return []
     words = f"law = {toml_value(law.name)}"
     unlimited = [name for name in (*STIFFNESSES, *COHESIVE[:2]) if getattr(interface, name) is None]
     needed = [name for name in unlimited if name in law.needs]
-    found = [f"[{label}] {name}: {words} needs a finite one" for name in needed]
+    found = [f"[{label}] {name}: {words} needs a finite one" for name in needed if name in table]
     found += [f"[{label}] {line}" for line in _branch_faults(interface)]
-    return found or [f"[{label}] {line}" for line in _short_of_energy(interface)]
+    return found if found or needed else [f"[{label}] {line}" for line in _short_of_energy(interface)]
 
 
 def _friction_faults(interface: InterfaceSection, label: str) -> list[str]:

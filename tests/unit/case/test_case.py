@@ -86,6 +86,14 @@ def test_there_are_enough_faulty_cases():
     assert len(FAULTY) == sum(map(len, (*parts, FAULTY_COHESIVE_LAWS))) >= 100
 
 
+def test_a_missing_number_of_a_softening_law_is_one_fault(tmp_path):
+    with pytest.raises(CaseError) as caught:
+        case_of(tmp_path, FAULTY_COHESIVE_LAWS["softening_without_toughness"][0])
+    assert sorted(fault.split(":")[0] for fault in caught.value.faults) == [
+        f"[interface] {name}" for name in ("normal_toughness", "tangential_strength", "tangential_toughness")
+    ]
+
+
 def test_a_missing_file_is_reported(tmp_path):
     with pytest.raises(CaseError, match=r"none\.toml: cannot be read: No such file"):
         load(tmp_path / "none.toml")
