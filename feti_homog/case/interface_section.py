@@ -117,7 +117,7 @@ class InterfaceSection:
     )
     normal_stiffness: float | None = key(
         STIFFNESS,
-        "Normal traction / opening, k_n, of the bonds that hold, in tension and compression.",
+        "Normal traction / opening, k_n: of bonds that hold in tension and compression, of broken faces in contact.",
         unit="stress / length",
         default=None,
         default_words="inf",

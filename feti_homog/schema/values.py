@@ -43,7 +43,13 @@ class ValueType:
 
     def complaint(self, value: Any) -> str:
         """Return the expectation that a value fails, empty if it is valid."""
-        return "" if self.accepts(value) else f"expected {self.expected}{magnitudes_in_words(value)}"
+        return "" if self.accepts(value) else f"expected {self.expected}{magnitudes_in_words(value)}{_scatter(value)}"
+
+
+def _scatter(value: Any) -> str:
+    """Return which command takes a value with its scatter, {mean, std} or {mean, cv}; else empty."""
+    has_scatter = isinstance(value, dict) and set(value) in ({"mean", "std"}, {"mean", "cv"})
+    return "; `feti-homog uncertainty` takes scatter" if has_scatter else ""
 
 
 def magnitudes_in_words(value: Any) -> str:
