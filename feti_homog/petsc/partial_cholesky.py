@@ -89,8 +89,10 @@ class PartialFactor:
         n, is_last = A.shape[0], np.zeros(A.shape[0], bool)
         is_last[rows] = True
         A.sort_indices()
-        arrays = A.indptr.astype(np.int32, copy=False), A.indices.astype(np.int32, copy=False), A.data
-        matrix = _Sparse(n, n, A.nnz, *map(_address, arrays[:2]), None, _address(A.data), None, LOWER, 0, REAL, 0, 1, 1)
+        # CHOLMOD reads these arrays as they lie in memory.
+        p, i = (own.astype(np.int32, copy=False) for own in (A.indptr, A.indices))
+        x = np.asarray(A.data, np.float64)
+        matrix = _Sparse(n, n, A.nnz, _address(p), _address(i), None, _address(x), None, LOWER, 0, REAL, 0, 1, 1)
         self._order, self._m = np.r_[order[~is_last[order]], rows], len(rows)
         self._common, library = ctypes.create_string_buffer(COMMON_BYTES), _library()
         library.cholmod_start(self._common)
@@ -119,7 +121,7 @@ class PartialFactor:
 
     def solve(self, B: Float) -> Float:
         """A^-1 B for B (n,) or (n, k)."""
-        return self._solve(WHOLE, np.asfortranarray(B.reshape(len(B), -1))).reshape(B.shape)
+        return self._solve(WHOLE, np.asfortranarray(B.reshape(len(B), -1), np.float64)).reshape(B.shape)
 
     def _solve(self, system: int, B: Float) -> Float:
         """(n, k) solution of one of CHOLMOD's systems, for B (n, k) in Fortran order.

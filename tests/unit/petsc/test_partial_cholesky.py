@@ -26,6 +26,15 @@ def test_the_factor_is_the_dense_one():
     assert factor.forward(loads[:, :0]).shape == (9, 0)
 
 
+@pytest.mark.parametrize("kind", [np.float32, np.int64])
+def test_numbers_of_other_types_are_converted(kind):
+    A, rows, order = 4.0 * np.eye(3) + np.eye(3, k=1) + np.eye(3, k=-1), np.array([2]), np.arange(3)
+    B = np.array([1.0, 2.0, 3.0])
+    for matrix, right in ((A.astype(kind), B), (A, B.astype(kind))):
+        found = PartialFactor(csr_matrix(matrix), rows, order).solve(right)
+        np.testing.assert_allclose(found, np.linalg.solve(A, B), rtol=1e-12)
+
+
 def test_a_matrix_that_is_not_definite_is_refused_without_a_word(capfd):
     A = csr_matrix(np.array([[1.0, 2.0, 0.0], [2.0, 1.0, 0.0], [0.0, 0.0, 1.0]]))
     with pytest.raises(np.linalg.LinAlgError, match="not positive definite"):
