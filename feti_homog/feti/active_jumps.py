@@ -1,4 +1,4 @@
-"""Jumps that the active rows see but for rigid-body motions, P of them, and what of these is rounding."""
+"""Jumps on the active rows, projected by P so that no rigid-body motion is left, and the rounding in them."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ class ActiveJumps:
     def projected(self, x: Float, size: Float) -> Float:
         """P x for jumps x (owned rows, k) of the norms `size` (k,).
 
-        It is projected again where it is far smaller than x: rounding of the motions that were taken away is out of
-        the range of P, so no multipliers remove it, and a Krylov method that meets it stalls.
+        It is projected again where it is far smaller than x. Rounding of the motions that P takes away is out of the
+        range of P, so no multipliers remove it, and a Krylov method that meets it stalls.
         """
         projected = self._natural.project(self._active.restrict(x))
         if (self.norms(projected) < CANCELLED * size).any():
@@ -60,7 +60,10 @@ class ActiveJumps:
     def solutions(
         self, strains: Float, lam: Float, jump: Float, iterations: int, reason: int, scale: Float
     ) -> list[DualSolution]:
-        """Amplitudes, jumps, residuals of `lam` (owned rows, k); `jump` = d E - F lam but for rigid motions."""
+        """Return the solutions that multipliers `lam` (owned rows, k) make, with amplitudes, jumps and residuals.
+
+        `jump` (owned rows, k) is d E - F lam, to which rigid-body motions are added; `scale` (k,) that of residuals.
+        """
         alpha = np.zeros((self._natural.kernel_dimension, len(strains)))
         if self._natural.kernel_dimension:
             alpha -= self._natural.amplitudes(self._active.restrict(jump))

@@ -1,4 +1,4 @@
-"""Solutions by influence columns, which F lambda confirms seldom while it finds nothing to iterate."""
+"""Solutions by influence columns; as long as F lambda confirms them, it is applied only now and then."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from feti_homog.typing import Float
 
 
 class InfluenceSolutions:
-    """Spare F lambda in solves by influence columns: 2n + 1 after a confirmed one that n spared ones precede.
+    """Solves by influence columns, most of them without F lambda.
 
-    They are at most MOST_UNCONFIRMED.
+    After n solves without F lambda, one with it confirms them; then 2 n + 1 go without, at most MOST_UNCONFIRMED.
     """
 
     def __init__(
@@ -47,8 +47,8 @@ class InfluenceSolutions:
     def solutions(self, strains: Float, d: Float) -> list[DualSolution] | None:
         """Return those of the loads (k, v), with jumps d (owned rows, v) of the torn cell; None if F lambda is due.
 
-        It always is for loads of which the active rows see so little that it may be rounding, and where as many motions
-        are free by rank as columns find is not so.  Collective.
+        It is always due for loads whose jump on the active rows may be rounding, and where the columns find another
+        number of free motions than the coarse space has.  Collective.
         """
         self._expected = None
         if not self._granted:
@@ -74,18 +74,18 @@ class InfluenceSolutions:
     def closing(self, d: Float, E: Float, weights: Float) -> Float:
         """H d E, but for rounding, of loads E (v, k) of a solve with `weights` (k,), for F lambda to confirm.
 
-        It is that which is followed, if there is one: so what is confirmed costs no columns.  Collective.
+        Multipliers that `solutions` has left to be confirmed are taken: they cost no columns.  Collective.
         """
         return self._inverse.multipliers(d, E) if self._expected is None else self._expected[0] * weights
 
     def record(self, solutions: list[DualSolution], d: Float) -> None:
-        """Record solutions that F lambda confirmed, or that iterations had to improve; none of loads that are unseen.
+        """Record solutions that F lambda confirmed, or that iterations had to improve; none if a load is unseen.
 
         Collective.
 
         Raises:
-            ConvergenceError: what the columns would have given, as in the solves before, is off by more than checks
-                pass.
+            ConvergenceError: the multipliers that the columns give, as in the solves before, have a larger error than
+                the checks of a run allow.
         """
         if solutions and self._expected is not None:
             self._check(d, solutions)
@@ -97,7 +97,7 @@ class InfluenceSolutions:
             self._squares = allreduce_sum(self._comm, np.stack([seen.T @ seen, d.T @ d]))
 
     def _check(self, d: Float, solutions: list[DualSolution]) -> None:
-        """Make what is followed anew where solutions that F lambda confirms show more than rounding.
+        """Compare expected multipliers with solutions that F lambda confirms; renew them if more than rounding differs.
 
         Collective; raises as `record`.
         """
@@ -111,7 +111,7 @@ class InfluenceSolutions:
             self._renew(d, solutions, error)
 
     def _renew(self, d: Float, solutions: list[DualSolution], error: float) -> None:
-        """Make what is followed anew; where that changes nothing, the `error` is rounding of F lambda.  Collective."""
+        """Renew followed multipliers; if they stay the same, the `error` is rounding of F lambda.  Collective."""
         self._inverse.renew_answer(d)
         strains = np.stack([each.strain for each in solutions], axis=1)
         again = self._inverse.answer(d, strains, self._natural.unconstrained_modes.shape[1])

@@ -1,4 +1,4 @@
-"""The parts of the solver: boundary operators, preconditioner and coarse spaces, made as `solver_plan` chooses."""
+"""The parts of the solver, built as `solver_plan` chooses: boundary operators, preconditioner and coarse spaces."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class SolverParts:
 
     @property
     def coarse_dimension(self) -> int:
-        """Coarse displacements, or where only rigid-body motions are, these."""
+        """Number of coarse displacements; without an adaptive coarse space, of rigid-body motions."""
         return self.natural.kernel_dimension if self.adaptive is None else self.adaptive.coarse_dimension
 
     def describe(self, comm: MPI.Intracomm) -> str:
@@ -117,8 +117,9 @@ def build(
 ) -> SolverParts:
     """Factor the subdomains and set up what the options and sizes ask for.  Collective.
 
-    `compliance` (owned rows,) is C, which may grow if the springs `soften`. Where displacements inside will be asked
-    for, `recovers`, the factor of a rank's only subdomain is kept: it would be the largest at that time anyway.
+    `compliance` (owned rows,) is C, which may grow if the springs `soften`. `recovers` tells that displacements inside
+    will be asked for: then a rank with one subdomain keeps its factor, which takes about the memory that a factor of
+    the interior would take later.
 
     Options: `feti_dual_operator`, `feti_pc_type`, `feti_coarse_space`, `feti_coarse_threshold`.
 

@@ -3,7 +3,7 @@
 H is the preconditioner: M^-1, or H_0 of `coarse.adaptive.Balanced` with coarse displacements in equilibrium.
 
 A vector holds k multiplier vectors, the k values of a row side by side, so that load cases are solved together.
-What the contexts raise is kept until PETSc has returned (`CallbackErrors`).
+Errors that the contexts raise are kept until PETSc has returned (`CallbackErrors`).
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from feti_homog.parallel.distributed_arrays import allreduce_sum, scale_rows
 from feti_homog.petsc.c_functions import CallbackErrors
 from feti_homog.typing import Float
 
-# Methods that apply the preconditioner to the residual itself, so that the jump can be read off there.  With the
-# others the test is on the forces alone, and the checks of the response have the jump.
+# Methods that apply the preconditioner to the residual itself, so that the jump can be read off there.  With others
+# the convergence test sees only the forces; the checks of a response test the jump.
 PRECONDITION_TRUE_RESIDUAL = (PETSc.KSP.Type.CG, PETSc.KSP.Type.FCG)
 
 ESTIMATES_SINGULAR_VALUES = (PETSc.KSP.Type.CG, PETSc.KSP.Type.GMRES, PETSc.KSP.Type.FGMRES)
@@ -99,7 +99,7 @@ class ProjectedPreconditioner:
 
 
 class Stall:
-    """Return whether a norm has not halved for `patience` iterations."""
+    """Watches a norm: it stalls if it has not halved for `patience` iterations."""
 
     def __init__(self, patience: int) -> None:
         self._patience = patience
@@ -109,7 +109,7 @@ class Stall:
         self._smallest, self._found_at = np.inf, 0
 
     def is_reached(self, iteration: int, norm: float) -> bool:
-        """With the norm of this iteration."""
+        """Return whether the norm stalls, given that of this iteration."""
         if norm < self._smallest / 2:
             self._smallest, self._found_at = norm, iteration
         return iteration - self._found_at >= self._patience
@@ -131,17 +131,17 @@ class PrimalTest:
         self._jump_stall, self._force_stall = Stall(STALL_ITERATIONS), Stall(FORCE_STALL_ITERATIONS)
 
     def set_scales(self, jump: float, forces: float) -> None:
-        """Norms of the torn cell's jump and of the forces that close it, for the next solve."""
+        """Set the norms of the torn cell's jump and of the forces that close it, for the next solve."""
         self._jump_scale, self._force_scale = jump, forces
 
     def is_met(self, rtol: float, jump: float, forces: float) -> bool:
-        """Return whether norms of the jump and of the forces are both below rtol; no jump at all is."""
+        """Return whether norms of the jump and of the forces are both below rtol, or there is no jump."""
         return jump <= rtol * self._jump_scale and (forces <= rtol * self._force_scale or jump == 0.0)
 
     def __call__(self, ksp: PETSc.KSP, iteration: int, residual: float) -> PETSc.KSP.ConvergedReason:
         """Return whether to go on; `residual` is the norm of the preconditioned one, |P H r|.  Collective."""
-        ended = PETSc.KSP.ConvergedReason.DIVERGED_NANORINF
-        return self._errors.call(lambda: self._judge(ksp, iteration, residual), ended)
+        failed = PETSc.KSP.ConvergedReason.DIVERGED_NANORINF
+        return self._errors.call(lambda: self._judge(ksp, iteration, residual), failed)
 
     def _judge(self, ksp: PETSc.KSP, iteration: int, residual: float) -> PETSc.KSP.ConvergedReason:
         rtol, atol, divtol, _ = ksp.getTolerances()
@@ -229,10 +229,7 @@ class Krylov:
         return found
 
     def describe(self, iterations: int) -> str:
-        """Return iterations and condition number of the last solve.
-
-        As the method estimates it and -feti_view prints.
-        """
+        """Return iterations and estimated condition number of the last solve, as -feti_view prints them."""
         ksp, load_cases = self.ksp, self._columns
         words = f"FETI: {load_cases} load case{'s' * (load_cases > 1)}, {iterations} iterations"
         if not iterations or ksp.getType() not in ESTIMATES_SINGULAR_VALUES:

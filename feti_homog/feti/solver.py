@@ -33,7 +33,7 @@ from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.runtime import process_memory
 from feti_homog.typing import Float
 
-# What rounding can end in.
+# Reasons for which PETSc gives up where rounding is at work.
 REASON = PETSc.KSP.ConvergedReason
 BREAKDOWNS = (REASON.DIVERGED_INDEFINITE_PC, REASON.DIVERGED_INDEFINITE_MAT, REASON.DIVERGED_BREAKDOWN)
 
@@ -47,7 +47,7 @@ class Iterate(NamedTuple):
 
 
 class FetiSolver:
-    """Set-up of the dual problem; all factorizations of subdomains are made here, once.
+    """Set-up of the dual problem: it factors every subdomain, once; `displacement` may factor interiors.
 
     Options have the prefix `feti_`.
 
@@ -61,7 +61,7 @@ class FetiSolver:
         exact_inverse: the preconditioner, if it is the inverse of the dual operator; else None.
         natural: the rigid-body motions, G and P.
         adaptive: the coarse space of the preconditioner, if it has one.
-        coarse_dimension: coarse displacements, or where only rigid-body motions are, these.
+        coarse_dimension: number of coarse displacements, or of rigid-body motions without `adaptive`.
         active: which rows carry multipliers.
         solves: dual problems so far, one for each load.
     """
@@ -165,9 +165,9 @@ class FetiSolver:
         return np.asarray(self.torn_stiffness @ solution.strain + forces)
 
     def set_state(self, active: Float, compliance: Float) -> None:
-        """Let rows where `active` is 1 alone carry multipliers, and springs have this C (owned rows,).  Collective.
+        """Let only rows where `active` is 1 carry multipliers, and springs have this C (owned rows,).  Collective.
 
-        C is no less than at first; refactors the coarse problem alone. Raises as `Preconditioner.soften`.
+        C is no less than at first. Only the coarse problem is refactored. Raises as `Preconditioner.soften`.
         """
         changed = bool((active != self.active.mask).any()) + 2 * bool((compliance != self.operator.compliance).any())
         change = self.comm.allreduce(changed, MPI.BOR)
@@ -223,23 +223,23 @@ class FetiSolver:
         return solutions
 
     def completed(self, solution: DualSolution) -> DualSolution:
-        """Return a solution of the present state, with what F lambda gives if that did not confirm it.  Collective."""
+        """Return a solution of the present state, completed by F lambda unless that confirmed it.  Collective."""
         return solution if solution.alpha is not None else self._jumps.completed(solution, self.d)
 
     def boundary_displacement(self, solution: DualSolution) -> Float:
-        """(boundary dofs,) u* of a solution, Eq. (34), of the present state unless complete.  Collective."""
+        """(boundary dofs,) u* of a solution, Eq. (34), which is of the present state or complete.  Collective."""
         solution = self.completed(solution)
         assert solution.alpha is not None
         u = self._torn_displacement @ solution.strain - self.operator.displacement(solution.lam)
         return np.asarray(u + self.natural.rigid_body_motion(solution.alpha))
 
     def displacement(self, solution: DualSolution) -> Float:
-        """(local dofs,) u* of a solution; factors the interiors when first called.  Collective."""
+        """(local dofs,) u* of a solution; the first call factors interiors without a kept factor.  Collective."""
         u, places = self.boundary_displacement(solution), range(len(self.subdomains))
         return np.concatenate([np.zeros(0), *(self.extended(place, u, solution.strain) for place in places)])
 
     def extended(self, place: int, u: Float, loads: Float, keep: bool = True) -> Float:
-        """(dofs, k) u* of one subdomain, of u (boundary dofs, k) on all boundaries under the loads (v, k)."""
+        """(dofs, k) u* of one subdomain, of u (boundary dofs, k) on all boundaries; see `InterfaceOperators.extend`."""
         operators = self.interface_operators
         return operators.extend(place, u[operators.slices[place]], loads, keep)
 
@@ -254,11 +254,11 @@ class FetiSolver:
             self.adaptive.destroy()
 
     def _solve_with_restarts(self, krylov: Krylov, lam: Float, right: Float) -> tuple[Iterate, int, int]:
-        """Multipliers, iterations, and why they ended.
+        """Return multipliers, iterations, and why these ended.
 
         With an adaptive coarse space the condition number is small: proven with all rows active, measured with others.
-        So what holds the iteration is rounding, and it begins anew from where it is, with what is left computed anew;
-        after MAX_RESTARTS of that it is left to go on.
+        So only rounding stalls the iteration. Then it restarts from its last multipliers, with their residual computed
+        anew; after MAX_RESTARTS restarts of this kind a stall does not end it any more.
         """
         iterations = 0
         for restart in range(MAX_RESTARTS + 2):
@@ -275,7 +275,7 @@ class FetiSolver:
         return Iterate(lam, self.operator.apply(lam), first.residual), iterations, reason
 
     def _first_iterate(self, lam: Float, right: Float) -> Iterate:
-        """Multipliers to begin with, 0 where `lam` leave more than was there."""
+        """Return the iterate to begin with: `lam`, or 0 for loads of which `lam` leaves a larger residual than 0."""
         applied, residual = np.zeros_like(lam), right
         if self._jumps.norms(lam).any():
             applied = self.operator.apply(lam)

@@ -17,7 +17,7 @@ WITHOUT_INVERSE = (
     f"[interface] friction: needs influence columns, which are taken up to {DEFAULTS.assembled_schur_dofs} degrees of "
     "freedom on shared nodes unless -feti_pc_type asks for others; -feti_pc_type influence has them in any cell"
 )
-"""The words by which a cell with friction is refused."""
+"""The message to a cell with friction whose preconditioner is not made of influence columns."""
 
 
 @dataclass(frozen=True)
@@ -64,10 +64,7 @@ class SolverOptions:
         )
 
     def want_soft_modes(self, bodies_are_cut: bool) -> bool:
-        """Return whether soft modes are looked for.
-
-        Asked for, or bodies are cut, for the webs that METIS makes have them.
-        """
+        """Return whether soft modes are looked for: if asked for, or if bodies are cut, as webs by METIS have some."""
         return self.coarse_space == "adaptive" or (self.coarse_space == "auto" and bodies_are_cut)
 
 
@@ -79,11 +76,10 @@ class ProblemSizes:
         applications: how many times the dual operator is expected to be applied.
         bodies_are_cut: whether there are more subdomains than bodies.
         all_dense: whether all boundary operators are dense.
-        all_searchable: whether all are dense, but of bodies whose faces are searched for soft modes one by one.
+        all_searchable: whether all can be searched for soft modes: they are dense, or are searched face by face.
         shared_dofs: dofs on the shared nodes, of the cell with all bonds intact.
-        has_thin: whether some bodies are thin.  Such a ring bends easily and resists to change its thickness, which
-            no scaling meets: with the Dirichlet preconditioner thin ones take hundreds of iterations, or do not
-            converge.
+        has_thin: whether some bodies are thin.  A thin ring bends easily but resists a change of its thickness, which
+            no scaling reflects: the Dirichlet preconditioner takes hundreds of iterations then, or does not converge.
         one_each: whether each of several ranks has a single subdomain, and these reach across materials.
     """
 

@@ -125,13 +125,13 @@ INCOMPRESSIBLE_SHARE = 1e-4
 RTOL = 1e-8
 # Iterations per load case: the default of `-feti_ksp_max_it`.
 MAX_ITERATIONS = 2000
-# Iterations in which the jump must halve once the forces are small enough; else rounding holds it, and the solve is
-# begun anew from where it is.  Without rounding CG at a condition number of 10 halves it in one or two.
+# Iterations in which the jump must halve once the forces are small enough; else rounding stalls it, and the solve
+# restarts from its last multipliers.  Without rounding CG at a condition number of 10 halves it in one or two.
 STALL_ITERATIONS = 4
 # Iterations in which the forces must halve before they are small enough: plateaus of CG are shorter where the coarse
 # space leaves a condition number of about 1 / tau (`scripts/robustness`: at most 23 iterations in all).
 FORCE_STALL_ITERATIONS = 50
-# Such new beginnings, before the iteration is left to go on.
+# Restarts of a stalled iteration, before it is left to go on.
 MAX_RESTARTS = 2
 # A projected vector, relative to the one before, below which it is projected again: what rounding leaves of rigid-body
 # motions is then that of a vector of its own size.

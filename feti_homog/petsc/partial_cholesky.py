@@ -1,7 +1,7 @@
-"""Partial Cholesky factorizations by the CHOLMOD that PETSc is linked with; PETSc's interface to it has none.
+"""Partial Cholesky factorizations by the CHOLMOD that PETSc is linked with; PETSc's own interface to it offers none.
 
-MUMPS chooses the order of the other rows without regard to those that stay, and takes longer where these are many.
-CHOLMOD's own functions get a whole order. Its structures are those of its manual, which every version since 2 has.
+MUMPS orders the eliminated rows without regard to those that stay, and takes longer where many stay. CHOLMOD's own
+functions take a given order of all rows. The structures below are those of its manual, the same in KNOWN_VERSIONS.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from scipy.sparse import csr_matrix
 
 from feti_homog.typing import Array, Float, Int
 
-# Bytes for `cholmod_common`, which has less than 4 KiB, and whose members are not touched.
+# Bytes for `cholmod_common`, which takes less than 4 KiB; this module reads none of its members.
 COMMON_BYTES = 2**16
 GIVEN = 1  # an order of rows
 WHOLE, FORWARD = 0, 4  # the solves with A, and with L
@@ -93,6 +93,7 @@ class PartialFactor:
         p, i = (own.astype(np.int32, copy=False) for own in (A.indptr, A.indices))
         x = np.asarray(A.data, np.float64)
         matrix = _Sparse(n, n, A.nnz, _address(p), _address(i), None, _address(x), None, LOWER, 0, REAL, 0, 1, 1)
+        # The rows in the order that is asked for; CHOLMOD eliminates row `_order[k]` as its `_place[k]`-th.
         self._order, self._m = np.r_[order[~is_last[order]], rows], len(rows)
         self._common, library = ctypes.create_string_buffer(COMMON_BYTES), _library()
         library.cholmod_start(self._common)
@@ -105,14 +106,14 @@ class PartialFactor:
             raise np.linalg.LinAlgError(f"not positive definite (cholmod: pivot {self._factor.contents.minor})")
 
     def last_block(self) -> Float:
-        """(m, m) part of L on `rows`, in reverse, so that it is an upper triangle.
+        """(m, m) block of L on `rows`, in reverse, so that it is an upper triangle.
 
-        Entry (m - 1 - i, m - 1 - j) is L's of rows i and j of `rows`. Below the diagonal there is anything.
+        Entry (m - 1 - i, m - 1 - j) is that of L on rows i and j of `rows`. Entries below the diagonal are arbitrary.
         """
         return _block(self._factor.contents, self._place[len(self._place) - self._m :])
 
     def forward(self, B: Float) -> Float:
-        """(n, k) L^-1 B for B (n, k), the other rows first, in the order of elimination, and `rows` at the end."""
+        """(n, k) L^-1 B for B (n, k): first the other rows in the `order` given, then `rows`."""
         if not B.shape[1]:
             return B
         permuted = np.empty(B.shape, order="F")
@@ -127,7 +128,7 @@ class PartialFactor:
         """(n, k) solution of one of CHOLMOD's systems, for B (n, k) in Fortran order.
 
         Raises:
-            MemoryError: there is none left.
+            MemoryError: CHOLMOD could not solve, for want of memory as a rule.
         """
         right = _Dense(len(B), B.shape[1], B.size, len(B), _address(B), None, REAL, 0)
         solved = _library().cholmod_solve(system, self._factor, byref(right), self._common)
@@ -140,7 +141,10 @@ class PartialFactor:
 
 
 def _analyse(matrix: _Sparse, order: Int, factor: Any, common: Any) -> Int:
-    """Lay out a factor in an equivalent order, a postordering of the tree; return the place (n,) of each of `order`."""
+    """Lay out a factor in a postordering of the elimination tree, which has the same fill as `order` (n,).
+
+    Return the place (n,) of each row of `order` in it.
+    """
     n, library = len(order), _library()
     parent, post, count, *work = np.empty((5, n), np.int32)
     done = library.cholmod_analyze_ordering(
@@ -206,7 +210,7 @@ def _library() -> ctypes.CDLL:
     library.cholmod_allocate_factor.restype = POINTER(_Factor)
     library.cholmod_ptranspose.restype = POINTER(_Sparse)
     library.cholmod_solve.restype = POINTER(_Dense)
-    try:  # its warnings go to the user's screen, and are raised
+    try:  # CHOLMOD prints no warnings: this module raises what they say
         library.SuiteSparse_config_printf_func_set(None)
     except AttributeError:  # before SuiteSparse 6 the function is the fifth of a structure
         with suppress(ValueError):

@@ -26,8 +26,8 @@ TOO_SMALL, MORE_WORKSPACE = (-8, -9), (None, 100, 1000)
 def schur_complement(matrix: csr_matrix, rows: Int, order: Int | None = None) -> Float:
     """(n, n) Schur complement of a matrix on `rows`, in Fortran order; the rest of the matrix has to be SPD.
 
-    By CHOLMOD in an `order` (dofs,) of elimination, where there is one, of a matrix with a positive diagonal. By MUMPS
-    otherwise, and where there are options, which have the prefix `feti_schur_`.
+    CHOLMOD eliminates the rest in the `order` (dofs,) if that is given; the diagonal on `rows` has to be positive then.
+    Without an order, and if there are options under `feti_schur_`, MUMPS does.
 
     Raises:
         LinAlgError: the rest of the matrix is not positive definite, or has entries that are not finite.
@@ -51,14 +51,20 @@ def schur_complement(matrix: csr_matrix, rows: Int, order: Int | None = None) ->
 
 @dataclass(frozen=True)
 class ShiftedFactor:
-    """K + D = L L^T of a condensed matrix K (dofs, dofs), with D > 0 on `rows` (n,) alone: it may be singular."""
+    """Cholesky factor of K + D, for a matrix K (dofs, dofs) that may be singular itself.
+
+    Attributes:
+        factor: L with L L^T = K + D.
+        rows: (n,) those to which K is condensed.
+        D: (n,) > 0, what is added to the diagonal of K on `rows`.
+    """
 
     factor: PartialFactor
     rows: Int
     D: Float
 
     def solution(self, f: Float, x: Float) -> Float:
-        """(dofs, k) u of K u = f (dofs, k), which is known to be x (n, k) on the `rows`: (K + D) u = f + D x."""
+        """(dofs, k) u with K u = f (dofs, k) and known values x (n, k) on `rows`, from (K + D) u = f + D x."""
         right = f.copy(order="F")
         right[self.rows] += (self.D * x.T).T
         u = self.factor.solve(right)
@@ -74,7 +80,7 @@ class CondensedMatrix:
         S: (n, n) Schur complement, in Fortran order.
         q: (n, v) Q_b - K_bi K_ii^-1 Q_i.
         C: (v, v) -Q_i^T K_ii^-1 Q_i.
-        factor: of all of K, None of a library that leaves none.
+        factor: of K + D if CHOLMOD condensed K; None if MUMPS did, which leaves none.
     """
 
     S: Float
@@ -84,7 +90,7 @@ class CondensedMatrix:
 
 
 def condensed_with_loads(matrix: csr_matrix, rows: Int, loads: Float, order: Int | None = None) -> CondensedMatrix:
-    """Condense a matrix as `schur_complement`, and the loads Q (dofs, v), which border it, by the same elimination."""
+    """Condense a matrix and its loads Q (dofs, v) to `rows` by one elimination; errors as of `schur_complement`."""
     if order is not None and _can_be_ordered():
         return _by_cholmod(matrix, rows, loads, order)
     v, n = loads.shape[1], len(rows)
@@ -96,8 +102,8 @@ def condensed_with_loads(matrix: csr_matrix, rows: Int, loads: Float, order: Int
 
 
 def _can_be_ordered() -> bool:
-    """Return whether CHOLMOD can leave a Schur complement, and nothing is asked of MUMPS."""
-    from feti_homog.petsc import partial_cholesky  # of large subdomains alone
+    """Return whether CHOLMOD can eliminate in a given order, and no option asks for anything of MUMPS."""
+    from feti_homog.petsc import partial_cholesky  # only large subdomains need it
 
     return partial_cholesky.is_available() and not PETSc.Options("feti_schur_").getAll()
 
@@ -105,9 +111,10 @@ def _can_be_ordered() -> bool:
 def _by_cholmod(matrix: csr_matrix, rows: Int, loads: Float, order: Int) -> CondensedMatrix:
     """Return the result of `condensed_with_loads` from K + D = L L^T.
 
-    D > 0 on `rows` alone, so that these have a factor, too: S + D = L_bb L_bb^T, q = L_bb y_b of y = L^-1 Q.
+    D > 0 on `rows` makes K + D definite even if K is singular. With y = L^-1 Q and the block L_bb of L on `rows`,
+    S = L_bb L_bb^T - D and q = L_bb y_b.
     """
-    from feti_homog.petsc.partial_cholesky import PartialFactor  # as before
+    from feti_homog.petsc.partial_cholesky import PartialFactor  # only large subdomains need it
 
     n, shift = len(rows), matrix.diagonal()[rows]
     D = csr_matrix((shift, (rows, rows)), shape=matrix.shape)

@@ -60,16 +60,16 @@ class InterfaceOperators:
         dofs: for each subdomain, (n_s,) local numbers of its boundary dofs, sorted.
         offsets: (subdomains + 1,) where each subdomain begins among the n.
         local_dofs: (n,) their numbers among all dofs of this rank.
-        operators: dense or factored, of each subdomain.
-        with_springs: the same for the preconditioner and the coarse space: those of a body on springs have these.
+        operators: of each subdomain, dense matrices or sparse factors.
+        with_springs: the same with the springs on which a body is, for the preconditioner and the coarse space.
         facewise: whether the soft modes of each are to be looked for face by face.
         B: (local rows, n) the constraints on them, and `BT` its transpose.
         of_inner: (n,) whether each boundary dof is that of the inner of two bodies.
-        body_diagonal: (n,) of K.
-        diagonal: (n,) the same, with springs that of their chain.
-        interiors: of some subdomains, by their places, factored and kept.
+        body_diagonal: (n,) the diagonal of K.
+        diagonal: (n,) the same for scaling jumps: its compressible share, in series with the springs of the body.
+        interiors: kept factors of interiors, by the place of the subdomain.
         springs: (owned rows,) compliance of the springs.
-        compliance: the same of those that no subdomain has, where both bodies are cut.
+        compliance: (owned rows,) the same of springs that belong to no subdomain, as both bodies are cut; else 0.
     """
 
     def __init__(
@@ -81,12 +81,12 @@ class InterfaceOperators:
         soft_modes: bool,
         thresholds: Thresholds = DEFAULTS,
         compliance: Float | None = None,
-        keep: bool = False,
+        keep_factors: bool = False,
     ) -> None:
         """Factor every subdomain, once, as `choose` chooses; takes the stiffness of each.  Arguments as of `choose`.
 
-        `compliance` (local rows,) is that of the springs of the interfaces, None where no rank has any.  `keep` factors
-        for displacements inside.  Nothing is communicated: a rank may fail alone.
+        `compliance` (local rows,) is that of the springs of the interfaces, None where no rank has any.  `keep_factors`
+        of dense operators for `extend`.  Nothing is communicated: a rank may fail alone.
         """
         self.subdomains, self._loads = subdomains, len(jump_operator.problem.loads)
         self.dofs = _constrained_dofs(jump_operator.B, subdomains)
@@ -112,7 +112,7 @@ class InterfaceOperators:
         self.interiors: dict[int, Interior] = {}
         bodies, diagonals = [np.zeros(0)], [np.zeros(0)]
         for subdomain, dofs, choice, root in zip(subdomains, self.dofs, chosen, roots, strict=True):
-            operator, diagonal = _factor(subdomain, dofs, choice.explicit, keep)
+            operator, diagonal = _factor(subdomain, dofs, choice.explicit, keep_factors)
             self.operators.append(operator)
             self.with_springs.append(operator if root is None else WithSprings(operator, root, subdomain.R[dofs]))
             bodies.append(diagonal)
@@ -189,7 +189,7 @@ class InterfaceOperators:
         return CondensedLoads(boundary, of_stresses, sum((own.energy for own in each), np.zeros((v, v))))
 
     def _interior(self, place: int, keep: bool) -> Interior:
-        """Return the factored interior of the subdomain at a place, kept for other loads if that is asked for."""
+        """Return the factored interior of the subdomain at a place; `keep` it for later calls."""
         operator = self.operators[place]
         if isinstance(operator, ImplicitInterfaceOperator):
             return operator.interior
@@ -202,10 +202,10 @@ class InterfaceOperators:
         return interior
 
     def extend(self, place: int, x: Float, loads: Float | None = None, keep: bool = True) -> Float:
-        """(dofs, k) displacements of one subdomain under loads (v, k), if there are any, x (n_s, k) on its boundary.
+        """(dofs, k) displacements of the subdomain at a place, of x (n_s, k) on its boundary and loads (v, k), if any.
 
-        By the factor of the subdomain if that was kept; else the first call factors the interior, each one if it is not
-        to be kept.
+        They come from the factor of the subdomain if that was kept.  Otherwise its interior is factored: by the first
+        call if that may `keep` it, else by every call.
         """
         operator, s = self.operators[place], self.subdomains[place]
         if isinstance(operator, ExplicitInterfaceOperator) and operator.factor is not None:
@@ -222,10 +222,10 @@ class InterfaceOperators:
         return u
 
 
-def _factor(subdomain: Subdomain, dofs: Int, explicit: bool, keep: bool) -> tuple[InterfaceOperator, Float]:
-    """Return the boundary operator of a subdomain and the diagonal of K on its boundary `dofs`.
+def _factor(subdomain: Subdomain, dofs: Int, explicit: bool, keep_factor: bool) -> tuple[InterfaceOperator, Float]:
+    """Return the boundary operator of a subdomain and the diagonal of K on its boundary `dofs`; K is freed.
 
-    K is freed at the end; a dense operator may `keep` its factor.
+    `keep_factor` as of `ExplicitInterfaceOperator`.
 
     Raises:
         MeshError: rounding leaves K no factor.
@@ -234,7 +234,7 @@ def _factor(subdomain: Subdomain, dofs: Int, explicit: bool, keep: bool) -> tupl
     operator: InterfaceOperator
     try:
         if explicit:
-            operator = ExplicitInterfaceOperator(subdomain, K, dofs, keep)
+            operator = ExplicitInterfaceOperator(subdomain, K, dofs, keep_factor)
         else:
             operator = ImplicitInterfaceOperator(subdomain, K, dofs)
     except np.linalg.LinAlgError as error:

@@ -1,8 +1,8 @@
 """Boundary operators of a subdomain, its Schur complement S and flexibility S+: dense matrices, or sparse factors.
 
 Dense ones are symmetric and share one square array, so that a product reads n^2 / 2 numbers.  S comes from one partial
-factorization, whose factors are kept for displacements inside alone: all that the dual problem needs lives on the
-boundary.  Sparse ones serve where these matrices would be too large.
+factorization.  The dual problem needs only the boundary, so the factor is kept only for displacements inside.  Sparse
+factors serve where dense matrices would be too large.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from scipy.sparse import csr_matrix
 
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.linalg.dense_matrices import (
+    ShiftedFactor,
     condensed_with_loads,
     full_from_lower,
     invert_upper,
@@ -33,37 +34,29 @@ from feti_homog.typing import Float, Int
 
 
 class ExplicitInterfaceOperator:
-    """S and S+ of one subdomain on its n boundary dofs, and its unit loads there, `condensed`.
+    """S and S+ of one subdomain on its n boundary dofs, as dense matrices.
 
     With the fixing nodes on the boundary, the inverse of S + rho Rf Rf^T is the boundary part of K+.
 
     Attributes:
-        factor: of the subdomain, if it is kept and the library leaves one.
+        condensed: the unit loads on the boundary.
+        factor: of the whole subdomain, from which `extend` has displacements inside; None if it was not kept.
     """
 
     is_dense = True
 
-    def __init__(self, subdomain: Subdomain, K: csr_matrix, dofs: Int, keep: bool = False) -> None:
-        """Condense K (2c, 2c) to `dofs` (n,), which are sorted local numbers.  Options under `feti_schur_`.
+    def __init__(self, subdomain: Subdomain, K: csr_matrix, dofs: Int, keep_factor: bool = False) -> None:
+        """Condense K (cn, cn) to `dofs` (n,), which are sorted local numbers.  Options under `feti_schur_`.
 
-        `keep` the factor of a subdomain with loads inside.
+        `keep_factor` of a subdomain with loads inside, if CHOLMOD condenses it.
 
         Raises:
             LinAlgError: the Schur complement is not positive definite on the complement of the kernel.
         """
         fixed, self._term = subdomain.fixing(K, np.unique(subdomain.problem.nodes(dofs)))
         self._fixed = np.searchsorted(dofs, fixed)
-        self.n = len(dofs)
-        s, q, C = subdomain, subdomain.Q[dofs], subdomain.area * subdomain.L
-        order, self._subdomain, self.factor = s.elimination_order(), subdomain, None
-        if s.loads_inside:
-            condensed = condensed_with_loads(K, dofs, s.Q, order)
-            both, q, C = condensed.S, condensed.q, C + condensed.C
-            self.factor = condensed.factor if keep else None
-            del condensed  # with the factor
-        else:
-            both = schur_complement(K, dofs, order)
-        self.condensed = CondensedLoads(q, C, C)
+        self.n, self._subdomain = len(dofs), subdomain
+        both, self.condensed, self.factor = _condensed(subdomain, K, dofs, keep_factor)
         self._schur_diagonal = both.diagonal().copy()
         # S stays below the diagonal; the inverse of the regularised S comes above it.
         both[np.ix_(self._fixed, self._fixed)] += np.triu(self._term)
@@ -114,11 +107,11 @@ class ExplicitInterfaceOperator:
         return out
 
     def extend(self, x: Float, loads: Float | None) -> Float:
-        """(dofs, k) displacements under loads (v, k), if any, that are x (n, k) on the boundary, by the kept factor."""
+        """(dofs, k) displacements under loads (v, k), if any, and x (n, k) on the boundary, by the kept factor."""
         assert self.factor is not None
         forces, reactions = np.zeros((self._subdomain.n_dofs, *x.shape[1:])), self.apply_schur(x)
         if loads is not None:
-            forces, reactions = -self._subdomain.Q @ loads, reactions + self.condensed.boundary @ loads
+            forces, reactions = self._subdomain.Q @ -loads, reactions + self.condensed.boundary @ loads
         forces[self.factor.rows] += reactions
         return self.factor.solution(forces, x)
 
@@ -154,13 +147,25 @@ class CondensedLoads:
     Attributes:
         boundary: (n, v) q.
         stiffness: (v, v) C, or the sum.
-        energy: (v, v) C as what 2 x the energy is where u_b = 0. Without a boundary that is not how stresses are
-            computed, but |Omega| L + 2 Q_i^T u_i + u_i^T K_ii u_i, which errors of u_i make another.
+        energy: (v, v) twice the energy where u_b = 0: C. Of a subdomain without a boundary it is computed as
+            |Omega| L + 2 Q_i^T u_i + u_i^T K_ii u_i, which is C only if u_i is exact.
     """
 
     boundary: Float
     stiffness: Float
     energy: Float
+
+
+def _condensed(
+    subdomain: Subdomain, K: csr_matrix, dofs: Int, keep_factor: bool
+) -> tuple[Float, CondensedLoads, ShiftedFactor | None]:
+    """Return S (n, n) of a subdomain on its boundary `dofs` (n,), its unit loads there, and its factor if kept."""
+    s, C = subdomain, subdomain.area * subdomain.L
+    if not s.loads_inside:
+        return schur_complement(K, dofs, s.elimination_order()), CondensedLoads(s.Q[dofs], C, C), None
+    found = condensed_with_loads(K, dofs, s.Q, s.elimination_order())
+    C = C + found.C
+    return found.S, CondensedLoads(found.q, C, C), found.factor if keep_factor else None
 
 
 class ImplicitInterfaceOperator:
@@ -171,18 +176,22 @@ class ImplicitInterfaceOperator:
     def __init__(self, subdomain: Subdomain, K: csr_matrix, dofs: Int) -> None:
         """Factor K + rho Rf Rf^T; `dofs` (n,) are sorted local numbers.  Options under `feti_sub_`."""
         self.n, self.dofs, self._subdomain = len(dofs), dofs, subdomain
+        if not len(dofs) and not subdomain.R.shape[1]:
+            self._solve_whole(K)
+            return
         # A single subdomain has no boundary: any of its nodes can be fixed.
         own = subdomain.problem.nodes(dofs)
         nodes = np.unique(own) if len(dofs) else np.arange(subdomain.mesh.n_classes)
-        if not len(dofs) and not subdomain.R.shape[1]:
-            self.interior = Interior(K, dofs, subdomain.elimination_order())  # all of it: no forces come from outside
-            s, u = subdomain, np.empty(subdomain.Q.shape)
-            self.interior.answers = self.interior.solve(-s.Q[self.interior.dofs])
-            u[self.interior.dofs] = self.interior.answers
-            C = s.area * s.L + s.Q.T @ u
-            self.condensed = CondensedLoads(s.Q[dofs], C, C + s.Q.T @ u + u.T @ (K @ u))
-            return
         self._solver = DirectSolver(subdomain.regularised(K, nodes), "feti_sub_")
+
+    def _solve_whole(self, K: csr_matrix) -> None:
+        """Solve for the unit loads of a pinned subdomain without a boundary: no other forces will act on it."""
+        s, u = self._subdomain, np.empty(self._subdomain.Q.shape)
+        self.interior = Interior(K, self.dofs, s.elimination_order())
+        self.interior.answers = self.interior.solve(-s.Q[self.interior.dofs])
+        u[self.interior.dofs] = self.interior.answers
+        C = s.area * s.L + s.Q.T @ u
+        self.condensed = CondensedLoads(s.Q[self.dofs], C, C + s.Q.T @ u + u.T @ (K @ u))
 
     @cached_property
     def interior(self) -> Interior:
@@ -215,7 +224,7 @@ class ImplicitInterfaceOperator:
 
 
 class Interior:
-    """The dofs of one subdomain that no constraint acts on.
+    """The factored interior of one subdomain: the dofs that no constraint acts on.
 
     Attributes:
         dofs: their local numbers, in the order of elimination if there is one, else sorted.
@@ -225,9 +234,9 @@ class Interior:
     answers: Float | None = None
 
     def __init__(self, K: csr_matrix, dofs: Int, order: Int | None = None) -> None:
-        """Split K (cn, cn) and factor K_ii; `dofs` (n,) are the boundary's.  Options under `feti_interior_`.
+        """Split K (cn, cn) and factor K_ii; `dofs` (n,) are those of the boundary.  Options under `feti_interior_`.
 
-        Eliminated in the `order` (cn,) of all dofs if that is given, else in one of the library's.
+        `order` (cn,) is an order of elimination of all dofs; without it the library chooses one.
         """
         inside = np.ones(K.shape[0], bool)
         inside[dofs] = False

@@ -45,4 +45,4 @@ def test_a_stiffness_without_a_factor_is_one_line_that_names_its_subdomain(subdo
     inner = np.isin(np.arange(subdomain.n_dofs), dofs) != inside
     spoilt = replace(subdomain, _built_stiffness=(K - 1e9 * diags(1.0 * inner)).tocsr())
     with pytest.raises(MeshError, match=r"subdomain \d+ \(fibre\) near \(.*not positive definite.*are degenerate$"):
-        interface_operators._factor(spoilt, dofs, explicit, keep=False)
+        interface_operators._factor(spoilt, dofs, explicit, keep_factor=False)
