@@ -36,7 +36,7 @@ def schur_complement(matrix: csr_matrix, rows: Int, order: Int | None = None) ->
     if len(rows) == matrix.shape[0]:
         return np.asarray(matrix.toarray(order="F"))
     if order is not None and _can_be_ordered():
-        return _by_cholmod(matrix, rows, np.zeros((matrix.shape[0], 0)), order).S
+        return _by_cholmod(matrix, rows, np.zeros((matrix.shape[0], 0)), order, False).S
     scale = power_of_two(matrix.diagonal())
     matrix.sort_indices()
     # In place and back, which changes no digit: a copy would be as large as the matrix.
@@ -80,7 +80,7 @@ class CondensedMatrix:
         S: (n, n) Schur complement, in Fortran order.
         q: (n, v) Q_b - K_bi K_ii^-1 Q_i.
         C: (v, v) -Q_i^T K_ii^-1 Q_i.
-        factor: of K + D if CHOLMOD condensed K; None if MUMPS did, which leaves none.
+        factor: of K + D if it is kept and CHOLMOD condensed K: MUMPS leaves none.
     """
 
     S: Float
@@ -89,10 +89,12 @@ class CondensedMatrix:
     factor: ShiftedFactor | None = None
 
 
-def condensed_with_loads(matrix: csr_matrix, rows: Int, loads: Float, order: Int | None = None) -> CondensedMatrix:
+def condensed_with_loads(
+    matrix: csr_matrix, rows: Int, loads: Float, order: Int | None = None, keep_factor: bool = False
+) -> CondensedMatrix:
     """Condense a matrix and its loads Q (dofs, v) to `rows` by one elimination; errors as of `schur_complement`."""
     if order is not None and _can_be_ordered():
-        return _by_cholmod(matrix, rows, loads, order)
+        return _by_cholmod(matrix, rows, loads, order, keep_factor)
     v, n = loads.shape[1], len(rows)
     corner = csr_matrix((np.zeros(v), np.arange(v), np.arange(v + 1)), shape=(v, v))  # MUMPS expects a diagonal
     Q = csr_matrix(loads)
@@ -108,7 +110,7 @@ def _can_be_ordered() -> bool:
     return partial_cholesky.is_available() and not PETSc.Options("feti_schur_").getAll()
 
 
-def _by_cholmod(matrix: csr_matrix, rows: Int, loads: Float, order: Int) -> CondensedMatrix:
+def _by_cholmod(matrix: csr_matrix, rows: Int, loads: Float, order: Int, keep_factor: bool) -> CondensedMatrix:
     """Return the result of `condensed_with_loads` from K + D = L L^T.
 
     D > 0 on `rows` makes K + D definite even if K is singular. With y = L^-1 Q and the block L_bb of L on `rows`,
@@ -120,6 +122,8 @@ def _by_cholmod(matrix: csr_matrix, rows: Int, loads: Float, order: Int) -> Cond
     D = csr_matrix((shift, (rows, rows)), shape=matrix.shape)
     factor = PartialFactor(csr_matrix(matrix + D), rows, order)
     U, y = factor.last_block(), factor.forward(loads)
+    kept = ShiftedFactor(factor, rows, shift) if keep_factor else None
+    del factor  # before S needs its memory
     inner, last = y[:-n], y[-n:]
     q = dtrmm(1.0, U, last[::-1])[::-1].copy()
     if not np.isfinite(U.diagonal()).all():
@@ -127,7 +131,7 @@ def _by_cholmod(matrix: csr_matrix, rows: Int, loads: Float, order: Int) -> Cond
     check_lapack("dlauum", dlauum(U, lower=0, overwrite_c=1)[1])
     S = full_from_lower(U[::-1, ::-1]).T
     S[np.diag_indices(n)] -= shift
-    return CondensedMatrix(S, q, -inner.T @ inner, ShiftedFactor(factor, rows, shift))
+    return CondensedMatrix(S, q, -inner.T @ inner, kept)
 
 
 def _by_mumps(matrix: csr_matrix, rows: Int) -> Float:

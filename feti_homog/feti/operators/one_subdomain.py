@@ -163,9 +163,9 @@ def _condensed(
     s, C = subdomain, subdomain.area * subdomain.L
     if not s.loads_inside:
         return schur_complement(K, dofs, s.elimination_order()), CondensedLoads(s.Q[dofs], C, C), None
-    found = condensed_with_loads(K, dofs, s.Q, s.elimination_order())
+    found = condensed_with_loads(K, dofs, s.Q, s.elimination_order(), keep_factor)
     C = C + found.C
-    return found.S, CondensedLoads(found.q, C, C), found.factor if keep_factor else None
+    return found.S, CondensedLoads(found.q, C, C), found.factor
 
 
 class ImplicitInterfaceOperator:
