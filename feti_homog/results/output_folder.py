@@ -153,18 +153,23 @@ def remove_other_results(directory: Path, written: Collection[str]) -> None:
 def write_product(path: Path, text: str) -> Path:
     """Write what a command makes in place of a result, a card or a table of fibres, to a file; returns its path.
 
+    A link stays; the file that it leads to is written.
+
     Raises:
-        CaseError: `path` is a folder, in no folder, or a file of a result.
+        CaseError: `path` is a folder, a device or a pipe, in no folder, or a file of a result.
         FetiHomogError: it cannot be written; nothing is left half-written.
     """
-    if path.is_dir():
-        raise CaseError(f"--out {path}: expected a file, but it is a folder")
-    if not path.parent.is_dir():
+    if path.exists() and not path.is_file():  # a device would be replaced, not written to
+        kind = "a folder" if path.is_dir() else "a device or a pipe"
+        raise CaseError(f"--out {path}: expected a file, but it is {kind}")
+    target = Path(os.path.realpath(path))
+    if not target.parent.is_dir():
         raise CaseError(f"--out {path}: expected a file in a folder that there is")
-    if RESULT_FILE.fullmatch(path.name):
+    if RESULT_FILE.fullmatch(path.name) or RESULT_FILE.fullmatch(target.name):
         raise CaseError(f"--out {path}: expected another name; results have files of that name")
-    atomic.remove_abandoned(path.parent, re.compile(re.escape(path.name)))
-    return atomic.replace_text(path, f"{text}\n")
+    atomic.remove_abandoned(target.parent, re.compile(re.escape(target.name)))
+    atomic.replace_text(target, f"{text}\n")
+    return path
 
 
 def _hold(lock: Lock, directory: Path) -> tuple[list[Path], str]:

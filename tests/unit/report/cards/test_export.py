@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 import pytest
 from support.effective_results import DISTINCT, document
 
@@ -28,6 +30,19 @@ def test_a_card_replaces_what_was_there(tmp_path):
     path.write_text("before")
     assert output_folder.write_product(path, "a\nb") == path
     assert path.read_text() == "a\nb\n" and list(tmp_path.iterdir()) == [path]
+
+
+def test_a_card_goes_where_a_link_leads(tmp_path):
+    (tmp_path / "link.inp").symlink_to(tmp_path / "card.inp")
+    assert output_folder.write_product(tmp_path / "link.inp", "a") == tmp_path / "link.inp"
+    assert (tmp_path / "link.inp").is_symlink() and (tmp_path / "card.inp").read_text() == "a\n"
+
+
+def test_devices_and_pipes_are_not_replaced(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(CaseError, match="expected a file, but it is a device or a pipe"):
+        output_folder.write_product(tmp_path / "pipe", "card")
+    assert (tmp_path / "pipe").is_fifo()
 
 
 @pytest.mark.parametrize(
