@@ -73,6 +73,7 @@ def content(fit: Fit, estimates: Estimates) -> dict[str, Any]:
     found, names = estimates, [*fit.unknowns]
     faults = [] if found.converged else [f"no minimum after {found.evaluations} evaluations"]
     faults += names_of(found.undetermined, names)
+    faults += _hardly_determined(fit, found)
     unknowns = {
         name: {
             "estimate": float(found.x[k]),
@@ -103,6 +104,16 @@ def content(fit: Fit, estimates: Estimates) -> dict[str, Any]:
         "chance": found.chance,
         "measured": data,
     }
+
+
+def _hardly_determined(fit: Fit, found: Estimates) -> list[str]:
+    """Return a line for each unknown whose standard deviation is more than the width of its bounds."""
+    return [
+        f"[unknown] {name}: the measured values hardly determine it: its standard deviation {std:.3g} is more than the "
+        f"width {unknown.upper - unknown.lower:.3g} of its bounds"
+        for (name, unknown), std in zip(fit.unknowns.items(), found.std, strict=True)
+        if np.isfinite(std) and std > unknown.upper - unknown.lower
+    ]
 
 
 def text(document: Mapping[str, Any]) -> str:

@@ -1,0 +1,32 @@
+"""What fit.json has of a fit: unknowns that the measured values hardly determine."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.base_case import BASE
+
+from feti_homog.fit import files
+from feti_homog.fit.description import parse
+from feti_homog.fit.estimation import summarize
+
+TEXT = (
+    "[unknown]\nmaterial.fibre.young = {start = 150.0, lower = 50.0, upper = 500.0}\n"
+    "[measured]\nC11 = {value = 150.0, std = 1.5}\n"
+)
+
+
+@pytest.mark.parametrize(("slope", "status"), [(0.1, "done"), (1e-3, "not converged")])
+def test_an_unknown_with_a_scatter_beyond_its_bounds_is_named(slope, status):
+    """Of a standard deviation 1.5 / slope, 15 or 1500, and bounds 450 apart."""
+    fit = parse(tomllib.loads(BASE + TEXT), Path())
+    bounds = np.array([50.0]), np.array([500.0])
+    measured = np.array([150.0]), np.array([1.5])
+    found = files.content(fit, summarize(np.array([200.0]), measured[0], measured, np.array([[slope]]), bounds))
+    assert found["status"] == status
+    assert [line.partition(": its")[0] for line in found["faults"]] == (
+        [] if status == "done" else ["[unknown] material.fibre.young: the measured values hardly determine it"]
+    )
