@@ -5,6 +5,7 @@ The numbers of the fibres are those that `fibre = N` of a case file means.
 
 from __future__ import annotations
 
+from textwrap import fill
 from typing import Any
 
 import matplotlib as mpl
@@ -16,16 +17,20 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from scipy.spatial import cKDTree
 
+from feti_homog.report.plots.cell_frame import (
+    BAR_INCHES,
+    LEAST_BAR,
+    bar_beside,
+    cell_scale,
+    cell_size,
+    figure_of,
+    label_cell_axes,
+)
 from feti_homog.report.plots.decimation import DrawnMesh, outline_edges, triangle_means
 from feti_homog.report.plots.interface_marks import DrawnCell
 from feti_homog.report.plots.plot_helpers import (
-    BAR_INCHES,
-    bar_beside,
-    cell_scale,
     draw_segments,
-    figure_of,
     fill_triangles,
-    label_cell_axes,
     plain,
     value_range,
 )
@@ -39,6 +44,7 @@ MOST_NUMBERS = 2000  # of fibres; of more none could be read
 INSIDE, SEEN = 0.4, 0.85  # of a radius: how far from the sides a number stands, and how far at most from the centre
 POINTS_PER_INCH, CHARACTERS = 72, 2.2
 LEAST_SIZE, LARGEST_SIZE = 3.0, 11.0  # of the letters, in points
+LETTER = 0.075  # inches, on the average
 DECADES = 4  # below the density of errors that hardly any area exceeds; less is one colour
 
 
@@ -96,7 +102,9 @@ def mesh_error(cell: DrawnCell) -> Figure | None:
     colours = ScalarMappable(LogNorm(least, top), "magma_r")
     fill_triangles(axes, drawn, drawn.points, np.asarray(colours.to_rgba(np.maximum(density, least))), edges=False)
     extend = "both" if most > top else "min"
-    bar_beside(axes, colours, extend).set_label("error of the strain energy / energy, per share of the area")
+    bar = bar_beside(axes, colours, extend, cell_size(file.attrs))
+    letters = int(max(cell_size(file.attrs)[1], LEAST_BAR[1]) / LETTER)
+    bar.set_label(fill("error of the strain energy / energy, per share of the area", letters))
     draw_segments(axes, drawn.points[cell.borders], "black", 0.7)
     label_cell_axes(axes, file.attrs)
     axes.set_title(_title(file.attrs, "estimated error of the mesh"))

@@ -17,12 +17,12 @@ from matplotlib.ticker import MaxNLocator
 from PIL import Image
 
 from feti_homog.errors import FetiHomogError
+from feti_homog.report.plots.cell_frame import bar_beside
 from feti_homog.report.plots.decimation import drawn_displacement, drawn_mesh, largest_scale
 from feti_homog.report.plots.interface_marks import DAMAGED, STATE_NAMES, DrawnCell, state_legend, states_of_nodes
 from feti_homog.report.plots.load_labels import LoadLabels
 from feti_homog.report.plots.plot_helpers import (
     STRESS_SYMBOLS,
-    bar_beside,
     colour_range,
     draw_segments,
     largest_length,

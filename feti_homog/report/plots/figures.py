@@ -22,6 +22,7 @@ from feti_homog.report.plots import (
     response_curves,
     traction_plots,
 )
+from feti_homog.report.plots.cell_frame import BAR_INCHES, bar_beside, cell_size, figure_of, label_cell_axes
 from feti_homog.report.plots.decimation import (
     DrawnMesh,
     FreeExpansion,
@@ -32,14 +33,10 @@ from feti_homog.report.plots.decimation import (
 from feti_homog.report.plots.interface_marks import DrawnCell, states_of_nodes
 from feti_homog.report.plots.load_labels import LoadLabels
 from feti_homog.report.plots.plot_helpers import (
-    BAR_INCHES,
     STRESS_SYMBOLS,
     STYLE,
-    bar_beside,
     colour_range,
     draw_segments,
-    figure_of,
-    label_cell_axes,
     largest_length,
     magnification,
     nodal_stress,
@@ -164,7 +161,8 @@ def _coloured(cell: DrawnCell, state: Any, moved: Array, output: Document) -> tu
     component = stress_component(output.get("stress", "auto"), [state])
     stress = nodal_stress(state, component, drawn)
     norm, colours, extend = colour_range(stress, drawn.node_areas)
-    bar = bar_beside(axes, shade_triangles(axes, drawn, moved, stress, norm, colours), extend)
+    shapes = shade_triangles(axes, drawn, moved, stress, norm, colours)
+    bar = bar_beside(axes, shapes, extend, cell_size(attributes))
     bar.ax.ticklabel_format(axis="y", scilimits=POWERS)
     bar.set_label(f"${STRESS_SYMBOLS[component]}$ {stress_label(attributes['stress_unit'])}")
     return figure, axes

@@ -1,10 +1,11 @@
-"""Parts that pictures share: their style, the frame of a cell, triangles and lines, colour ranges, labels."""
+"""Parts that pictures share: their style, triangles and lines, colour ranges, labels."""
 
 from __future__ import annotations
 
 import math
 import warnings
 from collections.abc import Sequence
+from io import BytesIO
 from pathlib import Path
 from typing import Any, Literal
 
@@ -42,21 +43,28 @@ STRESS_TABLES: dict[str, tuple[str, int | None]] = {
 # Fields that vary by less, relatively, have one colour; share of one sign below which zero is not in the middle; share
 # of the area that may lie outside of a colour range, at either end.
 UNIFORM, ONE_SIGN, OUTLIERS = 0.01, 0.1, 0.005
-CELL_INCHES, BAR_INCHES = 4.8, 1.1  # the longer side of a drawn cell, and the room for a colour bar beside it
 INK = ("#1f4e9c", "#c44e00", "#2a7f3f", "#7a3e9d", "#8a6d00", "#0f7c8c", "#8c1d40")  # of curves
 STYLE = {"font.size": 10, "axes.titlesize": 11, "axes.linewidth": 0.8}
-DPI, PADDING = 200, 0.08  # dots per inch; inches
+DPI, PADDING, CUT = 200, 0.08, 0.02  # dots per inch; inches, the last of what may lie beyond the sides of a figure
 # Shares of the cell that the largest displacement and opening are drawn as, and to which the former may be stretched.
 SEEN_DISPLACEMENT, SEEN_OPENING, MOST_DISPLACEMENT = 0.1, 0.04, 0.25
 
 
 def save(figure: Figure, path: Path) -> Path:
-    """Write the figure as PNG without the white around it; `bbox_inches="tight"` would draw it twice.
+    """Write the figure as PNG without the white around it; only one with words beyond its sides is drawn twice.
 
     Raises FetiHomogError if it cannot be written.
     """
     figure.set_dpi(DPI)
-    picture = Image.fromarray(np.ascontiguousarray(_trimmed(pixels_of(figure), round(PADDING * DPI))))
+    pixels = pixels_of(figure)
+    drawn: Any = figure.get_tightbbox()
+    low, high = drawn.min, drawn.max
+    if (low < -CUT).any() or (high > figure.get_size_inches() + CUT).any():
+        figure.set_layout_engine("none")  # which is done
+        with BytesIO() as stream:
+            figure.savefig(stream, format="png", dpi=DPI, bbox_inches=drawn.padded(PADDING))
+            pixels = np.asarray(Image.open(stream).convert("RGB"))
+    picture = Image.fromarray(np.ascontiguousarray(_trimmed(pixels, round(PADDING * DPI))))
     return atomic.replace(path, lambda part: picture.save(part, format="PNG"))
 
 
@@ -79,37 +87,6 @@ def _trimmed(pixels: Array, padding: int) -> Array:
         places.append(slice(max(low - padding, 0), high + padding))
     part: Array = pixels[tuple(places)]
     return part
-
-
-def figure_of(attributes: Any, panels: int, beside: float = 0.0) -> tuple[Figure, Sequence[Axes]]:
-    """Return a figure with panels for pictures of the cell, and so many inches beside them."""
-    width, height = float(attributes["width"]), float(attributes["height"])
-    inches = cell_scale(attributes)
-    figure = Figure(
-        figsize=(panels * (width * inches + 0.7) + 0.1 + beside, height * inches + 1.2), layout="compressed"
-    )
-    return figure, figure.subplots(1, panels, squeeze=False)[0]
-
-
-def cell_scale(attributes: Any) -> float:
-    """Inches in the picture for a length unit of the cell."""
-    return CELL_INCHES / max(float(attributes["width"]), float(attributes["height"]))
-
-
-def label_cell_axes(axes: Axes, attributes: Any) -> None:
-    unit = unit_label(attributes["length_unit"]) or "(cell units)"
-    axes.set_aspect("equal")
-    axes.autoscale_view()
-    axes.margins(0.03)
-    axes.set_xlabel(f"$x_1$ {unit}")
-    axes.set_ylabel(f"$x_2$ {unit}")
-    axes.spines[["top", "right"]].set_visible(False)
-
-
-def bar_beside(axes: Axes, shapes: Any, extend: str) -> Any:
-    """Return the colour bar of shapes, at the right of their axes."""
-    figure: Any = axes.figure
-    return figure.colorbar(shapes, cax=axes.inset_axes((1.03, 0.0, 0.04, 1.0)), extend=extend)
 
 
 def finish_curves(axes: Axes) -> None:
