@@ -150,18 +150,24 @@ def fields_line(case: Case, nodes: int, elements: int, interface_nodes: int, ran
     mesh = int(rows @ MESH_BYTES) + 3 * case.cell.order * CORNER_BYTES * elements
     if case.section.is_followed and isinstance(asked, str):
         return f"fields     {_size(mesh)} of result.h5, and {_size(state)} for each state"
-    may_open = bool(case.arcs) or case.cell.has_own_mesh  # by its curve "debonded", if it has one
-    contact = case.interface is not None and case.interface.contact and may_open
-    is_most = case.section.is_followed or (contact and not case.arcs)
-    loads = sum(len(problem.loads) for problem in phase_laws.problems(case))
-    count = asked if case.section.is_followed else case.section.solves(loads, contact)
-    assert isinstance(count, int)
+    count, is_most = _states(case)
     noun = "state" if count == 1 else "states"
     words = f"{'at most ' if is_most else ''}{count} {noun} of {_size(state)}"
     of_each = STATE_SECONDS + elements / ranks * STATE_ELEMENT_SECONDS
     if case.section.is_followed:
         of_each = POINT_SECONDS + elements / ranks * POINT_ELEMENT_SECONDS
     return f"fields     {words}, {_size(mesh + count * state)} in result.h5, {_rounded(count * of_each)}"
+
+
+def _states(case: Case) -> tuple[int, bool]:
+    """Return how many states result.h5 has, and whether that is the most that it may have."""
+    if case.section.is_followed:
+        assert isinstance(case.output.states, int)
+        return case.output.states, True
+    may_open = bool(case.arcs) or case.cell.has_own_mesh  # by its curve "debonded", if it has one
+    contact = case.interface is not None and case.interface.contact and may_open
+    loads = sum(len(problem.loads) for problem in phase_laws.problems(case))
+    return case.section.solves(loads, contact), contact and not case.arcs
 
 
 def events_lines(

@@ -142,7 +142,8 @@ def curves_figure(table: SweepTable) -> Figure:
     picture = Figure(figsize=(0.4 + 4.6 * len(components), 4.6), layout="constrained")
     panels = picture.subplots(1, len(components), sharex=True, squeeze=False)[0]
     symbol = SYMBOLS[strains[along]]
-    few = min(len(table.curves(point)[1]) for point in points) < FEWEST_OF_INTERVAL
+    counts = [len(table.curves(point)[1]) for point in points]
+    few = min(counts) < FEWEST_OF_INTERVAL
     for axes, component in zip(panels, components, strict=True):
         for style, point in enumerate(points):
             _bundle(axes, table, point, component, COLOURS[style], few)
@@ -150,7 +151,8 @@ def curves_figure(table: SweepTable) -> Figure:
         axes.axhline(0.0, color="0.6", linewidth=0.6, zorder=0)
         label_axes(axes, f"$\\Sigma_{{{stresses[component][1:]}}}$", table, f"${symbol}$")
     band = "range of the realisations" if few else "95 % confidence interval of the mean"
-    picture.suptitle(f"{plain(table.name)}: realisations and their mean; band: {band}", fontsize=11)
+    words = f"realisations and their mean; band: {band}" if max(counts) > 1 else "stress along the paths"
+    picture.suptitle(f"{plain(table.name)}: {words}", fontsize=11)
     legend(picture, list(panels))
     return picture
 
