@@ -103,7 +103,9 @@ def strengths(toughness: float, mode_sensitivity: float) -> tuple[float, float]:
 def parser() -> argparse.ArgumentParser:
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--out", type=Path, default=Path("results/interface_toughness"), metavar="DIR")
-    options.add_argument("--quick", action="store_true", help="one cell of two fibres, the toughness alone")
+    options.add_argument(
+        "--quick", action="store_true", help="one cell of two fibres, the toughness alone, whatever other options say"
+    )
     options.add_argument("--seeds", type=int, default=4, help="arrangements: 0, 1, ...")
     options.add_argument("--fibres", type=int, default=20)
     options.add_argument("--refine", type=int, default=1)

@@ -38,7 +38,8 @@ COLUMNS = ("test", "temperature", "modulus", "first break", "peak", "strain at p
 def main(given: argparse.Namespace, comm: Intracomm) -> None:
     """Follow each test after each change of temperature; print, write and draw."""
     if given.quick:
-        given.fibres, given.refine, given.temperatures = 2, 0, [0.0, -100.0]
+        given.fibres, given.refine = 2, 0
+    given.temperatures = given.temperatures or ([0.0, -100.0] if given.quick else [0.0, -50.0, -100.0])
     found = {
         (test, temperature): solved(given, comm, test, temperature)
         for test in TESTS
@@ -68,7 +69,7 @@ def solved(given: argparse.Namespace, comm: Intracomm, test: str, temperature: f
         "path": {"waypoints": [*cooling, {strain: end}]},
         "output": figures.written(given) | {"stress_unit": "MPa", "length_unit": "um"},
     }
-    return figures.computed(comm, Case.parse(document), given.out / f"{test}_{abs(temperature):g}K")
+    return figures.computed(comm, Case.parse(document), given.out / f"{test}_{temperature:g}K")
 
 
 def curve(result: Result, component: int) -> np.ndarray:
@@ -102,9 +103,10 @@ def write(folder: Path, found: dict[tuple[str, float], Result]) -> list[Path]:
     figure = Figure(figsize=(9.0, 4.0), layout="constrained")
     for axes, (test, (strain, _, component, stress)) in zip(figure.subplots(1, 2), TESTS.items(), strict=True):
         own = {temperature: result for (name, temperature), result in found.items() if name == test}
-        for colour, (temperature, result) in zip(INK, own.items(), strict=False):
-            points = curve(result, component)
-            label = f"cooled by {-temperature:g} K" if temperature else "not cooled"
+        for k, (temperature, result) in enumerate(own.items()):
+            points, colour = curve(result, component), INK[k % len(INK)]
+            change = "cooled" if temperature < 0.0 else "heated"
+            label = f"{change} by {abs(temperature):g} K" if temperature else "not cooled"
             axes.plot(100 * points[:, 0], points[:, 1], color=colour, linewidth=1.2, label=label)
         axes.set(xlabel=f"${symbol(strain)}$ (%)", ylabel=f"${symbol(stress)}$ (MPa)")
         axes.set_title({"tension": "Tension across the fibres", "shear": "Shear along the fibres"}[test], fontsize=11)
@@ -126,5 +128,6 @@ if __name__ == "__main__":
     options = figures.quick_parser(__doc__ or "", "ply_strength", "two fibres, long elements")
     options.add_argument("--fibres", type=int, default=20)
     options.add_argument("--refine", type=int, default=2)
-    options.add_argument("--temperatures", type=float, nargs="+", default=[0.0, -50.0, -100.0], help="changes, K")
+    words = "changes, K (default: 0 -50 -100; with --quick 0 -100)"
+    options.add_argument("--temperatures", type=float, nargs="+", help=words)
     sys.exit(launch(main, options))

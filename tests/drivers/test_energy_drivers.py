@@ -72,18 +72,18 @@ def test_cells_of_random_fibres_scatter(tmp_path, law):
 
 
 def test_plies_break_by_tension_across_and_by_shear_along_the_fibres(tmp_path):
-    rows = driven("ply_strength", tmp_path)
+    rows = driven("ply_strength", tmp_path, "--temperatures", "0", "-80")  # which --quick leaves as they are
     assert [(row["test"], float(row["temperature"])) for row in rows] == [
         ("tension", 0.0),
-        ("tension", -100.0),
+        ("tension", -80.0),
         ("shear", 0.0),
-        ("shear", -100.0),
+        ("shear", -80.0),
     ]
     modulus = column(rows, "modulus")
     # Until a bond breaks the temperature changes no stiffness.
     assert modulus[0] == pytest.approx(modulus[1], rel=1e-6) and modulus[2] == pytest.approx(modulus[3], rel=1e-6)
-    folders = [tmp_path / f"{row['test']}_{abs(float(row['temperature'])):g}K" for row in rows]
+    folders = [tmp_path / f"{row['test']}_{float(row['temperature']):g}K" for row in rows]
     component = {"tension": 1, "shear": 3}
     results = [of_its_path(row, folder, component[row["test"]]) for row, folder in zip(rows, folders, strict=True)]
     cooled = [result for result in results if len(result["case"]["path"]["waypoints"]) == 2]
-    assert all(result["path"][-1]["temperature"] == -100.0 for result in cooled)
+    assert all(result["path"][-1]["temperature"] == -80.0 for result in cooled)
