@@ -42,7 +42,7 @@ def _text(path: Path) -> str:
     try:
         content = input_files.read(path, MAX_BYTES)
     except OSError as error:
-        raise CaseError(f"{path.name}: cannot be read: {error.strerror}") from error
+        raise CaseError(f"{path}: cannot be read: {error.strerror}") from error
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -98,7 +98,7 @@ def test_other_faults(tmp_path):
         (case, None, "expected at least two fibres, got 1"),
         (case, (1.0, 1.0), "--size: only for a table"),
         (tmp_path, None, "cannot read"),
-        (tmp_path / "nowhere.csv", None, "nowhere.csv: cannot be read"),
+        (tmp_path / "nowhere.csv", None, f"{tmp_path}/nowhere.csv: cannot be read"),
     ]:
         with pytest.raises(CaseError, match=words):
             fibre_statistics.pattern(path, size)
