@@ -45,7 +45,9 @@ def add(actions: argparse._SubParsersAction[Any]) -> None:
     )
     export = _add(actions, "export", _export, "print a result as a material card", EXPORT_HELP)
     programs = "abaqus, calculix, ansys, moose, csv"
-    export.add_argument("--format", default="", metavar="PROGRAM", help=f"needed: the program that reads the card, {programs}")
+    export.add_argument(
+        "--format", default="", metavar="PROGRAM", help=f"program that reads the card, needed: {programs}"
+    )
     export.add_argument("--out", type=Path, metavar="FILE", help="write the card to a file instead of printing it")
     export.add_argument(
         "--transversely-isotropic",

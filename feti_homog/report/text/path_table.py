@@ -92,7 +92,7 @@ def _peak_lines(document: Document, peak: Mapping[str, Any], label: str) -> list
     if "event_left" in peak:
         lost = 1.0 - peak["stress_left"] / peak["stress"]
         rises = f" as the {path_curves.what_rises(document)} rises" if path_curves.is_proportional(document) else ""
-        text += f"; {peak['stress_left']:.6g} after it{rises}, {lost:.1%} less (point {peak['event_left']})"
+        text += f"; {peak['stress_left']:.6g} after the peak{rises}, {lost:.1%} less (point {peak['event_left']})"
     events = {
         "the first break": peak.get("first_break_event"),
         f"the {_largest(peak)[1]}": peak["event"],
