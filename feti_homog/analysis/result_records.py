@@ -123,7 +123,7 @@ class AnglePoint:
     debonded_length: Float = described("debonded length of each fibre's interface", LENGTH, "(f,)")
     debonding_angle: Float = described(DEBONDED_ANGLE, DEGREES, "(f,)")
     tips: TipRates | None = described("energy release rates at the tips of its arcs", default=None)
-    bonded: int = described("bonded interface nodes")
+    bonded: int = described("bonded interface nodes; of unit strains under gamma12, as the next two")
     open: int = described("debonded interface nodes without contact")
     closed: int = described("debonded interface nodes in contact")
     iterations: int = described("Krylov iterations")

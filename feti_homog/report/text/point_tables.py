@@ -26,6 +26,7 @@ SHARES = {"normal": "normal", "tangential": "tangent", "axial": "axial", "psi": 
 RATES = (*(Column(name) for name in ("G", "G_I", "G_II")), Column("psi", 8, ".1f"), Column("fibre", 8, "d"),
          Column("angle", 9))  # fmt: skip
 SECTION = Column("interface", 11, "d")  # of cases that have several
+LAST_STRAIN = "bonded, open, closed: interface nodes under the unit strain gamma12"
 TIP_TITLE = "Largest energy release rate"
 
 Point = Mapping[str, Any]
@@ -54,7 +55,8 @@ def all_numbers(key: str, document: Document, label: str, numbers: Sequence[int]
         values = [point["stiffness"][i][j] for i, j in entries.values()] if stiff else point["stress"]
         rows.append([number, *(point[name] for name in names), *values])
     head = ["point", *names, *(entries or voigt_names(len(points[0]["stress"]))[1])]
-    return Table(f"Points of the {key}{some}; stress{label}", [*map(Column, head)], rows)
+    title = f"Points of the {key}{some}; stress{label}"
+    return Table(title, [*map(Column, head)], rows, [LAST_STRAIN] if stiff else [])
 
 
 def _path_numbers(document: Document, title: str, names: Sequence[str], numbers: Sequence[int]) -> Table:
@@ -84,7 +86,8 @@ def angle_table(points: Sequence[Point], label: str) -> Table:
         rows.append([point["angle"], *map(without_noise, values), *states])
     width = 12 if counts else 10
     columns = [Column("angle", 9), *(Column(name, width) for name in tuple(entries) or STRESSES), *counts]
-    return Table(f"{'Stiffness' if stiff else 'Stress'}{label} against the debonding angle (degrees)", columns, rows)
+    title = f"{'Stiffness' if stiff else 'Stress'}{label} against the debonding angle (degrees)"
+    return Table(title, columns, rows, [LAST_STRAIN] if stiff and counts else [])
 
 
 def columns_without_noise(values: Sequence[Sequence[float]]) -> Any:

@@ -1,4 +1,4 @@
-"""The printed tables of points: that of an envelope."""
+"""The printed tables of points: those of an envelope and of an angle."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from feti_homog.report.text.point_tables import components, envelope_lines
+from feti_homog.report.text.point_tables import angle_table, components, envelope_lines
 
 
 def document(count: int, names: tuple[str, ...], without: tuple[int, ...] = (), **section: Any) -> dict[str, Any]:
@@ -55,3 +55,11 @@ def test_strains_have_no_unit():
 @pytest.mark.parametrize(("angle", "expected"), [(0.0, (3.0, 0.0)), (90.0, (0.0, 3.0)), (180.0, (-3.0, 0.0))])
 def test_what_rounding_leaves_of_zero_is_zero(angle, expected):
     assert components({"angle": angle, "factor": 3.0}) == pytest.approx(expected, abs=1e-300)
+
+
+def test_counts_of_nodes_of_an_angle_say_under_which_strain_they_are():
+    """Of three unit strains each opens and closes other nodes."""
+    counts = {"angle": 90.0, "bonded": 9, "open": 2, "closed": 1}
+    words = "bonded, open, closed: interface nodes under the unit strain gamma12"
+    assert words in angle_table([counts | {"stiffness": [[9.0, 2, 0], [2, 8, 0], [0, 0, 3]]}], "").lines
+    assert words not in angle_table([counts | {"stress": [1.0, 2.0, 3.0]}], "").lines
