@@ -18,9 +18,8 @@ BAR, LEAST_BAR = (0.04, 1.0), (0.15, 1.2)  # width and height of a bar: shares o
 def figure_of(attributes: Any, panels: int, beside: float = 0.0) -> tuple[Figure, Sequence[Axes]]:
     """Return a figure with panels for pictures of the cell, and so many inches beside them for a bar."""
     width, height = cell_size(attributes)
-    if beside:
-        height = max(height, LEAST_BAR[1])
-    figure = Figure(figsize=(panels * (width + 0.7) + 0.1 + beside, height + 1.2), layout="compressed")
+    size = panels * (width + 0.7) + 0.1 + beside, max(height, LEAST_BAR[1]) + 1.2
+    figure = Figure(figsize=size, layout="compressed")
     return figure, figure.subplots(1, panels, squeeze=False)[0]
 
 

@@ -45,6 +45,7 @@ MAX_FRAMES, FRAME_TIME = 24, 250  # of the animation; milliseconds
 FRAME_LIMIT, PANEL_LIMIT, STATE_LIMIT = 8000, 30_000, 60_000  # triangles in a frame, a panel, a picture of one state
 MOST_COLUMNS = 3
 INCHES, BAR = 8.0, 0.55  # of all panels of a row, and of the colour bar in each
+FRAME, MOST_HEIGHT = 3.6, 6.0  # width of a cell in the animation; largest height of a cell in it and in a panel; inches
 LOADS_IN_PANEL, LINE = 2, 0.15  # in a line of its title; inches of a line
 
 
@@ -96,9 +97,9 @@ class DeformedCell(DrawnCell):
         axes.set_title(f"{title}\n{self.labels.label(attributes, LOADS_IN_PANEL)}", fontsize=9, y=1.0)
         return shapes
 
-    def bar(self, axes: Axes, shapes: Any) -> None:
-        """Draw the colour bar of all states beside axes."""
-        bar = bar_beside(axes, shapes, self.colours[2])
+    def bar(self, axes: Axes, shapes: Any, size: tuple[float, float] | None = None) -> None:
+        """Draw the colour bar of all states beside axes, of a cell in this size (inches), if it is known."""
+        bar = bar_beside(axes, shapes, self.colours[2], size)
         bar.ax.tick_params(labelsize=8)
         bar.locator = MaxNLocator(6)
 
@@ -201,9 +202,9 @@ def _side_by_side(file: Any, numbers: Sequence[int], document: Document, scale: 
     places = [cell.moved(number) for number in numbers]
     size = np.subtract(*_corners(places)[::-1])
     rows, columns = _grid(len(numbers), size[0] / size[1])
-    panel = (INCHES - BAR) / columns
+    height = _inches(size, (INCHES - BAR) / columns)[1]
     title = 0.2 + LINE * (1 + max(cell.lines(number) for number in numbers))
-    figure = Figure(figsize=(INCHES, rows * (panel * size[1] / size[0] + title) + 0.7), layout="constrained")
+    figure = Figure(figsize=(INCHES, rows * (height + title) + 0.7), layout="constrained")
     grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
     shapes = [cell.draw(axes, number, moved) for axes, number, moved in zip(grid, numbers, places, strict=False)]
     bar: Any = figure.colorbar(shapes[0], ax=grid.tolist(), extend=cell.colours[2], shrink=0.7, aspect=30, pad=0.01)
@@ -220,9 +221,15 @@ def _side_by_side(file: Any, numbers: Sequence[int], document: Document, scale: 
     return figure
 
 
+def _inches(size: Array, width: float) -> tuple[float, float]:
+    """Width and height of a cell of this size (2,) in a picture: as wide as may be, but not higher than MOST_HEIGHT."""
+    scale = min(width / size[0], MOST_HEIGHT / size[1])
+    return float(scale * size[0]), float(scale * size[1])
+
+
 def _grid(panels: int, ratio: float) -> tuple[int, int]:
     """Return rows and columns of panels of this ratio of width to height: about as wide as high, few places empty."""
-    wanted = math.sqrt(0.7 * panels * ratio)
+    wanted = min(math.sqrt(0.7 * panels * ratio), panels)
     grids = [(rows, -(-panels // rows)) for rows in {max(1, math.floor(wanted)), math.ceil(wanted)}]
     grids = [grid for grid in grids if grid[1] <= MOST_COLUMNS] or grids
     return min(grids, key=lambda grid: (grid[0] * grid[1] - panels, abs(grid[0] - wanted)))
@@ -235,14 +242,15 @@ def _animation(file: Any, numbers: Sequence[int], document: Document, scale: flo
     low, high = _corners(places)
     size = high - low
     title = 0.75 + LINE * max(cell.lines(number) for number in numbers)
-    figure = Figure(figsize=(3.6 + BAR, 3.6 * size[1] / size[0] + title), dpi=100, layout="constrained")
+    width, height = _inches(size, FRAME)
+    figure = Figure(figsize=(FRAME + BAR, height + title), dpi=100, layout="constrained")
     axes = figure.subplots()
     figure.suptitle(cell.caption, fontsize=10)
     frames: list[Image.Image] = []
     for number, moved in zip(reversed(numbers), reversed(places), strict=True):
         for artist in [*axes.collections, *axes.patches, *axes.child_axes]:
             artist.remove()
-        cell.bar(axes, cell.draw(axes, number, moved))
+        cell.bar(axes, cell.draw(axes, number, moved), (width, height))
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         picture = Image.fromarray(pixels_of(figure))
         figure.set_layout_engine("none")

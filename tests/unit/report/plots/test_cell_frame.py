@@ -10,6 +10,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 from PIL import Image
 
+from feti_homog.report.plots import deformed_panels
 from feti_homog.report.plots.cell_frame import BAR_INCHES, LEAST_BAR, bar_beside, cell_size, figure_of, label_cell_axes
 from feti_homog.report.plots.plot_helpers import DPI, pixels_of, save
 
@@ -35,3 +36,15 @@ def test_titles_wider_than_the_figure_are_drawn_whole(tmp_path: Path, letters: i
         assert (picture.width > 3.0 * DPI) == (letters == 200)
         edges = np.asarray(picture)[:, [0, -1]]
     assert (edges == 255).all()
+
+
+@pytest.mark.parametrize("panels", [1, 2, 4, 6])
+@pytest.mark.parametrize("ratio", [0.05, 1.0, 20.0])
+def test_panels_leave_no_row_empty(panels: int, ratio: float) -> None:
+    rows, columns = deformed_panels._grid(panels, ratio)
+    assert (rows - 1) * columns < panels <= rows * columns
+
+
+def test_panels_and_frames_of_tall_cells_fit_on_a_page() -> None:
+    assert deformed_panels._inches(np.array([1.0, 1.0]), 3.6) == (3.6, 3.6)
+    assert deformed_panels._inches(np.array([8.0, 80.0]), 3.6) == pytest.approx((0.6, 6.0))
