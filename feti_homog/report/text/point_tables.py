@@ -77,7 +77,7 @@ def angle_table(points: Sequence[Point], label: str) -> Table:
     `label` is the unit of stresses in brackets, or empty.
     """
     stiff = "stiffness" in points[0]
-    entries = shown_entries(points) if stiff else {}
+    entries, above = (shown_entries(points), [LAST_STRAIN]) if stiff else ({}, [])
     counts = COUNTS if len(entries) <= len(ENTRIES) else []
     rows = []
     for point in points:
@@ -87,7 +87,7 @@ def angle_table(points: Sequence[Point], label: str) -> Table:
     width = 12 if counts else 10
     columns = [Column("angle", 9), *(Column(name, width) for name in tuple(entries) or STRESSES), *counts]
     title = f"{'Stiffness' if stiff else 'Stress'}{label} against the debonding angle (degrees)"
-    return Table(title, columns, rows, [LAST_STRAIN] if stiff and counts else [])
+    return Table(title, columns, rows, above if counts else [])
 
 
 def columns_without_noise(values: Sequence[Sequence[float]]) -> Any:
