@@ -261,9 +261,9 @@ class Cell:
     )
     window: str = key(
         choice("periodic", "cut"),
-        'What a table is. "periodic": a cell, whose fibres must not overlap; all are shifted so that its sides cut them '
-        'well, unless a file gives left and bottom. "cut": a piece of something larger, whose fibres may overlap across '
-        "the border: they are moved apart as little as can be. Those with centres outside are left out.",
+        'What a table is. "periodic": a cell, whose fibres must not overlap; all are shifted so that its sides cut '
+        'them well, unless a file gives left and bottom. "cut": a piece of something larger, whose fibres may overlap '
+        "across the border: they are moved apart as little as can be. Those with centres outside are left out.",
         default="periodic",
         only=TABLE,
     )
