@@ -43,7 +43,7 @@ def table_arrangement(cell: Cell) -> Arrangement:
     across its border are moved apart.
 
     A table that gives the corner of its cell keeps it, if the sides are clear of tangency with its discs and the corner
-    in no void (`in_voids`); the table of a random cell gives the mesh of that cell. Else all is shifted (`clear_shift`),
+    in no void (`in_voids`); that of a random cell gives the mesh of that cell. Else all is shifted (`clear_shift`),
     rounded and meshed in the order of the coordinates, so that tables that differ by a shift, by the order of rows or
     by units have one mesh. Outlines that are not round are rounded wherever they are.
 
