@@ -239,6 +239,7 @@ def _content(
     between = values.std(axis=0, ddof=1) if count > 1 else np.zeros(len(data))
     return {
         "name": str(study.document.get("name", "case")),
+        "stress_unit": str(study.document["output"].get("stress_unit", "")),
         "parameters": [
             {"name": name, "mean": study.means[name], "std": std,
              "by": "differences" if name in missing else "derivatives"}

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from feti_homog.report.text.constant_tables import shown
-from feti_homog.report.text.table import Column, Table, without_noise
+from feti_homog.report.text.table import Column, Table, with_unit, without_noise
 
 DIGITS = "0123456789"
 NOISY = 0.5  # of a slope: a larger standard error over random cells is worth a line
@@ -38,8 +38,13 @@ def _noisy(document: Mapping[str, Any]) -> Iterator[str]:
 
 def _rows(document: Mapping[str, Any], keys: Sequence[str]) -> list[list[Any]]:
     """Return the rows of results that scatter."""
+    stress_unit = document.get("stress_unit", "")
     return [
-        [each["name"], *("-" if each[key] is None else each[key] for key in keys), *(100 * s for s in each["shares"])]
+        [
+            with_unit(each["name"], stress_unit),
+            *("-" if each[key] is None else each[key] for key in keys),
+            *(100 * s for s in each["shares"]),
+        ]
         for each in _shown(document)
     ]
 

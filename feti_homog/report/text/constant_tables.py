@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.report.text.stiffness_tables import SHORT, UNKNOWN, abreast, with_errors
-from feti_homog.report.text.table import Column, Table, without_noise
+from feti_homog.report.text.table import Column, Table, in_brackets, without_noise
 from feti_homog.typing import Document
 
 TITLE = "Material axes: 1 along the fibres (x3 of the cell), 2 and 3 across (x1, x2)"
@@ -134,7 +134,8 @@ def uncertainty(document: Document) -> list[Table]:
         for k, name in ((names.index(name), name) for name in shown(names))
         if found["std"][k] > 0
     ]
-    return [Table("Scatter by uncertain constants (std), and their shares of the variance (%)", columns, rows)]
+    label = in_brackets(document["case"].get("output", {}).get("stress_unit", ""))
+    return [Table(f"Scatter by uncertain constants{label}: std, and their shares of the variance (%)", columns, rows)]
 
 
 def mesh_errors(document: Document) -> dict[str, float]:
