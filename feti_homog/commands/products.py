@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from feti_homog.api import folder
-from feti_homog.errors import EXIT_DEFECT, EXIT_DONE, EXIT_UNCONVERGED, FetiHomogError
+from feti_homog.errors import EXIT_DEFECT, EXIT_DONE, EXIT_UNCONVERGED, CaseError, FetiHomogError
 from feti_homog.parallel.mpi_errors import on_root, on_root_only
 from feti_homog.runtime.environment import require_report
 from feti_homog.runtime.standard_streams import complain, end_on_signals, launched_rank, prepare, print_product, say
@@ -70,9 +70,25 @@ def _add(
 ) -> argparse.ArgumentParser:
     """Return the new parser of a command of a results folder."""
     parser: argparse.ArgumentParser = actions.add_parser(name, help=words, description=description)
-    parser.add_argument("directory", type=folder, metavar="DIR")
+    parser.add_argument("directory", type=_result_folder if action else folder, metavar="DIR")
     parser.set_defaults(action=action)
     return parser
+
+
+def _result_folder(name: str) -> Path:
+    """Return the folder of that name; CaseError for a file, and for the folder of a sweep, whose cases have results."""
+    from feti_homog.results import result_json
+    from feti_homog.sweep.store import INDEX_FILE
+
+    directory = folder(name)
+    if os.path.isfile(directory):
+        raise CaseError(f"{directory}: expected the folder of a result, not a file")
+    if os.path.exists(directory / INDEX_FILE) and not os.path.exists(directory / result_json.NAME):
+        raise CaseError(
+            f"{directory}: expected the folder of a case, such as {directory / 'case-0001'}, not that of a sweep; "
+            f"`feti-homog collect {directory}` draws a sweep"
+        )
+    return directory
 
 
 def _plot(arguments: argparse.Namespace, comm: Intracomm) -> None:

@@ -21,7 +21,7 @@ from feti_homog.version import __version__
 
 NAME, TABLE, PICTURE = "fit.json", "measured.csv", "fit.png"
 OWN = re.compile(r"fit\.(json|png)|measured\.csv|(evaluation|differences)-\d{4,}")
-FIRST, LEAST_SHARE = Column("", -38), 0.01
+FIRST, LEAST_SHARE, MOST_DEVIATIONS = Column("", -38), 0.01, 3.0
 HEAD = ("test", "name", "strain", "value", "std", "computed", "residual")
 
 
@@ -133,7 +133,18 @@ def text(document: Mapping[str, Any]) -> str:
     squares = document["sum_of_squares"]
     total = "beyond all numbers" if squares is None else f"{squares:.4g}"
     last = f"Sum of squares {total}{chance}; {document['evaluations']} evaluations"
-    return "\n\n".join(["", *("\n".join(table.lines) for table in tables), last])
+    return "\n\n".join(["", *("\n".join(table.lines) for table in tables), last, *_limits(document, data)])
+
+
+def _limits(document: Mapping[str, Any], data: Sequence[str]) -> list[str]:
+    """Return a remark where unknowns end at their bounds, and a measured value is off by more than MOST_DEVIATIONS."""
+    bound = [f"{name} at its {own['at_bound']}" for name, own in document["unknowns"].items() if own["at_bound"]]
+    residuals = [each["residual"] for each in document["measured"]]
+    worst = int(np.argmax(np.abs(residuals)))
+    if not bound or abs(residuals[worst]) <= MOST_DEVIATIONS:
+        return []
+    off = f"{data[worst]} is {abs(residuals[worst]):.3g} standard deviations off"
+    return [f"Remark: the fit ends with {', '.join(bound)} bound, and {off}"]
 
 
 def _labels(document: Mapping[str, Any]) -> list[str]:

@@ -131,6 +131,17 @@ def test_plot_of_an_empty_folder_names_the_missing_file(tmp_path):
     )
 
 
+@pytest.mark.parametrize("command", ["plot", "report", "fields"])
+def test_what_is_no_folder_of_a_result_is_named(tmp_path, command):
+    path = case_file(tmp_path)
+    job = command_line(1, command, path)
+    assert job.returncode == 2
+    assert job.stderr.startswith(f"error: {path}: expected the folder of a result, not a file\n")
+    (tmp_path / "sweep.json").touch()
+    job = command_line(1, command, tmp_path)
+    assert job.returncode == 2 and "not that of a sweep; `feti-homog collect" in job.stderr
+
+
 def test_without_fields_only_the_json_is_written_and_nothing_drawn(tmp_path):
     out = tmp_path / "results"
     command_line(2, "run", case_file(tmp_path, "[output]\nfields = false\n"), "--out", out)
