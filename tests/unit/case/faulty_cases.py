@@ -69,10 +69,6 @@ FAULTY_CASES: dict[str, tuple[str, tuple[str, ...]]] = {
         fraction("40"),
         ("[cell] fibre_fraction = 40: expected a number above 0 and below 1",),
     ),
-    "fraction_scatters": (
-        fraction("{mean = 0.4, cv = 0.1}"),
-        ("expected a number above 0 and below 1; `feti-homog uncertainty` takes scatter",),
-    ),
     "fraction_is_text": (fraction('"0.4"'), ('[cell] fibre_fraction = "0.4": expected a number',)),
     "fraction_is_true": (fraction("true"), ("[cell] fibre_fraction = true: expected a number",)),
     "fraction_is_nan": (fraction("nan"), ("[cell] fibre_fraction = nan: expected a number",)),

@@ -236,3 +236,9 @@ def test_phases_of_any_name(tmp_path):
     for name in ("void", '"my glass"', '"glass:"'):
         with pytest.raises(CaseError, match="unknown phase"):
             case_of(tmp_path, MESH + f"[material.{name}]\nyoung = 5\npoisson = 0\n")
+
+
+def test_scatter_of_a_case_names_the_command_that_takes_it(tmp_path):
+    text = changed(("fibre_fraction = 0.4", "fibre_fraction = {mean = 0.4, cv = 0.1}"))
+    with pytest.raises(CaseError, match="a number above 0 and below 1; `feti-homog uncertainty` takes scatter"):
+        case_of(tmp_path, text)
