@@ -146,9 +146,9 @@ class Output:
     mesh_error: bool = key(
         boolean,
         "Estimate the error that the mesh makes of every constant: about a twentieth of a run that writes fields where "
-        "refine >= 1, up to an eighth of large cells and with elements of order 2, a seventh of a case in sweeps of "
-        "small cells; else, with polygons, and beside debonded arcs with elements of order 2 or a tip_size, up to "
-        "three fifths of one without fields.",
+        "refine >= 1, up to a sixth of large cells without fields and of those with elements of order 2, a seventh of "
+        "a case in sweeps of small cells; else, with polygons, and beside debonded arcs with elements of order 2 or a "
+        "tip_size, up to three fifths of one without fields.",
         default=True,
     )
     sensitivities: bool = key(
