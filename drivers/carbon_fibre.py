@@ -75,7 +75,7 @@ def measured(values: tuple[float, ...]) -> dict[str, Any]:
 def parser() -> argparse.ArgumentParser:
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--out", type=Path, default=Path("results/carbon_fibre"), metavar="DIR")
-    options.add_argument("--quick", action="store_true", help="coarse meshes, whatever --mesh-size says")
+    options.add_argument("--quick", action="store_true", help="coarse meshes, in place of --mesh-size")
     options.add_argument("--mesh-size", type=float, default=0.15)
     return options
 

@@ -35,7 +35,7 @@ def quick_parser(description: str, name: str, quick: str) -> argparse.ArgumentPa
     options = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--out", type=Path, default=Path("results") / name, metavar="DIR")
     add_output_options(options)
-    options.add_argument("--quick", action="store_true", help=f"{quick}, whatever the options for these say")
+    options.add_argument("--quick", action="store_true", help=f"{quick}, in place of the options for these")
     return options
 
 

@@ -104,7 +104,7 @@ def parser() -> argparse.ArgumentParser:
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--out", type=Path, default=Path("results/interface_toughness"), metavar="DIR")
     options.add_argument(
-        "--quick", action="store_true", help="one cell of two fibres, the toughness alone, whatever other options say"
+        "--quick", action="store_true", help="one cell of two fibres, the toughness alone, in place of other options"
     )
     options.add_argument("--seeds", type=int, default=4, help="arrangements: 0, 1, ...")
     options.add_argument("--fibres", type=int, default=20)

@@ -41,7 +41,7 @@ class Checks:
         confirmed = response.checks.get("jump")
         without = "by the factor of the cell" if response.checks.keys() & {"hill"} else "by influence columns"
         jump = without if confirmed is None else f"relative jump {confirmed:.1e}"
-        words = f"{state.iterations} iterations, {jump}" if state.iterations else f"solved directly, {jump}"
+        words = f"{state.iterations or 'no'} iterations, {jump}"
         if response.debonded:
             words += f", {response.debonded} debonded ({response.counts['closed']} closed), {state.solves} solves"
         if state.free_motions:

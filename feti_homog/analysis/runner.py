@@ -219,8 +219,7 @@ def _analyse(context: AnalysisContext) -> dict[str, Any]:
     with context.progress.stage("solve") as words:
         analysis = analysis_of(context.case).run(context)
         iterations = context.checks.iterations
-        total = f"{sum(iterations)} iterations" if any(iterations) else "solved directly"
-        words.append(f"{len(iterations)} states, {total}")
+        words.append(f"{len(iterations)} states, {sum(iterations) or 'no'} iterations")
     return analysis
 
 

@@ -70,6 +70,7 @@ def _add(
 ) -> argparse.ArgumentParser:
     """Return the new parser of a command of a results folder."""
     parser: argparse.ArgumentParser = actions.add_parser(name, help=words, description=description)
+    # Without an action it is `verify`, which loads no module of the results that it checks.
     parser.add_argument("directory", type=_result_folder if action else folder, metavar="DIR")
     parser.set_defaults(action=action)
     return parser

@@ -117,9 +117,9 @@ def build(
 ) -> SolverParts:
     """Factor the subdomains and set up what the options and sizes ask for.  Collective.
 
-    `compliance` (owned rows,) is C, which may grow if the springs `soften`. `recovers` tells that displacements inside
-    will be asked for: then a rank with one subdomain keeps its factor, which takes about the memory that a factor of
-    the interior would take later.
+    `compliance` (owned rows,) is C, which may grow if the springs `soften`. Where the run `recovers`
+    displacements inside, a rank with one subdomain keeps its factor, which takes about the memory that a factor of the
+    interior would take later.
 
     Options: `feti_dual_operator`, `feti_pc_type`, `feti_coarse_space`, `feti_coarse_threshold`.
 

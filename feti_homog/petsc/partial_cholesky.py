@@ -210,7 +210,7 @@ def _library() -> ctypes.CDLL:
     library.cholmod_allocate_factor.restype = POINTER(_Factor)
     library.cholmod_ptranspose.restype = POINTER(_Sparse)
     library.cholmod_solve.restype = POINTER(_Dense)
-    try:  # CHOLMOD prints no warnings: this module raises what they say
+    try:  # CHOLMOD prints no warnings: this module raises errors in their place
         library.SuiteSparse_config_printf_func_set(None)
     except AttributeError:  # before SuiteSparse 6 the function is the fifth of a structure
         with suppress(ValueError):

@@ -36,7 +36,7 @@ def schur_complement(matrix: csr_matrix, rows: Int, order: Int | None = None) ->
     if len(rows) == matrix.shape[0]:
         return np.asarray(matrix.toarray(order="F"))
     if order is not None and _can_be_ordered():
-        return _by_cholmod(matrix, rows, np.zeros((matrix.shape[0], 0)), order, False).S
+        return _by_cholmod(matrix, rows, np.zeros((matrix.shape[0], 0)), order, keep_factor=False).S
     scale = power_of_two(matrix.diagonal())
     matrix.sort_indices()
     # In place and back, which changes no digit: a copy would be as large as the matrix.

@@ -187,8 +187,7 @@ def facts(document: Document) -> list[tuple[str, str]]:
                  f"order {case['cell'].get('order', 1)}, refine {case['cell'].get('refine', cell.get('refine', 0))}"),
         ("Solver", f"{_count(ranks)} rank{'' if ranks == 1 else 's'}, {_count(solver['subdomains'])} subdomains, "
                    f"{_count(solver['dofs'])} degrees of freedom"),
-        ("Iterations", f"{sum(iterations)} in {len(iterations)} states, to {solver['rtol']:g}" if any(iterations)
-                       else f"none: {len(iterations)} states solved directly"),
+        ("Iterations", f"{sum(iterations) or 'none'} in {len(iterations)} states, to {solver['rtol']:g}"),
         ("Time", ", ".join(f"{stage} {seconds:.2f} s" for stage, seconds in document["timings"].items())),
         ("Version", f"feti-homog {document['version']}, layout {document['schema']}"),
     ]  # fmt: skip

@@ -163,7 +163,7 @@ def _factorized(solver: Document) -> list[str]:
 
 def _iterations(counts: Sequence[int]) -> list[str]:
     if not any(counts):
-        return [f"none: {_number(len(counts), 'state')} solved directly"]
+        return [f"none in {_number(len(counts), 'state')}"]
     if len(counts) <= LISTED:
         return [str(count) for count in counts]
     return [f"{min(counts)} to {max(counts)} a state", f"{sum(counts)} for {len(counts)} states"]

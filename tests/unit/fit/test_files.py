@@ -1,4 +1,4 @@
-"""What fit.json has of a fit: unknowns that the measured values hardly determine."""
+"""Faults and remarks of a fit: unknowns that measured values hardly determine, and bounds far from these."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ TEXT = (
 
 @pytest.mark.parametrize(("slope", "status"), [(0.1, "done"), (1e-3, "not converged")])
 def test_an_unknown_with_a_scatter_beyond_its_bounds_is_named(slope, status):
-    """Of a standard deviation 1.5 / slope, 15 or 1500, and bounds 450 apart."""
+    """Compare standard deviations of 1.5 / slope, 15 and 1500, with bounds 450 apart."""
     fit = parse(tomllib.loads(BASE + TEXT), Path())
     bounds = np.array([50.0]), np.array([500.0])
     measured = np.array([150.0]), np.array([1.5])

@@ -57,8 +57,8 @@ def test_what_rounding_leaves_of_zero_is_zero(angle, expected):
     assert components({"angle": angle, "factor": 3.0}) == pytest.approx(expected, abs=1e-300)
 
 
-def test_counts_of_nodes_of_an_angle_say_under_which_strain_they_are():
-    """Of three unit strains each opens and closes other nodes."""
+def test_counts_of_nodes_of_an_angle_name_their_unit_strain():
+    """Each of the three unit strains opens and closes other nodes."""
     counts = {"angle": 90.0, "bonded": 9, "open": 2, "closed": 1}
     words = "bonded, open, closed: interface nodes under the unit strain gamma12"
     assert words in angle_table([counts | {"stiffness": [[9.0, 2, 0], [2, 8, 0], [0, 0, 3]]}], "").lines

@@ -293,6 +293,6 @@ def test_checks_of_contact_are_those_of_interfaces() -> None:
 
 def test_states_without_iterations_are_reported() -> None:
     document = changed()
-    for counts, words in (([0] * 30, "none: 30 states solved directly"), ([0], "none: 1 state solved directly")):
+    for counts, words in (([0] * 30, "none in 30 states"), ([0], "none in 1 state")):
         document["solver"] |= {"iterations": counts}
         assert line(summary(document), "Iterations").endswith(words)
