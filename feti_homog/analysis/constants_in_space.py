@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.case.phase_names import COATING
 from feti_homog.homogenization import bonds
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.materials.estimates.constituents import Fibres, Springs
@@ -20,6 +19,7 @@ from feti_homog.materials.spatial_constants import (
     transverse_moduli,
     transversely_isotropic_part,
 )
+from feti_homog.microstructure.phase_names import COATING
 from feti_homog.typing import Bool, Float
 
 # Radii of fibres that differ by less, relatively, are one: those of users' meshes are fitted to nodes.

@@ -18,7 +18,7 @@ from feti_homog.schema.wording import limit_in_words, toml_value
 from feti_homog.typing import Bool
 
 if TYPE_CHECKING:
-    from feti_homog.case.fibre_table import FibreTable
+    from feti_homog.fibres.fibre_table import FibreTable
 
 SUFFIXES = {"mesh": MESH_SUFFIXES, "table": TABLE_SUFFIXES}
 LIST = "fibre_list"
@@ -82,7 +82,7 @@ def _with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
     if words := missing(file):
         faults.append(f"{given}: {words}")
         return cell
-    from feti_homog.case.fibre_window import read_window  # loads SciPy's trees, which few cases need
+    from feti_homog.fibres.fibre_window import read_window  # loads SciPy's trees, which few cases need
     from feti_homog.microstructure.neighbour_match import knows_neighbours
 
     try:
@@ -101,7 +101,7 @@ def _with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
 
 def _with_table(cell: Cell, faults: list[str]) -> Cell:
     """Return the cell with its table, which has the size of the cell."""
-    from feti_homog.case.fibre_table import read_table, table_of  # which few cases need
+    from feti_homog.fibres.fibre_table import read_table, table_of  # which few cases need
 
     try:
         table = read_table(cell.file, cell.columns) if cell.file is not None else table_of(cell.fibre_list or (), LIST)

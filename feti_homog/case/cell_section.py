@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from feti_homog.case.phase_names import FIBRE
 from feti_homog.case.section_values import (
     CELL_FILE,
     FIBRE_LIST,
@@ -19,13 +18,14 @@ from feti_homog.case.section_values import (
     SEED,
     TABLE_FILE,
 )
+from feti_homog.microstructure.phase_names import FIBRE
 from feti_homog.schema.keys import Selector, key
 from feti_homog.schema.values import choice, integer, real
 
 MOST_FIBRES = 100_000  # of a cell, and as many voids
 
 if TYPE_CHECKING:
-    from feti_homog.case.fibre_table import FibreTable
+    from feti_homog.fibres.fibre_table import FibreTable
     from feti_homog.microstructure.fibre_pattern import FibrePattern
 
 CIRCULAR = ("square", "hexagonal", "random")

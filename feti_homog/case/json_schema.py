@@ -14,7 +14,6 @@ from feti_homog.case.cell_section import ALL_CIRCULAR
 from feti_homog.case.interface_section import Arc, Scatter
 from feti_homog.case.material_sections import CONSTANTS
 from feti_homog.case.mixed_load import TEMPERATURE, MixedLoad
-from feti_homog.case.phase_names import COATING, FIBRE, MATRIX, PHASE
 from feti_homog.case.rules import PLACES_OF_LOADS, PLACES_OF_TABLES, RULES
 from feti_homog.case.sections import (
     AXIS_MEANING,
@@ -30,6 +29,7 @@ from feti_homog.case.selectors import ANALYSIS_TYPE, CRITERION, GENERALIZED, PLA
 from feti_homog.case.uncertainty import UNCERTAINTY
 from feti_homog.materials.forms import EXPANSION_PAIR, MATERIAL_FORMS
 from feti_homog.materials.laws import NEEDED
+from feti_homog.microstructure.phase_names import COATING, FIBRE, MATRIX, PHASE
 from feti_homog.schema.keys import Condition, Key, defaults_of, keys_of
 from feti_homog.schema.rules import ITEMS, Rule, Schema
 from feti_homog.schema.values import text

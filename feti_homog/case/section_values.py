@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
-from feti_homog.case.phase_names import FIBRE_PHASE, PHASE
-from feti_homog.fibres.outlines.outlines import Column
-from feti_homog.fibres.outlines.shapes import SHAPES
+from feti_homog.fibres.table_columns import FIBRE_CELLS
+from feti_homog.microstructure.phase_names import FIBRE_PHASE, PHASE
 from feti_homog.schema.values import (
     SMALLEST,
     ValueType,
@@ -61,20 +59,6 @@ def _positive_or_inf(what: str) -> ValueType:
         {"type": "number", "minimum": SMALLEST},
     )
 
-
-# Of an empty cell, and the bounds, of the columns that are numbers.
-NUMBERS = {
-    "x": Column(math.nan),
-    "y": Column(math.nan),
-    "radius": Column(math.nan, above=0.0),
-    "coating": Column(0.0, least=0.0),
-    "inner_radius": Column(0.0, least=0.0),
-    "strength": Column(1.0, above=0.0),
-} | {name: column for shape in SHAPES for name, column in shape.columns.items()}
-FIBRE_CELLS: Mapping[str, ValueType] = {
-    name: real(least=column.least, above=column.above) for name, column in NUMBERS.items()
-}
-"""The numbers of a fibre in a table."""
 
 TABLE_SUFFIXES = (".csv", ".txt", ".dat")
 TABLE_FILE = file_name("the name of a .csv file", *TABLE_SUFFIXES)

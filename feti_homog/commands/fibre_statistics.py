@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.case.fibre_window import read_window
-from feti_homog.case.phase_names import VOID
 from feti_homog.commands import listed_fibres
 from feti_homog.errors import CaseError
+from feti_homog.fibres.fibre_window import read_window
 from feti_homog.fibres.hard_core import hard_core
 from feti_homog.microstructure.fibre_pattern import FibrePattern
+from feti_homog.microstructure.phase_names import VOID
 from feti_homog.microstructure.statistics import SECTORS, FibreStatistics, VoronoiCells, measure, poisson
 from feti_homog.results import atomic, output_folder
 from feti_homog.typing import Array, Float

@@ -9,11 +9,11 @@ from itertools import product
 import numpy as np
 from scipy.spatial import cKDTree
 
-from feti_homog.case.phase_names import COATING, MATRIX, VOID
 from feti_homog.errors import MeshError
 from feti_homog.fibres.outlines.convex_sums import ConvexSums
 from feti_homog.fibres.outlines.ellipses import Discs
 from feti_homog.fibres.outlines.outlines import Outlines, directions
+from feti_homog.microstructure.phase_names import COATING, MATRIX, VOID
 from feti_homog.typing import Bool, Float, Int
 
 # Decimals in which lengths / width of the cell are compared.

@@ -6,11 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from feti_homog.case.cell_section import Cell
-from feti_homog.case.fibre_table import FibreTable
 from feti_homog.errors import MeshError
 from feti_homog.fibres import cut_window
 from feti_homog.fibres.arrangement import Arrangement, clear_shift, clearance, in_voids, neighbours
+from feti_homog.fibres.fibre_table import FibreTable
 from feti_homog.fibres.outlines.ellipses import Discs
 from feti_homog.fibres.outlines.outlines import Outlines, directions
 from feti_homog.fibres.outlines.shapes import SHAPES, with_parts
@@ -36,8 +35,8 @@ REPAIRED = 0.01
 MOST_LISTED = 30  # moved fibres that are listed one by one
 
 
-def table_arrangement(cell: Cell) -> Arrangement:
-    """Return the fibres of the case's table, in the order of its rows, then its voids.
+def table_arrangement(table: FibreTable, window: str, repairs: bool = False) -> Arrangement:
+    """Return the fibres of a table, in the order of its rows, then its voids.
 
     Periodic images are one, the first of them. In a window that is cut out of something larger, fibres that overlap
     across its border are moved apart.
@@ -50,15 +49,13 @@ def table_arrangement(cell: Cell) -> Arrangement:
     Raises:
         MeshError: rows lie outside, come twice, overlap or touch; a line for each fault.
     """
-    table = cell.table
-    assert table is not None and table.width is not None
-    table, repaired = _repaired(table, cell.window) if cell.repair == "overlaps" else (table, ())
-    kept, centres, moves, size = on_torus(table, cell.window)
+    table, repaired = _repaired(table, window) if repairs else (table, ())
+    kept, centres, moves, size = on_torus(table, window)
     order = np.argsort(table.is_void[kept], kind="stable")
     rows, places = kept[order], (centres + moves)[order]
     fibres = replace(
         _nested(table, rows, places % size / size[0], float(size[1] / size[0])),
-        remarks=repaired + (_moved_fibres(table, kept, moves) if cell.window == "cut" else ()),
+        remarks=repaired + (_moved_fibres(table, kept, moves) if window == "cut" else ()),
     )
     shifted = clear_shift(fibres)
     is_placed = table.left is not None and table.bottom is not None

@@ -10,13 +10,13 @@ import numpy as np
 
 from feti_homog.case.case import Case
 from feti_homog.case.interface_section import Arc, InterfaceSection, interface_label
-from feti_homog.case.phase_names import COATING, MATRIX
 from feti_homog.interface.tips import debonded_arcs
 from feti_homog.interface.tips.debonded_arcs import MovedTips
 from feti_homog.mesh.outline.outline import MERGED
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.mesh.sizes.element_estimate import ElementEstimate, ratio_at_a_tip
+from feti_homog.microstructure.phase_names import COATING, MATRIX
 from feti_homog.typing import Bool, Float, Int
 
 # The stress at a tip is singular, so that the energy errs by about the size of the elements there, elsewhere by

@@ -12,8 +12,8 @@ from mpi4py import MPI
 
 from feti_homog.case import case as cases
 from feti_homog.case.case import Case
-from feti_homog.fibres.arrange import listed_arrangement
 from feti_homog.homogenization import arc_selection
+from feti_homog.mesh.arrange import listed_arrangement
 from feti_homog.mesh.coarse_mesh import CoarseMesh
 from feti_homog.mesh.fill.gmsh_mesher import NodedCell, UnmeshedCell, begin
 from feti_homog.mesh.outline.bare_outline import LineStations

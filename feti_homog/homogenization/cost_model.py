@@ -18,11 +18,11 @@ import numpy as np
 from feti_homog.case.bond_laws import LAWS, laws_with
 from feti_homog.case.case import Case
 from feti_homog.case.interface_section import InterfaceSection
-from feti_homog.case.phase_names import COATING
 from feti_homog.fem.problem import AXIAL, Problem
 from feti_homog.feti.thresholds import INFLUENCE_COLUMNS, NEVER_REFACTORED_ROWS
 from feti_homog.homogenization import phase_laws
 from feti_homog.materials.plane_state import PLANE_STATES
+from feti_homog.microstructure.phase_names import COATING
 
 # Seconds to start Python, MPI, PETSc and gmsh.
 START_SECONDS = 0.9

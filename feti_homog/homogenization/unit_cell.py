@@ -10,7 +10,6 @@ import numpy as np
 from mpi4py import MPI
 
 from feti_homog.case.case import Case
-from feti_homog.case.phase_names import COATING, MATRIX
 from feti_homog.fem.problem import AXIAL
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.shared_entities import SharedEntities, share_entities
@@ -30,6 +29,7 @@ from feti_homog.interface.tips import debonded_arcs
 from feti_homog.mesh.coarse_mesh import CoarseMesh
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.mesh.submesh import SubdomainTable, Submesh, SubmeshesOfRank
+from feti_homog.microstructure.phase_names import COATING, MATRIX
 from feti_homog.parallel.distributed_arrays import scatter
 from feti_homog.parallel.mpi_errors import agree, on_root, on_root_only
 from feti_homog.runtime.progress import Progress

@@ -9,10 +9,10 @@ from collections import deque
 
 import numpy as np
 
-from feti_homog.case.phase_names import COATING
 from feti_homog.mesh.coarse_mesh import areas
 from feti_homog.mesh.periodic_topology import Torus, components, edge_pairs
 from feti_homog.mesh.submesh import Submesh, cut_bodies
+from feti_homog.microstructure.phase_names import COATING
 from feti_homog.typing import Bool, Float, Int
 
 # Relative to the radius: circles nearer than this are images of one.

@@ -13,7 +13,6 @@ from mpi4py import MPI
 from feti_homog.case import case as cases
 from feti_homog.case import element_sizes
 from feti_homog.case.case import Case
-from feti_homog.case.phase_names import COATING
 from feti_homog.case.sections import SWEEP
 from feti_homog.errors import CaseError
 from feti_homog.feti import solver_plan
@@ -26,6 +25,7 @@ from feti_homog.homogenization.domain_partition import CellSummary
 from feti_homog.homogenization.partition_policy import BY_COST
 from feti_homog.homogenization.unit_cell import cut
 from feti_homog.mesh.refinement import ReferenceLattice
+from feti_homog.microstructure.phase_names import COATING
 from feti_homog.parallel.mpi_errors import on_root, on_root_only
 from feti_homog.petsc.options import case_options
 from feti_homog.results import checkpoint

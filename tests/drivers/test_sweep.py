@@ -195,7 +195,8 @@ def test_jobs_of_an_array_share_the_folder_but_no_case(tmp_path):
     jobs = [launched(0, *words, str(k), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) for k in (1, 2)]
     assert [job.wait(PATIENCE) for job in jobs] == [0, 0] and len(results(out)) == 2
     held = subprocess.Popen(
-        [sys.executable, "-c", f"from feti_homog.runtime.file_locks import Lock; from pathlib import Path; import sys\n"
+        [sys.executable, "-c", "import sys; from pathlib import Path\n"
+         "from feti_homog.runtime.file_locks import Lock\n"
          f"Lock(Path({str(out / 'case-0001/lock')!r})).acquire(); print('held', flush=True); sys.stdin.read()"],
         stdin=subprocess.PIPE, stdout=subprocess.PIPE,
     )  # fmt: skip

@@ -17,9 +17,9 @@ from unit.case.faulty_cases import FAULTY_CASES
 
 from feti_homog.analysis import stored_result
 from feti_homog.case import case
-from feti_homog.case.fibre_window import read_window
 from feti_homog.commands import listed_fibres
 from feti_homog.errors import FetiHomogError
+from feti_homog.fibres.fibre_window import read_window
 from feti_homog.report.cards import export
 from feti_homog.report.text.summary import summary
 from feti_homog.results import seals

@@ -15,8 +15,8 @@ from unit.mesh.faulty_meshes import ALL_SIDES, RIGHT_SIDE, grid
 
 from feti_homog.case import case as cases
 from feti_homog.errors import CaseError
-from feti_homog.fibres.arrange import arrange
 from feti_homog.homogenization.unit_cell import tear
+from feti_homog.mesh.arrange import arrange
 from feti_homog.runtime.progress import Progress
 
 pytestmark = pytest.mark.parallel

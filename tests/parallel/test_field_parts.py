@@ -13,7 +13,7 @@ from support.ranks import parallel_assert
 
 from feti_homog import Case, run
 from feti_homog.analysis.result import Result
-from feti_homog.fibres.arrange import arrange
+from feti_homog.mesh.arrange import arrange
 
 pytestmark = pytest.mark.parallel
 

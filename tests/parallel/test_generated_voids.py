@@ -11,7 +11,7 @@ from support.void_cells import write_part
 
 from feti_homog import run
 from feti_homog.case import case as cases
-from feti_homog.fibres.arrange import arrange
+from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.verify.certificate import verify
 

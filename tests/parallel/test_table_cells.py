@@ -9,7 +9,7 @@ import pytest
 from support.cases import FIBRE, MATRIX, relative_error, solve
 
 from feti_homog.case import case as cases
-from feti_homog.fibres.arrange import arrange
+from feti_homog.mesh.arrange import arrange
 
 pytestmark = pytest.mark.parallel
 

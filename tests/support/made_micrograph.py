@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from feti_homog.case.cell_section import Cell
-from feti_homog.fibres.arrange import arrange
+from feti_homog.mesh.arrange import arrange
 
 CELL = Cell(geometry="random", fibre_fraction=0.5, fibres=300, radius_spread=0.15, min_gap=0.04, seed=11)
 RADIUS = 3.5  # um, in the mean

@@ -10,8 +10,8 @@ from reference.spatial_programme import Part, SpatialProgramme
 
 from feti_homog.analysis.runner import compute
 from feti_homog.case.case import Case
-from feti_homog.fibres.arrange import arrange
 from feti_homog.homogenization import unit_cell
+from feti_homog.mesh.arrange import arrange
 from feti_homog.petsc.options import case_options
 from feti_homog.runtime.progress import Progress
 

@@ -10,12 +10,12 @@ from reference.quadratic_programme import QuadraticProgramme, torus_keys
 
 from feti_homog.case import sections
 from feti_homog.feti.thresholds import DEFAULTS
-from feti_homog.fibres.arrange import arrange
 from feti_homog.homogenization import unit_cell
 from feti_homog.homogenization.partition_policy import DEFAULT_POLICY
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.states import BONDED, OPEN, BondState
+from feti_homog.mesh.arrange import arrange
 from feti_homog.petsc.options import case_options
 from feti_homog.runtime.progress import Progress
 from support.cases import make_case

@@ -9,7 +9,7 @@ from types import MappingProxyType
 import numpy as np
 
 from feti_homog.fibres.outlines.ellipses import Ellipses
-from feti_homog.fibres.outlines.outlines import Column, Columns, ConvexCurves, directions, widest
+from feti_homog.fibres.outlines.outlines import ColumnRange, Columns, ConvexCurves, directions, widest
 from feti_homog.typing import Bool, Float, Int
 
 # Points of each outline from which distances are taken.
@@ -119,7 +119,7 @@ class PolygonalRows:
     """
 
     name, sizes, has_tips = "polygons", ("radius",), False
-    columns = MappingProxyType({"sides": Column(0.0, least=0.0), "corner": Column(0.0, least=0.0)})
+    columns = MappingProxyType({"sides": ColumnRange(0.0, least=0.0), "corner": ColumnRange(0.0, least=0.0)})
 
     def given(self, rows: Columns) -> Bool:
         """(N,) which rows have it."""

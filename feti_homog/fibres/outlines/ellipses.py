@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from feti_homog.fibres.outlines.outlines import Column, Columns, ConvexCurves, directions, widest
+from feti_homog.fibres.outlines.outlines import ColumnRange, Columns, ConvexCurves, directions, widest
 from feti_homog.typing import Bool, Float, Int
 
 # Relative difference of the squares of semi-axes of a circle.
@@ -168,7 +168,9 @@ class EllipticRows:
     """Rows with semi-axes in place of a radius, as `Shape`."""
 
     name, sizes, has_tips = "ellipses", ("a", "b"), True
-    columns = MappingProxyType({"a": Column(np.nan, above=0.0), "b": Column(np.nan, above=0.0), "angle": Column(0.0)})
+    columns = MappingProxyType(
+        {"a": ColumnRange(np.nan, above=0.0), "b": ColumnRange(np.nan, above=0.0), "angle": ColumnRange(0.0)}
+    )
 
     def given(self, rows: Columns) -> Bool:
         """(N,) which rows have it."""

@@ -117,7 +117,7 @@ class ConvexCurves:
         return type(self)(*(function(*(getattr(each, name) for each in (self, *others))) for name in names))
 
 
-class Column(NamedTuple):
+class ColumnRange(NamedTuple):
     """A column of numbers: what an empty cell counts as, and the bound that numbers keep or do not reach."""
 
     empty: float
@@ -139,7 +139,7 @@ class Shape(Protocol):
     def name(self) -> str: ...
 
     @property
-    def columns(self) -> Mapping[str, Column]: ...
+    def columns(self) -> Mapping[str, ColumnRange]: ...
 
     @property
     def sizes(self) -> tuple[str, ...]: ...

@@ -9,10 +9,10 @@ from functools import partial
 
 import numpy as np
 
-from feti_homog.case.phase_names import PHASE, VOID
 from feti_homog.errors import MeshError
 from feti_homog.mesh.coarse_mesh import areas
 from feti_homog.mesh.readers.raw_mesh import DEBONDED, RawMesh, first_of
+from feti_homog.microstructure.phase_names import PHASE, VOID
 from feti_homog.schema.wording import toml_key, toml_value
 
 NUMBER = re.compile("number [0-9]+")

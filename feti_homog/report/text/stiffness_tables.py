@@ -8,8 +8,8 @@ from itertools import zip_longest
 from math import floor, log10
 from typing import Any
 
-from feti_homog.case.phase_names import COATING
 from feti_homog.materials.voigt import SPATIAL_STRESSES, STRAINS, voigt_names
+from feti_homog.microstructure.phase_names import COATING
 from feti_homog.report.text.table import Column, Table, number, with_unit
 from feti_homog.typing import Document
 

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, NullLocator
 
-from feti_homog.case.fibre_window import read_window
+from feti_homog.fibres.fibre_window import read_window
 from feti_homog.materials.voigt import voigt_names
 from feti_homog.microstructure.fibre_pattern import FibrePattern
 from feti_homog.microstructure.neighbour_match import nearest_neighbours

@@ -8,7 +8,7 @@ import pytest
 
 from feti_homog.case.case import Case, parse
 from feti_homog.errors import CaseError, MeshError
-from feti_homog.fibres.arrange import arrange
+from feti_homog.mesh.arrange import arrange
 
 MATERIAL = {"young": 1.0, "poisson": 0.3}
 SQUARE = {"geometry": "square", "fibre_fraction": 0.5, "coating": 0.1}

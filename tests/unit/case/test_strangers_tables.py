@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from feti_homog import Case
-from feti_homog.case.fibre_table import read_table
 from feti_homog.errors import CaseError, MeshError
-from feti_homog.fibres.periodic_table import table_arrangement
+from feti_homog.fibres.fibre_table import read_table
+from feti_homog.mesh.arrange import arrange
 
 SIZE = "# width = 8, height = 6\n"
 TABLES = {
@@ -56,7 +56,7 @@ def is_expected(table):
 def test_a_strangers_table_is_read_as_it_is(tmp_path, writer):
     read = case(tmp_path / "t.csv", SIZE + TABLES[writer])
     is_expected(read.cell.table)
-    assert len(table_arrangement(read.cell).radii) == 2
+    assert len(arrange(read.cell).radii) == 2
     assert bool(read.remarks()) == (writer not in WHOLLY_READ)
 
 
@@ -109,8 +109,8 @@ TOUCHING = "x,y,r\n2,2,1\n3.995,2,1\n6,4,0.5\n"
 def test_small_overlaps_are_repaired_where_that_is_asked_for(tmp_path):
     """Radii of 1 overlap by 0.005."""
     with pytest.raises(MeshError, match=r'rows 3 and 4: overlap by 0\.005; repair = "overlaps" makes them smaller'):
-        table_arrangement(case(tmp_path / "t.csv", SIZE + TOUCHING).cell)
-    found = table_arrangement(case(tmp_path / "t.csv", SIZE + TOUCHING, repair="overlaps").cell)
+        arrange(case(tmp_path / "t.csv", SIZE + TOUCHING).cell)
+    found = arrange(case(tmp_path / "t.csv", SIZE + TOUCHING, repair="overlaps").cell)
     radii = found.radii * 8
     assert radii[2] == pytest.approx(0.5) and (radii[:2] > 0.997).all() and radii[:2].sum() < 1.995
     assert found.remarks == ('[cell] repair = "overlaps": rows 3, 4 are smaller by up to 0.26 %',)
@@ -119,7 +119,7 @@ def test_small_overlaps_are_repaired_where_that_is_asked_for(tmp_path):
 def test_larger_overlaps_are_not_repaired(tmp_path):
     text = SIZE + TOUCHING.replace("3.995", "3.95")
     with pytest.raises(MeshError, match=r"rows 3 and 4: overlap by 0\.05$"):
-        table_arrangement(case(tmp_path / "t.csv", text, repair="overlaps").cell)
+        arrange(case(tmp_path / "t.csv", text, repair="overlaps").cell)
 
 
 def test_each_geometry_has_its_repair(tmp_path):

@@ -14,10 +14,10 @@ from unit.mesh.faulty_meshes import grid
 
 from feti_homog.analysis.runner import run
 from feti_homog.case.case import load
-from feti_homog.case.fibre_table import read_table
 from feti_homog.commands import listed_fibres
 from feti_homog.errors import CaseError, MeshError
-from feti_homog.fibres.arrange import arrange
+from feti_homog.fibres.fibre_table import read_table
+from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.tiles.filling import gmsh_session
 
 CELL = 'geometry = "hexagonal"\nfibre_fraction = 0.4\n'

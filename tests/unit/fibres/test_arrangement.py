@@ -9,9 +9,9 @@ import pytest
 from support.circular_cells import cell
 
 from feti_homog.errors import MeshError
-from feti_homog.fibres.arrange import arrange
 from feti_homog.fibres.arrangement import Arrangement, clear_shift, neighbours
-from feti_homog.fibres.hard_core import random_arrangement
+from feti_homog.mesh.arrange import arrange
+from feti_homog.mesh.random_cell import random_arrangement
 
 
 def smallest_gap(arrangement):

@@ -10,9 +10,9 @@ from unit.fibres.test_periodic_table import cell_of, table
 
 from feti_homog.case.cell_section import Cell
 from feti_homog.errors import MeshError
-from feti_homog.fibres.arrange import arrange
 from feti_homog.fibres.cut_window import LEAST_GAP, MOST_GAP, moves
 from feti_homog.fibres.outlines.ellipses import Discs
+from feti_homog.mesh.arrange import arrange
 
 SIZE = np.array([1.0, 1.0])
 

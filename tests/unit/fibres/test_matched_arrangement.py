@@ -15,11 +15,11 @@ from support.measured_fibres import clustered_table
 
 from feti_homog.case import case as cases
 from feti_homog.case.cell_section import Cell
-from feti_homog.case.fibre_window import read_window
 from feti_homog.case.json_schema import json_schema
 from feti_homog.errors import CaseError
-from feti_homog.fibres.arrange import arrange
+from feti_homog.fibres.fibre_window import read_window
 from feti_homog.fibres.hard_core import distance_of
+from feti_homog.mesh.arrange import arrange
 from feti_homog.microstructure.fibre_pattern import FibrePattern
 from feti_homog.microstructure.neighbour_match import match_distance, matched, nearest_neighbours, wanted_distances
 

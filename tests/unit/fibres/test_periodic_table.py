@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from feti_homog.case.cell_section import Cell
-from feti_homog.case.fibre_table import table_of
 from feti_homog.errors import MOST_FAULTS, MeshError
-from feti_homog.fibres.arrange import arrange
+from feti_homog.fibres.fibre_table import table_of
+from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.mesh.mesh_fibres import fibre_circles
 from feti_homog.mesh.periodic_topology import Torus

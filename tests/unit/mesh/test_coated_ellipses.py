@@ -7,7 +7,7 @@ import pytest
 from unit.mesh.test_table_ellipses import ROWS, cell_of, table
 
 from feti_homog.errors import MeshError
-from feti_homog.fibres.arrange import arrange
+from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.coarse_mesh import areas, double_arcs
 from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.mesh.mesh_fibres import fibre_circles

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from feti_homog.case.cell_section import Cell
-from feti_homog.fibres.arrange import arrange
 from feti_homog.fibres.arrangement import Arrangement
+from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.coarse_mesh import areas, double_arcs
 from feti_homog.mesh.fill.gmsh_mesher import UnmeshedCell, generate
 from feti_homog.mesh.mesh_fibres import fibre_circles

@@ -10,7 +10,7 @@ from unit.mesh.faulty_meshes import ALL_SIDES, FIBRE, MATRIX, RIGHT_SIDE, grid, 
 
 from feti_homog.case.cell_section import Cell
 from feti_homog.errors import MeshError
-from feti_homog.fibres.arrange import arrange
+from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.fill.gmsh_mesher import UnmeshedCell, generate
 from feti_homog.mesh.mesh_fibres import fibre_circles
 from feti_homog.mesh.periodic_topology import Torus

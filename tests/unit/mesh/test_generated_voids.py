@@ -13,7 +13,7 @@ from feti_homog import run
 from feti_homog.case import case as cases
 from feti_homog.commands import fibre_statistics, listed_fibres
 from feti_homog.errors import CaseError, MeshError
-from feti_homog.fibres.arrange import arrange
+from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.coarse_mesh import areas, void_edges, voids
 from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.microstructure.fibre_pattern import FibrePattern

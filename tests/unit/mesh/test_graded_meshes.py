@@ -15,7 +15,7 @@ from support.circular_cells import cell
 from unit.mesh.fill.test_gmsh_mesher import least_angle
 
 from feti_homog.errors import MeshError
-from feti_homog.fibres.arrange import arrange
+from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.mesh.sizes import element_estimate
 from feti_homog.mesh.sizes.from_sources import MAX_GROWTH

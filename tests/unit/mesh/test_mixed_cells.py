@@ -10,7 +10,7 @@ from feti_homog.case.cell_section import Cell
 from feti_homog.case.mixed_cell import fibre_counts
 from feti_homog.commands.listed_fibres import table
 from feti_homog.errors import MeshError
-from feti_homog.fibres.arrange import arrange
+from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.fill.gmsh_mesher import arrangement_scale, generate
 from feti_homog.mesh.sizes.element_estimate import ElementEstimate
 

@@ -15,10 +15,10 @@ from feti_homog import run
 from feti_homog.case import case as cases
 from feti_homog.commands import listed_fibres
 from feti_homog.errors import CaseError, MeshError
-from feti_homog.fibres.arrange import arrange
 from feti_homog.fibres.arrangement import Arrangement
 from feti_homog.fibres.outlines.convex_sums import ConvexSums
 from feti_homog.fibres.outlines.shapes import outlines_of
+from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.coarse_mesh import areas, voids
 from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.mesh.fill.shape_mesher import mesh_outlines

@@ -9,10 +9,10 @@ import pytest
 
 from feti_homog.case.cell_files import check_shapes
 from feti_homog.case.cell_section import Cell
-from feti_homog.case.fibre_table import table_of
 from feti_homog.errors import MeshError
-from feti_homog.fibres.arrange import arrange
+from feti_homog.fibres.fibre_table import table_of
 from feti_homog.fibres.outlines.ellipses import Ellipses, gaps
+from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.coarse_mesh import areas
 from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.mesh.mesh_fibres import fibre_circles

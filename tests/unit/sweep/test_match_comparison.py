@@ -10,7 +10,7 @@ from matplotlib.image import imread
 from support.fibre_patterns import poisson_points
 from support.measured_fibres import clustered_table
 
-from feti_homog.case.fibre_window import read_window
+from feti_homog.fibres.fibre_window import read_window
 from feti_homog.microstructure.neighbour_match import nearest_neighbours
 from feti_homog.sweep.report import figures
 from feti_homog.sweep.report.sweep_table import SweepTable

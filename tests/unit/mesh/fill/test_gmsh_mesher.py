@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from support.circular_cells import cell
 
-from feti_homog.fibres.arrange import arrange
+from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.coarse_mesh import areas, flip_double_arcs
 from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.mesh.outline.bare_outline import BareOutline

@@ -8,8 +8,8 @@ from scipy.special import ellipe
 from unit.mesh.test_table_ellipses import cell_of, table
 
 from feti_homog.errors import MeshError
-from feti_homog.fibres.arrange import arrange
 from feti_homog.fibres.outlines.ellipses import Ellipses
+from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.mesh.sizes.element_estimate import ElementEstimate, refuse_many
 from feti_homog.mesh.sizes.graded_size import MeshSizes, size_field

@@ -11,9 +11,9 @@ from support.tiled_cells import CELLS, SMALL, mesh_of, noded
 from unit.mesh.fill.test_gmsh_mesher import least_angle
 
 from feti_homog.errors import MeshError
-from feti_homog.fibres.arrange import arrange
 from feti_homog.fibres.arrangement import Arrangement
 from feti_homog.fibres.outlines.shapes import elliptic
+from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.coarse_mesh import areas
 from feti_homog.mesh.fill.gmsh_mesher import begin, generate
 from feti_homog.mesh.outline.bridges import CLEAR, LEAST_ANGLE

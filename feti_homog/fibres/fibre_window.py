@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from feti_homog.case.fibre_table import FibreTable, read_table
 from feti_homog.errors import CaseError
+from feti_homog.fibres.fibre_table import FibreTable, read_table
 from feti_homog.fibres.outlines.shapes import BOTH_SIZES, have_both_sizes
 from feti_homog.microstructure.fibre_pattern import FibrePattern
 from feti_homog.typing import Bool

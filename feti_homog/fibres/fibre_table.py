@@ -11,12 +11,20 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.case.phase_names import MATRIX, PHASE, VOID
-from feti_homog.case.section_values import FIBRE_CELLS, NUMBERS
-from feti_homog.case.table_columns import Column, are_units, lines_of, misspelt, number_of, understood
 from feti_homog.errors import CaseError
 from feti_homog.fibres.outlines.outlines import Columns, Outlines
 from feti_homog.fibres.outlines.shapes import REPLACING, outlines_of
+from feti_homog.fibres.table_columns import (
+    FIBRE_CELLS,
+    NUMBERS,
+    SourceColumn,
+    are_units,
+    lines_of,
+    misspelt,
+    number_of,
+    understood,
+)
+from feti_homog.microstructure.phase_names import MATRIX, PHASE, VOID
 from feti_homog.schema.values import is_number
 from feti_homog.schema.wording import suggestion, toml_value
 from feti_homog.typing import Bool, Float, Int
@@ -187,7 +195,7 @@ def _read_sizes(comment: str, row: int, sizes: dict[str, float], faults: _Faults
 
 
 def _check_names(
-    words: Sequence[str], read: Sequence[Column], others: Sequence[str], row: int, faults: _Faults
+    words: Sequence[str], read: Sequence[SourceColumn], others: Sequence[str], row: int, faults: _Faults
 ) -> None:
     """Add the faults of a line of names: none that is known, some twice, misspelt or missing."""
     names = [column.name for column in read]
@@ -214,7 +222,7 @@ def _missing(names: set[str]) -> list[str]:
 
 
 def _split(
-    lines: list[tuple[int, str]], columns: Sequence[Column], count: int, delimiter: str | None, faults: _Faults
+    lines: list[tuple[int, str]], columns: Sequence[SourceColumn], count: int, delimiter: str | None, faults: _Faults
 ) -> Iterator[tuple[int, dict[str, Any]]]:
     """Each row's number, and its cells by column: numbers, texts, and nothing for cells that are empty."""
     for row, line in lines:

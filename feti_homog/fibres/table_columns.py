@@ -8,12 +8,29 @@ from __future__ import annotations
 import difflib
 import math
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from feti_homog.errors import CaseError
+from feti_homog.fibres.outlines.outlines import ColumnRange
+from feti_homog.fibres.outlines.shapes import SHAPES
 from feti_homog.runtime import input_files
+from feti_homog.schema.values import ValueType, real
+
+# Of an empty cell, and the bounds, of the columns that are numbers.
+NUMBERS = {
+    "x": ColumnRange(math.nan),
+    "y": ColumnRange(math.nan),
+    "radius": ColumnRange(math.nan, above=0.0),
+    "coating": ColumnRange(0.0, least=0.0),
+    "inner_radius": ColumnRange(0.0, least=0.0),
+    "strength": ColumnRange(1.0, above=0.0),
+} | {name: column for shape in SHAPES for name, column in shape.columns.items()}
+FIBRE_CELLS: Mapping[str, ValueType] = {
+    name: real(least=column.least, above=column.above) for name, column in NUMBERS.items()
+}
+"""The numbers of a fibre in a table."""
 
 MAX_BYTES = 1 << 26
 EMPTY = " \t\r,;"
@@ -100,7 +117,7 @@ INSTEAD = {"radius": "a"}
 
 
 @dataclass(frozen=True)
-class Column:
+class SourceColumn:
     """A column that is read: its place in the rows, its name, and what makes its value of a number."""
 
     place: int
@@ -124,15 +141,15 @@ def _bare_names(words: Sequence[str]) -> list[str]:
     return ["angle" if name == "orientation" else name for name in bare] if MATLABS_AXIS in bare else bare
 
 
-def understood(words: Sequence[str], known: Sequence[str]) -> tuple[list[Column], list[str]]:
+def understood(words: Sequence[str], known: Sequence[str]) -> tuple[list[SourceColumn], list[str]]:
     """Return the columns of a line of names that are among those `known`, in any case, and the other words."""
     bare = _bare_names(words)
     values = {"angle": _turned} if AXES_OF_PICTURES & set(bare) else {}
-    columns = [Column(place, name, values.get(name, _same)) for place, name in enumerate(bare) if name in known]
+    columns = [SourceColumn(place, name, values.get(name, _same)) for place, name in enumerate(bare) if name in known]
     for others, name, value in OTHERS:
         given = {column.name for column in columns}
         if {name, INSTEAD.get(name, name)}.isdisjoint(given):
-            columns += [Column(bare.index(other), name, value) for other in others if other in bare][:1]
+            columns += [SourceColumn(bare.index(other), name, value) for other in others if other in bare][:1]
     read = {column.place for column in columns}
     return columns, [word for place, word in enumerate(words) if place not in read]
 

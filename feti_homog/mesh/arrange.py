@@ -2,39 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from importlib import import_module
 from math import pi, sqrt
 
 import numpy as np
 
 from feti_homog.case.cell_section import Cell
-from feti_homog.case.phase_names import FIBRE
 from feti_homog.errors import MeshError
 from feti_homog.fibres.arrangement import Arrangement
+from feti_homog.microstructure.phase_names import FIBRE
 from feti_homog.typing import Float
-
-MODULES = {
-    "square": "arrange",
-    "hexagonal": "arrange",
-    "random": "hard_core",
-    "matched": "hard_core",
-    "table": "periodic_table",
-}
-"""Module of this package whose function NAME_arrangement makes each; it is imported when a cell asks for it."""
 
 
 def arrange(cell: Cell) -> Arrangement:
     """Return the arrangement that a case asks for in a cell of width 1, its fractions `cell.fractions` to rounding.
 
     square: one disc in the middle of a 1 x 1 cell. hexagonal: 1 x sqrt(3), a disc in the middle and one at
-    the corner. random: discs in a 1 x 1 cell, see `hard_core.random_arrangement`, with
-    `cell.match` see `hard_core.matched_arrangement`. table: see `periodic_table.table_arrangement`.
+    the corner. random: discs in a 1 x 1 cell, see `random_cell.random_arrangement`, with
+    `cell.match` see `random_cell.matched_arrangement`. table: see `periodic_table.table_arrangement`.
 
     Raises:
         MeshError: discs of that fraction touch, no arrangement is found, or the table is faulty.
     """
-    return _function("matched" if cell.match is not None else cell.geometry)(cell)
+    if cell.geometry == "random":
+        from feti_homog.mesh import random_cell  # with the statistics that it matches
+
+        return random_cell.random_arrangement(cell) if cell.match is None else random_cell.matched_arrangement(cell)
+    if cell.table is not None:
+        from feti_homog.fibres.periodic_table import table_arrangement
+
+        return table_arrangement(cell.table, cell.window, cell.repair == "overlaps")
+    return square_arrangement(cell) if cell.geometry == "square" else hexagonal_arrangement(cell)
 
 
 def listed_arrangement(cell: Cell) -> Arrangement | None:
@@ -42,15 +39,7 @@ def listed_arrangement(cell: Cell) -> Arrangement | None:
 
     Raises as `arrange`.
     """
-    return None if cell.table is None else _function("table")(cell)
-
-
-def _function(name: str) -> Callable[[Cell], Arrangement]:
-    """Return the function that makes arrangements of this name."""
-    found: Callable[[Cell], Arrangement] = getattr(
-        import_module(f"feti_homog.fibres.{MODULES[name]}"), f"{name}_arrangement"
-    )
-    return found
+    return None if cell.table is None else arrange(cell)
 
 
 def square_arrangement(cell: Cell) -> Arrangement:
