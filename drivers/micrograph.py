@@ -18,10 +18,10 @@ import figures
 import numpy as np
 from figures import INK
 from mpi4py.MPI import Intracomm
+from pattern_statistics import voronoi_cells
 
 from feti_homog import Case, Result, launch
 from feti_homog.microstructure.fibre_pattern import FibrePattern
-from feti_homog.microstructure.statistics import voronoi_cells
 
 TABLE = Path(__file__).parents[1] / "meshes" / "micrograph.csv"
 MATERIAL = {"matrix": {"young": 2790.0, "poisson": 0.33}, "fibre": {"young": 70800.0, "poisson": 0.22}}  # MPa

@@ -5,7 +5,7 @@
 Random cells of 50 % fibres with E = 200, nu = 0.222 in a matrix with E = 88, nu = 0.299 (GPa), plane strain, several
 arrangements of each number of fibres.  A cell is representative where the mean no longer moves by more than its
 confidence interval, and one arrangement scatters by less than what is asked for.  It is a sweep: started again it
-goes on; statistics.csv and cell_size.png are its table and its picture.
+goes on; statistics.csv and representative_cell.png are its table and its picture.
 """
 
 from __future__ import annotations
@@ -13,9 +13,13 @@ from __future__ import annotations
 import argparse
 import sys
 from functools import partial
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import sweeping
+from figures import INK
+from matplotlib.figure import Figure
 from mpi4py.MPI import Intracomm
 
 from feti_homog import launch
@@ -25,7 +29,7 @@ NAMES = ("C11", "bulk", "shear")
 
 def main(given: argparse.Namespace, comm: Intracomm) -> None:
     """Run the sweep, print means and scatter for each size, name the representative one, and draw."""
-    sweeping.swept(given, comm, document(given), partial(report, tolerance=given.tolerance))
+    sweeping.swept(given, comm, document(given), partial(report, given), draw)
 
 
 def document(given: argparse.Namespace) -> dict[str, Any]:
@@ -47,8 +51,9 @@ def document(given: argparse.Namespace) -> dict[str, Any]:
     }
 
 
-def report(table: Any, tolerance: float) -> list[str]:
+def report(given: argparse.Namespace, table: Any) -> list[str]:
     """Return a line for each number of fibres: mean, half of its 95 % interval, and standard deviation of one cell."""
+    tolerance = given.tolerance
     heads = "".join(f"{name + ' (GPa)':>12}{'+-':>9}{'std %':>8}" for name in NAMES)
     lines, more = [f"{'fibres':>6}{heads}"], []
     enough = None
@@ -65,6 +70,31 @@ def report(table: Any, tolerance: float) -> list[str]:
         enough = fibres if enough is None and worst <= tolerance else enough if worst <= tolerance else None
     answer = f"from {enough} fibres on" if enough is not None else "no cell here is that large"
     return [*lines, *more, f"one cell scatters by less than {100 * tolerance:g} %: {answer}"]
+
+
+def draw(folder: Path, table: Any) -> Path:
+    """Draw the means with their 95 % intervals, and below the scatter of a cell and of the mean."""
+    figure = Figure(figsize=(12.0, 6.6), layout="constrained")
+    fibres = np.array([table.inputs["cell.fibres"][table.rows(point)[0]] for point in table.points])
+    for name, upper, lower in zip(NAMES, *figure.subplots(2, len(NAMES), sharex=True), strict=True):
+        found = table.statistics[name]
+        for x, point in zip(fibres, table.points, strict=True):
+            rows = table.rows(point)
+            upper.plot([0.94 * x] * len(rows), table.outputs[name][rows], ".", color="0.7")
+        upper.errorbar(fibres, found.mean, found.ci95, marker="o", color=INK[0])
+        upper.set_ylabel(f"{name} (GPa)")
+        for values, style, words in (
+            (found.std, "-", "standard deviation of a cell"),
+            (found.ci95, ":", "95 % interval"),
+        ):
+            lower.plot(fibres, 100 * values / found.mean, style, marker="o", color=INK[0], label=words)
+        lower.set(xlabel="number of fibres", ylabel="scatter / mean (%)", ylim=(0.0, None), xscale="log")
+        lower.set_xlim(fibres[0] / 1.3, fibres[-1] * 1.3)
+        lower.set_xticks(fibres, [str(x) for x in fibres])
+        lower.minorticks_off()
+    lower.legend(frameon=False)
+    figure.savefig(folder / "representative_cell.png")
+    return folder / "representative_cell.png"
 
 
 def _laws(statistics: Any, number: int) -> str:

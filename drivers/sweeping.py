@@ -28,11 +28,12 @@ def parser(description: str, name: str) -> argparse.ArgumentParser:
 
 
 def swept(
-    given: argparse.Namespace, comm: Intracomm, document: dict[str, Any], report: Callable[[Any], list[str]]
-) -> None:
-    """Run the sweep, print the report of its table, and draw."""
+    given: argparse.Namespace, comm: Intracomm, document: dict[str, Any], report: Callable[[Any], list[str]],
+    draw: Callable[[Path, Any], Path] | None = None,
+) -> None:  # fmt: skip
+    """Run the sweep, print the report of its table, and draw; `draw` adds a picture of the table to a folder."""
     document["output"] = written(given)
     table = run_sweep(document, given.out, comm, ranks_per_case=given.ranks_per_case, retry=True, quiet=given.quiet)
     lines = [*report(table), *collect_sweep(given.out, comm)]
     if comm.rank == 0:
-        print(*lines, sep="\n")
+        print(*lines, *([draw(given.out, table)] if draw else []), sep="\n")

@@ -101,7 +101,7 @@ def run_sweep(
 
 
 def collect_sweep(out: str | Path, comm: Intracomm | None = None, *, pictures: bool = True) -> list[str]:
-    """Write cases.csv, statistics.csv, sweep.h5 and pictures of a sweep's folder; returns lines to print.
+    """Write cases.csv, statistics.csv and pictures of a sweep's folder; returns lines to print.
 
     Collective; the sweep may still be running.
 

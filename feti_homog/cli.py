@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 
 LAUNCHER_HELP = "Switches of Open MPI go to mpirun: --allow-run-as-root, --oversubscribe (more ranks than cores)."
+GONE = {"statistics": "is drivers/fibre_statistics.py now"}
+"""Commands of earlier versions, and what replaces them."""
 COMMANDS = (run.add, products.add, fibres.add, sweep.add, run.add_reference)
 
 
@@ -40,6 +42,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _command(words: Sequence[str], comm: Intracomm) -> int:
+    if words and words[0] in GONE:
+        raise CaseError(f"command line: feti-homog {words[0]} {GONE[words[0]]}")
     parser = command_parser()
     _refuse_single_dashes(parser)
     arguments = parsed(parser, words or ["--help"], comm)

@@ -67,7 +67,9 @@ def missing(file: Path) -> str:
     """Why there is no such file, empty if there is."""
     if os.path.isfile(file):  # false, not an error, for a name too long
         return ""
-    return f"a folder; expected a file at {file}" if os.path.isdir(file) else f"no such file (expected at {file})"
+    if not os.path.exists(file):
+        return f"no such file (expected at {file})"
+    return f"{'a folder' if os.path.isdir(file) else 'a pipe or device'}; expected a file at {file}"
 
 
 def _with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:

@@ -21,8 +21,8 @@ SWEEP_HELP = (
     "skipped: the same command resumes. Failed cases are kept and reported at the end, with exit code 3."
 )
 COLLECT_HELP = (
-    "Write cases.csv, the inputs and outputs of all cases, statistics.csv, those over realisations, sweep.h5 with "
-    "both, and pictures of the varied outputs. The sweep may still be running: finished cases are collected."
+    "Write cases.csv, the inputs and outputs of all cases, statistics.csv, those over realisations, and "
+    "pictures of the varied outputs. The sweep may still be running: finished cases are collected."
 )
 
 FIT_HELP = (

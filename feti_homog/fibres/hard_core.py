@@ -47,21 +47,6 @@ def _sum_at(rows: Int, vectors: Float, count: int) -> Float:
     return np.stack([np.bincount(rows, vectors[:, axis], count) for axis in (0, 1)], axis=1)
 
 
-def hard_core(pattern: FibrePattern, generator: np.random.Generator, max_steps: int = MAX_STEPS) -> FibrePattern:
-    """Return the same fibres elsewhere, as those of random cells are placed (`relax`).
-
-    No gap is smaller than the smallest one of the pattern. Across the sides of a window they are placed as in a
-    periodic cell.
-
-    Raises:
-        MeshError: no such pattern is found.
-    """
-    try:
-        return placed(pattern, max(pattern.smallest_gap, 0.0), generator, max_steps)
-    except MeshError as error:
-        raise MeshError(f"{error}; compare with --model poisson") from error
-
-
 def placed(
     pattern: FibrePattern, gap: float, generator: np.random.Generator, max_steps: int = MAX_STEPS
 ) -> FibrePattern:

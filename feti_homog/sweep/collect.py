@@ -30,7 +30,7 @@ def read(directory: Path) -> SweepTable:
 
 
 def collect(directory: Path, pictures: bool) -> list[str]:
-    """Write cases.csv, statistics.csv, sweep.h5 and the pictures; returns the lines to print.  On one rank.
+    """Write cases.csv, statistics.csv and the pictures; returns the lines to print.  On one rank.
 
     Raises:
         CaseError: as `read`.
@@ -38,9 +38,7 @@ def collect(directory: Path, pictures: bool) -> list[str]:
     """
     index, states = _index_and_states(directory)
     table = _table(index, states)
-    atomic.remove_abandoned(
-        directory, re.compile(r"(cases|statistics)\.csv|sweep\.h5|(moduli|cell_size|curves|match)\.png")
-    )
+    atomic.remove_abandoned(directory, re.compile(r"(cases|statistics)\.csv|(moduli|curves)\.png"))
     paths = tables.write(directory, table)
     if pictures:
         paths += figures.plot(directory, table)

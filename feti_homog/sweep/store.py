@@ -33,9 +33,7 @@ INDEX_FILE, TABLE_FILE, ERROR_FILE, CASE_FILE, LOCK_FILE = (
     "sweep.json", "cases.csv", "error.txt", "case.toml", "lock",
 )  # fmt: skip
 # What a sweep, its collection and its report write beside sweep.json.
-SWEEP_ENTRY = re.compile(
-    r"(cases|statistics)\.csv|lock|sweep\.h5|(moduli|cell_size|curves|match)\.png|report\.html|case-\d{4,}"
-)
+SWEEP_ENTRY = re.compile(r"(cases|statistics)\.csv|lock|(moduli|curves)\.png|report\.html|case-\d{4,}")
 INDEX_LOCK_FILE, INDEX_LOCK_TIMEOUT_S = "index.lock", 30.0
 
 

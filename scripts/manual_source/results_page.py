@@ -10,7 +10,7 @@ from feti_homog.analysis.result import schema_keys
 from feti_homog.analysis.result_records import AnglePoint, EnvelopePoint, LoadPoint, PathPoint
 from feti_homog.results.csv_tables import Column, columns
 from feti_homog.results.field_layout import Item, items, spatial_items
-from feti_homog.sweep.report.tables import COLUMNS, DATASETS, STATISTICS_COLUMNS
+from feti_homog.sweep.report.tables import COLUMNS, STATISTICS_COLUMNS
 
 INTRODUCTION = """\
 Any consistent units: the unit of stresses is that of the moduli in the case file, that of lengths the unit of the cell.
@@ -55,7 +55,7 @@ def results() -> str:
     parts += ["## load.csv", _columns(columns(LoadPoint))]
     parts += ["## envelope.csv", _columns(columns(EnvelopePoint))]
     parts += ["## cases.csv", CASES_CSV, _columns(COLUMNS), "## statistics.csv", STATISTICS_CSV]
-    parts += [_columns(STATISTICS_COLUMNS), "## sweep.h5", _columns(DATASETS, "dataset")]
+    parts += [_columns(STATISTICS_COLUMNS)]
     return page(*parts)
 
 

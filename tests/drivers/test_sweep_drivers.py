@@ -47,6 +47,6 @@ def test_representative_cell_prints_what_scatters(tmp_path):
     assert (table[:, 2::3] > 0).all() and (table[:, 3::3] > 0).all()
     assert "one cell scatters by less than 50 %: from 2 fibres on" in output
     assert output.count("C11 - C22 = ") == output.count("bulk between ") == 2
-    assert imread(tmp_path / "cell_size.png")[..., :3].std() > 0.02
+    assert imread(tmp_path / "representative_cell.png")[..., :3].std() > 0.02
     assert_verified(*(path.parent for path in tmp_path.rglob("result.h5")))
     assert means(tmp_path, "bulk") == pytest.approx(table[:, 4], rel=1e-4)

@@ -49,7 +49,6 @@ SURROUNDINGS: dict[str, tuple[str, str, tuple[int, ...]]] = {
 FULL: dict[str, str] = {
     "keys": "feti keys",
     "check": "feti check c.toml",
-    "statistics": "feti statistics out --model poisson",
     "fibres": "feti fibres out",
     "verify": "feti verify out",
     "export": "feti export out --format abaqus",

@@ -29,7 +29,6 @@ COMMANDS = {
     "report": ("report", "@/out"),
     "verify": ("verify", "@/out"),
     "export": ("export", "@/out", "--format", "abaqus", "--out", "@/out/card.inp"),
-    "statistics": ("statistics", "@/out"),
     "fibres": ("fibres", "@/out"),
     "collect": ("collect", "@/out"),
 }

@@ -22,7 +22,7 @@ from feti_homog.results.csv_tables import columns
 from feti_homog.results.field_layout import items, spatial_items
 from feti_homog.sweep import collect, execute, plan
 from feti_homog.sweep.report.outputs import outputs
-from feti_homog.sweep.report.tables import COLUMNS, DATASETS, OUTPUT_COLUMNS, STATISTICS_COLUMNS
+from feti_homog.sweep.report.tables import COLUMNS, OUTPUT_COLUMNS, STATISTICS_COLUMNS
 
 pytestmark = pytest.mark.slow
 
@@ -288,11 +288,3 @@ def test_columns_of_sweeps(documents, sweep_folder):
         with (sweep_folder / name).open() as stream:
             header = next(csv.reader(stream))
         assert not unmatched(header, {column.name for column in described})[0]
-
-
-def test_datasets_of_sweep_h5(sweep_folder):
-    found = set()
-    with h5py.File(sweep_folder / "sweep.h5") as file:
-        file.visititems(lambda name, item: found.add(f"/{name}") if isinstance(item, h5py.Dataset) else None)
-    unknown, unused = unmatched(found, {dataset.name for dataset in DATASETS})
-    assert (unknown, unused) == (set(), set())

@@ -38,8 +38,8 @@ NAMES = {
 }
 
 
-def plot_series(axes: Axes, table: SweepTable, series: Series, name: str, style: int, x_factor: float = 1.0) -> None:
-    """Every realisation as a faint mark, at x times `x_factor`, and the means with their confidence intervals.
+def plot_series(axes: Axes, table: SweepTable, series: Series, name: str, style: int) -> None:
+    """Every realisation as a faint mark, and the means with their confidence intervals.
 
     Wide pale bars are the mean estimates of the mesh error, if there are any.
     """
@@ -49,7 +49,7 @@ def plot_series(axes: Axes, table: SweepTable, series: Series, name: str, style:
     for x, point in zip(series.x, series.points, strict=True):
         rows = table.rows(point)
         if len(rows) > 1:
-            axes.plot([x * x_factor] * len(rows), values[rows], marker, **REALISATION_STYLE, color=colour)
+            axes.plot([x] * len(rows), values[rows], marker, **REALISATION_STYLE, color=colour)
     mean, spread = statistics.mean[numbers], np.nan_to_num(statistics.ci95[numbers])
     axes.plot(series.x, mean, color=colour, marker=marker, markersize=4.5, linewidth=1.2, label=series.label or None)
     if spread.any():

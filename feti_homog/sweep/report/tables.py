@@ -1,4 +1,4 @@
-"""cases.csv, statistics.csv and sweep.h5: the table of a sweep and its statistics."""
+"""cases.csv and statistics.csv: the table of a sweep and its statistics."""
 
 from __future__ import annotations
 
@@ -10,18 +10,16 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 
 from feti_homog.materials.bounds import Moduli
 from feti_homog.materials.spatial_constants import EngineeringConstants, TransverselyIsotropic
-from feti_homog.materials.voigt import voigt_names
 from feti_homog.report.text.point_tables import STATES
 from feti_homog.report.text.table import unit
 from feti_homog.results import atomic
 from feti_homog.results.csv_tables import Column, columns
 from feti_homog.runtime.records import STRESS
-from feti_homog.sweep.report.sweep_table import Statistics, SweepTable
+from feti_homog.sweep.report.sweep_table import SweepTable
 
 CASE_COLUMNS = (
     Column("case", "", "number of the case, from 1"),
@@ -98,28 +96,15 @@ STATISTICS_COLUMNS = (
     Column("ci95", "that of the output", "half the width of the 95 % confidence interval of the mean"),
 )
 
-DATASETS = (
-    Column("/cases/COLUMN", "", "`folder`, `point`, `realisation`, `status`, `reason` of each case"),
-    Column("/inputs/SECTION.KEY", "that of the key", "of each case"),
-    Column("/outputs/COLUMN", "that of the column", "of each case, NaN where there is none"),
-    Column("/points/number", "", "the points"),
-    Column("/points/SECTION.KEY", "that of the key", "of each point"),
-    Column("/statistics/PART/COLUMN", "that of the column", "`count`, `mean`, `std`, `ci95` of each point"),
-    Column("/curves/point-K/strain", "", "strains at which the straight paths of a point are compared"),
-    Column("/curves/point-K/Sij", STRESS, "stresses there, a row for each realisation"),
-    Column("/curves/point-K/Sij_PART", STRESS, "`mean`, `std`, `ci95` of these"),
-)
 PARTS = ("count", "mean", "std", "ci95")
 COUNTS = ("refine", "elements", "nodes", "ranks", "subdomains", "dofs", "multipliers", "iterations", "memory")
 CASE = ("folder", "point", "realisation", "status", "reason")
 
 
 def write(directory: Path, table: SweepTable) -> list[Path]:
-    """Write all, each in one step; returns their paths.  On one rank.  Raises FetiHomogError if it cannot."""
-    writers: dict[str, Callable[[SweepTable, Path], None]] = {
-        "cases.csv": partial(_csv, _case_rows), "statistics.csv": partial(_csv, _statistics_rows), "sweep.h5": _hdf5,
-    }  # fmt: skip
-    return [atomic.replace(directory / name, partial(writer, table)) for name, writer in writers.items()]
+    """Write both, each in one step; returns their paths.  On one rank.  Raises FetiHomogError if it cannot."""
+    rows = {"cases.csv": _case_rows, "statistics.csv": _statistics_rows}
+    return [atomic.replace(directory / name, partial(_csv, own, table)) for name, own in rows.items()]
 
 
 def _csv(rows: Callable[[SweepTable], Iterator[list[Any]]], table: SweepTable, path: Path) -> None:
@@ -164,62 +149,3 @@ def _cell(value: Any) -> Any:
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return ""
     return json.dumps(value) if isinstance(value, list | dict) else value
-
-
-def _hdf5(table: SweepTable, path: Path) -> None:
-    """/cases, /inputs, /outputs: a row a case; /statistics/mean, ...: a row a point, as /points/number and inputs.
-
-    /curves/point-K of straight paths: strain (g,), S11, S22, ... (realisations, g) and of each mean, std, ci95 (g,).
-    """
-    with h5py.File(path, "w") as file:
-        file.attrs.update(name=table.name, stress_unit=table.stress_unit)
-        for name in CASE:
-            _put(file, f"cases/{name}", list(getattr(table, name)), "")
-        _put_inputs(file, table)
-        for name, column in table.outputs.items():
-            _put(file, f"outputs/{name}", column, unit(name, table.stress_unit))
-        for name, statistics in table.statistics.items():
-            for part in PARTS:
-                own = "" if part == "count" else unit(name, table.stress_unit)
-                _put(file, f"statistics/{part}/{name}", getattr(statistics, part), own)
-        for point in table.points:
-            _put_curves(file, table, point)
-
-
-def _put_inputs(file: Any, table: SweepTable) -> None:
-    """Write the inputs of all cases and, except for the seed, of all points."""
-    first = [table.rows(point)[0] for point in table.points]
-    _put(file, "points/number", table.points, "")
-    for name, values in table.inputs.items():
-        own = unit(name, table.stress_unit)
-        _put(file, f"inputs/{name}", list(values), own)
-        if name != "cell.seed":
-            _put(file, f"points/{name}", [values[row] for row in first], own)
-
-
-def _put_curves(file: Any, table: SweepTable, point: int) -> None:
-    strain, stress = table.curves(point)
-    if not len(strain):
-        return
-    group = f"curves/point-{point}"
-    _put(file, f"{group}/strain", strain, "")
-    for k, name in enumerate(voigt_names(stress.shape[2])[1]):
-        statistics = Statistics.of(stress[:, :, k])
-        _put(file, f"{group}/{name}", stress[:, :, k], table.stress_unit)
-        for part in PARTS[1:]:
-            _put(file, f"{group}/{name}_{part}", getattr(statistics, part), table.stress_unit)
-
-
-def _put(file: Any, name: str, values: Any, own_unit: str) -> None:
-    """Write a dataset of numbers if all values are numbers, otherwise of texts."""
-    column = values if isinstance(values, np.ndarray) else _column(values)
-    file[name] = column
-    if own_unit:
-        file[name].attrs["unit"] = own_unit
-
-
-def _column(values: list[Any]) -> Any:
-    if all(v is None or (isinstance(v, int | float) and not isinstance(v, bool)) for v in values):
-        return np.array([np.nan if value is None else value for value in values])
-    texts = [v if isinstance(v, str) else "" if v is None else json.dumps(v) for v in values]
-    return np.array(texts, dtype=h5py.string_dtype())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fibre_statistics
 import numpy as np
 import pytest
 import tomli_w
@@ -11,7 +12,7 @@ from support.void_cells import write_voids
 
 from feti_homog import run
 from feti_homog.case import case as cases
-from feti_homog.commands import fibre_statistics, listed_fibres
+from feti_homog.commands import listed_fibres
 from feti_homog.errors import CaseError, MeshError
 from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.coarse_mesh import areas, void_edges, voids

@@ -5,12 +5,12 @@ from __future__ import annotations
 import csv
 import math
 
-import h5py
 import numpy as np
 import pytest
 from matplotlib.image import imread
 from scipy import stats
 
+from feti_homog.materials.voigt import SPATIAL_STRESSES
 from feti_homog.report.text.table import unit, with_unit
 from feti_homog.sweep.report import figures, moduli, tables
 from feti_homog.sweep.report.outputs import numbers, outputs
@@ -93,14 +93,13 @@ def test_curves_of_a_given_stress_have_six_components(tmp_path):
     tables.write(tmp_path, table)
     assert table.outputs["onset_S13"].tolist() == [2.0] * 4 and table.outputs["work"].tolist() == [0.3] * 4
     assert table.outputs["end_gamma13"].tolist() == pytest.approx([0.8, 0.8, 1.6, 1.6])
-    with h5py.File(tmp_path / "sweep.h5") as file:
-        group = file["curves/point-1"]
-        strain, stresses = group["strain"][()], group["S13"][()]
+    strain, stress = table.curves(1)
+    stresses = stress[:, :, SPATIAL_STRESSES.index("S13")]
     assert strain[-1] == pytest.approx(0.8) and stresses.shape == (2, len(strain))
     # To the load 2 at the compliance 0.1, then a jump, then half as steep; of the other twice as soft.
     assert np.interp([0.1, 0.3, 0.6], strain, stresses[0]) == pytest.approx([1.0, 2.0, 3.0])
     assert np.interp([0.2, 0.6], strain, stresses[1]) == pytest.approx([1.0, 2.0])
-    assert_drawn(tmp_path, table, ["cell_size.png", "curves.png"])
+    assert_drawn(tmp_path, table, ["curves.png"])
 
 
 def test_columns_of_a_path_are_its_first_point_its_peaks_and_its_end():
@@ -135,7 +134,7 @@ def fractions():
 
 def test_tables_hold_cases_and_statistics_of_points(tmp_path):
     table = fractions()
-    assert [path.name for path in tables.write(tmp_path, table)] == ["cases.csv", "statistics.csv", "sweep.h5"]
+    assert [path.name for path in tables.write(tmp_path, table)] == ["cases.csv", "statistics.csv"]
     rows, statistics = (
         list(csv.DictReader((tmp_path / name).read_text().splitlines())) for name in ("cases.csv", "statistics.csv")
     )
@@ -147,14 +146,11 @@ def test_tables_hold_cases_and_statistics_of_points(tmp_path):
         ("1", "0.2", "GPa", "3"),
         ("2", "0.4", "GPa", "2"),
     ]
-    with h5py.File(tmp_path / "sweep.h5") as file:
-        assert file["statistics/mean/C11"][()].tolist() == pytest.approx([136.5, 152.25])
-        halves = [stats.t.ppf(0.975, 2) * 0.5 / 3**0.5, stats.t.ppf(0.975, 1) * 0.25]
-        assert file["statistics/ci95/C11"][()] == pytest.approx(halves)
-        assert file["cases/status"].asstr()[5] == "waiting" and np.isnan(file["outputs/C11"][5])
-        assert file["points/cell.fibre_fraction"][()].tolist() == [0.2, 0.4]
-        assert file["outputs/seconds_solve"].attrs["unit"] == "s"
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["cases.csv", "statistics.csv", "sweep.h5"]
+    (first, second) = [row for row in statistics if row["output"] == "C11"]
+    halves = [stats.t.ppf(0.975, 2) * 0.5 / 3**0.5, stats.t.ppf(0.975, 1) * 0.25]
+    assert [float(row["mean"]) for row in (first, second)] == [136.5, 152.25]
+    assert [float(row["ci95"]) for row in (first, second)] == pytest.approx(halves)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["cases.csv", "statistics.csv"]
 
 
 def test_entries_beside_cases_in_space_have_the_names_of_space(tmp_path):
@@ -182,25 +178,19 @@ def test_mean_curves_keep_the_bonded_branch(tmp_path):
     assert table.outputs["onset_S11"].tolist() == [4.0, 4.0, 5.0, 5.0]
     assert table.outputs["peak_S11"].tolist() == [4.0, 4.0, 5.0, 5.0]  # before the fall
     assert table.outputs["end_S11"].tolist() == [8.0, 8.0, 9.0, 9.0]
-    with h5py.File(tmp_path / "sweep.h5") as file:
-        group = file["curves/point-1"]
-        strain, mean = group["strain"][()], group["S11_mean"][()]
-        assert strain[[0, -1]].tolist() == [0.0, 0.2] and group["S11"].shape == (2, len(strain))
-        assert mean[[0, -1]] == pytest.approx([0.0, 8.5])
-        # The bonded branch: from zero to the mean of the first breaks.
-        assert np.interp(0.01, strain, mean) == pytest.approx(2.25)
-        half = stats.t.ppf(0.975, 1) * 0.5**0.5 / 2**0.5
-        assert group["S11_ci95"][-1] == pytest.approx(half)
-    assert_drawn(tmp_path, table, ["cell_size.png", "curves.png"])
+    strain, stress = table.curves(1)
+    found = Statistics.of(stress[:, :, 0])
+    assert strain[[0, -1]].tolist() == [0.0, 0.2] and stress.shape[:2] == (2, len(strain))
+    assert found.mean[[0, -1]] == pytest.approx([0.0, 8.5])
+    # The bonded branch: from zero to the mean of the first breaks.
+    assert np.interp(0.01, strain, found.mean) == pytest.approx(2.25)
+    assert found.ci95[-1] == pytest.approx(stats.t.ppf(0.975, 1) * 0.5**0.5 / 2**0.5)
+    assert_drawn(tmp_path, table, ["curves.png"])
 
 
 @pytest.mark.slow
 def test_moduli_are_drawn(tmp_path):
     assert_drawn(tmp_path, fractions(), ["moduli.png"])
-    documents = [document(0.4, fibres, shift / fibres) for shift in (-1.0, 0.0, 1.0) for fibres in (4, 8, 16)]
-    inputs = {"cell.fibres": [4, 8, 16] * 3, "cell.mesh_size": [0.3, 0.2, 0.1] * 3, "cell.seed": [0] * 9}
-    table = collected(inputs, documents, [1, 2, 3] * 3, [1] * 3 + [2] * 3 + [3] * 3)
-    assert_drawn(tmp_path, table, ["cell_size.png"])
     assert not figures.plot(tmp_path, collected({"cell.order": [1]}, [document(0.4, 8, 0)], [1], [1]))
     waiting = collected({"cell.fibre_fraction": [0.1, 0.2]}, [None] * 2, [1, 2], [1] * 2)
     assert not figures.plot(tmp_path, waiting)

@@ -79,7 +79,7 @@ def test_a_full_device_is_reported():
         atomic.replace(Path("/dev/shm/feti_homog_none"), lambda part: Path("/dev/full").write_text("x"))
 
 
-OWN = ["cases.csv", "lock", "statistics.csv", "sweep.h5", "match.png", "case-0001/notes.txt"]
+OWN = ["cases.csv", "lock", "statistics.csv", "moduli.png", "case-0001/notes.txt"]
 
 
 @pytest.mark.parametrize("name", OWN)

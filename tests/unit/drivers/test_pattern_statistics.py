@@ -7,10 +7,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from support.fibre_patterns import pattern, poisson_points, square_lattice
-
-from feti_homog.microstructure.neighbour_match import nearest_neighbours
-from feti_homog.microstructure.statistics import (
+from pattern_statistics import (
     envelope,
     measure,
     pair_directions,
@@ -18,6 +15,9 @@ from feti_homog.microstructure.statistics import (
     poisson,
     voronoi_cells,
 )
+from support.fibre_patterns import pattern, poisson_points, square_lattice
+
+from feti_homog.microstructure.neighbour_match import nearest_neighbours
 
 r = np.linspace(0.1, 4.0, 40)
 both = pytest.mark.parametrize("periodic", [True, False])

@@ -11,8 +11,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
+from pattern_statistics import SECTORS, FibreStatistics
 
-from feti_homog.microstructure.statistics import SECTORS, FibreStatistics
 from feti_homog.report.plots.plot_helpers import STYLE, faint_grid, plain, save
 from feti_homog.typing import Float
 

@@ -1,23 +1,29 @@
-"""Text of `feti-homog statistics`, the placement of the fibres of a table, a result or a case, and its tables."""
+"""How the fibres of a cross-section are placed: neighbours, local fractions, directions, Ripley's L beside simulations.
+
+    .venv/bin/python drivers/fibre_statistics.py meshes/clustered.csv --out results/statistics
+
+The source is a table of fibres in a window of a micrograph, or a folder of results or a case file, whose cells are
+periodic.  Ellipses count as discs of the same area.  With --out, tables of all quantities, of g(r) and of K(r) are
+written, and statistics.png.
+"""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping
-from functools import partial
+import argparse
+import csv
+import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+import statistics_picture
+from mpi4py.MPI import Intracomm
+from pattern_statistics import SECTORS, FibreStatistics, VoronoiCells, hard_core, measure, poisson
 
+from feti_homog import CaseError, launch
 from feti_homog.commands import listed_fibres
-from feti_homog.errors import CaseError
 from feti_homog.fibres.fibre_window import read_window
-from feti_homog.fibres.hard_core import hard_core
 from feti_homog.microstructure.fibre_pattern import FibrePattern
 from feti_homog.microstructure.phase_names import VOID
-from feti_homog.microstructure.statistics import SECTORS, FibreStatistics, VoronoiCells, measure, poisson
-from feti_homog.results import atomic, output_folder
 from feti_homog.typing import Array, Float
 
 ORDINALS = ("nearest", "second", "third")
@@ -77,13 +83,19 @@ def _randomness(found: FibreStatistics, model: str, simulations: int) -> str:
 
 
 def write(directory: Path, found: FibreStatistics) -> list[Path]:
-    """Write the three tables; returns their paths.  On one rank.  Raises FetiHomogError if they cannot be written."""
+    """Write the three tables; returns their paths."""
     tables = {
         "fibre_statistics.csv": fibre_columns(found),
         "pair_functions.csv": pair_columns(found),
         "pair_directions.csv": {"angle": np.arange(SECTORS) * 180 / SECTORS, "relative_share": found.directions},
     }
-    return [atomic.replace(directory / name, partial(_write, columns)) for name, columns in tables.items()]
+    for name, columns in tables.items():
+        with (directory / name).open("w", newline="", encoding="utf-8") as stream:
+            rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+            writer = csv.writer(stream)
+            writer.writerow(columns)
+            writer.writerows([value if np.isfinite(value) else "" for value in row] for row in rows)
+    return [directory / name for name in tables]
 
 
 def fibre_columns(found: FibreStatistics) -> dict[str, Array]:
@@ -125,40 +137,21 @@ def pair_columns(found: FibreStatistics) -> dict[str, Array]:
     }
 
 
-def _write(columns: Mapping[str, Array], path: Path) -> None:
-    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
-    lines = [",".join(columns), *(",".join(map(_cell, row)) for row in rows)]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-
-def _cell(value: Any) -> str:
-    """Return a number as Python reads it back; nothing for one that is not there."""
-    return repr(value) if np.isfinite(value) else ""
-
-
 def run(
     source: Path, out: Path | None, model: str, simulations: int, size: tuple[float, float] | None = None
 ) -> list[str]:
-    """Measure, write three tables and a picture to `out` if it is given; returns the lines to print.  On one rank.
+    """Measure, write three tables and a picture to `out` if it is given; returns the lines to print.
 
     `size` is that of the window of a table that gives none.
 
     Raises:
-        CaseError, MeshError: the source is faulty, `out` cannot be used, or the model has no such pattern.
-        FetiHomogError: a file cannot be written.
+        CaseError, MeshError: the source is faulty, or the model has no such pattern.
     """
-    fibres = pattern(source, size)
-    if out is not None:
-        output_folder.usable(out)
-    found = measure(fibres, MODELS[model], simulations)
+    found = measure(pattern(source, size), MODELS[model], simulations)
     lines = [text(found, model, simulations)]
     if out is not None:
-        from feti_homog.report.plots import statistics_picture
-
         out.mkdir(parents=True, exist_ok=True)
-        atomic.remove_abandoned(out, re.compile(r"[a-z_]+\.(csv|png)"))
-        paths = write(out, found)
-        paths.append(statistics_picture.write(out, found, source.stem, model))
+        paths = [*write(out, found), statistics_picture.write(out, found, source.stem, model)]
         lines += map(str, paths)
     return lines
 
@@ -183,3 +176,26 @@ def pattern(source: Path, size: tuple[float, float] | None) -> FibrePattern:
     if found.count < 2:
         raise CaseError(f"{source}: expected at least two fibres, got {found.count}")
     return found
+
+
+def main(given: argparse.Namespace, comm: Intracomm) -> None:
+    """Print, write and draw on rank 0."""
+    if comm.rank == 0:
+        size = None if given.size is None else tuple(given.size)
+        print(*run(given.source, given.out, given.model, given.simulations, size), sep="\n")
+
+
+def _parser() -> argparse.ArgumentParser:
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("source", type=Path, metavar="FILE.csv|DIR|CASE.toml")
+    options.add_argument("--out", type=Path, metavar="DIR", help="folder of the tables and the picture")
+    words = "random reference: fibres of these radii with at least the smallest gap found (the default), or points"
+    options.add_argument("--model", choices=tuple(MODELS), default="hard-core", help=words)
+    options.add_argument("--simulations", type=int, default=39, metavar="N", help="how many are compared (default 39)")
+    words = "size of the window, in the unit of the table (default: from a comment in the table)"
+    options.add_argument("--size", type=float, nargs=2, metavar=("WIDTH", "HEIGHT"), help=words)
+    return options
+
+
+if __name__ == "__main__":
+    sys.exit(launch(main, _parser()))

@@ -10,6 +10,8 @@ from math import pi, sqrt
 import numpy as np
 from scipy.spatial import Voronoi
 
+from feti_homog.errors import MeshError
+from feti_homog.fibres.hard_core import MAX_STEPS, placed
 from feti_homog.microstructure.fibre_pattern import FibrePattern
 from feti_homog.microstructure.neighbour_match import NearestNeighbours, nearest_neighbours
 from feti_homog.typing import Bool, Float
@@ -104,6 +106,21 @@ class Envelope:
     high: Float
     mean: Float
     p_value: float
+
+
+def hard_core(pattern: FibrePattern, generator: np.random.Generator, max_steps: int = MAX_STEPS) -> FibrePattern:
+    """Return the same fibres elsewhere, as those of random cells are placed (`relax`).
+
+    No gap is smaller than the smallest one of the pattern. Across the sides of a window they are placed as in a
+    periodic cell.
+
+    Raises:
+        MeshError: no such pattern is found.
+    """
+    try:
+        return placed(pattern, max(pattern.smallest_gap, 0.0), generator, max_steps)
+    except MeshError as error:
+        raise MeshError(f"{error}; compare with --model poisson") from error
 
 
 def poisson(pattern: FibrePattern, generator: np.random.Generator) -> FibrePattern:

@@ -5,20 +5,19 @@ from __future__ import annotations
 import csv
 from pathlib import Path
 
+import fibre_statistics
 import numpy as np
 import pytest
+from fibre_statistics import text
 from mpi4py import MPI
+from pattern_statistics import hard_core, measure, poisson
 from support.base_case import BASE, RANDOM
 from support.fibre_patterns import hexagonal_lattice, poisson_points, square_lattice
 
 from feti_homog.analysis.runner import run
 from feti_homog.case import case as cases
-from feti_homog.commands import fibre_statistics
-from feti_homog.commands.fibre_statistics import text
 from feti_homog.errors import CaseError, MeshError
-from feti_homog.fibres.hard_core import hard_core
 from feti_homog.microstructure.neighbour_match import nearest_neighbours
-from feti_homog.microstructure.statistics import measure, poisson
 
 MESHES = Path(__file__).parents[3] / "meshes"
 SMALL = BASE.replace('geometry = "hexagonal"\n', f"{RANDOM}width = 40.0\n").replace("0.05", "0.1")
