@@ -18,7 +18,7 @@ setup(
     license="MIT",
     python_requires=">=3.11",
     packages=find_packages(include=["feti_homog", "feti_homog.*"]),
-    package_data={"feti_homog.report.html": ["templates/*"]},
+    package_data={"feti_homog.report": ["page.css"]},
     install_requires=[
         "numpy>=1.23",  # of the major version that petsc4py was built for: scripts/bootstrap takes that one
         "scipy>=1.10",
@@ -31,11 +31,9 @@ setup(
         # These must be built on one MPI: from the distribution or the cluster's modules, never by default
         # from wheels (the h5py wheel has no MPI).
         "mpi": ["petsc4py>=3.18", "mpi4py>=3.1", "h5py>=3.7"],
-        "report": ["bokeh>=3.4", "jinja2>=3.1", "tqdm>=4.64"],  # report.html, and a progress bar on terminals
+        "progress": ["tqdm>=4.64"],  # a progress bar on terminals
         "meshes": ["meshio>=5.3"],  # cells in .vtu and .vtk files
         "dev": [
-            "bokeh>=3.4",
-            "jinja2>=3.1",
             "tqdm>=4.64",
             "meshio>=5.3",
             "pytest>=7.4",

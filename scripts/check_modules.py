@@ -29,8 +29,6 @@ PROVIDERS = {
             "numpy",
             "scipy",
             "matplotlib",
-            "bokeh",
-            "jinja2",
             "selenium",
             "pymetis",
             "tqdm",

@@ -34,7 +34,6 @@ from feti_homog.results.events_in_memory import EventsInMemory
 from feti_homog.results.field_file import FieldFile
 from feti_homog.results.output_folder import EventLog
 from feti_homog.runtime import process_memory
-from feti_homog.runtime.environment import require_report
 from feti_homog.runtime.progress import Progress
 
 # Freed bytes that stay for the next case of a process: to give them back and take them again costs a small one a tenth.
@@ -58,8 +57,6 @@ def run(
     if resume and on_root(comm, _is_finished, directory, case):
         progress.say(f"{directory} holds the finished result of this case: nothing to do")
         return Result.of(on_root(comm, result_json.read, directory))
-    if case.output.report:
-        require_report()
     on_root(comm, output_folder.usable, directory)
     on_root(comm, output_folder.refuse_files_of_others, directory)
     with output_folder.held(directory, comm, progress.say):
@@ -270,7 +267,6 @@ def _print_summary(result: Result, progress: Progress) -> None:
 
 
 def _report(directory: Path) -> list[Path]:
-    """report.html; only a rank that writes it loads Bokeh."""
-    from feti_homog.report.html import page
+    from feti_homog.report import page  # with tables that other ranks do not load
 
     return [page.write(directory)]

@@ -160,7 +160,7 @@ class Output:
         default=False,
     )
     pictures: bool = key(boolean, "Draw the PNG files; without fields, the curves alone.", default=True)
-    report: bool = key(boolean, "Write report.html: numbers, pictures, curves and states on one page.", default=False)
+    report: bool = key(boolean, "Write report.html: tables, checks and pictures on one page.", default=False)
     stress: str = key(
         choice("auto", "S11", "S22", "S12", *OUT_OF_PLANE_STRESSES),
         'Component to draw; "auto": the component of the unit strain. "S33", "S23" and "S13" exist in generalized '

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 from feti_homog.api import folder
 from feti_homog.errors import EXIT_DEFECT, EXIT_DONE, EXIT_UNCONVERGED, CaseError, FetiHomogError
 from feti_homog.parallel.mpi_errors import on_root, on_root_only
-from feti_homog.runtime.environment import require_report
 from feti_homog.runtime.standard_streams import complain, end_on_signals, launched_rank, prepare, print_product, say
 
 if TYPE_CHECKING:
@@ -106,19 +105,12 @@ def _plot(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 def _report(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.analysis import stored_result
+    from feti_homog.report import page
 
-    require_report()
     on_root_only(comm, stored_result.read, arguments.directory)
-    path = on_root_only(comm, _written_report, arguments.directory)
+    path = on_root_only(comm, page.write, arguments.directory)
     if path is not None:
         say(str(path))
-
-
-def _written_report(directory: Path) -> Path:
-    """Return the report; only a rank that writes it loads Bokeh."""
-    from feti_homog.report.html import page
-
-    return page.write(directory)
 
 
 def _fields(arguments: argparse.Namespace, comm: Intracomm) -> None:

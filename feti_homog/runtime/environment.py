@@ -9,8 +9,6 @@ from collections.abc import MutableMapping
 from importlib.util import find_spec
 from pathlib import Path
 
-from feti_homog.errors import LibraryError
-
 SETTINGS = {
     "OMP_NUM_THREADS": "1",  # one core per rank: threads of BLAS would compete with the ranks
     "OMP_THREAD_LIMIT": "1",  # CHOLMOD starts four whatever the number of threads is: half of its time is theirs
@@ -58,14 +56,3 @@ def prepare(environment: MutableMapping[str, str]) -> None:
     for name, value in SETTINGS.items():
         if name != "OMP_THREAD_LIMIT" or environment["OMP_NUM_THREADS"] == "1":
             environment.setdefault(name, value)
-
-
-def require_report() -> None:
-    """Check the libraries of report.html.
-
-    Raises:
-        LibraryError: one is not installed.
-    """
-    missing = [name for name in ("bokeh", "jinja2") if find_spec(name) is None]
-    if missing:
-        raise LibraryError(f"report.html needs {' and '.join(missing)}: pip install 'feti_homog[report]'")

@@ -1,6 +1,6 @@
 """Results of each analysis as summary, pictures and pages show them: the registry of the report.
 
-Curves of an analysis are found by its name: `response_curves.CURVES`, `deformed_panels.PANELS`, `curves.FIGURES`.
+Curves of an analysis are found by its name: `response_curves.CURVES`, `deformed_panels.PANELS`.
 """
 
 from __future__ import annotations

@@ -1,0 +1,126 @@
+"""report.html: one page of a result with its tables, checks and pictures, readable without a network."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterable
+from html import escape
+from importlib import resources
+from pathlib import Path
+
+from feti_homog.errors import CaseError
+from feti_homog.materials.voigt import SPATIAL_STRAINS, STRAINS
+from feti_homog.report.text.summary import answers, checks, summary, title_of
+from feti_homog.report.text.table import Column, Table
+from feti_homog.results import atomic, output_folder, result_json
+from feti_homog.typing import Document
+
+NAME, SWEEP = "report.html", "sweep.json"
+UNIT_LOADS = dict.fromkeys((*STRAINS, *SPATIAL_STRAINS, "temperature"))
+PICTURES = {
+    "cell": "The cell: phases and numbers of the fibres",
+    "partition": "The subdomains",
+    **{f"case_{load}": f"Deformed cell under {load}" for load in UNIT_LOADS},
+    **{f"case_minus_{load}": f"Deformed cell under minus {load}" for load in UNIT_LOADS},
+    "angle": "Response against the debonding angle",
+    "angle_states": "Deformed cell at several angles",
+    "path": "Response along the path of load",
+    "path_states": "Deformed cell along the path",
+    "energy": "Energies along the path",
+    "load": "Deformed cell under the load",
+    "envelope": "Onset of debonding",
+    "interface": "Tractions and jumps of interfaces",
+    "mesh_error": "Estimated error of the mesh",
+    "sensitivities": "Relative changes of constants with each parameter",
+}
+MOST_ROWS = 60  # of a table of points
+# The page can fetch nothing, whatever is in it.
+POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
+
+
+def write(directory: Path) -> Path:
+    """Write `directory`/report.html from result.json and the pictures in the folder; return its path.
+
+    Call on one rank.
+
+    Raises:
+        CaseError: the folder is not that of a result, or a file of it is missing or damaged.
+        FetiHomogError: the report cannot be written.
+    """
+    if not directory.is_dir():
+        raise CaseError(f"cannot report {directory}: there is no such folder")
+    if (directory / SWEEP).exists():
+        raise CaseError(f"cannot report {directory}: it is the folder of a sweep; name the folder of one of its cases")
+    document = result_json.read(directory)
+    atomic.remove_abandoned(directory, output_folder.RESULT_FILE)
+    try:
+        html = page(document, directory)
+    except (OSError, KeyError) as error:
+        raise CaseError(f"cannot report {directory}: a file of the result is missing or damaged: {error}") from error
+    return atomic.replace_text(directory / NAME, html)
+
+
+def page(document: Document, directory: Path) -> str:
+    """Return the page of a result.  Raises OSError or KeyError where its files are damaged."""
+    title, status = escape(title_of(document)), document["status"]
+    laws = [
+        [check.law, check.error, "none" if check.limit is None else check.limit, "holds" if check.holds else "fails"]
+        for check in checks(document)
+    ]
+    columns = [Column("law"), Column("error", form=".1e"), Column("limit", form=".1e"), Column("")]
+    table = Table("Largest relative error of each law over all states", columns, laws)
+    style = resources.files("feti_homog.report").joinpath("page.css").read_text(encoding="utf-8")
+    sections = {
+        "Results": "\n".join(f'<div class="scroll">{answer.html}</div>' for answer in answers(document, MOST_ROWS)),
+        "Remarks": "\n".join(_remarks(document)),
+        "Checks": f'<div class="scroll">{table.html}</div>',
+        "Pictures": "\n".join(_pictures(directory)) or "<p>None: <code>feti-homog plot</code> draws them.</p>",
+        "Summary": f"<pre>{escape(summary(document))}</pre>",
+    }
+    shown = {name: body for name, body in sections.items() if body}
+    links = "\n".join(f'<a href="#{name.lower()}">{name}</a>' for name in shown)
+    body = "\n".join(
+        f'<section id="{name.lower()}">\n<h2>{name}</h2>\n{text}\n</section>' for name, text in shown.items()
+    )
+    return f"""<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta http-equiv="Content-Security-Policy" content="{POLICY}">
+<title>{title}</title>
+<style>
+{style}</style>
+</head>
+<body>
+<header>
+<p class="program">feti-homog {escape(str(document["version"]))}</p>
+<h1>{title}</h1>
+<p class="status {"good" if status == "done" else "bad"}">{escape(status)}</p>
+<nav>
+{links}
+</nav>
+</header>
+<main>
+{body}
+</main>
+</body>
+</html>
+"""
+
+
+def _remarks(document: Document) -> Iterable[str]:
+    for label, key in (("Remark", "remarks"), ("Warning", "warnings"), ("Fault", "faults")):
+        for words in document.get(key, ()):
+            yield f'<p class="{label.lower()}"><strong>{label}</strong> {escape(words)}</p>'
+
+
+def _pictures(directory: Path) -> Iterable[str]:
+    """Yield the pictures of the folder as figures with captions."""
+    paths = {directory / f"{name}.png": caption for name, caption in PICTURES.items()}
+    paths |= {path: f"Deformed cell, {path.stem.replace('_', ' ')}" for path in sorted(directory.glob("state_*.png"))}
+    for path, caption in paths.items():
+        if path.is_file():
+            data = base64.b64encode(path.read_bytes()).decode()
+            image = f'<img src="data:image/png;base64,{data}" alt="{caption}">'
+            yield f"<figure>{image}<figcaption>{caption}</figcaption></figure>"
