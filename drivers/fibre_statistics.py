@@ -21,8 +21,8 @@ from pattern_statistics import SECTORS, FibreStatistics, VoronoiCells, hard_core
 
 from feti_homog import CaseError, launch
 from feti_homog.commands import listed_fibres
-from feti_homog.fibres.fibre_window import read_window
 from feti_homog.microstructure.fibre_pattern import FibrePattern
+from feti_homog.microstructure.fibre_window import read_window
 from feti_homog.microstructure.phase_names import VOID
 from feti_homog.typing import Array, Float
 

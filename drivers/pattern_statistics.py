@@ -11,8 +11,8 @@ import numpy as np
 from scipy.spatial import Voronoi
 
 from feti_homog.errors import MeshError
-from feti_homog.fibres.hard_core import MAX_STEPS, placed
 from feti_homog.microstructure.fibre_pattern import FibrePattern
+from feti_homog.microstructure.hard_core import MAX_STEPS, placed
 from feti_homog.microstructure.neighbour_match import NearestNeighbours, nearest_neighbours
 from feti_homog.typing import Bool, Float
 

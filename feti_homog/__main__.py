@@ -5,9 +5,9 @@ import signal
 import sys
 
 from feti_homog.errors import FetiHomogError
-from feti_homog.runtime import process_memory
-from feti_homog.runtime.environment import prepare
-from feti_homog.runtime.standard_streams import complain, launched_rank
+from feti_homog.system.runtime import process_memory
+from feti_homog.system.runtime.environment import prepare
+from feti_homog.system.runtime.standard_streams import complain, launched_rank
 
 
 def main() -> int:

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 from feti_homog.case.case import Case
 from feti_homog.errors import EXIT_DONE, CaseError, LibraryError
-from feti_homog.petsc import libraries
-from feti_homog.petsc.option_table import unknown_to_petsc
-from feti_homog.petsc.option_values import faulty_values, named_values, petsc_words, split_argv
-from feti_homog.runtime import standard_streams
-from feti_homog.runtime.environment import ignore_settings_of_the_folder, prefer_own_toolkits
-from feti_homog.runtime.standard_streams import end_on_signals, launched_rank
+from feti_homog.system.petsc import libraries
+from feti_homog.system.petsc.option_table import unknown_to_petsc
+from feti_homog.system.petsc.option_values import faulty_values, named_values, petsc_words, split_argv
+from feti_homog.system.runtime import standard_streams
+from feti_homog.system.runtime.environment import ignore_settings_of_the_folder, prefer_own_toolkits
+from feti_homog.system.runtime.standard_streams import end_on_signals, launched_rank
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from feti_homog.analysis.result import Result
     from feti_homog.results.viewed_states import ViewedState
-    from feti_homog.sweep.report.sweep_table import SweepTable
+    from feti_homog.studies.sweep.report.sweep_table import SweepTable
 
 
 def run(
@@ -88,8 +88,8 @@ def run_sweep(
         ConvergenceError: cases failed; `collect_sweep` makes the table of the others.
     """
     comm = _started(comm)
-    from feti_homog.parallel.mpi_errors import on_root
-    from feti_homog.sweep import collect, execute, plan
+    from feti_homog.studies.sweep import collect, execute, plan
+    from feti_homog.system.parallel.mpi_errors import on_root
 
     if isinstance(cases, Mapping):
         expanded = on_root(comm, plan.expand, cases, Path())
@@ -109,8 +109,8 @@ def collect_sweep(out: str | Path, comm: Intracomm | None = None, *, pictures: b
         CaseError: `out` is no folder of a sweep.
     """
     comm = _started(comm)
-    from feti_homog.parallel.mpi_errors import on_root
-    from feti_homog.sweep import collect
+    from feti_homog.studies.sweep import collect
+    from feti_homog.system.parallel.mpi_errors import on_root
 
     return on_root(comm, collect.collect, Path(out), pictures)
 
@@ -134,8 +134,8 @@ def run_fit(
         ConvergenceError: a case failed, or the data do not determine the unknowns.
     """
     comm = _started(comm)
-    from feti_homog.fit import description, execute
-    from feti_homog.parallel.mpi_errors import on_root
+    from feti_homog.studies.fit import description, execute
+    from feti_homog.system.parallel.mpi_errors import on_root
 
     if isinstance(fit, str | Path):
         read = on_root(comm, description.load, Path(fit))
@@ -203,7 +203,7 @@ def start(command: Callable[[Sequence[str], Intracomm], int], argv: Sequence[str
         return error.exit_code
     from mpi4py import MPI
 
-    from feti_homog.parallel.mpi_errors import run_main
+    from feti_homog.system.parallel.mpi_errors import run_main
 
     def main() -> int:
         _start_petsc(petsc, MPI.COMM_WORLD)
@@ -243,7 +243,7 @@ def folder(name: str | Path) -> Path:
 
 def parsed(parser: argparse.ArgumentParser, words: Sequence[str], comm: Intracomm) -> argparse.Namespace:
     """Return the arguments; help, version and argparse's own complaints are printed by rank 0. Collective."""
-    from feti_homog.parallel.mpi_errors import on_root_only
+    from feti_homog.system.parallel.mpi_errors import on_root_only
 
     printed = io.StringIO()
     try:

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, NoReturn
 from feti_homog.api import parsed, start
 from feti_homog.commands import fibres, products, run, sweep
 from feti_homog.errors import EXIT_DONE, CaseError
-from feti_homog.petsc.option_table import help_text
-from feti_homog.petsc.option_values import split_argv
+from feti_homog.system.petsc.option_table import help_text
+from feti_homog.system.petsc.option_values import split_argv
 from feti_homog.version import __version__
 
 if TYPE_CHECKING:

@@ -32,9 +32,9 @@ from feti_homog.interface.laws.strength import MaxStrength  # noqa: E402
 from feti_homog.interface.loads.load import Load  # noqa: E402
 from feti_homog.interface.path.path_following import events  # noqa: E402
 from feti_homog.interface.path.path_points import unloaded  # noqa: E402
-from feti_homog.petsc.options import case_options  # noqa: E402
-from feti_homog.runtime import process_memory  # noqa: E402
-from feti_homog.runtime.progress import Progress  # noqa: E402
+from feti_homog.system.petsc.options import case_options  # noqa: E402
+from feti_homog.system.runtime import process_memory  # noqa: E402
+from feti_homog.system.runtime.progress import Progress  # noqa: E402
 
 STRAIN = [0.2, 0.0, 0.0]
 STRENGTH = 10.0

@@ -36,7 +36,7 @@ from feti_homog.homogenization.mesh_error import energy_errors, factors, is_nest
 from feti_homog.homogenization.nested_interiors import locks
 from feti_homog.homogenization.partition_policy import BY_COST
 from feti_homog.homogenization.unit_cell import tear
-from feti_homog.runtime.progress import Progress
+from feti_homog.system.runtime.progress import Progress
 from feti_homog.typing import Float
 
 SIZES = {1: (0.1, 0.05, 0.025), 2: (0.2, 0.1, 0.05)}

@@ -28,8 +28,8 @@ from feti_homog.case import case as cases  # noqa: E402
 from feti_homog.case.case import Case  # noqa: E402
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds  # noqa: E402
 from feti_homog.homogenization.unit_cell import tear  # noqa: E402
-from feti_homog.petsc.options import case_options  # noqa: E402
-from feti_homog.runtime.progress import Progress  # noqa: E402
+from feti_homog.system.petsc.options import case_options  # noqa: E402
+from feti_homog.system.runtime.progress import Progress  # noqa: E402
 
 # Columns that are no whole numbers.
 REAL = (

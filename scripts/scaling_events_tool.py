@@ -27,9 +27,9 @@ from feti_homog.case import case as cases  # noqa: E402
 from feti_homog.case.case import Case  # noqa: E402
 from feti_homog.homogenization.averaging import Homogenization  # noqa: E402
 from feti_homog.homogenization.unit_cell import tear  # noqa: E402
-from feti_homog.parallel.mpi_errors import run_main  # noqa: E402
-from feti_homog.petsc.options import case_options  # noqa: E402
-from feti_homog.runtime.progress import Progress  # noqa: E402
+from feti_homog.system.parallel.mpi_errors import run_main  # noqa: E402
+from feti_homog.system.petsc.options import case_options  # noqa: E402
+from feti_homog.system.runtime.progress import Progress  # noqa: E402
 
 
 def main() -> int:

@@ -36,10 +36,10 @@ from feti_homog.homogenization.tile_tearing import summary_of, tiled_cell, tiles
 from feti_homog.homogenization.unit_cell import TornCell, tear  # noqa: E402
 from feti_homog.mesh.fill.gmsh_mesher import UnmeshedCell  # noqa: E402
 from feti_homog.mesh.tiles.tiles import TilePolicy  # noqa: E402
-from feti_homog.parallel.mpi_errors import on_root, run_main  # noqa: E402
-from feti_homog.petsc.options import case_options  # noqa: E402
-from feti_homog.runtime import process_memory  # noqa: E402
-from feti_homog.runtime.progress import Progress  # noqa: E402
+from feti_homog.system.parallel.mpi_errors import on_root, run_main  # noqa: E402
+from feti_homog.system.petsc.options import case_options  # noqa: E402
+from feti_homog.system.runtime import process_memory  # noqa: E402
+from feti_homog.system.runtime.progress import Progress  # noqa: E402
 from feti_homog.typing import Int  # noqa: E402
 
 LOADS = 3

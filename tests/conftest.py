@@ -14,7 +14,7 @@ import pytest
 from hypothesis import settings
 from support import jobs
 
-from feti_homog.parallel.mpi_errors import others_come
+from feti_homog.system.parallel.mpi_errors import others_come
 
 # The same examples in every run and on every rank; `--hypothesis-profile=search` looks for new ones.
 settings.register_profile("suite", derandomize=True, deadline=None, max_examples=60, database=None)

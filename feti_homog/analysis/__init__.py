@@ -1,5 +1,5 @@
 """Analyses of a torn cell, a module each, found by `registry`; `context` has what they share.
 
-Imports `case`, `feti`, `fibres`, `homogenization`, `interface`, `materials`, `parallel`, `petsc`, `report`, `results`
-and `runtime`.  Main entries: `runner.run` (with files) and `runner.compute` (without).
+Imports `case`, `feti`, `homogenization`, `interface`, `materials`, `microstructure`, `report`, `results` and `system`.
+Main entries: `runner.run` (with files) and `runner.compute` (without).
 """

@@ -23,7 +23,7 @@ from feti_homog.interface.loads.load import Load
 from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS
 from feti_homog.results.checkpoint import Checkpoint
 from feti_homog.results.events_in_memory import NoCheckpoint
-from feti_homog.runtime.progress import Progress
+from feti_homog.system.runtime.progress import Progress
 from feti_homog.typing import Float
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Any, Self
 
-from feti_homog.runtime.progress import Progress
+from feti_homog.system.runtime.progress import Progress
 
 SECONDS_A_LINE = 1.0
 # The time left of equal steps is printed; the number of events is unknown.

@@ -18,7 +18,7 @@ from feti_homog.errors import CoarseMeshError, NotCarriedError
 from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response
 from feti_homog.materials import bounds, spatial_constants
-from feti_homog.runtime.records import plain
+from feti_homog.system.runtime.records import plain
 from feti_homog.typing import Float
 
 if TYPE_CHECKING:

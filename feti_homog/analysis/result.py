@@ -32,11 +32,10 @@ from feti_homog.materials.bounds import Moduli
 from feti_homog.materials.estimates.constituents import Estimates, FibreBounds
 from feti_homog.materials.spatial_constants import EngineeringConstants, TransverselyIsotropic, TransverseModuli
 from feti_homog.materials.voigt import voigt_names
-from feti_homog.results import path_curves
 from feti_homog.results.field_layout import FibrePart, Header, InterfacePart, MeshPart, StatePart, tables
 from feti_homog.results.result_json import SCHEMA
 from feti_homog.results.seals import FileSeal
-from feti_homog.runtime.records import BYTES, SECONDS, STRESS, Key, described, keys, plain, restored
+from feti_homog.system.runtime.records import BYTES, SECONDS, STRESS, Key, described, keys, plain, restored
 from feti_homog.typing import Float
 
 if TYPE_CHECKING:
@@ -226,6 +225,8 @@ class Result:
 
         Raises ValueError for any other result, and where that strain does not rise with the load.
         """
+        from feti_homog.results import path_curves  # of no use to other analyses
+
         curve = path_curves.rising_strain(self.document)
         if curve is None or self.peak is None:
             raise ValueError("only a path of one leg whose leading strain rises has a response to a rising strain")
@@ -265,6 +266,8 @@ class Result:
         The load is held there; the point is the one whose branch the stress is on. Raises ValueError for any other
         result.
         """
+        from feti_homog.results import path_curves
+
         document = self.document
         if not self.path or not path_curves.is_proportional(document):
             raise ValueError("only a path of one leg, followed by events, has a first drop")

@@ -12,10 +12,10 @@ from feti_homog.analysis.checks import CONTACT_TOLERANCE
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result import Fields, Result
 from feti_homog.case.case import Case
-from feti_homog.fibres.outlines.ellipses import Ellipses
 from feti_homog.homogenization.uniform_parts import nodes_of_parts
 from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.parallel.mpi_errors import on_root
+from feti_homog.microstructure.shapes.ellipses import Ellipses
+from feti_homog.system.parallel.mpi_errors import on_root
 from feti_homog.version import __version__
 
 # Phases that are no fibres.

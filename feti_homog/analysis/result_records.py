@@ -17,7 +17,7 @@ from feti_homog.materials.voigt import (
     STRAINS,
     STRESSES,
 )
-from feti_homog.runtime.records import DEGREES, LENGTH, STRESS, described
+from feti_homog.system.runtime.records import DEGREES, LENGTH, STRESS, described
 from feti_homog.typing import Float
 
 EITHER, EITHER_STIFFNESS = "(3,) or (6,)", "(3, 3) or (6, 6)"

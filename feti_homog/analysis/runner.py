@@ -20,8 +20,6 @@ from feti_homog.case.case import Case
 from feti_homog.errors import CheckpointError, CoarseMeshError, ConvergenceError, MeshError, NoMemoryError
 from feti_homog.homogenization.partition_policy import BY_COST
 from feti_homog.homogenization.unit_cell import TornCell, tear
-from feti_homog.parallel.mpi_errors import all_raise, on_root, on_root_only
-from feti_homog.petsc.options import case_options, refuse_unused
 from feti_homog.results import (
     field_file,
     field_parts,
@@ -33,8 +31,10 @@ from feti_homog.results.checkpoint import Checkpoint, room_of
 from feti_homog.results.events_in_memory import EventsInMemory
 from feti_homog.results.field_file import FieldFile
 from feti_homog.results.output_folder import EventLog
-from feti_homog.runtime import process_memory
-from feti_homog.runtime.progress import Progress
+from feti_homog.system.parallel.mpi_errors import all_raise, on_root, on_root_only
+from feti_homog.system.petsc.options import case_options, refuse_unused
+from feti_homog.system.runtime import process_memory
+from feti_homog.system.runtime.progress import Progress
 
 # Freed bytes that stay for the next case of a process: to give them back and take them again costs a small one a tenth.
 KEPT = 256 << 20

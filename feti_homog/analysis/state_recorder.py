@@ -9,11 +9,11 @@ from feti_homog.analysis.result import Fields
 from feti_homog.errors import FetiHomogError
 from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.parallel.mpi_errors import on_root
 from feti_homog.results import field_parts, seals
 from feti_homog.results.field_file import FieldFile
 from feti_homog.results.field_layout import StatePart
 from feti_homog.results.seals import FileSeal
+from feti_homog.system.parallel.mpi_errors import on_root
 
 
 class StateRecorder:

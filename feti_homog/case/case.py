@@ -55,10 +55,10 @@ from feti_homog.case.uncertainty import UNCERTAINTY, Uncertainty, read_uncertain
 from feti_homog.errors import CaseError
 from feti_homog.materials.forms import Material
 from feti_homog.materials.laws import contrast_faults, contrast_warnings
-from feti_homog.runtime import input_files
 from feti_homog.schema.keys import Selected, TableReader, selected_value, to_table
 from feti_homog.schema.values import text
 from feti_homog.schema.wording import suggestion, toml_key, toml_value
+from feti_homog.system.runtime import input_files
 
 FIELDS = {"load": "single_load"}  # of a section whose name is that of a method
 

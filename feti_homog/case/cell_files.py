@@ -13,12 +13,12 @@ from feti_homog.case.cell_section import TOUCHING, Cell, size_faults
 from feti_homog.case.mixed_cell import mix_faults
 from feti_homog.case.section_values import MESH_SUFFIXES, TABLE_SUFFIXES
 from feti_homog.errors import CaseError
-from feti_homog.fibres.outlines.shapes import BOTH_SIZES, SHAPES, given_shapes, have_both_sizes
+from feti_homog.microstructure.shapes.shapes import BOTH_SIZES, SHAPES, given_shapes, have_both_sizes
 from feti_homog.schema.wording import limit_in_words, toml_value
 from feti_homog.typing import Bool
 
 if TYPE_CHECKING:
-    from feti_homog.fibres.fibre_table import FibreTable
+    from feti_homog.microstructure.fibre_table import FibreTable
 
 SUFFIXES = {"mesh": MESH_SUFFIXES, "table": TABLE_SUFFIXES}
 LIST = "fibre_list"
@@ -84,7 +84,7 @@ def _with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
     if words := missing(file):
         faults.append(f"{given}: {words}")
         return cell
-    from feti_homog.fibres.fibre_window import read_window  # loads SciPy's trees, which few cases need
+    from feti_homog.microstructure.fibre_window import read_window  # loads SciPy's trees, which few cases need
     from feti_homog.microstructure.neighbour_match import knows_neighbours
 
     try:
@@ -103,7 +103,7 @@ def _with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
 
 def _with_table(cell: Cell, faults: list[str]) -> Cell:
     """Return the cell with its table, which has the size of the cell."""
-    from feti_homog.fibres.fibre_table import read_table, table_of  # which few cases need
+    from feti_homog.microstructure.fibre_table import read_table, table_of  # which few cases need
 
     try:
         table = read_table(cell.file, cell.columns) if cell.file is not None else table_of(cell.fibre_list or (), LIST)

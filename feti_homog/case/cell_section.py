@@ -25,8 +25,8 @@ from feti_homog.schema.values import choice, integer, real
 MOST_FIBRES = 100_000  # of a cell, and as many voids
 
 if TYPE_CHECKING:
-    from feti_homog.fibres.fibre_table import FibreTable
     from feti_homog.microstructure.fibre_pattern import FibrePattern
+    from feti_homog.microstructure.fibre_table import FibreTable
 
 CIRCULAR = ("square", "hexagonal", "random")
 TOUCHING = {"square": math.pi / 4, "hexagonal": math.pi / math.sqrt(12), "random": math.pi / math.sqrt(12)}

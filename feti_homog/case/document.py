@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from feti_homog.errors import CaseError
-from feti_homog.runtime import input_files
 from feti_homog.schema.wording import dotted_key
+from feti_homog.system.runtime import input_files
 
 MAX_BYTES = 1 << 24
 MAX_DEPTH = 50

@@ -7,8 +7,8 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
-from feti_homog.fibres.table_columns import FIBRE_CELLS
 from feti_homog.microstructure.phase_names import FIBRE_PHASE, PHASE
+from feti_homog.microstructure.table_columns import FIBRE_CELLS
 from feti_homog.schema.values import (
     SMALLEST,
     ValueType,

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from feti_homog.api import folder
-from feti_homog.parallel.mpi_errors import on_root_only
-from feti_homog.runtime.standard_streams import print_product, say
+from feti_homog.system.parallel.mpi_errors import on_root_only
+from feti_homog.system.runtime.standard_streams import print_product, say
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm

@@ -13,14 +13,14 @@ from feti_homog.analysis import stored_result
 from feti_homog.case import case as cases
 from feti_homog.case.cell_section import Cell
 from feti_homog.errors import CaseError
-from feti_homog.fibres.outlines.ellipses import Ellipses
-from feti_homog.fibres.outlines.shapes import columns_without_tips, elliptic
 from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.coarse_mesh import voids
 from feti_homog.mesh.fill.gmsh_mesher import arrangement_scale
 from feti_homog.mesh.mesh_fibres import coating_thickness, fibre_circles, fibre_frames, fibre_numbers
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.readers.msh_reader import read_cell
+from feti_homog.microstructure.shapes.ellipses import Ellipses
+from feti_homog.microstructure.shapes.shapes import columns_without_tips, elliptic
 from feti_homog.typing import Float
 
 

@@ -14,8 +14,15 @@ from typing import TYPE_CHECKING, Any
 
 from feti_homog.api import folder
 from feti_homog.errors import EXIT_DEFECT, EXIT_DONE, EXIT_UNCONVERGED, CaseError, FetiHomogError
-from feti_homog.parallel.mpi_errors import on_root, on_root_only
-from feti_homog.runtime.standard_streams import complain, end_on_signals, launched_rank, prepare, print_product, say
+from feti_homog.system.parallel.mpi_errors import on_root, on_root_only
+from feti_homog.system.runtime.standard_streams import (
+    complain,
+    end_on_signals,
+    launched_rank,
+    prepare,
+    print_product,
+    say,
+)
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
@@ -78,7 +85,7 @@ def _add(
 def _result_folder(name: str) -> Path:
     """Return the folder of that name; CaseError for a file, and for the folder of a sweep, whose cases have results."""
     from feti_homog.results import result_json
-    from feti_homog.sweep.store import INDEX_FILE
+    from feti_homog.studies.sweep.store import INDEX_FILE
 
     directory = folder(name)
     if os.path.isfile(directory):

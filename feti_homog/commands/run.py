@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 from feti_homog.api import folder
 from feti_homog.errors import CaseError
-from feti_homog.parallel.mpi_errors import on_root, on_root_only
-from feti_homog.petsc.option_table import help_text
-from feti_homog.runtime.standard_streams import print_product
+from feti_homog.system.parallel.mpi_errors import on_root, on_root_only
+from feti_homog.system.petsc.option_table import help_text
+from feti_homog.system.runtime.standard_streams import print_product
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
@@ -46,9 +46,9 @@ def _run(arguments: argparse.Namespace, comm: Intracomm) -> None:
 def _check(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.case.document import read_document
     from feti_homog.case.sections import FIT_SECTIONS
-    from feti_homog.fit import description as fits
-    from feti_homog.fit import scatter
-    from feti_homog.sweep import description
+    from feti_homog.studies.fit import description as fits
+    from feti_homog.studies.sweep import description
+    from feti_homog.studies.uncertainty import scatter
 
     document = on_root(comm, read_document, arguments.case)  # once: it may be a pipe
     describe = scatter.of_document if on_root(comm, scatter.is_study, document) else description.of_document

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from feti_homog.api import folder
 from feti_homog.errors import CaseError
-from feti_homog.parallel.mpi_errors import on_root, on_root_only
-from feti_homog.runtime.standard_streams import print_product, say
+from feti_homog.system.parallel.mpi_errors import on_root, on_root_only
+from feti_homog.system.runtime.standard_streams import print_product, say
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
@@ -78,7 +78,7 @@ def _add_sweep(actions: argparse._SubParsersAction[Any]) -> None:
 
 def _sweep(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.results import output_folder
-    from feti_homog.sweep import execute, plan
+    from feti_homog.studies.sweep import execute, plan
 
     if arguments.out is None and not arguments.list:
         raise CaseError("command line: the following arguments are required: --out (see --help)")
@@ -103,21 +103,21 @@ def _add_collect(actions: argparse._SubParsersAction[Any]) -> None:
 
 
 def _collect(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    from feti_homog.sweep import collect
+    from feti_homog.studies.sweep import collect
 
     for line in on_root_only(comm, collect.collect, arguments.directory, not arguments.no_pictures) or []:
         say(line)
 
 
 def _fit(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    from feti_homog.fit import description, execute
+    from feti_homog.studies.fit import description, execute
 
     fit = on_root(comm, description.load, arguments.case)
     execute.run(fit, arguments.out, comm, _group(arguments, comm), arguments.retry, arguments.quiet)
 
 
 def _uncertainty(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    from feti_homog.fit import scatter
+    from feti_homog.studies.uncertainty import scatter
 
     study = on_root(comm, scatter.load, arguments.case)
     scatter.run(study, arguments.out, comm, _group(arguments, comm), arguments.retry, arguments.quiet)

@@ -10,7 +10,7 @@ from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.feti.krylov import ActiveRows
 from feti_homog.feti.operators.interface_operators import DualOperator
 from feti_homog.feti.thresholds import CANCELLED, ROUNDING_MARGIN, SMALL_JUMP, ZERO_JUMP
-from feti_homog.parallel.distributed_arrays import allreduce_sum
+from feti_homog.system.parallel.distributed_arrays import allreduce_sum
 from feti_homog.typing import Float
 
 

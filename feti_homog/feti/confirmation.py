@@ -10,8 +10,8 @@ from feti_homog.errors import ConvergenceError
 from feti_homog.feti.active_jumps import ActiveJumps
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace
 from feti_homog.feti.dual_solution import DualSolution
+from feti_homog.feti.exact.exact_inverse import ExactInverse
 from feti_homog.feti.operators.interface_operators import DualOperator
-from feti_homog.feti.preconditioners.exact_inverse import ExactInverse
 from feti_homog.feti.thresholds import (
     LEAST_UNCONFIRMED_JUMP,
     MOST_CONFIRMED_ROUNDING,
@@ -19,7 +19,7 @@ from feti_homog.feti.thresholds import (
     MOST_UNCONFIRMED,
     MOST_UNCONFIRMED_ERROR,
 )
-from feti_homog.parallel.distributed_arrays import allreduce_sum
+from feti_homog.system.parallel.distributed_arrays import allreduce_sum
 from feti_homog.typing import Float
 
 

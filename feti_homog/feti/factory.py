@@ -18,22 +18,22 @@ from feti_homog.feti.preconditioners.assembled_schur import shared_dofs
 from feti_homog.feti.preconditioners.scaled import Dirichlet, Identity, Lumped, Preconditioner
 from feti_homog.feti.solver_plan import BONDED, ProblemSizes, SolverOptions, choose
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
-from feti_homog.parallel.mpi_errors import agree
+from feti_homog.system.parallel.mpi_errors import agree
 from feti_homog.typing import Float
 
 if TYPE_CHECKING:
     from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace
-    from feti_homog.feti.preconditioners.exact_inverse import ExactInverse
+    from feti_homog.feti.exact.exact_inverse import ExactInverse
 
 
 def _influence(comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> Preconditioner:
-    from feti_homog.feti.preconditioners.exact_inverse import ExactInverse  # four modules that no other one needs
+    from feti_homog.feti.exact.exact_inverse import ExactInverse  # four modules that no other one needs
 
     return ExactInverse(comm, jump_operator, operators)
 
 
 def _bonded(comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> Preconditioner:
-    from feti_homog.feti.preconditioners.bonded_inverse import BondedInverse  # with two of these modules
+    from feti_homog.feti.exact.bonded_inverse import BondedInverse  # with two of these modules
 
     return BondedInverse(comm, jump_operator, operators)
 
@@ -159,7 +159,7 @@ def build(
     left_out = operators.compliance if plan.preconditioner == "dirichlet" else np.zeros(len(compliance))
     followed = plan.preconditioner == "influence" or not soften
     if not followed or comm.allreduce(bool(left_out.any()), MPI.LOR):
-        from feti_homog.feti.preconditioners.spring_update import SpringUpdated  # of softening springs alone
+        from feti_homog.feti.exact.spring_update import SpringUpdated  # of softening springs alone
 
         preconditioner = SpringUpdated(comm, preconditioner, jump_operator.owned[0], left_out)
     inverse = cast("ExactInverse", preconditioner) if plan.preconditioner == "influence" else None

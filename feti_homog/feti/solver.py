@@ -30,7 +30,7 @@ from feti_homog.feti.operators.interface_operators import DualOperator
 from feti_homog.feti.operators.one_subdomain import CondensedLoads
 from feti_homog.feti.thresholds import DEFAULTS, MAX_RESTARTS, MOST_DOFS_UNTRIMMED, Thresholds
 from feti_homog.mesh.refinement import ReferenceLattice
-from feti_homog.runtime import process_memory
+from feti_homog.system.runtime import process_memory
 from feti_homog.typing import Float
 
 # Reasons for which PETSc gives up where rounding is at work.

@@ -20,7 +20,7 @@ from feti_homog.interface.contact.rubbing_bonds import energy_beside_springs, sl
 from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, Equilibrium, Status
 from feti_homog.interface.loads.load import Load
 from feti_homog.materials.voigt import STRAINS, STRESSES
-from feti_homog.parallel.distributed_arrays import allreduce_sum
+from feti_homog.system.parallel.distributed_arrays import allreduce_sum
 from feti_homog.typing import Float
 
 

@@ -9,7 +9,6 @@ import numpy as np
 from feti_homog.case.case import Case
 from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.partition import Decomposition, decompose, halves
-from feti_homog.fibres.outlines.ellipses import Ellipses
 from feti_homog.homogenization import arc_selection, cell_remarks, process_zone
 from feti_homog.homogenization.arc_selection import InterfaceNodes
 from feti_homog.homogenization.cell_remarks import mesh_remarks, subdomain_remarks, table_remarks
@@ -26,6 +25,7 @@ from feti_homog.mesh.mesh_fibres import coating_thickness, fibre_circles, fibre_
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.mesh.submesh import SubdomainTable, SubmeshesOfRank, cut_for_ranks, pinned_class
+from feti_homog.microstructure.shapes.ellipses import Ellipses
 from feti_homog.typing import Bool, Float, Int
 
 ROUNDING = 1e-9  # of coordinates, relative to the cell
@@ -215,7 +215,7 @@ def match_distance(case: Case, width: float, height: float, centres: Float, radi
     window = case.cell.matched
     if window is None:
         return None
-    from feti_homog.fibres.hard_core import distance_of  # with statistics of neighbours
+    from feti_homog.microstructure.hard_core import distance_of  # with statistics of neighbours
 
     return distance_of(window, width, height, centres, radii)
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.contact.states import BONDED, Status
-from feti_homog.parallel.distributed_arrays import allreduce_sum
+from feti_homog.system.parallel.distributed_arrays import allreduce_sum
 from feti_homog.typing import Float
 
 

@@ -18,7 +18,7 @@ from feti_homog.homogenization.nested_interiors import groups, locks, nested_int
 from feti_homog.homogenization.uniform_parts import UniformPart, parts_of_phases
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.mesh.refinement import FineMesh, ReferenceLattice, joined
-from feti_homog.parallel.distributed_arrays import allreduce_sum
+from feti_homog.system.parallel.distributed_arrays import allreduce_sum
 from feti_homog.typing import Bool, Float, Int
 
 Members = list[Subdomain] | list[UniformPart]

@@ -12,7 +12,7 @@ from feti_homog.homogenization import phase_laws
 from feti_homog.materials.laws import isotropic_ratio
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.mesh.tiles.tiles import DEFAULT_TILES, TilePolicy
-from feti_homog.petsc.options import given_options
+from feti_homog.system.petsc.options import given_options
 from feti_homog.typing import Int
 
 # Poisson's ratio up to which single nodes of mixed elements are hardly stiffer than mu makes them (`SCALED_LAME`).

@@ -30,7 +30,7 @@ from feti_homog.homogenization.domain_partition import CellSummary
 from feti_homog.homogenization.uniform_parts import UniformPart
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.materials.derivatives import law_changes
-from feti_homog.parallel.distributed_arrays import allreduce_sum
+from feti_homog.system.parallel.distributed_arrays import allreduce_sum
 from feti_homog.typing import Float, Int32
 
 PATTERNS = ("square", "hexagonal")

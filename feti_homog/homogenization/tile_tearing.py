@@ -29,8 +29,8 @@ from feti_homog.mesh.sizes.element_estimate import ElementEstimate
 from feti_homog.mesh.submesh import SubdomainTable, SubmeshesOfRank, cut_for_ranks, joined, pinning
 from feti_homog.mesh.tiles.filling import arc_edges
 from feti_homog.mesh.tiles.tiles import FilledTile, NumberedTile, Regions, tile_torus
-from feti_homog.parallel.distributed_arrays import alltoall
-from feti_homog.parallel.mpi_errors import agree, on_root, on_root_only
+from feti_homog.system.parallel.distributed_arrays import alltoall
+from feti_homog.system.parallel.mpi_errors import agree, on_root, on_root_only
 from feti_homog.typing import Float, Int
 
 

@@ -30,9 +30,9 @@ from feti_homog.mesh.coarse_mesh import CoarseMesh
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.mesh.submesh import SubdomainTable, Submesh, SubmeshesOfRank
 from feti_homog.microstructure.phase_names import COATING, MATRIX
-from feti_homog.parallel.distributed_arrays import scatter
-from feti_homog.parallel.mpi_errors import agree, on_root, on_root_only
-from feti_homog.runtime.progress import Progress
+from feti_homog.system.parallel.distributed_arrays import scatter
+from feti_homog.system.parallel.mpi_errors import agree, on_root, on_root_only
+from feti_homog.system.runtime.progress import Progress
 from feti_homog.typing import Bool, Float, Int
 
 

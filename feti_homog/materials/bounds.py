@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from feti_homog.runtime.records import STRESS, described
+from feti_homog.system.runtime.records import STRESS, described
 from feti_homog.typing import Array, Float
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from feti_homog.materials.forms import PER_TEMPERATURE
-from feti_homog.runtime.records import STRESS, described
+from feti_homog.system.runtime.records import STRESS, described
 from feti_homog.typing import Array, Float
 
 DIRECTIONS = 720  # across the fibres

@@ -8,7 +8,7 @@ import numpy as np
 
 from feti_homog.case.cell_section import Cell
 from feti_homog.errors import MeshError
-from feti_homog.fibres.arrangement import Arrangement
+from feti_homog.microstructure.arrangement import Arrangement
 from feti_homog.microstructure.phase_names import FIBRE
 from feti_homog.typing import Float
 
@@ -28,7 +28,7 @@ def arrange(cell: Cell) -> Arrangement:
 
         return random_cell.random_arrangement(cell) if cell.match is None else random_cell.matched_arrangement(cell)
     if cell.table is not None:
-        from feti_homog.fibres.periodic_table import table_arrangement
+        from feti_homog.microstructure.periodic_table import table_arrangement
 
         return table_arrangement(cell.table, cell.window, cell.repair == "overlaps")
     return square_arrangement(cell) if cell.geometry == "square" else hexagonal_arrangement(cell)

@@ -14,9 +14,9 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra
 
-from feti_homog.fibres.outlines.ellipses import Ellipses
 from feti_homog.mesh.coarse_mesh import CoarseMesh, paired_sides
 from feti_homog.microstructure.phase_names import COATING
+from feti_homog.microstructure.shapes.ellipses import Ellipses
 from feti_homog.typing import Bool, Float, Int, Int32
 
 # Numbers below a size, in proportion to it, below which sorting them costs less than an entry for each below it.

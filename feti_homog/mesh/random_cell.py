@@ -9,9 +9,9 @@ import numpy as np
 from feti_homog.case.cell_section import MOST_FIBRES, Cell
 from feti_homog.case.mixed_cell import fibre_counts, fractions_in_words, void_count
 from feti_homog.errors import MeshError
-from feti_homog.fibres.arrangement import Arrangement, clear_shift
-from feti_homog.fibres.hard_core import MAX_STEPS, placed, relax
+from feti_homog.microstructure.arrangement import Arrangement, clear_shift
 from feti_homog.microstructure.fibre_pattern import FibrePattern
+from feti_homog.microstructure.hard_core import MAX_STEPS, placed, relax
 from feti_homog.microstructure.neighbour_match import matched, wanted_distances
 from feti_homog.microstructure.phase_names import FIBRE, VOID
 from feti_homog.typing import Float

@@ -1,4 +1,5 @@
-"""Spatial statistics of fibres in a cross-section, of a periodic cell or of a window of a micrograph: pure functions.
+"""Fibres in a cross-section: outlines, tables, arrangements on the torus, and their statistics.
 
-Imports nothing.  Main entries: `statistics.measure`, `statistics.envelope` and `neighbour_match`.
+Imports `microstructure.shapes`, `schema` and `system`.  Main entries: `arrangement.Arrangement`,
+`periodic_table.table_arrangement`, `neighbour_match`.
 """

@@ -1,4 +1,5 @@
 """Results for readers: the printed summary, pictures, report.html, material cards.
 
-Reads the files of `results`.  Main entries: its own floors, from below `text`, `plots`, `html` and `cards`.
+Imports `materials`, `report.text` and `results`.  Main entries: its own floors, from below `text`, `plots`, `page` and
+`cards`.
 """

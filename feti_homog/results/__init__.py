@@ -1,5 +1,5 @@
 """Files of results, each written whole or not at all: `result.json`, `result.h5`, `result.xdmf`, tables, checkpoints.
 
-Imports `case`, `fem`, `homogenization`, `materials`, `parallel`, `runtime` and `verify`.  Main entries:
-`field_file.FieldFile`, `result_json.write`, `viewed_states.read_state`.
+Imports `case`, `fem`, `homogenization`, `materials`, `system` and `verify`.  Main entries: `field_file.FieldFile`,
+`result_json.write`, `viewed_states.read_state`.
 """

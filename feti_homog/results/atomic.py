@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from feti_homog.errors import FetiHomogError
-from feti_homog.runtime import owners
+from feti_homog.system.runtime import owners
 
 
 def replace(path: Path, write: Callable[[Path], object]) -> Path:

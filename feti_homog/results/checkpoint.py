@@ -24,10 +24,10 @@ from numpy.typing import NDArray
 from feti_homog.case.case import Case
 from feti_homog.errors import CaseError, CheckpointError, FetiHomogError
 from feti_homog.homogenization import phase_laws
-from feti_homog.parallel.mpi_errors import on_root, on_root_only
 from feti_homog.results import atomic, checkpoint_file
 from feti_homog.results.checkpoint_file import Arrays
 from feti_homog.results.checkpoint_folder import FOLDER, remove
+from feti_homog.system.parallel.mpi_errors import on_root, on_root_only
 
 # Light events that a file has at most; as many a killed run has to find again.
 EVENTS_AT_ONCE = 64

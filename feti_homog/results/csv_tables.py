@@ -11,7 +11,7 @@ from typing import Any, get_type_hints
 import numpy as np
 
 from feti_homog.results import atomic
-from feti_homog.runtime.records import Description, descriptions, is_record, plain
+from feti_homog.system.runtime.records import Description, descriptions, is_record, plain
 
 
 @dataclass(frozen=True)

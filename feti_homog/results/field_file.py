@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feti_homog.errors import FetiHomogError
-from feti_homog.parallel.mpi_errors import agree, agree_after, all_raise, on_root, on_root_only
 from feti_homog.results import atomic
 from feti_homog.results.field_layout import (
     PROGRAM,
@@ -29,8 +28,9 @@ from feti_homog.results.field_layout import (
     tables,
 )
 from feti_homog.results.field_views import add_views, bytes_of_views
-from feti_homog.runtime import owners
-from feti_homog.runtime.records import LENGTH, STRESS, Description
+from feti_homog.system.parallel.mpi_errors import agree, agree_after, all_raise, on_root, on_root_only
+from feti_homog.system.runtime import owners
+from feti_homog.system.runtime.records import LENGTH, STRESS, Description
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Comm

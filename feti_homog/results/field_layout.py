@@ -13,7 +13,7 @@ from typing import Any
 
 from feti_homog.materials.voigt import AXIAL_STRESSES, SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS, STRESSES
 from feti_homog.results.field_views import GROUP_OF_STATES, SPATIAL_VIEWS, VIEWS, View
-from feti_homog.runtime.records import LENGTH, STRESS, Description, described, descriptions, type_words
+from feti_homog.system.runtime.records import LENGTH, STRESS, Description, described, descriptions, type_words
 from feti_homog.typing import AnyInt, Float, Float32
 
 PROGRAM = "feti_homog"

@@ -17,11 +17,11 @@ from typing import TYPE_CHECKING, TextIO
 
 from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.materials.voigt import SPATIAL_STRAINS
-from feti_homog.parallel.mpi_errors import on_root
 from feti_homog.results import atomic, checkpoint_folder, field_file, result_json
 from feti_homog.results.field_layout import PROGRAM
-from feti_homog.runtime import input_files
-from feti_homog.runtime.file_locks import Lock, LockHeld, LocksUnsupported, holder
+from feti_homog.system.parallel.mpi_errors import on_root
+from feti_homog.system.runtime import input_files
+from feti_homog.system.runtime.file_locks import Lock, LockHeld, LocksUnsupported, holder
 from feti_homog.version import __version__
 
 if TYPE_CHECKING:

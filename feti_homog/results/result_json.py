@@ -12,7 +12,7 @@ import numpy as np
 
 from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.results import atomic, seals
-from feti_homog.runtime import input_files
+from feti_homog.system.runtime import input_files
 
 NAME = "result.json"
 SCHEMA = 1  # version of the layout: to be raised when a key is renamed, removed or changes its meaning

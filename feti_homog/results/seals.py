@@ -17,7 +17,7 @@ import numpy as np
 
 from feti_homog.errors import CaseError
 from feti_homog.results import atomic
-from feti_homog.runtime.records import BYTES, described
+from feti_homog.system.runtime.records import BYTES, described
 
 KEY = "checksum"
 CHECKSUM_DIGITS = 8

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.special import gammaln
 
-from feti_homog.runtime import input_files
+from feti_homog.system.runtime import input_files
 from feti_homog.typing import Float
 from feti_homog.verify.check_fields import BONDED
 from feti_homog.verify.check_loads import StateNumbers

@@ -16,7 +16,7 @@ import h5py
 import numpy as np
 
 from feti_homog.errors import CaseError
-from feti_homog.runtime import input_files
+from feti_homog.system.runtime import input_files
 from feti_homog.typing import Float, Int
 from feti_homog.verify.cell_tables import Fibres, InterfaceRows, Mesh, State, gradient
 

@@ -14,7 +14,7 @@ from feti_homog import errors
 from feti_homog.case import reference
 from feti_homog.case.json_schema import json_schema
 from feti_homog.cli import command_parser
-from feti_homog.petsc.option_table import OPTIONS
+from feti_homog.system.petsc.option_table import OPTIONS
 
 SCHEMA = "case.schema.json"
 ERRORS = (errors.FetiHomogError, errors.CaseError, errors.MeshError, errors.ConvergenceError)

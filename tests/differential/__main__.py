@@ -18,7 +18,7 @@ from typing import Any
 from differential.job import DRAWN_PER_CASE, FAILED, REFUSED, ROWS, RUNS, Row, examine, table
 from differential.relations import ALWAYS, DRAWN, RANKS, STRESS_BACK
 from feti_homog.api import launch
-from feti_homog.parallel.mpi_errors import on_root
+from feti_homog.system.parallel.mpi_errors import on_root
 
 CASES, SEED = 40, 1
 MOST_REFUSED = 0.1  # share of cases that may be refused

@@ -23,7 +23,7 @@ from differential.random_softening import softens
 from differential.relations import ALWAYS, DRAWN, RANKS, Relation, Setting
 from feti_homog import run
 from feti_homog.errors import CaseError, FetiHomogError, MeshError, NotCarriedError
-from feti_homog.parallel.mpi_errors import end_job, on_root
+from feti_homog.system.parallel.mpi_errors import end_job, on_root
 
 # Relations that a case draws, and the share of cases that try one of these on all ranks.
 DRAWN_PER_CASE = 2

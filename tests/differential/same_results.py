@@ -14,8 +14,8 @@ from differential import comparison, transforms
 from differential.random_cases import Drawn
 from differential.setting import Compared, Setting
 from feti_homog.errors import FetiHomogError
-from feti_homog.parallel.mpi_errors import on_root
 from feti_homog.results.checkpoint import Checkpoint
+from feti_homog.system.parallel.mpi_errors import on_root
 
 # Units that a case's own are multiplied by.
 STRESS_UNITS = (1e-20, 1e20)

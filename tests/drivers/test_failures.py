@@ -88,7 +88,7 @@ def test_a_file_in_the_place_of_the_folder_is_left_alone(tmp_path, ranks):
 HOLDER = """
 import sys
 from pathlib import Path
-from feti_homog.runtime.file_locks import Lock
+from feti_homog.system.runtime.file_locks import Lock
 Lock(Path(sys.argv[1])).acquire()
 print("held", flush=True)
 sys.stdin.read()

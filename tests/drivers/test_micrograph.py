@@ -12,7 +12,7 @@ from support.jobs import ROOT, mpirun
 from support.made_micrograph import text
 from support.moved_rows import moved_rows
 
-from feti_homog.fibres.fibre_table import read_table
+from feti_homog.microstructure.fibre_table import read_table
 
 TABLE = "# width = 20, height = 16\nx,y,radius\n3,3,2.6\n9,4,2\n15,3,2.5\n4,12,3\n12,11,2.8\n18.5,12,2.4\n"
 

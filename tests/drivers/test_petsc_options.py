@@ -10,7 +10,7 @@ import pytest
 from support.command_line import case_file, command_line
 from support.hooks import Hook, hooked
 
-from feti_homog.petsc.option_table import OPTIONS
+from feti_homog.system.petsc.option_table import OPTIONS
 
 PREFIXES = ("natural", "coarse", "bonded", "sub", "interior")
 WITHOUT_CHOLMOD = [word for p in PREFIXES for word in (f"-feti_{p}_pc_factor_mat_solver_type", "mumps")]

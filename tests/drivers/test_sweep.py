@@ -197,7 +197,7 @@ def test_jobs_of_an_array_share_the_folder_but_no_case(tmp_path):
     assert [job.wait(PATIENCE) for job in jobs] == [0, 0] and len(results(out)) == 2
     held = subprocess.Popen(
         [sys.executable, "-c", "import sys; from pathlib import Path\n"
-         "from feti_homog.runtime.file_locks import Lock\n"
+         "from feti_homog.system.runtime.file_locks import Lock\n"
          f"Lock(Path({str(out / 'case-0001/lock')!r})).acquire(); print('held', flush=True); sys.stdin.read()"],
         stdin=subprocess.PIPE, stdout=subprocess.PIPE,
     )  # fmt: skip

@@ -19,11 +19,11 @@ from feti_homog.analysis import stored_result
 from feti_homog.case import case
 from feti_homog.commands import listed_fibres
 from feti_homog.errors import FetiHomogError
-from feti_homog.fibres.fibre_window import read_window
+from feti_homog.microstructure.fibre_window import read_window
 from feti_homog.report.cards import export
 from feti_homog.report.text.summary import summary
 from feti_homog.results import seals
-from feti_homog.sweep import plan, store
+from feti_homog.studies.sweep import plan, store
 from feti_homog.verify.certificate import verify
 from hostile.attempts import LIMIT_S, PATIENCE_S
 from hostile.fibre_tables import CASE, HEAD

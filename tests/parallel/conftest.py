@@ -14,7 +14,7 @@ def agreement_is_silent():
     from collective_calls import no_communication
     from mpi4py import MPI
 
-    from feti_homog.parallel import mpi_errors
+    from feti_homog.system.parallel import mpi_errors
 
     attempt = mpi_errors._attempt
 

@@ -13,8 +13,8 @@ from feti_homog import Case, run
 from feti_homog.analysis import runner
 from feti_homog.analysis.mesh_errors import add_errors_of_breaks, note_accuracy
 from feti_homog.errors import CaseError, CheckpointError, CoarseMeshError, ConvergenceError
-from feti_homog.parallel.mpi_errors import agree, on_root
-from feti_homog.runtime.progress import Progress
+from feti_homog.system.parallel.mpi_errors import agree, on_root
+from feti_homog.system.runtime.progress import Progress
 
 pytestmark = pytest.mark.parallel
 

@@ -17,7 +17,7 @@ from feti_homog.case import case as cases
 from feti_homog.errors import CaseError
 from feti_homog.homogenization.unit_cell import tear
 from feti_homog.mesh.arrange import arrange
-from feti_homog.runtime.progress import Progress
+from feti_homog.system.runtime.progress import Progress
 
 pytestmark = pytest.mark.parallel
 

@@ -17,8 +17,8 @@ from feti_homog.case.load_section import LoadPath
 from feti_homog.errors import CaseError, ConvergenceError
 from feti_homog.interface.contact.states import OPEN
 from feti_homog.interface.laws.strength import MaxStrength
-from feti_homog.petsc.options import case_options
-from feti_homog.runtime.progress import Progress
+from feti_homog.system.petsc.options import case_options
+from feti_homog.system.runtime.progress import Progress
 
 pytestmark = pytest.mark.parallel
 

@@ -9,7 +9,7 @@ from collective_calls import CommunicationError, collective_calls, no_communicat
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from feti_homog.parallel.mpi_errors import agree
+from feti_homog.system.parallel.mpi_errors import agree
 
 pytestmark = pytest.mark.parallel
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from feti_homog.feti.thresholds import KEPT_EXCHANGES
-from feti_homog.parallel.distributed_arrays import alltoall, exchange
+from feti_homog.system.parallel.distributed_arrays import alltoall, exchange
 
 pytestmark = [pytest.mark.parallel, pytest.mark.quick]
 

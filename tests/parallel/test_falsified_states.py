@@ -15,7 +15,7 @@ from feti_homog.case.interface_section import Arc
 from feti_homog.homogenization.averaging import Homogenization
 from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN
 from feti_homog.interface.loads.load import Load
-from feti_homog.runtime.progress import Progress
+from feti_homog.system.runtime.progress import Progress
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks, pytest.mark.usefixtures("shared_interfaces")]
 

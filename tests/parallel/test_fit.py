@@ -10,9 +10,9 @@ import pytest
 from support.fitted_composites import COMPOSITES, fit, model, truth
 
 from feti_homog import CaseError, ConvergenceError, run, run_fit
-from feti_homog.fit import description, execute
-from feti_homog.fit.predictions import exact_derivatives, predicted
-from feti_homog.parallel.mpi_errors import on_root
+from feti_homog.studies.fit import description, execute
+from feti_homog.studies.fit.predictions import exact_derivatives, predicted
+from feti_homog.system.parallel.mpi_errors import on_root
 
 pytestmark = pytest.mark.parallel
 

@@ -14,7 +14,7 @@ from support.ranks import PIECES, parallel_assert
 
 from feti_homog import Case, run
 from feti_homog.errors import ConvergenceError
-from feti_homog.parallel.mpi_errors import on_root
+from feti_homog.system.parallel.mpi_errors import on_root
 from feti_homog.verify.certificate import verify
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]

@@ -12,7 +12,7 @@ from support.ranks import parallel_assert
 from unit.mesh.faulty_meshes import grid
 
 from feti_homog import Case, run
-from feti_homog.parallel.mpi_errors import on_root
+from feti_homog.system.parallel.mpi_errors import on_root
 from feti_homog.verify.certificate import verify
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]

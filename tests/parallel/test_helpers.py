@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from feti_homog.errors import CaseError, MeshError
-from feti_homog.parallel.distributed_arrays import gather, scatter
-from feti_homog.parallel.mpi_errors import RemoteError, agree, on_root, on_root_only
+from feti_homog.system.parallel.distributed_arrays import gather, scatter
+from feti_homog.system.parallel.mpi_errors import RemoteError, agree, on_root, on_root_only
 
 pytestmark = pytest.mark.parallel
 

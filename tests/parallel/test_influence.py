@@ -14,8 +14,8 @@ from support import torn_cells
 from support.coarse_space_cells import BREAKING, NARROW, solve_many
 
 from feti_homog.errors import CaseError, ConvergenceError
+from feti_homog.feti.exact.renewed_reference import RenewedReference
 from feti_homog.feti.operators.one_subdomain import ExplicitInterfaceOperator
-from feti_homog.feti.preconditioners.renewed_reference import RenewedReference
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN
 

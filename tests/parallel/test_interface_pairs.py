@@ -8,7 +8,7 @@ from support import coated_cells
 from unit.mesh.faulty_meshes import MATRIX, grid, node
 
 from feti_homog import Case, run
-from feti_homog.parallel.mpi_errors import on_root
+from feti_homog.system.parallel.mpi_errors import on_root
 from feti_homog.verify.certificate import verify
 
 EPOXY, GLASS = {"young": 2.79, "poisson": 0.33}, {"young": 70.8, "poisson": 0.22}

@@ -9,7 +9,7 @@ from support.ranks import PIECES
 
 from feti_homog import Case, run
 from feti_homog.homogenization.bonds import strength_factors
-from feti_homog.parallel.mpi_errors import on_root
+from feti_homog.system.parallel.mpi_errors import on_root
 from feti_homog.verify.certificate import verify
 
 EPOXY, GLASS = {"young": 2.79, "poisson": 0.33}, {"young": 70.8, "poisson": 0.22}

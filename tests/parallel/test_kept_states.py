@@ -17,8 +17,8 @@ from feti_homog import Case, run
 from feti_homog.analysis import runner
 from feti_homog.errors import ConvergenceError
 from feti_homog.materials.voigt import STRAINS, STRESSES
-from feti_homog.parallel.mpi_errors import on_root
 from feti_homog.results import checkpoint_file, field_file
+from feti_homog.system.parallel.mpi_errors import on_root
 from feti_homog.verify.certificate import verify
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks, pytest.mark.usefixtures("shared_interfaces")]

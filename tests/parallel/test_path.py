@@ -18,7 +18,7 @@ from feti_homog.interface.contact.states import BONDED, OPEN
 from feti_homog.interface.laws.strength import MaxStrength, QuadraticStrength
 from feti_homog.interface.path.path_following import events, increments
 from feti_homog.interface.path.path_points import unloaded
-from feti_homog.parallel.mpi_errors import on_root
+from feti_homog.system.parallel.mpi_errors import on_root
 
 pytestmark = [pytest.mark.parallel, pytest.mark.usefixtures("shared_interfaces")]
 

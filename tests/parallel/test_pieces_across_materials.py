@@ -15,9 +15,9 @@ from feti_homog.homogenization.averaging import Homogenization
 from feti_homog.homogenization.partition_policy import BY_COST, PartitionPolicy
 from feti_homog.homogenization.uniform_parts import nodes_of_parts
 from feti_homog.homogenization.unit_cell import tear
-from feti_homog.parallel.mpi_errors import on_root
-from feti_homog.runtime.progress import Progress
-from feti_homog.runtime.records import plain
+from feti_homog.system.parallel.mpi_errors import on_root
+from feti_homog.system.runtime.progress import Progress
+from feti_homog.system.runtime.records import plain
 
 pytestmark = pytest.mark.parallel
 RANDOM = {

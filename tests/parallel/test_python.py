@@ -13,7 +13,7 @@ from support.ranks import parallel_assert
 
 from feti_homog import Case, CaseError, ConvergenceError, collect_sweep, run, run_sweep
 from feti_homog.results.field_layout import tables
-from feti_homog.runtime.records import plain
+from feti_homog.system.runtime.records import plain
 
 pytestmark = pytest.mark.parallel
 

@@ -11,7 +11,7 @@ from support.ranks import PIECES
 from support.verified_results import CARBON, MATRIX, WARM, document
 
 from feti_homog import Case, run
-from feti_homog.parallel.mpi_errors import on_root
+from feti_homog.system.parallel.mpi_errors import on_root
 
 pytestmark = [pytest.mark.parallel, pytest.mark.usefixtures("shared_interfaces")]
 

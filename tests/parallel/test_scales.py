@@ -15,8 +15,8 @@ from support.loads import strains
 
 from feti_homog import Case, run
 from feti_homog.errors import ConvergenceError
-from feti_homog.feti.preconditioners.bordered_inverse import BorderedInverse
-from feti_homog.feti.preconditioners.exact_inverse import ExactInverse
+from feti_homog.feti.exact.bordered_inverse import BorderedInverse
+from feti_homog.feti.exact.exact_inverse import ExactInverse
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BONDED, OPEN
 from feti_homog.interface.laws.energy import SpringEnergy

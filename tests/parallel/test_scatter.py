@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from feti_homog import CaseError
-from feti_homog.fit import scatter
-from feti_homog.parallel.mpi_errors import on_root
+from feti_homog.studies.uncertainty import scatter
+from feti_homog.system.parallel.mpi_errors import on_root
 
 pytestmark = pytest.mark.parallel
 MATERIAL = {

@@ -14,9 +14,9 @@ from unit.mesh.faulty_meshes import grid
 
 from feti_homog import Case, run
 from feti_homog.errors import ConvergenceError
-from feti_homog.feti.preconditioners.followed_response import FollowedResponse
-from feti_homog.parallel.mpi_errors import on_root
+from feti_homog.feti.exact.followed_response import FollowedResponse
 from feti_homog.results import checkpoint_file
+from feti_homog.system.parallel.mpi_errors import on_root
 from feti_homog.verify.certificate import verify
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks, pytest.mark.usefixtures("shared_interfaces")]

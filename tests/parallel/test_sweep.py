@@ -15,9 +15,9 @@ from support.sweep_files import BY_BODIES, CASE, RANDOM
 
 from feti_homog import run
 from feti_homog.errors import ConvergenceError
-from feti_homog.parallel.mpi_errors import on_root
 from feti_homog.results.result_json import read
-from feti_homog.sweep import collect, execute, plan, store
+from feti_homog.studies.sweep import collect, execute, plan, store
+from feti_homog.system.parallel.mpi_errors import on_root
 
 pytestmark = pytest.mark.parallel
 

@@ -15,8 +15,8 @@ from feti_homog.case import case as cases
 from feti_homog.feti.thresholds import DEFAULTS
 from feti_homog.homogenization.partition_policy import DEFAULT_POLICY
 from feti_homog.homogenization.unit_cell import tear
-from feti_homog.petsc.options import case_options
-from feti_homog.runtime.progress import Progress
+from feti_homog.system.petsc.options import case_options
+from feti_homog.system.runtime.progress import Progress
 
 MATRIX, FIBRE = {"young": 88.0, "poisson": 0.299}, {"young": 200.0, "poisson": 0.222}
 

@@ -15,9 +15,9 @@ from reference.spatial_programme import Part, SpatialProgramme
 from feti_homog import Case, run
 from feti_homog.homogenization import unit_cell
 from feti_homog.mesh.arrange import arrange
-from feti_homog.parallel.mpi_errors import on_root
-from feti_homog.petsc.options import case_options
-from feti_homog.runtime.progress import Progress
+from feti_homog.system.parallel.mpi_errors import on_root
+from feti_homog.system.petsc.options import case_options
+from feti_homog.system.runtime.progress import Progress
 from support.ranks import PIECES
 
 GENERALIZED = "generalized"

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from feti_homog.fibres.cut_window import TOLERANCE
-from feti_homog.fibres.fibre_table import FibreTable
-from feti_homog.fibres.periodic_table import on_torus
+from feti_homog.microstructure.cut_window import TOLERANCE
+from feti_homog.microstructure.fibre_table import FibreTable
+from feti_homog.microstructure.periodic_table import on_torus
 from feti_homog.typing import Float, Int
 
 

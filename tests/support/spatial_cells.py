@@ -12,8 +12,8 @@ from feti_homog.analysis.runner import compute
 from feti_homog.case.case import Case
 from feti_homog.homogenization import unit_cell
 from feti_homog.mesh.arrange import arrange
-from feti_homog.petsc.options import case_options
-from feti_homog.runtime.progress import Progress
+from feti_homog.system.petsc.options import case_options
+from feti_homog.system.runtime.progress import Progress
 
 EPOXY = {"young": 3.45, "poisson": 0.35, "expansion": 54.0}
 GLASS = {"young": 73.0, "poisson": 0.22, "expansion": 5.0}

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from feti_homog.case import reference
-from feti_homog.petsc.option_table import unknown_options
+from feti_homog.system.petsc.option_table import unknown_options
 
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("drivers", "feti_homog", "meshes", "scripts", "tests")

@@ -20,9 +20,9 @@ from feti_homog.analysis.runner import run
 from feti_homog.case.case import Case
 from feti_homog.results.csv_tables import columns
 from feti_homog.results.field_layout import items, spatial_items
-from feti_homog.sweep import collect, execute, plan
-from feti_homog.sweep.report.outputs import outputs
-from feti_homog.sweep.report.tables import COLUMNS, OUTPUT_COLUMNS, STATISTICS_COLUMNS
+from feti_homog.studies.sweep import collect, execute, plan
+from feti_homog.studies.sweep.report.outputs import outputs
+from feti_homog.studies.sweep.report.tables import COLUMNS, OUTPUT_COLUMNS, STATISTICS_COLUMNS
 
 pytestmark = pytest.mark.slow
 

@@ -39,8 +39,8 @@ from feti_homog.feti.thresholds import (
     ROUNDED_MODE_ENERGY,
     Thresholds,
 )
-from feti_homog.parallel.distributed_arrays import allreduce_sum, scale_rows
-from feti_homog.runtime import process_memory
+from feti_homog.system.parallel.distributed_arrays import allreduce_sum, scale_rows
+from feti_homog.system.runtime import process_memory
 from feti_homog.typing import Float, Int
 
 

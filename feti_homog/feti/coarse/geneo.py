@@ -30,8 +30,8 @@ from feti_homog.feti.linalg.sparse_matrices import add_shared_rows
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.preconditioners.scaled import StiffnessScaled
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
-from feti_homog.parallel.distributed_arrays import allreduce_sum
-from feti_homog.parallel.mpi_errors import agree
+from feti_homog.system.parallel.distributed_arrays import allreduce_sum
+from feti_homog.system.parallel.mpi_errors import agree
 from feti_homog.typing import Float, Float32, Int
 
 

@@ -14,7 +14,7 @@ from feti_homog.feti.linalg.sparse_matrices import assemble_owned_rows
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.thresholds import UNCONSTRAINED_EIGENVALUE
 from feti_homog.mesh.periodic_topology import components
-from feti_homog.parallel.distributed_arrays import allreduce_sum
+from feti_homog.system.parallel.distributed_arrays import allreduce_sum
 from feti_homog.typing import Float, Int
 
 

@@ -14,7 +14,7 @@ from feti_homog.feti.thresholds import (
     MUMPS_COLUMNS_ONE_BY_ONE,
     REPLICATED_UNKNOWNS,
 )
-from feti_homog.parallel.distributed_arrays import allgather_rows, allreduce_sum
+from feti_homog.system.parallel.distributed_arrays import allgather_rows, allreduce_sum
 from feti_homog.typing import Float, Int
 
 

@@ -18,7 +18,7 @@ from scipy.sparse import csr_matrix
 
 from feti_homog.errors import CaseError
 from feti_homog.feti.thresholds import CHOLMOD_COLUMNS_ONE_BY_ONE, ITERATIVE_RTOL, MUMPS_EXTRA_WORKSPACE_PERCENT
-from feti_homog.petsc.c_functions import error_words
+from feti_homog.system.petsc.c_functions import error_words
 from feti_homog.typing import Float
 
 Options = Mapping[str, bool | int | str]

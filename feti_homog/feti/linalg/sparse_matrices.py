@@ -8,7 +8,7 @@ from petsc4py import PETSc
 from scipy.sparse import csr_matrix, diags
 
 from feti_homog.feti.thresholds import MAX_BUFFERED_ENTRIES
-from feti_homog.parallel.distributed_arrays import allgather_rows
+from feti_homog.system.parallel.distributed_arrays import allgather_rows
 from feti_homog.typing import Bool, Float, Int, Int32
 
 

@@ -24,7 +24,7 @@ from feti_homog.feti.operators.one_subdomain import (
 )
 from feti_homog.feti.operators.with_springs import BoundaryOperator, WithSprings, compliance_root
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
-from feti_homog.parallel.distributed_arrays import scale_rows
+from feti_homog.system.parallel.distributed_arrays import scale_rows
 from feti_homog.typing import Bool, Float, Int
 
 InterfaceOperator = ExplicitInterfaceOperator | ImplicitInterfaceOperator

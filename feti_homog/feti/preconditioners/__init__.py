@@ -1,5 +1,4 @@
-"""Preconditioners of the dual problem: none, lumped and Dirichlet (scaled by stiffness), and exact inverses.
+"""Preconditioners of the dual problem: none, lumped and Dirichlet, scaled by stiffness.
 
-Imports `feti`, `feti.decomposition`, `feti.linalg`, `feti.operators`, `parallel` and `runtime`.  Main entries:
-`scaled`, `exact_inverse` and `bonded_inverse`.
+Imports `feti`, `feti.decomposition`, `feti.linalg`, `feti.operators` and `system`.  Main entries: `scaled`.
 """

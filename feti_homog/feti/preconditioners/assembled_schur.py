@@ -16,7 +16,7 @@ from feti_homog.feti.linalg.sparse_matrices import DenseBlockSum, allreduce_spar
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.operators.with_springs import is_dense
 from feti_homog.feti.thresholds import ASSEMBLED_PARTS, DENSE_SHARE, MOST_DENSE_ROWS
-from feti_homog.parallel.distributed_arrays import share_columns
+from feti_homog.system.parallel.distributed_arrays import share_columns
 from feti_homog.typing import Float, Int
 
 # Entries of Z, which are cosines of angles or their products, that rounding leaves of zero.

@@ -20,7 +20,7 @@ from feti_homog.feti.coarse.natural import NaturalCoarseSpace
 from feti_homog.feti.decomposition.constraint_layout import InterfaceNodes
 from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.mesh.periodic_topology import components
-from feti_homog.parallel.mpi_errors import on_root
+from feti_homog.system.parallel.mpi_errors import on_root
 from feti_homog.typing import Array, Bool, Float
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from feti_homog.feti.solver_plan import WITHOUT_INVERSE
 from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.states import BondState
 from feti_homog.interface.friction.status_system import HELD
-from feti_homog.parallel.distributed_arrays import allreduce_sum, gather_rows
+from feti_homog.system.parallel.distributed_arrays import allreduce_sum, gather_rows
 from feti_homog.typing import Float, Int
 
 # Steps by which what is held is let go of again.

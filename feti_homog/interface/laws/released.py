@@ -15,7 +15,7 @@ from typing import ClassVar
 import numpy as np
 
 from feti_homog.errors import ConvergenceError
-from feti_homog.feti.preconditioners.exact_inverse import ExactInverse
+from feti_homog.feti.exact.exact_inverse import ExactInverse
 from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BONDED, BondState, Status

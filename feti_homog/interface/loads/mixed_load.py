@@ -15,7 +15,7 @@ from feti_homog.errors import NotCarriedError
 from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.feti.solver import FetiSolver
 from feti_homog.interface.loads.load import Load
-from feti_homog.parallel.distributed_arrays import allreduce_sum
+from feti_homog.system.parallel.distributed_arrays import allreduce_sum
 from feti_homog.typing import Bool, Float
 
 # Share of the stresses that may act on what resists nothing: rounding of directions.

@@ -25,7 +25,7 @@ from feti_homog.interface.path.path_points import (
     most_utilised,
 )
 from feti_homog.interface.path.sliding_leg import SlidingLeg
-from feti_homog.parallel.mpi_errors import on_root
+from feti_homog.system.parallel.mpi_errors import on_root
 
 
 def sliding_increments(

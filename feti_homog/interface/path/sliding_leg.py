@@ -14,7 +14,7 @@ from feti_homog.interface.friction.status_system import OPEN_FACE
 from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.loads.load import Load, Macroscopic
 from feti_homog.interface.path.path_points import NO_ENERGIES, Energies, PathState, break_bonds
-from feti_homog.parallel.mpi_errors import on_root
+from feti_homog.system.parallel.mpi_errors import on_root
 from feti_homog.typing import Bool, Float
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from feti_homog.materials.forms import PER_TEMPERATURE
 from feti_homog.materials.spatial_constants import TransverselyIsotropic, transverse_constants
-from feti_homog.runtime.records import STRESS, described
+from feti_homog.system.runtime.records import STRESS, described
 
 Pair = tuple[float, float]
 

@@ -12,8 +12,6 @@ import numpy as np
 from feti_homog.case.cell_section import Cell
 from feti_homog.case.mixed_cell import fractions_in_words, mixed_width
 from feti_homog.errors import MeshError
-from feti_homog.fibres.arrangement import Arrangement
-from feti_homog.fibres.outlines.ellipses import Discs, Ellipses
 from feti_homog.mesh.arrange import arrange, listed_arrangement
 from feti_homog.mesh.coarse_mesh import CoarseMesh, representatives
 from feti_homog.mesh.outline.bare_outline import BareOutline, LineStations
@@ -29,7 +27,9 @@ from feti_homog.mesh.sizes.element_estimate import (
 from feti_homog.mesh.sizes.graded_size import MeshSizes
 from feti_homog.mesh.tiles.filling import Filling, Tile, arc_edges, fill
 from feti_homog.mesh.tiles.tiles import DEFAULT_TILES, Regions, TilePolicy, Tiling, cut, is_tiled, tiling
+from feti_homog.microstructure.arrangement import Arrangement
 from feti_homog.microstructure.phase_names import VOID
+from feti_homog.microstructure.shapes.ellipses import Discs, Ellipses
 from feti_homog.typing import Float, Int, Int32
 
 # Radius / width of the cell above which positions on a circle differ by more than rounding.

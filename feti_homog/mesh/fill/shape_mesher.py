@@ -15,9 +15,6 @@ from types import ModuleType
 import numpy as np
 from scipy.spatial import cKDTree
 
-from feti_homog.fibres.arrangement import Arrangement
-from feti_homog.fibres.outlines.convex_sums import POINTS, ConvexSums
-from feti_homog.fibres.outlines.outlines import Outlines
 from feti_homog.mesh.coarse_mesh import CoarseMesh
 from feti_homog.mesh.readers.gmsh_file import triangles_of_model
 from feti_homog.mesh.readers.msh_reader import made
@@ -25,7 +22,10 @@ from feti_homog.mesh.sizes.element_estimate import refuse_many
 from feti_homog.mesh.sizes.from_sources import MAX_GROWTH, wrap
 from feti_homog.mesh.sizes.graded_size import MIN_EDGES_AROUND, PASSAGE_EDGE, MeshSizes
 from feti_homog.mesh.tiles.filling import gmsh_session
+from feti_homog.microstructure.arrangement import Arrangement
 from feti_homog.microstructure.phase_names import MATRIX, VOID
+from feti_homog.microstructure.shapes.convex_sums import POINTS, ConvexSums
+from feti_homog.microstructure.shapes.outlines import Outlines
 from feti_homog.typing import Float, Int
 
 # Distance from a line / size of the cell within which curves lie on it.

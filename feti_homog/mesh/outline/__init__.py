@@ -1,4 +1,4 @@
 """Lines of a cell and the nodes on them: sides, arcs of fibres, bridges between fibres.
 
-Imports `fibres`, `mesh.sizes` and `parallel`.  Main entries: `bare_outline` and `outline`.
+Imports `mesh.sizes`, `microstructure` and `system`.  Main entries: `bare_outline` and `outline`.
 """

@@ -10,9 +10,6 @@ from itertools import pairwise
 import numpy as np
 from scipy.spatial import cKDTree
 
-from feti_homog.fibres.arrangement import Arrangement
-from feti_homog.fibres.outlines.ellipses import Ellipses
-from feti_homog.fibres.outlines.outlines import on_circle
 from feti_homog.mesh.outline.bridges import Bridges, OnCircles
 from feti_homog.mesh.outline.curves import MATRIX, Curves, Numbering
 from feti_homog.mesh.outline.lines import WHOLE, Arcs, EdgeSamples, Sampling, Segments, Stations
@@ -29,7 +26,10 @@ from feti_homog.mesh.outline.outline import (
     vertex_angles,
 )
 from feti_homog.mesh.sizes.graded_size import MeshSizes, SizeField, circle_size, size_field
-from feti_homog.parallel.dividing import even
+from feti_homog.microstructure.arrangement import Arrangement
+from feti_homog.microstructure.shapes.ellipses import Ellipses
+from feti_homog.microstructure.shapes.outlines import on_circle
+from feti_homog.system.parallel.dividing import even
 from feti_homog.typing import Bool, Float, Int
 
 NO_BRIDGES = Bridges(np.zeros((0, 2), np.int64), np.zeros(0))

@@ -10,9 +10,6 @@ from itertools import product
 import numpy as np
 from scipy.spatial import cKDTree
 
-from feti_homog.fibres.arrangement import Arrangement, neighbours
-from feti_homog.fibres.outlines.ellipses import Ellipses, gaps
-from feti_homog.fibres.outlines.outlines import directions
 from feti_homog.mesh.outline.bridges import TURN
 from feti_homog.mesh.outline.curves import MATRIX, Curves, Numbering
 from feti_homog.mesh.outline.lines import WHOLE, EdgeSamples
@@ -37,6 +34,9 @@ from feti_homog.mesh.sizes.graded_size import (
     at_vertices,
     passage_growth,
 )
+from feti_homog.microstructure.arrangement import Arrangement, neighbours
+from feti_homog.microstructure.shapes.ellipses import Ellipses, gaps
+from feti_homog.microstructure.shapes.outlines import directions
 from feti_homog.typing import Float, Int
 
 # Steps of a quarter of an ellipse between which its length is taken to be linear.

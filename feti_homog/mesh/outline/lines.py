@@ -9,8 +9,8 @@ from typing import Protocol
 import numpy as np
 
 from feti_homog.errors import MeshError
-from feti_homog.fibres.outlines.outlines import on_circle
 from feti_homog.mesh.sizes.graded_size import SizeField
+from feti_homog.microstructure.shapes.outlines import on_circle
 from feti_homog.typing import Float, Int
 
 

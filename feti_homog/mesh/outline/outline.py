@@ -9,12 +9,12 @@ from itertools import product
 import numpy as np
 from scipy.spatial import cKDTree
 
-from feti_homog.fibres.arrangement import Arrangement
-from feti_homog.fibres.outlines.ellipses import Ellipses
 from feti_homog.mesh.outline.bridges import TURN, OnCircles
 from feti_homog.mesh.outline.curves import MATRIX, OUTSIDE, Curves, Numbering, backwards
 from feti_homog.mesh.outline.lines import EdgeSamples, Sampling, Segments
 from feti_homog.mesh.sizes.graded_size import SizeField
+from feti_homog.microstructure.arrangement import Arrangement
+from feti_homog.microstructure.shapes.ellipses import Ellipses
 from feti_homog.typing import Bool, Float, Int
 
 # Relative distance below which two positions are one.

@@ -1,4 +1,4 @@
 """Meshes of users: gmsh, Abaqus and VTK files, their checks, and the curves that their interfaces follow.
 
-Imports `case`, `fibres`, `mesh`, `mesh.tiles`, `runtime` and `schema`.  Main entry: `msh_reader.read`.
+Imports `case`, `mesh`, `mesh.tiles`, `microstructure`, `schema` and `system`.  Main entry: `msh_reader.read`.
 """

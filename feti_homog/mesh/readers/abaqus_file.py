@@ -11,8 +11,8 @@ import numpy as np
 
 from feti_homog.errors import MeshError
 from feti_homog.mesh.readers.raw_mesh import Block, RawMesh, assembled
-from feti_homog.runtime import input_files
 from feti_homog.schema.wording import toml_value
+from feti_homog.system.runtime import input_files
 from feti_homog.typing import Int
 
 TRIANGLE = re.compile(r"(CPE|CPS|CPEG|DC2D|M3D|S|STRI|R3D)(3|6|65)[A-Z]*")

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from feti_homog.fibres.outlines.ellipses import Ellipses
 from feti_homog.mesh.coarse_mesh import CoarseMesh, edge_keys, flip_double_arcs, interface_edges
 from feti_homog.mesh.periodic_topology import components
 from feti_homog.mesh.readers.mesh_checks import SAME_PLACE
 from feti_homog.mesh.readers.raw_mesh import MiddleNodes, RawMesh, at, first_of
 from feti_homog.mesh.readers.round_interfaces import with_arcs
+from feti_homog.microstructure.shapes.ellipses import Ellipses
 from feti_homog.typing import Bool, Float, Int32
 
 # Distance of a middle node from its edge / length of the edge up to which the edge is straight.

@@ -13,7 +13,7 @@ from feti_homog.mesh.readers import msh_content
 from feti_homog.mesh.readers.msh_content import KINDS, MshContent
 from feti_homog.mesh.readers.raw_mesh import Block, RawMesh, assembled, at, first_of
 from feti_homog.mesh.tiles.filling import LINE, TRIANGLE
-from feti_homog.runtime import input_files
+from feti_homog.system.runtime import input_files
 from feti_homog.typing import Float, Int
 
 # What to do about other elements, by order and dimension.

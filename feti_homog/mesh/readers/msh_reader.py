@@ -13,7 +13,6 @@ from scipy.spatial import ConvexHull, cKDTree
 
 from feti_homog.case.cell_section import Cell
 from feti_homog.errors import MeshError, escaped
-from feti_homog.fibres.outlines.ellipses import Ellipses
 from feti_homog.mesh.coarse_mesh import CoarseMesh, areas, can_debond, edge_keys, edges, paired_sides, representatives
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.readers import abaqus_file, bent_edges, gmsh_file, mesh_checks, vtk_file
@@ -21,6 +20,7 @@ from feti_homog.mesh.readers.bent_edges import with_bent_edges
 from feti_homog.mesh.readers.named_phases import Selectors, unknown_phases, with_phases
 from feti_homog.mesh.readers.raw_mesh import RawMesh, at
 from feti_homog.mesh.readers.round_interfaces import with_circles, with_ellipses
+from feti_homog.microstructure.shapes.ellipses import Ellipses
 from feti_homog.typing import Float, Int, Int32
 
 LOADERS = {".msh": gmsh_file.load, ".inp": abaqus_file.load} | dict.fromkeys(vtk_file.READERS, vtk_file.load)

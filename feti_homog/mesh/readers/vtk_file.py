@@ -19,8 +19,8 @@ import numpy as np
 
 from feti_homog.errors import MeshError
 from feti_homog.mesh.readers.raw_mesh import DEBONDED, Block, RawMesh, assembled
-from feti_homog.runtime import input_files
 from feti_homog.schema.wording import toml_value
+from feti_homog.system.runtime import input_files
 from feti_homog.typing import Int
 
 # Readers of meshio, and how many nodes its triangles have.

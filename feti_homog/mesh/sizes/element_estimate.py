@@ -11,11 +11,11 @@ import numpy as np
 from feti_homog.case.cell_section import FIBRES_OF, Cell
 from feti_homog.case.mixed_cell import fibre_counts
 from feti_homog.errors import MeshError
-from feti_homog.fibres.arrangement import Arrangement
-from feti_homog.fibres.outlines.ellipses import Ellipses
-from feti_homog.fibres.outlines.shapes import elliptic
 from feti_homog.mesh.sizes.from_sources import MAX_GROWTH
 from feti_homog.mesh.sizes.graded_size import MIN_EDGES_AROUND
+from feti_homog.microstructure.arrangement import Arrangement
+from feti_homog.microstructure.shapes.ellipses import Ellipses
+from feti_homog.microstructure.shapes.shapes import elliptic
 from feti_homog.typing import Float
 
 # Elements that are meshed in some minutes on one rank, and by all ranks together.

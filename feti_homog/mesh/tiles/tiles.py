@@ -14,8 +14,6 @@ from itertools import product
 import numpy as np
 from scipy.spatial import QhullError
 
-from feti_homog.fibres.arrangement import Arrangement
-from feti_homog.fibres.outlines.ellipses import Discs, Ellipses
 from feti_homog.mesh.coarse_mesh import CoarseMesh, edge_keys, edges
 from feti_homog.mesh.outline.bridges import CLEAR, Bridges, bridges, centre_lines
 from feti_homog.mesh.outline.curves import MATRIX, OUTSIDE
@@ -23,6 +21,8 @@ from feti_homog.mesh.outline.outline import Outline, crossings, disc_at, images,
 from feti_homog.mesh.periodic_topology import Torus, plane_edges_of
 from feti_homog.mesh.tiles.filling import Filling, Tile, arc_edges
 from feti_homog.mesh.tiles.matrix_faces import MatrixTiles, grid_cell, matrix_tiles
+from feti_homog.microstructure.arrangement import Arrangement
+from feti_homog.microstructure.shapes.ellipses import Discs, Ellipses
 from feti_homog.typing import Array, Float, Int, Int32
 
 

@@ -1,5 +1,4 @@
 """Pictures, drawn from the files of a result folder.
 
-Imports `case`, `materials`, `microstructure`, `report.text` and `results`.  Loads Matplotlib.  Main entry:
-`figures.plot`.
+Imports `case`, `materials`, `report.text` and `results`. Loads Matplotlib.  Main entry: `figures.plot`.
 """

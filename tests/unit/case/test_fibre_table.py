@@ -7,7 +7,7 @@ import pytest
 from unit.case.faulty_fibre_tables import FAULTY_TABLES, HEAD
 
 from feti_homog.errors import MOST_FAULTS, CaseError
-from feti_homog.fibres.fibre_table import read_table, table_of
+from feti_homog.microstructure.fibre_table import read_table, table_of
 
 PLAIN = """# width = 12, height = 8.5
 # left = -1

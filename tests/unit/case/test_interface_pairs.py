@@ -8,7 +8,7 @@ from jsonschema import Draft202012Validator
 from feti_homog import Case
 from feti_homog.case.json_schema import json_schema
 from feti_homog.errors import CaseError
-from feti_homog.sweep.plan import case_documents
+from feti_homog.studies.sweep.plan import case_documents
 
 OUTER, INNER = ["coating", "matrix"], ["fibre", "coating"]
 STRONG = {"normal_strength": 1.0}

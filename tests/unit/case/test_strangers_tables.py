@@ -7,8 +7,8 @@ import pytest
 
 from feti_homog import Case
 from feti_homog.errors import CaseError, MeshError
-from feti_homog.fibres.fibre_table import read_table
 from feti_homog.mesh.arrange import arrange
+from feti_homog.microstructure.fibre_table import read_table
 
 SIZE = "# width = 8, height = 6\n"
 TABLES = {

@@ -16,9 +16,9 @@ from feti_homog.analysis.runner import run
 from feti_homog.case.case import load
 from feti_homog.commands import listed_fibres
 from feti_homog.errors import CaseError, MeshError
-from feti_homog.fibres.fibre_table import read_table
 from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.tiles.filling import gmsh_session
+from feti_homog.microstructure.fibre_table import read_table
 
 CELL = 'geometry = "hexagonal"\nfibre_fraction = 0.4\n'
 FIBRES = 'fibre_list = [{x = 1, y = 2, radius = 0.3}, {x = 2.8, y = 2, radius = 0.3, phase = "fibre:2"}]'

@@ -7,7 +7,7 @@ import pytest
 from scipy.special import ellipeinc
 
 from feti_homog.feti.decomposition.shared_entities import along, mean_speed
-from feti_homog.fibres.outlines.ellipses import Ellipses
+from feti_homog.microstructure.shapes.ellipses import Ellipses
 
 A, B = 0.5, 0.2
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from feti_homog.case.cell_section import Cell
-from feti_homog.fibres.arrangement import Arrangement
 from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.coarse_mesh import areas, double_arcs
 from feti_homog.mesh.fill.gmsh_mesher import UnmeshedCell, generate
@@ -15,6 +14,7 @@ from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.refinement import ReferenceLattice, refine
 from feti_homog.mesh.sizes.graded_size import MeshSizes
 from feti_homog.mesh.submesh import cut
+from feti_homog.microstructure.arrangement import Arrangement
 
 CELLS = {
     "square": Cell(geometry="square", fibre_fraction=0.4, coating=0.05),

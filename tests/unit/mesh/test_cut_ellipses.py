@@ -8,10 +8,10 @@ from support.moved_rows import moved_rows
 from unit.mesh.test_table_ellipses import cell_of, table
 
 from feti_homog.errors import MeshError
-from feti_homog.fibres.arrangement import neighbours
-from feti_homog.fibres.cut_window import LEAST_GAP, MOST_GAP, moves
-from feti_homog.fibres.outlines.ellipses import Discs, Ellipses, gaps
 from feti_homog.mesh.arrange import arrange
+from feti_homog.microstructure.arrangement import neighbours
+from feti_homog.microstructure.cut_window import LEAST_GAP, MOST_GAP, moves
+from feti_homog.microstructure.shapes.ellipses import Discs, Ellipses, gaps
 
 SIZE = np.array([1.0, 1.0])
 

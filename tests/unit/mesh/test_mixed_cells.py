@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from unit.fibres.test_arrangement import smallest_gap
+from unit.microstructure.test_arrangement import smallest_gap
 
 from feti_homog.case.cell_section import Cell
 from feti_homog.case.mixed_cell import fibre_counts

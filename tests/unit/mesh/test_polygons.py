@@ -15,15 +15,15 @@ from feti_homog import run
 from feti_homog.case import case as cases
 from feti_homog.commands import listed_fibres
 from feti_homog.errors import CaseError, MeshError
-from feti_homog.fibres.arrangement import Arrangement
-from feti_homog.fibres.outlines.convex_sums import ConvexSums
-from feti_homog.fibres.outlines.shapes import outlines_of
 from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.coarse_mesh import areas, voids
 from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.mesh.fill.shape_mesher import mesh_outlines
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.sizes.graded_size import MeshSizes
+from feti_homog.microstructure.arrangement import Arrangement
+from feti_homog.microstructure.shapes.convex_sums import ConvexSums
+from feti_homog.microstructure.shapes.shapes import outlines_of
 
 SQUARE = {"x": 0.5, "y": 0.5, "radius": 0.3, "sides": 4, "corner": 0.3, "angle": 10.0}
 ROWS = [

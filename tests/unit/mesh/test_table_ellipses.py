@@ -10,8 +10,6 @@ import pytest
 from feti_homog.case.cell_files import check_shapes
 from feti_homog.case.cell_section import Cell
 from feti_homog.errors import MeshError
-from feti_homog.fibres.fibre_table import table_of
-from feti_homog.fibres.outlines.ellipses import Ellipses, gaps
 from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.coarse_mesh import areas
 from feti_homog.mesh.fill.gmsh_mesher import generate
@@ -19,6 +17,8 @@ from feti_homog.mesh.mesh_fibres import fibre_circles
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.refinement import ReferenceLattice, refine
 from feti_homog.mesh.submesh import cut
+from feti_homog.microstructure.fibre_table import table_of
+from feti_homog.microstructure.shapes.ellipses import Ellipses, gaps
 
 ROWS = [
     {"x": 0.5, "y": 0.5, "a": 0.25, "b": 0.1, "angle": 30.0},

@@ -5,7 +5,7 @@ from __future__ import annotations
 from mpi4py import MPI
 
 from feti_homog.results import atomic, output_folder
-from feti_homog.runtime import owners
+from feti_homog.system.runtime import owners
 
 
 def test_unfinished_files_are_removed(tmp_path):

@@ -12,7 +12,7 @@ from mpi4py import MPI
 
 from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.results import output_folder
-from feti_homog.runtime.file_locks import Lock
+from feti_homog.system.runtime.file_locks import Lock
 
 
 def test_folders_that_stay_empty_are_removed(tmp_path):

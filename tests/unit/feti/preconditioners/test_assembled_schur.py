@@ -10,7 +10,7 @@ from scipy.sparse import csr_matrix, identity
 from feti_homog.feti.linalg.dense_matrices import DenseSolver
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
 from feti_homog.feti.preconditioners.assembled_schur import AssembledSchur, block_sum
-from feti_homog.petsc.options import case_options
+from feti_homog.system.petsc.options import case_options
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from feti_homog.feti.preconditioners.bordered_inverse import BorderedInverse
+from feti_homog.feti.exact.bordered_inverse import BorderedInverse
 
 # Below all diagonals.
 SMALL = 1e-3

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from feti_homog.feti.preconditioners.followed_changes import FollowedChanges
-from feti_homog.feti.preconditioners.followed_response import FollowedResponse
+from feti_homog.feti.exact.followed_changes import FollowedChanges
+from feti_homog.feti.exact.followed_response import FollowedResponse
 
 N, NO_PINS = 12, np.zeros(0, np.int64)
 

@@ -8,11 +8,11 @@ from scipy.special import ellipe
 from unit.mesh.test_table_ellipses import cell_of, table
 
 from feti_homog.errors import MeshError
-from feti_homog.fibres.outlines.ellipses import Ellipses
 from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.mesh.sizes.element_estimate import ElementEstimate, refuse_many
 from feti_homog.mesh.sizes.graded_size import MeshSizes, size_field
+from feti_homog.microstructure.shapes.ellipses import Ellipses
 
 
 @pytest.mark.parametrize("ratio", [1.5, 4.0, 16.0])

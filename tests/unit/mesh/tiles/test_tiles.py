@@ -11,8 +11,6 @@ from support.tiled_cells import CELLS, SMALL, mesh_of, noded
 from unit.mesh.fill.test_gmsh_mesher import least_angle
 
 from feti_homog.errors import MeshError
-from feti_homog.fibres.arrangement import Arrangement
-from feti_homog.fibres.outlines.shapes import elliptic
 from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.coarse_mesh import areas
 from feti_homog.mesh.fill.gmsh_mesher import begin, generate
@@ -22,6 +20,8 @@ from feti_homog.mesh.outline.outline import images
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.tiles import filling
 from feti_homog.mesh.tiles.tiles import TilePolicy, is_tiled, tiling
+from feti_homog.microstructure.arrangement import Arrangement
+from feti_homog.microstructure.shapes.shapes import elliptic
 
 NONE = TilePolicy(least_discs=10**6)
 MARKS = {0: (20.0, 100.0), 7: (0.0, 180.0)}

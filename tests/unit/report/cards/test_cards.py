@@ -27,7 +27,7 @@ from feti_homog.report.cards import effective_material
 from feti_homog.report.cards.effective_material import in_axes_of_the_cell, nearest_transversely_isotropic
 from feti_homog.report.cards.export import FORMATS
 from feti_homog.report.text import constant_tables
-from feti_homog.runtime.records import plain
+from feti_homog.system.runtime.records import plain
 
 every_format = pytest.mark.parametrize("form", FORMATS)
 

@@ -1,0 +1,86 @@
+"""The present response from that of the reference cell, by followed columns of the rows C that changed since.
+
+With W = s of rows that left (1) or came (-1), and dC of those whose springs gained compliance, the transforms of
+`followed_response` give Gamma_:C B = Gamma'_:C W with the present response Gamma'.  So all other columns, and
+answers U, follow from those of the reference cell by one product:
+
+    U' = U - Gamma'_:C W U_C,  U 0 before on rows that left or came.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+
+from feti_homog.feti.exact.followed_response import FollowedResponse
+from feti_homog.feti.exact.reference_cell import ReferenceCell
+from feti_homog.feti.thresholds import CHECKED_COLUMNS
+from feti_homog.system.parallel.distributed_arrays import gather_rows
+from feti_homog.typing import Float, Int
+
+
+class FollowedChanges:
+    """The rows C of a reference cell that have changed, all of which have followed columns.
+
+    Attributes:
+        rows: (c,) C, global numbers.
+    """
+
+    def __init__(
+        self, comm: MPI.Intracomm, first: int, cell: ReferenceCell, followed: FollowedResponse, rows: Int, kinds: Float
+    ) -> None:
+        """C are these global `rows` (c,); `kinds` (c, 2) are s, 0 of rows that hold here and there, and dC.
+
+        This rank's rows begin at `first`.
+        """
+        self._comm, self._first, self._cell, self._followed, self.rows = comm, first, cell, followed, rows
+        self._turned, self._more = kinds.T[:, :, None]
+        self._weights = np.where(self._turned != 0.0, self._turned, self._more)
+        own = rows - first
+        self._mine = np.flatnonzero((own >= 0) & (own < len(cell.active)))
+        self._own = own[self._mine]
+
+    def present(self, columns: Float) -> Float:
+        """(owned rows, k) U' of U (owned rows, k).  Collective."""
+        found = columns.copy()
+        found[self._own[self._turned[self._mine, 0] != 0.0]] = 0.0
+        found -= self._followed.product(self.rows, self._weights * self._gathered(columns))
+        return found
+
+    def refined(self, columns: Float) -> Float:
+        """`present` without the rounding of what is followed, by a step of iterative refinement.  Collective.
+
+        c = B U_C obeys (Gamma_CC + D) c = U_C with the reference cell's own Gamma.
+        """
+        found = self.present(columns)
+        theirs = self._gathered(found)
+        c = self._weights * theirs
+        left = columns - self._cell.respond(self._spread(c))
+        # D c of rows that hold in both cells, that came, and that left.
+        stretched = np.where(self._turned == 0.0, theirs, np.where(self._turned < 0.0, -self._more * c, 0.0))
+        rest = self._spread(self._gathered(left) - stretched)
+        left[self._own] = found[self._own]
+        return left + self.present(rest)
+
+    def error(self, rows: Int, columns: Float, stiffness: Float) -> float:
+        """Return how far new columns (owned rows, k) of global rows (k,), none of C, are off what is followed of C.
+
+        Gamma' is symmetric.  Relative to the largest entry, each by its units: `stiffness` (all rows,) on active rows.
+        Collective.
+        """
+        rows, columns = rows[:CHECKED_COLUMNS], columns[:, :CHECKED_COLUMNS]
+        theirs, ours = self._gathered(columns), self._followed.entries(rows, self.rows).T
+        holds = self._turned[:, 0] <= 0.0, gather_rows(self._comm, self._cell.active, self._first, rows) > 0.0
+        pairs = zip(holds, (np.sqrt(stiffness[each]) for each in (self.rows, rows)), strict=True)
+        units = np.multiply.outer(*(np.where(own, 1.0 / root, root) for own, root in pairs))
+        off, largest = (np.abs(units * x).max(initial=0.0) for x in (theirs - ours, theirs))
+        return float(self._comm.bcast(off / max(largest, 1.0)))
+
+    def _gathered(self, x: Float) -> Float:
+        return gather_rows(self._comm, x, self._first, self.rows)
+
+    def _spread(self, values: Float) -> Float:
+        """(owned rows, k) these (c, k) on C, 0 elsewhere."""
+        x = np.zeros((len(self._cell.active), values.shape[1]))
+        x[self._own] = values[self._mine]
+        return x

@@ -1,0 +1,292 @@
+"""The answer of a cell to its unit loads, and columns of its response, followed while bonds soften, break and close.
+
+U has multipliers on active rows and on the others the jumps that are left; Gamma is the response, multipliers and
+jumps, to jumps of active rows and forces on the others.  Both are principal pivot transforms.  With dC more
+compliance on the rows I of bonds that hold they become
+
+    U <- U - Gamma_:I B U_I,  Gamma <- Gamma - Gamma_:I B Gamma_I:,  B = (dC^-1 + Gamma_II)^-1,
+
+and where the rows I leave (s = 1) or come to be active (s = -1), with B = Gamma_II^-1,
+
+    U_I <- s B U_I,  Gamma_I: <- s B Gamma_I:,  Gamma_:I <- Gamma_:I B s,  Gamma_II <- -s B s,
+
+all others as above.  Springs of rows that are not active have C_0: Gamma_II gives up what they gained where they
+leave, and takes it where they come.  The rows I need one column each; changes of the other columns that are kept wait
+until there are many.
+
+A row that leaves without a force, for it alone resisted a motion of a body, becomes a pin: it stays among the active
+ones, where it bears nothing and its jump, like the place of the body, is as good as any other.  Pins leave when rows
+come that resist the motion.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+from scipy.linalg.blas import dgemm
+from scipy.linalg.lapack import dpstrf
+
+from feti_homog.feti.linalg.dense_matrices import product_with_some
+from feti_homog.feti.thresholds import (
+    FOLLOWED_COLUMNS,
+    FOLLOWED_SHARE,
+    LATE_CHANGES,
+    LEAST_FOLLOWED_PIVOT,
+    RIGID_SHARE,
+    SINGULAR_PIVOT,
+    WAITING_COLUMNS,
+)
+from feti_homog.system.parallel.distributed_arrays import allreduce_sum, gather_rows
+from feti_homog.typing import Bool, Float, Int
+
+
+class FollowedResponse:
+    """U and columns of Gamma in the present state.
+
+    Attributes:
+        answer: (owned rows, v) U.
+        pins: (p,) global rows that left and hold bodies that nothing else does.
+        most: columns at most.
+    """
+
+    def __init__(
+        self,
+        comm: MPI.Intracomm,
+        first: int,
+        stiffness: Float,
+        answer: Float,
+        pins: Int,
+        most: int = FOLLOWED_COLUMNS,
+    ) -> None:
+        """`answer` is U with these `pins`; this rank's rows begin at `first`.  No columns yet.
+
+        `stiffness` (all rows,) is the most that the diagonal of Gamma can be on active rows.
+        """
+        self._comm, self._first, self._stiffness = comm, first, stiffness
+        self.answer, self.pins, self.most = answer, pins, most
+        self._slot = np.full(len(stiffness), -1)
+        self._rows: Int = np.zeros(0, np.int64)
+        # When each column was last used, and when it came, counted in changes.
+        self._used, self._now = np.zeros(most, np.int64), 0
+        self._came = np.zeros(most, np.int64)
+        # Memory is taken when columns come.
+        self._buffer = np.zeros((len(answer), most), order="F")
+        # What is taken off at changes that wait, and its factors in the columns of the rows K that are kept.
+        self._waiting = np.zeros((len(answer), WAITING_COLUMNS), order="F")
+        self._factors = np.zeros((most, WAITING_COLUMNS))
+        self._count = 0
+
+    def lacking(self, rows: Int) -> Int:
+        """Return which of the global rows have no column."""
+        return rows[self._slot[rows] < 0]
+
+    def make_room(self, more: int, wanted: Int, useful: Bool) -> Bool:
+        """Let columns go where there is no room for so many more, and return which of them were ever used.
+
+        Those longest unused go first, those of rows that are `useful` (all rows,) last, those of `wanted` stay.
+        """
+        if len(self._rows) + more <= self.most:
+            return np.zeros(0, bool)
+        # Some more at once, for the others move.
+        count = min(int(FOLLOWED_SHARE * self.most), self.most - more)
+        spared, is_useful = np.isin(self._rows, wanted), useful[self._rows]
+        order = np.lexsort([-self._used[: len(self._rows)], ~is_useful, ~spared])
+        stay, go = np.split(order, [max(count, int(spared.sum()))])
+        was_used = np.asarray(self._used[go] > self._came[go])
+        self._retain(np.sort(stay))
+        return was_used
+
+    def keep(self, useful: Bool) -> None:
+        """Let columns go but those of rows that are `useful` (all rows,) or were used lately."""
+        self._retain(np.flatnonzero(useful[self._rows] | (self._used[: len(self._rows)] >= self._now - LATE_CHANGES)))
+
+    def _retain(self, stay: Int) -> None:
+        """Let columns go but those at the places `stay` (n,), ascending."""
+        kept, n = self._rows[stay], len(stay)
+        self._slot[self._rows] = -1
+        self._slot[kept] = np.arange(n)
+        self._rows, self._used[:n], self._came[:n] = kept, self._used[stay], self._came[stay]
+        for part in np.array_split(np.arange(n), n // WAITING_COLUMNS + 1):
+            # Columns move to the left, so that none is lost.
+            self._buffer[:, part] = self._buffer[:, stay[part]]
+        self._factors[:n] = self._factors[stay]
+
+    def columns(self, rows: Int) -> Float:
+        """(owned rows, k) columns of the global rows (k,), which have them."""
+        at, n = self._slot[rows], self._count
+        return np.asarray(self._buffer[:, at] - self._waiting[:, :n] @ self._factors[at, :n].T)
+
+    def product(self, rows: Int, x: Float) -> Float:
+        """(owned rows, k) columns of the global rows (c,), which have them, times x (c, k)."""
+        at, n, known = self._slot[rows], self._count, len(self._rows)
+        waiting = self._waiting[:, :n] @ (self._factors[at, :n].T @ x)
+        return product_with_some(self._buffer[:, :known], at, x) - waiting
+
+    def entries(self, rows: Int, of: Int) -> Float:
+        """(k, c) entries at the global rows (k,) of the columns of the global rows `of` (c,).  Collective."""
+        at, n, own = self._slot[of], self._count, rows - self._first
+        mine = np.flatnonzero((own >= 0) & (own < len(self._buffer)))
+        own, found = own[mine], np.zeros((len(rows), len(of)))
+        found[mine] = self._buffer[own[:, None], at] - self._waiting[own, :n] @ self._factors[at, :n].T
+        return allreduce_sum(self._comm, found)
+
+    def blocks(self, pairs: Int) -> Float:
+        """(m, 2, 2) diagonal blocks of Gamma at the pairs (m, 2) of global rows, which have columns.  Collective.
+
+        A pair is on one rank.
+        """
+        if len(self.lacking(pairs)):
+            raise ValueError("rows without columns have no blocks")
+        own, at, n = pairs - self._first, self._slot[pairs], self._count
+        self._used[at] = self._now
+        mine = ((own >= 0) & (own < len(self._buffer))).all(axis=1)
+        own, at = own[mine], at[mine]
+        blocks = np.zeros((len(pairs), 2, 2))
+        blocks[mine] = self._buffer[own[:, :, None], at[:, None, :]]
+        blocks[mine] -= self._waiting[own, :n] @ self._factors[at, :n].transpose(0, 2, 1)
+        return allreduce_sum(self._comm, blocks)
+
+    def add(self, rows: Int, columns: Float) -> None:
+        """Take the columns (owned rows, k) of these global rows (k,) in, for which there is room."""
+        self._apply_waiting()
+        old, new = len(self._rows), len(self._rows) + len(rows)
+        self._slot[rows] = np.arange(old, new)
+        self._rows = np.concatenate([self._rows, rows])
+        self._buffer[:, old:new], self._used[old:new], self._came[old:new] = columns, self._now, self._now
+
+    def follow(self, rows: Int, turned: Float, gained: Float) -> bool:
+        """Let the global rows (k,) leave (`turned` is 1), come (-1) or soften (0), their springs gain compliance (k,).
+
+        False where columns, those of pins too, are lacking or lose too many digits; then this is of no state.
+        Collective.
+        """
+        soft, is_pin = turned == 0.0, (rows[:, None] == self.pins).any(axis=1)
+        if len(self.lacking(np.concatenate([rows, self.pins]))) or (gained[soft] < 0.0).any():
+            return False
+        if is_pin.any():
+            self.pins = np.setdiff1d(self.pins, rows)
+        softer = (soft | is_pin) & (gained != 0.0)
+        if softer.any():
+            self.soften(rows[softer], gained[softer])
+        moves = ~soft & ~is_pin
+        return not moves.any() or self._exchange(*(x[moves] for x in (rows, turned, gained)))
+
+    def soften(self, rows: Int, more: Float) -> None:
+        """Let springs of the global rows (k,), which have columns, gain compliance (k,).  Collective."""
+        self._make_room(len(rows))
+        columns, values = self._present(rows)
+        k = len(rows)
+        # One rank's rounding is that of all.
+        B = self._comm.bcast(np.linalg.inv(np.diag(1.0 / more) + (values[:k, :k] + values[:k, :k].T) / 2))
+        self._change(columns, B, values)
+
+    def _exchange(self, rows: Int, sign: Float, gained: Float) -> bool:
+        """Let rows leave (sign 1) or come (-1), and pins leave with those that come; False where digits are lost.
+
+        Collective.
+        """
+        columns, values = self._present(rows)
+        if len(moved := self._moved_pins(values[len(rows) :, : len(rows)][:, sign < 0.0])):
+            rows, none = np.concatenate([rows, moved]), np.zeros(len(moved))
+            sign, gained = np.concatenate([sign, none + 1.0]), np.concatenate([gained, none])
+            columns, values = self._present(rows)
+        if (k := len(rows)) > WAITING_COLUMNS:
+            return False
+        block = (values[:k, :k] + values[:k, :k].T) / 2 - np.diag(np.where(sign < 0.0, gained, 0.0))
+        found = self._comm.bcast(_regular(block, sign, self._stiffness[rows]))
+        if found is None:
+            return False
+        which, B = found
+        if len(which):
+            self._make_room(len(which))
+            kept = np.concatenate([which, np.arange(k, len(values))])
+            values = np.hstack([values[kept][:, which], values[kept, k:]])
+            self._turn(rows[which], sign[which], gained[which], B, columns[:, which], values)
+        if len(moved) or len(which) < k or len(self.pins):
+            loose = np.setdiff1d(np.arange(k), which)
+            self._pin(np.union1d(np.setdiff1d(self.pins, moved), rows[loose]))
+            # Springs of pins have C_0, as of all rows that are not active.
+            if len(loose := loose[gained[loose] != 0.0]):
+                self.soften(rows[loose], gained[loose])
+        return True
+
+    def _pin(self, pins: Int) -> None:
+        """Let these global rows be the pins, whose answer is 0."""
+        self.pins, self.answer = pins, self.answer.copy()
+        self.answer[pins[(pins >= self._first) & (pins < self._first + len(self.answer))] - self._first] = 0.0
+
+    def _moved_pins(self, forces: Float) -> Int:
+        """Return the pins that unit forces on rows that come press; `forces` (columns, k) of them on all columns."""
+        pins: Int = self.pins[(np.abs(forces[self._slot[self.pins]]) > RIGID_SHARE).any(axis=1)]
+        return pins
+
+    def _turn(self, rows: Int, sign: Float, gained: Float, B: Float, columns: Float, values: Float) -> None:
+        """Let rows leave (sign 1) or come (-1) whose block has the inverse B.  Collective."""
+        at = self._slot[rows]
+        mine = np.flatnonzero((rows >= self._first) & (rows < self._first + len(columns)))
+        own = rows[mine] - self._first
+        theirs = columns @ (B * sign)
+        theirs[own] = -(sign[:, None] * B * sign + np.diag(np.where(sign > 0.0, gained, 0.0)))[mine]
+        # The rows themselves become s B U_I and s B Gamma_I:, from nothing: of what they were, differences lose digits
+        # where a stiffness is far from 1.
+        self.answer = self.answer.copy()
+        self.answer[own], self._buffer[own], self._waiting[own, : self._count] = 0.0, 0.0, 0.0
+        taken = columns.copy()
+        taken[own] = -np.diag(sign)[mine]
+        self._change(taken, B, values)
+        self._buffer[:, at], self._factors[at] = theirs, 0.0
+
+    def _present(self, rows: Int) -> tuple[Float, Float]:
+        """(owned rows, k) columns, and (k + all columns, k + v) rows of them and of U on every rank.  Collective."""
+        self._now += 1
+        self._used[self._slot[rows]] = self._now
+        columns = self.columns(rows)
+        everywhere = np.concatenate([rows, self._rows])
+        return columns, gather_rows(self._comm, np.hstack([columns, self.answer]), self._first, everywhere)
+
+    def _change(self, taken: Float, B: Float, values: Float) -> None:
+        """Take `taken` B times the rows I off the answer, and later off all columns."""
+        n, k = self._count, len(B)
+        self.answer = self.answer - taken @ (B @ values[:k, k:])
+        self._waiting[:, n : n + k], self._factors[: len(self._rows), n : n + k] = taken, values[k:, :k] @ B
+        self._count += k
+
+    def _make_room(self, k: int) -> None:
+        if self._count + k > WAITING_COLUMNS:
+            self._apply_waiting()
+
+    def _apply_waiting(self) -> None:
+        n, k = self._count, len(self._rows)
+        if n and k and len(self._buffer):
+            # In place: a product by itself would take as much memory as all columns.
+            product = -1.0, self._waiting[:, :n], self._factors[:k, :n]
+            dgemm(*product, beta=1.0, c=self._buffer[:, :k], trans_b=1, overwrite_c=1)
+        self._count = 0
+
+
+def _regular(block: Float, sign: Float, stiffness: Float) -> tuple[Int, Float] | None:
+    """Return the rows that can turn, and the inverse of their part of `block` (k, k); None if that loses digits.
+
+    They are all that come (sign -1), and of those that leave (1) as many as leave no body free.
+    """
+    # Rows that leave and rows that come differ by the square of a stiffness.
+    root = np.sqrt(np.maximum(np.where(sign > 0.0, stiffness, 1.0 / stiffness), np.abs(block.diagonal())))
+    outer = np.outer(root, root)
+    scaled, which = block / outer, np.arange(len(block))
+    if not _has_digits(scaled):
+        come, leave = np.flatnonzero(sign < 0.0), np.flatnonzero(sign > 0.0)
+        if not len(leave) or not _has_digits(scaled[come[:, None], come]):
+            return None
+        across = scaled[come[:, None], leave]
+        rest = scaled[leave[:, None], leave] - across.T @ np.linalg.solve(scaled[come[:, None], come], across)
+        factor, order, rank, _ = dpstrf(rest, tol=SINGULAR_PIVOT, lower=1)
+        # The first pivot is taken whatever it is.
+        rank = min(rank, int((factor.diagonal() ** 2 > SINGULAR_PIVOT).sum()))
+        which = np.concatenate([come, leave[order[:rank] - 1]])
+        if not _has_digits(scaled[which[:, None], which]):
+            return None
+    return which, np.linalg.inv(scaled[which[:, None], which]) / outer[which[:, None], which]
+
+
+def _has_digits(block: Float) -> bool:
+    return bool(np.linalg.svd(block, compute_uv=False).min(initial=1.0) > LEAST_FOLLOWED_PIVOT)

@@ -1,0 +1,243 @@
+"""The cell with a reference set A of active rows, factored, and columns of its response to unit jumps and forces.
+
+Jumps g on the rows of A and forces f on the others I, each on both faces, make multipliers on A and gaps on I,
+
+    (lam, gap) = Gamma (g, f),  Gamma = [ F_AA^-1          -F_AA^-1 F_AI                  ]
+                                        [ -F_IA F_AA^-1    F_IA F_AA^-1 F_AI - F_II       ],
+
+the principal pivot transform of the dual operator, with F_AA^-1 the inverse on forces in equilibrium.  It is symmetric,
+positive semi-definite on A and negative definite on I.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+from scipy.sparse import csr_matrix
+
+from feti_homog.feti.decomposition.jump_operator import JumpOperator
+from feti_homog.feti.exact.spring_update import SpringUpdate
+from feti_homog.feti.operators.interface_operators import InterfaceOperators
+from feti_homog.feti.preconditioners.assembled_schur import AssembledSchur
+from feti_homog.feti.thresholds import BUFFERED_COLUMNS, CHUNK_RANKS, INFLUENCE_CHUNK, NORM_ITERATIONS, STIFF_FIBRES
+from feti_homog.system.parallel.distributed_arrays import allreduce_sum, gather_rows, scale_rows
+from feti_homog.typing import Float, Int
+
+# Bonds, each in all directions, that let no rigid-body motion pass between two bodies.
+HOLDING_BONDS = 2
+
+
+class BodyTies:
+    """Two bonds of every fibre and the body around it, the second as far as can be from the first."""
+
+    def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator) -> None:
+        """Choose the bonds.  Collective."""
+        nodes = jump_operator.nodes
+        self._comm = comm
+        self._rows = nodes.row[:, None] + np.arange(jump_operator.components)
+        bodies, points = (np.concatenate(comm.allgather(x)) for x in (nodes.bodies, nodes.points))
+        _, first, pair = np.unique(bodies, axis=0, return_index=True, return_inverse=True)
+        pair = pair.ravel()
+        distance = np.linalg.norm(points - points[first[pair]], axis=1)
+        order = np.lexsort([distance, pair])
+        last = order[np.cumsum(np.bincount(pair)) - 1] if len(pair) else first
+        begin = comm.exscan(len(nodes.row)) or 0
+        self._ties = np.stack([first, last], axis=1) - begin
+        self._pair = pair[begin : begin + len(nodes.row)]
+
+    def tied(self, active: Float) -> Float:
+        """`active` (owned rows,) with all rows of the ties where fewer than two bonds hold two bodies.  Collective."""
+        bonded = active[self._rows].prod(axis=1)
+        holding = allreduce_sum(self._comm, np.bincount(self._pair, bonded, len(self._ties)).astype(float))
+        ties = self._ties[holding < HOLDING_BONDS].ravel()
+        own = self._rows[ties[(ties >= 0) & (ties < len(self._rows))]]
+        tied = active.copy()
+        tied[own] = 1.0
+        return tied
+
+
+class ReferenceCell:
+    """Gamma of one reference set.
+
+    Attributes:
+        active: (owned rows,) 1 on A.
+        assembled: the cell with the bonds of A.
+    """
+
+    def __init__(
+        self,
+        comm: MPI.Intracomm,
+        jump_operator: JumpOperator,
+        operators: InterfaceOperators,
+        one_sided: csr_matrix,
+        active: Float,
+        assembled: AssembledSchur,
+    ) -> None:
+        """`one_sided` is B_D, and `assembled` has the same active rows.  Collective."""
+        self._comm, self.active = comm, active
+        self._jump_operator, self._operators = jump_operator, operators
+        self._BD, self._BDT = one_sided, one_sided.T.tocsr()
+        reached = self._BDT.getnnz(axis=1) > 0
+        self._reached = [bool(reached[own].any()) for own in operators.slices]
+        self.assembled = assembled
+        self._is_bonded = not comm.allreduce(bool((active == 0).any()), MPI.LOR)
+        first = jump_operator.owned[0]
+        self._springs = SpringUpdate(comm, first, active * operators.compliance, self._without_springs)
+
+    def destroy(self) -> None:
+        """Free the factor."""
+        self.assembled.destroy()
+
+    def respond(self, x: Float) -> Float:
+        """Gamma x for x (owned rows,) or (owned rows, k).  Collective."""
+        return self._springs.apply(self._without_springs(x))
+
+    def force_of_rigid_motions(self, stiffness: Float) -> float:
+        """Return the largest force, relative to `stiffness` (owned rows,), by jumps of rigid-body motions of size 1.
+
+        Collective.
+        """
+        bodies = zip(self._operators.subdomains, self._operators.dofs, strict=True)
+        motions = [s.R[dofs].sum(axis=1) for s, dofs in bodies]
+        moved = np.concatenate([np.zeros(0), *(own / (np.abs(own).max(initial=0.0) or 1.0) for own in motions)])
+        jump = scale_rows(self.active, self._jump_operator.sum(self._operators.B @ moved))
+        force = scale_rows(self.active, self.respond(jump)) / stiffness
+        return float(self._comm.allreduce(np.abs(force).max(initial=0.0), MPI.MAX))
+
+    def largest_eigenvalue(self, first: int) -> float:
+        """|Gamma| as some steps of the power method find it; this rank's rows begin at `first`.  Collective."""
+        x = np.cos(np.arange(first, first + len(self.active)) ** 2.0)
+        norm = 0.0
+        for _ in range(NORM_ITERATIONS):
+            length = np.sqrt(allreduce_sum(self._comm, np.array([x @ x]))[0])
+            if length == 0.0:
+                break
+            x = self.respond(x / length)
+            norm = float(np.sqrt(allreduce_sum(self._comm, np.array([x @ x]))[0]))
+        return norm
+
+    def _without_springs(self, x: Float) -> Float:
+        """Return the same without the springs at nodes of A where fibre and matrix are both cut.
+
+        Displacements u = B_D^T g + Z y whose forces S u - B_I^T f vanish on Z; then B_A^T lam = S u - B_I^T f.
+        """
+        operators, jump_operator = self._operators, self._jump_operator
+        g, f = scale_rows(self.active, x), scale_rows(1.0 - self.active, x)
+        is_pulled = not self._is_bonded and self._comm.allreduce(bool(f.any()), MPI.LOR)
+        pulled = operators.BT @ jump_operator.gather(f) if is_pulled else 0.0
+
+        def forces_by(u: Float) -> Float:
+            forces = operators.apply_some_with_springs(self._reached, u)
+            return forces - pulled if is_pulled else forces
+
+        u = self._BDT @ jump_operator.gather(g)
+        u += self.assembled.relieving_displacement(forces_by(u))
+        lam = scale_rows(self.active, jump_operator.sum(self._BD @ forces_by(u)))
+        if self._is_bonded:
+            return lam
+        gap = -jump_operator.sum(operators.B @ u)
+        if is_pulled:
+            gap -= scale_rows(operators.compliance, f)
+        return lam + scale_rows(1.0 - self.active, gap)
+
+
+def one_sided_jumps(comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> csr_matrix:
+    """(local rows, boundary dofs) B_D with B B_D^T = I that leaves one side of each interface at rest.  Collective.
+
+    So forces are wanted of the other side alone: of the inner body, if it is not so stiff that rounding would show.
+    """
+    inside, B = jump_operator.inside, operators.B.tocoo()
+    is_bond = inside >= 0
+    inner, mine = inside[B.row], is_bond[B.row]
+    # Of each inner body and what is around it: the mean diagonal stiffness.
+    side = 2 * inner + operators.of_inner[B.col]
+    most = 2 * (comm.allreduce(int(inside.max(initial=-1)), MPI.MAX) + 1)
+    weights = B.data[mine] ** 2
+    sums = [np.bincount(side[mine], values, most) for values in (weights * operators.diagonal[B.col[mine]], weights)]
+    total, count = allreduce_sum(comm, np.stack(sums))
+    outer_mean, inner_mean = (total / np.maximum(count, 1.0)).reshape(-1, 2).T
+    moves_inner = np.append(inner_mean <= STIFF_FIBRES * outer_mean, False)[inside]
+    moved = ~mine | (operators.of_inner[B.col] == moves_inner[B.row])
+    copies = np.where(is_bond, jump_operator.copies[np.arange(len(inside)), moves_inner.astype(int)], 1)
+    return csr_matrix(((copies[B.row] * B.data)[moved], (B.row[moved], B.col[moved])), shape=B.shape)
+
+
+def stiffness_of_rows(jump_operator: JumpOperator, operators: InterfaceOperators) -> Float:
+    """(owned rows,) 1 / (B D^-1 B^T + C) of each row.  Collective.
+
+    D is the diagonal of the bodies' stiffness, C the compliance of the springs.
+    """
+    flexibility = jump_operator.sum(operators.B.power(2) @ (1.0 / operators.body_diagonal))
+    return np.asarray(1.0 / (flexibility + operators.springs))
+
+
+class ResponseColumns:
+    """Gamma[:, K] and Gamma[K, K] for a growing set K of rows.
+
+    Attributes:
+        rows: (k,) K, global numbers in the order in which they came.
+    """
+
+    def __init__(self, comm: MPI.Intracomm, cell: ReferenceCell, owned: tuple[int, int], global_rows: int) -> None:
+        """No columns yet; this rank owns the rows from owned[0] up to owned[1]."""
+        self._comm, self._cell, self._first = comm, cell, owned[0]
+        self.rows: Int = np.zeros(0, np.int64)
+        self._position = np.full(global_rows, -1)
+        # Both grow in place; a full buffer doubles.  Memory is taken when columns come.
+        room = min(global_rows, BUFFERED_COLUMNS)
+        self._columns, self._block = np.empty((owned[1] - owned[0], room), order="F"), np.empty((room, room))
+
+    @property
+    def owned(self) -> Float:
+        """(owned rows, k) Gamma[:, K]."""
+        return self._columns[:, : len(self.rows)]
+
+    @property
+    def block(self) -> Float:
+        """(k, k) Gamma[K, K] on every rank."""
+        return self._block[: len(self.rows), : len(self.rows)]
+
+    def positions(self, rows: Int) -> Int:
+        """Return where rows are in K; -1 if they are not."""
+        return self._position[rows]
+
+    def clear(self) -> None:
+        """Give the memory back; no columns are left."""
+        self.rows, self._columns, self._block = self.rows[:0], self._columns[:, :0].copy(), self._block[:0, :0].copy()
+
+    def add(self, rows: Int) -> None:
+        """Find the columns of those rows that have none.  Collective."""
+        new = np.unique(rows[self._position[rows] < 0])
+        for some in self._chunks(new):
+            self._append(some, self._of_units(some))
+
+    def found(self, rows: Int) -> Float:
+        """(owned rows, k) columns of global rows (k,), which are not kept.  Collective."""
+        return np.hstack([self._of_units(some) for some in self._chunks(rows)])
+
+    def _chunks(self, rows: Int) -> list[Int]:
+        """Divide rows into those whose columns are found at once."""
+        # A few columns too many are cheaper with others than by themselves.
+        chunk = INFLUENCE_CHUNK * min(self._comm.size, CHUNK_RANKS)
+        return np.array_split(rows, max(round(len(rows) / chunk), 1)) if len(rows) else []
+
+    def _of_units(self, rows: Int) -> Float:
+        unit = np.zeros((len(self._columns), len(rows)))
+        mine = np.flatnonzero((rows >= self._first) & (rows < self._first + len(unit)))
+        unit[rows[mine] - self._first, mine] = 1.0
+        return self._cell.respond(unit)
+
+    def _append(self, rows: Int, columns: Float) -> None:
+        """Take the columns (owned rows, k) of rows (k,) that have none.  Collective."""
+        old = len(self.rows)
+        self._position[rows] = old + np.arange(len(rows))
+        self.rows = np.concatenate([self.rows, rows])
+        n = len(self.rows)
+        if n > len(self._block):
+            size = max(n, 2 * len(self._block))
+            columns_of, block = np.empty((len(self._columns), size), order="F"), np.empty((size, size))
+            columns_of[:, :old], block[:old, :old] = self._columns[:, :old], self._block[:old, :old]
+            self._columns, self._block = columns_of, block
+        self._columns[:, old:n] = columns
+        self._block[:n, old:n] = gather_rows(self._comm, columns, self._first, self.rows)
+        self._block[old:n, :old] = self._block[:old, old:n].T

@@ -1,0 +1,104 @@
+"""Springs at the few nodes where both bodies are cut, which belong to the boundary of no single subdomain.
+
+With the compliances C of the rows X the preconditioner H, M^-1 or H_0, becomes
+
+    H - H X (C^-1 + X^T H X)^-1 X^T H,
+
+which is (H^-1 + X C X^T)^-1 where H is definite, as H_0 is on G^T lam = 0.  On the rows X this is
+
+    C^-1 (C^-1 + X^T H X)^-1 X^T H,
+
+of which, however soft the springs, nothing cancels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from mpi4py import MPI
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
+
+from feti_homog.errors import ConvergenceError
+from feti_homog.feti.preconditioners.scaled import Preconditioner
+from feti_homog.system.parallel.distributed_arrays import gather_rows, scale_rows
+from feti_homog.system.parallel.mpi_errors import agree
+from feti_homog.typing import Float
+
+
+class SpringUpdate:
+    """The update for the rows where `compliance` (owned rows,) is not 0."""
+
+    def __init__(self, comm: MPI.Intracomm, first: int, compliance: Float, inverse: Callable[[Float], Float]) -> None:
+        """`inverse` is r -> H r for r (owned rows, k); `first` is this rank's first row.  Collective.
+
+        Raises:
+            ConvergenceError: the springs are so soft beside the bodies that rounding of H hides them.
+        """
+        self.comm, self.first = comm, first
+        own = np.flatnonzero(compliance)
+        self.rows = np.concatenate(comm.allgather(first + own))
+        if not len(self.rows):
+            return
+        mine = (self.rows >= first) & (self.rows < first + len(compliance))
+        unit = np.zeros((len(compliance), len(self.rows)))
+        unit[own, np.flatnonzero(mine)] = 1.0
+        self._columns = inverse(unit)
+        stiffness = 1.0 / np.concatenate(comm.allgather(compliance[own]))
+        block = gather_rows(comm, self._columns, first, self.rows)
+        self._factor = agree(comm, _factored, np.diag(stiffness) + (block + block.T) / 2)
+        self._own, self._mine, self._stiffness = own, mine, stiffness[mine]
+
+    def apply(self, z: Float) -> Float:
+        """Return the updated H times r, for z = H r (owned rows,) or (owned rows, k). Collective."""
+        if not len(self.rows):
+            return z
+        stretch = cho_solve(self._factor, gather_rows(self.comm, z, self.first, self.rows))
+        updated = np.asarray(z - self._columns @ stretch)
+        updated[self._own] = scale_rows(self._stiffness, stretch[self._mine])
+        return updated
+
+
+def _factored(block: Float) -> tuple[Float, bool]:
+    """Return the factor of C^-1 + X^T H X. Raises ConvergenceError if it is not definite."""
+    try:
+        factor: tuple[Float, bool] = cho_factor(block)
+    except LinAlgError as error:
+        raise ConvergenceError(
+            "[interface] springs too soft beside the pieces of cut fibres, rounding hides them: expected whole fibres, "
+            "by fewer [decomposition] subdomains, or -feti_pc_type dirichlet"
+        ) from error
+    return factor
+
+
+class SpringUpdated(Preconditioner):
+    """A preconditioner with the update for the springs of all active rows, and for what they soften."""
+
+    def __init__(self, comm: MPI.Intracomm, inner: Preconditioner, first: int, compliance: Float) -> None:
+        """Arguments as of `SpringUpdate`; `inner` is H, for all rows active.  Collective."""
+        self._comm, self._inner, self._first = comm, inner, first
+        self._left_out = self._compliance = compliance
+        self.is_exact = inner.is_exact
+        self._update = SpringUpdate(comm, first, compliance, inner.apply)
+
+    @property
+    def norm(self) -> float:
+        """Bound of |H|, which softer springs make smaller."""
+        return self._inner.norm
+
+    def soften(self, more: Float) -> None:
+        """Let `more` (owned rows,) be what the springs gained in compliance, from the next `activate` on."""
+        self._compliance = self._left_out + more
+
+    def activate(self, active: Float) -> None:
+        """Restrict to the rows where `active` is 1, and update.  Collective."""
+        self._inner.activate(active)
+        self._update = SpringUpdate(self._comm, self._first, active * self._compliance, self._inner.apply)
+
+    def apply(self, r: Float) -> Float:
+        """Return the updated H times r. Collective."""
+        return self._update.apply(self._inner.apply(r))
+
+    def closing_forces(self, jump: Float) -> Float:
+        """Return the forces of `inner`, updated.  Collective."""
+        return self._update.apply(self._inner.closing_forces(jump))

@@ -1,0 +1,138 @@
+"""A window cut out of a micrograph made periodic: fibres that overlap across its border are moved apart."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import nnls
+
+from feti_homog.errors import MeshError
+from feti_homog.microstructure.arrangement import neighbours
+from feti_homog.microstructure.shapes.outlines import Outlines
+from feti_homog.typing import Float, Int
+
+# Gap / sum of the radii of fibres across the border, at least and at most.
+LEAST_GAP, MOST_GAP = 0.01, 0.05
+# Overlap / sum of the radii that counts as none, and what distances are made larger by to come below it.
+TOLERANCE = 1e-6
+# Moves differ from the smallest ones by less than this, / mean radius.
+SETTLED = 1e-4
+MAX_STEPS = 100
+
+
+@dataclass(frozen=True)
+class _Pairs:
+    """Fibres `first` and `second` (k,), the latter moved by `shift` (k, 2) periods, and least gaps (k,)."""
+
+    first: Int
+    second: Int
+    shift: Float
+    least: Float
+
+    @property
+    def key(self) -> Float:
+        """(k, 4) keys that distinguish pairs."""
+        return np.column_stack([self.first, self.second, np.round(self.shift)])
+
+    def joined(self, other: _Pairs) -> _Pairs:
+        """All pairs of both, each once."""
+        keys = np.concatenate([self.key, other.key])
+        once = np.unique(keys, axis=0, return_index=True)[1]
+        least = np.concatenate([self.least, other.least])[once]
+        return _Pairs(keys[once, 0].astype(np.intp), keys[once, 1].astype(np.intp), keys[once, 2:], least)
+
+    def where(self, chosen: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]) -> _Pairs:
+        return _Pairs(self.first[chosen], self.second[chosen], self.shift[chosen], self.least[chosen])
+
+    def vectors(self, centres: Float, size: Float) -> Float:
+        """(k, 2) from the first fibres to the second."""
+        return np.asarray(centres[self.second] - centres[self.first] + self.shift * size)
+
+
+# As `Outlines.parting`.
+Parting = Callable[[Int, Int, Float], tuple[Float, Float]]
+
+
+def moves(outlines: Outlines, size: Float) -> Float:
+    """(N, 2) the moves d of outlines on the torus that part those which overlap across its border.
+
+    The periods of the torus are `size` (2,).
+
+    They are a local minimum of sum |d|^2 such that no gap across the border is less than the smallest one within, and
+    no gap within becomes less than that, all relative to the sum of the radii and that gap between LEAST_GAP and
+    MOST_GAP. Each step solves it with the distances |v| >= r replaced by n . v >= r, n the present directions; since
+    n . v <= |v|, its solution keeps the distances.
+
+    Of others than discs, with radii of the same areas, n is the direction of the largest n . v - r, where r is the
+    reach of both along n, and that is the gap.
+
+    Raises:
+        MeshError: there is no room.
+    """
+    centres, radii, parting = outlines.centres, outlines.radii, outlines.parting
+    reach = 3 * float(outlines.longest.max())
+    moved, gap = np.zeros_like(centres), _gap_within(centres, radii, size, reach, parting)
+    nobody = np.zeros(0, np.intp)
+    pairs = _Pairs(nobody, nobody, np.zeros((0, 2)), np.zeros(0))
+    for _ in range(MAX_STEPS):
+        near = _near(centres, moved, radii, size, gap, reach, parting)
+        present = near.vectors(centres + moved, size)
+        normal, least = parting(near.first, near.second, present)
+        short = near.where((normal * present).sum(axis=1) < (least + near.least) * (1 - TOLERANCE))
+        before, pairs = moved, pairs.joined(short)
+        moved = _least_moves(pairs, centres, moved, size, float(radii.mean()), parting)
+        if len(short.first) == 0 and np.abs(moved - before).max() < SETTLED * radii.mean():
+            return moved
+    raise MeshError("there is no room to move them apart")
+
+
+def _gap_within(centres: Float, radii: Float, size: Float, reach: float, parting: Parting) -> float:
+    """Return the smallest gap / sum of the radii of discs that are not across the border, within its limits."""
+    first, second, vector = neighbours(centres, size, reach)
+    across = np.abs(centres[second] - centres[first] - vector).max(axis=1) > TOLERANCE * radii.mean()
+    normal, least = parting(first, second, vector)
+    gap = ((normal * vector).sum(axis=1) - least) / (radii[first] + radii[second])
+    return float(np.clip(gap[~across].min(initial=MOST_GAP), LEAST_GAP, MOST_GAP))
+
+
+def _near(
+    centres: Float, moved: Float, radii: Float, size: Float, gap: float, reach: float, parting: Parting
+) -> _Pairs:
+    """Pairs of different discs that are, or soon may be, nearer than they must be."""
+    present = centres + moved
+    first, second, vector = neighbours(present, size, reach)
+    apart = first != second
+    first, second, vector = first[apart], second[apart], vector[apart]
+    shift = np.round((vector - present[second] + present[first]) / size)
+    vector = centres[second] - centres[first] + shift * size
+    normal, least = parting(first, second, vector)
+    before, wanted = (normal * vector).sum(axis=1) - least, (radii[first] + radii[second]) * gap
+    return _Pairs(first, second, shift, np.where(shift.any(axis=1), wanted, np.minimum(before, wanted)))
+
+
+def _least_moves(pairs: _Pairs, centres: Float, moved: Float, size: Float, unit: float, parting: Parting) -> Float:
+    """(N, 2) the d of least sum |d|^2 with n . (v + d_second - d_first) >= r for all pairs, n their present directions.
+
+    By non-negative least squares: C. L. Lawson, R. J. Hanson, Solving Least Squares Problems, 1974, chapter 23.
+    """
+    result = np.zeros_like(centres)
+    if len(pairs.first) == 0:
+        return result
+    normal, reach = parting(pairs.first, pairs.second, pairs.vectors(centres + moved, size))
+    own, place = np.unique(np.concatenate([pairs.first, pairs.second]), return_inverse=True)
+    rows, count = np.arange(len(normal)), len(normal)
+    matrix = np.zeros((2 * len(own) + 1, count))
+    for axis in (0, 1):
+        matrix[2 * place[:count] + axis, rows] -= normal[:, axis]
+        matrix[2 * place[count:] + axis, rows] += normal[:, axis]
+    needed = (reach + pairs.least) * (1 + TOLERANCE) - (normal * pairs.vectors(centres, size)).sum(axis=1)
+    matrix[-1] = needed / unit
+    target = np.zeros(len(matrix))
+    target[-1] = 1.0
+    residual = matrix @ nnls(matrix, target, maxiter=100 * count)[0] - target
+    if abs(residual[-1]) < TOLERANCE:
+        raise MeshError("there is no room to move them apart")
+    result[own] = (-residual[:-1] / residual[-1]).reshape(-1, 2) * unit
+    return result

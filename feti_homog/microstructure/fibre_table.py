@@ -1,0 +1,288 @@
+"""A table of fibres, as micrographs are measured: one row for each, with columns x, y, radius and others."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from feti_homog.errors import CaseError
+from feti_homog.microstructure.phase_names import MATRIX, PHASE, VOID
+from feti_homog.microstructure.shapes.outlines import Columns, Outlines
+from feti_homog.microstructure.shapes.shapes import REPLACING, outlines_of
+from feti_homog.microstructure.table_columns import (
+    FIBRE_CELLS,
+    NUMBERS,
+    SourceColumn,
+    are_units,
+    lines_of,
+    misspelt,
+    number_of,
+    understood,
+)
+from feti_homog.schema.values import is_number
+from feti_homog.schema.wording import suggestion, toml_value
+from feti_homog.typing import Bool, Float, Int
+
+COLUMNS = (*list(NUMBERS)[:3], "phase", *list(NUMBERS)[3:])
+SIZES = ("width", "height", "left", "bottom")
+"""Names in comment lines about the cell: its size, and the coordinates of its lower left corner."""
+OF_FIBRES = ("coating", "inner_radius")
+SIZE = re.compile(r"\b(width|height|left|bottom)\s*[=:]\s*([^\s;=]+?)(?=,?\s|,?$|;|,[a-z])")
+
+
+@dataclass(frozen=True)
+class FibreTable:
+    """N fibres in one unit of length, any of whose periodic images may stand for them.
+
+    Attributes:
+        name: of the file or list, for faults.
+        row: (N,) line of the file, counted from 1, or place in the list: what faults call the fibre.
+        columns: (N,) numbers of all NUMBERS, and which of them the table has.
+        phase: N names, "fibre" where the table gives none, "void" of voids.
+        width, height: of the cell; None if the table does not give it.
+        left, bottom: coordinates of its lower left corner; None if the table does not give it.
+        remarks: what of the table is not used, a line each.
+    """
+
+    name: str
+    row: Int
+    columns: Columns
+    given: frozenset[str]
+    phase: tuple[str, ...]
+    width: float | None
+    height: float | None
+    left: float | None
+    bottom: float | None
+    remarks: tuple[str, ...] = ()
+
+    @cached_property
+    def outlines(self) -> Outlines:
+        """(N,) without coatings, in the unit of the table; of tables without faults."""
+        return outlines_of(self.columns)
+
+    @property
+    def radius(self) -> Float:
+        """(N,) of discs, and of discs of the same area as other outlines."""
+        return self.outlines.radii
+
+    @property
+    def coating(self) -> Float:
+        """(N,) thickness of coatings / radius, 0 without one."""
+        return self.columns["coating"]
+
+    @property
+    def inner_radius(self) -> Float:
+        """(N,) of the void within hollow fibres, 0 of others."""
+        return self.columns["inner_radius"]
+
+    @property
+    def strength(self) -> Float:
+        """(N,) strength of the bonds of each fibre / that of the case, 1 where the table gives none."""
+        return self.columns["strength"]
+
+    @property
+    def centres(self) -> Float:
+        """(N, 2)."""
+        return np.column_stack([self.columns["x"], self.columns["y"]])
+
+    @property
+    def is_void(self) -> Bool:
+        """(N,) which rows are voids."""
+        return np.array([name == VOID for name in self.phase], bool)
+
+    @property
+    def solid(self) -> FibreTable:
+        """The table without its voids."""
+        return self.rows(np.flatnonzero(~self.is_void))
+
+    def rows(self, kept: Int) -> FibreTable:
+        """Return the table of the rows `kept` (k,)."""
+        columns = {name: values[kept] for name, values in self.columns.items()}
+        return replace(self, row=self.row[kept], columns=columns, phase=tuple(self.phase[k] for k in kept.tolist()))
+
+    @property
+    def outer_radius(self) -> Float:
+        """(N,) with the coating."""
+        return self.radius * (1 + self.coating)
+
+
+def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
+    """Return the table in a text file, which is not judged as a whole: fibres may overlap.
+
+    A line of names comes first, in whose place `columns` has them: x, y, radius (or a, b), and phase, coating, angle
+    if there are any, or other names that `understood` takes; then a line for each fibre. Columns are parted by commas,
+    semicolons, tabs or else by spaces; without commas between columns, decimals may have them. What follows "#" is
+    a comment; "# width = 120, height = 80" has the size of the cell, and "left" and "bottom" have its corner.
+
+    Raises:
+        CaseError: the table is faulty; a line for each fault, with the line of the file.
+    """
+    name, faults = path.name, _Faults(path.name)
+    sizes: dict[str, float] = {}
+    lines = list[tuple[int, str]]()
+    for number, contents, comment in lines_of(path):
+        _read_sizes(comment, number, sizes, faults)
+        if contents:
+            lines.append((number, contents))
+    if not lines:
+        raise CaseError(*faults.lines, f"{name}: no rows; expected a line of names such as x, y, radius, then fibres")
+    delimiter = next((mark for mark in ";\t," if mark in lines[0][1]), None)
+    words = [_bare(word) for word in lines[0][1].split(delimiter)] if columns is None else list(columns)
+    read, others = understood(words, COLUMNS)
+    _check_names(words, read, others, lines[0][0], faults)
+    faults.throw()
+    rows = dict(_split(_below_names(lines, columns is None, delimiter), read, len(words), delimiter, faults))
+    remarks = (f"[cell] {name}: not read: {', '.join(map(toml_value, others))}",) if others else ()
+    return replace(_table(name, rows, {column.name for column in read}, sizes, faults), remarks=remarks)
+
+
+def table_of(entries: Sequence[Mapping[str, Any]], name: str) -> FibreTable:
+    """Return the table of a list of fibres with the same keys as columns have; its faults count its rows from 1.
+
+    Raises:
+        CaseError: the list is faulty; a line for each fault.
+    """
+    faults = _Faults(name)
+    for number, entry in enumerate(entries, 1):
+        for key in entry.keys() - set(COLUMNS):
+            faults.add(number, f"{key} = {toml_value(entry[key])}: unknown key; {suggestion(key, COLUMNS, {})}")
+    return _table(name, dict(enumerate(entries, 1)), {key for entry in entries for key in entry}, {}, faults)
+
+
+class _Faults:
+    """Gathers the faults of a table, each with the row that has it."""
+
+    def __init__(self, name: str) -> None:
+        self.lines: list[str] = []
+        self._name = name
+
+    def add(self, row: int, words: str) -> None:
+        self.lines.append(f"{self._name}: row {row}: {words}")
+
+    def throw(self) -> None:
+        """Raise those that there are."""
+        if self.lines:
+            raise CaseError(*self.lines)
+
+
+def _below_names(lines: list[tuple[int, str]], has_names: bool, delimiter: str | None) -> list[tuple[int, str]]:
+    """Return the lines of fibres: without the first if it has names, or no numbers, and without a next one of units."""
+    first, *others = [[_bare(word) for word in line.split(delimiter)] for _, line in lines[:2]]
+    if not has_names and any(number_of(word, delimiter) is not None for word in first):
+        return lines
+    return lines[2 if others and are_units(others[0]) else 1 :]
+
+
+def _bare(word: str) -> str:
+    return word.strip().strip('"').strip()
+
+
+def _read_sizes(comment: str, row: int, sizes: dict[str, float], faults: _Faults) -> None:
+    """Add the sizes of the cell in a comment to `sizes`."""
+    for key, word in SIZE.findall(comment):
+        value = number_of(word, ";")
+        if value is None or not is_number(value) or (value <= 0 and key in SIZES[:2]):
+            expected = "a number above 0" if key in SIZES[:2] else "a number"
+            faults.add(row, f"{key} = {word}: expected {expected}")
+        elif sizes.setdefault(key, value) != value:
+            faults.add(row, f"{key} = {word}: an earlier line has {sizes[key]:g}")
+
+
+def _check_names(
+    words: Sequence[str], read: Sequence[SourceColumn], others: Sequence[str], row: int, faults: _Faults
+) -> None:
+    """Add the faults of a line of names: none that is known, some twice, misspelt or missing."""
+    names = [column.name for column in read]
+    if not names:
+        given = toml_value(", ".join(words))
+        ways = 'in [cell] columns = ["x", "y", "radius"]'
+        faults.add(row, f"{given}: expected names of columns, as x, y, radius, here or {ways}")
+        faults.throw()
+    for name in dict.fromkeys(name for name in names if names.count(name) > 1):
+        faults.add(row, f"column {name}: there are two of it")
+    for word in others:
+        if meant := misspelt(word, [name for name in COLUMNS if name not in names]):
+            faults.add(row, f"column {toml_value(word)}: unknown; did you mean {meant}?")
+    for name in _missing(set(names)):
+        ignored = f"; not read: {', '.join(map(toml_value, others))}" if others else ""
+        faults.add(row, f"column {name}: missing{ignored}")
+
+
+def _missing(names: set[str]) -> list[str]:
+    """Columns that a table with these lacks: x, y, and the radius or the sizes of a shape, which stand in its place."""
+    instead = [sizes for sizes in REPLACING if names & set(sizes)]
+    sizes = [] if "radius" in names else instead[0] if instead else ("radius",)
+    return [name for name in ("x", "y", *sizes) if name not in names]
+
+
+def _split(
+    lines: list[tuple[int, str]], columns: Sequence[SourceColumn], count: int, delimiter: str | None, faults: _Faults
+) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Each row's number, and its cells by column: numbers, texts, and nothing for cells that are empty."""
+    for row, line in lines:
+        if line.count('"') % 2:
+            faults.add(row, "a quotation mark is not closed")
+            continue
+        words = [_bare(word) for word in line.split(delimiter)]
+        if len(words) != count:
+            faults.add(row, f"has {len(words)} columns; expected {count}, as there are names")
+            continue
+        yield row, {c.name: c.read(words[c.place], delimiter) for c in columns if words[c.place]}
+
+
+def _table(
+    name: str, rows: Mapping[int, Mapping[str, Any]], names: set[str], sizes: Mapping[str, float], faults: _Faults
+) -> FibreTable:
+    """Return the table of rows whose cells are numbers, or texts where they are faulty."""
+    for row, cells in rows.items():
+        for words in _cell_faults(cells):
+            faults.add(row, words)
+    if not rows and not faults.lines:
+        faults.lines.append(f"{name}: no fibres; expected a row for each")
+    faults.throw()
+    columns = {
+        key: np.array([cells.get(key, column.empty) for cells in rows.values()], float)
+        for key, column in NUMBERS.items()
+    }
+    return FibreTable(
+        name=name,
+        row=np.fromiter(rows, np.intp),
+        columns=columns,
+        given=frozenset(names),
+        phase=tuple(cells.get("phase", "fibre") for cells in rows.values()),
+        width=sizes.get("width"),
+        height=sizes.get("height"),
+        left=sizes.get("left"),
+        bottom=sizes.get("bottom"),
+    )
+
+
+def _cell_faults(cells: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the faults of one row."""
+    has_size = any(set(sizes) <= cells.keys() for sizes in REPLACING)
+    for key in ("x", "y", *([] if has_size else ["radius"])):
+        if key not in cells:
+            yield f"{key}: no value; expected a number"
+    for key in NUMBERS:
+        complaint = FIBRE_CELLS[key].complaint(cells.get(key, 1.0))
+        if complaint:
+            yield f"{key} = {toml_value(cells[key])}: {complaint}"
+    yield from _phase_faults(cells)
+
+
+def _phase_faults(cells: Mapping[str, Any]) -> Iterator[str]:
+    """Faults of the phase of one row."""
+    phase = cells.get("phase", "fibre")
+    if phase == VOID:
+        yield from (f"{key} = {toml_value(cells[key])}: a void has none" for key in OF_FIBRES if cells.get(key))
+    if not isinstance(phase, str) or not (phase == VOID or PHASE.fullmatch(phase)) or phase == MATRIX:
+        yield (
+            f"phase = {toml_value(phase)}: expected a name of letters, digits, _, - and :, "
+            'but not "matrix", which is around the fibres'
+        )

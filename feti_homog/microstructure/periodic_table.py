@@ -1,0 +1,266 @@
+"""The arrangement of the fibres of a table: images that are one fibre, and what is wrong with it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from feti_homog.errors import MeshError
+from feti_homog.microstructure import cut_window
+from feti_homog.microstructure.arrangement import Arrangement, clear_shift, clearance, in_voids, neighbours
+from feti_homog.microstructure.fibre_table import FibreTable
+from feti_homog.microstructure.shapes.ellipses import Discs
+from feti_homog.microstructure.shapes.outlines import Outlines, directions
+from feti_homog.microstructure.shapes.shapes import SHAPES, with_parts
+from feti_homog.typing import Bool, Float, Int
+
+# Relative to the radius: rows nearer than this, or a period apart to this, are one fibre.
+SAME_FIBRE = 0.01
+# Directions in which outlines are compared.
+COMPARED = directions(np.linspace(0.0, 2 * np.pi, 24, endpoint=False))
+# Gap / mean radius of two fibres below which they touch: elements between them would be too many.
+LEAST_GAP = 1e-4
+# Radius / width of the cell above which positions on a circle differ by more than rounding.
+SMALLEST_RADIUS = 1e-6
+# Thickness / radius of the thinnest and of the thickest coating.
+COATINGS = 0.01, 1.0
+# Distance of the sides of a cell from tangency with an outline / mean radius, below which elements there are needles.
+LEAST_CLEARANCE = 1e-3
+# Decimals of coordinates / width of the cell of tables that may have any origin and unit, and of height / width: gmsh
+# may put other elements beside ellipses and polygons where the last digit of a length is another.
+TABLE_DECIMALS, HEIGHT_DECIMALS = 10, 12
+# Overlap / radius of the smaller fibre, up to which fibres are repaired.
+REPAIRED = 0.01
+MOST_LISTED = 30  # moved fibres that are listed one by one
+
+
+def table_arrangement(table: FibreTable, window: str, repairs: bool = False) -> Arrangement:
+    """Return the fibres of a table, in the order of its rows, then its voids.
+
+    Periodic images are one, the first of them. In a window that is cut out of something larger, fibres that overlap
+    across its border are moved apart.
+
+    A table that gives the corner of its cell keeps it, if the sides are clear of tangency with its discs and the corner
+    in no void (`in_voids`); that of a random cell gives the mesh of that cell. Else all is shifted (`clear_shift`),
+    rounded and meshed in the order of the coordinates, so that tables that differ by a shift, by the order of rows or
+    by units have one mesh. Outlines that are not round are rounded wherever they are.
+
+    Raises:
+        MeshError: rows lie outside, come twice, overlap or touch; a line for each fault.
+    """
+    table, repaired = _repaired(table, window) if repairs else (table, ())
+    kept, centres, moves, size = on_torus(table, window)
+    order = np.argsort(table.is_void[kept], kind="stable")
+    rows, places = kept[order], (centres + moves)[order]
+    fibres = replace(
+        _nested(table, rows, places % size / size[0], float(size[1] / size[0])),
+        remarks=repaired + (_moved_fibres(table, kept, moves) if window == "cut" else ()),
+    )
+    shifted = clear_shift(fibres)
+    is_placed = table.left is not None and table.bottom is not None
+    clear = min(LEAST_CLEARANCE * float(fibres.radii.mean()), clearance(shifted))
+    if not is_placed or clearance(fibres) < clear or in_voids(fibres, np.zeros((1, 2))).all():
+        return _in_mesh_order(_rounded(shifted))
+    return fibres if isinstance(fibres.outlines, Discs) else _rounded(fibres)
+
+
+def _repaired(table: FibreTable, window: str) -> tuple[FibreTable, tuple[str, ...]]:
+    """Return the table without slight overlaps, and its repaired rows in one line.
+
+    Fibres that touch or overlap by up to REPAIRED of a radius are smaller by what parts them.
+    """
+    assert table.width is not None and table.height is not None
+    size, centres = np.array([table.width, table.height]), table.centres - _corner(table)
+    kept = np.flatnonzero(_without_images(table, centres, size, window == "cut")[0])
+    outer = table.outlines[kept].at(centres[kept]).grown((table.coating * table.radius)[kept])
+    first, second, gap, _, across = _gaps(table, kept, outer, size)
+    least = LEAST_GAP * (table.outer_radius[kept][first] + table.outer_radius[kept][second]) / 2
+    smaller = np.minimum(table.radius[kept][first], table.radius[kept][second])
+    near = (gap < least) & (gap > -REPAIRED * smaller) & ~(across & (window == "cut"))
+    share = np.zeros(len(table.row))
+    for own in (first[near], second[near]):
+        sizes = np.stack([table.columns[name][kept[own]] for name in ("radius", "a", "b")])
+        np.maximum.at(share, kept[own], (least - gap)[near] / np.nanmin(sizes, axis=0))
+    names = {"radius", *(name for shape in SHAPES for name in shape.sizes if name != "sides")}
+    # A little more than enough, for the gap is compared with the radii that are left.
+    columns = {name: own * (1 - 0.51 * share) if name in names else own for name, own in table.columns.items()}
+    rows = table.row[share > 0]
+    listed = f"rows {', '.join(map(str, rows[:MOST_LISTED]))}{', ...' if len(rows) > MOST_LISTED else ''}"
+    words = f"{listed} are smaller by up to {100 * 0.51 * share.max():.2g} %" if len(rows) else "nothing to repair"
+    return replace(table, columns=columns), (f'[cell] repair = "overlaps": {words}',)
+
+
+def _nested(table: FibreTable, rows: Int, centres: Float, height: float) -> Arrangement:
+    """Return the rows (k,) about these centres / width of the cell.
+
+    A ring around each outline that has a coating or that is a void in a hollow fibre.
+    """
+    assert table.width is not None
+    outlines, core = table.outlines[rows].per(table.width).at(centres), table.inner_radius[rows] / table.width
+    radii, is_hollow = outlines.radii, core > 0
+    coating = np.where(is_hollow, radii - core, table.coating[rows] * radii)
+    inner = with_parts(outlines, [(is_hollow, Discs(centres[is_hollow], core[is_hollow]))])
+    phase = tuple(table.phase[row] for row in rows)
+    return Arrangement(1.0, height, inner, phase, coating, is_hollow, row=rows)
+
+
+def _rounded(arrangement: Arrangement) -> Arrangement:
+    """Return the arrangement with coordinates of TABLE_DECIMALS, 0 on either side, in a cell of HEIGHT_DECIMALS."""
+    outlines, least = arrangement.outlines.rounded(TABLE_DECIMALS), 10.0**-TABLE_DECIMALS
+    return replace(
+        arrangement,
+        height=round(arrangement.height, HEIGHT_DECIMALS),
+        outlines=outlines.at(np.where(outlines.centres >= arrangement.size - least, 0.0, outlines.centres)),
+        coating=arrangement.coating.round(TABLE_DECIMALS),
+    )
+
+
+def _in_mesh_order(arrangement: Arrangement) -> Arrangement:
+    """Return the arrangement meshed in the order of its coordinates."""
+    x, y = arrangement.centres.T
+    return replace(arrangement, mesh_order=np.lexsort((y, x)))
+
+
+def _moved_fibres(table: FibreTable, kept: Int, moves: Float) -> tuple[str, ...]:
+    """List the rows of `kept` (k,) that a cut window moves by these vectors (k, 2), and how far, in one line."""
+    distance = np.linalg.norm(moves, axis=1)
+    moved = distance > cut_window.TOLERANCE * table.radius.mean()
+    rows, far = table.row[kept[moved]], distance[moved]
+    listed = [f"row {rows[k]} by {far[k]:.3g}" for k in np.argsort(-far, kind="stable")[:MOST_LISTED]]
+    rest = [f"and {len(rows) - MOST_LISTED} others by less"] if len(rows) > MOST_LISTED else []
+    which = f": {', '.join(listed + rest)}" if listed else ""
+    return (f'[cell] window = "cut": {len(rows)} of {len(table.row)} fibres moved{which}',)
+
+
+def on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]:
+    """Rows (k,) that are fibres, where they are (k, 2) in the cell, their moves (k, 2), and the cell's size (2,).
+
+    Raises as `table_arrangement`.
+    """
+    assert table.width is not None and table.height is not None
+    size = np.array([table.width, table.height])
+    centres = table.centres - _corner(table)
+    is_cut = window == "cut"
+    _raise_faults(table, _outside(table, centres, size, is_cut))
+    first, faults = _without_images(table, centres, size, is_cut)
+    _raise_faults(table, faults)
+    kept = np.flatnonzero(first)
+    centres = centres[kept]
+    outer = table.outlines[kept].at(centres).grown((table.coating * table.radius)[kept])
+    _raise_faults(table, _contacts(table, kept, outer, size, is_cut))
+    if not is_cut:
+        return kept, centres, np.zeros_like(centres), size
+    try:
+        return kept, centres, cut_window.moves(outer, size), size
+    except MeshError as error:
+        words = "fibres overlap across the border, and " + str(error)
+        raise MeshError(f'[cell] {table.name}: window = "cut": {words}; leave some of them out') from error
+
+
+def fibre_rows(table: FibreTable, window: str) -> Int:
+    """(fibres,) places in the table of the fibres of its cell, in the order of their numbers."""
+    size = np.array([table.width, table.height], float)
+    first, _ = _without_images(table, table.centres - _corner(table), size, window == "cut")
+    return np.flatnonzero(first & ~table.is_void)
+
+
+def _corner(table: FibreTable) -> Float:
+    """(2,) the lower left corner of the cell; the lowest coordinates of centres if the table gives none."""
+    given = np.array([table.left, table.bottom], float)
+    return np.where(np.isnan(given), table.centres.min(axis=0), given)
+
+
+def _raise_faults(table: FibreTable, faults: list[str]) -> None:
+    if faults:
+        raise MeshError(*(f"[cell] {table.name}: {fault}" for fault in faults))
+
+
+def _outside(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> list[str]:
+    """Faults of fibres that are no part of the cell, or too large or too small for it.
+
+    Discs reach into a periodic cell; of a cut window the centres are within.
+    """
+    radius, called = _largest_sizes(table)
+    faults = []
+    for axis, (name, width) in enumerate(zip(("width", "height"), size.tolist(), strict=True)):
+        over = np.maximum(-centres[:, axis], centres[:, axis] - width)
+        reach = radius if (table.left, table.bottom)[axis] is not None else np.full_like(radius, 2 * radius.max())
+        for k in np.flatnonzero(over > (SAME_FIBRE * radius if is_cut else (1 + SAME_FIBRE) * reach)).tolist():
+            value = table.centres[k, axis]
+            faults.append(f"row {table.row[k]}: {'xy'[axis]} = {value:g}: lies outside the cell, of {name} {width:g}")
+    for k in np.flatnonzero((2 * radius >= size.min()) | (radius < SMALLEST_RADIUS * size[0])).tolist():
+        limits = f"from {SMALLEST_RADIUS * size[0]:g} to below {size.min() / 2:g} in this cell"
+        faults.append(f"row {table.row[k]}: {called[k]} = {radius[k]:g}: expected {limits}")
+    return faults + _unlikely_coatings(table)
+
+
+def _largest_sizes(table: FibreTable) -> tuple[Float, list[str]]:
+    """Return the largest of the lengths (N,) that rows give, and their columns."""
+    names = ["radius", *(name for shape in SHAPES for name in shape.sizes if name != "radius")]
+    given = np.nan_to_num(np.stack([table.columns[name] for name in names]))
+    return given.max(axis=0), [names[k] for k in given.argmax(axis=0).tolist()]
+
+
+def _unlikely_coatings(table: FibreTable) -> list[str]:
+    """Faults of coatings that are too thin or too thick to be meshed."""
+    least, most = COATINGS
+    bad = np.flatnonzero((table.coating > 0) & ((table.coating < least) | (table.coating > most)))
+    expected = f"expected 0, or from {least:g} to {most:g}"
+    return [f"row {table.row[k]}: coating = {table.coating[k]:g}: {expected}" for k in bad.tolist()]
+
+
+def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> tuple[Bool, list[str]]:
+    """(N,) which rows are the first of their fibre, and faults of rows at one place that are not one fibre."""
+    first, second, vector = neighbours(centres, size, SAME_FIBRE * table.radius.max())
+    radius, strength, apart = table.radius, table.strength, np.linalg.norm(vector, axis=1)
+    smaller = np.minimum(radius[first], radius[second])
+    near = (first != second) & (apart < SAME_FIBRE * smaller)
+    first, second, vector = first[near], second[near], vector[near]
+    in_place = np.linalg.norm(centres[second] - centres[first] - vector, axis=1) < SAME_FIBRE * radius[first]
+    reach = table.outlines.support(np.broadcast_to(COMPARED, (len(radius), *COMPARED.shape)))
+    both = np.column_stack([reach, radius, table.outer_radius])
+    alike = (np.abs(both[second] - both[first]) < SAME_FIBRE * smaller[near, None]).all(axis=1)
+    faults = []
+    for i, j, is_here, is_alike in zip(first.tolist(), second.tolist(), in_place, alike, strict=True):
+        rows = f"rows {table.row[i]} and {table.row[j]}"
+        if is_here:
+            faults.append(f"{rows}: are at one place; expected each fibre once")
+        elif not is_cut and (not is_alike or table.phase[i] != table.phase[j] or strength[i] != strength[j]):
+            faults.append(f"{rows}: are images of one fibre, a period apart; expected one shape, phase and strength")
+    is_first = np.ones(len(radius), bool)
+    is_first[np.maximum(first, second)] = is_cut
+    return is_first, faults
+
+
+def _contacts(table: FibreTable, kept: Int, outer: Outlines, size: Float, is_cut: bool) -> list[str]:
+    """Faults of fibres, the rows `kept` (k,) with their coatings, that overlap or touch.
+
+    Of a cut window only of those that do within.
+    """
+    first, second, gap, together, across = _gaps(table, kept, outer, size)
+    bad = np.flatnonzero((gap < LEAST_GAP * together / 2) & ~(across & is_cut))
+    faults = []
+    for k in bad[np.unique(np.stack([first[bad], second[bad]]), axis=1, return_index=True)[1]].tolist():
+        i, j = table.row[kept[first[k]]], table.row[kept[second[k]]]
+        who = f"rows {i} and {j}" if i != j else f"row {i} and its image"
+        what = f"overlap by {-gap[k]:.3g}" if gap[k] < -LEAST_GAP * together[k] / 2 else "touch"
+        least = REPAIRED * min(table.radius[kept[[first[k], second[k]]]])
+        hint = '; repair = "overlaps" makes them smaller' if -gap[k] < least else ""
+        faults.append(f"{who}: {what}{' across the border' if across[k] else ''}{hint}")
+    if (across[bad]).any():
+        faults.append('fibres meet across the border: give the right width and height, or window = "cut"')
+    return faults
+
+
+def _gaps(table: FibreTable, kept: Int, outer: Outlines, size: Float) -> tuple[Int, Int, Float, Float, Bool]:
+    """Return the pairs of near fibres among the rows `kept` (k,).
+
+    Places in these, gaps, sums of radii, and whether they are across the border.
+    """
+    centres, radius = outer.centres, table.outer_radius[kept]
+    first, second, vector = neighbours(centres, size, 2 * outer.longest.max() * (1 + LEAST_GAP))
+    normal, reach = outer.parting(first, second, vector)
+    gap = (normal * vector).sum(axis=1) - reach
+    across = np.linalg.norm(centres[second] - centres[first] - vector, axis=1) > SAME_FIBRE * radius[first]
+    return first, second, gap, radius[first] + radius[second], across

@@ -1,0 +1,233 @@
+"""Discs, and ellipses as affine images of the unit circle: points, tangency with lines, curvature, and distances."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+
+import numpy as np
+
+from feti_homog.microstructure.shapes.outlines import ColumnRange, Columns, ConvexCurves, directions, widest
+from feti_homog.typing import Bool, Float, Int
+
+# Relative difference of the squares of semi-axes of a circle.
+SAME_AXES = 1e-12
+# Shorter / longer semi-axis of a fibre, at least: elements at the tips would be too small.
+THINNEST = 0.05
+
+
+@dataclass(frozen=True)
+class Ellipses(ConvexCurves):
+    """The k images c + F p of the unit circle |p| = 1, as `Outlines`; `centres` (k, 2), `frames` (k, 2, 2)."""
+
+    frames: Float
+
+    @classmethod
+    def of(cls, centres: Float, a: Float, b: Float, angle: Float) -> Ellipses:
+        """Return those of semi-axes a, b (k,), the first at `angle` (k,) in degrees from x."""
+        cosine, sine = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+        axes = np.stack([np.stack([cosine, sine], axis=1), np.stack([-sine, cosine], axis=1)], axis=2)
+        return cls(centres, axes * np.stack([a, b], axis=1)[:, None])
+
+    @classmethod
+    def round(cls, circles: Float) -> Ellipses:
+        """Return the circles of centre and radius (k, 3)."""
+        return cls(circles[:, :2], circles[:, 2, None, None] * np.eye(2))
+
+    @property
+    def circles(self) -> Float:
+        """(k, 3) centre and radius; that of ellipses which are not round is NaN."""
+        return np.column_stack([self.centres, np.where(self.are_round, self.radii, np.nan)])
+
+    @property
+    def cores(self) -> Float:
+        """The origin."""
+        return np.zeros((len(self), 1, 2))
+
+    @property
+    def radii(self) -> Float:
+        """See `Outlines`."""
+        return np.asarray(np.sqrt(np.abs(np.linalg.det(self.frames))))
+
+    @property
+    def extents(self) -> Float:
+        """See `Outlines`."""
+        return np.repeat(self.reach[:, :, None], 2, axis=2)
+
+    def grown(self, thickness: Float) -> Ellipses:
+        """Ellipses whose semi-axes are longer by `thickness` (k,)."""
+        lengths = np.linalg.norm(self.frames, axis=1)
+        return Ellipses(self.centres, self.frames * (1 + thickness[:, None] / lengths)[:, None])
+
+    @property
+    def squares(self) -> Float:
+        """(k, 2, 2) F F^T, which determine an ellipse but for its place."""
+        return np.asarray(self.frames @ self.frames.transpose(0, 2, 1))
+
+    @property
+    def reach(self) -> Float:
+        """(k, 2) how far they reach from their centres along x and y."""
+        return np.asarray(np.linalg.norm(self.frames, axis=2))
+
+    @property
+    def are_round(self) -> Bool:
+        """(k,) which are circles."""
+        squares, radius = self.squares, np.abs(np.linalg.det(self.frames))
+        away = np.abs(squares - radius[:, None, None] * np.eye(2)).max(axis=(1, 2))
+        return np.asarray(away < SAME_AXES * radius)
+
+    @property
+    def semi_axes(self) -> Float:
+        """(k, 2) their lengths, for frames whose columns are along them."""
+        return np.asarray(np.linalg.norm(self.frames, axis=1))
+
+    @property
+    def perimeters(self) -> Float:
+        """(k,) by Ramanujan's second formula, short by at most 0.04 %."""
+        a, b = self.semi_axes.T
+        h = 3 * ((a - b) / (a + b)) ** 2
+        return np.asarray(np.pi * (a + b) * (1 + h / (10 + np.sqrt(4 - h))))
+
+    @property
+    def angles(self) -> Float:
+        """(k,) from x to the first semi-axis, in degrees."""
+        return np.asarray(np.degrees(np.arctan2(self.frames[:, 1, 0], self.frames[:, 0, 0])))
+
+    @property
+    def longest(self) -> Float:
+        """(k,) the longer semi-axes."""
+        return np.asarray(self.semi_axes.max(axis=1))
+
+    def points(self, angle: Float) -> Float:
+        """(k, 2) the point c + F (cos t, sin t) of each at its parameter t (k,)."""
+        return np.asarray(self.centres + np.einsum("kij,kj->ki", self.frames, directions(angle)))
+
+    def unit(self, offsets: Float) -> Float:
+        """(k, 2) F^-1 d of a vector d (k, 2) for each."""
+        return np.asarray(np.linalg.solve(self.frames, offsets[:, :, None])[:, :, 0])
+
+    def parameter(self, offsets: Float) -> Float:
+        """(k,) the parameter at which the ray from each centre along d (k, 2) meets the ellipse."""
+        unit = self.unit(offsets)
+        return np.arctan2(unit[:, 1], unit[:, 0])
+
+    def level(self, points: Float) -> Float:
+        """(n, k) |F^-1 (x - c)| of points (n, 2): below 1 within."""
+        inverse = np.linalg.inv(self.frames)
+        return np.asarray(np.linalg.norm(np.einsum("kij,nkj->nki", inverse, points[:, None] - self.centres), axis=2))
+
+    def support(self, normal: Float) -> Float:
+        """(k, ...) |F^T n| for unit vectors n (k, ..., 2), as in `Outlines`."""
+        return np.asarray(np.linalg.norm(np.einsum("kij,k...i->k...j", self.frames, normal), axis=-1))
+
+    def parting(self, first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
+        """See `Outlines`."""
+        one, other = self[first], self[second]
+        normal = directions(gaps(one, other.at(one.centres + vector))[1])
+        return normal, one.support(normal) + other.support(normal)
+
+    def distances(self, offsets: Float) -> Float:
+        """Distances as in `Outlines`: ||F^-1 d| - 1| times the mean radius."""
+        unit = np.einsum("kij,nkj->nki", np.linalg.inv(self.frames), offsets)
+        return np.asarray(np.abs(np.linalg.norm(unit, axis=2) - 1) * self.radii)
+
+    def facing(self, normal: Float) -> Float:
+        """(k, 2) the point of each whose outward normal is n (k, 2)."""
+        along = np.einsum("kij,kj->ki", self.squares, normal)
+        return np.asarray(self.centres + along / self.support(normal)[:, None])
+
+    def bend(self, normal: Float) -> Float:
+        """(k,) the radius of curvature det(F)^2 / |F^T n|^3 at the point whose normal is n (k, 2)."""
+        return np.asarray(np.linalg.det(self.frames) ** 2 / self.support(normal) ** 3)
+
+    def normal(self, angle: Float) -> Float:
+        """(k, 2) the outward unit normal of each at its parameter (k,)."""
+        across = np.einsum("kji,kj->ki", np.linalg.inv(self.frames), directions(angle))
+        return np.asarray(across / np.linalg.norm(across, axis=1)[:, None])
+
+
+def gaps(first: Ellipses, second: Ellipses) -> tuple[Float, Float]:
+    """Return the gap (k,) between each of the first and of the second, and the direction (k,) in radians across it.
+
+    Of convex bodies it is max_n (c_2 - c_1) . n - |F_1^T n| - |F_2^T n|: the distance where they are apart, else minus
+    the shortest way that parts them.
+    """
+    vector = second.centres - first.centres
+    one, other = first.squares, second.squares
+
+    def gap(angle: Float) -> Float:
+        n = directions(angle)
+        reach = [np.sqrt(np.einsum("kmi,kij,kmj->km", n, squares, n)) for squares in (one, other)]
+        return np.asarray(np.einsum("ki,kmi->km", vector, n) - reach[0] - reach[1])
+
+    return widest(vector, gap)
+
+
+class EllipticRows:
+    """Rows with semi-axes in place of a radius, as `Shape`."""
+
+    name, sizes, has_tips = "ellipses", ("a", "b"), True
+    columns = MappingProxyType(
+        {"a": ColumnRange(np.nan, above=0.0), "b": ColumnRange(np.nan, above=0.0), "angle": ColumnRange(0.0)}
+    )
+
+    def given(self, rows: Columns) -> Bool:
+        """(N,) which rows have it."""
+        return np.asarray(~np.isnan(rows["a"]) & (rows["a"] != rows["b"]))
+
+    def faults(self, rows: Columns) -> Iterator[tuple[Bool, str]]:
+        """See `Shape`."""
+        a, b = rows["a"], rows["b"]
+        thin = np.minimum(a, b) < THINNEST * np.maximum(a, b)
+        yield thin, f"expected a / b from {THINNEST:g} to {1 / THINNEST:g}"
+        yield self.given(rows) & (rows["inner_radius"] > 0), "has an inner_radius, which only round fibres may have"
+
+    def outlines(self, rows: Columns, centres: Float) -> Ellipses:
+        """See `Shape`."""
+        return Ellipses.of(centres, rows["a"], rows["b"], rows["angle"])
+
+
+@dataclass(frozen=True)
+class Discs(ConvexCurves):
+    """k of them, as `Outlines`; `centres` (k, 2), `radii` (k,)."""
+
+    radii: Float
+
+    @property
+    def cores(self) -> Float:
+        """The origin."""
+        return np.zeros((len(self), 1, 2))
+
+    @property
+    def frames(self) -> Float:
+        """See `Outlines`."""
+        return np.asarray(self.radii[:, None, None] * np.eye(2))
+
+    @property
+    def longest(self) -> Float:
+        """The radii."""
+        return self.radii
+
+    @property
+    def extents(self) -> Float:
+        """The radii."""
+        return np.broadcast_to(self.radii[:, None, None], (len(self), 2, 2))
+
+    def grown(self, thickness: Float) -> Discs:
+        """See `Outlines`."""
+        return replace(self, radii=self.radii + thickness)
+
+    def support(self, normal: Float) -> Float:
+        """See `Outlines`."""
+        return np.broadcast_to(self.radii.reshape(-1, *[1] * (normal.ndim - 2)), normal.shape[:-1])
+
+    def parting(self, first: Int, second: Int, vector: Float) -> tuple[Float, Float]:
+        """Gaps as in `Outlines`: along the vectors, or along x where that is 0."""
+        length = np.linalg.norm(vector, axis=1)
+        normal = np.where(length[:, None] > 0, vector / np.maximum(length, 1e-300)[:, None], [1.0, 0.0])
+        return normal, self.radii[first] + self.radii[second]
+
+    def distances(self, offsets: Float) -> Float:
+        """See `Outlines`."""
+        return np.asarray(np.abs(np.linalg.norm(offsets, axis=2) - self.radii))

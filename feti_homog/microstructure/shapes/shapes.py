@@ -1,0 +1,84 @@
+"""The shapes that rows of a table may have, and the outlines of all its rows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from feti_homog.microstructure.shapes.convex_sums import ConvexSums, PolygonalRows
+from feti_homog.microstructure.shapes.ellipses import Discs, Ellipses, EllipticRows
+from feti_homog.microstructure.shapes.outlines import Columns, Outlines, Shape
+from feti_homog.typing import Bool, Float
+
+SHAPES: tuple[Shape, ...] = (EllipticRows(), PolygonalRows())
+"""All but discs, which rows are that have none of them."""
+BOTH_SIZES = "has a radius and semi-axes; give one"
+
+
+REPLACING = tuple(shape.sizes for shape in SHAPES if "radius" not in shape.sizes)
+"""Columns that stand in place of the radius."""
+
+
+def given_shapes(rows: Columns, has_tips: bool) -> list[Shape]:
+    """Return the shapes that some rows have and whose meshes may, or may not, have nodes at tips."""
+    return [shape for shape in SHAPES if shape.has_tips == has_tips and shape.given(rows).any()]
+
+
+def columns_without_tips(rows: Columns) -> dict[str, Float]:
+    """Columns (N,) of rows of such shapes, NaN of other rows; none without such rows."""
+    shapes = given_shapes(rows, has_tips=False)
+    own = np.logical_or.reduce([np.zeros(len(rows["x"]), bool), *(shape.given(rows) for shape in shapes)])
+    names = {name for shape in shapes for name in (*shape.sizes, *shape.columns, "angle")}
+    return {name: np.where(own, values, np.nan) for name, values in rows.items() if name in names}
+
+
+def have_both_sizes(rows: Columns) -> Bool:
+    """(N,) which rows have a radius and the lengths of a shape that stand in its place."""
+    others = [~np.isnan(rows[sizes[0]]) for sizes in REPLACING]
+    return np.asarray(~np.isnan(rows["radius"]) & np.logical_or.reduce(others))
+
+
+def outlines_of(rows: Columns) -> Outlines:
+    """Return the outlines (N,) of rows without faults, without their coatings, in the unit of the table."""
+    centres, radius = (
+        np.column_stack([rows["x"], rows["y"]]),
+        np.where(np.isnan(rows["radius"]), rows["a"], rows["radius"]),
+    )
+    parts: list[tuple[Bool, Outlines]] = []
+    for shape in SHAPES:
+        own = shape.given(rows)
+        if own.any():
+            parts.append((own, shape.outlines({name: values[own] for name, values in rows.items()}, centres[own])))
+    return with_parts(Discs(centres, radius), parts)
+
+
+def with_parts(outlines: Outlines, parts: Sequence[tuple[Bool, Outlines]]) -> Outlines:
+    """Return the outlines, but those of the rows (N,) of each part in its place.
+
+    Discs, ellipses or sums, if need be.
+    """
+    parts = [(own, part) for own, part in parts if own.any()]
+    if not parts:
+        return outlines
+    if all(isinstance(each, Discs) for each in (outlines, *(part for _, part in parts))):
+        radii = outlines.radii.copy()
+        for own, part in parts:
+            radii[own] = part.radii
+        return Discs(outlines.centres, radii)
+    most = max(part.cores.shape[1] for part in (outlines, *(part for _, part in parts)))
+    frames, cores = outlines.frames.copy(), _padded(outlines.cores, most)
+    for own, part in parts:
+        frames[own], cores[own] = part.frames, _padded(part.cores, most)
+    return Ellipses(outlines.centres, frames) if most == 1 else ConvexSums(outlines.centres, cores, frames)
+
+
+def elliptic(outlines: Outlines) -> Ellipses:
+    """Ellipses, and in place of other outlines discs of the same areas."""
+    has_core = outlines.cores.any(axis=(1, 2))[:, None, None]
+    return Ellipses(outlines.centres, np.where(has_core, outlines.radii[:, None, None] * np.eye(2), outlines.frames))
+
+
+def _padded(cores: Float, corners: int) -> Float:
+    """Cores (k, m, 2) of so many corners, the last one repeated."""
+    return np.pad(cores, ((0, 0), (0, corners - cores.shape[1]), (0, 0)), mode="edge")

@@ -1,0 +1,174 @@
+"""Tables of fibres as spreadsheets and other programs write them: their lines, and the names of their columns.
+
+Columns have units in brackets, diameters, areas and axes of ellipses.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from feti_homog.errors import CaseError
+from feti_homog.microstructure.shapes.outlines import ColumnRange
+from feti_homog.microstructure.shapes.shapes import SHAPES
+from feti_homog.schema.values import ValueType, real
+from feti_homog.system.runtime import input_files
+
+# Of an empty cell, and the bounds, of the columns that are numbers.
+NUMBERS = {
+    "x": ColumnRange(math.nan),
+    "y": ColumnRange(math.nan),
+    "radius": ColumnRange(math.nan, above=0.0),
+    "coating": ColumnRange(0.0, least=0.0),
+    "inner_radius": ColumnRange(0.0, least=0.0),
+    "strength": ColumnRange(1.0, above=0.0),
+} | {name: column for shape in SHAPES for name, column in shape.columns.items()}
+FIBRE_CELLS: Mapping[str, ValueType] = {
+    name: real(least=column.least, above=column.above) for name, column in NUMBERS.items()
+}
+"""The numbers of a fibre in a table."""
+
+MAX_BYTES = 1 << 26
+EMPTY = " \t\r,;"
+"""Characters of a line without cells, as Excel writes them below a table."""
+SEPARATOR = re.compile(r"sep=[,;\t]?")
+"""First line that Excel reads."""
+UNITS_OF_EXCEL = bytes.maketrans(b"\xb5\xb0\xb2", b"uo2")
+"""Micro, degree and square in its code pages of Western Europe."""
+
+
+def lines_of(path: Path) -> Iterator[tuple[int, str, str]]:
+    """Yield the number of each line, its cells, empty if it has none, and what follows "#".
+
+    Raises:
+        CaseError: the file cannot be read, or is no text.
+    """
+    has_begun = False
+    for number, line in enumerate(_text(path).splitlines(), 1):
+        contents, _, comment = line.partition("#")
+        is_empty = not contents.strip(EMPTY) or (not has_begun and SEPARATOR.fullmatch(contents.strip()) is not None)
+        has_begun = has_begun or not is_empty
+        yield number, "" if is_empty else contents, comment
+
+
+def _text(path: Path) -> str:
+    try:
+        content = input_files.read(path, MAX_BYTES)
+    except OSError as error:
+        raise CaseError(f"{path}: cannot be read: {error.strerror}") from error
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        place = error.start
+    try:
+        return content.translate(UNITS_OF_EXCEL).decode()
+    except UnicodeDecodeError as error:
+        raise CaseError(f"{path.name}: expected text in UTF-8; it has other bytes at {place}") from error
+
+
+UNITS = "nm|um|µm|μm|mm|cm|m|px|pixels?|deg|degrees?"
+UNIT = re.compile(rf"\s*(\[[^]]*\]|\([^)]*\)|/\s*[^/]+|_({UNITS}))\s*$", re.IGNORECASE)
+ROW_UNIT = re.compile(rf"[\[(]?({UNITS}|°|-)[\])]?", re.IGNORECASE)
+"""A cell in a line of units."""
+MATLABS_AXIS = "majoraxislength"
+AXES_OF_PICTURES = {"major", MATLABS_AXIS}
+"""Major axes of tables whose angles count as in pictures, where y points down."""
+CENTRES = ("{}c", "{}_c", "c{}", "center_{}", "centre_{}", "centroid_{}", "{}_center", "{}_centre")
+EQUIVALENT_DIAMETERS = ("equivdiameter", "equivalent_diameter", "equivalent_diameter_area")
+
+
+def _radius_of_area(area: float) -> float:
+    return math.copysign(math.sqrt(abs(area) / math.pi), area)
+
+
+def _same(value: float) -> float:
+    return value
+
+
+def _half(value: float) -> float:
+    return value / 2
+
+
+def _turned(value: float) -> float:
+    """Return an angle that is measured as a picture is seen, for coordinates whose y points down."""
+    return -value
+
+
+# Other names of columns, those before first, and what makes the column of their values. Major and Minor are ImageJ's
+# axes of ellipses, whose areas are of no more use; MATLAB's Centroid_1 is x, centroid-0 of scikit-image its row, y.
+OTHERS: tuple[tuple[tuple[str, ...], str, Callable[[float], float]], ...] = (
+    (("xm", *(word.format("x") for word in CENTRES), "centroid_1", "centroid-1"), "x", _same),
+    (("ym", *(word.format("y") for word in CENTRES), "centroid_2", "centroid-0"), "y", _same),
+    (("major", MATLABS_AXIS), "a", _half),
+    (("minor", "minoraxislength"), "b", _half),
+    (("r", "rad", "fibre_radius", "fiber_radius", "radii"), "radius", _same),
+    (("diameter", "diam", "d", "fibre_diameter", "fiber_diameter", *EQUIVALENT_DIAMETERS), "radius", _half),
+    (("area",), "radius", _radius_of_area),
+    (("material", "type"), "phase", _same),
+)
+
+
+INSTEAD = {"radius": "a"}
+"""Columns that are not made where another is given."""
+
+
+@dataclass(frozen=True)
+class SourceColumn:
+    """A column that is read: its place in the rows, its name, and what makes its value of a number."""
+
+    place: int
+    name: str
+    value: Callable[[float], float]
+
+    def read(self, word: str, delimiter: str | None) -> float | str:
+        """Return the value of a cell: a number, or its text if it is none."""
+        number = None if self.name == "phase" else number_of(word, delimiter)
+        return word if number is None else self.value(number)
+
+
+def _bare(word: str) -> str:
+    """Return a name without its unit, in lower case."""
+    return UNIT.sub("", word).strip().lower()
+
+
+def _bare_names(words: Sequence[str]) -> list[str]:
+    """Return bare names; MATLAB's orientation is an angle, those of others are in radians, or of another axis."""
+    bare = list(map(_bare, words))
+    return ["angle" if name == "orientation" else name for name in bare] if MATLABS_AXIS in bare else bare
+
+
+def understood(words: Sequence[str], known: Sequence[str]) -> tuple[list[SourceColumn], list[str]]:
+    """Return the columns of a line of names that are among those `known`, in any case, and the other words."""
+    bare = _bare_names(words)
+    values = {"angle": _turned} if AXES_OF_PICTURES & set(bare) else {}
+    columns = [SourceColumn(place, name, values.get(name, _same)) for place, name in enumerate(bare) if name in known]
+    for others, name, value in OTHERS:
+        given = {column.name for column in columns}
+        if {name, INSTEAD.get(name, name)}.isdisjoint(given):
+            columns += [SourceColumn(bare.index(other), name, value) for other in others if other in bare][:1]
+    read = {column.place for column in columns}
+    return columns, [word for place, word in enumerate(words) if place not in read]
+
+
+def are_units(words: Sequence[str]) -> bool:
+    """Return whether a line has units alone, which some programs write below the names."""
+    return bool(set(words) - {"", "-"}) and all(ROW_UNIT.fullmatch(word) for word in words if word)
+
+
+def misspelt(word: str, missing: Sequence[str]) -> str:
+    """Return the column among those that are `missing` that a word is nearly the name of; empty if there is none."""
+    near = difflib.get_close_matches(_bare(word), missing, n=1, cutoff=0.75)
+    return near[0] if near else ""
+
+
+def number_of(word: str, delimiter: str | None) -> float | None:
+    """Return the number that a word is, with a decimal comma where commas do not part columns; None if it is none."""
+    try:
+        value = float(word if delimiter == "," else word.replace(",", "."))
+    except ValueError:
+        return None
+    return value if math.isfinite(value) and "_" not in word else None

@@ -1,0 +1,248 @@
+"""Running the cases of a sweep: all of them, by groups of ranks, or one of a job array."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError
+from feti_homog.studies.sweep import store
+from feti_homog.studies.sweep.description import check_options
+from feti_homog.studies.sweep.plan import Sweep
+from feti_homog.studies.sweep.store import LOCK_FILE, Status
+from feti_homog.system.parallel.mpi_errors import ARRIVAL_TIMEOUT_S, on_root, on_root_only, others_come
+from feti_homog.system.runtime.file_locks import LOCK_TIMEOUT_S, Lock, LockHeld
+from feti_homog.system.runtime.standard_streams import complain, say
+
+if TYPE_CHECKING:
+    from mpi4py.MPI import Intracomm
+
+
+import time
+from dataclasses import dataclass
+from enum import Enum, auto
+from typing import TYPE_CHECKING
+
+from feti_homog.analysis.runner import run
+from feti_homog.case.case import Case
+from feti_homog.errors import MeshError
+from feti_homog.studies.sweep.plan import SweepCase
+
+if TYPE_CHECKING:
+    from mpi4py.MPI import Intracomm
+
+
+def list_cases(sweep: Sweep, directory: Path | None) -> list[str]:
+    """Return the cases in a table, with their status if a folder is given. On one rank."""
+    statuses = ["" if directory is None else store.case_state(directory, entry).status for entry in sweep.entries]
+    width = max(map(len, statuses))
+    return [
+        f"{entry.folder}  {status:<{width}}  {entry.describe(sweep.stress_unit)}".replace("    ", "  ").rstrip()
+        for entry, status in zip(sweep.entries, statuses, strict=True)
+    ]
+
+
+def check_groups(comm: Intracomm, ranks_per_case: int) -> None:
+    """Raise CaseError unless the ranks make groups of this size."""
+    if ranks_per_case < 1 or comm.size % ranks_per_case:
+        raise CaseError(f"--ranks-per-case {ranks_per_case}: expected a divisor of the {comm.size} ranks")
+
+
+def run_all(sweep: Sweep, directory: Path, comm: Intracomm, ranks_per_case: int, retry: bool, quiet: bool) -> None:
+    """Run all cases, each on so many ranks; as many at once as there are such groups.  Collective.
+
+    Raises:
+        CaseError: options of PETSc are faulty, `ranks_per_case` does not divide the number of ranks, or the folder
+            cannot be used: it holds another sweep, or another process runs this one.
+        ConvergenceError: cases failed; they are printed.
+        FetiHomogError: a result could not be written; the finished ones are kept.
+    """
+    check_groups(comm, ranks_per_case)
+    check_options(sweep)
+    with _sweep_lock(directory, comm, sweep, shared=False):
+        group = comm if ranks_per_case == comm.size else _group(comm, ranks_per_case)
+        if retry:
+            on_root_only(comm, _reset_failures, directory, sweep)
+        fault = _run_free_cases(CaseRunner(group, directory, False, quiet), sweep)
+        _raise_together(comm, fault)
+    _report(sweep, directory, comm, quiet)
+
+
+def _report(sweep: Sweep, directory: Path, comm: Intracomm, quiet: bool) -> None:
+    """Print how many cases are done; raises ConvergenceError if some failed.  Collective."""
+    states = on_root(comm, lambda: [store.case_state(directory, entry) for entry in sweep.entries])
+    if comm.rank == 0 and not quiet:
+        done = sum(state.status is Status.DONE for state in states)
+        say(f"{done} of {len(states)} cases done in {directory}")
+    failed = [(entry, state) for entry, state in zip(sweep.entries, states, strict=True) if state.status.is_failure]
+    if failed:
+        if comm.rank == 0:
+            say("\n".join(store.failure_lines(failed, sweep.stress_unit)))
+        raise ConvergenceError(f"{len(failed)} of {len(states)} cases failed; --retry computes them again")
+
+
+def run_one(sweep: Sweep, number: int, directory: Path, comm: Intracomm, retry: bool, quiet: bool) -> None:
+    """Run the case of that number (from 1) on all ranks; others may be run at the same time.  Collective.
+
+    Raises:
+        CaseError: as `run_all`, or there is no such case, or another process has it.
+        ConvergenceError: the case failed, now or before.
+        FetiHomogError: its result could not be written.
+    """
+    if not 1 <= number <= len(sweep.entries):
+        raise CaseError(f"--index {number}: expected the number of a case, 1 to {len(sweep.entries)}")
+    check_options(sweep)
+    entry, case = sweep.entries[number - 1], sweep.cases[number - 1]
+    with _sweep_lock(directory, comm, sweep, shared=True):
+        outcome, holder = CaseRunner(comm, directory, retry, quiet).run(entry, case, len(sweep.entries))
+    if outcome is Outcome.HELD_ELSEWHERE:
+        raise CaseError(f"--index {number}: {entry.folder} is being computed by {holder}")
+    if outcome is Outcome.FINISHED_BEFORE and comm.rank == 0 and not quiet:
+        say(f"{entry.folder} is finished: nothing to do")
+    state = on_root(comm, store.case_state, directory, entry)
+    if state.status.is_failure:
+        hint = "; it failed before, --retry computes it again" if outcome is Outcome.FAILED_BEFORE else ""
+        raise ConvergenceError(f"{entry.folder} ({entry.describe(sweep.stress_unit)}): {state.reason}{hint}")
+
+
+def _group(comm: Intracomm, ranks: int) -> Any:
+    """Return this rank's group of so many neighbours.  Collective."""
+    return comm.Split(comm.rank // ranks)
+
+
+def _run_free_cases(runner: CaseRunner, sweep: Sweep) -> FetiHomogError | None:
+    """Run whatever case is free until none is; returns what made the group stop before.  Collective in the group.
+
+    The group passes over cases that others have at once; in a last round it waits for each as `Lock` does.
+    """
+    timeouts = [0.0, LOCK_TIMEOUT_S]
+    try:
+        while timeouts:
+            some_computed = False
+            for entry, case in zip(sweep.entries, sweep.cases, strict=True):
+                outcome, _ = runner.run(entry, case, len(sweep.entries), timeouts[0])
+                some_computed = some_computed or outcome is Outcome.COMPUTED
+            timeouts = timeouts if some_computed else timeouts[1:]
+    except FetiHomogError as error:
+        if not others_come(runner.comm, ARRIVAL_TIMEOUT_S):
+            raise
+        if runner.comm.rank == 0:
+            complain(*error.faults)
+        return error
+    return None
+
+
+def _raise_together(comm: Intracomm, fault: FetiHomogError | None) -> None:
+    """Raise on all ranks the faults that made any group stop. Collective."""
+    faults = [fault for fault in comm.allgather(fault) if fault is not None]
+    if faults:
+        kept = "finished cases are kept; the same command goes on with the others"
+        raise FetiHomogError(*dict.fromkeys(line for fault in faults for line in fault.faults), kept)
+
+
+def _reset_failures(directory: Path, sweep: Sweep) -> None:
+    for entry in sweep.entries:
+        status = store.case_state(directory, entry).status
+        if status.is_failure:
+            store.reset(directory, entry, status)
+
+
+@contextmanager
+def _sweep_lock(directory: Path, comm: Intracomm, sweep: Sweep, shared: bool) -> Iterator[None]:
+    """Provide the folder made and held: by one sweep, or by any number of single cases. Collective."""
+    lock = Lock(directory / LOCK_FILE, shared)
+    on_root(comm, _prepare_and_lock, lock, directory, sweep)
+    try:
+        yield
+    finally:
+        lock.release()
+
+
+def _prepare_and_lock(lock: Lock, directory: Path, sweep: Sweep) -> None:
+    store.prepare_folder(directory, sweep)
+    try:
+        lock.acquire()
+    except LockHeld as holder:
+        who = str(holder) if lock.shared else f"{holder} (or single cases of it)"
+        raise CaseError(f"--out {directory}: this sweep is being run by {who}") from holder
+
+
+class Outcome(Enum):
+    """Outcome of a request to run a case."""
+
+    COMPUTED = auto()
+    FINISHED_BEFORE = auto()
+    FAILED_BEFORE = auto()
+    HELD_ELSEWHERE = auto()
+
+
+@dataclass(frozen=True)
+class CaseRunner:
+    """Runs cases of one sweep on the ranks of `comm`; `retry` takes up failed ones, `quiet` prints nothing."""
+
+    comm: Intracomm
+    directory: Path
+    retry: bool
+    quiet: bool
+
+    def run(self, entry: SweepCase, case: Case, total: int, timeout: float = LOCK_TIMEOUT_S) -> tuple[Outcome, str]:
+        """Run a case unless it is finished, failed before, or another has it for `timeout` seconds.  Collective.
+
+        Returns what came of it, and which process has the case if another one has.  Raises FetiHomogError if the
+        folder cannot be written.
+        """
+        lock = Lock(self.directory / entry.folder / LOCK_FILE, timeout=timeout)
+        try:
+            outcome, holder = on_root(self.comm, self._claim, lock, entry, case)
+            if outcome is not Outcome.COMPUTED:
+                return outcome, holder
+            start = time.perf_counter()
+            status = self._compute(entry, case)
+            seconds = time.perf_counter() - start
+            inputs = entry.describe(case.output.stress_unit)
+            self._print(f"{entry.folder} of {total}: {status}, {seconds:.2f} s; {inputs}")
+            return Outcome.COMPUTED, ""
+        finally:
+            lock.release()
+
+    def _claim(self, lock: Lock, entry: SweepCase, case: Case) -> tuple[Outcome, str]:
+        """Take the case's lock, and keep it if the case is to be computed."""
+        folder = self.directory / entry.folder
+        try:
+            folder.mkdir(exist_ok=True)
+            lock.acquire()
+        except LockHeld as holder:
+            return Outcome.HELD_ELSEWHERE, str(holder)
+        except OSError as error:
+            raise FetiHomogError(f"cannot make {folder}: {error.strerror}") from error
+        state = store.stored_state(self.directory, entry)
+        if state.status is Status.DONE or (state.status.is_failure and not self.retry):
+            lock.release()
+            return Outcome.FAILED_BEFORE if state.status.is_failure else Outcome.FINISHED_BEFORE, ""
+        if state.status is Status.DAMAGED:
+            self._print(f"{entry.folder}: {state.reason}; set aside, the case is computed again")
+        if state.status is not Status.WAITING:
+            store.reset(self.directory, entry, state.status)
+        store.write_case_file(self.directory, entry, case)
+        return Outcome.COMPUTED, ""
+
+    def _compute(self, entry: SweepCase, case: Case) -> str:
+        """Run a case and keep its error if it is the case's own.  Collective; returns its status in words."""
+        try:
+            run(case, self.directory / entry.folder, self.comm, quiet=True, resume=case.section.is_followed)
+            return Status.DONE
+        except (CaseError, MeshError, ConvergenceError) as error:
+            if not others_come(self.comm, ARRIVAL_TIMEOUT_S):
+                raise
+            on_root_only(self.comm, store.write_error, self.directory, entry, error)
+            return f"failed ({error.faults[0]})"
+        except FetiHomogError:  # a file could not be written: the case is to be computed again
+            if others_come(self.comm, ARRIVAL_TIMEOUT_S):
+                on_root_only(self.comm, store.set_aside, self.directory, entry, Status.DAMAGED)
+            raise
+
+    def _print(self, line: str) -> None:
+        if self.comm.rank == 0 and not self.quiet:
+            say(line)

@@ -1,0 +1,243 @@
+"""A sweep file expanded: its numbered cases, all of them checked."""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from feti_homog.case import case as cases
+from feti_homog.case.case import Case
+from feti_homog.case.document import read_document, to_document
+from feti_homog.case.sections import SWEEP
+from feti_homog.errors import CaseError
+from feti_homog.report.text.table import unit
+from feti_homog.schema.wording import dotted_key, toml_value
+from feti_homog.studies.sweep.points import Assignment, read_points
+
+MAX_NAMED_CASES = 4  # in one fault
+
+
+@dataclass(frozen=True)
+class SweepCase:
+    """Place of a case in a sweep.
+
+    Attributes:
+        number: of the case, from 1.
+        point: which values, from 1: all realisations of a point have the same.
+        realisation: from 1.
+        inputs: what varies, by dotted key.
+        identity: short name of what the case computes.
+    """
+
+    number: int
+    point: int
+    realisation: int
+    inputs: dict[str, Any]
+    identity: str
+
+    @property
+    def folder(self) -> str:
+        return f"case-{self.number:04d}"
+
+    def describe(self, stress_unit: str) -> str:
+        """Return the inputs in one line, with their units."""
+        values = [(f"{name} = {toml_value(value)}", unit(name, stress_unit)) for name, value in self.inputs.items()]
+        return ", ".join(f"{text} {own}".rstrip() for text, own in values)
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """The cases of a sweep file; `cases[k]` is that of `entries[k]`."""
+
+    name: str
+    entries: tuple[SweepCase, ...]
+    cases: tuple[Case, ...]
+
+    @property
+    def stress_unit(self) -> str:
+        return self.cases[0].output.stress_unit
+
+
+def load(path: str | Path) -> Sweep:
+    """Return the sweep in a file. Raises CaseError with all faults of the table [sweep], or else of all its cases."""
+    document = read_document(path)
+    if SWEEP not in document:
+        raise CaseError(f"{path}: [{SWEEP}]: missing section; `feti-homog run` runs a single case")
+    return expand(document, Path(path).parent)
+
+
+def expand(values: Mapping[str, Any], folder: Path) -> Sweep:
+    """Return the sweep of nested dictionaries with a table "sweep"; its files are relative to `folder`.
+
+    All points come once before any comes in its next realisation, so that more realisations add cases at the end.
+    Raises CaseError as `load` does.
+    """
+    document = to_document(values)
+    if SWEEP not in document:
+        raise CaseError(f"[{SWEEP}]: missing section; a single case is not a sweep")
+    table = document.pop(SWEEP)
+    if not isinstance(table, dict):
+        raise CaseError(f"{SWEEP} = {toml_value(table)}: expected a section [{SWEEP}]")
+    faults: list[str] = []
+    points, settings = read_points(table, faults)
+    unchecked = case_documents(document, points, settings.realisations, faults)
+    if faults:
+        raise CaseError(*dict.fromkeys(faults))
+    return checked(str(document.get("name", "case")), unchecked, folder)
+
+
+def checked(name: str, unchecked: Sequence[CaseDocument], folder: Path) -> Sweep:
+    """Return the sweep of its documents.
+
+    Raises CaseError with the faults of all cases, each with the cases that have it.
+    """
+    found, numbers_by_fault = [], dict[str, list[int]]()
+    for number, each in enumerate(unchecked, start=1):
+        try:
+            case = cases.parse(each.document | {"name": f"{name}-{number:04d}"}, folder)
+            identity = identity_of(case.digest(), case.petsc)
+            found.append((SweepCase(number, each.point, each.realisation, each.inputs, identity), case))
+        except CaseError as error:
+            for fault in error.faults:
+                numbers_by_fault.setdefault(fault, []).append(number)
+    if numbers_by_fault:
+        raise CaseError(*(f"{case_names(numbers)}: {fault}" for fault, numbers in numbers_by_fault.items()))
+    entries, checked = zip(*found, strict=True)
+    return Sweep(name, entries, checked)
+
+
+def identity_of(digest: str, petsc: Mapping[str, Any]) -> str:
+    """Short name of what is computed, and with which options."""
+    return hashlib.sha256((digest + json.dumps(dict(petsc), sort_keys=True)).encode()).hexdigest()[:16]
+
+
+def case_names(numbers: list[int]) -> str:
+    """Return which cases, in words."""
+    names = ", ".join(f"case-{number:04d}" for number in numbers[:MAX_NAMED_CASES])
+    rest = len(numbers) - MAX_NAMED_CASES
+    return names if rest <= 0 else f"{names} and {rest} more"
+
+
+@dataclass(frozen=True)
+class CaseDocument:
+    """The document of a case that is not checked yet: its point and realisation, from 1, and what varies."""
+
+    point: int
+    realisation: int
+    inputs: dict[str, Any]
+    document: dict[str, Any]
+
+
+def case_documents(
+    base: Mapping[str, Any],
+    points: Sequence[Assignment],
+    realisations: int | None,
+    faults: list[str],
+    section: str = SWEEP,
+) -> list[CaseDocument]:
+    """Return the cases in their order: all points, then the next realisation of those with a random cell.
+
+    What is wrong with the points, of a section, and their number of realisations is added to `faults`.
+    """
+    documents = [_with_values(base, point, faults, section) for point in points]
+    if realisations is not None:
+        faults += _realisation_faults(documents, points)
+    faults += _repeated(points[0], section) if points else []
+    return [] if faults else list(_ordered(points, documents, realisations))
+
+
+def _ordered(
+    points: Sequence[Assignment], documents: Sequence[dict[str, Any]], realisations: int | None
+) -> Iterator[CaseDocument]:
+    for realisation in range(1, (realisations or 1) + 1):
+        for point, (assignment, document) in enumerate(zip(points, documents, strict=True), start=1):
+            inputs = _inputs(assignment)
+            if realisations is not None and _is_random(document):
+                seed = _seed(document, realisation)
+                cell = document["cell"] | {"seed": seed}
+                yield CaseDocument(point, realisation, inputs | {"cell.seed": seed}, document | {"cell": cell})
+            elif realisation == 1:
+                yield CaseDocument(point, realisation, inputs, document)
+
+
+def _seed(document: Mapping[str, Any], realisation: int) -> Any:
+    """Return the seed of a realisation: that of [cell] and those after it; a faulty one stays as it is."""
+    first = document["cell"].get("seed", 0)
+    return first + realisation - 1 if isinstance(first, int) else first
+
+
+def _with_values(base: Mapping[str, Any], point: Assignment, faults: list[str], section: str) -> dict[str, Any]:
+    """Return the base with the values of a point; a table is merged into the section that it is a value of."""
+    document = copy.deepcopy(dict(base))
+    for path, value in point.items():
+        table = document
+        for name in path[:-1]:
+            table = _entry(table, name)
+            if table is None:
+                faults.append(f"[{section}] {dotted_key(path)}: {toml_value(name)} is no section")
+                return document
+        if isinstance(table, list) and len(table) == 1 and isinstance(table[0], dict):
+            table = table[0]
+        if isinstance(table, list):
+            faults.append(f"[{section}] {dotted_key(path)}: {_several(path, table)}")
+            return document
+        last = path[-1]
+        if isinstance(value, dict) and isinstance(table.get(last, {}), dict):
+            table[last] = table.get(last, {}) | value
+        else:
+            table[last] = value
+    return document
+
+
+def _entry(table: Any, name: str) -> Any:
+    """Return the table or the list of tables of this name, or of a list the table of this number, from 1.
+
+    A new one is made if there is none; None if there is something else.
+    """
+    if isinstance(table, list):
+        is_one = name.isdecimal() and 0 < int(name) <= len(table)
+        found = table[int(name) - 1] if is_one else None
+    else:
+        found = table.setdefault(name, {})
+    return found if isinstance(found, dict | list) else None
+
+
+def _several(path: Sequence[str], tables: Sequence[Any]) -> str:
+    """Return the fault of a key of several sections of one name."""
+    section, key = dotted_key(path[:-1]), path[-1]
+    return f"there are {len(tables)} sections [[{section}]]; expected {section}.1.{key} or the like"
+
+
+def _realisation_faults(documents: Sequence[dict[str, Any]], points: Sequence[Assignment]) -> list[str]:
+    line = f"[{SWEEP}] realisations: "
+    faults = []
+    if not any(map(_is_random, documents)):
+        faults.append(f'{line}only cells with geometry = "random" have several')
+    if any("cell.seed" in _inputs(point) for point in points):
+        faults.append(f"{line}excludes cell.seed, the first of which is that of [cell]")
+    return faults
+
+
+def _repeated(point: Assignment, section: str) -> list[str]:
+    """Faults of keys that vary by themselves and within a table too."""
+    given = [key for path, value in point.items() for key in _inputs({path: value})]
+    return [f"[{section}] {key}: given twice" for key in dict.fromkeys(given) if given.count(key) > 1]
+
+
+def _is_random(document: Mapping[str, Any]) -> bool:
+    cell = document.get("cell")
+    return isinstance(cell, dict) and cell.get("geometry") == "random"
+
+
+def _inputs(point: Assignment) -> dict[str, Any]:
+    """Return the values of a point by dotted key, tables taken apart."""
+    inputs: dict[str, Any] = {}
+    for path, value in point.items():
+        parts = {(*path, name): part for name, part in value.items()} if isinstance(value, dict) else {path: value}
+        inputs |= {dotted_key(key): part for key, part in parts.items()}
+    return inputs

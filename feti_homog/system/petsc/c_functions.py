@@ -1,0 +1,108 @@
+"""The few functions of PETSc's C interface that petsc4py 3.18 does not bind, and errors of callbacks from C.
+
+petsc4py's extension module resolves PETSc's symbols, so no library has to be found.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
+from typing import TYPE_CHECKING, TypeVar
+
+import numpy as np
+from petsc4py import PETSc
+
+from feti_homog.system.parallel.mpi_errors import all_raise, end_job
+from feti_homog.typing import Float
+
+Pointer = ctypes.c_void_p
+if TYPE_CHECKING:
+    from mpi4py.MPI import Comm
+
+T = TypeVar("T")
+
+
+def option_was_used(name: str) -> bool:
+    """Return whether any object has read the option `name` (without dash)."""
+    used = ctypes.c_int()
+    _call("PetscOptionsUsed", None, name.encode(), ctypes.byref(used))
+    return bool(used.value)
+
+
+def error_words(error: PETSc.Error) -> str:
+    """Return the last line of an error of PETSc's, without the rank: what was wrong."""
+    return str(error).splitlines()[-1].split("] ", 1)[-1]
+
+
+def finalize() -> int:
+    """End PETSc, which prints its logs; the error code, 0 if it could.  Collective over all ranks."""
+    return int(_library().PetscFinalize())
+
+
+def set_schur(factor: PETSc.Mat, rows: PETSc.IS) -> None:
+    """Ask the factor matrix, before it is factored, to leave the Schur complement on `rows`."""
+    _call("MatFactorSetSchurIS", Pointer(factor.handle), Pointer(rows.handle))
+
+
+def schur_complement(factor: PETSc.Mat, size: int) -> Float:
+    """Return the dense (size, size) Schur complement, in Fortran order, that a symmetric factorization has left."""
+    schur, values = Pointer(), ctypes.POINTER(ctypes.c_double)()
+    _call("MatFactorCreateSchurComplement", Pointer(factor.handle), ctypes.byref(schur), None)
+    try:
+        _call("MatDenseGetArrayRead", schur, ctypes.byref(values))
+        return np.ctypeslib.as_array(values, (size, size)).T.copy(order="F")
+    finally:
+        _call("MatDestroy", ctypes.byref(schur))
+
+
+def _call(function: str, *arguments: object) -> None:
+    code = getattr(_library(), function)(*arguments)
+    if code:
+        raise PETSc.Error(code)
+
+
+@cache
+def _library() -> ctypes.CDLL:
+    return ctypes.CDLL(PETSc.__file__)
+
+
+class CallbackErrors:
+    """Calls functions within PETSc's callbacks, and keeps the first exception that one raises.
+
+    No exception may pass through PETSc's C code: petsc4py 3.22 crashes. Instead the callback returns what ends PETSc's
+    method, such as NaN, and so do all later ones, until `raised` raises the exception.
+    """
+
+    def __init__(self, comm: Comm) -> None:
+        self._comm = comm
+        self._error: BaseException | None = None
+
+    def call(self, function: Callable[[], T], otherwise: T) -> T:
+        """Return function(), or `otherwise` if that, or an earlier call, has raised. Collective.
+
+        An error for the user that all ranks raise is kept on all. A rank that raises alone, or meets a defect, ends
+        the job: the others, in the middle of `function`, would wait for it.
+        """
+        if self._error is not None:
+            return otherwise
+        try:
+            return function()
+        except BaseException as error:
+            if self._comm.size > 1 and not all_raise(self._comm, error):
+                end_job(self._comm, error)
+            self._error = error
+            return otherwise
+
+    @contextmanager
+    def raised(self) -> Iterator[None]:
+        """At the end of the block, which calls PETSc, raise what was kept."""
+        try:
+            yield
+        except PETSc.Error:
+            if self._error is None:
+                raise
+        error, self._error = self._error, None
+        if error is not None:
+            raise error

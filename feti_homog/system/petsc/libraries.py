@@ -1,0 +1,138 @@
+"""The libraries that are built on one MPI, which pip does not bring: found, started, or reported in a sentence."""
+
+from __future__ import annotations
+
+import atexit
+import importlib
+import re
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from feti_homog.errors import EXIT_DEFECT, LibraryError
+from feti_homog.system.runtime import process_memory
+from feti_homog.system.runtime.standard_streams import complain
+
+if TYPE_CHECKING:
+    from mpi4py.MPI import Intracomm
+
+DEBIAN_PETSC = Path("/usr/lib/petscdir")
+DEBIAN_MODULES = "/usr/lib/python3/dist-packages"
+MPI4PY = "install the Debian package python3-mpi4py, or load your cluster's module of mpi4py"
+H5PY = "install the Debian packages python3-h5py and python3-h5py-mpi, or load your cluster's module of h5py with MPI"
+
+
+def require() -> None:
+    """Import mpi4py, petsc4py and h5py, which starts MPI, not PETSc.
+
+    Raises:
+        LibraryError: one line for each that is missing, broken or without MPI, with what to do about it.
+    """
+    faults = [_fault("mpi4py", MPI4PY), _fault("petsc4py", petsc4py_advice()), _fault("h5py", H5PY) or _serial_h5py()]
+    if any(faults):
+        raise LibraryError(*filter(None, faults))
+
+
+def start_petsc(words: Sequence[str], comm: Intracomm) -> None:
+    """Start PETSc with the words of a command line, the program's name first.  Collective over `comm`.
+
+    Files .petscrc and petscrc, which lie in the current folder without being asked for, are not read.
+
+    PETSc ends when Python does; a rank on which it cannot, for its logs cannot be written, ends the job: the others
+    would wait for it.  At its end PETSc does not list options that nobody read, unless -options_left asks for it: the
+    program refuses misspelt ones, and one set of options serves all runs.
+
+    Raises:
+        LibraryError: petsc4py was built for another NumPy.
+    """
+    import petsc4py
+
+    try:
+        petsc4py.init([*words, "-skip_petscrc"], comm=comm)
+    except (ImportError, ValueError) as error:
+        raise LibraryError(_unfit("petsc4py", error, petsc4py_advice())) from error
+    from petsc4py import PETSc
+
+    atexit.register(_end_petsc, comm)
+    if process_memory.limits_addresses():
+        _reserve_buffers()
+    options = PETSc.Options()
+    if not options.hasName("options_left"):
+        options.setValue("options_left", "no")
+
+
+def _reserve_buffers() -> None:
+    """Let each BLAS have its buffers while there are addresses: OpenBLAS, which finds none later, tries for ever."""
+    import numpy as np
+    from petsc4py import PETSc
+    from scipy.linalg import blas
+
+    square = np.eye(200)
+    blas.dgemm(1.0, square @ square, square)
+    matrix = PETSc.Mat().createDense(square.shape, array=square.copy(), comm=PETSc.COMM_SELF)
+    matrix.assemble()
+    for each in (matrix.matMult(matrix), matrix):
+        each.destroy()
+
+
+def _end_petsc(comm: Intracomm) -> None:
+    from petsc4py import PETSc
+
+    from feti_homog.system.petsc import c_functions
+
+    # Each start asks for its end.
+    code = 0 if PETSc.Sys.isFinalized() else c_functions.finalize()
+    if code:
+        complain(f"error: PETSc cannot end (error code {code}); results are written")
+        comm.Abort(EXIT_DEFECT)
+
+
+def petsc4py_advice(debian: Path = DEBIAN_PETSC, path: Sequence[str] = sys.path) -> str:
+    """Return the advice where petsc4py is not on the `path`.
+
+    Debian has it in a folder of `debian` that PETSC_DIR names.
+    """
+    found = [folder for folder in debian.glob("petsc*/*-real") if (folder / "lib/python3/dist-packages").is_dir()]
+    if not found:
+        return (
+            "install the Debian packages python3-petsc4py and python3-petsc4py-real, or load your cluster's module of "
+            "PETSc with petsc4py, and make the environment with scripts/bootstrap"
+        )
+    newest = max(found, key=lambda folder: [int(number) for number in re.findall(r"\d+", folder.parent.name)])
+    environment = "" if DEBIAN_MODULES in path else " and make the environment with --system-site-packages"
+    return f"export PETSC_DIR={newest}{environment}, or make the environment with scripts/bootstrap"
+
+
+def _fault(name: str, advice: str) -> str:
+    """Empty if the module can be imported, else why not and what to do."""
+    try:
+        importlib.import_module(name)
+    except ModuleNotFoundError as error:
+        return f"{error.name} is not found: {advice}"
+    except (ImportError, ValueError) as error:
+        return _unfit(name, error, advice)
+    return ""
+
+
+def _unfit(name: str, error: Exception, advice: str) -> str:
+    """Text on a module that cannot be imported; errors about NumPy's types mean that it fits another release."""
+    if "numpy" not in str(error):
+        return f"{name} cannot be imported ({error}): {advice}"
+    import numpy as np
+
+    return (
+        f"{name} was built for another NumPy than {np.__version__}: install NumPy of the major version that it was "
+        "built for, as scripts/bootstrap does"
+    )
+
+
+def _serial_h5py() -> str:
+    """Empty if h5py is built with MPI, else what to do."""
+    import h5py
+
+    return (
+        ""
+        if h5py.get_config().mpi
+        else f"h5py {h5py.__file__} is built without MPI: import feti_homog before h5py, or {H5PY}, and remove this one"
+    )

@@ -1,0 +1,249 @@
+"""PETSc's options before PETSc has started: words of the command line, values that can be checked, files."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+import stat
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from feti_homog.system.petsc.option_table import DIRECT_PREFIXES, OPTIONS
+from feti_homog.system.runtime import input_files
+
+Value = str | int | float | bool
+TRUE, FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
+LARGEST_INTEGER = 2**31 - 1  # of a PETSc with 32-bit integers
+VIEWER = re.compile(r"(ascii)?(:(?P<file>[^:]*)(:(default|ascii_\w+)?(:(write|append))?)?)?")
+FLAGS = (
+    *("feti_view", "malloc_debug", "malloc_test", "log_view_memory", "log_view_gpu_time"),
+    *("options_left", "skip_petscrc", "on_error_abort", "on_error_mpiabort", "no_signal_handler"),
+)
+VIEWERS = (
+    *(option.name for option in OPTIONS if not option.value and option.name != "feti_view"),
+    *(f"feti_ksp_{name}" for name in ("monitor_true_residual", "monitor_singular_value", "view_final_residual")),
+    *(f"feti_ksp_{name}" for name in ("converged_rate", "view_eigenvalues", "view_rhs", "view_solution")),
+    "log_view",
+    "options_view",
+)
+"""Flags that print, whose value may be a place."""
+OWN_SHORT = ("-h",)
+CASE_FILE = ".toml"
+
+
+def can_be_written(file: str) -> bool:
+    """Return whether a file of this name can be opened for writing: there is one that can, or a folder for it.
+
+    A pipe can if somebody reads from it; else opening it would wait.
+    """
+    if not file or "\0" in file or file.endswith(os.sep):
+        return False
+    try:
+        kind = os.stat(file).st_mode
+    except FileNotFoundError:
+        folder = os.path.dirname(os.path.realpath(file))
+        return os.path.isdir(folder) and os.access(folder, os.W_OK | os.X_OK)
+    except OSError:  # too long a name, a file for a folder, links in a circle
+        return False
+    if stat.S_ISFIFO(kind):
+        return _has_reader(file)
+    return not stat.S_ISDIR(kind) and os.access(file, os.W_OK)
+
+
+def _has_reader(pipe: str) -> bool:
+    try:
+        os.close(os.open(pipe, os.O_WRONLY | os.O_NONBLOCK))
+    except OSError:
+        return False
+    return True
+
+
+@dataclass(frozen=True)
+class Rule:
+    """Values that an option takes, in words and as a test of a text, which is empty if no value is given."""
+
+    expected: str
+    holds: Callable[[str], bool]
+
+
+def faulty_values(options: Mapping[str, Value]) -> list[str]:
+    """One fault for each option (name without dash) that cannot have its value."""
+    texts = {name: _text(value) for name, value in options.items()}
+    return sorted(
+        f"{in_words(name, texts[name])}: expected {rule.expected}"
+        for name, rule in RULES.items()
+        if name in texts and not rule.holds(texts[name])
+    )
+
+
+def in_words(name: str, value: str) -> str:
+    """Return an option (name without dash) as on the command line."""
+    return f"-{name} {value}".strip()
+
+
+def flag_value(value: Value) -> str | None:
+    """Return PETSc's value of a flag: empty if it is set, None if it is not; a viewer stays."""
+    text = _text(value)
+    return "" if text.lower() in TRUE else None if text.lower() in FALSE else text
+
+
+def is_flag(name: str) -> bool:
+    """Return whether an option (name without dash) is a flag, which needs no value and may have that of a viewer."""
+    return name in FLAGS or name in VIEWERS
+
+
+def is_own_flag(name: str) -> bool:
+    """Return whether an option (name without dash) is a flag of PETSc itself, which it reads when it starts or ends."""
+    return is_flag(name) and not name.startswith("feti_")
+
+
+def is_flag_value(text: str) -> bool:
+    """Return whether a word after a flag is its value."""
+    return SWITCH.holds(text) or VIEWER.fullmatch(text) is not None
+
+
+def _text(value: Value) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _real(expected: str, holds: Callable[[float], bool]) -> Rule:
+    def rule(text: str) -> bool:
+        try:
+            return holds(float(text)) and "_" not in text
+        except ValueError:
+            return False
+
+    return Rule(expected, rule)
+
+
+def _integer(least: int, most: int = LARGEST_INTEGER) -> Rule:
+    def holds(text: str) -> bool:
+        return re.fullmatch(r"\+?[0-9]{1,10}", text) is not None and least <= int(text) <= most
+
+    return Rule(f"an integer of at least {least} and at most {most}", holds)
+
+
+def _is_viewer(text: str) -> bool:
+    """Return whether the text is a place to print, in a folder that exists."""
+    match = VIEWER.fullmatch(text)
+    return match is not None and (not match["file"] or can_be_written(match["file"]))
+
+
+def _is_new_file(text: str) -> bool:
+    """Return whether the text is empty, or what may stand before its first colon is a file that can be written."""
+    file = text.partition(":")[0]
+    return not file or SWITCH.holds(file) or can_be_written(file)
+
+
+def _never(text: str) -> bool:
+    return text.lower() in FALSE
+
+
+def _has_options(file: str) -> bool:
+    """Return whether a file can be read, and its lines are options, comments or aliases."""
+    try:
+        content = input_files.read(Path(file), 1 << 20)
+    except (OSError, ValueError):  # ValueError: of a null character
+        return False
+    lines = [line.strip() for line in content.decode("utf-8", "replace").splitlines()]
+    return all(not line or line.startswith(("-", "#", "!", "%", "alias ")) for line in lines)
+
+
+SWITCH = Rule("true or false, or no value", lambda text: text.lower() in ("", *TRUE, *FALSE))
+PRINTS = Rule(
+    "true or false, no value, or ascii:FILE of an existing folder",
+    lambda text: SWITCH.holds(text) or _is_viewer(text),
+)
+SHARE = _real("a number above 0 and below 1", lambda number: 0.0 < number < 1.0)
+NOT_NEGATIVE = _real("a number of at least 0", lambda number: 0.0 <= number < math.inf)
+
+
+# With a relative tolerance of 1 or more nothing is solved.
+RULES: dict[str, Rule] = {
+    **{name: SWITCH for name in FLAGS},
+    **{name: PRINTS for name in VIEWERS},
+    **{
+        option.name: Rule(f"one of {option.value.replace('|', ', ')}", option.value.split("|").__contains__)
+        for option in OPTIONS
+        if "|" in option.value and not option.value.endswith("...")
+    },
+    **{f"{prefix}ksp_rtol": SHARE for prefix in ("feti_", *DIRECT_PREFIXES)},
+    "feti_coarse_threshold": SHARE,
+    "feti_ksp_atol": NOT_NEGATIVE,
+    "feti_ksp_divtol": _real("a number above 1", lambda number: 1.0 < number < math.inf),
+    "feti_ksp_max_it": _integer(1),
+    "feti_schur_mat_mumps_icntl_14": _integer(0, 10_000),
+    "feti_schur_pc_type": Rule("cholesky, for what is condensed is symmetric", "cholesky".__eq__),
+    "feti_schur_pc_factor_mat_solver_type": Rule("mumps, which alone makes Schur complements", "mumps".__eq__),
+    "feti_ksp_error_if_not_converged": Rule("nothing: the run reports it and keeps its results", _never),
+    "fp_trap": Rule("nothing: numbers that are not finite are checked where they may occur", _never),
+    "info": Rule("a file of an existing folder, or no value", _is_new_file),
+    "malloc_dump": Rule("a file of an existing folder, or no value", _is_new_file),
+    "malloc_view": Rule("a file of an existing folder, or no value", _is_new_file),
+    "options_file": Rule("a file with an option of PETSc in each line", _has_options),
+    "log_trace": Rule("a file of an existing folder, or no value", lambda text: not text or can_be_written(text)),
+}
+"""For each of these options, what is expected in words, and whether a text is that."""
+
+
+def split_argv(argv: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Return the words that are ours and those that are PETSc's, each in their order.
+
+    PETSc's are single-dash options with the word after each as its value, unless that word begins another option
+    or cannot be the value; a negative number can.
+    """
+    ours: list[str] = []
+    petsc: list[str] = []
+    name = ""
+    for word in argv:
+        if _is_petsc(word):
+            petsc.append(word)
+            name = word[1:]
+        elif name and not word.startswith("--") and word not in OWN_SHORT and _may_be_value(name, word):
+            petsc.append(word)
+            name = ""
+        else:
+            ours.append(word)
+            name = ""
+    return ours, petsc
+
+
+def named_values(words: Sequence[str]) -> dict[str, str]:
+    """PETSc's words of the command line by name without dash; the text is empty where there is no value."""
+    values: dict[str, str] = {}
+    name = ""
+    for word in words:
+        if _is_petsc(word):
+            name = word[1:].lower()  # PETSc takes names in either case
+            values[name] = ""
+        else:
+            values[name] = word
+    return values
+
+
+def petsc_words(options: Mapping[str, str]) -> list[str]:
+    """Return the words of options by name without dash, for PETSc's start.
+
+    Its own flags are there or not, true or false.
+
+    False flags of the solver stay, for a case may have them true.
+    """
+    kept = {name: flag_value(text) if is_own_flag(name) else text for name, text in options.items()}
+    words = [(f"-{name}", text) for name, text in kept.items() if text is not None]
+    return [word for pair in words for word in pair if word]
+
+
+def _is_petsc(word: str) -> bool:
+    return re.match(r"-[A-Za-z]", word) is not None and word not in OWN_SHORT
+
+
+def _may_be_value(name: str, word: str) -> bool:
+    """Return whether a word is the value, right or wrong, of the option before it.
+
+    A value is no case file, and no path after a flag.
+    """
+    if word.endswith(CASE_FILE) and name != "options_file":
+        return False
+    return not is_flag(name) or is_flag_value(word) or not (os.sep in word or os.path.exists(word))

@@ -1,0 +1,153 @@
+"""Locks between processes, on one machine or on several that share a file system.
+
+The system takes a lock back when its process ends, however that ends: none is left behind by a kill.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import fcntl
+import os
+import socket
+import time
+from pathlib import Path
+from types import TracebackType
+
+from feti_homog.errors import FetiHomogError
+from feti_homog.system.runtime import owners
+
+# Seconds that a lock is tried for: one who only looks whether it is held, holds it for a moment.
+LOCK_TIMEOUT_S = 0.2
+# Errors of the system for a lock that somebody else has, and for a file system without locks.
+HELD = (errno.EAGAIN, errno.EACCES)
+UNSUPPORTED = (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP)
+
+
+class LockHeld(Exception):
+    """Somebody else holds the lock; the text names the holder."""
+
+
+class LocksUnsupported(FetiHomogError):
+    """The file system has no locks."""
+
+
+class Lock:
+    """A lock on the file `path`, which its last holder removes; `shared` ones exclude the others only.
+
+    It is tried for during `timeout` seconds.  As a context manager it is held while the block lasts.
+    """
+
+    def __init__(self, path: Path, shared: bool = False, timeout: float = LOCK_TIMEOUT_S) -> None:
+        self.path, self.shared, self.timeout = path, shared, timeout
+        self._file = -1
+
+    def acquire(self) -> None:
+        """Take the lock.
+
+        Raises:
+            LockHeld: somebody else has it.
+            LocksUnsupported: nobody can have one on this file system.
+            FetiHomogError: the file cannot be made or locked.
+        """
+        self._take()
+        while not self._is_at_path():  # its last holder removed the file after it was opened here
+            self._close()
+            self._take()
+        if not self.shared:
+            owners.files.add(self.path)
+
+    def release(self) -> None:
+        """Give the lock back, if it is held, and remove its file unless others share it."""
+        if self._file >= 0 and self._is_alone():
+            with contextlib.suppress(OSError):
+                self.path.unlink()
+        owners.files.discard(self.path)
+        self._close()
+
+    def __enter__(self) -> Lock:
+        self.acquire()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.release()
+
+    def _take(self) -> None:
+        try:
+            self._file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666)
+            self._try_until(time.monotonic() + self.timeout)
+            if not self.shared:
+                with contextlib.suppress(OSError):  # it holds on a full disk too, without the name of its holder
+                    os.truncate(self._file, 0)
+                    os.pwrite(self._file, this_process().encode(), 0)
+        except OSError as error:
+            self._close()
+            kind = LocksUnsupported if error.errno in UNSUPPORTED else FetiHomogError
+            raise kind(f"cannot lock {self.path}: {error.strerror}") from error
+        except LockHeld:
+            self._close()
+            raise
+
+    def _try_until(self, deadline: float) -> None:
+        kind = fcntl.LOCK_SH if self.shared else fcntl.LOCK_EX
+        while True:
+            try:
+                return fcntl.flock(self._file, kind | fcntl.LOCK_NB)
+            except OSError as error:
+                if error.errno not in HELD:
+                    raise
+                if time.monotonic() > deadline:
+                    raise LockHeld(_written(self._file)) from error
+            time.sleep(0.01)
+
+    def _close(self) -> None:
+        if self._file >= 0:
+            os.close(self._file)
+            self._file = -1
+
+    def _is_alone(self) -> bool:
+        """Return whether nobody shares the lock; then it is exclusive."""
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            return False
+        return self._is_at_path()
+
+    def _is_at_path(self) -> bool:
+        try:
+            return os.path.samestat(os.fstat(self._file), self.path.stat())
+        except FileNotFoundError:
+            return False
+
+
+def holder(path: Path) -> str | None:
+    """Who holds the lock exclusively just now, in words; None if nobody does."""
+    try:
+        file = os.open(path, os.O_RDWR)
+    except OSError:
+        return None
+    try:
+        fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        return None
+    except OSError as error:
+        return _written(file) if error.errno in HELD else None
+    finally:
+        os.close(file)
+
+
+def is_locked(path: Path) -> bool:
+    """Return whether somebody holds the lock exclusively just now."""
+    return holder(path) is not None
+
+
+def this_process() -> str:
+    """Machine, process and, under SLURM or PBS, job: how a lock's file names its holder."""
+    words = [socket.gethostname(), f"process {os.getpid()}"]
+    job = os.environ.get("SLURM_JOB_ID") or os.environ.get("PBS_JOBID")
+    return ", ".join([*words, f"job {job}"] if job else words)
+
+
+def _written(file: int) -> str:
+    return os.pread(file, 200, 0).decode(errors="replace") or "another process"

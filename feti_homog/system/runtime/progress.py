@@ -1,0 +1,76 @@
+"""Stages of a run: printed on rank 0, timed on every rank, and shown by PETSc's -log_view."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from importlib.util import find_spec
+from typing import TypeVar
+
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from feti_homog.system.runtime import process_memory
+from feti_homog.system.runtime.standard_streams import say
+
+T = TypeVar("T")
+
+
+class Progress:
+    """Prints a line a stage and a line a solve on rank 0, unless quiet, and keeps the stages' times."""
+
+    def __init__(self, comm: MPI.Intracomm, quiet: bool) -> None:
+        self.comm = comm
+        self.prints = comm.rank == 0 and not quiet
+        # mpirun gives rank 0 a terminal for its output even if mpirun has none itself, but none for its errors.
+        self.on_terminal = self.prints and sys.stdout.isatty() and sys.stderr.isatty() and find_spec("tqdm") is not None
+        self.seconds: dict[str, float] = {}
+        self._within = [0.0]  # seconds that stages within those now open took, the innermost last
+
+    def say(self, line: str) -> None:
+        """Print one line on rank 0, past the progress bar if there is one."""
+        if self.on_terminal:
+            from tqdm import tqdm
+
+            with tqdm.external_write_mode(file=sys.stdout):
+                say(line)
+        elif self.prints:
+            say(line)
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[list[str]]:
+        """Provide a PETSc log stage.
+
+        The block may append words to the list, which are printed with its time, that of stages within it left out.
+        """
+        words: list[str] = []
+        start = time.perf_counter()
+        self._within.append(0.0)
+        try:
+            with PETSc.Log.Stage(name):
+                yield words
+        finally:
+            whole = time.perf_counter() - start
+            took = whole - self._within.pop()
+            self._within[-1] += whole
+        self.seconds[name] = self.seconds.get(name, 0.0) + took
+        self.say(f"{name:<9} {took:8.2f} s  {' '.join(words)}".rstrip())
+
+    def bar(self, items: Iterable[T], label: str) -> Iterator[T]:
+        """Yield the items, with a progress bar if rank 0 writes to a terminal."""
+        if not self.on_terminal:
+            return iter(items)
+        from tqdm import tqdm  # of no use to most runs, and slow to import
+
+        return iter(tqdm(items, desc=label, leave=False))
+
+    def timings(self) -> dict[str, float]:
+        """Seconds of each stage, the maximum over ranks."""
+        return {name: self.comm.allreduce(took, MPI.MAX) for name, took in self.seconds.items()}
+
+    def memory(self) -> int:
+        """Peak resident memory of the case in bytes, the maximum over ranks."""
+        peak: int = self.comm.allreduce(process_memory.peak(), MPI.MAX)
+        return peak

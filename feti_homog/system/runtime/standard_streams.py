@@ -1,0 +1,107 @@
+"""Standard output and error, without which work goes on, and signals that end the process.
+
+Ctrl-C and a launcher's or batch system's order to end print one line, and the process ends at once.  Python runs its
+signal handlers between two of its own steps, which a mesher or a factorization may keep it from for long, libraries
+take handlers away, and an exception in the middle of a collective call would leave other ranks waiting.  So the signals
+are blocked, and a thread waits for them.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import signal
+import sys
+import threading
+import time
+
+from feti_homog.errors import FetiHomogError, escaped
+from feti_homog.system.runtime import owners
+
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGXCPU)  # the last: the limit of CPU time
+# Variables in which launchers give the rank of a process before MPI has started.
+RANK_VARIABLES = ("OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID")
+# How long the others wait: after a rank has ended, Open MPI drops what rank 0 prints, and a call of a library may keep
+# rank 0 from hearing the signal for a while.
+SILENT_SECONDS = 5.0
+KEPT = "\n\t"  # of the characters that are not printable; others may come from files
+
+
+def end_on_signals() -> None:
+    """From now on SIGINT, SIGTERM and SIGXCPU end the process with exit code 128 + signal: 130, 143 and 152.
+
+    Files of locks and unfinished ones are removed before.  Rank 0 reports it on standard error.  Signals that are
+    ignored, as in a background job of a shell, stay so.  Call it before any other thread starts.
+    """
+    awaited = {number for number in ENDING if signal.getsignal(number) is not signal.SIG_IGN}
+    # Writing shows that the reader of a pipe has closed it.
+    signal.pthread_sigmask(signal.SIG_BLOCK, {*awaited, signal.SIGPIPE})
+    if awaited:
+        threading.Thread(target=_wait_and_end, args=(awaited,), daemon=True).start()
+
+
+def launched_rank() -> int:
+    """Return the rank of this process among those that a launcher started, as far as that gives it.
+
+    Does not need MPI.
+    """
+    return int(next((os.environ[name] for name in RANK_VARIABLES if os.environ.get(name, "").isdecimal()), 0))
+
+
+def _wait_and_end(awaited: set[signal.Signals]) -> None:
+    number = signal.sigwait(awaited)
+    if launched_rank() == 0:
+        complain(f"interrupted by {signal.Signals(number).name}")
+    else:
+        time.sleep(SILENT_SECONDS)
+    owners.remove_files()
+    os._exit(128 + number)
+
+
+def prepare() -> None:
+    """Call before anything is printed: characters that the locale lacks are escaped, and closed streams are silent."""
+    for number in (0, 1, 2):
+        try:
+            os.fstat(number)
+        except OSError:  # the next file that is opened would take its place, and what is printed
+            os.open(os.devnull, os.O_RDWR)
+    sys.stdout = sys.stdout or open(os.devnull, "w")  # noqa: SIM115 (None if it was closed)
+    sys.stderr = sys.stderr or open(os.devnull, "w")  # noqa: SIM115
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def say(text: str) -> None:
+    """Print a line beside the results.  If that fails, nothing more is printed, and standard error reports it once."""
+    try:
+        print_product(text)
+    except FetiHomogError as error:
+        complain(f"warning: {error}; result files are not affected")
+
+
+def print_product(text: str) -> None:
+    """Print what a command is for.
+
+    Raises:
+        FetiHomogError: it cannot be written, and not because the reader left.
+    """
+    try:
+        print(escaped(text, KEPT), flush=True)
+    except OSError as error:
+        _give_up()
+        if not isinstance(error, BrokenPipeError):  # a reader that left, as `head` does, wants no more
+            raise FetiHomogError(f"standard output cannot be written: {error.strerror}") from error
+
+
+def complain(*lines: str) -> None:
+    """Print lines on standard error, if that can be written."""
+    with contextlib.suppress(OSError):
+        print(*(escaped(line, KEPT) for line in lines), sep="\n", file=sys.stderr, flush=True)
+
+
+def _give_up() -> None:
+    """From now on what goes to standard output, also from PETSc and at the end of Python, is lost without an error."""
+    with contextlib.suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

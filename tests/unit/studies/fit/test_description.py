@@ -1,0 +1,112 @@
+"""Faulty fit files: a line each, with its section and key."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import pytest
+from support.base_case import BASE
+
+from feti_homog.case.case import Case
+from feti_homog.errors import CaseError
+from feti_homog.studies.fit.description import parse
+
+UNKNOWN = "[unknown]\nmaterial.fibre.young = {start = 150.0, lower = 50.0, upper = 500.0}\n"
+MEASURED = "[measured]\nC11 = {value = 150.0, std = 1.5}\n"
+PATH = (
+    '[interface]\ncriterion = "energy"\nnormal_stiffness = 100.0\ntangential_stiffness = 50.0\ntoughness = 0.01\n'
+    "[path]\nstrain = [0.1, 0.0, 0.0]\n"
+)
+
+
+def faults(text: str, folder: Path = Path()) -> tuple[str, ...]:
+    with pytest.raises(CaseError) as error:
+        parse(tomllib.loads(text), folder)
+    return error.value.faults
+
+
+@pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        (MEASURED, "[unknown]: expected a table of SECTION.KEY = {start, lower, upper}"),
+        (f"[unknown]\nmaterial.fibre.young = 3.0\n{MEASURED}",
+         "[unknown] material.fibre.young = 3.0: expected a table {start, lower, upper}"),
+        (f"[unknown]\nmaterial.fibre.young = {{start = 1.0, lower = 0.5}}\n{MEASURED}",
+         "[unknown] material.fibre.young.upper: missing; expected a number"),
+        (UNKNOWN.replace("150.0", "600.0") + MEASURED,
+         "[unknown] material.fibre.young: lower = 50, start = 600, upper = 500: expected lower <= start <= upper, "
+         "lower < upper"),
+        (UNKNOWN.replace("50.0, upper", "-50.0, upper") + MEASURED,
+         "[unknown] material.fibre.young, lower = -50.0: case-0001: [material.fibre] young = -50.0: expected a number "
+         "above 0"),
+        (UNKNOWN.replace("young", "yuong") + MEASURED,
+         "case-0001: [material.fibre] yuong = 150.0: unknown key; did you mean young?"),
+        (f"[unknown]\npetsc.feti_ksp_rtol = {{start = 1e-9, lower = 1e-10, upper = 1e-8}}\n{MEASURED}",
+         "[unknown] petsc.feti_ksp_rtol: no measured value depends on it"),
+        (UNKNOWN, "expected [measured] for one test or [[test]] for each of several, with measured"),
+        (f"{UNKNOWN}[measured]\nC11 = 3.0\n", "[measured] C11 = 3.0: expected a table {value, std}"),
+        (f"{UNKNOWN}[measured]\nC11 = {{value = 3.0, std = 0.0}}\n",
+         "[measured] C11.std = 0.0: expected a number above 0"),
+        (f"{UNKNOWN}[measured]\nC11 = {{value = -3.0, std = 1e-100}}\n",
+         "[measured] C11.std = 1e-100: expected at least 1e-12 of -3"),
+        (f"{UNKNOWN}[measured]\nE_axial = {{value = 3.0, std = 0.1}}\n",
+         "[measured] E_axial: the analysis does not give it; expected one of C11, C12, C13, C22, C23, C33, E1, E2, "
+         "nu12, nu21, G12"),
+        (f'{UNKNOWN}[measured]\ncurve = {{file = "none.csv", std = 0.1}}\n',
+         '[measured] curve.file = "none.csv": No such file or directory'),
+        (UNKNOWN + 'material.matrix.young = {start = 1.0, lower = 0.5, upper = 2.0}\n' + MEASURED,
+         "[unknown]: 2 unknowns, 1 measured values; expected at least as many values"),
+        (f"{UNKNOWN}[[test]]\nmaterial.fibre.young = 3.0\n[test.measured]\nC11 = {{value = 3.0, std = 0.1}}\n",
+         "[[test]] 1, material.fibre.young: it is an unknown of [unknown]"),
+        (f"{UNKNOWN}[[test]]\ncell.fibre_fraction = 0.3\n",
+         "[[test]] 1, [measured]: expected a table of NAME = {value, std}"),
+        (f"{UNKNOWN}{MEASURED}[sweep]\nrealisations = 2\n",
+         "[sweep]: a fit has no sweep; expected [[test]] for each test"),
+    ],
+)  # fmt: skip
+def test_faults_have_their_line(text, line):
+    assert faults(BASE + text) == (line,)
+
+
+def test_a_case_file_with_unknowns_is_none_of_a_run():
+    with pytest.raises(CaseError, match=r"\[unknown\]: unknown section; it belongs to the file of a fit"):
+        Case.parse(tomllib.loads(BASE + UNKNOWN))
+
+
+def test_tests_are_changes_of_one_case(tmp_path):
+    table = "[[test]]\ncell.fibre_fraction = {}\n[test.measured]\nC11 = {{value = 3.0, std = 0.1}}\n"
+    fit = parse(tomllib.loads(BASE + UNKNOWN + table.format(0.3) + table.format(0.5)), tmp_path)
+    cases = fit.at([77.0]).cases
+    assert [case.cell.fibre_fraction for case in cases] == [0.3, 0.5]
+    assert all(case.materials["fibre"].young == 77.0 and case.output.sensitivities for case in cases)
+    assert [fit.rows_of(test) for test in (0, 1)] == [slice(0, 1), slice(1, 2)]
+
+
+@pytest.mark.parametrize(
+    ("load", "table", "line"),
+    [
+        ("strain = [0.1, 0.0, 0.0]", "E11, S33\n0.01, 1.0\n", '[measured] curve: plane = "strain" has no S33'),
+        ("strain = [0.1, 0.0, 0.0]", f"E11, S11\n{'1' * 200_000}, 1.0\n", "field larger than field limit (131072)"),
+        ("strain = [0.1, -0.2, 0.0]", "E11, S11\n0.01, 1.0\n",
+         "[measured] curve: expected the strain that rises along the path, E22"),
+        ("strain = [0.1, 0.0, 0.0]", "E11, S11\n0.0, 0.0\n-0.01, 1.0\n",
+         "[measured] curve: expected strains of the sign of the path, which ends at 0.1"),
+        ("strain = [-0.1, 0.0, 0.0]", "E11, S11\n-0.01, 1.0\n-0.11, 2.0\n",
+         "[measured] curve: a strain of 0.11 is beyond the end of the path at 0.1"),
+        ("waypoints = [{S11 = -1.0, S22 = 0.0, S12 = 0.0}]", "E11, S11\n0.01, 1.0\n",
+         "[measured] curve: expected strains of the sign of the path, which ends at -1"),
+        ("waypoints = [{S11 = 1.0}, {S11 = 0.0}]", "E11, S11\n0.01, 1.0\n",
+         "[measured] curve: expected an analysis of type path, of one leg"),
+        (None, "E11, S11\n0.01, 1.0\n", "[measured] curve: expected an analysis of type path, of one leg"),
+    ],
+)  # fmt: skip
+def test_curves_have_their_faults(tmp_path, load, table, line):
+    """All of them before anything is computed."""
+    (tmp_path / "curve.csv").write_text(table)
+    unknown, end = UNKNOWN, '[measured]\ncurve = {file = "curve.csv", std = 0.1}\n'
+    if load is not None:
+        end += PATH.partition("[path]")[0] + f"[path]\n{load}\n"
+    text = (BASE if load is None else BASE.replace('"stiffness"', '"path"')) + unknown + end
+    found = faults(text, tmp_path)
+    assert len(found) == 1 and line in found[0], found

@@ -1,0 +1,290 @@
+"""Statistics over realisations, and the tables and pictures of a sweep."""
+
+from __future__ import annotations
+
+import csv
+import math
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+from scipy import stats
+
+from feti_homog.materials.voigt import SPATIAL_STRESSES
+from feti_homog.report.text.table import unit, with_unit
+from feti_homog.studies.sweep.report import figures, moduli, tables
+from feti_homog.studies.sweep.report.outputs import numbers, outputs
+from feti_homog.studies.sweep.report.sweep_table import Statistics, SweepTable, series_over
+
+MATERIAL = {"matrix": {"young": 88.0, "poisson": 0.299}, "fibre": {"young": 200.0, "poisson": 0.222}}
+
+
+def test_statistics_are_scipys():
+    samples = np.random.default_rng(0).normal(5.0, 2.0, (7, 3))
+    found = Statistics.of(samples)
+    for k, column in enumerate(samples.T):
+        low, high = stats.t.interval(0.95, len(column) - 1, loc=column.mean(), scale=stats.sem(column))
+        assert (found.mean[k], found.std[k]) == pytest.approx((column.mean(), column.std(ddof=1)))
+        assert found.mean[k] + np.array([-1, 1]) * found.ci95[k] == pytest.approx([low, high])
+
+
+def test_statistics_of_too_few_values_are_nan():
+    found = Statistics.of(np.array([[1.0, 2.0, np.nan], [np.nan, 4.0, np.nan]]))
+    assert found.count.tolist() == [1, 2, 0]
+    assert found.mean[:2].tolist() == [1.0, 3.0] and math.isnan(found.mean[2])
+    assert np.isnan(found.std[[0, 2]]).all() and found.std[1] == pytest.approx(2**0.5)
+    assert found.ci95[1] == pytest.approx(12.706, rel=1e-4)
+
+
+def document(fraction, fibres, shift):
+    """Write the files of a run with a stiffness slightly above that of Reuss."""
+    C = np.array([[120.0 + 80 * fraction, 50.0, 0.0], [50.0, 120.0 + 80 * fraction, 0.0], [0.0, 0.0, 35.0]]) + shift
+    cell = {"geometry": "random", "fibre_fraction": fraction, "fibres": fibres}
+    return {
+        "case": {"cell": cell, "material": MATERIAL, "analysis": {"type": "stiffness", "plane": "strain"}},
+        "cell": {"fibre_fraction": fraction, "elements": 10, "nodes": 9},
+        "solver": {"ranks": 1, "subdomains": 2, "dofs": 18, "multipliers": 4, "iterations": [3, 4, 5]},
+        "effective_stiffness": C, "moduli": {"bulk": 85.0 + 60 * fraction + shift, "shear": 35.0 + shift},
+        "checks": {"hill": 1e-12}, "timings": {"solve": 0.1}, "memory": 1000,
+    }  # fmt: skip
+
+
+def path_document(fibres, shift):
+    points = [
+        {"load_factor": f, "strain": [0.2 * f, 0, 0], "stress": [s + shift, s / 3, 0.0], "broke": 1,
+         "dissipated": 0.1 * f, "work": 0.3 * f, "bonded": 9, "open": 1, "closed": 0}
+        for f, s in ((0.1, 4.0), (0.08, 2.0), (0.5, 5.0), (1.0, 8.0))
+    ]  # fmt: skip
+    base = document(0.4, fibres, 0.0)
+    case = base["case"] | {"path": {"method": "events", "strain": [0.2, 0, 0]}}
+    del base["effective_stiffness"], base["moduli"]
+    return base | {"case": case, "path": points}
+
+
+def sheared(fibres, compliance):
+    """Under a given stress S13 in generalized plane strain: at load 0.5 the strain jumps to twice as much."""
+    points = [
+        {"load_factor": t, "strain": [0, 0, 0, 0, 4 * t * f * compliance, 0], "stress": [0, 0, 0, 0, 4 * t, 0],
+         "broke": 1, "dissipated": 0.1, "work": 0.3, "bonded": 9, "open": 1, "closed": 0}
+        for t, f in ((0.5, 1.0), (0.4, 1.5), (1.0, 2.0))
+    ]  # fmt: skip
+    base = document(0.4, fibres, 0.0)
+    case = base["case"] | {"path": {"method": "events", "to": {"S13": 4.0}}}
+    case["analysis"] = case["analysis"] | {"type": "path", "plane": "generalized"}
+    del base["effective_stiffness"], base["moduli"]
+    return base | {"case": case, "path": points}
+
+
+def collected(inputs, documents, point, realisation):
+    found = [outputs(d) if d else {} for d in documents]
+    names = dict.fromkeys(name for row in found for name in row)
+    return SweepTable(
+        name="test", stress_unit="GPa", folder=[f"case-{k + 1:04d}" for k in range(len(documents))],
+        point=point, realisation=realisation, status=["done" if d else "waiting" for d in documents],
+        reason=[""] * len(documents), inputs=inputs, documents=documents,
+        outputs={name: np.array([row.get(name, np.nan) for row in found]) for name in names},
+    )  # fmt: skip
+
+
+@pytest.mark.slow
+def test_curves_of_a_given_stress_have_six_components(tmp_path):
+    documents = [sheared(fibres, e) for e in (0.1, 0.2) for fibres in (2, 4)]
+    table = collected({"cell.fibres": [2, 4, 2, 4], "cell.seed": [0, 0, 1, 1]}, documents, [1, 2, 1, 2], [1, 1, 2, 2])
+    tables.write(tmp_path, table)
+    assert table.outputs["onset_S13"].tolist() == [2.0] * 4 and table.outputs["work"].tolist() == [0.3] * 4
+    assert table.outputs["end_gamma13"].tolist() == pytest.approx([0.8, 0.8, 1.6, 1.6])
+    strain, stress = table.curves(1)
+    stresses = stress[:, :, SPATIAL_STRESSES.index("S13")]
+    assert strain[-1] == pytest.approx(0.8) and stresses.shape == (2, len(strain))
+    # To the load 2 at the compliance 0.1, then a jump, then half as steep; of the other twice as soft.
+    assert np.interp([0.1, 0.3, 0.6], strain, stresses[0]) == pytest.approx([1.0, 2.0, 3.0])
+    assert np.interp([0.2, 0.6], strain, stresses[1]) == pytest.approx([1.0, 2.0])
+    assert_drawn(tmp_path, table, ["curves.png"])
+
+
+def test_columns_of_a_path_are_its_first_point_its_peaks_and_its_end():
+    path = path_document(2, 0.0)
+    path["path"][-1] |= {"stress": [-7.0, 1.0, 0.5], "bonded": 5, "open": 3, "closed": 2}
+    found = outputs(path)
+    assert [found[f"{place}_S11"] for place in ("onset", "peak", "end")] == [4.0, 4.0, -7.0]
+    assert found["peak_E11"] == pytest.approx(0.02)  # whose stress falls behind it
+    assert [found[f"peak_{name}"] for name in ("S22", "S12")] == pytest.approx([5.0 / 3, 0.5])
+    assert (found["onset_E11"], found["end_E11"]) == pytest.approx((0.02, 0.2))
+    assert [found[f"end_{state}"] for state in ("bonded", "open", "closed")] == [5.0, 3.0, 2.0]
+    path["path"] = [point | {"broke": 0} for point in path["path"]]
+    assert {*found} - {*outputs(path)} == {name for name in found if name.startswith("onset_")}
+    path["path"][1]["softened"] = 1
+    assert outputs(path)["onset_S11"] == 2.0
+
+
+def test_columns_of_bounds_are_the_lower_and_the_upper():
+    sides = {"reuss": np.diag([1.0, 2.0, 3.0]), "voigt": np.diag([4.0, 5.0, 6.0])}
+    found = outputs(document(0.4, 2, 0.0) | {"bounds": sides | {"hashin_shtrikman": {"bulk": [7.0, 8.0]}}})
+    assert [found[f"C{i}{i}_{side}"] for side in sides for i in (1, 2, 3)] == [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
+    assert (found["bulk_lower"], found["bulk_upper"]) == (7.0, 8.0)
+
+
+def fractions():
+    """Two fractions with three realisations each, of which one still waits."""
+    documents = [document(c, 8, shift) for shift in (0.0, 0.5, 1.0) for c in (0.2, 0.4)]
+    documents[-1] = None
+    inputs = {"cell.fibre_fraction": [0.2, 0.4] * 3, "cell.seed": [0, 0, 1, 1, 2, 2]}
+    return collected(inputs, documents, [1, 2] * 3, [1, 1, 2, 2, 3, 3])
+
+
+def test_tables_hold_cases_and_statistics_of_points(tmp_path):
+    table = fractions()
+    assert [path.name for path in tables.write(tmp_path, table)] == ["cases.csv", "statistics.csv"]
+    rows, statistics = (
+        list(csv.DictReader((tmp_path / name).read_text().splitlines())) for name in ("cases.csv", "statistics.csv")
+    )
+    assert [row["case"] for row in rows] == list("123456") and rows[0]["elements"].isdigit()
+    assert rows[5]["status"] == "waiting" and rows[5]["bulk"] == "" and rows[5]["cell.fibre_fraction"] == "0.4"
+    bulk = [row for row in statistics if row["output"] == "bulk"]
+    assert [float(row["mean"]) for row in bulk] == pytest.approx([97.5, 109.25])
+    assert [(row["point"], row["cell.fibre_fraction"], row["unit"], row["count"]) for row in bulk] == [
+        ("1", "0.2", "GPa", "3"),
+        ("2", "0.4", "GPa", "2"),
+    ]
+    (first, second) = [row for row in statistics if row["output"] == "C11"]
+    halves = [stats.t.ppf(0.975, 2) * 0.5 / 3**0.5, stats.t.ppf(0.975, 1) * 0.25]
+    assert [float(row["mean"]) for row in (first, second)] == [136.5, 152.25]
+    assert [float(row["ci95"]) for row in (first, second)] == pytest.approx(halves)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["cases.csv", "statistics.csv"]
+
+
+def test_entries_beside_cases_in_space_have_the_names_of_space(tmp_path):
+    """The third strain of the plane is the sixth of space."""
+    plane = document(0.4, 8, 0.0)
+    plane["effective_stiffness_compression"] = 2 * plane["effective_stiffness"]
+    plane["bounds"] = {side: plane["effective_stiffness"] for side in ("reuss", "voigt")}
+    plane["angle"] = [{"angle": 30.0, "stiffness": plane["effective_stiffness"]}]
+    space = document(0.4, 8, 0.0) | {"effective_stiffness": np.arange(36.0).reshape(6, 6), "moduli": {}}
+    space["case"]["analysis"]["plane"] = "generalized"
+    own = numbers(["strain", "generalized"])
+    found, beside = outputs(plane, own), outputs(space, own)
+    assert (found["C66"], found["C66_compression"], found["angle_30_C66"], found["C66_voigt"]) == (35, 70, 35, 35)
+    assert (beside["C66"], beside["C33"]) == (35, 14) and not [name for name in found if "C33" in name or "C13" in name]
+    for alone in (["strain", "stress"], [None, None]):
+        assert outputs(plane, numbers(alone)) == outputs(plane)
+    assert (outputs(plane)["C33"], outputs(plane)["C33_reuss"], outputs(space)["C33"]) == (35, 35, 14)
+
+
+@pytest.mark.slow
+def test_mean_curves_keep_the_bonded_branch(tmp_path):
+    documents = [path_document(fibres, shift) for shift in (0.0, 1.0) for fibres in (2, 4)]
+    table = collected({"cell.fibres": [2, 4, 2, 4], "cell.seed": [0, 0, 1, 1]}, documents, [1, 2, 1, 2], [1, 1, 2, 2])
+    tables.write(tmp_path, table)
+    assert table.outputs["onset_S11"].tolist() == [4.0, 4.0, 5.0, 5.0]
+    assert table.outputs["peak_S11"].tolist() == [4.0, 4.0, 5.0, 5.0]  # before the fall
+    assert table.outputs["end_S11"].tolist() == [8.0, 8.0, 9.0, 9.0]
+    strain, stress = table.curves(1)
+    found = Statistics.of(stress[:, :, 0])
+    assert strain[[0, -1]].tolist() == [0.0, 0.2] and stress.shape[:2] == (2, len(strain))
+    assert found.mean[[0, -1]] == pytest.approx([0.0, 8.5])
+    # The bonded branch: from zero to the mean of the first breaks.
+    assert np.interp(0.01, strain, found.mean) == pytest.approx(2.25)
+    assert found.ci95[-1] == pytest.approx(stats.t.ppf(0.975, 1) * 0.5**0.5 / 2**0.5)
+    assert_drawn(tmp_path, table, ["curves.png"])
+
+
+@pytest.mark.slow
+def test_moduli_are_drawn(tmp_path):
+    assert_drawn(tmp_path, fractions(), ["moduli.png"])
+    assert not figures.plot(tmp_path, collected({"cell.order": [1]}, [document(0.4, 8, 0)], [1], [1]))
+    waiting = collected({"cell.fibre_fraction": [0.1, 0.2]}, [None] * 2, [1, 2], [1] * 2)
+    assert not figures.plot(tmp_path, waiting)
+
+
+def test_bars_are_the_mean_errors_of_the_mesh():
+    errors = ({"constants": {"bulk": error, "nu31": 1.0}, "energy": 0.01} for error in (2.0, 4.0, 1.0, 3.0))
+    documents = [document(c, 8, shift) for shift in (0.0, 1.0) for c in (0.2, 0.4)]
+    documents = [each | {"mesh_error": error} for each, error in zip(documents, errors, strict=True)]
+    table = collected({"cell.fibre_fraction": [0.2, 0.4] * 2}, documents, [1, 2] * 2, [1, 1, 2, 2])
+    assert "nu31_mesh_error" not in table.outputs  # of a constant that has no column
+    panel = (figure := moduli.figure(table)).axes[moduli.PANELS.index("bulk")]
+    assert {"realisations", "95 % confidence of the mean"} <= {each.get_text() for each in figure.legends[0].texts}
+    (bars,) = (each for each in panel.containers if each.get_label() == "estimated error of the mesh")
+    (ends,) = (lines.get_segments() for lines in bars.lines[2])
+    assert [end[:, 1].tolist() for end in ends] == [pytest.approx([96.0, 99.0]), pytest.approx([106.0, 113.0])]
+
+
+def assert_drawn(folder, table, names):
+    paths = figures.plot(folder, table)
+    assert [path.name for path in paths] == names
+    for path in paths:
+        picture = imread(path)
+        assert min(picture.shape[:2]) > 500 and picture[..., :3].std() > 0.03
+
+
+def spatial_document(fraction, shift):
+    """Write the files of a run in generalized plane strain."""
+    found = document(fraction, 1, 0.0)
+    C = np.diag([150.0 + shift, 150.0, 210.0, 50.0, 50.0, 45.0]) + 1e-3 * np.arange(36).reshape(6, 6)
+    thermal = {"thermal_stress": [-1.0] * 6, "thermal_expansion": [1e-5] * 6}
+    case = found["case"] | {"analysis": {"type": "stiffness", "plane": "generalized"}}
+    about_fibres = {"E_axial": 200.0, "E_transverse": 120.0, "G_axial": 50.0, "G_transverse": 46.0}
+    constants = {"constants": {"E3": 200.0}, "transversely_isotropic": about_fibres | {"expansion_axial": None}}
+    del found["moduli"]
+    return found | {"case": case, "effective_stiffness": C} | thermal | constants
+
+
+def test_stiffnesses_in_space_fill_columns_and_are_drawn(tmp_path):
+    documents = [spatial_document(c, shift) for shift in (0.0, 1.0) for c in (0.2, 0.4)]
+    table = collected({"cell.fibre_fraction": [0.2, 0.4] * 2, "cell.seed": [0, 0, 1, 1]}, documents, [1, 2] * 2, [1, 2])
+    stiffness = documents[0]["effective_stiffness"]
+    assert [table.outputs[f"C{i}{j}"][0] for i in range(1, 7) for j in range(1, 7)] == stiffness.ravel().tolist()
+    assert table.outputs["anisotropy_shear"][0] == pytest.approx(45.035 - (150.0 + 150.007 - 2 * 0.001) / 4)
+    assert table.outputs["thermal_S33"].tolist() == [-1.0] * 4 and table.outputs["expansion_gamma12"][0] == 1e-5
+    assert (table.outputs["E3"][0], table.outputs["G_axial"][0]) == (200.0, 50.0)
+    assert "expansion_axial" not in table.outputs and "bulk" not in table.outputs
+    assert moduli.panels_of(table) == ("E_axial", "E_transverse", "G_axial", "G_transverse")
+    assert_drawn(tmp_path, table, ["moduli.png"])
+
+
+def test_bounds_in_space_enclose_each_other_and_what_is_between():
+    """At any fraction the tighter ones lie between Reuss and Voigt; all meet where there is one phase."""
+    documents = [spatial_document(c, 0.0) for c in (0.2, 0.6)]
+    bounds = moduli._bounds(collected({"cell.fibre_fraction": [0.2, 0.6]}, documents, [1, 2], [1, 1]))
+    assert bounds.tight == "Hill, Hashin" and bounds.fractions[0] == 0.0
+    for rows in bounds.rows.values():
+        assert (rows[1] >= rows[0] * (1 - 1e-12)).all() and np.ptp(rows[:, 0]) < 1e-9 * rows[0, 0]
+        if len(rows) == 4:
+            assert (rows[0] <= rows[2] * (1 + 1e-12)).all() and (rows[2] <= rows[3] * (1 + 1e-12)).all()
+            assert (rows[3] <= rows[1] * (1 + 1e-12)).all()
+    assert [len(rows) for rows in bounds.rows.values()] == [4, 2, 4, 4]
+
+
+def test_secants_in_space_are_drawn_without_bounds(tmp_path):
+    documents = [spatial_document(c, 0.0) for c in (0.2, 0.4)]
+    for each in documents:
+        del each["constants"], each["transversely_isotropic"]
+    table = collected({"cell.fibre_fraction": [0.2, 0.4]}, documents, [1, 2], [1, 1])
+    assert moduli.panels_of(table) == ("C11", "C33", "C44", "C66")
+    assert moduli.figure(table).get_suptitle().endswith("plane generalized; no bounds, for faces may touch")
+    assert_drawn(tmp_path, table, ["moduli.png"])
+
+
+def test_angles_in_space_have_all_entries():
+    point = {"angle": 60.0, "stiffness": np.arange(36.0).reshape(6, 6)}
+    base = {name: part for name, part in document(0.4, 8, 0).items() if name != "effective_stiffness"}
+    found = outputs(base | {"angle": [point]})
+    assert (found["angle_60_C11"], found["angle_60_C33"], found["angle_60_C66"]) == (0.0, 14.0, 35.0)
+
+
+def test_what_varies_along_is_no_other_series():
+    documents = [document(0.4, fibres, 0.0) for fibres in (4, 8, 4, 8)]
+    inputs = {"cell.fibres": [4, 8, 4, 8], "cell.mesh_size": [0.3, 0.2, 0.3, 0.2], "material.fibre.young": [1, 1, 2, 2]}
+    found = series_over(collected(inputs, documents, [1, 2, 3, 4], [1] * 4), "cell.fibres")
+    assert [(one.label, one.points, one.x.tolist()) for one in found] == [
+        ("fibre young 1 GPa", [1, 2], [4.0, 8.0]), ("fibre young 2 GPa", [3, 4], [4.0, 8.0]),
+    ]  # fmt: skip
+
+
+def test_outputs_have_their_units():
+    assert unit("material.fibre.young", "GPa") == "GPa" == unit("C11_compression", "GPa") == unit("onset_S11", "GPa")
+    assert unit("material.fibre.E_axial", "GPa") == "GPa" == unit("material.fibre.G13", "GPa")
+    assert not unit("material.fibre.nu_axial", "GPa") and not unit("material.fibre.expansion_axial", "GPa")
+    assert with_unit("angle_60_C11", "MPa") == "angle_60_C11 (MPa)" and with_unit("bulk", "") == "bulk"
+    assert unit("seconds_solve", "GPa") == "s" and unit("material.fibre.angle", "GPa") == "degrees"
+    assert not unit("cell.fibre_fraction", "GPa") and not unit("nu12", "GPa") and not unit("check_hill", "GPa")

@@ -1,0 +1,69 @@
+"""Columns of a sweep's table: those of a state under a load and of an envelope."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from unit.studies.sweep.test_collect import path_document
+
+from feti_homog.report.text.table import unit
+from feti_homog.studies.sweep.report.outputs import outputs
+
+
+def document(factors: list[float | None], plane: tuple[str, str]) -> dict[str, Any]:
+    points = [{"angle": 90.0 * k} | ({} if f is None else {"factor": f}) for k, f in enumerate(factors)]
+    solver = dict.fromkeys(("ranks", "subdomains", "dofs", "multipliers"), 1) | {"iterations": [1]}
+    return {
+        "case": {"envelope": {"plane": list(plane)}}, "envelope": points, "solver": solver,
+        "cell": {"fibre_fraction": 0.4, "elements": 1, "nodes": 1}, "checks": {}, "timings": {}, "memory": 1,
+    }  # fmt: skip
+
+
+def of_envelope(factors: list[float | None], plane: tuple[str, str] = ("S22", "S12")) -> dict[str, float]:
+    return {name: value for name, value in outputs(document(factors, plane)).items() if name.startswith("envelope")}
+
+
+def test_the_state_under_a_load_has_columns():
+    point = {
+        "strain": [0.1, -0.02, 0.0],
+        "stress": [5.0, 0.0, 0.0],
+        "stored": 0.25,
+        "bonded": 9,
+        "open": 1,
+        "closed": 0,
+    }
+    base = document([], ("S22", "S12")) | {"load": point}
+    found = outputs(base)
+    assert found["load_E11"] == 0.1 and found["load_S11"] == 5.0 and found["load_open"] == 1.0
+    assert unit("load_S11", "GPa") == "GPa" == unit("load_stored", "GPa") and unit("load_E11", "GPa") == ""
+
+
+def test_the_first_axis_the_least_and_the_largest():
+    found = of_envelope([5.0, 2.0, 9.0, 3.0])
+    assert found == {"envelope_S22": 5.0, "envelope_least_S22_S12": 2.0, "envelope_largest_S22_S12": 9.0}
+    assert {unit(name, "MPa") for name in found} == {"MPa"}
+
+
+def test_strains_have_no_unit():
+    found = of_envelope([5.0, 2.0, 9.0, 3.0], ("E11", "gamma12"))
+    assert len(found) == 3 and {unit(name, "MPa") for name in found} == {""}
+
+
+def test_without_an_onset_there_is_no_largest():
+    assert of_envelope([None, 2.0, 9.0, 3.0]) == {"envelope_least_S22_S12": 2.0}
+    assert of_envelope([None] * 4) == {}
+
+
+def test_loads_and_stresses_where_bonds_break_have_errors():
+    whole = document([5.0, 2.0, 9.0, 3.0], ("S22", "S12"))
+    whole["envelope"][1]["mesh_error"] = 0.01
+    errors = {name: value for name, value in outputs(whole).items() if name.endswith("_mesh_error")}
+    assert errors == pytest.approx({"envelope_least_S22_S12_mesh_error": 0.02})
+    path = path_document(2, 0.0)
+    first = path["path"][0]
+    first |= {"load_mesh_error": 3e-3, "mesh_error": 4e-3}
+    errors = {name: value for name, value in outputs(path).items() if name.endswith("_mesh_error")}
+    assert errors == pytest.approx(
+        {"onset_load_factor_mesh_error": 3e-3 * first["load_factor"], "peak_S11_mesh_error": 5e-3 * first["stress"][0]}
+    )

@@ -1,0 +1,124 @@
+"""Locks between processes, and files that are written whole or not at all."""
+
+from __future__ import annotations
+
+import csv
+import subprocess
+import sys
+from itertools import product
+from pathlib import Path
+
+import pytest
+from support.sweep_files import sweep_file
+
+from feti_homog.errors import CaseError, FetiHomogError
+from feti_homog.results import atomic
+from feti_homog.studies.sweep import plan, store
+from feti_homog.system.runtime.file_locks import Lock, LockHeld, is_locked
+
+HOLDER = """
+import sys
+from pathlib import Path
+from feti_homog.system.runtime.file_locks import Lock
+Lock(Path(sys.argv[1]), shared={shared}).acquire()
+print("held", flush=True)
+sys.stdin.read()
+"""
+
+
+def holder(path: Path, shared: bool = False) -> subprocess.Popen[bytes]:
+    """Another process that holds the lock."""
+    program = [sys.executable, "-c", HOLDER.format(shared=shared), str(path)]
+    process = subprocess.Popen(program, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    assert process.stdout is not None and process.stdout.readline() == b"held\n"
+    return process
+
+
+@pytest.mark.parametrize(("theirs", "ours", "free"), [
+    (False, False, False), (False, True, False), (True, False, False), (True, True, True),
+])  # fmt: skip
+def test_a_lock_excludes_unless_both_share_it(tmp_path, theirs, ours, free):
+    path = tmp_path / "lock"
+    process = holder(path, theirs)
+    try:
+        lock = Lock(path, ours, timeout=0.05)
+        if free:
+            lock.acquire()
+            lock.release()
+        else:
+            with pytest.raises(LockHeld, match="another process" if theirs else f"process {process.pid}"):
+                lock.acquire()
+        assert is_locked(path) != theirs
+    finally:
+        process.communicate()
+    with Lock(path):
+        assert is_locked(path)
+    assert not is_locked(path)
+
+
+def test_a_lock_that_cannot_be_made_is_reported(tmp_path):
+    with pytest.raises(FetiHomogError, match="cannot lock"):
+        Lock(tmp_path / "none" / "lock").acquire()
+    assert not is_locked(tmp_path / "none" / "lock")
+
+
+def test_a_file_is_replaced_whole_or_not_at_all(tmp_path):
+    path = atomic.replace_text(tmp_path / "file", "old")
+
+    def ends_early(part: Path) -> None:
+        part.write_text("ne")
+        raise OSError(28, "No space left on device")
+
+    with pytest.raises(FetiHomogError, match=r"cannot write .*file: No space left on device"):
+        atomic.replace(path, ends_early)
+    assert path.read_text() == "old" and list(tmp_path.iterdir()) == [path]
+
+
+def test_a_full_device_is_reported():
+    with pytest.raises(FetiHomogError, match="No space left on device"):
+        atomic.replace(Path("/dev/shm/feti_homog_none"), lambda part: Path("/dev/full").write_text("x"))
+
+
+OWN = ["cases.csv", "lock", "statistics.csv", "moduli.png", "case-0001/notes.txt"]
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_files_that_no_sweep_wrote_are_not_replaced(tmp_path, name):
+    sweep, out = plan.load(sweep_file(tmp_path, '"cell.order" = [1, 2]\n')), tmp_path / "out"
+    (out / name).parent.mkdir(parents=True)
+    (out / name).write_text("mine")
+    with pytest.raises(CaseError, match=f"no sweep of this program wrote {Path(name).parts[0]}, and this one would"):
+        store.prepare_folder(out, sweep)
+    assert [path.read_text() for path in out.rglob("*") if path.is_file()] == ["mine"]
+
+
+def test_the_folder_of_a_sweep_is_made_whole_again(tmp_path):
+    """A sweep may be killed when it has written its list and not yet the table."""
+    axes = '"cell.order" = [1, 2]\n"material.fibre.young" = [300.0, 400.0, 500.0]\n'
+    sweep, out = plan.load(sweep_file(tmp_path, axes)), tmp_path / "out"
+    store.prepare_folder(out, sweep)
+    table = (out / "cases.csv").read_text()
+    expected = [
+        {"case": f"{k}", "folder": f"case-000{k}", "point": f"{k}", "realisation": "1", "cell.order": order,
+         "material.fibre.young": young}
+        for k, (order, young) in enumerate(product("12", ("300.0", "400.0", "500.0")), start=1)
+    ]  # fmt: skip
+    assert list(csv.DictReader(table.splitlines())) == expected
+    (out / "cases.csv").unlink()
+    (out / "statistics.csv").write_text("collected")
+    atomic.part_of(out / "cases.csv").write_text("half")
+    store.prepare_folder(out, sweep)
+    assert {path.name: path.read_text() for path in out.glob("*.csv*")} == {
+        "cases.csv": table,
+        "statistics.csv": "collected",
+    }
+    assert store.read_index(out).entries == sweep.entries
+
+
+def test_bonds_that_never_break_are_values_of_a_sweep(tmp_path):
+    """JSON has no infinite numbers, and the list of cases is such a file."""
+    axes = '"interface.debonded" = [[]]\n"interface.normal_stiffness" = [2.0, inf]\n'
+    sweep, out = plan.load(sweep_file(tmp_path, axes)), tmp_path / "out"
+    store.prepare_folder(out, sweep)
+    assert store.read_index(out).entries == sweep.entries
+    store.prepare_folder(out, sweep)
