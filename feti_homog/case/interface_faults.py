@@ -11,12 +11,12 @@ from typing import Any
 from feti_homog.case.bond_laws import BRANCH, COHESIVE, LAWS, STIFFNESSES
 from feti_homog.case.interface_section import InterfaceSection, Scatter, interface_label, interface_tables
 from feti_homog.case.section_values import PAIR
-from feti_homog.schema.keys import TableReader, to_table
+from feti_homog.schema.keys import TableReader, keys_of, to_table
 from feti_homog.schema.wording import toml_value
 
 # Relative difference of numbers that a table and other keys give alike.
 SAME = 1e-6
-COMMON = ("contact", "criterion", "growth", "scatter", "teeth", "softening_tolerance", *BRANCH)
+COMMON = tuple(name for name, entry in keys_of(InterfaceSection).items() if not entry.by_pair)
 """The keys in which all sections [[interface]] agree."""
 
 

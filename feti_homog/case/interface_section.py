@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from feti_homog.case.bond_laws import DEFAULT, LAWS, REGISTRY
@@ -21,6 +22,9 @@ from feti_homog.case.selectors import (
 )
 from feti_homog.schema.keys import key
 from feti_homog.schema.values import POSITIVE_OR_INF, boolean, choice, integer, list_of, real, table_of
+
+pair_key = partial(key, by_pair=True)
+"""A key in which several sections [[interface]] may differ; they agree in all others."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,7 +77,7 @@ class InterfaceSection:
     """Bonding of fibres and matrix: what is debonded from the start, and the tractions that debond more.
 
     Without this section bonding is perfect. Several sections [[interface]], each with its pair of phases, have the same
-    contact, law, growth and scatter.
+    contact, law with its teeth, branch and growth, and scatter.
 
     A strength of None is unlimited.
     """
@@ -84,7 +88,7 @@ class InterfaceSection:
         "overlap freely.",
         default=True,
     )
-    friction: float = key(
+    friction: float = pair_key(
         real(least=0.0),
         "Coulomb's coefficient mu of debonded faces: they stick while |t_t| < mu |t_n|, and slide at that traction. "
         "The load is controlled from the first leg on, without snap-back. Cells too large for influence columns are "
@@ -92,14 +96,14 @@ class InterfaceSection:
         default=0.0,
         only=PATH_ANALYSIS,
     )
-    friction_on_damage: bool = key(
+    friction_on_damage: bool = pair_key(
         boolean,
         "true: friction acts on the damaged share of bonds that hold, too, with the whole of their pressure. false: on "
         "broken bonds alone.",
         default=False,
         only=(PATH_ANALYSIS, SOFTENING),
     )
-    axial_friction: str = key(
+    axial_friction: str = pair_key(
         choice("free", "prevented"),
         'Slip along the fibre of debonded faces with friction: "free": they bear no shear along it, as without '
         'friction; "prevented": while they touch they bear any, and keep their slip along it. The default is the one '
@@ -109,27 +113,27 @@ class InterfaceSection:
         default="free",
         only=(PATH_ANALYSIS, GENERALIZED),
     )
-    debonded: tuple[Arc, ...] = key(
+    debonded: tuple[Arc, ...] = pair_key(
         ARCS,
         'What is debonded from the start; needed in type = "angle", and in type = "stiffness" unless the cell is a '
         'mesh (there lines in a physical curve "debonded" are debonded too).',
         default=(),
     )
-    normal_stiffness: float | None = key(
+    normal_stiffness: float | None = pair_key(
         STIFFNESS,
         "Normal traction / opening, k_n: of bonds that hold in tension and compression, of broken faces in contact.",
         unit="stress / length",
         default=None,
         default_words="inf",
     )
-    tangential_stiffness: float | None = key(
+    tangential_stiffness: float | None = pair_key(
         STIFFNESS,
         "Tangential traction / slip, k_t, of the bonds that hold.",
         unit="stress / length",
         default=None,
         default_words="inf",
     )
-    axial_stiffness: float | None = key(
+    axial_stiffness: float | None = pair_key(
         POSITIVE_OR_INF,
         "Traction along the fibre / slip along it, k_a, of the bonds that hold; inf: no slip along it.",
         unit="stress / length",
@@ -137,7 +141,7 @@ class InterfaceSection:
         default_words="tangential_stiffness",
         only=GENERALIZED,
     )
-    normal_strength: float | None = key(
+    normal_strength: float | None = pair_key(
         STRENGTH,
         "R^n: the normal traction at which a bond breaks, or N: at which its damage begins. A force per area: it does "
         "not depend on the mesh.",
@@ -146,7 +150,7 @@ class InterfaceSection:
         default_words="inf",
         only=(BREAKING, BY_STRENGTH),
     )
-    tangential_strength: float | None = key(
+    tangential_strength: float | None = pair_key(
         STRENGTH,
         "R^t: the tangential traction at which a bond breaks, or S: at which its damage begins; of cohesive laws along "
         "the fibre, too.",
@@ -155,7 +159,7 @@ class InterfaceSection:
         default_words="inf",
         only=(BREAKING, BY_STRENGTH),
     )
-    axial_strength: float | None = key(
+    axial_strength: float | None = pair_key(
         POSITIVE_OR_INF,
         "R^a: the traction along the fibre at which a bond breaks; inf: it breaks none.",
         unit="stress",
@@ -181,14 +185,14 @@ class InterfaceSection:
         default=DEFAULT,
         only=BREAKING,
     )
-    normal_toughness: float | None = key(
+    normal_toughness: float | None = pair_key(
         TOUGHNESS,
         "G_n, the energy per area that a bond takes in pure opening: no less than N^2 / (2 normal_stiffness).",
         unit="stress * length",
         default=None,
         only=(BREAKING, SOFTENING),
     )
-    tangential_toughness: float | None = key(
+    tangential_toughness: float | None = pair_key(
         TOUGHNESS,
         "G_t, the energy per area in pure shear. At the share B of shear in the energy of undamaged springs damage "
         "begins at (t_n / N)^2 + (t_t / S)^2 = 1 and takes G_n + (G_t - G_n) B^mixing_exponent.",
@@ -196,7 +200,7 @@ class InterfaceSection:
         default=None,
         only=(BREAKING, SOFTENING),
     )
-    mixing_exponent: float = key(
+    mixing_exponent: float = pair_key(
         real(above=0.0), "Exponent of Benzeggagh and Kenane's toughness.", default=2.0, only=(BREAKING, SOFTENING)
     )
     teeth: int | None = key(
@@ -227,7 +231,7 @@ class InterfaceSection:
         default=None,
         only=(BREAKING, BY_TABLE),
     )
-    toughness: float | None = key(
+    toughness: float | None = pair_key(
         TOUGHNESS,
         "G_Ic, energy per area. A bond breaks when G_I + G_II = <t_n>^2 / (2 k_n) + t_t^2 / (2 k_t) reaches "
         "G_c = G_Ic (1 + tan^2((1 - mode_sensitivity) psi)), tan^2 psi = G_II / G_I; along the fibre "
@@ -243,7 +247,7 @@ class InterfaceSection:
         only=BY_ENERGY,
         instead="no growth: a law that softens takes the energy of its teeth, at tips too",
     )
-    mode_sensitivity: float = key(
+    mode_sensitivity: float = pair_key(
         real(least=0.0, most=1.0),
         "How much of the toughness in opening holds in shear: 1 all modes have the same, 0 shear alone breaks nothing.",
         default=0.25,
@@ -259,7 +263,7 @@ class InterfaceSection:
         default_words="none",
         only=BREAKING,
     )
-    between: tuple[str, str] | None = key(
+    between: tuple[str, str] | None = pair_key(
         PAIR,
         "The two phases whose interfaces these are, in any order; pairs that no section names never part. Needed where "
         "there are several sections [[interface]].",

@@ -65,6 +65,7 @@ class Key:
         required: whether it must be there where it belongs.
         instead: what to write where it does not belong; empty if there is nothing like it.
         unless: other keys of the table, beside any of which it is not required.
+        by_pair: whether it may differ between several sections [[interface]].
     """
 
     type: ValueType
@@ -75,6 +76,7 @@ class Key:
     required: bool = False
     instead: str = ""
     unless: tuple[str, ...] = ()
+    by_pair: bool = False
 
     def belongs(self, selected: Selected) -> bool:
         """Return whether the key belongs to the table; not, if that depends on a faulty selector."""
@@ -91,6 +93,7 @@ def key(
     only: Condition | tuple[Condition, ...] = (),
     instead: str = "",
     unless: tuple[str, ...] = (),
+    by_pair: bool = False,
 ) -> Any:
     """Return a dataclass field read from the key of its name; required where it belongs if it has no default.
 
@@ -100,7 +103,7 @@ def key(
     required = default is dataclasses.MISSING
     written = toml_value(list(default) if isinstance(default, tuple) else default)
     words = default_words or ("" if required or default is None else written)
-    metadata = {"key": Key(type_, meaning, unit, words, conditions, required, instead, unless)}
+    metadata = {"key": Key(type_, meaning, unit, words, conditions, required, instead, unless, by_pair)}
     if required and not conditions:
         return dataclasses.field(metadata=metadata)
     return dataclasses.field(default=None if required else default, metadata=metadata)

@@ -108,6 +108,8 @@ def checked(name: str, unchecked: Sequence[CaseDocument], folder: Path) -> Sweep
     if numbers_by_fault:
         raise CaseError(*(f"{case_names(numbers)}: {fault}" for fault, numbers in numbers_by_fault.items()))
     entries, checked = zip(*found, strict=True)
+    if len({case.output.stress_unit for case in checked}) > 1:
+        raise CaseError("[output] stress_unit: expected the same in all cases, for they share their tables")
     return Sweep(name, entries, checked)
 
 

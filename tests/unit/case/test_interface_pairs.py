@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import pytest
 from jsonschema import Draft202012Validator
 
 from feti_homog import Case
+from feti_homog.case.interface_faults import COMMON
+from feti_homog.case.interface_section import InterfaceSection
 from feti_homog.case.json_schema import json_schema
 from feti_homog.errors import CaseError
+from feti_homog.schema.keys import keys_of
 from feti_homog.studies.sweep.plan import case_documents
 
 OUTER, INNER = ["coating", "matrix"], ["fibre", "coating"]
@@ -47,25 +53,9 @@ FAULTY = {
     "a phase with itself": (STRONG | {"between": ["matrix", "matrix"]}, "[interface] between = "),
     "one phase": (STRONG | {"between": "coating"}, '[interface] between = "coating": expected the names of two phases'),
     "three phases": (STRONG | {"between": ["a", "b", "c"]}, "expected the names of two phases"),
-    "contact": (
-        [STRONG | {"between": OUTER}, STRONG | {"between": INNER, "contact": False}],
-        "[interface 2] contact = false: expected true, as of [interface 1]",
-    ),
-    "criteria": (
-        [STRONG | {"between": OUTER}, STRONG | {"between": INNER, "criterion": "quadratic"}],
-        '[interface 2] criterion = "quadratic": expected "max", as of [interface 1]',
-    ),
     "laws": (
         [STRONG | {"between": OUTER}, STRONG | {"between": INNER, "law": "quadratic"}],
         '[interface 2] law = "quadratic": expected "max", as of [interface 1]',
-    ),
-    "growth": (
-        [ENERGY | {"between": OUTER}, ENERGY | {"between": INNER, "growth": "springs"}],
-        '[interface 2] growth = "springs": expected "released", as of [interface 1]',
-    ),
-    "scatter": (
-        [STRONG | {"between": OUTER}, STRONG | {"between": INNER, "scatter": {"shape": 8.0}}],
-        "[interface 2] scatter = {shape = 8.0, seed = 0}: expected none, as of [interface 1]",
     ),
     "a value of the second": (
         [STRONG | {"between": OUTER}, {"normal_strength": -1.0, "between": INNER}],
@@ -94,8 +84,72 @@ def test_faults_name_their_section(name):
 
 @pytest.mark.parametrize("name", FAULTY)
 def test_the_schema_refuses_all_but_disagreements_of_sections(name):
-    agree = name not in ("the same pair", "contact", "criteria", "laws", "growth", "scatter")
+    agree = name not in ("the same pair", "laws")
     assert Draft202012Validator(json_schema()).is_valid(document(FAULTY[name][0])) != agree
+
+
+TABLE = {
+    "law": "table", "tangential_stiffness": 1.0, "tangential_strength": 1.0, "tangential_toughness": 2.0,
+    "openings": [0.1, 1.0], "tractions": [1.0, 0.0],
+}  # fmt: skip
+BILINEAR = TABLE | {"law": "bilinear", "normal_stiffness": 10.0, "normal_strength": 1.0}
+del BILINEAR["openings"], BILINEAR["tractions"]
+ARC = {"fibre": 1, "angle": 30.0}
+# Of each key a law that has it, and two values.
+VALUES = {
+    "contact": (STRONG, True, False),
+    "friction": (STRONG, 0.1, 0.2),
+    "friction_on_damage": (TABLE | {"friction": 0.1}, True, False),
+    "axial_friction": (STRONG | {"friction": 0.1}, "free", "prevented"),
+    "debonded": (STRONG, [ARC], [ARC | {"angle": 60.0}]),
+    "normal_stiffness": (STRONG, 1.0, 2.0),
+    "tangential_stiffness": (STRONG, 1.0, 2.0),
+    "axial_stiffness": (STRONG, 1.0, 2.0),
+    "normal_strength": ({}, 1.0, 2.0),
+    "tangential_strength": ({}, 1.0, 2.0),
+    "axial_strength": ({}, 1.0, 2.0),
+    "law": (STRONG, "max", "quadratic"),
+    "criterion": (STRONG, "max", "quadratic"),
+    "normal_toughness": (BILINEAR, 0.5, 0.6),
+    "tangential_toughness": (TABLE, 2.0, 3.0),
+    "mixing_exponent": (TABLE, 1.0, 2.0),
+    "teeth": (TABLE, 5, 6),
+    "softening_tolerance": (TABLE, 0.1, 0.2),
+    "openings": (TABLE, [0.1, 1.0], [0.1, 2.0]),
+    "tractions": (TABLE, [1.0, 0.0], [2.0, 0.0]),
+    "toughness": (ENERGY, 0.1, 0.2),
+    "growth": (ENERGY, "released", "springs"),
+    "mode_sensitivity": (ENERGY, 0.2, 0.3),
+    "scatter": (STRONG, {"shape": 8.0}, {"shape": 8.0, "seed": 1}),
+    "between": (STRONG, OUTER, INNER),
+}
+
+
+@pytest.mark.parametrize("name", keys_of(InterfaceSection))
+def test_sections_differ_in_the_keys_of_a_pair_alone(name):
+    """Two values of each key: one fault with section, key and the value of the first, or a case that has both."""
+    law, *values = VALUES[name]
+    sections = [
+        {"between": between} | law | {name: value} for between, value in zip((OUTER, INNER), values, strict=True)
+    ]
+    whole = document(sections) | {"path": {"to": {"E11": 0.1}}}
+    whole["analysis"]["plane"] = "generalized"
+    if keys_of(InterfaceSection)[name].by_pair:
+        read = Case.parse(whole).resolved()["interface"]
+        assert [section[name] for section in read] != [read[0][name]] * 2
+        return
+    with pytest.raises(CaseError) as caught:
+        Case.parse(whole)
+    assert len(caught.value.faults) == 1
+    assert caught.value.faults[0].startswith(f"[interface 2] {name} = ")
+    assert "as of [interface 1]" in caught.value.faults[0]
+
+
+def test_what_is_read_of_the_first_section_is_common_to_all():
+    sources = "\n".join(path.read_text() for path in (Path(__file__).parents[3] / "feti_homog").rglob("*.py"))
+    of_first = re.findall(r"(?:case\.interface|(?:bonds|interfaces)\[0\])\.(\w+)", sources)
+    read = {*of_first, *re.findall(r"\.common\(\"(\w+)\"\)", sources)}
+    assert read | {"law"} == {*COMMON}  # whose value is that of `criterion`
 
 
 def test_sweeps_vary_a_key_of_one_section():
