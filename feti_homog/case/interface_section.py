@@ -69,7 +69,7 @@ class Scatter:
     )
 
 
-ARCS = list_of(table_of(Arc, "arc", ""), "a list of arcs {fibre, centre, angle}")
+ARCS = list_of(table_of(Arc, ""), "a list of arcs {fibre, centre, angle}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -254,7 +254,7 @@ class InterfaceSection:
         only=BY_ENERGY,
     )
     scatter: Scatter | None = key(
-        table_of(Scatter, "scatter", "a table such as {shape = 8.0, seed = 1}"),
+        table_of(Scatter, "a table such as {shape = 8.0, seed = 1}"),
         "Strengths that differ from fibre to fibre: each fibre has a random factor f of mean 1, by which all strengths "
         "of its interfaces are multiplied, and toughnesses by f^2; stiffnesses stay, and so does the length of the "
         "process zone. Strengths and toughness of this section are then those of a mean fibre, f = 1. The column "

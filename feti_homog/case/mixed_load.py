@@ -61,7 +61,7 @@ class MixedLoad:
         return {name: value for name, value in values if value is not None}
 
 
-LOAD = table_of(MixedLoad, "mixed_load", "a table of strains and stresses such as {S11 = 60.0, S22 = 0.0}", least=1)
+LOAD = table_of(MixedLoad, "a table of strains and stresses such as {S11 = 60.0, S22 = 0.0}", least=1)
 WAYPOINTS = list_of(
     either("", STRAIN, LOAD), f"a list of strains {STRAIN_COMPONENTS} or of tables such as {{S11 = 60.0}}", least=1
 )

@@ -1,11 +1,13 @@
-"""The relations between the keys of a case file that the reader and the JSON Schema share."""
+"""The relations between the keys of a case file."""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import product
+from operator import eq
 from typing import Any
 
 from feti_homog.case.bond_laws import REGISTRY, STIFFNESSES, STRENGTHS
@@ -30,7 +32,19 @@ from feti_homog.case.uncertainty import DIFFERENTIABLE
 from feti_homog.materials import plane_state
 from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS, STRESSES
 from feti_homog.schema.keys import Condition, Selector, keys_of
-from feti_homog.schema.rules import ITEMS, Path, Place, Rule, Schema, belonging, exclusive, misplaced, needed, refused
+from feti_homog.schema.rules import (
+    ITEMS,
+    Path,
+    Place,
+    Rule,
+    Test,
+    belonging,
+    exclusive,
+    has,
+    misplaced,
+    needed,
+    refused,
+)
 from feti_homog.schema.values import INF
 from feti_homog.schema.wording import toml_value
 
@@ -43,26 +57,39 @@ PLACES_OF_TABLES: tuple[tuple[Path, type[Any]], ...] = (
     *((place, MixedLoad) for place in PLACES_OF_LOADS),
 )
 ALONG_FIBRES = [name for name in (*SPATIAL_STRESSES, *SPATIAL_STRAINS) if name not in (*STRESSES, *STRAINS)]
-SOME_ARC: Schema = {"required": ["debonded"], "properties": {"debonded": {"minItems": 1}}}
-NO_TABLES: Schema = {"not": {"anyOf": [{"type": "object"}, {"type": "array"}]}}
 
 
-def _any_section(schema: Schema) -> Schema:
-    """Return the condition that a section, or one of several, is valid; other types are faults elsewhere."""
-    return {"anyOf": [{"type": "object", **schema}, {"type": "array", "contains": schema}, NO_TABLES]}
+def _some_arc(table: Any) -> bool:
+    """Return whether a section has debonded arcs."""
+    return has(table, "debonded") and table["debonded"] != []
 
 
-def _values(selector: Selector) -> list[str]:
+def _any_section(test: Test) -> Test:
+    """Return the test that [interface], or one of several, passes a test; other types are faults elsewhere."""
+
+    def holds(document: Any) -> bool:
+        section = document.get("interface")
+        tables = section if isinstance(section, list) else [section]
+        return any(not isinstance(table, dict) or test(table) for table in tables)
+
+    return holds
+
+
+def _given(section: str) -> Test:
+    """Return the test that a document has a section."""
+    return lambda document: section in document
+
+
+def _values(selector: Selector) -> Sequence[str]:
     """Return the values that a selector may have."""
-    values: list[str] = keys_of(SECTIONS[selector.section])[selector.key].type.json_schema["enum"]
-    return values
+    return keys_of(SECTIONS[selector.section])[selector.key].type.options
 
 
 def _sections_of_an_analysis() -> Iterator[Rule]:
     """Sections that one type of analysis needs, and that no other has."""
     for section, own in SECTIONS_OF_AN_ANALYSIS.items():
         line = f"[{section}]: missing section; {own.in_words(section)} needs it"
-        yield _document({"required": [section]}, line, own)
+        yield _document(_given(section), line, own)
         yield belonging((section,), own, _values(ANALYSIS_TYPE))
 
 
@@ -78,18 +105,16 @@ def _conditional_keys() -> Iterator[Rule]:
                 yield needed(path, name, line, *entry.only, unless=entry.unless)
 
 
-def _document(schema: Schema, line: str, *when: Condition) -> Rule:
+def _document(holds: Test, line: str, *when: Condition) -> Rule:
     """Return a rule for the document as a whole."""
-    return Rule((), schema, lambda _: line, when)
+    return Rule((), holds, lambda _: line, when)
 
 
 def _cell() -> Iterator[Rule]:
     """Yield the requirements and exclusions among the keys of [cell]."""
     yield exclusive(CELL, "width", "fibre_radius")
     yield exclusive(CELL, *ASKED)
-    yield Rule(
-        CELL, {"not": {"type": "object", "anyOf": [{"required": [*pair]} for pair in product(ASKED, CHOSEN)]}}, _sizes
-    )
+    yield Rule(CELL, lambda cell: not any(has(cell, *pair) for pair in product(ASKED, CHOSEN)), _sizes)
     yield exclusive(CELL, "fibre_fraction", "mix")
     yield exclusive(CELL, "match", "mix")
     yield misplaced(CELL, "radii", "mix", "; use fibre_radius")
@@ -103,15 +128,23 @@ def _cell() -> Iterator[Rule]:
     yield misplaced(CELL, "void_radius", "voids")
     yield misplaced(CELL, "accuracy_check", "accuracy")
     yield exclusive(CELL, "match", "voids", words="exclude each other; cells that match a table have no voids")
-    both = {"required": ["match", "radius_spread"], "properties": {"radius_spread": {"exclusiveMinimum": 0}}}
     line = "exclude each other; the table gives the radii"
-    yield Rule(CELL, {"not": {"type": "object", **both}}, lambda at: f"{at.named('match', 'radius_spread')}: {line}")
-    enough = {"properties": {"fibres": {"minimum": FEWEST_MATCHED}}}
     yield Rule(
         CELL,
-        {"if": {"required": ["match"]}, "then": enough},
+        lambda cell: not has(cell, "match", "radius_spread") or _below(cell["radius_spread"], 0, or_equal=True),
+        lambda at: f"{at.named('match', 'radius_spread')}: {line}",
+    )
+    yield Rule(
+        CELL,
+        lambda cell: not has(cell, "match", "fibres") or not _below(cell["fibres"], FEWEST_MATCHED),
         lambda at: f"{at.named('fibres')} = {at.value['fibres']}: expected at least {FEWEST_MATCHED} with match",
     )
+
+
+def _below(value: Any, limit: float, or_equal: bool = False) -> bool:
+    """Return whether the value is a number below the limit."""
+    is_of_type = isinstance(value, int | float) and not isinstance(value, bool)
+    return is_of_type and (value < limit or (or_equal and value == limit))
 
 
 def _sizes(place: Place) -> str:
@@ -126,37 +159,48 @@ def _files() -> Iterator[Rule]:
     yield needed(CELL, "file", f"missing; expected the name of a {MESH_FILE}", MESH)
     line = "missing; expected the name of a .csv file, or fibre_list"
     yield needed(CELL, "file", line, TABLE, unless=("fibre_list",))
-    meshes = "|".join(suffix[1:] for suffix in MESH_SUFFIXES)
-    tables = "|".join(suffix[1:] for suffix in TABLE_SUFFIXES)
-    for pattern, expected, geometry in ((rf"\.({tables})$", MESH_FILE, MESH), (rf"\.({meshes})$", ".csv file", TABLE)):
+    for suffixes, expected, geometry in ((TABLE_SUFFIXES, MESH_FILE, MESH), (MESH_SUFFIXES, ".csv file", TABLE)):
         line = f"expected the name of a {expected} for {geometry.in_words('cell')}"
-        yield refused((*CELL, "file"), {"type": "string", "pattern": pattern}, line, geometry)
+        yield refused((*CELL, "file"), partial(_ends, suffixes), line, geometry)
     for wrong, right, geometry in (("overlaps", "snap", MESH), ("snap", "overlaps", TABLE)):
         line = f'expected "none" or "{right}" for {geometry.in_words("cell")}'
-        yield refused((*CELL, "repair"), {"enum": [wrong]}, line, geometry)
+        yield refused((*CELL, "repair"), partial(eq, wrong), line, geometry)
     for name in ("width", "height"):
         line = "missing; fibre_list has no line such as # width = 120, height = 80"
         yield needed(CELL, name, line, TABLE, beside="fibre_list")
+
+
+def _ends(suffixes: tuple[str, ...], value: Any) -> bool:
+    """Return whether the value is the name of a file with one of some suffixes."""
+    return isinstance(value, str) and value.endswith(suffixes)
 
 
 def _output() -> Iterator[Rule]:
     """Yield what some analyses cannot give."""
     others = ANALYSIS_TYPE.among(*(name for name in _values(ANALYSIS_TYPE) if name not in DIFFERENTIABLE))
     line = f"belongs to [analysis] type = {' or '.join(map(toml_value, DIFFERENTIABLE))}"
-    yield refused(("output", "sensitivities"), {"type": "boolean", "enum": [True]}, line, others)
-    pairs = (("cell", "accuracy_check", "repeat"), ("output", "mesh_error", False))
-    tables = {s: {"type": "object", "required": [key], "properties": {key: {"enum": [v]}}} for s, key, v in pairs}
+    yield refused(("output", "sensitivities"), lambda value: value is True, line, others)
     line = '[output] mesh_error = false: expected true with [cell] accuracy_check = "repeat"'
-    yield Rule((), {"not": {"required": ["cell", "output"], "properties": tables}}, lambda _: line)
+    yield _document(lambda document: not _repeats_unestimated(document), line)
+
+
+def _repeats_unestimated(document: Any) -> bool:
+    """Return whether a second mesh is to follow from an error that is not estimated."""
+    cell, output = document.get("cell"), document.get("output")
+    repeats = has(cell, "accuracy_check") and cell["accuracy_check"] == "repeat"
+    return repeats and has(output, "mesh_error") and output["mesh_error"] is False
 
 
 def _loads() -> Iterator[Rule]:
     """One form of a path; of each component its strain or its stress, by name in generalized plane strain."""
-    given: Schema = {"anyOf": [{"required": [name]} for name in LOADS]}
-    yield Rule(("path",), given, lambda place: f"{place.named(*LOADS)}: missing; give one")
+    yield Rule(
+        ("path",),
+        lambda path: not isinstance(path, dict) or any(name in path for name in LOADS),
+        lambda place: f"{place.named(*LOADS)}: missing; give one",
+    )
     yield exclusive(("path",), *LOADS)
     line = f"expected a table such as {{E11 = 0.01}} in {GENERALIZED.in_words('path')}"
-    yield refused(("path", "waypoints", ITEMS), {"type": "array"}, line, GENERALIZED)
+    yield refused(("path", "waypoints", ITEMS), lambda value: isinstance(value, list), line, GENERALIZED)
     for path, pair in product(PLACES_OF_LOADS, plane_state.GENERALIZED.components):
         yield exclusive(path, *pair)
 
@@ -164,39 +208,52 @@ def _loads() -> Iterator[Rule]:
 def _bonds() -> Iterator[Rule]:
     """Yield the rules of debonded arcs, and the requirements of energies and envelopes."""
     line = f"[interface] debonded: missing; {ANGLE_ANALYSIS.in_words('interface')} needs {ARCS.expected}"
-    yield _document(
-        {"required": ["interface"], "properties": {"interface": _any_section(SOME_ARC)}}, line, ANGLE_ANALYSIS
-    )
+    cracked = _any_section(_some_arc)
+    yield _document(lambda document: "interface" in document and cracked(document), line, ANGLE_ANALYSIS)
     # An empty list is meant; of a user's mesh a curve may be debonded.
-    ways: Schema = {"anyOf": [{"required": [name]} for name in ("debonded", *STIFFNESSES, "axial_stiffness")]}
+    ways = ("debonded", *STIFFNESSES, "axial_stiffness")
     line = f"[interface] debonded: missing; expected {ARCS.expected}, or []: nothing else can open"
     unbroken = ANALYSIS_TYPE.among("stiffness", "load")
-    yield _document({"properties": {"interface": _any_section(ways)}}, line, unbroken, MESHED)
+    yield _document(_any_section(lambda table: any(name in table for name in ways)), line, unbroken, MESHED)
     yield exclusive(INTERFACE, "law", "criterion", words="exclude each other; criterion is the older word for law")
     for law in REGISTRY:
         missing = f"missing; law = {toml_value(law.name)} needs it"
         for name in law.needs:
             yield needed(INTERFACE, name, missing, BREAKING, CRITERION.among(law.name))
-    type_, unlimited = ENVELOPE_ANALYSIS.in_words(""), [law.name for law in REGISTRY if not law.limits]
-    yield _document({"required": ["interface"]}, f"[interface]: missing section; {type_} needs it", ENVELOPE_ANALYSIS)
+    type_ = ENVELOPE_ANALYSIS.in_words("")
+    line = f"[interface]: missing section; {type_} needs it"
+    yield _document(_given("interface"), line, ENVELOPE_ANALYSIS)
     for plane, names in ((IN_THE_PLANE, STRENGTHS[:2]), (GENERALIZED, STRENGTHS)):
-        finite: Schema = {"maximum": sys.float_info.max, "not": {"enum": [INF]}}
-        strong: list[Schema] = [{"required": [name], "properties": {name: finite}} for name in names]
-        strong += [{"required": [key], "properties": {key: {"enum": unlimited}}} for key in ("criterion", "law")]
         line = f"[interface] {', '.join(names)}: missing; {type_} needs one"
-        bonds = {"properties": {"interface": _any_section({"anyOf": strong})}}
-        yield _document(bonds, line, ENVELOPE_ANALYSIS, plane)
-    free: Schema = {"required": ["contact"], "properties": {"contact": {"enum": [False]}}}
-    cracked: Schema = {"if": _any_section(SOME_ARC), "then": {**free, "items": free}}
+        yield _document(_any_section(partial(_breaks, names)), line, ENVELOPE_ANALYSIS, plane)
     line = f"expected false with debonded arcs; {type_} superposes loads, which contact forbids"
-    yield _document({"properties": {"interface": cracked}}, f"[interface] contact: {line}", ENVELOPE_ANALYSIS)
+    yield _document(_touches_nowhere, f"[interface] contact: {line}", ENVELOPE_ANALYSIS)
+
+
+def _breaks(strengths: Sequence[str], table: Any) -> bool:
+    """Return whether bonds of a section break under some load: a finite strength, or a law without one."""
+    unlimited = [law.name for law in REGISTRY if not law.limits]
+    is_finite = (has(table, name) and table[name] not in (math.inf, INF) for name in strengths)
+    return any(is_finite) or any(has(table, key) and table[key] in unlimited for key in ("criterion", "law"))
+
+
+def _touches_nowhere(document: Any) -> bool:
+    """Return whether no debonded arcs come with contact."""
+    section = document.get("interface")
+    tables = section if isinstance(section, list) else [section]
+    is_free = all(has(table, "contact") and table["contact"] is False for table in tables if isinstance(table, dict))
+    return is_free or not any(map(_some_arc, tables))
 
 
 def _along_fibres() -> Iterator[Rule]:
     """Components that generalized plane strain alone has."""
     for path, names in ((("output", "stress"), OUT_OF_PLANE_STRESSES), (("envelope", "plane", ITEMS), ALONG_FIBRES)):
         rule = belonging(path, GENERALIZED, _values(PLANE))
-        yield replace(rule, schema={"not": {"enum": [*names]}})
+        yield replace(rule, holds=partial(_is_none_of, names))
+
+
+def _is_none_of(names: Sequence[str], value: Any) -> bool:
+    return value not in names
 
 
 RULES = (

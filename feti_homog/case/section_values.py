@@ -8,9 +8,7 @@ from itertools import pairwise
 from typing import Any
 
 from feti_homog.microstructure.phase_names import FIBRE_PHASE, PHASE
-from feti_homog.microstructure.table_columns import FIBRE_CELLS
 from feti_homog.schema.values import (
-    SMALLEST,
     ValueType,
     choice,
     either,
@@ -40,12 +38,6 @@ def _by_phase(words: str, example: str, number: ValueType) -> ValueType:
         f"a table by phase, other than matrix, coating and void, of {words}, such as {example}",
         accepts,
         lambda value: {phase: float(entry) for phase, entry in value.items()},
-        {
-            "type": "object",
-            "minProperties": 1,
-            "patternProperties": {f"^({FIBRE_PHASE.pattern})$": number.json_schema},
-            "additionalProperties": False,
-        },
     )
 
 
@@ -56,7 +48,6 @@ def _positive_or_inf(what: str) -> ValueType:
         f"{what} above 0, or inf",
         lambda value: number.accepts(value) or (isinstance(value, float) and value == math.inf),
         lambda value: None if value == math.inf else float(value),
-        {"type": "number", "minimum": SMALLEST},
     )
 
 
@@ -68,16 +59,6 @@ FIBRE_LIST = ValueType(
     "a list of fibres such as {x = 0.5, y = 0.5, radius = 0.3}",
     lambda value: isinstance(value, list) and value != [] and all(isinstance(fibre, dict) for fibre in value),
     tuple,
-    {
-        "type": "array",
-        "minItems": 1,
-        "items": {
-            "type": "object",
-            "properties": {"phase": {"type": "string"}} | {name: t.json_schema for name, t in FIBRE_CELLS.items()},
-            "required": ["x", "y"],
-            "additionalProperties": False,
-        },
-    },
 )
 FRACTIONS = _by_phase("numbers above 0 and below 1", "{glass = 0.3, carbon = 0.25}", real(above=0.0, below=1.0))
 _SELECTOR = either("", text, integer(least=0, most=10**9))
@@ -87,12 +68,6 @@ PHASES = ValueType(
     '{matrix = "Epoxy", fibre = [2, "Glass"]}',
     lambda v: isinstance(v, dict) and v != {} and all(PHASE.fullmatch(k) and _SELECTORS.accepts(v[k]) for k in v),
     lambda v: {phase: tuple(own if isinstance(own, list) else [own]) for phase, own in v.items()},
-    {
-        "type": "object",
-        "minProperties": 1,
-        "patternProperties": {f"^({PHASE.pattern})$": _SELECTORS.json_schema},
-        "additionalProperties": False,
-    },
 )
 RADII = _by_phase("numbers from 1e-9 to 1e9", "{glass = 6.0, carbon = 3.5}", real(least=1e-9, most=1e9))
 FIBRE = integer(least=1)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -61,8 +60,6 @@ def add_reference(actions: argparse._SubParsersAction[Any]) -> None:
     keys = actions.add_parser("keys", help="print the keys of a case file and their meaning")
     keys.add_argument("section", nargs="?", metavar="SECTION", help="cell, material, ...; by default all of them")
     keys.set_defaults(action=_keys)
-    schema = actions.add_parser("schema", help="print the JSON Schema of a case file, for editors")
-    schema.set_defaults(action=_schema)
     options = actions.add_parser("options", help="print PETSc's options that the solver takes")
     options.set_defaults(action=_options)
 
@@ -73,12 +70,6 @@ def _keys(arguments: argparse.Namespace, comm: Intracomm) -> None:
     section = arguments.section
     tables = on_root_only(comm, reference.tables if section is None else partial(reference.tables_of, section))
     on_root_only(comm, print_product, reference.as_text(tables or []))
-
-
-def _schema(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    from feti_homog.case.json_schema import json_schema
-
-    on_root_only(comm, print_product, json.dumps(json_schema(), indent=2))
 
 
 def _options(arguments: argparse.Namespace, comm: Intracomm) -> None:

@@ -1,22 +1,19 @@
-"""Relations between the keys of a document, each as a JSON Schema and as the fault that is found where it fails."""
+"""Relations between the keys of a document: a test of each place, and the fault of a place that fails it."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import combinations
 from typing import Any
 
 from feti_homog.schema.keys import Condition, Selected
 from feti_homog.schema.wording import toml_value
 
-Schema = dict[str, Any]
 Path = tuple[str, ...]
+Test = Callable[[Any], bool]
 
 ITEMS = "items"
 """In a path: the entries of a list."""
-_TYPES: dict[str, Any] = {"object": dict, "array": list, "string": str, "boolean": bool}
 
 
 @dataclass(frozen=True)
@@ -45,13 +42,13 @@ class Rule:
 
     Attributes:
         path: from the section to a table or value; where there is none, the rule holds. Empty: the whole document.
-        schema: the JSON Schema of what stands there, in the words that `holds` takes.
+        holds: whether the value there is valid; None if no value may stand there.
         fault: the line for a place that is not valid.
         when: conditions all of which must hold.
     """
 
     path: Path
-    schema: Schema | bool
+    holds: Test | None
     fault: Callable[[Place], str]
     when: tuple[Condition, ...] = ()
 
@@ -59,36 +56,44 @@ class Rule:
         """Yield a line for each place of the document that is not valid."""
         if all(selected.get(condition.selector) in condition.values for condition in self.when):
             for place in _places(document, self.path):
-                if not holds(self.schema, place.value):
+                if self.holds is None or not self.holds(place.value):
                     yield self.fault(replace(place, selected=selected))
 
 
+def has(table: Any, *names: str) -> bool:
+    """Return whether the value is a table with all of these keys."""
+    return isinstance(table, dict) and {*names} <= table.keys()
+
+
 def exclusive(path: Path, *names: str, words: str = "exclude each other; give one", beside: Sequence[str] = ()) -> Rule:
-    """At most one of these keys may be given; beside others, if there are any."""
-    pairs = [{"required": [*pair, *beside]} for pair in combinations(names, 2)]
+    """Allow at most one of these keys; beside others, if there are any."""
 
     def fault(place: Place) -> str:
         return f"{place.named(*(name for name in names if name in place.value))}: {words}"
 
-    return Rule(path, {"not": {"type": "object", "anyOf": pairs}}, fault)
+    return Rule(path, lambda table: not has(table, *beside) or sum(has(table, name) for name in names) < 2, fault)
 
 
 def needed(path: Path, name: str, words: str, *when: Condition, beside: str = "", unless: Sequence[str] = ()) -> Rule:
-    """Return a key, or one of others in its place, must be given, under some conditions or beside another key."""
-    there: Schema = {"anyOf": [{"required": [each]} for each in (name, *unless)]}
-    schema = {"if": {"required": [beside]}, "then": there} if beside else there
-    return Rule(path, schema, lambda place: f"{place.named(name)}: {words}", when)
+    """Require a key, or one of others in its place, under some conditions or beside another key."""
+
+    def holds(table: Any) -> bool:
+        is_asked = isinstance(table, dict) and (not beside or beside in table)
+        return not is_asked or any(each in table for each in (name, *unless))
+
+    return Rule(path, holds, lambda place: f"{place.named(name)}: {words}", when)
 
 
 def misplaced(path: Path, name: str, owner: str, words: str = "") -> Rule:
-    """Return a key belongs to another one, which must be given with it."""
+    """Require `owner` wherever `name` is given."""
     line = f"belongs to {owner}, which is missing{words}"
-    schema = {"if": {"required": [name]}, "then": {"required": [owner]}}
-    return Rule(path, schema, lambda place: f"{place.named(name)}: {line}")
+    return Rule(
+        path, lambda table: not has(table, name) or owner in table, lambda place: f"{place.named(name)}: {line}"
+    )
 
 
 def belonging(path: Path, condition: Condition, values: Sequence[str], *when: Condition, instead: str = "") -> Rule:
-    """Return a key or section, at the end of the path, belongs to cases in which a selector has some of its values."""
+    """Refuse the key or section at the end of the path where the selector has other values than the condition."""
     others = tuple(value for value in values if value not in condition.values)
 
     def fault(place: Place) -> str:
@@ -96,45 +101,12 @@ def belonging(path: Path, condition: Condition, values: Sequence[str], *when: Co
         owner = f"{condition.in_words(path[0])}, not {toml_value(place.selected[condition.selector])}"
         return f"{start}: belongs to {owner}{f'; use {instead}' if instead else ''}"
 
-    return Rule(path, False, fault, (*when, condition.selector.among(*others)))
+    return Rule(path, None, fault, (*when, condition.selector.among(*others)))
 
 
-def refused(path: Path, schema: Schema, words: str, *when: Condition) -> Rule:
-    """Return a value must not be valid by a schema, under some conditions."""
-    return Rule(path, {"not": schema}, lambda place: f"{place.given}: {words}", when)
-
-
-def holds(schema: Schema | bool, value: Any) -> bool:
-    """Return whether a value is valid by a JSON Schema, of the words that are needed here."""
-    if isinstance(schema, bool):
-        return schema
-    return all(_CHECKS[word](part, value, schema) for word, part in schema.items())
-
-
-def _of(kind: Any, check: Callable[[Any, Any], bool]) -> Callable[[Any, Any, Schema], bool]:
-    """Return a word that concerns values of one type."""
-    return lambda part, value, _: not isinstance(value, kind) or isinstance(value, bool) or check(part, value)
-
-
-_CHECKS: dict[str, Callable[[Any, Any, Schema], bool]] = {
-    "type": lambda name, value, _: isinstance(value, _TYPES[name]),
-    "enum": lambda choices, value, _: value in choices,
-    "required": _of(dict, lambda names, table: {*names} <= table.keys()),
-    "properties": _of(dict, lambda parts, table: all(holds(parts[k], v) for k, v in table.items() if k in parts)),
-    "items": _of(list, lambda part, values: all(holds(part, value) for value in values)),
-    "contains": _of(list, lambda part, values: any(holds(part, value) for value in values)),
-    "minItems": _of(list, lambda least, values: len(values) >= least),
-    "pattern": _of(str, lambda pattern, text: re.search(pattern, text) is not None),
-    "minimum": _of((int, float), lambda least, number: number >= least),
-    "maximum": _of((int, float), lambda most, number: number <= most),
-    "exclusiveMinimum": _of((int, float), lambda low, number: number > low),
-    "not": lambda part, value, _: not holds(part, value),
-    "allOf": lambda parts, value, _: all(holds(part, value) for part in parts),
-    "anyOf": lambda parts, value, _: any(holds(part, value) for part in parts),
-    "if": lambda part, value, schema: holds(schema.get("then" if holds(part, value) else "else", True), value),
-    "then": lambda *_: True,
-    "else": lambda *_: True,
-}
+def refused(path: Path, is_refused: Test, words: str, *when: Condition) -> Rule:
+    """Refuse values by a test, under some conditions."""
+    return Rule(path, lambda value: not is_refused(value), lambda place: f"{place.given}: {words}", when)
 
 
 def _places(document: Mapping[str, Any], path: Path) -> Iterator[Place]:

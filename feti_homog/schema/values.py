@@ -1,9 +1,9 @@
-"""Types of values in a case file: each in words, as a test, as a JSON Schema, and as it is stored."""
+"""Types of values in a case file: each in words, as a test, and as it is stored."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -25,17 +25,17 @@ class ValueType:
         expected: in words, for faults and for the reference.
         accepts: whether a value, of TOML's types, is right.
         store: of a right value, what the dataclass of its table keeps.
-        json_schema: the same as JSON Schema, which has no relations between numbers.
         table: the dataclass of the value if it is a table; `TableReader` reads it.
         item: of a list with tables in it, the type of its entries.
+        options: of a choice, the texts that it may be.
     """
 
     expected: str
     accepts: Callable[[Any], bool]
     store: Callable[[Any], Any]
-    json_schema: Mapping[str, Any]
     table: type[Any] | None = None
     item: ValueType | None = None
+    options: tuple[str, ...] = ()
 
     def named(self, expected: str, store: Callable[[Any], Any] | None = None) -> ValueType:
         """Return the same values in other words, stored in another way if one is given."""
@@ -83,14 +83,6 @@ class Limits:
         limits = {"above": self.above, "at least": self.least, "below": self.below, "at most": self.most}
         return " and ".join(f"{word} {_short(limit)}" for word, limit in limits.items() if math.isfinite(limit))
 
-    def json_schema(self) -> dict[str, float]:
-        limits = {
-            "exclusiveMinimum": self.above if self.above else -math.inf,
-            "minimum": max(self.least, -LARGEST if self.above else SMALLEST),
-            "exclusiveMaximum": self.below, "maximum": min(self.most, LARGEST),
-        }  # fmt: skip
-        return {word: limit for word, limit in limits.items() if math.isfinite(limit)}
-
 
 def _short(limit: float) -> str:
     return str(limit) if isinstance(limit, int) else f"{limit:.6g}"
@@ -112,7 +104,6 @@ def _numeric(name: str, is_of_type: Callable[[Any], bool], store: Callable[[Any]
         f"{article} {name} {limits.in_words()}".strip(),
         lambda value: is_of_type(value) and limits.hold(value),
         store,
-        {"type": name, **limits.json_schema()},
     )
 
 
@@ -127,11 +118,7 @@ def list_of(
             return False
         return all(map(item.accepts, value)) and not (unique and len({*value}) < len(value))
 
-    limits = {"minItems": fewest, "maxItems": count, "uniqueItems": unique}
-    schema = {"type": "array", "items": item.json_schema} | {word: limit for word, limit in limits.items() if limit}
-    return ValueType(
-        expected, accepts, lambda value: tuple(map(item.store, value)), schema, item=item if item.table else None
-    )
+    return ValueType(expected, accepts, lambda value: tuple(map(item.store, value)), item=item if item.table else None)
 
 
 def either(expected: str, *types: ValueType) -> ValueType:
@@ -141,42 +128,35 @@ def either(expected: str, *types: ValueType) -> ValueType:
         expected,
         lambda value: any(each.accepts(value) for each in types),
         lambda value: next(each.store(value) for each in types if each.accepts(value)),
-        {"anyOf": [each.json_schema for each in types]},
         table,
     )
 
 
-def table_of(table: type[Any], name: str, expected: str, *, least: int = 0) -> ValueType:
-    """Return a table of at least so many keys, which `TableReader` reads; `name` is that of its JSON Schema."""
-    reference = {"$ref": f"#/$defs/{name}"} | ({"minProperties": least} if least else {})
-    return ValueType(expected, lambda v: isinstance(v, dict) and len(v) >= least, lambda v: v, reference, table)
+def table_of(table: type[Any], expected: str, *, least: int = 0) -> ValueType:
+    """Return a table of at least so many keys, which `TableReader` reads."""
+    return ValueType(expected, lambda v: isinstance(v, dict) and len(v) >= least, lambda v: v, table)
 
 
 def file_name(expected: str, *suffixes: str) -> ValueType:
     """Return the name of a file with one of some suffixes."""
-    pattern = rf"^{PRINTABLE}*\.({'|'.join(suffix[1:] for suffix in suffixes)})$"
-    accepts = lambda value: text.accepts(value) and value.endswith(suffixes)  # noqa: E731
-    return ValueType(expected, accepts, Path, {"type": "string", "pattern": pattern})
+    return ValueType(expected, lambda value: text.accepts(value) and value.endswith(suffixes), Path)
 
 
 def choice(*options: str) -> ValueType:
     """One of some texts."""
     words = "one of " + ", ".join(map(toml_value, options))
-    return ValueType(words, lambda value: value in options, str, {"enum": list(options)})
+    return ValueType(words, lambda value: value in options, str, options=options)
 
 
 POSITIVE_OR_INF = ValueType(
     "a positive number, or inf",
     lambda value: value in (math.inf, INF) or (is_number(value) and value > 0),
     float,
-    {"anyOf": [{"type": "number", "minimum": SMALLEST}, {"const": INF}]},
 )
 """Where inf is another thing than no value."""
-boolean = ValueType("true or false", lambda value: isinstance(value, bool), bool, {"type": "boolean"})
-PRINTABLE = "[^\\u0000-\\u001f\\u007f]"
+boolean = ValueType("true or false", lambda value: isinstance(value, bool), bool)
 text = ValueType(
     "a text in one line",
     lambda value: isinstance(value, str) and value.isprintable(),
     str,
-    {"type": "string", "pattern": f"^{PRINTABLE}*$"},
 )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -12,20 +11,17 @@ from results_page import results
 
 from feti_homog import errors
 from feti_homog.case import reference
-from feti_homog.case.json_schema import json_schema
 from feti_homog.cli import command_parser
 from feti_homog.system.petsc.option_table import OPTIONS
 
-SCHEMA = "case.schema.json"
 ERRORS = (errors.FetiHomogError, errors.CaseError, errors.MeshError, errors.ConvergenceError)
 
 
 def write(folder: Path) -> None:
-    """Write every page to the folder, under its name, and the JSON Schema of case files."""
+    """Write every page to the folder, under its name."""
     folder.mkdir()
     for name, text in PAGES.items():
         (folder / f"{name}.md").write_text(text(), encoding="utf-8")
-    (folder / SCHEMA).write_text(json.dumps(json_schema(), indent=2), encoding="utf-8")
 
 
 def command_line() -> str:
@@ -40,11 +36,7 @@ def command_line() -> str:
 
 def case_file() -> str:
     """Return the keys of every table of a case file."""
-    words = (
-        f"A case file is TOML. `feti-homog keys` prints these tables; [{SCHEMA}]({SCHEMA}), which `feti-homog schema` "
-        "prints, lets editors complete and check the keys."
-    )
-    parts = ["# Case file", words]
+    parts = ["# Case file", "A case file is TOML. `feti-homog keys` prints these tables."]
     for each in reference.tables():
         rows = [(code(r.key), _accepts(r), r.default, r.applies, r.meaning) for r in each.rows]
         parts += [f"## {plain(capitalised(each.place))}", plain(capitalised(each.meaning))]

@@ -1,12 +1,9 @@
-"""`feti-homog keys` and `schema`."""
+"""`feti-homog keys`, and commands that are gone."""
 
 from __future__ import annotations
 
-import json
-
+import pytest
 from support.command_line import command_line
-
-from feti_homog.case.json_schema import json_schema
 
 
 def test_keys_of_all_sections():
@@ -26,6 +23,9 @@ def test_keys_of_no_section():
     assert job.returncode == 2 and job.stderr.count("cells: unknown section; expected one of name, cell") == 1
 
 
-def test_schema():
-    job = command_line(2, "schema")
-    assert job.returncode == 0 and json.loads(job.stdout) == json_schema()
+@pytest.mark.parametrize("name", ["schema", "statistics"])
+def test_commands_that_are_gone_name_the_way(name):
+    job = command_line(0, name)
+    assert (job.returncode, job.stdout) == (2, "") and job.stderr.startswith(
+        f"error: command line: feti-homog {name} is "
+    )

@@ -8,15 +8,12 @@ from itertools import product
 from pathlib import Path
 
 import pytest
-from jsonschema import Draft202012Validator
 
 from feti_homog.case.case import Case, parse
 from feti_homog.case.cell_section import Cell
-from feti_homog.case.json_schema import json_schema
 from feti_homog.case.mixed_cell import fibre_counts, mixed_width
 from feti_homog.errors import CaseError
 
-VALIDATOR = Draft202012Validator(json_schema())
 MIX = {"glass": 0.3, "carbon": 0.25}
 RADII = {"glass": 6.0, "carbon": 3.5}
 PHASE = {"young": 70.0, "poisson": 0.2}
@@ -133,7 +130,6 @@ def test_faults_of_mixes(name):
         case_of(**cell)
     assert any(words in fault for fault in caught.value.faults), caught.value.faults
     assert all(len(fault.splitlines()) == 1 for fault in caught.value.faults)
-    assert bool(list(VALIDATOR.iter_errors(document_of("glass", "carbon", **cell)))) == (name in FAULTS)
 
 
 @pytest.mark.parametrize(
@@ -154,6 +150,5 @@ def test_each_phase_of_a_mix_has_its_material(phases, fault):
 
 
 @pytest.mark.parametrize("keys", [{"fibres": 9}, {"fibres": 9, "radii": RADII}, {"width": 90.0, "radii": RADII}])
-def test_the_schema_takes_what_the_reader_takes(keys):
-    assert not list(VALIDATOR.iter_errors(document_of("glass", "carbon", mix=MIX, **keys)))
+def test_a_mix_has_a_number_of_fibres_or_a_width(keys):
     case_of(mix=MIX, **keys)

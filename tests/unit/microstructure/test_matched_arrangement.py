@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from jsonschema import Draft202012Validator
 from scipy.stats import ks_2samp
 from support.base_case import BASE
 from support.fibre_patterns import hexagonal_lattice, poisson_points
@@ -15,7 +13,6 @@ from support.measured_fibres import clustered_table
 
 from feti_homog.case import case as cases
 from feti_homog.case.cell_section import Cell
-from feti_homog.case.json_schema import json_schema
 from feti_homog.errors import CaseError
 from feti_homog.mesh.arrange import arrange
 from feti_homog.microstructure.fibre_pattern import FibrePattern
@@ -145,12 +142,6 @@ def test_faults(tmp_path, words):
     with pytest.raises(CaseError, match=FAULTY[words]) as error:
         load(tmp_path, words)
     assert len(error.value.faults) == (2 if words == 'match = "bad.csv"' else 1)
-
-
-def test_schema_knows_that_match_stands_for_number_and_fraction():
-    validator = Draft202012Validator(json_schema())
-    for words, is_valid in {'match = "f.csv"': True, "": False, "fibres = 20": False, 'match = "f.msh"': False}.items():
-        assert validator.is_valid(tomllib.loads(text(words))) == is_valid
 
 
 def test_match_is_for_random_cells(tmp_path):

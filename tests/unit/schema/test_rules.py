@@ -1,35 +1,35 @@
-"""Rules by the words of JSON Schema, against jsonschema; the places of their faults."""
+"""Relations between keys: conditions, the places of their faults, and documents changed at random."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import tomllib
+from pathlib import Path
 from typing import Any
 
-from hypothesis import given
-from jsonschema import Draft202012Validator
+from hypothesis import given, settings
 from unit.case.documents import changed_documents
-from unit.case.test_json_schema import SOURCES
+from unit.case.faulty_cases import FAULTY_CASES
+from unit.case.valid_cases import VALID_CASES
 
-from feti_homog.case.rules import RULES
+from feti_homog.case.case import parse
+from feti_homog.errors import CaseError
 from feti_homog.schema.keys import Selector
-from feti_homog.schema.rules import ITEMS, Rule, exclusive, holds, needed, refused
+from feti_homog.schema.rules import ITEMS, Rule, exclusive, needed, refused
 
-VALIDATORS = [(rule.schema, Draft202012Validator(rule.schema)) for rule in RULES]
-
-
-def values_in(value: Any, depth: int) -> Iterator[Any]:
-    """Yield the value and, to some depth, those in it."""
-    yield value
-    if depth and isinstance(value, dict | list):
-        for item in value.values() if isinstance(value, dict) else value:
-            yield from values_in(item, depth - 1)
+NO_TOML = {"syntax", "syntax_unclosed", "key_twice", "section_twice", "number_too_long"}
+SOURCES = [tomllib.loads(text) for text in VALID_CASES.values()]
+SOURCES += [tomllib.loads(text) for name, (text, _) in FAULTY_CASES.items() if name not in NO_TOML]
+SOURCES += [{**each, "interface": [each["interface"]]} for each in SOURCES if "interface" in each]
 
 
+@settings(deadline=None)
 @given(changed_documents(SOURCES))
-def test_what_holds_is_valid(document):
-    for value in values_in(document, 2):
-        for schema, validator in VALIDATORS:
-            assert holds(schema, value) == validator.is_valid(value), (schema, value)
+def test_every_fault_of_a_changed_document_is_a_line_of_its_own(document):
+    try:
+        parse(document, Path("nowhere"))
+    except CaseError as error:
+        assert len({*error.faults}) == len(error.faults)
+        assert all(fault.strip() and len(fault.splitlines()) == 1 for fault in error.faults)
 
 
 def faults(rule: Rule, document: dict[str, Any], **selected: str) -> list[str]:
@@ -41,7 +41,7 @@ def test_faults_name_the_section_and_the_place_in_it():
     in_a_list = exclusive(("a", "loads", ITEMS), "x", "y")
     document = {"a": {"loads": [{"x": 1}, {"x": 1, "y": 1}, 3]}}
     assert faults(in_a_list, document) == ["[a] loads[1].x, loads[1].y: exclude each other; give one"]
-    assert faults(refused(("a", "x"), {"enum": [1]}, "no"), {"a": {"x": 1}}) == ["[a] x = 1: no"]
+    assert faults(refused(("a", "x"), lambda value: value == 1, "no"), {"a": {"x": 1}}) == ["[a] x = 1: no"]
 
 
 def test_sections_of_one_name_are_numbered():
