@@ -32,7 +32,6 @@ setup(
         # from wheels (the h5py wheel has no MPI).
         "mpi": ["petsc4py>=3.18", "mpi4py>=3.1", "h5py>=3.7"],
         "progress": ["tqdm>=4.64"],  # a progress bar on terminals
-        "meshes": ["meshio>=5.3"],  # cells in .vtu and .vtk files
         "dev": [
             "tqdm>=4.64",
             "meshio>=5.3",

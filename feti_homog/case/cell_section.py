@@ -215,9 +215,9 @@ class Cell:
         CELL_FILE,
         'Relative to the case file. Of geometry = "mesh" the mesh: triangles of three or six nodes that fill a '
         'rectangle, in physical surfaces "matrix", "fibre", "glass", ...; the nodes on opposite sides match. Fibres '
-        "may have any shape. Of Abaqus' files (.inp) element sets have these names; of .vtu and .vtk files, which "
-        'meshio reads, cell data "phase" are 0 in the matrix, 1 in fibre, 2 in fibre:2, ... Of "table" the fibres, a '
-        "row for each: columns x, y, radius and, if there are any, phase, coating (thickness / radius) and strength "
+        "may have any shape. Of Abaqus' files (.inp) element sets have these names; of .vtu and .vtk files cell data "
+        '"phase" are 0 in the matrix, 1 in fibre, 2 in fibre:2, ... Of "table" the fibres, a row for each: columns x, '
+        "y, radius and, if there are any, phase, coating (thickness / radius) and strength "
         "(of its bonds / that of [interface]); of ellipses a and b, the semi-axes, in place of the radius, and angle "
         "from x to a in degrees; of hollow fibres inner_radius; of rounded polygons sides and corner, with the angle "
         "of the first corner. Rows of the phase void are voids. What "

@@ -15,7 +15,7 @@ from feti_homog.case.cell_section import Cell
 from feti_homog.errors import MeshError, escaped
 from feti_homog.mesh.coarse_mesh import CoarseMesh, areas, can_debond, edge_keys, edges, paired_sides, representatives
 from feti_homog.mesh.periodic_topology import Torus
-from feti_homog.mesh.readers import abaqus_file, bent_edges, gmsh_file, mesh_checks, vtk_file
+from feti_homog.mesh.readers import abaqus_file, bent_edges, gmsh_file, medit_file, mesh_checks, vtk_file, vtu_file
 from feti_homog.mesh.readers.bent_edges import with_bent_edges
 from feti_homog.mesh.readers.named_phases import Selectors, unknown_phases, with_phases
 from feti_homog.mesh.readers.raw_mesh import RawMesh, at
@@ -23,7 +23,13 @@ from feti_homog.mesh.readers.round_interfaces import with_circles, with_ellipses
 from feti_homog.microstructure.shapes.ellipses import Ellipses
 from feti_homog.typing import Float, Int, Int32
 
-LOADERS = {".msh": gmsh_file.load, ".inp": abaqus_file.load} | dict.fromkeys(vtk_file.READERS, vtk_file.load)
+LOADERS = {
+    ".msh": gmsh_file.load,
+    ".inp": abaqus_file.load,
+    ".vtu": vtu_file.load,
+    ".vtk": vtk_file.load,
+    ".mesh": medit_file.load,
+}
 # Sine of the angle at a node of the hull, and cosine between vectors of a lattice, that are zero but for rounding.
 STRAIGHT, RIGHT = 1e-5, 1e-6
 # Slope of sides that may be meant to be upright; share of the hull that a cell with voids fills at least.

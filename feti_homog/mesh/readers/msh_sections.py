@@ -6,7 +6,6 @@ All of it is data: nothing is executed, and nothing allocated that the length of
 from __future__ import annotations
 
 import re
-import warnings
 from typing import Any, NoReturn
 
 import numpy as np
@@ -14,20 +13,13 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import breadth_first_order
 
 from feti_homog.errors import MeshError
-from feti_homog.schema.wording import toml_value
+from feti_homog.mesh.readers.scanner import NotANumber, Numbers, numbers
 from feti_homog.typing import Float, Int
-
-Numbers = np.ndarray[Any, Any]
 
 # Whole numbers in binary files: C's int and size_t.
 INT, SIZE = "i4", "u8"
 # Whole numbers from here on are not exact as floating-point numbers.
 LARGEST = 2**53
-# The first word that is no number, of those that are read as whole or as real ones.
-WRONG_WORD = {
-    "i8": re.compile(rb"(?<!\S)(?![-+]?\d+(?!\S))\S+"),
-    "f8": re.compile(rb"(?i)(?<!\S)(?![-+]?((\d+\.?\d*|\.\d+)(e[-+]?\d+)?|nan|inf)(?!\S))\S+"),
-}
 
 
 class Section:
@@ -44,19 +36,11 @@ class Section:
         self.values, self.place = self._numbers(content[start : self.stop], kind), 0
 
     def _numbers(self, text: bytes, kind: str) -> Numbers:
-        if not text.strip():
-            return np.zeros(0)
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            try:
-                return np.fromstring(text, kind, sep=" ")
-            except (DeprecationWarning, ValueError):  # the one becomes the other in a later version of NumPy
-                wrong = WRONG_WORD[kind].search(text)
-        if wrong is None:
-            self.refuse("there are other things than numbers")
-        line = self.content.count(b"\n", 0, self.start + wrong.start()) + 1
-        what = "whole number" if kind == "i8" else "number"
-        self.refuse(f"line {line}, {toml_value(wrong[0].decode(errors='replace'))}: expected a {what}")
+        try:
+            return numbers(text, kind)
+        except NotANumber as error:
+            line = self.content.count(b"\n", 0, self.start + error.place) + 1
+            self.refuse(f"line {line}, {error}")
 
     def refuse(self, fault: str) -> NoReturn:
         """Raise MeshError."""
@@ -151,7 +135,7 @@ class BinarySection(Section):
         found = re.compile(rb"\s*\$End" + self.name.encode()).match(self.content, self.place)
         if found is None:
             self.refuse(f"there is no $End{self.name} after the numbers that its counts announce")
-        return found.end()
+        return self.place
 
 
 def end_of(name: str, content: bytes, start: int) -> int:

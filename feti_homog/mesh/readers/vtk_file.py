@@ -1,252 +1,145 @@
-"""Read the triangles and the lines of a file of VTK or Medit by meshio, within bounds on what it allocates."""
+"""Read the triangles and the lines of a legacy file of VTK (.vtk), of text or binary, up to version 5.1."""
 
 from __future__ import annotations
 
-import importlib
-import io
-import re
-import sys
-import warnings
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, redirect_stderr
-from functools import partial
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
-from typing import Any
-from xml.etree import ElementTree
+from urllib.parse import unquote
 
 import numpy as np
 
-from feti_homog.errors import MeshError
-from feti_homog.mesh.readers.raw_mesh import DEBONDED, Block, RawMesh, assembled
+from feti_homog.mesh.readers.msh_sections import chain
+from feti_homog.mesh.readers.raw_mesh import RawMesh
+from feti_homog.mesh.readers.scanner import Numbers, Scanner
+from feti_homog.mesh.readers.unstructured_grid import Grid, mesh_of
+from feti_homog.mesh.readers.vtu_file import TYPES as XML_TYPES
 from feti_homog.schema.wording import toml_value
 from feti_homog.system.runtime import input_files
 from feti_homog.typing import Int
 
-# Readers of meshio, and how many nodes its triangles have.
-READERS = {".vtu": "meshio.vtu", ".vtk": "meshio.vtk", ".mesh": "meshio.medit"}
-NODES = {"triangle": 3, "triangle6": 6, "quad": 4}
-LINES = ("line", "line3")
-VERTEX = "vertex"
-PHASE = "phase"
-# Cell data by which other programs number materials, in the order of precedence.
-NUMBERS = (
-    "medit:ref",
-    "gmsh:physical",
-    "CellEntityIds",
-    "mat_id",
-    "MaterialIds",
-    "material",
-    "cell_tags",
-    "region",
-    "gmsh:geometrical",
-)
-MOST_PHASES = 10**9
-# Bytes that compressed data may have: so many in any file, or so many for each of the file's.
-MOST_BYTES, MOST_RATIO = 2**26, 50
-# Modules by which meshio decompresses, and what makes a decompressor that stops where it should.
-DECOMPRESSORS = {"zlib": "decompressobj", "lzma": "LZMADecompressor"}
-# Sizes that sections of a legacy file declare, and arrays of its fields: components, tuples and a type.
-DECLARED = re.compile(
-    rb"(?im)^(POINTS|CELLS|CELL_TYPES|POINT_DATA|CELL_DATA|LOOKUP_TABLE|COLOR_SCALARS)\b([^\n]{0,200})"
-)
-ARRAY = re.compile(rb"(?im)^\S{1,200} (\d+) (\d+) [a-z][a-z_0-9]{0,20}\s*$")
-DATASET = re.compile(rb"(?im)^DATASET\s+(\S{1,60})")
-COUNTED = re.compile(rb"([A-Z][A-Za-z0-9]{0,40})\s+([0-9]{1,40})")
-RAW = re.compile(rb"(<AppendedData[^>]*>).*(</AppendedData>)", re.DOTALL)
+TYPES = {"char": "i1", "short": "i2", "int": "i4", "long": "i8"}
+TYPES |= {f"unsigned_{name}": f"u{kind[1]}" for name, kind in TYPES.items()}
+TYPES |= {f"vtktype{name.lower()}": kind for name, kind in XML_TYPES.items() if "Int" in name}
+TYPES |= {"signed_char": "i1", "vtkidtype": "i4", "float": "f4", "double": "f8"}
+# Numbers of a cell or a point in the sections that name their type; that of SCALARS stands behind it.
+WIDTHS = {"SCALARS": 1, "VECTORS": 3, "NORMALS": 3, "TENSORS": 9, "TENSORS6": 6, "GLOBAL_IDS": 1, "PEDIGREE_IDS": 1}
 
 
 def load(path: Path) -> RawMesh:
-    """Read the triangles and the lines of a .vtu, .vtk or .mesh file.
-
-    Its cell data `phase` are 0 in the matrix, 1 in phase fibre, k in fibre:k; in their place the groups are those of
-    one of NUMBERS, or of the only cell data of whole numbers. Its cell data `debonded`, if it has them, are 1 on lines
-    that are debonded from the start.  Nodes and elements have the numbers of the file, from 0.
+    """Read the triangles and the lines; nodes and cells have the numbers of the file, from 0.
 
     Raises:
         OSError: the file cannot be read.
-        MeshError: meshio is not installed or cannot read the file, it has other elements, or no phases.
+        MeshError: it is damaged, or has other cells or no phases.
     """
-    try:
-        reader = importlib.import_module(READERS[path.suffix])
-    except ImportError:
-        wanted = f"{path.suffix} files are read by meshio, which is not installed"
-        raise MeshError(f"{wanted}: pip install 'feti_homog[meshes]'") from None
-    content = input_files.read(path)
-    _check_content(content, path.suffix)
-    try:
-        with _bounded(reader, len(content)):
-            mesh = reader.read(str(path))
-    except Exception as error:  # meshio's readers raise whatever they meet
-        raise MeshError(f"meshio cannot read it: {str(error).strip() or type(error).__name__}") from None
-    faults = _faults(mesh) or _misfits(mesh)
-    if faults:
-        raise MeshError(*faults)
-    return _raw(mesh)
+    file = Scanner(input_files.read(path))
+    if file.line()[:4] != ["#", "vtk", "DataFile", "Version"]:
+        file.refuse("expected # vtk DataFile Version, with which a file of VTK begins")
+    file.place = file.content.find(b"\n", file.place) + 1 or len(file.content)  # the title, which may be empty
+    form = " ".join(file.line()).upper()
+    if form not in ("ASCII", "BINARY"):
+        file.refuse(f"{toml_value(form)}: expected ASCII or BINARY")
+    file.is_binary = form == "BINARY"
+    legacy = _Legacy(file)
+    while words := file.line():
+        legacy.take(words[0].upper(), [*words[1:], *[""] * 4])
+    return mesh_of(Grid(legacy.points, legacy.types, *legacy.cells(), legacy.data))
 
 
-def _faults(mesh: Any) -> list[str]:
-    """Elements that are not triangles, the lack of these, and of their phases."""
-    kinds = [block.type for block in mesh.cells]
-    others = [f"{len(block.data)} {block.type}" for block in mesh.cells if block.type not in (*NODES, *LINES, VERTEX)]
-    faults = [
-        f"elements are {kind}: only triangles of three or six nodes and quadrilaterals of four can be used"
-        for kind in others
-    ]
-    if not others and not set(kinds) & set(NODES):
-        faults.append("no triangles in it")
-    name = _numbers_name(mesh)
-    if not name:
-        expected = "expected 0 in the matrix, 1 in phase fibre, 2 in fibre:2, ..."
-        faults.append(f"no cell data named {PHASE}, but {', '.join(mesh.cell_data) or 'none'}: {expected}")
-    elif not faults:
-        values = np.concatenate([np.ravel(data) for data in mesh.cell_data[name]])
-        bad = values[~((values == np.round(values)) & (values >= 0) & (values < MOST_PHASES))]
-        if len(bad):
-            faults.append(f"cell data {name} = {bad[0]:g}: expected 0, 1, 2, ... below {MOST_PHASES}")
-    return faults
+class _Legacy:
+    """Take the sections of a file and keep those that make the mesh, and numbers of cells."""
 
+    def __init__(self, file: Scanner) -> None:
+        self.file, self.points, self.types = file, np.zeros((0, 3)), np.zeros(0, np.int64)
+        self.data = dict[str, Numbers]()
+        self.offsets, self.nodes = np.zeros(1, np.int64), np.zeros(0, np.int64)
+        self.rows: Int | None = None
+        self.are_of_cells, self.length, self.seen = False, 0, set[str]()
 
-def _numbers_name(mesh: Any) -> str:
-    """Return the name of the cell data with the phase of an element; empty if there are none."""
-    if known := [name for name in (PHASE, *NUMBERS) if name in mesh.cell_data]:
-        return known[0]
-    whole = [
-        name
-        for name, data in mesh.cell_data.items()
-        if name != DEBONDED and all(np.size(d) == len(d) and np.asarray(d).dtype.kind in "iu" for d in data)
-    ]
-    return whole[0] if len(whole) == 1 else ""
+    def take(self, section: str, words: list[str]) -> None:
+        """Take a section, the words of whose first line follow its name."""
+        file = self.file
+        if section in ("DATASET", "POINTS", "CELLS", "CELL_TYPES") and section in self.seen:
+            file.refuse(f"{section}: it is there twice")
+        self.seen.add(section)
+        match section:
+            case "DATASET":
+                if words[0].upper() != "UNSTRUCTURED_GRID":
+                    file.refuse(f"DATASET {words[0]}: expected UNSTRUCTURED_GRID")
+            case "POINTS":
+                self.points = file.take(3 * file.count(words[0]), self._type(words[1])).reshape(-1, 3).astype(float)
+            case "CELLS":
+                self._take_cells(*map(file.count, words[:2]))
+            case "CELL_TYPES":
+                self.types = file.take(file.count(words[0]), "i4").astype(np.int64)
+            case "CELL_DATA" | "POINT_DATA":
+                self.are_of_cells, self.length = section == "CELL_DATA", file.count(words[0])
+            case "FIELD":
+                for _ in range(min(file.count(words[1]), len(file.content))):
+                    self._take_array(file.line())
+            case "METADATA":
+                self._skip_metadata()
+            case _:
+                self._take_attribute(section, words)
 
+    def _take_cells(self, count: int, size: int) -> None:
+        """Take the nodes of cells: behind their offsets or, before version 5, each behind their number."""
+        if not self.file.follows("OFFSETS"):
+            self.rows = self.file.take(size, "i4").astype(np.int64)
+            return
+        self.offsets = self.file.take(count, self._type(self.file.line()[1:2])).astype(np.int64)
+        if not self.file.follows("CONNECTIVITY"):
+            self.file.refuse("CELLS: expected CONNECTIVITY behind OFFSETS")
+        self.nodes = self.file.take(size, self._type(self.file.line()[1:2])).astype(np.int64)
 
-def _misfits(mesh: Any) -> list[str]:
-    """Nodes of elements that are not there, and data of another number of elements or coordinates."""
-    count, faults = len(mesh.points), []
-    if mesh.points.ndim != 2 or mesh.points.shape[1] not in (2, 3):
-        faults.append("points have neither two nor three coordinates")
-    for number, cells in enumerate(mesh.cells):
-        nodes = np.asarray(cells.data)
-        bad = nodes[(nodes < 0) | (nodes >= count)]
-        if len(bad):
-            faults.append(f"a {cells.type} has the node {bad[0]}: expected 0 to {count - 1}")
-        for name in {_numbers_name(mesh), DEBONDED} & set(mesh.cell_data):
-            own = mesh.cell_data[name][number : number + 1]
-            if [np.size(values) for values in own] != [len(nodes)]:
-                faults.append(f"cell data {name}: expected one value for each of {len(nodes)} {cells.type}")
-    return faults
+    def _take_array(self, words: list[str]) -> None:
+        """Take an array of a field."""
+        if words[:1] == ["METADATA"]:
+            self._skip_metadata()
+            words = self.file.line()
+        name, width, length, kind = (*words, "", "", "", "")[:4]
+        values = self.file.take(self.file.count(width) * self.file.count(length), self._type(kind))
+        self._keep(name, values, int(width))
 
+    def _take_attribute(self, section: str, words: list[str]) -> None:
+        """Take numbers of points or cells, and colours of tables."""
+        file, byte = self.file, "u1" if self.file.is_binary else "f4"
+        if section == "LOOKUP_TABLE":
+            file.take(4 * file.count(words[1]), byte)
+        elif section == "COLOR_SCALARS":
+            width = file.count(words[1])
+            colours = file.take(self.length * width, byte)  # as text from 0 to 1
+            self._keep(words[0], colours if file.is_binary else np.rint(255 * colours).astype(np.int64), width)
+        elif section == "TEXTURE_COORDINATES":
+            file.take(self.length * file.count(words[1]), self._type(words[2]))
+        elif section in WIDTHS:
+            width = file.count(words[2]) if section == "SCALARS" and words[2] else WIDTHS[section]
+            if section == "SCALARS" and file.follows("LOOKUP_TABLE"):
+                file.line()
+            self._keep(words[0], file.take(self.length * width, self._type(words[1])), width)
+        else:
+            expected = "expected DATASET, POINTS, CELLS, CELL_TYPES, CELL_DATA, POINT_DATA or numbers of these"
+            file.refuse(f"{toml_value(section)}: {expected}")
 
-def _raw(mesh: Any) -> RawMesh:
-    first, blocks, name = 0, [], _numbers_name(mesh)
-    for cells, data in zip(mesh.cells, mesh.cell_data[name], strict=True):
-        tags = first + np.arange(len(cells.data))
-        first += len(tags)
-        if cells.type in NODES:
-            blocks.append(Block(tags, np.asarray(cells.data, np.int64), np.ravel(data).astype(np.int64)))
-    points = np.zeros((len(mesh.points), 3))
-    points[:, : mesh.points.shape[1]] = mesh.points
-    blocks, values = _used(blocks)
-    aliases = [(f"number {k}",) for k in values]
-    groups = [(("matrix", "fibre")[k] if k < 2 else f"fibre:{k}",) for k in values] if name == PHASE else aliases
-    containers = (f"value of {name}", "cells")
-    return assembled(np.arange(len(points)), points, blocks, groups, _curves(mesh, name), containers, aliases)
+    def _keep(self, name: str, values: Numbers, width: int) -> None:
+        if self.are_of_cells:
+            self.data[unquote(name)] = values if width == 1 else values.reshape(-1, max(width, 1))
 
+    def _skip_metadata(self) -> None:
+        """Pass over lines up to an empty one."""
+        stop = self.file.content.find(b"\n\n", self.file.place - 1)
+        self.file.place = len(self.file.content) if stop < 0 else stop + 2
 
-def _curves(mesh: Any, name: str) -> dict[str, Int]:
-    """Nodes (d, 2) at the ends of the lines that cell data `debonded` mark, and of the others by their number.
+    def _type(self, words: str | list[str]) -> str:
+        name = words if isinstance(words, str) else "".join(words)
+        if name.lower() not in TYPES:
+            self.file.refuse(f"{toml_value(name)}: expected a type of numbers, such as int or double")
+        return TYPES[name.lower()]
 
-    The number is in the cell data of that name or, if these are phases, the cells' type.
-    """
-    curves: dict[str, list[Int]] = {}
-    marks = mesh.cell_data.get(DEBONDED, [np.zeros(len(cells.data)) for cells in mesh.cells])
-    for cells, mark, numbers in zip(mesh.cells, marks, mesh.cell_data[name], strict=True):
-        if cells.type in LINES:
-            ends, is_debonded = np.asarray(cells.data, np.int64)[:, :2], np.ravel(mark) != 0
-            own = [(DEBONDED, is_debonded)]
-            if name == PHASE:
-                own.append((cells.type, ~is_debonded))
-            else:
-                values = np.ravel(numbers).astype(np.int64)
-                own += [(f"number {k}", ~is_debonded & (values == k)) for k in np.unique(values).tolist()]
-            for curve, members in own:
-                if members.any():
-                    curves.setdefault(curve, []).append(ends[members])
-    return {curve: np.concatenate(ends) for curve, ends in curves.items()}
-
-
-def _used(blocks: list[Block]) -> tuple[list[Block], list[int]]:
-    """Return the blocks with groups numbered without gaps, and the values of these groups."""
-    used: Int = np.unique(np.concatenate([block.group for block in blocks]))
-    renumbered = [Block(block.tags, block.nodes, np.searchsorted(used, block.group)) for block in blocks]
-    return renumbered, used.tolist()
-
-
-def _check_content(content: bytes, suffix: str) -> None:
-    """Raise MeshError where a file of this kind is damaged, or declares what meshio should not read."""
-    {".vtu": _check_xml, ".vtk": _check_legacy, ".mesh": _check_medit}[suffix](content)
-
-
-def _check_medit(content: bytes) -> None:
-    for name, count in COUNTED.findall(content):
-        if int(count) > len(content):
-            raise MeshError(f"it declares {int(count)} {name.decode()}: there are {len(content)} bytes in all")
-
-
-def _check_xml(content: bytes) -> None:
-    if re.search(rb"<AppendedData[^>]*[\"']raw[\"']", content):
-        content = RAW.sub(rb"\1\2", content)
-    try:
-        root = ElementTree.fromstring(content)
-    except (ElementTree.ParseError, ValueError, LookupError) as error:
-        raise MeshError(f"not XML: {error}") from None
-    header = root.get("header_type", "UInt32")
-    if header not in ("UInt32", "UInt64"):
-        raise MeshError(f"header_type is {toml_value(header)}: expected UInt32 or UInt64")
-    if any(array.get("Name") in ("faces", "faceoffsets") for array in root.iter("DataArray")):
-        raise MeshError("elements are polyhedra: only triangles of three or six nodes can be used")
-
-
-def _check_legacy(content: bytes) -> None:
-    for kind in DATASET.findall(content):
-        if kind.upper() != b"UNSTRUCTURED_GRID":
-            raise MeshError(f"DATASET {kind.decode(errors='replace')}: expected UNSTRUCTURED_GRID")
-    sizes = [
-        (name, int(word))
-        for name, words in DECLARED.findall(content)
-        for word in re.findall(rb"(?<!\S)\d{1,40}(?!\S)", words)
-    ]
-    sizes += [(b"an array", int(components[:40]) * int(tuples[:40])) for components, tuples in ARRAY.findall(content)]
-    for name, size in sizes:
-        if size > len(content):
-            words = f"{name.decode()} of {size} values"
-            raise MeshError(f"it declares {words}: there are {len(content)} bytes in all")
-
-
-@contextmanager
-def _bounded(reader: ModuleType, length: int) -> Iterator[None]:
-    """Let meshio decompress no more data than a file of this length should have, and print nothing."""
-    left = max(MOST_BYTES, MOST_RATIO * length)
-
-    def decompress(make: Callable[[], Any], content: bytes) -> bytes:
-        nonlocal left
-        decompressor = make()
-        data: bytes = decompressor.decompress(content, left + 1)
-        left -= len(data)
-        if left < 0:
-            raise MeshError("its compressed data are too large for a file of its length")
-        if not decompressor.eof:
-            raise MeshError("its compressed data are broken off")
-        return data
-
-    inner = sys.modules.get(f"{reader.__name__}._vtu")
-    kept = {name: module for name in DECOMPRESSORS if (module := getattr(inner, name, None))}
-    for name, module in kept.items():
-        own = partial(decompress, getattr(module, DECOMPRESSORS[name]))
-        setattr(inner, name, SimpleNamespace(decompress=own))
-    try:
-        with redirect_stderr(io.StringIO()), warnings.catch_warnings():
-            warnings.filterwarnings("error", "string or file could not be read")  # what is no number
-            yield
-    finally:
-        for name, module in kept.items():
-            setattr(inner, name, module)
+    def cells(self) -> tuple[Int, Int]:
+        """Return the nodes of the cells, one after the other, and how many each has."""
+        if self.rows is None:
+            return self.nodes, np.diff(self.offsets)
+        starts = chain(np.arange(len(self.rows)) + 1 + self.rows)
+        is_count = np.zeros(len(self.rows), bool)
+        is_count[starts] = True
+        return self.rows[~is_count], self.rows[starts]

@@ -2,12 +2,7 @@
 
 from __future__ import annotations
 
-import base64
-import lzma
-import zlib
-from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,10 +12,7 @@ from unit.mesh.second_order import second_order
 
 from feti_homog.errors import MeshError
 from feti_homog.mesh.coarse_mesh import areas
-from feti_homog.mesh.readers import vtk_file
 from feti_homog.mesh.readers.msh_reader import read
-
-meshio = pytest.importorskip("meshio")
 
 BENT = second_order(grid(), lambda x, y: (0.77, 0.37) if (x, y) == (0.75, 0.375) else (x, y))
 
@@ -71,153 +63,6 @@ def test_curves_that_nothing_uses_are_remarked(suffix, name, expected, tmp_path)
     result = read(written(grid().with_curve(RIGHT_SIDE, name), tmp_path / f"one{suffix}"))
     assert len(result.debonded_edges) == 0
     assert [line.startswith(expected) for line in result.remarks] == [True]
-
-
-def _text(content: str) -> Callable[[Path], Path]:
-    def write(path: Path) -> Path:
-        path.write_text(content)
-        return path
-
-    return write
-
-
-SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
-HALVES = {"triangle": [[0, 1, 2], [0, 2, 3]]}
-
-
-def _vtk(kinds: dict[str, list], **data: list) -> Callable[[Path], Path]:
-    def write(path: Path) -> Path:
-        meshio.Mesh(SQUARE, list(kinds.items()), cell_data={k: [np.array(v)] for k, v in data.items()}).write(path)
-        return path
-
-    return write
-
-
-def _changed(suffix: str, old: str, new: str, **options) -> Callable[[Path], Path]:
-    """Write the halves of a square with some other text in it."""
-
-    def write(path: Path) -> Path:
-        meshio.Mesh(SQUARE, [("triangle", HALVES["triangle"])], cell_data={"phase": [np.array([0, 0])]}).write(
-            path, **options
-        )
-        content = path.read_bytes()
-        assert old.encode() in content
-        path.write_bytes(content.replace(old.encode(), new.encode(), 1))
-        return path
-
-    return write
-
-
-def _packed(bytes_: int, compressor: str) -> Callable[[Path], Path]:
-    """Write the phases of a square as so many compressed zeros."""
-    pack = {"vtkZLibDataCompressor": zlib.compress, "vtkLZMADataCompressor": lzma.compress}[compressor]
-
-    def write(path: Path) -> Path:
-        block = pack(bytes(bytes_))
-        words = [np.array(part, "<u4").tobytes() for part in ([1, 2**31, 0, len(block)],)]
-        text = (base64.b64encode(words[0]) + base64.b64encode(block)).decode()
-        array = f'<DataArray type="Int8" Name="phase" format="binary">{text}</DataArray>'
-        path.write_text(
-            f'<VTKFile type="UnstructuredGrid" byte_order="LittleEndian" compressor="{compressor}"><UnstructuredGrid>'
-            f'<Piece NumberOfPoints="0" NumberOfCells="0"><CellData>{array}</CellData></Piece>'
-            "</UnstructuredGrid></VTKFile>"
-        )
-        return path
-
-    return write
-
-
-TEXT = {"binary": False}
-FAULTS = {
-    "no vtk": ("a.vtu", _text("hello"), "not XML: syntax error: line 1, column 0"),
-    "missing vtk": ("a.vtk", lambda path: path, "cannot be read"),
-    "no phase": ("a.vtu", _vtk(HALVES, density=[1.0, 2.0]), "no cell data named phase, but density: expected 0 in"),
-    **{
-        f"phase {value:g}": (
-            "a.vtu",
-            _vtk(HALVES, phase=[0.0, value]),
-            f"cell data phase = {value:g}: expected 0, 1, 2",
-        )
-        for value in (-1.0, 1e18, 1e30, float("inf"), float("nan"))
-    },
-    "node beyond the last": (
-        "a.vtu",
-        _vtk({"triangle": [[0, 1, 9]]}, phase=[0]),
-        "a triangle has the node 9: expected 0 to 3",
-    ),
-    "negative node": (
-        "a.vtk",
-        _vtk({"triangle": [[0, 1, -1]]}, phase=[0]),
-        "a triangle has the node -1: expected 0 to 3",
-    ),
-    "phases of two components": (
-        "a.vtu",
-        _vtk(HALVES, phase=[[0, 0], [0, 0]]),
-        "cell data phase: expected one value for",
-    ),
-    "line of the fault": (
-        "a.vtu",
-        _changed(".vtu", "</Piece>", "</Peace>", **TEXT),
-        "not XML: mismatched tag: line 51, column 2",
-    ),
-    "type of the header": (
-        "a.vtu",
-        _changed(".vtu", "<VTKFile ", '<VTKFile header_type="Int64" '),
-        'header_type is "Int64": expected UInt32 or UInt64',
-    ),
-    "polyhedra": ("a.vtu", _changed(".vtu", 'Name="phase"', 'Name="faces"', **TEXT), "elements are polyhedra: only"),
-    "words": (
-        "a.vtu",
-        _changed(".vtu", "0\n1\n2\n", "0\none\n2\n", **TEXT),
-        "meshio cannot read it: string or file could",
-    ),
-    "points": (
-        "a.vtk",
-        _changed(".vtk", "POINTS 4 ", "POINTS 99999999999 "),
-        "it declares POINTS of 99999999999 values",
-    ),
-    "cells": (
-        "a.vtk",
-        _changed(".vtk", "CELLS 3 6", "CELLS 3 1000000000000"),
-        "it declares CELLS of 1000000000000 values",
-    ),
-    "fields": (
-        "a.vtk",
-        _changed(".vtk", "phase 1 2 vtktypeint64", "phase 1000000 1000000 vtktypeint64"),
-        "it declares an array of 1000000000000 values",
-    ),
-    "structured": (
-        "a.vtk",
-        _text("# vtk DataFile Version 4.2\na\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 9999999 9999999 1\n"),
-        "DATASET STRUCTURED_POINTS: expected UNSTRUCTURED_GRID",
-    ),
-    "much from little": (
-        "a.vtu",
-        _packed(2**27, "vtkZLibDataCompressor"),
-        "its compressed data are too large for a file",
-    ),
-    "much by lzma": ("a.vtu", _packed(2**27, "vtkLZMADataCompressor"), "its compressed data are too large for a file"),
-    "broken phase": ("a.vtu", _vtk(HALVES, phase=[0.0, 0.5]), "cell data phase = 0.5: expected 0, 1, 2, ..."),
-    "tetrahedron": ("a.vtk", _vtk({"tetra": [[0, 1, 2, 3]]}, phase=[0]), "elements are 1 tetra: only triangles"),
-    "lines only": ("a.vtu", _vtk({"line": [[0, 1]]}, phase=[0]), "no triangles in it"),
-    "no matrix": ("a.vtu", _vtk(HALVES, phase=[1, 3]), 'no value of phase is named "matrix"'),
-    "coarse": ("a.vtu", _vtk(HALVES, phase=[0, 0]), "no node between the corners of the left, right, lower"),
-}
-
-
-@pytest.mark.parametrize("name", FAULTS)
-def test_faulty_mesh_is_refused(name, tmp_path):
-    file, write, message = FAULTS[name]
-    with pytest.raises(MeshError) as caught:
-        read(write(tmp_path / file))
-    assert any(message in fault for fault in caught.value.faults), caught.value
-    assert all(file in fault and "\n" not in fault for fault in caught.value.faults)
-
-
-def test_without_meshio_a_line_says_what_to_install(monkeypatch, tmp_path):
-    monkeypatch.setitem(vtk_file.READERS, ".vtu", "no_such_package.vtu")
-    with pytest.raises(MeshError, match=r"a.vtu: .vtu files are read by meshio, .* pip install 'feti_homog\[meshes\]'"):
-        read(tmp_path / "a.vtu")
 
 
 @pytest.mark.parametrize("mesh", [grid(), second_order(grid())], ids=["first", "second"])

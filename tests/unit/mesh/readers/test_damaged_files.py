@@ -16,8 +16,10 @@ import pytest
 from support.abaqus import write_inp
 from support.damaged_files import damaged
 from support.other_formats import written
+from support.vtk_files import write_vtk, write_vtu
 from unit.mesh.binary_msh import write_binary
 from unit.mesh.faulty_meshes import RIGHT_SIDE, MshFile, grid
+from unit.mesh.readers.test_strangers_meshes import by_gmsh
 from unit.mesh.second_order import second_order
 
 from feti_homog.errors import MeshError
@@ -37,6 +39,10 @@ SEEDS: dict[str, Callable[[Path], object]] = {
     "binary.vtk": lambda path: written(second_order(MESH), path),
     "text.vtk": lambda path: written(MESH, path, binary=False),
     "old.vtk": lambda path: written(MESH, path, file_format="vtk42"),
+    "raw.vtu": lambda path: write_vtu(path, "Appended raw"),
+    "bases.vtu": write_vtu,
+    "new.vtk": lambda path: write_vtk(path, "Binary", 51, "int32"),
+    "medit.mesh": lambda path: by_gmsh(path, grid()),
     "text-4.1.msh": lambda path: path.write_bytes((Path(__file__).parents[4] / "meshes/square.msh").read_bytes()),
 }
 
@@ -44,7 +50,7 @@ SEEDS: dict[str, Callable[[Path], object]] = {
 def outcome(path: Path) -> str:
     """Return how reading a file ends: a mesh or faults."""
     try:
-        read(path)
+        read(path, phases={"matrix": (1,), "fibre": (2,)} if path.suffix == ".mesh" else {})
     except MeshError as error:
         assert error.faults and all("\n" not in fault and fault.isprintable() for fault in error.faults), error
         return "refused"

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from support.cases import FIBRE, MATRIX
+from support.vtk_files import vtk_grid
 from unit.mesh.faulty_meshes import RIGHT_SIDE, MshFile, N, grid, node
 
 from feti_homog import Case, run
@@ -58,25 +59,11 @@ def by_meshio(path: Path, data: str | None, kind: str | None = None, sets: bool 
 
 def by_vtk(path: Path) -> None:
     """Write by VTK: compressed, appended, with normals that nobody needs."""
-    from vtkmodules.util.numpy_support import numpy_to_vtk
-    from vtkmodules.vtkCommonCore import vtkPoints
-    from vtkmodules.vtkCommonDataModel import vtkUnstructuredGrid
     from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
 
-    data, points = vtkUnstructuredGrid(), vtkPoints()
-    for place in grid().nodes.values():
-        points.InsertNextPoint(place)
-    data.SetPoints(points)
-    elements = list(grid().elements.values())
-    for element in elements:
-        data.InsertNextCell(5, 3, [n - 1 for n in element[3]])
-    for name, values in (("quality", np.linspace(0, 1, 32)), ("RegionId", np.array([e[1] for e in elements]))):
-        array = numpy_to_vtk(values, deep=True)
-        array.SetName(name)
-        data.GetCellData().AddArray(array)
     writer = vtkXMLUnstructuredGridWriter()
     writer.SetFileName(str(path))
-    writer.SetInputData(data)
+    writer.SetInputData(vtk_grid(name="RegionId", first=1))
     writer.Write()
 
 

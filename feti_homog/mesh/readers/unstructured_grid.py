@@ -1,0 +1,187 @@
+"""Points and cells of VTK's types, with numbers of each cell, as files of VTK and of Medit have them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from feti_homog.errors import MeshError
+from feti_homog.mesh.readers.raw_mesh import DEBONDED, Block, RawMesh, assembled
+from feti_homog.mesh.readers.scanner import Numbers
+from feti_homog.typing import Float, Int
+
+# VTK's types of cells: their numbers of nodes, by what becomes of them.
+TRIANGLES = {5: 3, 9: 4, 22: 6}
+LINES = {3: 2, 21: 3}
+POINTS = {1: 1}
+POLY_VERTEX, POLYGON, PIXEL = 2, 7, 8
+NAMES = {0: "empty cells", 4: "polylines", 6: "triangle strips", 7: "polygons", 10: "tetrahedra", 12: "hexahedra"}
+NAMES |= {13: "wedges", 14: "pyramids", 23: "quadrilaterals of eight nodes", 28: "quadrilaterals of nine nodes"}
+NAMES |= {34: "triangles of seven nodes", 42: "polyhedra", 69: "triangles of any order"}
+PHASE = "phase"
+# Cell data by which other programs number materials, in the order of precedence.
+NUMBERS = (
+    "medit:ref",
+    "gmsh:physical",
+    "CellEntityIds",
+    "mat_id",
+    "MaterialIds",
+    "material",
+    "cell_tags",
+    "region",
+    "gmsh:geometrical",
+)
+MOST_PHASES = 10**9
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Points and m cells.
+
+    Attributes:
+        points: (n, 3) their coordinates.
+        types: (m,) VTK's types of the cells.
+        nodes: their nodes, cell after cell, numbered from 0.
+        counts: (m,) how many nodes each has.
+        data: numbers of the cells, (m,) or (m, k), by their names.
+        first: the file's number of the first node and of the first cell.
+    """
+
+    points: Float
+    types: Int
+    nodes: Int
+    counts: Int
+    data: Mapping[str, Numbers]
+    first: int = 0
+
+    def nodes_of(self, cells: Int, count: int) -> Int:
+        """(k, count) the file's numbers of the nodes of cells (k,) that have so many."""
+        starts = np.cumsum(self.counts)[cells] - count
+        return np.asarray(self.first + self.nodes[starts[:, None] + np.arange(count)], np.int64)
+
+
+def mesh_of(grid: Grid) -> RawMesh:
+    """Return the triangles and the lines of a grid.
+
+    Its cell data `phase` are 0 in the matrix, 1 in phase fibre, k in fibre:k; in their place the groups are those of
+    one of NUMBERS, or of the only cell data of whole numbers. Its cell data `debonded`, if it has them, are 1 on lines
+    that are debonded from the start.
+
+    Raises:
+        MeshError: it has other cells or no phases, or is damaged.
+    """
+    faults = _misfits(grid)
+    if not faults:
+        grid = _in_common_types(grid)
+        faults = _other_cells(grid) + _unnumbered(grid)
+    if faults:
+        raise MeshError(*faults)
+    name = _numbers_name(grid)
+    groups = np.ravel(grid.data[name]).astype(np.int64)
+    is_triangle = np.isin(grid.types, [*TRIANGLES])
+    values, group = np.unique(groups[is_triangle], return_inverse=True)
+    place = np.zeros(len(groups), np.int64)
+    place[is_triangle] = group
+    blocks = []
+    for kind, count in TRIANGLES.items():
+        own = np.flatnonzero(grid.types == kind)
+        if len(own):
+            blocks.append(Block(grid.first + own, grid.nodes_of(own, count), place[own]))
+    aliases = [(f"number {k}",) for k in values.tolist()]
+    phases = [(("matrix", "fibre")[k] if k < 2 else f"fibre:{k}",) for k in values.tolist()]
+    named, containers = (phases if name == PHASE else aliases), (f"value of {name}", "cells")
+    tags = grid.first + np.arange(len(grid.points))
+    return assembled(tags, grid.points, blocks, named, _curves(grid, groups, name == PHASE), containers, aliases)
+
+
+def _misfits(grid: Grid) -> list[str]:
+    """Arrays of other lengths than the cells, and nodes that are not there."""
+    count, last = len(grid.types), len(grid.points) + grid.first - 1
+    if len(grid.counts) != count or np.any(grid.counts < 0) or grid.counts.sum() != len(grid.nodes):
+        return ["the cells and their nodes do not belong together: the file is damaged"]
+    bad = np.flatnonzero((grid.nodes < 0) | (grid.nodes >= len(grid.points)))
+    if len(bad):
+        cell, node = np.searchsorted(np.cumsum(grid.counts), bad[0], side="right"), grid.nodes[bad[0]] + grid.first
+        return [f"cell {cell + grid.first} has the node {node}: expected {grid.first} to {last}"]
+    return [
+        f"cell data {name}: {len(values)} values for {count} cells"
+        for name, values in grid.data.items()
+        if len(values) != count
+    ]
+
+
+def _in_common_types(grid: Grid) -> Grid:
+    """Return the grid with polygons of three and four nodes and pixels as triangles and quadrilaterals."""
+    counts, types, nodes = grid.counts, grid.types.copy(), grid.nodes.copy()
+    for count, kind in ((3, 5), (4, 9)):
+        types[(types == POLYGON) & (counts == count)] = kind
+    pixels = np.flatnonzero((types == PIXEL) & (counts == 4))
+    last = np.cumsum(counts)[pixels] - 1
+    nodes[last], nodes[last - 1] = nodes[last - 1], nodes[last]
+    types[pixels] = 9
+    types[types == POLY_VERTEX] = 1
+    return replace(grid, types=types, nodes=nodes)
+
+
+def _other_cells(grid: Grid) -> list[str]:
+    """Cells that are no triangles, lines or points, or have other numbers of nodes, and the lack of triangles."""
+    known, counts, faults = TRIANGLES | LINES, grid.counts, []
+    for kind in np.unique(grid.types).tolist():
+        own = np.flatnonzero(grid.types == kind)
+        wrong = own[counts[own] != known.get(kind, 0)]
+        if kind not in known and kind not in POINTS:
+            words = f"{len(own)} cells are {NAMES.get(kind, f'of type {kind}')}, the first is number"
+            expected = "only triangles of three or six nodes and quadrilaterals of four can be used"
+            faults.append(f"{words} {own[0] + grid.first}: {expected}")
+        elif kind in known and len(wrong):
+            cell = f"cell {wrong[0] + grid.first}, of type {kind}, has {counts[wrong[0]]} nodes"
+            faults.append(f"{cell}: expected {known[kind]}")
+    if not faults and not np.isin(grid.types, [*TRIANGLES]).any():
+        faults.append("no triangles in it")
+    return faults
+
+
+def _unnumbered(grid: Grid) -> list[str]:
+    """Phases that are missing, or no numbers of phases."""
+    name = _numbers_name(grid)
+    if not name:
+        expected = "expected 0 in the matrix, 1 in phase fibre, 2 in fibre:2, ..."
+        return [f"no cell data named {PHASE}, but {', '.join(grid.data) or 'none'}: {expected}"]
+    values = grid.data[name]
+    if np.size(values) != len(grid.types):
+        return [f"cell data {name}: expected one value for each of {len(grid.types)} cells"]
+    bad = np.ravel(values)[~np.ravel((values == np.round(values)) & (values >= 0) & (values < MOST_PHASES))]
+    return [f"cell data {name} = {bad[0]:g}: expected 0, 1, 2, ... below {MOST_PHASES}"] if len(bad) else []
+
+
+def _numbers_name(grid: Grid) -> str:
+    """Return the name of the cell data with the phase of an element; empty if there are none."""
+    if known := [name for name in (PHASE, *NUMBERS) if name in grid.data]:
+        return known[0]
+    whole = [
+        name
+        for name, values in grid.data.items()
+        if name != DEBONDED and np.size(values) == len(values) and values.dtype.kind in "iu"
+    ]
+    return whole[0] if len(whole) == 1 else ""
+
+
+def _curves(grid: Grid, groups: Int, has_phases: bool) -> dict[str, Int]:
+    """Nodes (d, 2) at the ends of the lines that cell data `debonded` mark, and of the others by their number.
+
+    Lines in a file with phases have no number but are called `line`.
+    """
+    marks = np.ravel(grid.data[DEBONDED]) if DEBONDED in grid.data else np.zeros(len(grid.types))
+    curves: dict[str, list[Int]] = {}
+    for kind, count in LINES.items():
+        own = np.flatnonzero(grid.types == kind)
+        ends = grid.nodes_of(own, count)[:, :2]
+        for number in np.unique(groups[own]).tolist():
+            for is_debonded in (True, False):
+                some = (groups[own] == number) & ((marks[own] != 0) == is_debonded)
+                name = DEBONDED if is_debonded else "line" if has_phases else f"number {number}"
+                if some.any():
+                    curves.setdefault(name, []).append(ends[some])
+    return {name: np.concatenate(parts) for name, parts in curves.items()}

@@ -1,0 +1,197 @@
+"""Read the triangles and the lines of an XML file of VTK (.vtu): text, base64 or raw, compressed or not."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import lzma
+import re
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+
+from feti_homog.errors import MeshError
+from feti_homog.mesh.readers.raw_mesh import RawMesh
+from feti_homog.mesh.readers.scanner import NotANumber, Numbers, numbers
+from feti_homog.mesh.readers.unstructured_grid import Grid, mesh_of
+from feti_homog.schema.wording import toml_value
+from feti_homog.system.runtime import input_files
+from feti_homog.typing import Int
+
+TYPES = {f"{sign}Int{8 * size}": f"{kind}{size}" for sign, kind in (("", "i"), ("U", "u")) for size in (1, 2, 4, 8)}
+TYPES |= {"Float32": "f4", "Float64": "f8"}
+ORDERS = {"LittleEndian": "<", "BigEndian": ">"}
+COMPRESSORS = {"vtkZLibDataCompressor": zlib.decompressobj, "vtkLZMADataCompressor": lzma.LZMADecompressor}
+# Bytes that compressed data may have: so many in any file, or so many for each of the file's.
+MOST_BYTES, MOST_RATIO = 2**26, 50
+ARRAYS = ("connectivity", "offsets", "types")
+SEGMENT = re.compile(rb"[^=]+={0,2}")
+
+
+def load(path: Path) -> RawMesh:
+    """Read the triangles and the lines; nodes and cells have the numbers of the file, from 0, piece after piece.
+
+    Raises:
+        OSError: the file cannot be read.
+        MeshError: it is damaged, or has other cells or no phases.
+    """
+    content = input_files.read(path)
+    root, appended = _parsed(content)
+    (grid,) = _children(root, "VTKFile", {"UnstructuredGrid": 1, "AppendedData": 0})["UnstructuredGrid"]
+    arrays = _Arrays(root, appended, max(MOST_BYTES, MOST_RATIO * len(content)))
+    pieces = [_piece(piece, arrays) for piece in _children(grid, grid.tag, {"Piece": 1, "FieldData": 0})["Piece"]]
+    first = np.cumsum([0, *(len(piece.points) for piece in pieces)])
+    nodes = np.concatenate([piece.nodes + own for piece, own in zip(pieces, first, strict=False)])
+    points, types, counts = (
+        np.concatenate([getattr(piece, name) for piece in pieces]) for name in ("points", "types", "counts")
+    )
+    names = [name for name in pieces[0].data if all(name in piece.data for piece in pieces)]
+    data = {name: np.concatenate([piece.data[name] for piece in pieces]) for name in names}
+    return mesh_of(Grid(points, types, nodes, counts, data))
+
+
+def _parsed(content: bytes) -> tuple[ElementTree.Element, bytes]:
+    """Return the root of the file and its appended data, whose first character is behind the underscore."""
+    start = content.find(b"<AppendedData")
+    stop, appended = content.rfind(b"</AppendedData>"), b""
+    if 0 <= start < stop and (head := content.find(b">", start, stop)) > 0:
+        appended = content[head + 1 : stop]
+        content = content[: head + 1] + content[stop:]
+        appended = appended[appended.find(b"_") + 1 :]
+    try:
+        return ElementTree.fromstring(content), appended
+    except (ElementTree.ParseError, ValueError, LookupError) as error:
+        raise MeshError(f"not XML: {error}") from None
+
+
+def _children(element: ElementTree.Element, name: str, known: Mapping[str, int]) -> dict[str, list[Any]]:
+    """Return the children of an element by their tags; a fault of any that is not known, or that is missing."""
+    found: dict[str, list[Any]] = {tag: element.findall(tag) for tag in known}
+    other = [child.tag for child in element if child.tag not in known]
+    expected = f"expected {' and '.join(known)}"
+    if other:
+        raise MeshError(f"<{other[0]}> in <{name}>: {expected}")
+    if missing := [tag for tag, least in known.items() if len(found[tag]) < least]:
+        raise MeshError(f"no <{missing[0]}> in <{name}>: {expected}")
+    if name != "UnstructuredGrid" and (several := [tag for tag in known if len(found[tag]) > 1]):
+        raise MeshError(f"<{several[0]}> is there twice in <{name}>: expected it once")
+    return found
+
+
+def _piece(piece: ElementTree.Element, arrays: _Arrays) -> Grid:
+    """Read a piece."""
+    found = _children(piece, "Piece", {"Points": 1, "Cells": 1, "CellData": 0, "PointData": 0})
+    counts = []
+    for name in ("NumberOfPoints", "NumberOfCells"):
+        word = piece.get(name, "").strip()
+        if not re.fullmatch("[0-9]{1,15}", word):
+            raise MeshError(f"{name} is {toml_value(word)}: expected a whole number")
+        counts.append(int(word))
+    points = next(iter(arrays.of(found["Points"][0]).values()), np.zeros(0))
+    cells = arrays.of(found["Cells"][0])
+    lost = [name for name in ARRAYS if name not in cells]
+    if lost and counts[1]:
+        raise MeshError(f"no array {lost[0]} of the cells")
+    nodes, ends, types = (np.ravel(cells.get(name, np.zeros(0))).astype(np.int64) for name in ARRAYS)
+    if np.size(points) != 3 * counts[0]:
+        raise MeshError(f"{np.size(points)} coordinates of points: expected {3 * counts[0]}")
+    if len(types) != counts[1]:
+        raise MeshError(f"{len(types)} types of cells: expected {counts[1]}")
+    data = arrays.of(found["CellData"][0]) if found["CellData"] else {}
+    return Grid(points.reshape(-1, 3).astype(float), types, nodes, np.diff(ends, prepend=0), data)
+
+
+def _decoded(text: bytes) -> bytes:
+    """Return the bytes of text in base64: header and data may be encoded separately, each with its own padding."""
+    return b"".join(base64.b64decode(part, validate=True) for part in SEGMENT.findall(b"".join(text.split())))
+
+
+class _Arrays:
+    """Arrays of a file, read as its root says; `left` bytes may be decompressed."""
+
+    def __init__(self, root: ElementTree.Element, appended: bytes, left: int) -> None:
+        kind, compressor = root.get("type"), root.get("compressor", "")
+        header, order = root.get("header_type", "UInt32"), root.get("byte_order", "LittleEndian")
+        expected = {
+            "type": (kind, ("UnstructuredGrid",)),
+            "header_type": (header, ("UInt32", "UInt64")),
+            "byte_order": (order, (*ORDERS,)),
+            "compressor": (compressor, ("", *COMPRESSORS)),
+        }
+        for name, (value, known) in expected.items():
+            if value not in known:
+                words = " or ".join(filter(None, known))
+                raise MeshError(f"{name} is {toml_value(value or '')}: expected {words}")
+        self.order, self.left = ORDERS[order], left
+        self.header = np.dtype(f"{self.order}{TYPES[header]}")
+        self.decompressor: Any = COMPRESSORS.get(compressor)
+        section = root.find("AppendedData")
+        self.appended, self.is_raw = appended, section is not None and section.get("encoding") == "raw"
+        starts = {self._offset(array) for array in root.iter("DataArray") if array.get("format") == "appended"}
+        self.starts = [*sorted(starts), len(appended)]
+
+    def of(self, section: ElementTree.Element) -> dict[str, Numbers]:
+        """Return the arrays of numbers in a section by their names: (k,), or a row for each tuple."""
+        found = {}
+        for array in section.iter("DataArray"):
+            name, kind = array.get("Name") or "Points", TYPES.get(array.get("type", ""))
+            if kind is None:
+                continue  # texts and bits
+            try:
+                values, width = self._values(array, kind), int(array.get("NumberOfComponents") or 1)
+                found[name] = values if width == 1 else values.reshape(-1, width)
+            except NotANumber as error:
+                raise MeshError(f"array {toml_value(name)}: {error}") from None
+            except (ValueError, zlib.error, lzma.LZMAError, binascii.Error):
+                raise MeshError(f"array {toml_value(name)}: its data are damaged or broken off") from None
+        return found
+
+    def _values(self, array: ElementTree.Element, kind: str) -> Numbers:
+        form, text = array.get("format", "ascii"), (array.text or "").encode()
+        if form == "ascii":
+            return numbers(text, "f8" if kind[0] == "f" else "i8")
+        if form == "appended":
+            start = self._offset(array)
+            text = self.appended[start : next((other for other in self.starts if other > start), start)]
+        elif form != "binary":
+            raise MeshError(f"format is {toml_value(form)}: expected ascii, binary or appended")
+        data = text if self.is_raw and form == "appended" else _decoded(text)
+        return np.frombuffer(self._unpacked(data) if self.decompressor else self._plain(data), f"{self.order}{kind}")
+
+    def _offset(self, array: ElementTree.Element) -> int:
+        word = array.get("offset", "").strip()
+        if not re.fullmatch("[0-9]{1,15}", word) or int(word) > len(self.appended):
+            raise MeshError(f"offset is {toml_value(word)}: expected one in {len(self.appended)} appended bytes")
+        return int(word)
+
+    def _words(self, data: bytes, count: int) -> Int:
+        """(count,) words of the header at the beginning of data."""
+        if count * self.header.itemsize > len(data):
+            raise ValueError
+        return np.frombuffer(data, self.header, count)
+
+    def _plain(self, data: bytes) -> bytes:
+        """Return data behind their length; ValueError if they are broken off."""
+        (length,), start = self._words(data, 1).tolist(), self.header.itemsize
+        if start + length > len(data):
+            raise ValueError
+        return data[start : start + length]
+
+    def _unpacked(self, data: bytes) -> bytes:
+        """Return data that are compressed block by block; their lengths are in front."""
+        (blocks,) = self._words(data, 1).tolist()
+        place, unpacked = (3 + blocks) * self.header.itemsize, []
+        for length in self._words(data, 3 + blocks).tolist()[3:] if blocks else []:
+            decompressor = self.decompressor()
+            unpacked.append(decompressor.decompress(data[place : place + length], self.left + 1))
+            self.left -= len(unpacked[-1])
+            place += length
+            if self.left < 0:
+                raise MeshError("its compressed data are too large for a file of its length")
+            if not decompressor.eof:
+                raise ValueError
+        return b"".join(unpacked)
