@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from feti_homog.errors import MeshError
+from feti_homog.mesh.readers.abaqus_keywords import REFUSED, KeywordBlock, blocks, name_of
 from feti_homog.mesh.readers.raw_mesh import Block, RawMesh, assembled
 from feti_homog.schema.wording import toml_value
 from feti_homog.system.runtime import input_files
@@ -17,19 +18,9 @@ from feti_homog.typing import Int
 
 TRIANGLE = re.compile(r"(CPE|CPS|CPEG|DC2D|M3D|S|STRI|R3D)(3|6|65)[A-Z]*")
 # Quadrilaterals are cut in two, and rigid triangles have the shape of others.
-QUAD = re.compile(r"(CPE|CPS|CPEG|DC2D|M3D|S)4[A-Z]*|R3D4")
+QUAD = re.compile(r"(CPE|CPS|CPEG|DC2D|M3D|S)4[A-Z]*5?|R3D4")
 LINE = re.compile(r"(T2D|T3D|B2|B3|DC1D)\w*")
 LINE_NODES = (2, 3)
-# Keywords that make or move nodes and elements, and the parameters that are read of others that have them.
-REFUSED = {
-    *("SYSTEM", "NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "IMPERFECTION", "IMPORT", "PARAMETER"),
-    "SYMMETRIC MODEL GENERATION",
-}
-PARAMETERS = {
-    "NODE": {"NSET", "SYSTEM"},
-    "ELEMENT": {"TYPE", "ELSET"},
-    "ELSET": {"ELSET", "GENERATE", "INTERNAL", "INSTANCE", "UNSORTED"},
-}
 # Members that sets may have together, in any file; in one with more characters as many as these.
 MOST_MEMBERS = 10**6
 # From which of its sets an element has its phase: those before come first.
@@ -42,6 +33,7 @@ class _Content:
 
     Attributes:
         left: how many members sets may still get from ranges and from other sets.
+        seen: PART and INSTANCE, if there is one.
         is_assembly: whether what follows belongs to the assembly, and not to a part or an instance of it.
     """
 
@@ -51,8 +43,7 @@ class _Content:
     lines: dict[int, list[int]] = field(default_factory=dict)
     sets: dict[tuple[int, str], set[int]] = field(default_factory=dict)
     materials: dict[str, str] = field(default_factory=dict)
-    parts: int = 0
-    instances: int = 0
+    seen: set[str] = field(default_factory=set)
     is_assembly: bool = False
 
     def members(self, level: int, name: str) -> set[int]:
@@ -75,59 +66,54 @@ def load(path: Path) -> RawMesh:
         OSError: the file cannot be read.
         MeshError: it is damaged, or has other elements.
     """
-    text = input_files.read(path).decode("utf-8", "replace")
+    text = input_files.read(path).decode("utf-8-sig", "replace")
     content = _Content(left=max(MOST_MEMBERS, len(text)))
-    for number, words, rows in _blocks(text):
+    for block in blocks(text):
         try:
-            _take(content, words, rows)
-        except KeyError as error:
-            raise MeshError(f"line {number}, *{words['']}: no {error.args[0]}") from None
-        except IndexError:
-            raise MeshError(f"line {number}, *{words['']}: a line below it ends too early") from None
+            _take(content, block)
         except ValueError as error:
-            raise MeshError(f"line {number}, *{words['']}: {error}") from None
+            raise MeshError(f"line {block.number}, *{block.word}: {error}") from None
     faults = _faults(content)
     if faults:
         raise MeshError(*faults)
     return _raw(content)
 
 
-def _take(content: _Content, words: dict[str, str], rows: list[list[str]]) -> None:
+def _take(content: _Content, block: KeywordBlock) -> None:
     """Read one block."""
-    keyword = words[""]
-    unread = [word for word in words if word and word not in PARAMETERS.get(keyword, words)]
-    if unread:
-        raise ValueError(f"its parameter {toml_value(unread[0])} is not read: write nodes and elements out without it")
-    if keyword in REFUSED:
+    if block.keyword in REFUSED:
         raise ValueError("it makes or moves nodes or elements, and is not read: write them out")
-    match keyword:
+    match block.keyword:
         case "PART" | "INSTANCE" | "END INSTANCE" | "ASSEMBLY" | "END ASSEMBLY":
-            _enter(content, keyword, rows)
+            _enter(content, block)
         case "INCLUDE":
             raise ValueError("other files are not read: expected all in one file")
         case "NODE" if not content.is_assembly:
-            _take_nodes(content, words, rows)
+            _take_nodes(content, block)
         case "ELEMENT":
-            _take_elements(content, words, rows)
-        case "ELSET" if "INSTANCE" not in words:
-            _take_set(content, words, rows)
-        case "SOLID SECTION" | "SHELL SECTION":
-            content.materials[words["ELSET"]] = words.get("MATERIAL", words["ELSET"])
+            _take_elements(content, block)
+        case "ELSET" if "INSTANCE" not in block.parameters:
+            _take_set(content, block)
+        case "SOLID SECTION" | "SHELL SECTION" | "MEMBRANE SECTION":
+            name = block.parameter("ELSET")
+            content.materials[name] = block.parameters.get("MATERIAL", name)
 
 
-def _enter(content: _Content, keyword: str, rows: list[list[str]]) -> None:
+def _enter(content: _Content, block: KeywordBlock) -> None:
     """Begin or end a part, an instance or the assembly."""
-    content.parts += keyword == "PART"
-    content.instances += keyword == "INSTANCE"
-    content.is_assembly = keyword in ("ASSEMBLY", "END INSTANCE")
-    if keyword == "INSTANCE" and len(rows) > 1:
+    if block.keyword in content.seen:
+        expected = "expected one, in which matrix and fibres share the nodes of their interfaces: merge the instances"
+        raise ValueError(f"a second {block.keyword.lower()}: {expected}")
+    content.seen |= {block.keyword} & {"PART", "INSTANCE"}
+    content.is_assembly = block.keyword in ("ASSEMBLY", "END INSTANCE")
+    if block.keyword == "INSTANCE" and len(block.rows) > 1:
         raise ValueError("its rotation is not read: rotate the part")
 
 
-def _take_nodes(content: _Content, words: dict[str, str], rows: list[list[str]]) -> None:
-    if words.get("SYSTEM", "r") != "r":
+def _take_nodes(content: _Content, block: KeywordBlock) -> None:
+    if block.parameters.get("SYSTEM", "r") != "r":
         raise ValueError("its parameter SYSTEM is not read: expected Cartesian coordinates")
-    for tag, *place in rows:
+    for tag, *place in block.rows:
         number = _integer(tag)
         if not place:
             raise ValueError(f"node {number} has no coordinates")
@@ -136,19 +122,19 @@ def _take_nodes(content: _Content, words: dict[str, str], rows: list[list[str]])
         content.nodes[number] = [*map(_real, place[:3]), 0.0, 0.0][:3]
 
 
-def _take_elements(content: _Content, words: dict[str, str], rows: list[list[str]]) -> None:
-    kind = words.get("TYPE", "").upper()
+def _take_elements(content: _Content, block: KeywordBlock) -> None:
+    kind = block.parameters.get("TYPE", "").upper()
     counts = _node_counts(kind)
     found = content.lines if counts == LINE_NODES else content.triangles
-    for row in rows:
+    for row in block.rows:
         tag, *nodes = map(_integer, row)
         if len(nodes) not in counts:
             raise ValueError(f"element {tag} has {len(nodes)} nodes: expected {' or '.join(map(str, counts))}")
         if tag in content.triangles or tag in content.lines:
             raise ValueError(f"element {tag} is there twice")
         found[tag] = nodes
-        if "ELSET" in words:
-            content.members(BY_ELEMENTS, words["ELSET"]).add(tag)
+        if "ELSET" in block.parameters:
+            content.members(BY_ELEMENTS, block.parameters["ELSET"]).add(tag)
 
 
 def _node_counts(kind: str) -> tuple[int, ...]:
@@ -164,11 +150,11 @@ def _node_counts(kind: str) -> tuple[int, ...]:
     return (3,) if triangle[2] == "3" else (6,)
 
 
-def _take_set(content: _Content, words: dict[str, str], rows: list[list[str]]) -> None:
-    members = content.members(BY_SET, words["ELSET"])
-    for row in rows:
-        parts = ({_integer(word)} if word.isdecimal() else _members(content, _name_of(word)) for word in row if word)
-        for own in [_range(row)] if "GENERATE" in words else parts:
+def _take_set(content: _Content, block: KeywordBlock) -> None:
+    members = content.members(BY_SET, block.parameter("ELSET"))
+    for row in block.rows:
+        parts = ({_integer(word)} if word.isdecimal() else _members(content, name_of(word)) for word in row if word)
+        for own in [_range(row)] if "GENERATE" in block.parameters else parts:
             content.spend(len(own))
             members.update(own)
 
@@ -183,18 +169,16 @@ def _range(row: list[str]) -> range:
 
 def _members(content: _Content, name: str) -> set[int]:
     """Return the elements of a set, however it was made."""
-    found = [members for (_, own), members in content.sets.items() if own == name]
+    levels = (BY_SECTION, BY_SET, BY_ELEMENTS)
+    found = [content.sets[level, name] for level in levels if (level, name) in content.sets]
     if not found:
         raise ValueError(f'there is no element set "{name}"')
     return set().union(*found)
 
 
 def _faults(content: _Content) -> list[str]:
-    """Several parts, no triangles, unknown nodes, sections of unknown sets."""
-    counts = {"parts": content.parts, "instances": content.instances}
-    faults = [f"{count} {name}: expected one" for name, count in counts.items() if count > 1]
-    if not content.triangles:
-        faults.append("no triangles in it")
+    """No triangles, unknown nodes, sections of unknown sets."""
+    faults = [] if content.triangles else ["no triangles in it"]
     elements = content.triangles | content.lines
     lost = ((tag, node) for tag, nodes in elements.items() for node in nodes if node not in content.nodes)
     faults += [f"element {tag}: there is no node {node}" for tag, node in list(lost)[:1]]
@@ -204,19 +188,24 @@ def _faults(content: _Content) -> list[str]:
 
 
 def _raw(content: _Content) -> RawMesh:
-    for name in content.materials:
-        content.members(BY_SECTION, name).update(_members(content, name))
-    labels = _labels(content)
     made_of = [(material, _members(content, name)) for name, material in content.materials.items()]
-    others = _names_of([*made_of, *((name, members) for (_, name), members in content.sets.items())])
+    # Sets that sections name have the phases, unless only the materials of the sections have their names.
+    by_material = "matrix" in content.materials.values() and "matrix" not in content.materials
+    for name, (material, members) in zip(content.materials, made_of, strict=True):
+        content.members(BY_SECTION, material if by_material else name).update(members)
+    labels = _labels(content)
+    all_sets = [(name, members) for (_, name), members in content.sets.items()]
+    others = _names_of(made_of + all_sets)
     names_of = {tag: (labels.get(tag, ()), others.get(tag, ())) for tag in content.triangles}
     place = {names: k for k, names in enumerate(dict.fromkeys(names_of.values()))}
     groups, aliases = zip(*place, strict=True)
+    by_count: dict[int, list[int]] = {}
+    for tag, nodes in content.triangles.items():
+        by_count.setdefault(len(nodes), []).append(tag)
     parts = []
-    for count in sorted({len(nodes) for nodes in content.triangles.values()}):
-        own = {tag: nodes for tag, nodes in content.triangles.items() if len(nodes) == count}
-        group = np.array([place[names_of[tag]] for tag in own])
-        parts.append(Block(np.fromiter(own, np.int64), np.array(list(own.values()), np.int64), group))
+    for _, tags in sorted(by_count.items()):
+        group = np.array([place[names_of[tag]] for tag in tags])
+        parts.append(Block(np.array(tags), np.array([content.triangles[tag] for tag in tags]), group))
     numbers, points = np.fromiter(content.nodes, np.int64), np.array(list(content.nodes.values()))
     containers = "element set", "element set"
     return assembled(numbers, points, parts, groups, _curves(content, labels), containers, aliases)
@@ -249,34 +238,6 @@ def _names_of(sets: Iterable[tuple[str, set[int]]]) -> dict[int, tuple[str, ...]
     return {tag: tuple(names) for tag, names in found.items()}
 
 
-def _blocks(text: str) -> Iterator[tuple[int, dict[str, str], list[list[str]]]]:
-    """Yield the keyword lines with their number, their words (the keyword under ""), and the data lines that follow."""
-    number, words, rows = 0, dict[str, str](), list[list[str]]()
-    open_line = ""
-    for place, line in enumerate(text.splitlines(), start=1):
-        line = line.strip()
-        if not line or line.startswith("**"):
-            continue
-        if line.startswith("*") or open_line.startswith("*"):
-            open_line += line
-            if open_line.endswith(","):
-                continue
-            if words:
-                yield number, words, rows
-            number, words, rows, open_line = place, _words(open_line), [], ""
-        elif words:
-            rows.append([word.strip() for word in line.rstrip(", \t").split(",")])
-    if words:
-        yield number, words, rows
-
-
-def _words(line: str) -> dict[str, str]:
-    """Keyword and parameters of a line: *ELEMENT, TYPE=CPE3 has {"": "ELEMENT", "TYPE": "CPE3"}."""
-    keyword, *parameters = (word.strip() for word in line[1:].split(","))
-    pairs = (word.partition("=") for word in parameters)
-    return {"": re.sub(r"\s+", " ", keyword.upper()), **{k.strip().upper(): _name_of(v) for k, _, v in pairs}}
-
-
 def _integer(word: str) -> int:
     """Return the whole number that a word is; ValueError if it is none."""
     if not re.fullmatch(r"[+-]?[0-9]{1,15}", word):
@@ -288,13 +249,7 @@ def _real(word: str) -> float:
     """Return the number that a word is; ValueError if it is none."""
     try:
         if "_" not in word and word.isascii():
-            return float(word)
+            return float(word.upper().replace("D", "E"))  # 1.0D+00 is Fortran's
     except ValueError:
         pass
     raise ValueError(f"{toml_value(word)}: expected a number")
-
-
-def _name_of(word: str) -> str:
-    """Return the name that a word is, in lower case unless it is quoted."""
-    word = word.strip()
-    return word[1:-1] if word[:1] == '"' else word.lower()

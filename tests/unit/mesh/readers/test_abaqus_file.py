@@ -11,6 +11,7 @@ from support.abaqus import write_inp
 from unit.mesh.faulty_meshes import RIGHT_SIDE, grid
 
 from feti_homog.errors import MeshError
+from feti_homog.mesh.readers import abaqus_file, abaqus_keywords
 from feti_homog.mesh.readers.msh_reader import read
 
 SQUARE = """*NODE
@@ -55,6 +56,53 @@ def test_nodes_of_the_assembly_are_not_those_of_the_part(tmp_path):
     assert np.array_equal(read(tmp_path / "two.inp").points, expected.points)
 
 
+KEYWORDS = (
+    "*ELEM, TYPE=CPS3, ELSET=matrix",
+    "* E l e m e n t, ELS=matrix, TYP=CPS3",
+    "*element,\ntype=CPS3,\nelset=matrix",
+)
+
+
+@pytest.mark.parametrize("line", KEYWORDS)
+def test_abbreviations_blanks_and_open_lines_are_read(line, tmp_path):
+    """Keywords and parameters need as many letters as tell them from others; blanks do not matter."""
+    (tmp_path / "a.inp").write_text(SQUARE)
+    expected = abaqus_file.load(tmp_path / "a.inp")
+    (tmp_path / "b.inp").write_text(
+        SQUARE.replace("*ELEMENT, TYPE=CPS3, ELSET=matrix", line).replace("*NODE", "*Nod e")
+    )
+    result = abaqus_file.load(tmp_path / "b.inp")
+    assert np.array_equal(result.triangles, expected.triangles) and result.groups == (("matrix",),)
+
+
+def test_no_keyword_without_elements_is_the_beginning_of_one_with_them():
+    """Otherwise a misspelt one would be passed over."""
+    names = [name.replace(" ", "") for name in (*abaqus_keywords.READ, *abaqus_keywords.REFUSED)]
+    assert [name for name in names if name.startswith(abaqus_keywords.OTHERS)] == []
+    for name in abaqus_keywords.READ:
+        assert abaqus_keywords.resolved(name.lower()) == name
+        with pytest.raises(ValueError, match="unknown keyword"):
+            abaqus_keywords.resolved(f"{name}S")
+
+
+@pytest.mark.parametrize("old", ["E+00", "D+00", "d0"])
+def test_a_byte_order_mark_and_exponents_of_fortran_are_read(old, tmp_path):
+    text = SQUARE.replace(", 1\n", f", 1.0{old}\n").encode()
+    (tmp_path / "a.inp").write_bytes(b"\xef\xbb\xbf" + text)
+    assert np.ptp(abaqus_file.load(tmp_path / "a.inp").points, axis=0).tolist() == [1, 1, 0]
+
+
+@pytest.mark.parametrize("section", ["*SOLID SECTION", "*Membrane Section", "*SHELLSECTION"])
+def test_materials_of_sections_are_phases_if_their_sets_are_not(section, tmp_path):
+    expected = read(write_inp(tmp_path / "one.inp", grid()))
+    text = (tmp_path / "one.inp").read_text().replace("=MATRIX", "=SET-M").replace("=FIBRE", "=SET-F")
+    sections = "".join(f"{section}, ELSET=SET-{name[0]}, MAT={name}\n1.\n" for name in ("FIBRE", "MATRIX"))
+    (tmp_path / "two.inp").write_text(text.replace("*END PART\n", f"{sections}*END PART\n"))
+    assert np.array_equal(read(tmp_path / "two.inp").phase, expected.phase)
+    by_sets = read(tmp_path / "two.inp", phases={"matrix": ("set-m",), "fibre": ("set-f",)})
+    assert np.array_equal(by_sets.phase, expected.phase)
+
+
 def _text(content: str) -> Callable[[Path], Path]:
     def write(path: Path) -> Path:
         path.write_text(content)
@@ -94,10 +142,27 @@ FAULTS = {
         )
         for keyword in ("NODE", "ELEMENT, TYPE=CPS3", "ELSET, ELSET=fibre")
     },
-    "abbreviated": (
-        _text(SQUARE + "*ELSET, ELSET=fibre, GEN\n1, 2\n"),
-        '*ELSET: its parameter "GEN" is not read',
+    "an abbreviation of several": (
+        _text(SQUARE + "*EL, TYPE=CPS3\n"),
+        "line 9, *EL: may be several keywords: write it out, or delete it if it makes no nodes or elements",
     ),
+    "an unknown keyword": (
+        _text(SQUARE + "*ELEMNT, TYPE=CPS3, ELSET=fibre\n3, 1, 2, 3\n"),
+        "line 9, *ELEMNT: unknown keyword: write it out, or delete it if it makes no nodes or elements",
+    ),
+    "nothing": (_text(SQUARE + "*\n3, 1, 2, 3\n"), "line 9, *: unknown keyword"),
+    "an abbreviation of a parameter of several": (
+        _text(SQUARE + "*ELSET, ELSET=fibre, IN\n1, 2\n"),
+        'line 9, *ELSET: its parameter "IN" is not read',
+    ),
+    "data before a keyword": (_text("1, 0, 0\n" + SQUARE), "line 1: data without a keyword: expected *NODE, *ELEMENT"),
+    **{
+        f"elements of type {kind}": (
+            _text(SQUARE + f"*ELEMENT, TYPE={kind}, ELSET=fibre\n3, 1, 2, 3, 4\n"),
+            f"line 9, *ELEMENT: elements are {kind}: only triangles of three or six nodes and quadrilaterals of four",
+        )
+        for kind in ("C3D4", "CPE8", "CPS8R", "S8R", "CAX3", "SC6R", "COH2D4", "MASS", "AC2D3", "U1")
+    },
     "underscore": (_text(SQUARE.replace("3, 1, 1", "3, 0.2_5, 1")), '*NODE: "0.2_5": expected a number'),
     "digits of another script": (
         _text(SQUARE.replace("2, 1, 3, 4", "2, 1, ٣, 4")),
@@ -111,7 +176,10 @@ FAULTS = {
     "empty coordinate": (_text(SQUARE.replace("3, 1, 1", "3, , 1")), 'line 1, *NODE: "": expected a number'),
     "node twice": (_text(SQUARE + "*NODE\n3, 0, 0\n"), "line 9, *NODE: node 3 is there twice"),
     "twice in a block": (_text(SQUARE.replace("2, 1, 3, 4", "1, 1, 3, 4")), "element 1 is there twice"),
-    "two instances": (_text(SQUARE + "*INSTANCE\n*INSTANCE\n"), "2 instances: expected one"),
+    "two instances": (
+        _text(SQUARE + "*INSTANCE\n*INSTANCE\n"),
+        "line 10, *INSTANCE: a second instance: expected one, in",
+    ),
     "rotated": (
         _text(SQUARE + "*INSTANCE, NAME=b\n0, 0, 0\n0, 0, 0, 0, 0, 1, 90\n"),
         "line 9, *INSTANCE: its rotation is not read: rotate the part",
@@ -148,7 +216,10 @@ FAULTS = {
     "unknown set": (_text(SQUARE + "*ELSET, ELSET=fibre\nother\n"), 'there is no element set "other"'),
     "unknown section": (_text(SQUARE + "*SOLID SECTION, ELSET=steel\n"), 'element set "steel": there is none'),
     "nameless set": (_text(SQUARE + "*ELSET\n1\n"), "line 9, *ELSET: no ELSET"),
-    "two parts": (_text("*PART, NAME=a\n*PART, NAME=b\n" + SQUARE), "2 parts: expected one"),
+    "two parts": (
+        _text("*PART, NAME=a\n*PART, NAME=b\n" + SQUARE),
+        "line 2, *PART: a second part: expected one",
+    ),
     "other files": (_text("*INCLUDE, INPUT=b.inp\n" + SQUARE), "other files are not read"),
     "no set": (
         _text(SQUARE.replace(", ELSET=matrix", "")),

@@ -1,0 +1,157 @@
+"""Blocks of an Abaqus input file, and its keywords: those that make a mesh, and those that do not."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+
+from feti_homog.errors import MeshError
+from feti_homog.schema.wording import toml_value
+
+# Keywords that are read with those of their parameters that have a meaning for the mesh; None: others may be there.
+READ: dict[str, tuple[str, ...] | None] = {
+    "NODE": ("NSET", "SYSTEM"),
+    "ELEMENT": ("TYPE", "ELSET"),
+    "ELSET": ("ELSET", "GENERATE", "INTERNAL", "INSTANCE", "UNSORTED"),
+    **dict.fromkeys(("SOLID SECTION", "SHELL SECTION", "MEMBRANE SECTION")),
+    **dict.fromkeys(("PART", "END PART", "INSTANCE", "END INSTANCE", "ASSEMBLY", "END ASSEMBLY", "INCLUDE")),
+}
+OF_SECTIONS = ("ELSET", "MATERIAL")
+# Keywords that make or move nodes and elements.
+REFUSED = (
+    *("SYSTEM", "NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "IMPERFECTION", "IMPORT", "PARAMETER"),
+    *("SYMMETRIC MODEL GENERATION", "SUBSTRUCTURE GENERATE", "USER ELEMENT", "REFINE MESH", "MODEL CHANGE"),
+)
+WHOLE = {name.replace(" ", ""): name for name in (*READ, *REFUSED)}
+# How keywords without nodes and elements begin, without blanks.
+BEGINNINGS = """
+ACOUSTIC ADAPTIVE ADJUST AMPLITUDE ANISOTROPIC ANNEAL AQUA BASELINE BASEMOTION BEAM BIAXIAL BOND BOUNDARY BRITTLE
+BUCKL BULKVISCOSITY CADDEDMASS CAP CASTIRON CAVITY CECHARGE CECURRENT CENTROID CFILM CFLOW CFLUX CHANGEFRICTION CLAY
+CLEARANCE CLOAD CO-SIMULATION COHESIVE COMBINEDTEST COMPLEX COMPOSITEMODAL CONCRETE CONDUCTIVITY CONNECTOR CONSTRAINT
+CONTACT CONTOUR CONTROLS CORRELATION COUPLE COUPLING CRADIATE CREEP CRUSHABLE CYCLED CYCLIC DADDEDMASS DAMAGE DAMPING
+DASHPOT DEBOND DECHARGE DECURRENT DEFORMATIONPLASTICITY DENSITY DEPVAR DESIGN DETONATION DFLOW DFLUX DIAGNOSTICS
+DIELECTRIC DIFFUSIVITY DIRECTCYCLIC DISPLAYBODY DISTRIBUTING DISTRIBUTION DLOAD DRAG DRUCKER DSA DSF DSLOAD DYNAMIC
+ELASTIC ELECTR ELEMENTMATRIX ELEMENTOUTPUT ELEMENTRESPONSE ELFILE ELPRINT EMBEDDED EMISSIVITY ENDLOAD ENDSTEP ENERGY
+ENRICHMENT EOS EPJOINT EQUATION EULERIAN EXPANSION EXTERNAL EXTREME FABRIC FACEPRINT FAIL FASTENER FIELD FILE FILM
+FILTER FIXEDMASS FLOW FLUID FLUX FOUNDATION FRACTURE FRAMESECTION FREQUENCY FRICTION GAP GAS GEL GEOSTATIC
+GLOBALDAMPING HEADING HEAT HOURGLASS HYPERELASTIC HYPERFOAM HYPOELASTIC HYSTERESIS IMPEDANCE INCIDENT INCREMENTATION
+INELASTIC INERTIA INITIAL INTEGRATED INTERFACE JOINT JOULE KAPPA KINEMATIC LATENT LOADCASE LOADING LOWDENSITY MAGNETIC
+MASS MATERIAL MEDIA MODAL MOHR MOISTURE MOLECULAR MONITOR MOTION MPC MULLINS NETWORKMPC NOCOMPRESSION NODAL NODEFILE
+NODEOUTPUT NODEPRINT NODERESPONSE NONLINEAR NONSTRUCT NORMAL NOTENSION NSET OBJECTIVE ORIENTATION ORNL OUTPUT PARTICLE
+PERIODICMEDIA PERMANENT PERMEABILITY PHYSICAL PIEZO PLANARTEST PLASTIC PML POROUS POSTOUTPUT POTENTIAL PRE-TENSION
+PREPRINT PRESSURE PRESTRESS PRINT PSD RADIATE RADIATION RANDOM RATE RATIOS REBAR RELEASE RESPONSE RESTART RETAINED
+RIGID ROTARY SECTION SELECT SENSITIVITY SFILM SFLOW SHEAR SHELLGENERAL SHELLTOSOLID SIMPEDANCE SIMPLESHEAR SLIDELINE
+SLOAD SOILS SOLUBILITY SOLUTION SOLVER SORPTION SPECIFIC SPECTRUM SPRING SRADIATE STATIC STEADYSTATE STEP SUBCYCLING
+SUBMODEL SURFACE SWELLING TEMPERATURE TENSILE TENSION THERMAL TIE TIME TORQUE TRACER TRANSFORM TRANSPORT TRIAXIAL TRS
+UELPROPERTY UNCOUPLED UNDEX UNIAXIAL UNLOADING USERDEFINED USERMATERIAL USEROUTPUT VALUESATINFINITY VIEWFACTOR VISCO
+VOIDNUCLEATION VOLUMETRIC WAVE WIND
+"""
+OTHERS = tuple(BEGINNINGS.split())
+
+
+@dataclass
+class KeywordBlock:
+    """A keyword line and the data lines below it.
+
+    Attributes:
+        number: of the line, from 1.
+        word: the keyword as the file has it.
+        keyword: it without abbreviation; empty if it makes no mesh.
+        parameters: by their names, in upper case.
+        rows: the words of each data line.
+    """
+
+    number: int
+    word: str
+    keyword: str
+    parameters: dict[str, str]
+    rows: list[list[str]] = field(default_factory=list)
+
+    def parameter(self, name: str) -> str:
+        """Return a parameter; a fault if it is missing."""
+        if name not in self.parameters:
+            raise ValueError(f"no {name}")
+        return self.parameters[name]
+
+
+def blocks(text: str) -> Iterator[KeywordBlock]:
+    """Yield the blocks of a file.
+
+    Raises:
+        MeshError: a keyword is not known, or data stand before the first one.
+    """
+    block, open_line = None, ""
+    for number, line in enumerate(map(str.strip, text.splitlines()), start=1):
+        if not line or line.startswith("**"):
+            continue
+        if line.startswith("*"):
+            if block is not None:
+                yield block
+            block, open_line = _begun(number, line), line
+        elif block is None:
+            raise MeshError(f"line {number}: data without a keyword: expected *NODE, *ELEMENT, ... before")
+        elif open_line.endswith(","):
+            open_line += line
+            block = _begun(block.number, open_line)
+        else:
+            open_line = ""
+            block.rows.append([word.strip() for word in line.rstrip(", \t").split(",")])
+    if block is not None:
+        yield block
+
+
+def _begun(number: int, line: str) -> KeywordBlock:
+    """Return the block of a keyword line: *ELEMENT, TYPE=CPE3 has the parameter TYPE."""
+    word, *rest = (part.strip() for part in line[1:].split(","))
+    try:
+        keyword = resolved(word)
+        parameters = _parameters(keyword, filter(None, rest))
+    except ValueError as error:
+        raise MeshError(f"line {number}, *{word}: {error}") from None
+    return KeywordBlock(number, word, keyword, parameters)
+
+
+def resolved(word: str) -> str:
+    """Return the keyword that a word or its abbreviation is, empty of one without nodes and elements.
+
+    Blanks and capitals do not matter. A beginning is enough if no other keyword has it.
+
+    Raises:
+        ValueError: it is none, or it may be several.
+    """
+    key = re.sub(r"\s", "", word.upper())
+    if key in WHOLE or key.startswith(OTHERS):
+        return WHOLE.get(key, "")
+    # *ELEM is *ELEMENT, although *ELEMENT OUTPUT begins with it too.
+    longer = [name for name in (*WHOLE, *OTHERS) if key and name.startswith(key)]
+    found = {WHOLE.get(name, "") for name in longer if not any(name.startswith(own) for own in {*longer} - {name})}
+    if len(found) != 1:
+        what = "may be several keywords" if found else "unknown keyword"
+        raise ValueError(f"{what}: write it out, or delete it if it makes no nodes or elements")
+    return found.pop()
+
+
+def _parameters(keyword: str, words: Iterable[str]) -> dict[str, str]:
+    """Return the parameters of a keyword, of those that are read with whole names; ValueError if others matter."""
+    known = OF_SECTIONS if keyword.endswith("SECTION") else READ.get(keyword) or ()
+    found = {}
+    for word in words:
+        name, _, value = word.partition("=")
+        found[_parameter(name, known)] = name_of(value)
+    if READ.get(keyword) and (unread := [name for name in found if name not in known]):
+        raise ValueError(f"its parameter {toml_value(unread[0])} is not read: write nodes and elements out without it")
+    return found
+
+
+def _parameter(name: str, known: tuple[str, ...]) -> str:
+    """Return the name of a parameter in upper case, whole if its beginning is that of one alone."""
+    name = name.strip().upper()
+    whole = [own for own in known if own.startswith(name)]
+    return whole[0] if len(whole) == 1 and name not in known else name
+
+
+def name_of(word: str) -> str:
+    """Return the name that a word is, in lower case unless it is quoted."""
+    word = word.strip()
+    return word[1:-1] if word[:1] == '"' else word.lower()
