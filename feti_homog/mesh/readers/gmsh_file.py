@@ -18,16 +18,15 @@ from feti_homog.typing import Float, Int
 
 # What to do about other elements, by order and dimension.
 REMEDY = {
-    (1, 2): "do not recombine",
     (2, 2): "do not recombine",
     (3, 2): "mesh with Mesh.ElementOrder = 1 or 2",
     (1, 3): "mesh the surfaces only",
     (2, 3): "mesh the surfaces only",
     (3, 3): "mesh the surfaces only",
 }
-# gmsh's types of elements of second order; how many nodes a triangle of each type has.
-LINE_2, TRIANGLE_2 = 8, 9
-NODES_OF_TRIANGLES = {TRIANGLE: 3, TRIANGLE_2: 6}
+# gmsh's other types of elements; how many nodes a triangle of each type has, or a quadrilateral, which is cut in two.
+LINE_2, TRIANGLE_2, QUADRILATERAL = 8, 9, 3
+NODES_OF_TRIANGLES = {TRIANGLE: 3, TRIANGLE_2: 6, QUADRILATERAL: 4}
 
 # Numbers (m,), nodes (m, k) and entities (m,) of the elements of one type.
 Elements = tuple[Int, Int, Int]
@@ -98,7 +97,7 @@ def _lost(nodes: Int, elements: Mapping[int, Elements]) -> list[str]:
 
 
 def _other_kinds(nodes: Int, points: Float, elements: Mapping[int, Elements]) -> list[str]:
-    """Elements that are not triangles of three or six nodes, and the lack of these."""
+    """Elements that are neither triangles of three or six nodes nor quadrilaterals of four, and the lack of these."""
     faults = []
     kinds = [kind for kind in sorted(elements) if KINDS[kind][1] >= 2]
     for kind in kinds:
@@ -108,7 +107,8 @@ def _other_kinds(nodes: Int, points: Float, elements: Mapping[int, Elements]) ->
             centre = points[np.isin(nodes, own[0])].mean(axis=0)
             faults.append(
                 f"element {numbers[0]} at {at(centre)}, the first of {len(numbers)}, is a {name}: only "
-                f"triangles of three or six nodes can be used ({REMEDY[min(order, 3), dimension]})"
+                f"triangles of three or six nodes and quadrilaterals of four can be used "
+                f"({REMEDY[min(order, 3), dimension]})"
             )
     if not kinds:
         faults.append("no triangles in it: mesh the surfaces and put them in physical surfaces before saving")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import re
 from collections import defaultdict
 from collections.abc import Callable
@@ -16,47 +17,31 @@ from feti_homog.typing import Float, Int
 
 # gmsh's types of elements that its manual has: name, dimension, order and number of nodes.
 KINDS = {
-    1: ("Line 2", 1, 1, 2),
-    2: ("Triangle 3", 2, 1, 3),
-    3: ("Quadrilateral 4", 2, 1, 4),
-    4: ("Tetrahedron 4", 3, 1, 4),
-    5: ("Hexahedron 8", 3, 1, 8),
-    6: ("Prism 6", 3, 1, 6),
-    7: ("Pyramid 5", 3, 1, 5),
-    8: ("Line 3", 1, 2, 3),
-    9: ("Triangle 6", 2, 2, 6),
-    10: ("Quadrilateral 9", 2, 2, 9),
-    11: ("Tetrahedron 10", 3, 2, 10),
-    12: ("Hexahedron 27", 3, 2, 27),
-    13: ("Prism 18", 3, 2, 18),
-    14: ("Pyramid 14", 3, 2, 14),
-    15: ("Point", 0, 0, 1),
-    16: ("Quadrilateral 8", 2, 2, 8),
-    17: ("Hexahedron 20", 3, 2, 20),
-    18: ("Prism 15", 3, 2, 15),
-    19: ("Pyramid 13", 3, 2, 13),
-    20: ("Triangle 9", 2, 3, 9),
-    21: ("Triangle 10", 2, 3, 10),
-    22: ("Triangle 12", 2, 4, 12),
-    23: ("Triangle 15", 2, 4, 15),
-    24: ("Triangle 15I", 2, 5, 15),
-    25: ("Triangle 21", 2, 5, 21),
-    26: ("Line 4", 1, 3, 4),
-    27: ("Line 5", 1, 4, 5),
-    28: ("Line 6", 1, 5, 6),
-    29: ("Tetrahedron 20", 3, 3, 20),
-    30: ("Tetrahedron 35", 3, 4, 35),
-    31: ("Tetrahedron 56", 3, 5, 56),
-    92: ("Hexahedron 64", 3, 3, 64),
-    93: ("Hexahedron 125", 3, 4, 125),
-}
+    1: ("Line 2", 1, 1, 2), 2: ("Triangle 3", 2, 1, 3), 3: ("Quadrilateral 4", 2, 1, 4),
+    4: ("Tetrahedron 4", 3, 1, 4), 5: ("Hexahedron 8", 3, 1, 8), 6: ("Prism 6", 3, 1, 6),
+    7: ("Pyramid 5", 3, 1, 5), 8: ("Line 3", 1, 2, 3), 9: ("Triangle 6", 2, 2, 6),
+    10: ("Quadrilateral 9", 2, 2, 9), 11: ("Tetrahedron 10", 3, 2, 10), 12: ("Hexahedron 27", 3, 2, 27),
+    13: ("Prism 18", 3, 2, 18), 14: ("Pyramid 14", 3, 2, 14), 15: ("Point", 0, 0, 1),
+    16: ("Quadrilateral 8", 2, 2, 8), 17: ("Hexahedron 20", 3, 2, 20), 18: ("Prism 15", 3, 2, 15),
+    19: ("Pyramid 13", 3, 2, 13), 20: ("Triangle 9", 2, 3, 9), 21: ("Triangle 10", 2, 3, 10),
+    22: ("Triangle 12", 2, 4, 12), 23: ("Triangle 15", 2, 4, 15), 24: ("Triangle 15I", 2, 5, 15),
+    25: ("Triangle 21", 2, 5, 21), 26: ("Line 4", 1, 3, 4), 27: ("Line 5", 1, 4, 5),
+    28: ("Line 6", 1, 5, 6), 29: ("Tetrahedron 20", 3, 3, 20), 30: ("Tetrahedron 35", 3, 4, 35),
+    31: ("Tetrahedron 56", 3, 5, 56), 92: ("Hexahedron 64", 3, 3, 64), 93: ("Hexahedron 125", 3, 4, 125),
+}  # fmt: skip
 # Numbers of nodes by type, 0 where the type is unknown, and of the parameters of a node by the dimension of its entity.
 NODES = np.array([KINDS[kind][3] if kind in KINDS else 0 for kind in range(max(KINDS) + 2)])
 PARAMETERS = np.array([0, 1, 2, 0])
 
-HEADER = re.compile(rb"^\$(\w+)[ \t\r]*$", re.MULTILINE)
+HEADER = re.compile(rb"\$(\w+)[ \t\r]*$", re.MULTILINE)
+BEHIND = re.compile(rb"(\s*\$End\w+)?\s*")
 NAME = re.compile(rb'^[ \t]*(\d{1,15})[ \t]+(-?\d{1,15})[ \t]+"([^"\n]*)"', re.MULTILINE)
-VERSIONS = ("2", "2.0", "2.1", "2.2", "4", "4.0", "4.1")
+VERSIONS = {2.0: "2", 2.1: "2", 2.2: "2", 4.0: "4.0", 4.1: "4.1"}
+# Sections without nodes or elements.
+OTHERS = {
+    *("Comments", "Periodic", "GhostElements", "Parametrizations", "NodeData", "ElementData", "ElementNodeData"),
+    *("InterpolationScheme", "PhysicalNames", "MeshFormat"),
+}
 
 
 @dataclass
@@ -77,20 +62,21 @@ class MshContent:
 
 
 def read(content: bytes) -> MshContent:
-    """Read the sections that matter, whatever stands between them.
+    """Read the sections that make the mesh; others that may be there are passed over.
 
     Raises:
-        MeshError: it is no such file, or it is damaged.
+        MeshError: it is no such file, it is damaged, or something else stands in it.
     """
+    content = content.removeprefix(codecs.BOM_UTF8)
     start = content[:4096].lstrip()
     if start.startswith(b"$NOD"):
         raise MeshError("format 1 of gmsh: save it in format 2.2 or 4.1")
     if not start.startswith((b"$MeshFormat", b"$Comments", b"$PhysicalNames")):
         raise MeshError("not a gmsh mesh file: it does not begin with $MeshFormat")
-    result, seen, place = MshContent(), set[str](), 0
+    result, seen, place = MshContent(), set[str](), _behind(content, 0)
     version, order = "", ""
-    while header := HEADER.search(content, place):
-        name, place = header[1].decode(), header.end() + 1
+    while place < len(content):
+        name, place = _section(content, place)
         if name in READERS:
             if not version or name in seen:
                 raise MeshError(
@@ -98,13 +84,31 @@ def read(content: bytes) -> MshContent:
                 )
             place = _read_section(name, content, place, version, order, result)
             seen.add(name)
-        elif name == "MeshFormat":
-            version, order = _format(content, place)
-        elif name == "PhysicalNames":
-            result.names |= _names(content, place)
-        elif not name.startswith("End"):
+        else:
+            if name == "MeshFormat":
+                version, order = _format(content, place)
+            elif name == "PhysicalNames":
+                result.names |= _names(content, place)
             place = end_of(name, content, place)
+        place = _behind(content, place)
     return result
+
+
+def _section(content: bytes, place: int) -> tuple[str, int]:
+    """Return the name of the section that begins at a place, and the place of its first line."""
+    header = HEADER.match(content, place)
+    name = "" if header is None else header[1].decode(errors="replace")
+    if header is None or (name not in READERS and name not in OTHERS):
+        line, words = content.count(b"\n", 0, place) + 1, content[place : place + 80].partition(b"\n")[0]
+        found = toml_value(words.decode(errors="replace").strip())
+        raise MeshError(f"line {line}: {found}: expected a section of a mesh, such as $Nodes, or $Comments")
+    return name, header.end() + 1
+
+
+def _behind(content: bytes, place: int) -> int:
+    """Return the place behind the end of a section and the blanks around it."""
+    found = BEHIND.match(content, place)
+    return place if found is None else found.end()
 
 
 def _read_section(name: str, content: bytes, start: int, version: str, order: str, result: MshContent) -> int:
@@ -118,7 +122,8 @@ def _read_section(name: str, content: bytes, start: int, version: str, order: st
 def _format(content: bytes, start: int) -> tuple[str, str]:
     """Version of the file and the byte order, none if it is text."""
     version, *words = content[start : start + 80].partition(b"\n")[0].decode(errors="replace").split() or [""]
-    if version not in VERSIONS:
+    number = float(version) if re.fullmatch(r"[0-9]\.?[0-9]{0,9}", version) else 0.0
+    if number not in VERSIONS:
         raise MeshError(f"format {toml_value(version)} of gmsh: expected 2.2, 4.0 or 4.1")
     if words not in (["0", "8"], ["1", "8"]):
         raise MeshError(f"$MeshFormat: {toml_value(' '.join(words))}: expected 0 8 of text and 1 8 of binary files")
@@ -126,7 +131,7 @@ def _format(content: bytes, start: int) -> tuple[str, str]:
     order = {b"\1\0\0\0": "<", b"\0\0\0\1": ">"}.get(content[one : one + 4], "")
     if words[0] == "1" and not order:
         raise MeshError("$MeshFormat: there is no number one that gives the byte order")
-    return version, order if words[0] == "1" else ""
+    return VERSIONS[number], order if words[0] == "1" else ""
 
 
 def _names(content: bytes, start: int) -> dict[tuple[int, int], str]:

@@ -117,7 +117,8 @@ def _hanging(offset: float = 0.0) -> MshFile:
 
 def _quadrilaterals() -> MshFile:
     a, b, c = grid().elements[11][3]
-    return grid().without(11, 12).with_element(50, 3, FIBRE, (a, b, c, grid().elements[12][3][2]))
+    corners = (a, b, c, grid().elements[12][3][2])
+    return grid().without(11, 12).with_element(50, 16, FIBRE, corners + corners)
 
 
 def _third_order() -> MshFile:
@@ -207,11 +208,11 @@ FAULTY_MESHES: dict[str, tuple[Callable[[Path], None], str]] = {
     "a line twice": (_line_twice, "element 12: the number is there twice"),
     "no elements": (_mesh(lambda: grid().without(*range(1, 33))), "no triangles"),
     "only lines": (_mesh(lambda: MshFile(grid().nodes, {1: (1, 1, 1, (1, 2))})), "no triangles"),
-    "quadrilaterals": (
+    "quadrilaterals of second order": (
         _mesh(_quadrilaterals),
-        "element 50 at (0.375, 0.375), the first of 1, is a Quadrilateral 4",
+        "element 50 at (0.375, 0.375), the first of 1, is a Quadrilateral 8",
     ),
-    "third order": (_mesh(_third_order), "only triangles of three or six nodes can be used (mesh with Mesh.Element"),
+    "third order": (_mesh(_third_order), "quadrilaterals of four can be used (mesh with Mesh.Element"),
     "tetrahedra": (
         _mesh(lambda: grid().moved(n13=(0.5, 0.5, 1)).with_element(60, 4, 1, (1, 2, 7, 13))),
         "Tetrahedron",

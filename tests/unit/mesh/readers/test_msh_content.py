@@ -196,6 +196,12 @@ FAULTS = {
         f"{HEAD_4}$Entities\n1000000000000 0 0 0\n$EndEntities\n",
         "$Entities: 1 numbers should",
     ),
+    "a section of another name": (
+        FILE_2.replace("$Elements", "$elements").replace("$EndElements", "$Endelements"),
+        'line 10: "$elements": expected a section of a mesh, such as $Nodes, or $Comments',
+    ),
+    "words between sections": (FILE_2.replace("$Elements", "more\n$Elements"), 'line 10: "more": expected a section'),
+    "elements behind the end": (FILE_2 + "2 2 2 1 1 1 2 3\n", 'line 14: "2 2 2 1 1 1 2 3": expected a section'),
     "no group": (FILE_4, "element 1 at (0.333333333, 0.333333333): not in any physical surface"),
     "no name": (FILE_2, 'no physical surface is named "matrix"; the file has 1. If 1 is the matrix, add'),
 }
@@ -210,11 +216,11 @@ def test_faults_of_the_format_are_named(name, tmp_path):
     assert caught.value.faults[0].startswith("a.msh: ") and message in caught.value.faults[0]
 
 
-def test_what_stands_between_sections_is_passed_over(tmp_path):
-    """Comments, unknown sections, periodic nodes and line ends of another system."""
+def test_sections_without_nodes_and_elements_are_passed_over(tmp_path):
+    """Comments, periodic nodes and data, blank lines and line ends of another system."""
     grid().write(tmp_path / "one.msh")
     text = (tmp_path / "one.msh").read_text()
-    other = "$Comments\nmine\n$Nodes\n$EndComments\n\n" + text.replace("$Nodes", "$Foo\n1 2\n$EndFoo\nwords\n$Nodes")
+    other = "$Comments\nmine\n$Nodes\n$EndComments\n\n" + text.replace("$Nodes", "\n  \n$Nodes", 1)
     periodic = "$Periodic\n1\n0 1 2\n1\n3 4\n$EndPeriodic\n$NodeData\nx\n$EndNodeData\n"
     (tmp_path / "other.msh").write_bytes((other + periodic).replace("\n", "\r\n").encode())
     assert_same(gmsh_file.load(tmp_path / "other.msh"), gmsh_file.load(tmp_path / "one.msh"))
