@@ -17,6 +17,7 @@ from feti_homog.case.section_values import (
     RADII,
     SEED,
     TABLE_FILE,
+    VOIDS,
 )
 from feti_homog.microstructure.phase_names import FIBRE
 from feti_homog.schema.keys import Selector, key
@@ -171,13 +172,12 @@ class Cell:
         only=RANDOM,
         default_words="equal ones",
     )
-    voids: float | None = key(
-        real(least=0.0, most=0.5),
-        "Voids at random among the fibres, min_gap from them and from each other: their area / area of the cell.",
-        default=None,
-        only=RANDOM,
-        default_words="none",
-    )
+    voids: float | bool | None = key(
+        VOIDS,
+        "Of a random cell voids among the fibres, min_gap from them and from each other: their area / area of the "
+        "cell. Of a mesh, true: where it has no elements there are voids; without it such holes are faults.",
+        default=None, default_words="none", only=GEOMETRY.among("random", "mesh"),
+    )  # fmt: skip
     void_radius: float | None = key(
         real(least=0.05, most=20.0),
         "Radius of the voids / mean radius of the fibres. There is the nearest whole number of voids, at least one; "

@@ -12,11 +12,11 @@ from typing import Any
 
 from feti_homog.case.bond_laws import REGISTRY, STIFFNESSES, STRENGTHS
 from feti_homog.case.cell_files import FEWEST_MATCHED
-from feti_homog.case.cell_section import MESH, MESHED, TABLE, Cell
+from feti_homog.case.cell_section import MESH, MESHED, RANDOM, TABLE, Cell
 from feti_homog.case.element_sizes import ASKED, CHOSEN
 from feti_homog.case.interface_section import ARCS, Arc, Scatter
 from feti_homog.case.mixed_load import MixedLoad
-from feti_homog.case.section_values import MESH_FILE, MESH_SUFFIXES, TABLE_SUFFIXES
+from feti_homog.case.section_values import MESH_FILE, MESH_SUFFIXES, TABLE_SUFFIXES, VOIDS_OF_A_RANDOM_CELL
 from feti_homog.case.sections import OUT_OF_PLANE_STRESSES, SECTIONS, SECTIONS_OF_AN_ANALYSIS
 from feti_homog.case.selectors import (
     ANALYSIS_TYPE,
@@ -126,6 +126,10 @@ def _cell() -> Iterator[Rule]:
     line = f"missing; expected {number}, or the width of the cell"
     yield needed(CELL, "fibres", line, beside="radii", unless=("width",))
     yield misplaced(CELL, "void_radius", "voids")
+    yield refused((*CELL, "voids"), {"type": "boolean"}, f"expected {VOIDS_OF_A_RANDOM_CELL.expected}", RANDOM)
+    yield refused(
+        (*CELL, "voids"), {"not": {"type": "boolean"}}, "expected true or false: the mesh has its voids", MESH
+    )
     yield misplaced(CELL, "accuracy_check", "accuracy")
     yield exclusive(CELL, "match", "voids", words="exclude each other; cells that match a table have no voids")
     line = "exclude each other; the table gives the radii"

@@ -10,6 +10,7 @@ from typing import Any
 from feti_homog.microstructure.phase_names import FIBRE_PHASE, PHASE
 from feti_homog.schema.values import (
     ValueType,
+    boolean,
     choice,
     either,
     file_name,
@@ -69,6 +70,8 @@ PHASES = ValueType(
     lambda v: isinstance(v, dict) and v != {} and all(PHASE.fullmatch(k) and _SELECTORS.accepts(v[k]) for k in v),
     lambda v: {phase: tuple(own if isinstance(own, list) else [own]) for phase, own in v.items()},
 )
+VOIDS_OF_A_RANDOM_CELL = real(least=0.0, most=0.5)
+VOIDS = either(f"true of a mesh, or {VOIDS_OF_A_RANDOM_CELL.expected}", VOIDS_OF_A_RANDOM_CELL, boolean)
 RADII = _by_phase("numbers from 1e-9 to 1e9", "{glass = 6.0, carbon = 3.5}", real(least=1e-9, most=1e9))
 FIBRE = integer(least=1)
 FIBRES = either("", choice("all"), FIBRE, list_of(FIBRE, "", least=1)).named(

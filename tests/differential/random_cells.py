@@ -154,4 +154,5 @@ def _mesh(rng: np.random.Generator, most: int, folder: Path) -> DrawnCell:
         away -= np.round(away / mesh.period) * mesh.period
         kept, count = np.hypot(*away.T) > radius, count - 1
     write_part(folder / MESH, mesh, kept)
-    return DrawnCell({"file": MESH}, ["fibre"], False, count)
+    has_void = {} if kept.all() else {"voids": True}
+    return DrawnCell({"file": MESH} | has_void, ["fibre"], False, count)

@@ -54,7 +54,7 @@ def test_voids_of_a_table_are_those_of_a_mesh_with_holes(comm, shared_path, deco
         write_part(shared_path / "cell.msh", mesh, number != number[hole])
     comm.barrier()
     own = solved(comm, table(ROWS[:3], refine=1), decomposition=decomposition)
-    mesh = {"geometry": "mesh", "file": "cell.msh", "refine": 1}
+    mesh = {"geometry": "mesh", "file": "cell.msh", "voids": True, "refine": 1}
     other = solved(comm, mesh, folder=shared_path, decomposition=decomposition)
     assert own.cell.porosity == pytest.approx(other.cell.porosity, rel=1e-9)
     assert relative_error(own.effective_stiffness, other.effective_stiffness) < 1e-9

@@ -21,7 +21,7 @@ RANDOM = {"geometry": "random", "fibres": 4, "fibre_fraction": 0.35, "min_gap": 
 
 def case_of(folder, fibre=True, plane="strain", interface=None, decomposition=None, **cell):
     document = {
-        "cell": {"geometry": "mesh", "file": "cell.msh"} | cell,
+        "cell": {"geometry": "mesh", "file": "cell.msh", "voids": True} | cell,
         "material": {"matrix": MATRIX} | ({"fibre": FIBRE} if fibre else {}),
         "analysis": {"type": "stiffness", "plane": plane},
         "decomposition": decomposition or {},
@@ -121,7 +121,7 @@ def test_files_are_certified_and_what_is_reported_of_voids_is_checked(comm, shar
 def test_debonding_beside_voids_is_certified(comm, shared_path, sections):
     write(comm, shared_path, voids=[0, 1], **RANDOM)
     document = {
-        "cell": {"geometry": "mesh", "file": "cell.msh"},
+        "cell": {"geometry": "mesh", "file": "cell.msh", "voids": True},
         "material": {"matrix": MATRIX, "fibre": FIBRE},
         "output": {"pictures": False},
     }

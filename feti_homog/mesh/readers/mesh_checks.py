@@ -250,11 +250,14 @@ def islands(raw: RawMesh, mesh: CoarseMesh) -> list[str]:
     return [f"{held}: that with {first_of(map(raw.element, first), len(first))}"] if len(first) else []
 
 
-def no_voids(raw: RawMesh, mesh: CoarseMesh) -> list[str]:
-    """Edges beside voids that have no area, and what is not meshed without such edges."""
+def void_faults(raw: RawMesh, mesh: CoarseMesh, has_voids: bool) -> list[str]:
+    """Holes where no voids are expected, voids without an area or that touch, and uncovered parts without edges."""
     pairs, empty = void_edges(mesh), 1.0 - areas(mesh.points, mesh.triangles).sum() / mesh.period.prod()
     if len(pairs) == 0:
         return [f"the elements leave {empty:.3g} of the cell uncovered"] if empty > ROUNDING else []
+    if empty > ROUNDING and not has_voids:
+        where = f"holes, {100 * empty:.3g} % of the cell, the first beside {raw.edge(pairs[0])}"
+        return [f"{where}: expected elements there, or voids = true in [cell] if holes are voids"]
     crowded = pairs[_is_crowded(mesh, pairs)]
     names = first_of(map(raw.edge, crowded), len(crowded))
     touching = [f"voids that touch in a node, as at {names}"] if len(crowded) else []

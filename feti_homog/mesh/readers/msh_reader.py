@@ -41,14 +41,17 @@ SHIFTS = (0.5, 0.25, 0.75, 0.375, 0.625, 0.125, 0.875)
 def read_cell(cell: Cell) -> CoarseMesh:
     """Return the user's mesh of a cell, repaired as the case asks for. Raises as `read`."""
     assert cell.file is not None
-    return read(cell.file, cell.snap_tolerance if cell.repair == "snap" else None, cell.phases or {})
+    snap = cell.snap_tolerance if cell.repair == "snap" else None
+    return read(cell.file, snap, cell.phases or {}, bool(cell.voids))
 
 
-def read(path: Path, snap: float | None = None, phases: Selectors = MappingProxyType({})) -> CoarseMesh:
+def read(
+    path: Path, snap: float | None = None, phases: Selectors = MappingProxyType({}), has_voids: bool = False
+) -> CoarseMesh:
     """Return the coarse mesh in a file of one of the LOADERS, moved to [0, width] x [0, height].
 
     It consists of triangles of three or six nodes, in either sense, in physical surfaces "matrix", "fibre", "glass",
-    ..., fills a rectangle but for voids, and has matching nodes on opposite sides. Lines in the curve
+    ..., fills a rectangle but for voids, if it `has_voids`, and has matching nodes on opposite sides. Lines in curve
     "debonded" are edges between a fibre and the matrix that are debonded. Round interfaces become circles
     (`with_circles`), elliptic ones ellipses (`with_ellipses`); others follow their middle nodes (`with_bent_edges`).
     `phases` are names and numbers in the file of the phases, if these are not their names (`with_phases`).
@@ -64,10 +67,10 @@ def read(path: Path, snap: float | None = None, phases: Selectors = MappingProxy
     if snap is not None:
         raw, moved = snapped(raw, snap)
     unused = tuple(escaped(f"{path.name}: {remark}") for remark in mesh_checks.unused_curves(raw))
-    return replace(made(raw, path.name), snapped=moved, remarks=unused)
+    return replace(made(raw, path.name, has_voids), snapped=moved, remarks=unused)
 
 
-def made(raw: RawMesh, path: str) -> CoarseMesh:
+def made(raw: RawMesh, path: str, has_voids: bool = True) -> CoarseMesh:
     """Return the coarse mesh of triangles in phases; `path` names them in faults. Raises as `read`."""
     _refuse(path, mesh_checks.not_planar(raw), mesh_checks.flat(raw), mesh_checks.duplicate_nodes(raw))
     raw = _turned(raw)
@@ -82,7 +85,7 @@ def made(raw: RawMesh, path: str) -> CoarseMesh:
     _refuse(path, mesh_checks.not_periodic(raw, plane, size), mesh_checks.unrefined_sides(plane, size))
     mesh = _coarse_mesh(raw, _matched(plane, size), size)
     _refuse(path, mesh_checks.unmatched_sides(raw, mesh))
-    _refuse(path, mesh_checks.islands(raw, mesh), mesh_checks.no_voids(raw, mesh))
+    _refuse(path, mesh_checks.islands(raw, mesh), mesh_checks.void_faults(raw, mesh, has_voids))
     _refuse(path, mesh_checks.cannot_debond(raw, mesh.debonded_edges, can_debond(mesh, mesh.debonded_edges)))
     middles = replace(raw.middles, points=raw.middles.points - [*origin, 0.0])
     mesh = with_circles(mesh, middles)

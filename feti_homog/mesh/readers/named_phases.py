@@ -10,14 +10,16 @@ from functools import partial
 import numpy as np
 
 from feti_homog.errors import MeshError
-from feti_homog.mesh.coarse_mesh import areas
+from feti_homog.mesh.coarse_mesh import areas, edges
+from feti_homog.mesh.periodic_topology import components
 from feti_homog.mesh.readers.raw_mesh import DEBONDED, RawMesh, first_of
 from feti_homog.microstructure.phase_names import PHASE, VOID
 from feti_homog.schema.wording import toml_key, toml_value
 
 NUMBER = re.compile("number [0-9]+")
 """Groups that have no other name."""
-HOLE = "expected no elements in a void, which is a hole in the mesh"
+HOLE = "expected no elements in a void, which is a hole in the mesh (with voids = true in [cell])"
+SIDE = 10**6  # of the cell, in steps within which middles of edges are at the same place
 Selectors = Mapping[str, tuple[str | int, ...]]
 
 

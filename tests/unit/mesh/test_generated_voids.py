@@ -102,13 +102,16 @@ def _toml(case):
 
 
 @pytest.mark.parametrize(("cell", "fault"), [
-    (RANDOM | {"voids": 0.6}, "[cell] voids = 0.6: expected a number at least 0 and at most 0.5"),
-    (RANDOM | {"voids": -0.1}, "[cell] voids = -0.1: expected a number at least 0 and at most 0.5"),
+    (RANDOM | {"voids": 0.6}, "[cell] voids = 0.6: expected true of a mesh, or a number at least 0 and at most 0.5"),
+    (RANDOM | {"voids": -0.1}, "[cell] voids = -0.1: expected true of a mesh, or a number at least 0 and at most 0.5"),
     (RANDOM | {"void_radius": 0.5}, "[cell] void_radius: belongs to voids, which is missing"),
     (RANDOM | {"voids": 0.1, "void_radius": 0.01},
      "[cell] void_radius = 0.01: expected a number at least 0.05 and at most 20"),
     ({"geometry": "square", "fibre_fraction": 0.4, "voids": 0.1},
-     '[cell] voids = 0.1: belongs to geometry = "random", not "square"'),
+     '[cell] voids = 0.1: belongs to geometry = "random" or "mesh", not "square"'),
+    (RANDOM | {"voids": True}, "[cell] voids = true: expected a number at least 0 and at most 0.5"),
+    ({"geometry": "mesh", "file": __file__.replace(".py", ".msh"), "voids": 0.1},
+     "[cell] voids = 0.1: expected true or false: the mesh has its voids"),
     (table([ROWS[0] | {"coating": 0.1}, ROWS[1]]), "[cell] fibre_list: row 1: coating = 0.1: a void has none"),
     (table([ROWS[0] | {"radius": -0.1}]), "[cell] fibre_list: row 1: radius = -0.1: expected a number above 0"),
 ])  # fmt: skip
@@ -154,7 +157,9 @@ def test_the_folder_of_a_result_has_the_table_of_its_case(tmp_path):
 def test_voids_of_a_users_mesh_are_not_listed(tmp_path):
     """Its fibres have statistics all the same."""
     write_voids(tmp_path / "cell.msh", voids=[0], **RANDOM | {"fibres": 3, "mesh_size": 0.1})
-    (tmp_path / "case.toml").write_text(_toml(case_of(tmp_path, {"geometry": "mesh", "file": "cell.msh"})))
+    (tmp_path / "case.toml").write_text(
+        _toml(case_of(tmp_path, {"geometry": "mesh", "file": "cell.msh", "voids": True}))
+    )
     with pytest.raises(CaseError, match="has voids, which only a case of a table or of a random cell lists"):
         listed_fibres.table(tmp_path / "case.toml")
     assert fibre_statistics.pattern(tmp_path / "case.toml", None).count == 2

@@ -23,7 +23,7 @@ TWO_FIBRES = np.array([[0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 0]])
 
 def torus_of(folder: Path, image: np.ndarray, jitter: float = 0.0, symmetry: np.ndarray = SYMMETRIES[0]) -> Torus:
     pixel_mesh(image, jitter, symmetry).write(folder / "pixels.msh")
-    return Torus.of(read(folder / "pixels.msh"))
+    return Torus.of(read(folder / "pixels.msh", has_voids=True))
 
 
 def places(torus: Torus, classes: np.ndarray, size: int) -> set[tuple[float, float]]:

@@ -8,6 +8,7 @@ from support.void_cells import write_part, write_voids
 
 from feti_homog.case.cell_section import Cell
 from feti_homog.errors import MeshError
+from feti_homog.mesh.coarse_mesh import voids
 from feti_homog.mesh.fill.gmsh_mesher import generate
 from feti_homog.mesh.readers.msh_reader import read
 
@@ -25,7 +26,7 @@ def without(mesh, gone):
 
 def faults_of(path) -> tuple[str, ...]:
     with pytest.raises(MeshError) as caught:
-        read(path)
+        read(path, has_voids=True)
     return caught.value.args
 
 
@@ -33,6 +34,16 @@ def inner_triangles(mesh):
     """Return the triangles with no node on a side of the cell."""
     inside = np.all((mesh.points > 0) & (mesh.points < mesh.period), axis=1)
     return np.flatnonzero(inside[mesh.triangles].all(axis=1))
+
+
+def test_a_hole_is_a_fault_unless_the_case_has_voids(tmp_path):
+    write_voids(tmp_path / "cell.msh", [0])
+    with pytest.raises(MeshError) as caught:
+        read(tmp_path / "cell.msh")
+    (fault,) = caught.value.args
+    assert fault.startswith("cell.msh: holes, 39 % of the cell, the first beside the edge between node ")
+    assert fault.endswith(": expected elements there, or voids = true in [cell] if holes are voids")
+    assert voids(read(tmp_path / "cell.msh", has_voids=True)) == 1
 
 
 def test_a_part_that_a_void_surrounds_is_held_by_nothing(mesh, tmp_path):
