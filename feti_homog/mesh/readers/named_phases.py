@@ -85,18 +85,50 @@ def unknown_phases(mesh: RawMesh) -> list[str]:
 
 
 def _way_out(mesh: RawMesh) -> str:
-    """Return the line of a case file that names the first groups, and their shares of the area."""
+    """Return the line of a case file that names the matrix and the largest other group, and all shares of the area."""
+    shares: dict[str, float] = {}
     with np.errstate(all="ignore"):  # coordinates are judged later
         sizes = np.bincount(mesh.group, np.abs(areas(mesh.points[:, :2], mesh.triangles)), len(mesh.groups))
-        percent = 100 * sizes / sizes.sum()
-    groups = zip(mesh.groups, percent, strict=True)
-    named = {_as_selected(names[0]): share for names, share in groups if names and names[0] != VOID}
-    if not named:
+        for names, percent in zip(mesh.groups, 100 * sizes / sizes.sum(), strict=True):
+            if names and names[0] != VOID:
+                shares[names[0]] = shares.get(names[0], 0.0) + percent
+        first = _surrounding(mesh)
+    if not shares:
         return ""
-    entries = ", ".join(f"{phase} = {own}" for phase, own in zip(("matrix", "fibre"), named, strict=False))
-    shares = first_of((f"{own}: {share:.3g} %" for own, share in named.items()), len(named), 20)
-    first = next(iter(named))
-    return f". If {first} is the matrix, add to [cell]: phases = {{{entries}}}. Shares of the area: {shares}"
+    order = sorted(shares, key=lambda name: (name != first, -shares[name]))
+    entries = ", ".join(
+        f"{phase} = {_as_selected(name)}" for phase, name in zip(("matrix", "fibre"), order, strict=False)
+    )
+    named = first_of((f"{_as_selected(name)}: {share:.3g} %" for name, share in shares.items()), len(shares), 20)
+    matrix = _as_selected(order[0])
+    return f". If {matrix} is the matrix, add to [cell]: phases = {{{entries}}}. Shares of the area: {named}"
+
+
+def _surrounding(mesh: RawMesh) -> str:
+    """Return the group that surrounds all others: connected across the periodic cell along both axes; else nothing.
+
+    In 3 x 3 copies of the cell on a torus, all copies of its elements are connected.
+    """
+    names = [own[0] if own else "" for own in mesh.groups]
+    number = np.unique(names, return_inverse=True)[1][mesh.group]
+    low, size = mesh.points[:, :2].min(axis=0), np.ptp(mesh.points[:, :2], axis=0)
+    middles = (mesh.points[edges(mesh.triangles), :2].mean(axis=1) - low) / size
+    if not np.isfinite(middles).all():
+        return ""
+    _, key = np.unique(np.rint(middles * SIDE).astype(np.int64) % SIDE, axis=0, return_inverse=True)
+    order = np.argsort(key.ravel(), kind="stable")
+    same = np.flatnonzero(np.diff(key.ravel()[order]) == 0)
+    one, other = order[same], order[same + 1]
+    alike = number[one // 3] == number[other // 3]
+    one, other, count = one[alike], other[alike], len(mesh.triangles)
+    step = np.rint(middles[one] - middles[other]).astype(np.int64)
+    copies = np.indices((3, 3)).reshape(2, -1, 1)
+    i, j = (copies[axis] + step[:, axis] for axis in (0, 1))
+    left = one // 3 + count * (3 * copies[0] + copies[1])
+    right = other // 3 + count * (3 * (i % 3) + j % 3)
+    parts = components(9 * count, left.ravel(), right.ravel()).reshape(9, count)
+    around = np.flatnonzero((parts == parts[0]).all(axis=0))
+    return names[mesh.group[around[0]]] if len(around) else ""
 
 
 def known_names(mesh: RawMesh, of_curves: bool = False) -> str:
