@@ -147,8 +147,8 @@ FAULTS = {
         "line 9, *EL: may be several keywords: write it out, or delete it if it makes no nodes or elements",
     ),
     "an unknown keyword": (
-        _text(SQUARE + "*ELEMNT, TYPE=CPS3, ELSET=fibre\n3, 1, 2, 3\n"),
-        "line 9, *ELEMNT: unknown keyword: write it out, or delete it if it makes no nodes or elements",
+        _text(SQUARE + "*ELEMENTS, TYPE=CPS3, ELSET=fibre\n3, 1, 2, 3\n"),
+        "line 9, *ELEMENTS: unknown keyword: write it out, or delete it if it makes no nodes or elements",
     ),
     "nothing": (_text(SQUARE + "*\n3, 1, 2, 3\n"), "line 9, *: unknown keyword"),
     "an abbreviation of a parameter of several": (
