@@ -11,7 +11,7 @@ import numpy as np
 from feti_homog.errors import MeshError
 from feti_homog.mesh.readers import msh_content
 from feti_homog.mesh.readers.msh_content import KINDS, MshContent
-from feti_homog.mesh.readers.raw_mesh import Block, RawMesh, assembled, at, first_of
+from feti_homog.mesh.readers.raw_mesh import DEBONDED, Block, RawMesh, assembled, at, first_of
 from feti_homog.mesh.tiles.filling import LINE, TRIANGLE
 from feti_homog.system.runtime import input_files
 from feti_homog.typing import Float, Int
@@ -19,6 +19,7 @@ from feti_homog.typing import Float, Int
 # What to do about other elements, by order and dimension.
 REMEDY = {
     (2, 2): "do not recombine",
+    (3, 1): "mesh with Mesh.ElementOrder = 1 or 2",
     (3, 2): "mesh with Mesh.ElementOrder = 1 or 2",
     (1, 3): "mesh the surfaces only",
     (2, 3): "mesh the surfaces only",
@@ -45,12 +46,14 @@ def load(path: Path) -> RawMesh:
         nodes, points = (np.concatenate(parts) for parts in zip(*content.nodes, strict=True))
     elements = {kind: own for kind, blocks in content.elements.items() if len((own := _by_entity(blocks))[0])}
     faults = _repeated(nodes, elements) or _lost(nodes, elements) or _other_kinds(nodes, points, elements)
+    curves = _curves_of_content(content, elements)
+    if DEBONDED in (name for (dimension, _), name in content.names.items() if dimension == 1):
+        faults += [] if len(curves.get(DEBONDED, ())) else [f'no lines in the physical curve "{DEBONDED}"']
     if faults:
         raise MeshError(*faults)
     blocks, physical = _triangles(content, elements)
     groups = [tuple(_name(content, 2, number) for number in own) for own in physical]
     aliases = [tuple(f"number {number}" for number in own) for own in physical]
-    curves = _curves_of_content(content, elements)
     return assembled(nodes, points, blocks, groups, curves, aliases=aliases)
 
 
@@ -99,7 +102,7 @@ def _lost(nodes: Int, elements: Mapping[int, Elements]) -> list[str]:
 def _other_kinds(nodes: Int, points: Float, elements: Mapping[int, Elements]) -> list[str]:
     """Elements that are neither triangles of three or six nodes nor quadrilaterals of four, and the lack of these."""
     faults = []
-    kinds = [kind for kind in sorted(elements) if KINDS[kind][1] >= 2]
+    kinds = [kind for kind in sorted(elements) if KINDS[kind][1] >= 1 and kind not in (LINE, LINE_2)]
     for kind in kinds:
         if kind not in NODES_OF_TRIANGLES:
             name, dimension, order, _ = KINDS[kind]
@@ -107,7 +110,7 @@ def _other_kinds(nodes: Int, points: Float, elements: Mapping[int, Elements]) ->
             centre = points[np.isin(nodes, own[0])].mean(axis=0)
             faults.append(
                 f"element {numbers[0]} at {at(centre)}, the first of {len(numbers)}, is a {name}: only "
-                f"triangles of three or six nodes and quadrilaterals of four can be used "
+                f"triangles of three or six nodes, quadrilaterals of four and lines of two or three can be used "
                 f"({REMEDY[min(order, 3), dimension]})"
             )
     if not kinds:

@@ -49,8 +49,11 @@ def load(path: Path) -> RawMesh:
     points, types, counts = (
         np.concatenate([getattr(piece, name) for piece in pieces]) for name in ("points", "types", "counts")
     )
-    names = [name for name in pieces[0].data if all(name in piece.data for piece in pieces)]
-    data = {name: np.concatenate([piece.data[name] for piece in pieces]) for name in names}
+    filled = [piece for piece in pieces if len(piece.types)] or pieces
+    for name in {name for piece in filled for name in piece.data}:
+        if not all(name in piece.data for piece in filled):
+            raise MeshError(f"cell data {name}: missing in one of {len(filled)} pieces")
+    data = {name: np.concatenate([piece.data[name] for piece in filled]) for name in filled[0].data}
     return mesh_of(Grid(points, types, nodes, counts, data))
 
 

@@ -212,7 +212,15 @@ FAULTY_MESHES: dict[str, tuple[Callable[[Path], None], str]] = {
         _mesh(_quadrilaterals),
         "element 50 at (0.375, 0.375), the first of 1, is a Quadrilateral 8",
     ),
-    "third order": (_mesh(_third_order), "quadrilaterals of four can be used (mesh with Mesh.Element"),
+    "third order": (_mesh(_third_order), "lines of two or three can be used (mesh with Mesh.Element"),
+    "lines of third order": (
+        _mesh(lambda: grid().with_element(60, 26, 0, (9, 14, 9, 14))),
+        "element 60 at (0.75, 0.375), the first of 1, is a Line 4: only triangles of three or six nodes,",
+    ),
+    "a curve without lines": (
+        _mesh(lambda: grid().with_curve(())),
+        'no lines in the physical curve "debonded"',
+    ),
     "tetrahedra": (
         _mesh(lambda: grid().moved(n13=(0.5, 0.5, 1)).with_element(60, 4, 1, (1, 2, 7, 13))),
         "Tetrahedron",

@@ -65,6 +65,14 @@ def test_all_pieces_are_read(tmp_path):
         read(tmp_path / "a.vtu")
 
 
+def test_cell_data_must_be_in_all_pieces(tmp_path):
+    text = write_vtu(tmp_path / "a.vtu", "Ascii").read_text()
+    head, piece, tail = re.split(r"(<Piece.*</Piece>)", text, flags=re.DOTALL)
+    (tmp_path / "a.vtu").write_text(head + piece + piece.replace('Name="phase"', 'Name="other"') + tail)
+    with pytest.raises(MeshError, match=r"cell data (phase|other): missing in one of 2 pieces"):
+        load(tmp_path / "a.vtu")
+
+
 def _numbers(text: str) -> list[str]:
     return re.sub(r"<InformationKey.*</InformationKey>", "", text, flags=re.DOTALL).split()
 
