@@ -1,4 +1,4 @@
-"""Put deliberate errors of one line into copies of the program, and show which of them the tests notice.
+"""Put deliberate errors of one line into copies of the program, and list the tests that notice each of them.
 
 `.venv/bin/python scripts/mutations.py [WORD ...]` tries those of tests/mutations.toml whose printed line has one of the
 words, or all; it ends with 1 if one survives, or if tests fail without any.
@@ -7,6 +7,7 @@ words, or all; it ends with 1 if one survives, or if tests fail without any.
 from __future__ import annotations
 
 import os
+import re
 import shlex
 import shutil
 import subprocess
@@ -19,7 +20,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 TABLE = ROOT / "tests" / "mutations.toml"
-PYTEST = ("pytest", "-x", "-q", "-p", "no:cacheprovider")
+PYTEST = ("pytest", "-q", "--color=no", "--tb=no", "-rfE", "-p", "no:cacheprovider")
+NOTICED = re.compile(r"^(?:FAILED|ERROR) (\S+)", re.MULTILINE)
 # Ranks that wait for each other have noticed the error, too: after this many times as long as the tests take without.
 TIMES, LEAST_S, LIMIT_S = 4.0, 90.0, 1200.0
 PASSED, FAILED, LATE = 0, 1, (124, 137, -9)
@@ -36,36 +38,44 @@ def copied(folder: Path) -> Path:
     return folder
 
 
-def run_tests(folder: Path, tests: str, ranks: int, limit: float) -> int:
-    """Return the exit status of tests in a folder at this number of ranks; `tests` are pytest's or hostile ones."""
+def run_tests(folder: Path, tests: str, ranks: int, limit: float) -> tuple[int, list[str]]:
+    """Return the exit status of tests in a folder at this number of ranks, and the names of those that failed.
+
+    `tests` are pytest's or hostile ones, which have no names.
+    """
     is_hostile = tests.startswith("hostile ")
     words = [sys.executable, "-m", *([] if is_hostile else PYTEST), *shlex.split(tests)]
     command = words if ranks == 1 else ["mpirun", "--oversubscribe", "-n", str(ranks), *words, "-m", "parallel"]
     paths = ":".join(str(folder / name) for name in ("", "tests", "scripts"))
     environment = os.environ | {"PYTHONPATH": paths, "PYTHONDONTWRITEBYTECODE": "1"}
     job = ["timeout", "--kill-after=10", str(limit), *command]
-    return subprocess.run(job, cwd=folder, env=environment, capture_output=True).returncode
+    done = subprocess.run(job, cwd=folder, env=environment, capture_output=True, text=True)
+    return done.returncode, NOTICED.findall(done.stdout)
 
 
 def time_of(folder: Path, tests: str, ranks: int) -> float | None:
     """Return the seconds that tests take without an error; None if they fail."""
     begin = time.monotonic()
-    return time.monotonic() - begin if run_tests(folder, tests, ranks, LIMIT_S) == PASSED else None
+    return time.monotonic() - begin if run_tests(folder, tests, ranks, LIMIT_S)[0] == PASSED else None
 
 
-def outcome(folder: Path, mutation: tuple[str, str, str], tests: str, ranks: int, limit: float) -> str:
-    """Put an error in, run the tests and take it out again; returns what became of it."""
+def outcome(
+    folder: Path, mutation: tuple[str, str, str], tests: str, ranks: int, limit: float
+) -> tuple[str, list[str]]:
+    """Put an error in, run the tests and take it out again; returns what became of it and the tests that failed."""
     name, old, new = mutation
     path = folder / name
     text = path.read_text(encoding="utf-8")
     if text.count(old) != 1:
-        return f"not tried: {text.count(old)} such lines"
+        return f"not tried: {text.count(old)} such lines", []
     path.write_text(text.replace(old, new), encoding="utf-8")
     try:
-        status = run_tests(folder, tests, ranks, limit)
+        status, names = run_tests(folder, tests, ranks, limit)
     finally:
         path.write_text(text, encoding="utf-8")
-    return "SURVIVED" if status == PASSED else "killed" if status in (FAILED, *LATE) else f"not tried: status {status}"
+    if status not in (PASSED, FAILED, *LATE):
+        return f"not tried: status {status}", names
+    return ("SURVIVED" if status == PASSED else "killed"), names
 
 
 def main(words: list[str]) -> int:
@@ -82,9 +92,10 @@ def main(words: list[str]) -> int:
                     continue
                 alone = takes(tests, ranks)
                 limit = max(LEAST_S, TIMES * (alone or 0.0))
-                found = outcome(folder, mutation, tests, ranks, limit) if alone else "not tried: tests fail"
+                failed = ("not tried: tests fail", [])
+                found, names = outcome(folder, mutation, tests, ranks, limit) if alone else failed
                 tried, alive = tried + 1, alive + (found != "killed")
-                print(f"{found:10} {line}", flush=True)
+                print(f"{found:10} {line}", *(f"{'':10} {name}" for name in names), sep="\n", flush=True)
     print(f"{tried - alive} of {tried} killed")
     return int(alive > 0)
 

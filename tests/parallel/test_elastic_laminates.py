@@ -14,6 +14,7 @@ from support.cases import FIBRE, MATRIX
 from support.loads import strains
 from unit.mesh.faulty_meshes import grid
 
+from feti_homog import Case, run
 from feti_homog.homogenization.averaging import Homogenization
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BONDED
@@ -97,3 +98,25 @@ def test_all_bonds_break_at_once_and_nothing_is_left(comm, strip, growth):
         assert last.load_factor == 1.0 and abs(interface.stress(last.state.solution)[0]) < 1e-9 * peak
         # All that was stored is lost.
         assert last.energies.released == pytest.approx(0.5 * 0.5 * strain[0, 0] * peak, rel=1e-8)
+
+
+@pytest.mark.parametrize("axial", [None, 40.0, np.inf], ids=["default", "given", "rigid"])
+def test_springs_along_the_fibres_are_those_around_them_by_default(comm, strip, shared_path, axial):
+    """1 / C55 = <1 / mu> + 2 / (k_a W) and 1 / C66 with k_t, of axial shear across the layers and in the plane."""
+    springs = {"normal_stiffness": NORMAL, "tangential_stiffness": TANGENTIAL}
+    found = run(
+        Case.parse(
+            {
+                "cell": {"geometry": "mesh", "file": "strip.msh", "order": 1},
+                "material": {"matrix": MATRIX, "fibre": FIBRE},
+                "analysis": {"type": "stiffness", "plane": "generalized"},
+                "interface": springs | ({} if axial is None else {"axial_stiffness": axial}),
+                "output": {"mesh_error": False},
+            },
+            shared_path,
+        ),
+        comm,
+    ).effective_stiffness
+    matrix, fibre = lame(MATRIX)[1], lame(FIBRE)[1]
+    shears = [series(matrix, fibre, k) for k in (TANGENTIAL if axial is None else axial, TANGENTIAL)]
+    assert [found[4, 4], found[5, 5]] == pytest.approx(shears, rel=1e-7)

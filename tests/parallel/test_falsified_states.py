@@ -13,7 +13,10 @@ from feti_homog.analysis import stiffness
 from feti_homog.analysis.context import AnalysisContext, CellLoads
 from feti_homog.case.interface_section import Arc
 from feti_homog.homogenization.averaging import Homogenization
+from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN
+from feti_homog.interface.friction.face_system import Prescribed
+from feti_homog.interface.friction.sliding_cell import SlidingCell
 from feti_homog.interface.loads.load import Load
 from feti_homog.system.runtime.progress import Progress
 
@@ -111,16 +114,26 @@ def mixed(pairs):
     return replace(pairs[0][1], **sums)
 
 
-@pytest.fixture(scope="module")
-def falsified():
+def cells_with(**petsc):
+    """Provide the cell with these options of the solver."""
     from mpi4py import MPI
 
     cell = torn_cells.tear(
         MPI.COMM_WORLD, [ARC], geometry="square", mesh_size=0.2, width=WIDTH, decomposition=PIECES,
-        petsc={"feti_ksp_rtol": 1e-12},
+        petsc={"feti_ksp_rtol": 1e-12} | petsc,
     )  # fmt: skip
     yield Falsified(cell)
     cell.solver.destroy()
+
+
+@pytest.fixture(scope="module")
+def falsified():
+    yield from cells_with()
+
+
+@pytest.fixture(scope="module")
+def rubbing():
+    yield from cells_with(feti_pc_type="influence")
 
 
 def test_a_glued_node_that_parts(falsified):
@@ -207,6 +220,23 @@ def test_open_faces_that_bear_a_force(falsified):
     expected = abs(t) * left / (largest * falsified.imposed(PULLED))
     assert left > 0 and expected > 1e-4
     falsified.assert_only(falsified.checks(borne, status), kkt_complementarity=expected)
+
+
+def test_faces_that_stick_beyond_their_friction(rubbing):
+    """All stick, those of the last rank in their place: by how much shear exceeds mu p, of the largest traction."""
+    which, mu = rubbing.arc & (rubbing.comm.rank == rubbing.comm.size - 1), 0.05
+    friction = np.where(which, mu, 1e3)
+    faces = SlidingCell(CoupledInterfaces(rubbing.interface), friction, 0.0 * friction)
+    bonds = replace(torn_cells.bonds(rubbing.status(CLOSED)), sliding=np.zeros(len(friction), np.int8))
+    load = Load.strain(PRESSED)
+    status, start = faces.begin(bonds, PRESSED)
+    given = Prescribed(load.by_stress, faces.given(load), np.zeros(len(status)))
+    state = faces.equilibrium(load, bonds, faces.faces.linear(0 * status, given, start))
+    traction = rubbing.interface.traction(state.solution)
+    beyond = rubbing.everywhere(np.abs(traction[which, 1]) - mu * np.maximum(-traction[which, 0], 0.0)).max()
+    largest = max(np.abs(rubbing.everywhere(traction)).max(), rubbing.bond_stress(PRESSED))
+    assert beyond > 1e-2 * largest
+    parallel_assert(rubbing.comm, state.certificate["kkt_friction"] == pytest.approx(beyond / largest, rel=1e-6))
 
 
 def test_a_stress_that_is_not_the_prescribed_one(falsified):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 from support import coated_cells
 from unit.mesh.faulty_meshes import MATRIX, grid, node
 
@@ -86,16 +87,40 @@ def test_both_interfaces_break_as_their_files_certify(comm, meshes, laws):
     assert certificate.holds, certificate
 
 
-@pytest.mark.parallel
-@pytest.mark.few_ranks
-def test_equal_laws_of_two_pairs_are_one_law(comm, shared_path):
-    """Two kinds of fibre, of one material."""
+def two_fibres():
+    """Return a mesh of two fibres of unlike names, one above the other."""
     mesh = grid(lambda x, y: 0.25 < x < 0.5 and y < 0.75)
     second = {tag: e for tag, e in mesh.elements.items() if e[1] != MATRIX and min(e[3]) >= node(0, 2)}
     for tag, (kind, _, _, nodes) in second.items():
         mesh = mesh.with_element(tag, kind, 3, nodes)
     mesh.names[3] = "fibre:2"
-    on_root(comm, mesh.write, shared_path / "two.msh")
+    return mesh
+
+
+@pytest.mark.parallel
+def test_unlike_cohesive_pairs_soften_alike_on_ranks_that_own_one_pair_or_none(comm, shared_path):
+    """Bodies are not cut: each pair is on a rank of its own, and another rank has no interface nodes."""
+    if comm.size < 3:
+        pytest.skip("two ranks have all nodes on one of them")
+    on_root(comm, two_fibres().write, shared_path / "two.msh")
+    law = STRONG | {"law": "bilinear", "normal_stiffness": 20.0, "tangential_stiffness": 20.0}
+    law |= {"softening_tolerance": 0.2}
+    unlike = [
+        law | {"between": ["matrix", name], "normal_toughness": G, "tangential_toughness": 2 * G}
+        for name, G in (("fibre", 1e-3), ("fibre:2", 3e-4))
+    ]
+    case = case_of(shared_path, "two", (EPOXY, GLASS, GLASS), unlike, path={"to": {"E11": 0.06, "gamma12": 0.03}})
+    found, alone = run(case, comm).path, on_root(comm, lambda: run(case, MPI.COMM_SELF).path)
+    assert [point.softened for point in found] == [point.softened for point in alone] and len(alone) > 5
+    stress = np.array([point.stress for point in alone])
+    np.testing.assert_allclose([point.stress for point in found], stress, atol=1e-8 * np.abs(stress).max())
+
+
+@pytest.mark.parallel
+@pytest.mark.few_ranks
+def test_equal_laws_of_two_pairs_are_one_law(comm, shared_path):
+    """Two kinds of fibre, of one material."""
+    on_root(comm, two_fibres().write, shared_path / "two.msh")
     paths = []
     for interface in (STRONG, [STRONG | {"between": ["matrix", name]} for name in ("fibre", "fibre:2")]):
         paths.append(run(case_of(shared_path, "two", (EPOXY, GLASS, GLASS), interface, path=PATH), comm).path)

@@ -19,6 +19,12 @@ from feti_homog.studies.sweep.description import describe
 GLASS, EPOXY = {"young": 70800.0, "poisson": 0.22}, {"young": 2790.0, "poisson": 0.33}
 CELL = {"geometry": "square", "fibre_fraction": 0.4, "fibre_radius": 7.5, "mesh_size": 0.05}
 
+DOCUMENT = {
+    "material": {"matrix": EPOXY, "fibre": GLASS, "coating": {"young": 1e4, "poisson": 0.3}},
+    "analysis": {"type": "path", "plane": "strain"},
+    "path": {"strain": [0.02, 0.0, 0.0]},
+}
+
 
 def case_of(normal_stiffness=2025.0, criterion="energy", plane="strain", folder=".", **cell):
     cell = {name: value for name, value in cell.items() if value is not None}
@@ -76,6 +82,37 @@ def test_what_the_warning_asks_for_is_enough(remedy):
 
 def test_other_bonds_have_no_such_length():
     assert process_zone.process_zone(case_of(criterion="max")) is None and warnings(case_of(criterion="max")) == []
+
+
+COHESIVE = {
+    "law": "bilinear", "normal_stiffness": 1e5, "tangential_stiffness": 4e4, "normal_strength": 40.0,
+    "tangential_strength": 60.0, "normal_toughness": 0.05, "tangential_toughness": 0.09,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("shear", [0.09, 0.3], ids=["shear is shorter", "opening is shorter"])
+def test_the_zone_is_that_of_the_shorter_mode_of_the_weakest_pair(shear):
+    """Lengths G / R^2 of pure modes: of one pair 0.05 / 40^2 and 0.09 or 0.3 / 60^2, of the other ten times."""
+    modulus = 2790.0 / (1 - 0.33**2)
+    weak = COHESIVE | {"tangential_toughness": shear}
+    tough = weak | {"normal_toughness": 0.5, "tangential_toughness": 10 * shear}
+    for pairs in ((weak,), (weak, tough), (tough, weak)):
+        between = (["coating", "matrix"], ["fibre", "coating"])
+        interfaces = [own | {"between": pair} for own, pair in zip(pairs, between, strict=False)]
+        document = DOCUMENT | {"interface": interfaces, "cell": CELL | {"coating": 0.1}}
+        found = process_zone.process_zone(cases.parse(document, Path()))
+        assert found == pytest.approx(modulus * min(0.05 / 40.0**2, shear / 60.0**2))
+
+
+def test_the_warning_has_the_traction_of_the_pair_with_the_shortest_zone():
+    """sqrt(2 k_n G_Ic) of k_n = 2025 and 900, though the softer springs have the larger toughness."""
+    interfaces = [
+        {"criterion": "energy", "normal_stiffness": k, "tangential_stiffness": k, "toughness": G, "between": pair}
+        for k, G, pair in ((900.0, 8.0, ["coating", "matrix"]), (2025.0, 2.0, ["fibre", "coating"]))
+    ]
+    case = cases.parse(DOCUMENT | {"interface": interfaces, "cell": CELL | {"coating": 0.1}}, Path())
+    line = process_zone.warnings(case, 20.0, 50.0)[0]
+    assert "for sigma_c = sqrt(2 k_n G_Ic) = 90, " in line and f"= {2790.0 / (1 - 0.33**2) / 4050:.3g} long" in line
 
 
 def test_a_mesh_of_ones_own_is_refined(tmp_path):

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from feti_homog.case.interface_section import InterfaceSection
 from feti_homog.errors import CaseError
+from feti_homog.homogenization.bonds import bond_law
 from feti_homog.interface.contact.states import BondState
 from feti_homog.interface.laws.energy import SpringEnergy
 from feti_homog.interface.laws.softening import Bilinear, Exponential, Table
@@ -131,6 +133,23 @@ def test_the_onset_of_damage_is_the_quadratic_criterion():
     law = made("bilinear", 100_000, MOOSE | {"tangential_strength": 1.7, "tangential_stiffness": 60.0})
     traction = np.random.default_rng(3).normal(size=(40, 2))
     np.testing.assert_allclose(law.share(traction), law.onset().share(traction), rtol=1e-4)
+
+
+def test_levels_of_damage_are_those_of_all_pairs_whatever_the_nodes():
+    """As on ranks that own nodes of one pair, or none: the teeth of the pair with the longest branch."""
+    given = {key: value for key, value in MOOSE.items() if "toughness" not in key}
+    sections = [
+        InterfaceSection(criterion="bilinear", normal_toughness=G, tangential_toughness=2 * G, **given)
+        for G in (0.01, 1.0)
+    ]
+    short, long = (bond_law([section], np.zeros(1, np.int64)) for section in sections)
+    assert len(short.levels) < len(long.levels) and long.levels == made("bilinear", None).levels
+    for pair in ([0, 0], [1], [0, 1], []):
+        law = bond_law(sections, np.array(pair, np.int64))
+        assert law.levels == long.levels
+        np.testing.assert_array_equal(law.normal_toughness, np.array([0.01, 1.0])[np.array(pair, int)])
+    shear = np.array([[0.0, 1.0]])
+    assert long.overshoot == pytest.approx(1.0 / long.share(shear)[0] - 1.0) and 0.0 < long.overshoot <= 0.02
 
 
 @pytest.mark.slow

@@ -111,29 +111,56 @@ def test_comments_say_what_the_axes_and_units_are(form, mark):
         assert words in comments
 
 
+AXES_IN_THE_CELL = {1: 3, 2: 1, 3: 2}  # the fibre is axis 1 of a card, and x3 of the cell
+ABOUT_THE_FIBRE = {
+    "E1": "E_axial", "E2": "E_transverse", "E3": "E_transverse", "nu12": "nu_axial", "nu13": "nu_axial",
+    "nu23": "nu_transverse", "G12": "G_axial", "G13": "G_axial", "G23": "G_transverse", "alpha1": "expansion_axial",
+    "alpha2": "expansion_transverse", "alpha3": "expansion_transverse",
+}  # fmt: skip
+
+
+def in_the_cell(name):
+    """Return the constant of the cell that a card calls so: by its axes, of shears in rising order."""
+    letters, axes = name.rstrip("123"), [AXES_IN_THE_CELL[int(digit)] for digit in name if digit.isdigit()]
+    return letters + "".join(map(str, sorted(axes) if letters == "G" else axes))
+
+
+def listed(text, words):
+    """Return the numbers by name of the comment of a card with these words."""
+    comment = " ".join(text.replace("**", " ").replace("!", " ").replace("#", " ").split())
+    part = comment.partition(f"{words}: ")[2].partition(". ")[0].removesuffix(".")
+    return {name: float(number) for name, number in (each.split() for each in part.split(", "))}
+
+
 @pytest.mark.parametrize("form", ["abaqus", "ansys", "moose"])
 def test_comments_have_the_errors_of_the_mesh_in_the_axes_of_the_card(form):
-    errors = {"constants": {"E3": 0.25, "E1": 0.5, "nu31": 0.01, "nu13": 0.9, "G13": 0.03}}
-    errors |= {"thermal_expansion": [2e-8, 0.0, 1e-8, 0.0, 0.0, 0.0]}
-    words = " ".join(FORMATS[form](in_axes_of_the_cell(document(DISTINCT, mesh_error=errors))).split())
-    for entry in ("by the mesh: E1 2.5e-01", "E2 5.0e-01", "nu12 1.0e-02", "G12 3.0e-02", "alpha1 1.0e-08"):
-        assert entry in words
-    assert "9.0e-01" not in words
-    errors = {"constants": {"E_axial": 0.25, "G_transverse": 0.5}}
-    words = " ".join(FORMATS[form](nearest_transversely_isotropic(document(DISTINCT, mesh_error=errors))).split())
-    assert "by the mesh: E1 2.5e-01, G23 5.0e-01." in words
+    """Every constant of a card has the error of its own, all unlike, and no other constant's."""
+    cell = {f"{k}{i}{j}": 0.0 for k in ("nu", "G") for i in (1, 2, 3) for j in (1, 2, 3)}
+    names = [*CONSTANTS.split(), "alpha1", "alpha2", "alpha3"]
+    errors = {name: round(0.011 * (k + 1), 3) for k, name in enumerate(names)}
+    found = {"constants": cell | {in_the_cell(name): errors[name] for name in CONSTANTS.split()}}
+    found["thermal_expansion"] = [errors["alpha2"], errors["alpha3"], errors["alpha1"], 0.5, 0.5, 0.5]
+    printed = listed(FORMATS[form](in_axes_of_the_cell(document(DISTINCT, mesh_error=found))), "by the mesh")
+    assert printed == pytest.approx(errors, rel=0.05)
+    known = {own: 0.011 * (k + 1) for k, own in enumerate(dict.fromkeys(ABOUT_THE_FIBRE.values()))}
+    text = FORMATS[form](nearest_transversely_isotropic(document(DISTINCT, mesh_error={"constants": known})))
+    expected = {name: known[own] for name, own in ABOUT_THE_FIBRE.items()}
+    assert listed(text, "by the mesh") == pytest.approx(expected, rel=0.05)
 
 
 @pytest.mark.parametrize("form", ["abaqus", "ansys", "moose"])
 def test_comments_have_the_scatter_by_uncertain_phases_in_the_axes_of_the_card(form):
-    names = ["E1", "E3", "nu12", "nu13", "G23", "expansion.3", "E_axial", "G_transverse"]
-    found = {"constants": names, "std": [0.5, 0.25, 0.01, 0.9, 0.03, 1e-8, 0.7, 0.8]}
-    words = " ".join(FORMATS[form](in_axes_of_the_cell(document(DISTINCT, uncertainty=found))).split())
-    marks = "**" if form == "abaqus" else "!" if form == "ansys" else "#"
-    words = words.replace(f" {marks} ", " ")
-    assert "of the phases: E1 2.5e-01, E2 5.0e-01, G13 3.0e-02, nu23 1.0e-02, alpha1 1.0e-08." in words
-    words = " ".join(FORMATS[form](nearest_transversely_isotropic(document(DISTINCT, uncertainty=found))).split())
-    assert "of the phases: E1 7.0e-01, G23 8.0e-01." in words.replace(f" {marks} ", " ")
+    """Sensitivities are of nu12, nu13, nu23 of the cell, of which a card has the first."""
+    names = ("E1", "E2", "E3", "nu12", "nu13", "nu23", "G12", "G13", "G23", "expansion.1", "expansion.2", "expansion.3")
+    std = {name: 0.011 * (k + 1) for k, name in enumerate((*names, *dict.fromkeys(ABOUT_THE_FIBRE.values())))}
+    found = {"constants": [*std], "std": [*std.values()]}
+    words = "constants of the phases"
+    printed = listed(FORMATS[form](in_axes_of_the_cell(document(DISTINCT, uncertainty=found))), words)
+    expected = {name: std[own] for name in CONSTANTS.split() if (own := in_the_cell(name)) in std}
+    expected |= {f"alpha{axis}": std[f"expansion.{own}"] for axis, own in AXES_IN_THE_CELL.items()}
+    assert printed == pytest.approx(expected, rel=0.05) and len(printed) == 10
+    printed = listed(FORMATS[form](nearest_transversely_isotropic(document(DISTINCT, uncertainty=found))), words)
+    assert printed == pytest.approx({name: std[own] for name, own in ABOUT_THE_FIBRE.items()}, rel=0.05)
 
 
 @pytest.mark.parametrize(

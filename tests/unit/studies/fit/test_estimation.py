@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import factorial
+
 import numpy as np
 import pytest
 
@@ -42,6 +44,27 @@ def test_intervals_cover_the_truth_as_often_as_they_claim():
         chances.append(found.chance)
     assert hits / len(noise) == pytest.approx([0.95, 0.95], abs=0.015)
     assert np.mean(np.array(chances) < 0.1) == pytest.approx(0.1, abs=0.02)
+
+
+def test_a_line_through_noisy_points_of_unlike_deviations_is_that_of_the_normal_equations():
+    """Estimates, standard deviations, correlation, shares and the chance of the residuals, by weights 1 / s^2."""
+    rng = np.random.default_rng(3)
+    std = np.geomspace(0.05, 2.0, len(TIMES))[rng.permutation(len(TIMES))]
+    A = np.stack([np.ones(len(TIMES)), TIMES], axis=1)
+    y = A @ TRUTH + std * rng.standard_normal(len(TIMES))
+    found = fitted(y, std, model=lambda x: A @ x, jacobian=lambda x: A)
+    covariance = np.linalg.inv(A.T @ (A / std[:, None] ** 2))
+    x = covariance @ A.T @ (y / std**2)
+    np.testing.assert_allclose(found.x, x, rtol=1e-7)
+    np.testing.assert_allclose(found.covariance, covariance, rtol=1e-7)
+    deviations = np.sqrt(covariance.diagonal())
+    np.testing.assert_allclose(found.half_width, 1.959964 * deviations, rtol=1e-6)
+    np.testing.assert_allclose(found.correlation[0, 1], covariance[0, 1] / deviations.prod(), rtol=1e-7)
+    np.testing.assert_allclose(found.shares.T, (covariance @ A.T / std).T ** 2 / deviations**2, rtol=1e-6)
+    squares = ((A @ x - y) ** 2 / std**2).sum()
+    freedom = len(y) - 2  # even, so that the tail of chi^2 is a sum of Poisson's
+    terms = [(squares / 2) ** k / factorial(k) for k in range(freedom // 2)]
+    assert found.chance == pytest.approx(np.exp(-squares / 2) * sum(terms))
 
 
 def test_directions_without_data_are_named_and_not_followed():

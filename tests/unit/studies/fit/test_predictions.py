@@ -1,4 +1,4 @@
-"""Values of results in place of measured ones: none where nothing happened, and no closed form beyond its law."""
+"""Values of results in place of measured ones: none where nothing happened, and derivatives only where a law is exact."""
 
 from __future__ import annotations
 
@@ -30,3 +30,25 @@ def test_a_path_without_a_break_has_no_onset():
     assert not [name for name in responses(document) if name.startswith("onset_")]
     for name in ("peak_S11", "peak_E11"):
         assert exact_derivatives(document, [data[name]], "interface.normal_strength") is None
+
+
+def broken(**bond):
+    """Return the result of a path on which bonds break."""
+    return run(Case.parse(copy.deepcopy(CASE) | {"interface": bond, "path": {"strain": [0.8, 0.0, 0.2]}})).document
+
+
+def test_the_only_strength_scales_the_load_of_onset_and_one_of_two_does_not():
+    """Twice the only strength is twice the onset; one of two alone has no closed form, and both together have."""
+    data = [Datum(0, name, 1.0, 0.1) for name in ("onset_S11", "onset_E11")]
+    one, twice = (predicted(broken(normal_strength=R), data) for R in (1.0, 2.0))
+    assert twice == pytest.approx(2 * one)
+    alone = broken(normal_strength=2.0)
+    slopes = exact_derivatives(alone, data, "interface.normal_strength")
+    assert slopes == pytest.approx(one) and 2.0 * slopes == pytest.approx(twice)
+    assert exact_derivatives(alone, data, "interface.tangential_strength") is None
+    both = broken(normal_strength=1.0, tangential_strength=0.1)
+    assert (predicted(both, data) < 0.9 * one).all()
+    for name in ("normal_strength", "tangential_strength"):
+        assert exact_derivatives(both, data, f"interface.{name}") is None
+    numbers = {"normal_strength": 1.0, "tangential_strength": float("inf")}
+    assert exact_derivatives(broken(**numbers), data, "interface.normal_strength") == pytest.approx(one)

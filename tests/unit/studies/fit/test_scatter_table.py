@@ -1,6 +1,8 @@
-"""The table of a study of scatter: results have their units."""
+"""The table of a study of scatter: every number in its column, and results with their units."""
 
 from __future__ import annotations
+
+import re
 
 from feti_homog.studies.uncertainty.scatter_table import text
 
@@ -22,3 +24,32 @@ def test_stresses_have_their_unit_and_strains_none():
     assert rows == ["onset_S11 (MPa)", "peak_E11", "E_axial (MPa)"]
     del document["stress_unit"]  # as files of earlier versions
     assert "onset_S11  " in text(document)
+
+
+def test_every_number_stands_under_its_head():
+    """Deviations by inputs 3 and between cells 4, together 5, of two results with their errors of the mesh."""
+    names = ("material.matrix.young", "interface.normal_stiffness")
+    rows = [
+        {"name": "C11", "value": 30.0, "std_inputs": 3.0, "std_cells": 4.0, "std": 5.0, "mesh_error": 0.25},
+        {"name": "nu12", "value": 0.5, "std_inputs": 0.03, "std_cells": 0.04, "std": 0.05, "mesh_error": None},
+    ]
+    shares = [[0.75, 0.25], [0.36, 0.64]]
+    document = {
+        "stress_unit": "GPa", "cells": 3,
+        "parameters": [{"name": names[0], "by": "derivatives"}, {"name": names[1], "by": "differences"}],
+        "results": [
+            row | {"shares": own, "derivatives": [1.0, -2.0], "derivative_errors": errors}
+            for row, own, errors in zip(rows, shares, ([0.4, 1.1], [0.6, 0.9]), strict=True)
+        ],
+    }  # fmt: skip
+    lines = text(document).splitlines()
+    head = re.split(r"\s{2,}", lines[2].strip())
+    assert head == ["value", "+- inputs", "+- cells", "+- both", "+- mesh", "matrix.young", names[1]]
+    cells = [re.split(r"\s{2,}", line.strip())[1:] for line in lines[3:5]]
+    assert [[float(cell) for cell in row if cell != "-"] for row in cells] == [
+        [30.0, 3.0, 4.0, 5.0, 0.25, 75.0, 25.0],
+        [0.5, 0.03, 0.04, 0.05, 36.0, 64.0],
+    ]
+    assert cells[1][4] == "-" and lines[5] == f"By differences of runs: {names[1]}"
+    words = "Standard error over the cells above half of the slope by"
+    assert lines[6:] == [f"{words} {names[0]}: nu12", f"{words} {names[1]}: C11"]

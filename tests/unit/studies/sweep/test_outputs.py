@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import pytest
 from unit.studies.sweep.test_collect import path_document
 
+from feti_homog.case import reference
+from feti_homog.case.sections import TOP_LEVEL
 from feti_homog.report.text.table import unit
 from feti_homog.studies.sweep.report.outputs import outputs
+from feti_homog.studies.sweep.report.tables import OUTPUT_COLUMNS
+from feti_homog.system.runtime.records import STRESS
 
 
 def document(factors: list[float | None], plane: tuple[str, str]) -> dict[str, Any]:
@@ -43,6 +48,30 @@ def test_the_first_axis_the_least_and_the_largest():
     found = of_envelope([5.0, 2.0, 9.0, 3.0])
     assert found == {"envelope_S22": 5.0, "envelope_least_S22_S12": 2.0, "envelope_largest_S22_S12": 9.0}
     assert {unit(name, "MPa") for name in found} == {"MPa"}
+
+
+def test_every_column_has_the_unit_of_its_reference():
+    """Of stresses, plain numbers, seconds and bytes; of a temperature nobody says the unit."""
+    examples = {
+        "Cij": "C12", "Cii": "C33", "Sij": "S13", "STRAIN": "gamma12", "ANGLE": "60", "STATUS": "open", "LAW": "hill",
+        "STAGE": "solve", "PHASE": "fibre",
+    }  # fmt: skip
+    given = {STRESS: "GPa", "": "", "s": "s", "bytes": "bytes"}
+    pattern, wrong = re.compile("|".join(examples)), {}
+    columns = [column for column in OUTPUT_COLUMNS if column.unit in given]
+    for column in columns:
+        name = pattern.sub(lambda found: examples[found[0]], column.name)
+        if unit(name, "GPa") != given[column.unit]:
+            wrong[column.name] = unit(name, "GPa")
+    assert not wrong and len(columns) > 60
+
+
+def test_every_key_of_a_case_that_is_a_stress_has_its_unit():
+    """Keys of other dimensions have none, but angles."""
+    given = {"stress": "GPa", "degrees": "degrees"}
+    keys = {f"{row.section}.name.{row.key}": row.unit for row in reference.rows() if row.section in TOP_LEVEL}
+    found = {name: unit(name, "GPa") for name in keys}
+    assert found == {name: given.get(own, "") for name, own in keys.items()} and "GPa" in found.values()
 
 
 def test_strains_have_no_unit():

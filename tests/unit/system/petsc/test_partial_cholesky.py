@@ -35,8 +35,11 @@ def test_numbers_of_other_types_are_converted(kind):
         np.testing.assert_allclose(found, np.linalg.solve(A, B), rtol=1e-12)
 
 
-def test_a_matrix_that_is_not_definite_is_refused_without_a_word(capfd):
-    A = csr_matrix(np.array([[1.0, 2.0, 0.0], [2.0, 1.0, 0.0], [0.0, 0.0, 1.0]]))
+@pytest.mark.parametrize("wrong", [0, 4, 8, 11])
+def test_a_matrix_that_is_not_definite_is_refused_without_a_word(capfd, wrong):
+    """One negative pivot anywhere: among the rows that are eliminated first, and the last of all."""
+    A = 4.0 * np.eye(12) + np.eye(12, k=1) + np.eye(12, k=-1)
+    A[wrong, wrong] = -1.0
     with pytest.raises(np.linalg.LinAlgError, match="not positive definite"):
-        PartialFactor(A, np.array([2]), np.arange(3))
+        PartialFactor(csr_matrix(A), np.array([8, 11]), np.arange(12))
     assert capfd.readouterr() == ("", "")
