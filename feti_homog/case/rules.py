@@ -126,10 +126,10 @@ def _cell() -> Iterator[Rule]:
     line = f"missing; expected {number}, or the width of the cell"
     yield needed(CELL, "fibres", line, beside="radii", unless=("width",))
     yield misplaced(CELL, "void_radius", "voids")
-    yield refused((*CELL, "voids"), {"type": "boolean"}, f"expected {VOIDS_OF_A_RANDOM_CELL.expected}", RANDOM)
-    yield refused(
-        (*CELL, "voids"), {"not": {"type": "boolean"}}, "expected true or false: the mesh has its voids", MESH
-    )
+    line = f"expected {VOIDS_OF_A_RANDOM_CELL.expected}"
+    yield refused((*CELL, "voids"), lambda value: isinstance(value, bool), line, RANDOM)
+    line = "expected true or false: the mesh has its voids"
+    yield refused((*CELL, "voids"), lambda value: not isinstance(value, bool), line, MESH)
     yield misplaced(CELL, "accuracy_check", "accuracy")
     yield exclusive(CELL, "match", "voids", words="exclude each other; cells that match a table have no voids")
     line = "exclude each other; the table gives the radii"

@@ -1,4 +1,4 @@
-"""Evaluations of a fit whose cases are closed forms: weights of the data, and differences of cases within the bounds."""
+"""Evaluations of a fit of closed forms: weights of the data, and differences of cases within the bounds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Values of results in place of measured ones: none where nothing happened, and derivatives only where a law is exact."""
+"""Values of results in place of measured ones: none where nothing happened, derivatives where a law is exact."""
 
 from __future__ import annotations
 
