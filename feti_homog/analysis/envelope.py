@@ -7,17 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
-from scipy.linalg import block_diag
 
 from feti_homog.analysis.constants import constants
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.criteria import criterion_of
 from feti_homog.analysis.mesh_errors import mesh_error, unit_errors
-from feti_homog.analysis.onset_errors import MOST, OnsetErrors
 from feti_homog.analysis.registry import Analysis
 from feti_homog.analysis.result_records import EnvelopePoint
 from feti_homog.analysis.tip_records import DIRECTION_DIGITS, bond_directions
@@ -28,9 +26,6 @@ from feti_homog.interface.path.onset import Onset
 from feti_homog.interface.path.path_points import UTILISATION_TIE
 from feti_homog.materials.voigt import voigt_names
 from feti_homog.typing import Float, Int
-
-if TYPE_CHECKING:
-    from feti_homog.homogenization.mesh_error import EnergyErrors
 
 # Bonds times directions that are looked at together.
 CHUNK = 200_000
@@ -83,10 +78,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     angles = 360.0 * np.arange(section.directions) / section.directions
     rays = rays_of(section.plane, angles, stiffness, columns.get("thermal_stress"), section.temperature or 0.0)
     law = criterion_of(context.cell)
-    onset_errors = OnsetErrors(context, law) if errors else None
-    if onset_errors is not None and not onset_errors.have_limits(bonds):
-        onset_errors = None
-    finder = _Finder(context, responses, Onset.of(law, context.loads.interfaces, bonds), onset_errors, errors)
+    finder = _Finder(context, responses, Onset.of(law, context.loads.interfaces, bonds))
     pairs = zip(angles, finder.points(rays), strict=True)
     points = tuple(EnvelopePoint(angle=float(angle), **point) for angle, point in pairs)
     secants: dict[str, Any] = {"effective_stiffness": stiffness} | columns
@@ -119,24 +111,12 @@ def rays_of(
 class _Finder:
     """Finds the first bond that breaks on each ray."""
 
-    def __init__(
-        self,
-        context: AnalysisContext,
-        responses: Sequence[Response],
-        onset: Onset,
-        onset_errors: OnsetErrors | None,
-        errors: Sequence[EnergyErrors],
-    ) -> None:
-        """`responses` are those to the unit loads, `errors` theirs, if there are any.  Collective."""
+    def __init__(self, context: AnalysisContext, responses: Sequence[Response], onset: Onset) -> None:
+        """Take the responses to the unit loads.  Collective."""
         cell = context.cell
         self._comm, self._onset, self._loads = cell.comm, onset, context.loads.names
         self._problems, self._noise = context.loads.interfaces.problems, context.plane.interface.scales.sign_noise
         self._unit = _tractions(context, responses)
-        self._errors = onset_errors
-        if onset_errors is not None:
-            self._energy_errors = block_diag(*(each.signed for each in errors))
-            self._bonded = np.concatenate(cell.comm.allgather(onset.bonded))
-            self._everywhere = np.concatenate(cell.comm.allgather(self._unit.swapaxes(0, 1)))
         self._most = max(1, self._comm.allreduce(self._unit.shape[1], MPI.MAX))
         nodes = cell.solver.jump_operator.nodes
         self._direction, self._fibre = bond_directions(cell), cell.summary.fibre_number(nodes.fibre)
@@ -160,36 +140,8 @@ class _Finder:
             else:
                 factors = np.tile(np.where(used >= most * (1.0 - UTILISATION_TIE), 0.0, np.inf), (len(ahead), 1))
             found = self._first(factors, at_start, ahead)
-            errors = self._mesh_errors(rays, rows, factors, found[:, 0], names)
-            for row, (bond, error) in enumerate(zip(found, errors, strict=True), first):
-                yield {} if np.isinf(bond[0]) else rays.at(row, float(bond[0])) | error | self._of_bond(bond)
-
-    def _mesh_errors(
-        self, rays: Rays, rows: slice, factors: Float, least: Float, names: Sequence[str]
-    ) -> list[dict[str, float]]:
-        """Entries `mesh_error` of some rays with the least of the factors (n, k).
-
-        The largest utilisation that a bond has with its own error, each under its own load.  Collective.
-        """
-        if self._errors is None:
-            return [{}] * len(least)
-        ahead = self._unit_loads(rays.strain[rows], 0.0, names)
-        energy = np.abs(np.einsum("nl,lm,nm->n", ahead, self._energy_errors, ahead))
-        energy /= np.einsum("nm,nm->n", rays.strain[rows], rays.stress[rows])
-        breaks = (least > 0.0) & np.isfinite(least)
-        ray, node = np.nonzero(breaks[:, None] & (factors <= least[:, None] * (1.0 + MOST)))
-        own = factors[ray, node]
-        ahead = own[:, None] * ahead[ray]
-        loads = ahead + self._unit_loads(rays.strain_before[None], rays.temperature, names)
-        stencil = self._errors.stencil(node, self._bonded)
-        traction = np.einsum("pl,pslc->psc", loads, self._everywhere[stencil])
-        along = np.einsum("pl,plc->pc", ahead, self._everywhere[stencil[:, 2]])
-        whole = bool(self._bonded.all())
-        error = self._errors.relative(self._onset.bonds.at(node), stencil, traction, energy[ray], whole, along)
-        found = np.zeros(len(least))
-        np.maximum.at(found, ray, least[ray] / own * (1.0 + error) - 1.0)
-        self._comm.Allreduce(MPI.IN_PLACE, found, MPI.MAX)
-        return [{"mesh_error": float(largest)} if largest > 0.0 else {} for largest in found]
+            for row, bond in enumerate(found, first):
+                yield {} if np.isinf(bond[0]) else rays.at(row, float(bond[0])) | self._of_bond(bond)
 
     def _tractions(self, strain: Float, temperature: float, names: Sequence[str]) -> Float:
         """(n, k, c) under strains (n, m) of these names and a change of temperature."""

@@ -186,23 +186,6 @@ def check_accuracy(context: AnalysisContext) -> None:
     note_accuracy(context, error["mesh_error"])
 
 
-def add_errors_of_breaks(entries: Sequence[dict[str, Any]]) -> None:
-    """Add `dissipated_mesh_error` to the points of a path that have a `mesh_error` e, as if bonds broke all the same.
-
-    A break loses R of the energy U before it, and errs by e U - e' (U - R), e' of the next point; between the points
-    that have one e is linear.
-    """
-    known = [number for number, entry in enumerate(entries) if "mesh_error" in entry]
-    if not known:
-        return
-    error = np.interp(range(len(entries)), known, [entries[number]["mesh_error"] for number in known])
-    stored, lost = (np.array([entry[name] for entry in entries]) for name in ("stored", "dissipated"))
-    off = error[:-1] * stored[:-1] - error[1:] * (stored[:-1] - np.diff(lost))
-    total = np.cumsum([0.0, *np.where(np.diff(lost) > 0, off, 0.0)])
-    for number in known:
-        entries[number]["dissipated_mesh_error"] = abs(float(total[number]))
-
-
 def energy_error(stiffness: Float, errors: list[EnergyErrors]) -> dict[str, float]:
     """Return `mesh_error` of a secant stiffness, the largest relative error of the strain energy, if there is one."""
     parts = {name: _secants(errors, name) for name in ("absolute", "signed", "least")}

@@ -11,8 +11,7 @@ import numpy as np
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.criteria import criterion_of
 from feti_homog.analysis.event_progress import BARS, EventProgress
-from feti_homog.analysis.mesh_errors import add_errors_of_breaks, check_accuracy, state_error
-from feti_homog.analysis.onset_errors import OnsetErrors
+from feti_homog.analysis.mesh_errors import check_accuracy, state_error
 from feti_homog.analysis.path_events import Work, averages, found_again, holding, last_confirmed, restored, stored
 from feti_homog.analysis.registry import Analysis
 from feti_homog.analysis.result_records import PathPoint, Peak
@@ -240,7 +239,6 @@ def _kept(
     legs = len(context.case.targets) if path.method == "events" else 0
     numbers = kept(entries, context.case.output.states, legs, marks(_document(context, entries)))
     tips = TipRecorder(context.cell, context.loads.interfaces, law) if law.has_tips else None
-    onset = OnsetErrors.of_path(context, law, path)
     with context.progress.stage("states") as words:
         for number in context.progress.bar(numbers, "states"):
             point = last if number == len(entries) - 1 else _read(context, law, number)
@@ -249,10 +247,9 @@ def _kept(
                 entries[number]["tips"] = tips.of(point)
             if context.states.has_place:
                 error, responses = state_error(context, responses)
-                entries[number] |= error | ({} if onset is None else onset.entry(point, error["mesh_error"]))
+                entries[number] |= error
                 context.record_state(responses, point.load_factor, _label(path, number), number)
         words.append(f"{len(numbers)} of {len(entries)} points")
-    add_errors_of_breaks(entries)
     return {"states": numbers} if context.states.has_place else {}
 
 

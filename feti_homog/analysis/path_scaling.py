@@ -44,7 +44,7 @@ def case(old: Mapping[str, Any], s: float) -> dict[str, Any]:
 def point(old: PathPoint, s: float) -> PathPoint:
     """Return a point with s times its strain, stress and temperature, and s^2 times its energies."""
     energies = (
-        *("stored", "stored_in_springs", "work", "dissipated", "dissipated_mesh_error"),
+        *("stored", "stored_in_springs", "work", "dissipated"),
         *("dissipated_strain_controlled", "fracture_energy"),
     )
     tips = None if old.tips is None else _scaled(old.tips, ("G_I", "G_II"), s**2)

@@ -157,16 +157,6 @@ class PathPoint:
         "estimated relative error of `stored` by the mesh, at the points that `states` in [output] chooses",
         default=None,
     )
-    load_mesh_error: float | None = described(
-        "estimated relative error by the mesh, at most 1, of the load at which bonds break at an event of the first "
-        "leg, at the same points; absent with friction, beside damaged bonds, and at tips and corners of rigid bonds",
-        default=None,
-    )
-    dissipated_mesh_error: float | None = described(
-        "estimated error of `dissipated` there by the mesh, of a path whose bonds break at the same strains",
-        STRESS,
-        default=None,
-    )
     work: float = described(
         "work of the loads so far per area of the cell, of a temperature too: `stored` and `dissipated` together, with "
         "friction and `friction_heat`",
@@ -273,10 +263,6 @@ class EnvelopePoint:
     factor: float | None = described(
         "load at onset, in the unit of the axes: their values are `factor` times cosine and sine of `angle`; 0 if the "
         "change of temperature alone breaks a bond",
-        default=None,
-    )
-    mesh_error: float | None = described(
-        "estimated relative error of `factor` by the mesh, at most 1; absent at tips and corners of rigid bonds",
         default=None,
     )
     strain: Float | None = described(

@@ -114,12 +114,6 @@ def keys_of(table_class: type[Any]) -> dict[str, Key]:
     return {each.name: each.metadata["key"] for each in dataclasses.fields(table_class) if "key" in each.metadata}
 
 
-def defaults_of(table_class: type[Any]) -> dict[str, Any]:
-    """Return the defaults of a table, as TOML has them, of the keys that have one."""
-    found = {each.name: each.default for each in dataclasses.fields(table_class) if each.name in keys_of(table_class)}
-    return {name: _to_toml(value, {}) for name, value in found.items() if value not in (None, dataclasses.MISSING)}
-
-
 def selected_value(table_class: type[Any], table: object, name: str) -> Any:
     """Return the value of a key if it is right, its default if it is not there, None if it is faulty."""
     default = getattr(table_class, name, None)

@@ -97,10 +97,9 @@ def _peak_lines(document: Document, peak: Mapping[str, Any], label: str) -> list
         "the first break": peak.get("first_break_event"),
         f"the {_largest(peak)[1]}": peak["event"],
     }
-    for name, of in (("mesh_error", "energy"), ("load_mesh_error", "load")):
-        errors = {words: document["path"][event].get(name) for words, event in events.items() if event is not None}
-        known = [f"{error:.1e} at {words}" for words, error in errors.items() if error is not None]
-        text += f"; mesh error, of the {of}, {', '.join(known)}" if known else ""
+    errors = {words: document["path"][event].get("mesh_error") for words, event in events.items() if event is not None}
+    known = [f"{error:.1e} at {words}" for words, error in errors.items() if error is not None]
+    text += f"; mesh error of the energy {', '.join(known)}" if known else ""
     lines = wrap(text, WIDTH, subsequent_indent="  ")
     if path_curves.scales_with_toughness(document):
         lines.append("Scaling: strains and stresses of the path are as the root of the toughness")
@@ -127,11 +126,10 @@ def _path_energies(document: Document, label: str) -> list[str]:
     last = document["path"][-1]
     where = " on the first leg" if path_curves.legs(document) > 1 else ""
     rising = f"{last['dissipated_strain_controlled']:.6g} if the {path_curves.what_rises(document)} only rises{where}"
-    error = f" (mesh error {last['dissipated_mesh_error']:.1e})" if "dissipated_mesh_error" in last else ""
     lines = [
         f"Work per area{label}: {last['work']:.6g}",
         *energies(last, label),
-        f"Dissipated per area{label}: {last['dissipated']:.6g} along all equilibria{error}, {rising}",
+        f"Dissipated per area{label}: {last['dissipated']:.6g} along all equilibria, {rising}",
     ]
     if "friction_heat" in last:
         lines.append(f"Heat of friction per area{label}: {last['friction_heat']:.6g}{_closed_cycle(document)}")

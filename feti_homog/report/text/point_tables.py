@@ -164,8 +164,7 @@ def envelope_lines(document: Document, label: str) -> list[str]:
     if not known:
         return lines
     for title, point in (("least", min(known, key=_load)), ("largest", max(known, key=_load))):
-        error = f", mesh error {point['mesh_error']:.1e} of it" if "mesh_error" in point else ""
-        lines.append(f"  {title:<9}{_load(point):.7g} at {point['angle']:g} degrees{error}")
+        lines.append(f"  {title:<9}{_load(point):.7g} at {point['angle']:g} degrees")
     return lines + _onset_lines(points, axes, known[0])
 
 

@@ -100,8 +100,7 @@ def _envelope(document: Document) -> dict[str, float]:
     least = {f"envelope_least_{first}_{second}": known[0]} if known else {}
     is_closed = len(known) == len(document["envelope"])
     places = along | least | ({f"envelope_largest_{first}_{second}": known[-1]} if is_closed else {})
-    errors = {f"{name}{ERROR}": p["factor"] * p["mesh_error"] for name, p in places.items() if "mesh_error" in p}
-    return {name: point["factor"] for name, point in places.items()} | errors
+    return {name: point["factor"] for name, point in places.items()}
 
 
 def _anisotropy(stiffness: Any) -> dict[str, float]:
@@ -150,19 +149,7 @@ def _path(document: Document) -> dict[str, float]:
     found |= {f"peak_{name}": value for name, value in zip(stresses, peak.tolist(), strict=True)}
     summit = peak_of(document)
     found |= {f"peak_{summit[f'{kind}_name']}": summit[kind] for kind in ("stress", "strain")}
-    found |= _path_errors(onset or {}, points[summit["event"]], summit)
     return found | {f"end_{state}": points[-1][state] for state in point_tables.STATES}
-
-
-def _path_errors(onset: Document, at_peak: Document, summit: Mapping[str, Any]) -> dict[str, float]:
-    """Estimated errors of the load of onset, and of the stress at the peak: of its load and of the energy there."""
-    found = {}
-    if "load_mesh_error" in onset:
-        found[f"onset_load_factor{ERROR}"] = onset["load_factor"] * onset["load_mesh_error"]
-    if "load_mesh_error" in at_peak:
-        error = float(np.hypot(at_peak["load_mesh_error"], at_peak["mesh_error"]))
-        found[f"peak_{summit['stress_name']}{ERROR}"] = abs(summit["stress"]) * error
-    return found
 
 
 def _at_point(place: str, point: Document) -> dict[str, float]:

@@ -53,7 +53,7 @@ OUTPUT_COLUMNS = (
     *columns(Moduli),
     *(column for column in columns(EngineeringConstants) if column.name not in MODULI),
     *columns(TransverselyIsotropic),
-    Column("NAME_mesh_error", "that of NAME", "estimated error of an entry, constant, onset or peak by its mesh"),
+    Column("NAME_mesh_error", "that of NAME", "estimated error of an entry or constant by its mesh"),
     Column("energy_mesh_error", "", "estimated relative error of the strain energy, the largest under any strain"),
     Column("Cii_reuss", STRESS, "lower bound of Cii"),
     Column("Cii_voigt", STRESS, "upper bound of Cii"),

@@ -22,11 +22,10 @@ def document(count: int, names: tuple[str, ...], without: tuple[int, ...] = (), 
 
 def test_the_least_and_the_largest_load_and_some_directions():
     whole = document(72, ("normal", "tangential", "axial"))
-    whole["envelope"][71]["mesh_error"] = 0.012
     lines = envelope_lines(whole, " (MPa)")
     assert lines[0] == "Onset of debonding in the plane S22, S12 (MPa): 72 directions"
     assert lines[1].split() == ["least", "10", "at", "0", "degrees"]
-    assert lines[2].strip() == "largest  81 at 355 degrees, mesh error 1.2e-02 of it"
+    assert lines[2].strip() == "largest  81 at 355 degrees"
     assert len(lines) == 5 + 12 and max(map(len, lines)) < 80
     assert lines[3].endswith(" (degrees), traction / strength")
     assert lines[4].split() == ["angle", "S22", "S12", "fibre", "at", "normal", "tangent", "axial"]

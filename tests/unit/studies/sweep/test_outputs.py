@@ -5,9 +5,6 @@ from __future__ import annotations
 import re
 from typing import Any
 
-import pytest
-from unit.studies.sweep.test_collect import path_document
-
 from feti_homog.case import reference
 from feti_homog.case.sections import TOP_LEVEL
 from feti_homog.report.text.table import unit
@@ -82,17 +79,3 @@ def test_strains_have_no_unit():
 def test_without_an_onset_there_is_no_largest():
     assert of_envelope([None, 2.0, 9.0, 3.0]) == {"envelope_least_S22_S12": 2.0}
     assert of_envelope([None] * 4) == {}
-
-
-def test_loads_and_stresses_where_bonds_break_have_errors():
-    whole = document([5.0, 2.0, 9.0, 3.0], ("S22", "S12"))
-    whole["envelope"][1]["mesh_error"] = 0.01
-    errors = {name: value for name, value in outputs(whole).items() if name.endswith("_mesh_error")}
-    assert errors == pytest.approx({"envelope_least_S22_S12_mesh_error": 0.02})
-    path = path_document(2, 0.0)
-    first = path["path"][0]
-    first |= {"load_mesh_error": 3e-3, "mesh_error": 4e-3}
-    errors = {name: value for name, value in outputs(path).items() if name.endswith("_mesh_error")}
-    assert errors == pytest.approx(
-        {"onset_load_factor_mesh_error": 3e-3 * first["load_factor"], "peak_S11_mesh_error": 5e-3 * first["stress"][0]}
-    )
