@@ -148,7 +148,7 @@ def test_corners_are_known_from_the_mesh_itself(comm):
 
 def test_corners_of_voids_are_known_from_the_mesh_itself(comm, shared_path):
     on_root(comm, pixel_mesh(np.diag([0, -1, 0, 0])).write, shared_path / "porous.msh")
-    cell = {"geometry": "mesh", "file": str(shared_path / "porous.msh"), "refine": 1}
+    cell = {"geometry": "mesh", "file": str(shared_path / "porous.msh"), "voids": True, "refine": 1}
     document = {"cell": cell, "material": {"matrix": MATRIX}, **UNIT}
     cuts = ({"cut": "bodies", "subdomains": 8}, {"cut": "auto"})
     by_bodies, across = (run(Case.parse(document | {"decomposition": cut}), comm).mesh_error for cut in cuts)

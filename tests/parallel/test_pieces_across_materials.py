@@ -107,7 +107,8 @@ def test_interface_nodes_are_those_by_bodies_if_one_is_pinned(comm, shared_path)
 
 def test_porous_cells_of_one_phase_have_fields_and_no_interface(comm, shared_path):
     on_root(comm, pixel_mesh(np.diag([0, -1, 0, 0])).write, shared_path / "porous.msh")
-    cell = {"cell": {"geometry": "mesh", "file": str(shared_path / "porous.msh")}, "material": {"matrix": MATRIX}}
+    mesh = {"geometry": "mesh", "file": str(shared_path / "porous.msh"), "voids": True}
+    cell = {"cell": mesh, "material": {"matrix": MATRIX}}
     runs = [Case.parse(document(cut) | cell) for cut in ("auto", "bodies")]
     across, bodies = (run(case, comm, fields=True) for case in runs)
     assert comm.allreduce(len(across.fields.interface.points)) == 0

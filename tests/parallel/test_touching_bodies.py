@@ -169,7 +169,7 @@ def test_tips_do_not_cross_voids(comm: Any, shared_path: Any):
     """A fibre's side at a void ends at interface nodes, and is no interface."""
     image = random_image(8, 208, 0.5, 2, 0.1)
     document = {
-        "cell": cell_of(comm, shared_path, pixel_mesh(image)),
+        "cell": cell_of(comm, shared_path, pixel_mesh(image), voids=True),
         "material": {"matrix": MATRIX, "fibre": FIBRE},
         "analysis": {"type": "path", "plane": "strain"},
         "interface": SPRINGS | {"criterion": "energy", "toughness": 0.02},

@@ -90,6 +90,8 @@ def _take(content: _Content, block: KeywordBlock) -> None:
             raise ValueError("other files are not read: expected all in one file")
         case "NODE" if not content.is_assembly:
             _take_nodes(content, block)
+        case "ELEMENT" if content.is_assembly:
+            raise ValueError("elements of the assembly are not read: expected all in the part")
         case "ELEMENT":
             _take_elements(content, block)
         case "ELSET" if "INSTANCE" not in block.parameters:

@@ -115,9 +115,9 @@ def _surrounding(mesh: RawMesh) -> str:
     middles = (mesh.points[edges(mesh.triangles), :2].mean(axis=1) - low) / size
     if not np.isfinite(middles).all():
         return ""
-    _, key = np.unique(np.rint(middles * SIDE).astype(np.int64) % SIDE, axis=0, return_inverse=True)
-    order = np.argsort(key.ravel(), kind="stable")
-    same = np.flatnonzero(np.diff(key.ravel()[order]) == 0)
+    key = (np.rint(middles * SIDE).astype(np.int64) % SIDE) @ [SIDE, 1]
+    order = np.argsort(key, kind="stable")
+    same = np.flatnonzero(np.diff(key[order]) == 0)
     one, other = order[same], order[same + 1]
     alike = number[one // 3] == number[other // 3]
     one, other, count = one[alike], other[alike], len(mesh.triangles)

@@ -180,6 +180,10 @@ FAULTS = {
         _text(SQUARE + "*INSTANCE\n*INSTANCE\n"),
         "line 10, *INSTANCE: a second instance: expected one, in",
     ),
+    "elements of the assembly": (
+        _text(SQUARE + "*ASSEMBLY, NAME=a\n*ELEMENT, TYPE=T2D2, ELSET=debonded\n7, 1, 2\n*END ASSEMBLY\n"),
+        "line 10, *ELEMENT: elements of the assembly are not read: expected all in the part",
+    ),
     "rotated": (
         _text(SQUARE + "*INSTANCE, NAME=b\n0, 0, 0\n0, 0, 0, 0, 0, 1, 90\n"),
         "line 9, *INSTANCE: its rotation is not read: rotate the part",

@@ -107,6 +107,21 @@ def calculix(path: Path, kind: str = "CPE4") -> None:
     path.write_text("\n".join([*lines, "*ELSET, ELSET=Ewhole", "Eall", ""]))
 
 
+def quads() -> MshFile:
+    """Return the grid of quadrilaterals."""
+    halves = grid().elements
+    corners = {tag: (*halves[tag][3], halves[tag + 1][3][2]) for tag in halves if tag % 2}
+    return replace(grid(), elements={tag: (3, *halves[tag][1:3], corners[tag]) for tag in corners})
+
+
+def in_few_letters(path: Path) -> None:
+    """Write Abaqus/CAE's words with the keyword of the elements abbreviated."""
+    abaqus_cae(path)
+    text = path.read_text()
+    assert "*Element, type" in text
+    path.write_text(text.replace("*Element, type", "*ELEM, TYP"))
+
+
 SETS = {"matrix": "Resin", "fibre": ["Glass"]}
 FILES = {
     "gmsh, names": ("a.msh", lambda path: by_gmsh(path, named()), WORDS),
@@ -124,6 +139,10 @@ FILES = {
     "meshio's Medit": ("a.mesh", lambda path: by_meshio(path, "medit:ref", "medit"), CODES),
     "VTK": ("a.vtu", by_vtk, CODES),
     "Abaqus/CAE": ("a.inp", abaqus_cae, WORDS),
+    "Abaqus/CAE, few letters": ("a.inp", in_few_letters, WORDS),
+    "gmsh, quadrilaterals": ("a.msh", lambda path: quads().write(path), CODES),
+    "gmsh's Medit, quadrilaterals": ("a.mesh", lambda path: by_gmsh(path, quads()), CODES),
+    "gmsh's VTK, quadrilaterals": ("a.vtk", lambda path: by_gmsh(path, quads()), CODES),
     "CalculiX": ("a.inp", calculix, {"matrix": "e_resin", "fibre": "e_glass"}),
     "CalculiX, shells": ("a.inp", lambda path: calculix(path, "S4R"), {"matrix": "e_resin", "fibre": "e_glass"}),
 }  # fmt: skip
