@@ -1,4 +1,4 @@
-"""Blocks of an Abaqus input file, and its keywords: those that make a mesh, and those that do not."""
+"""Blocks of an Abaqus input file, and which of its keywords make a mesh."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from feti_homog.errors import MeshError
 from feti_homog.schema.wording import toml_value
 
-# Keywords that are read with those of their parameters that have a meaning for the mesh; None: others may be there.
+# Keywords that are read and their parameters; None: any parameters may be there.
 READ: dict[str, tuple[str, ...] | None] = {
     "NODE": ("NSET", "SYSTEM"),
     "ELEMENT": ("TYPE", "ELSET"),
@@ -55,10 +55,10 @@ class KeywordBlock:
     """A keyword line and the data lines below it.
 
     Attributes:
-        number: of the line, from 1.
+        number: the number of the keyword line, from 1.
         word: the keyword as the file has it.
-        keyword: it without abbreviation; empty if it makes no mesh.
-        parameters: by their names, in upper case.
+        keyword: the keyword in full; empty if it makes no mesh.
+        parameters: their values by their names in upper case.
         rows: the words of each data line.
     """
 
@@ -113,12 +113,12 @@ def _begun(number: int, line: str) -> KeywordBlock:
 
 
 def resolved(word: str) -> str:
-    """Return the keyword that a word or its abbreviation is, empty of one without nodes and elements.
+    """Return the full keyword of a word, empty if the keyword makes no nodes or elements.
 
-    Blanks and capitals do not matter. A beginning is enough if no other keyword has it.
+    Blanks and capitals do not matter. A keyword may be abbreviated if no other one begins in the same way.
 
     Raises:
-        ValueError: it is none, or it may be several.
+        ValueError: no keyword begins so, or several do.
     """
     key = re.sub(r"\s", "", word.upper())
     if key in WHOLE or key.startswith(OTHERS):
@@ -133,7 +133,7 @@ def resolved(word: str) -> str:
 
 
 def _parameters(keyword: str, words: Iterable[str]) -> dict[str, str]:
-    """Return the parameters of a keyword, of those that are read with whole names; ValueError if others matter."""
+    """Return the parameters of a keyword by their full names; ValueError if one that is not read may matter."""
     known = OF_SECTIONS if keyword.endswith("SECTION") else READ.get(keyword) or ()
     found = {}
     for word in words:
@@ -145,7 +145,7 @@ def _parameters(keyword: str, words: Iterable[str]) -> dict[str, str]:
 
 
 def _parameter(name: str, known: tuple[str, ...]) -> str:
-    """Return the name of a parameter in upper case, whole if its beginning is that of one alone."""
+    """Return the full name of a parameter, in upper case, if it abbreviates a single known one."""
     name = name.strip().upper()
     whole = [own for own in known if own.startswith(name)]
     return whole[0] if len(whole) == 1 and name not in known else name

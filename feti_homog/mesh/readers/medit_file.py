@@ -15,7 +15,7 @@ from feti_homog.system.runtime import input_files
 
 # Sections of cells: VTK's type, number of nodes.
 CELLS = {"EDGES": (3, 2), "TRIANGLES": (5, 3), "QUADRILATERALS": (9, 4)}
-# Numbers in an entry of the sections that have no cells, without the coordinates of a vector.
+# Numbers per entry of sections without cells; vectors have as many as coordinates.
 OTHERS = {
     **dict.fromkeys(("CORNERS", "RIDGES", "REQUIREDVERTICES", "REQUIREDEDGES", "REQUIREDTRIANGLES"), 1),
     **dict.fromkeys(("NORMALATVERTICES", "TANGENTATVERTICES", "VERTEXONGEOMETRICVERTEX", "EDGEONGEOMETRICEDGE"), 2),
@@ -62,7 +62,7 @@ def _dimension(file: Scanner) -> int:
 
 
 def _rows(file: Scanner, word: str, dimension: int) -> Numbers:
-    """Take the entries of a section, (k, width) numbers; a fault if it may have cells that cannot be used."""
+    """Return the entries of a section, (k, width) numbers; MeshError if they may be cells of other types."""
     section = word.upper()
     if not section.isalnum() or section[0].isdigit():
         file.refuse(f"{toml_value(word)}: expected the name of a section")

@@ -62,10 +62,10 @@ class MshContent:
 
 
 def read(content: bytes) -> MshContent:
-    """Read the sections that make the mesh; others that may be there are passed over.
+    """Read the sections that make the mesh; OTHERS are passed over.
 
     Raises:
-        MeshError: it is no such file, it is damaged, or something else stands in it.
+        MeshError: the file is damaged, or has other sections or text outside them.
     """
     content = content.removeprefix(codecs.BOM_UTF8)
     start = content[:4096].lstrip()
@@ -106,7 +106,7 @@ def _section(content: bytes, place: int) -> tuple[str, int]:
 
 
 def _behind(content: bytes, place: int) -> int:
-    """Return the place behind the end of a section and the blanks around it."""
+    """Return the first place that is neither blank nor the end of a section."""
     found = BEHIND.match(content, place)
     return place if found is None else found.end()
 

@@ -85,7 +85,7 @@ def unknown_phases(mesh: RawMesh) -> list[str]:
 
 
 def _way_out(mesh: RawMesh) -> str:
-    """Return the line of a case file that names the matrix and the largest other group, and all shares of the area."""
+    """Propose the matrix and the largest other group for [cell.phases], with all shares of the area."""
     shares: dict[str, float] = {}
     with np.errstate(all="ignore"):  # coordinates are judged later
         sizes = np.bincount(mesh.group, np.abs(areas(mesh.points[:, :2], mesh.triangles)), len(mesh.groups))
@@ -105,9 +105,10 @@ def _way_out(mesh: RawMesh) -> str:
 
 
 def _surrounding(mesh: RawMesh) -> str:
-    """Return the group that surrounds all others: connected across the periodic cell along both axes; else nothing.
+    """Return the group that surrounds all others, empty if there is none.
 
-    In 3 x 3 copies of the cell on a torus, all copies of its elements are connected.
+    It is connected around the periodic cell along both axes: on a torus of 3 x 3 cells all copies of an element of it
+    are in one connected part.
     """
     names = [own[0] if own else "" for own in mesh.groups]
     number = np.unique(names, return_inverse=True)[1][mesh.group]

@@ -12,7 +12,7 @@ from feti_homog.mesh.readers.raw_mesh import DEBONDED, Block, RawMesh, assembled
 from feti_homog.mesh.readers.scanner import Numbers
 from feti_homog.typing import Float, Int
 
-# VTK's types of cells: their numbers of nodes, by what becomes of them.
+# Numbers of nodes by VTK's type of cell; quadrilaterals are cut in two triangles.
 TRIANGLES = {5: 3, 9: 4, 22: 6}
 LINES = {3: 2, 21: 3}
 POINTS = {1: 1}
@@ -57,7 +57,7 @@ class Grid:
     first: int = 0
 
     def nodes_of(self, cells: Int, count: int) -> Int:
-        """(k, count) the file's numbers of the nodes of cells (k,) that have so many."""
+        """Return the file's numbers (k, count) of the nodes of cells (k,) with `count` nodes each."""
         starts = np.cumsum(self.counts)[cells] - count
         return np.asarray(self.first + self.nodes[starts[:, None] + np.arange(count)], np.int64)
 
@@ -97,7 +97,7 @@ def mesh_of(grid: Grid) -> RawMesh:
 
 
 def _misfits(grid: Grid) -> list[str]:
-    """Arrays of other lengths than the cells, and nodes that are not there."""
+    """List arrays whose lengths do not fit the cells, and nodes that do not exist."""
     count, last = len(grid.types), len(grid.points) + grid.first - 1
     if len(grid.counts) != count or np.any(grid.counts < 0) or grid.counts.sum() != len(grid.nodes):
         return ["the cells and their nodes do not belong together: the file is damaged"]
@@ -126,7 +126,7 @@ def _in_common_types(grid: Grid) -> Grid:
 
 
 def _other_cells(grid: Grid) -> list[str]:
-    """Cells that are no triangles, lines or points, or have other numbers of nodes, and the lack of triangles."""
+    """List cells of types that cannot be used, cells with a wrong number of nodes, and the lack of triangles."""
     known, counts, faults = TRIANGLES | LINES, grid.counts, []
     for kind in np.unique(grid.types).tolist():
         own = np.flatnonzero(grid.types == kind)
@@ -144,7 +144,7 @@ def _other_cells(grid: Grid) -> list[str]:
 
 
 def _unnumbered(grid: Grid) -> list[str]:
-    """Phases that are missing, or no numbers of phases."""
+    """List the lack of phases, and values that are no numbers of phases."""
     name = _numbers_name(grid)
     if not name:
         expected = "expected 0 in the matrix, 1 in phase fibre, 2 in fibre:2, ..."
@@ -169,9 +169,9 @@ def _numbers_name(grid: Grid) -> str:
 
 
 def _curves(grid: Grid, groups: Int, has_phases: bool) -> dict[str, Int]:
-    """Nodes (d, 2) at the ends of the lines that cell data `debonded` mark, and of the others by their number.
+    """Return the end nodes (d, 2) of the lines of each curve.
 
-    Lines in a file with phases have no number but are called `line`.
+    Cell data `debonded` mark the curve DEBONDED; other lines are curves by their numbers, or `line` beside phases.
     """
     marks = np.ravel(grid.data[DEBONDED]) if DEBONDED in grid.data else np.zeros(len(grid.types))
     curves: dict[str, list[Int]] = {}

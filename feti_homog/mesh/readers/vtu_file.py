@@ -72,7 +72,7 @@ def _parsed(content: bytes) -> tuple[ElementTree.Element, bytes]:
 
 
 def _children(element: ElementTree.Element, name: str, known: Mapping[str, int]) -> dict[str, list[Any]]:
-    """Return the children of an element by their tags; a fault of any that is not known, or that is missing."""
+    """Return the children of an element by their tags; MeshError if others are there or required ones missing."""
     found: dict[str, list[Any]] = {tag: element.findall(tag) for tag in known}
     other = [child.tag for child in element if child.tag not in known]
     expected = f"expected {' and '.join(known)}"
@@ -86,7 +86,7 @@ def _children(element: ElementTree.Element, name: str, known: Mapping[str, int])
 
 
 def _piece(piece: ElementTree.Element, arrays: _Arrays) -> Grid:
-    """Read a piece."""
+    """Return the points, cells and cell data of a piece."""
     found = _children(piece, "Piece", {"Points": 1, "Cells": 1, "CellData": 0, "PointData": 0})
     counts = []
     for name in ("NumberOfPoints", "NumberOfCells"):
@@ -172,7 +172,7 @@ class _Arrays:
         return int(word)
 
     def _words(self, data: bytes, count: int) -> Int:
-        """(count,) words of the header at the beginning of data."""
+        """Return the first (count,) words of a header; ValueError if it is broken off."""
         if count * self.header.itemsize > len(data):
             raise ValueError
         return np.frombuffer(data, self.header, count)
@@ -185,7 +185,7 @@ class _Arrays:
         return data[start : start + length]
 
     def _unpacked(self, data: bytes) -> bytes:
-        """Return data that are compressed block by block; their lengths are in front."""
+        """Return the data of compressed blocks, whose lengths stand in front; ValueError if they are broken off."""
         (blocks,) = self._words(data, 1).tolist()
         place, unpacked = (3 + blocks) * self.header.itemsize, []
         for length in self._words(data, 3 + blocks).tolist()[3:] if blocks else []:
