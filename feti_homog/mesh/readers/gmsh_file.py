@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 
@@ -47,13 +48,11 @@ def load(path: Path) -> RawMesh:
     elements = {kind: own for kind, blocks in content.elements.items() if len((own := _by_entity(blocks))[0])}
     faults = _repeated(nodes, elements) or _lost(nodes, elements) or _other_kinds(nodes, points, elements)
     curves = _curves_of_content(content, elements)
-    if DEBONDED in (name for (dimension, _), name in content.names.items() if dimension == 1):
-        faults += [] if len(curves.get(DEBONDED, ())) else [f'no lines in the physical curve "{DEBONDED}"']
-    if faults:
+    if faults := faults or _without_lines(content, curves):
         raise MeshError(*faults)
     blocks, physical = _triangles(content, elements)
-    groups = [tuple(_name(content, 2, number) for number in own) for own in physical]
-    aliases = [tuple(f"number {number}" for number in own) for own in physical]
+    names = partial(_name, content, 2), "number {}".format
+    groups, aliases = ([tuple(map(name, own)) for own in physical] for name in names)
     return assembled(nodes, points, blocks, groups, curves, aliases=aliases)
 
 
@@ -116,6 +115,13 @@ def _other_kinds(nodes: Int, points: Float, elements: Mapping[int, Elements]) ->
     if not kinds:
         faults.append("no triangles in it: mesh the surfaces and put them in physical surfaces before saving")
     return faults
+
+
+def _without_lines(content: MshContent, curves: Mapping[str, Int]) -> list[str]:
+    """Return the fault of a curve DEBONDED that has a name but no lines."""
+    named = [name for (dimension, _), name in content.names.items() if dimension == 1]
+    is_empty = DEBONDED in named and not len(curves.get(DEBONDED, ()))
+    return [f'no lines in the physical curve "{DEBONDED}"'] if is_empty else []
 
 
 def _name(content: MshContent, dimension: int, group: int) -> str:

@@ -7,7 +7,7 @@ import binascii
 import lzma
 import re
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -43,18 +43,26 @@ def load(path: Path) -> RawMesh:
     root, appended = _parsed(content)
     (grid,) = _children(root, "VTKFile", {"UnstructuredGrid": 1, "AppendedData": 0})["UnstructuredGrid"]
     arrays = _Arrays(root, appended, max(MOST_BYTES, MOST_RATIO * len(content)))
-    pieces = [_piece(piece, arrays) for piece in _children(grid, grid.tag, {"Piece": 1, "FieldData": 0})["Piece"]]
+    pieces = _children(grid, grid.tag, {"Piece": 1, "FieldData": 0})["Piece"]
+    return mesh_of(_joined([_piece(piece, arrays) for piece in pieces]))
+
+
+def _joined(pieces: Sequence[Grid]) -> Grid:
+    """Return the grid of all pieces."""
     first = np.cumsum([0, *(len(piece.points) for piece in pieces)])
     nodes = np.concatenate([piece.nodes + own for piece, own in zip(pieces, first, strict=False)])
     points, types, counts = (
         np.concatenate([getattr(piece, name) for piece in pieces]) for name in ("points", "types", "counts")
     )
-    filled = [piece for piece in pieces if len(piece.types)] or pieces
-    for name in {name for piece in filled for name in piece.data}:
-        if not all(name in piece.data for piece in filled):
-            raise MeshError(f"cell data {name}: missing in one of {len(filled)} pieces")
-    data = {name: np.concatenate([piece.data[name] for piece in filled]) for name in filled[0].data}
-    return mesh_of(Grid(points, types, nodes, counts, data))
+    return Grid(points, types, nodes, counts, _joined_data([piece for piece in pieces if len(piece.types)]))
+
+
+def _joined_data(pieces: Sequence[Grid]) -> dict[str, Numbers]:
+    """Return the cell data of all pieces; MeshError if one of them lacks data of another."""
+    for name in {name for piece in pieces for name in piece.data}:
+        if not all(name in piece.data for piece in pieces):
+            raise MeshError(f"cell data {name}: missing in one of {len(pieces)} pieces")
+    return {name: np.concatenate([piece.data[name] for piece in pieces]) for name in pieces[0].data} if pieces else {}
 
 
 def _parsed(content: bytes) -> tuple[ElementTree.Element, bytes]:
