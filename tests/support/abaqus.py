@@ -11,7 +11,7 @@ def write_inp(path: Path, mesh: Any, sets: bool = True, elements: Mapping[int, s
     """Write an `MshFile` as one part; phases and curves are element sets, or the ELSET of its *ELEMENT lines."""
     lines = ["*HEADING", "a mesh", "** a comment", "*PART, NAME=cell", "*NODE, NSET=all"]
     lines += [f"{tag}, {x!r}, {y!r}" for tag, (x, y, _) in mesh.nodes.items()]
-    kinds = {2: "CPE3", 9: "CPE6M", 1: "T2D2", 8: "T3D3", **(elements or {})}
+    kinds = {2: "CPE3", 3: "CPE4", 9: "CPE6M", 1: "T2D2", 8: "T3D3", **(elements or {})}
     names = mesh.names | mesh.curves
     for phase in sorted({e[1] for e in mesh.elements.values()}):
         for kind in sorted({e[0] for e in mesh.elements.values() if e[1] == phase}):

@@ -21,7 +21,7 @@ def written(mesh: Any, path: Path, **options: Any) -> Path:
         return path
     if path.suffix == ".inp":
         return write_inp(path, mesh)
-    tags, kinds = sorted(mesh.nodes), {1: "line", 8: "line3", 2: "triangle", 9: "triangle6"}
+    tags, kinds = sorted(mesh.nodes), {1: "line", 8: "line3", 2: "triangle", 3: "quad", 9: "triangle6"}
     cells, phases, debonded = [], [], []
     for kind in sorted({e[0] for e in mesh.elements.values()}):
         own = [mesh.elements[tag] for tag in sorted(mesh.elements) if mesh.elements[tag][0] == kind]

@@ -1,4 +1,4 @@
-"""Images of square pixels as meshes of gmsh: two triangles a pixel, so that bodies touch at corners."""
+"""Images of square pixels as meshes of gmsh, two triangles or a quadrilateral a pixel: bodies touch at corners."""
 
 from __future__ import annotations
 
@@ -59,6 +59,15 @@ def pixel_mesh(image: np.ndarray, jitter: float = 0.0, symmetry: np.ndarray = SY
     nodes = {tag: (*places[tag - 1].tolist(), 0.0) for tag in used}
     names = {1: "matrix", 2: "fibre", 3: "fibre:2", 4: "fibre:3"}
     return MshFile(nodes, elements, {tag: names[tag] for tag in range(1, int(image.max()) + 2)})
+
+
+def quadrilaterals(image: np.ndarray) -> MshFile:
+    """Return the unit square of these pixels, a quadrilateral of four nodes each."""
+    mesh = pixel_mesh(image)
+    halves = list(mesh.elements.values())
+    pairs = enumerate(zip(halves[::2], halves[1::2], strict=True), start=1)
+    elements = {tag: (3, *first[1:3], (*first[3], second[3][2])) for tag, (first, second) in pairs}
+    return MshFile(mesh.nodes, elements, mesh.names)
 
 
 def turned(symmetry: np.ndarray, of_strain: bool = False) -> np.ndarray:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from feti_homog.mesh.coarse_mesh import edge_keys
+from feti_homog.mesh.readers.quadrilaterals import in_triangles
 from feti_homog.typing import Float, Int, Int32
 
 # The physical curve of the edges that are debonded from the start.
@@ -106,15 +107,26 @@ def first_of(names: Iterable[str], total: int, shown: int = 3) -> str:
 
 @dataclass(frozen=True)
 class Block:
-    """m triangles of a file.
+    """m triangles or quadrilaterals of a file.
 
-    Their numbers (m,), the numbers of their nodes (m, 3) or (m, 6), corners first and then the middles of the edges 01,
-    12, 20, and the group (m,) of each; or quadrilaterals of four nodes (m, 4).
+    Their numbers (m,), the group (m,) of each, and the numbers of their nodes: the corners, then the middles of the
+    edges 01, 12, ... of second-order ones, then what is inside; (m, 3) or (m, 6), (m, 4), (m, 8) or (m, 9).
     """
 
     tags: Int
     nodes: Int
     group: Int
+
+    @property
+    def corners(self) -> Int:
+        """(m, 3) or (m, 4)."""
+        return self.nodes[:, : 3 if self.nodes.shape[1] in (3, 6) else 4]
+
+    @property
+    def middles(self) -> Int:
+        """(m, 3) or (m, 4) of second-order ones, (m, 0) of others."""
+        count = self.corners.shape[1]
+        return self.nodes[:, count : 2 * count]
 
 
 def assembled(
@@ -136,11 +148,11 @@ def assembled(
     """
     order = np.argsort(node_tags)
     points, known = points[order], node_tags[order]
-    blocks = [part for block in blocks for part in _in_triangles(block, known, points)]
-    used, triangles = np.unique(np.concatenate([block.nodes[:, :3] for block in blocks]), return_inverse=True)
-    bent = [block.nodes for block in blocks if block.nodes.shape[1] == 6]
-    six = np.concatenate([np.zeros((0, 6), np.int64), *bent])
-    middles = six[:, 3:].ravel()
+    sides = [(block.corners, block.middles) for block in blocks if block.middles.size]
+    blocks = _in_triangles(blocks, known, points)
+    used, triangles = np.unique(np.concatenate([block.nodes for block in blocks]), return_inverse=True)
+    bent = [np.stack([nodes, np.roll(nodes, -1, axis=1)], axis=2).reshape(-1, 2) for nodes, _ in sides]
+    middles = np.concatenate([np.zeros(0, np.int64), *(own.ravel() for _, own in sides)])
     return RawMesh(
         node_tags=used,
         points=points[np.searchsorted(known, used)],
@@ -150,7 +162,7 @@ def assembled(
         groups=tuple(groups),
         curves=curves,
         middles=MiddleNodes(
-            edges=np.searchsorted(used, six[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)).astype(np.int32),
+            edges=np.searchsorted(used, np.concatenate([np.zeros((0, 2), np.int64), *bent])).astype(np.int32),
             tags=middles,
             points=points[np.searchsorted(known, middles)],
         ),
@@ -160,17 +172,12 @@ def assembled(
     )
 
 
-def _in_triangles(block: Block, known: Int, points: Float) -> list[Block]:
-    """Return a block, quadrilaterals cut in two along the diagonal that leaves the larger of the smaller triangles."""
-    if block.nodes.shape[1] != 4:
-        return [block]
-    x, y = points[np.searchsorted(known, block.nodes)].T[:2]  # (4, m)
-
-    def area(i: int, j: int, k: int) -> Float:
-        return np.asarray((x[j] - x[i]) * (y[k] - y[i]) - (x[k] - x[i]) * (y[j] - y[i]))
-
-    halves = np.array([[[0, 1, 2], [0, 2, 3]], [[0, 1, 3], [1, 2, 3]]])
-    sense = np.sign(area(0, 1, 2) + area(0, 2, 3))
-    least = [np.minimum(*(sense * area(*half) for half in pair)) for pair in halves.tolist()]
-    chosen = halves[(least[1] > least[0]).astype(int)]
-    return [Block(block.tags, np.take_along_axis(block.nodes, chosen[:, k], axis=1), block.group) for k in (0, 1)]
+def _in_triangles(blocks: Sequence[Block], known: Int, points: Float) -> list[Block]:
+    """Return triangles of three nodes, those of quadrilaterals last, two of each."""
+    found = [replace(block, nodes=block.corners) for block in blocks]
+    quads = [block for block in found if block.nodes.shape[1] == 4]
+    if not quads:
+        return found
+    tags, nodes, group = (np.concatenate([getattr(q, name) for q in quads]) for name in ("tags", "nodes", "group"))
+    halves = known[in_triangles(np.searchsorted(known, nodes), points)].reshape(-1, 3)
+    return [b for b in found if b.nodes.shape[1] == 3] + [Block(tags.repeat(2), halves, group.repeat(2))]
