@@ -23,6 +23,7 @@ from feti_homog.typing import Bool, Float, Int, Int32
 
 # Elements that are integrated at once: bounds the memory of their gradients, about 100 MB of quadratic ones.
 ELEMENTS_AT_ONCE = 1 << 16
+Mixed = bool | tuple[bool, ...]
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,7 @@ class Assembly:
 
 
 def assemble(
-    mesh: FineMesh, laws: Float, problem: Problem = PLANE, is_mixed: bool = False, material: Int | None = None
+    mesh: FineMesh, laws: Float, problem: Problem = PLANE, mixed: Mixed = False, material: Int | None = None
 ) -> Assembly:
     """Assemble the subdomain `mesh` of the stiffness L (v, v), or of several.
 
@@ -58,13 +59,14 @@ def assemble(
 
     Args:
         laws: L (v, v), or (materials, v, v) with the `material` (t,) of each coarse triangle.
+        mixed: whether elements are, or those of each material.
     """
     macro, c = MacroElement.of(mesh.lattice), problem.components
     classes, n = mesh.node_class[mesh.nodes], mesh.n_classes
     couples, loads = np.empty((len(mesh.nodes), len(macro.rows), c * c)), np.empty((*mesh.nodes.shape, 2))
     stiffnesses = laws.reshape(-1, *laws.shape[-2:])
     Q, slopes, areas = np.zeros((c * n, laws.shape[-1])), np.zeros((n, 2)), np.zeros(len(stiffnesses))
-    for number, L in enumerate(stiffnesses):
+    for number, (L, is_mixed) in enumerate(zip(stiffnesses, np.broadcast_to(mixed, len(stiffnesses)), strict=True)):
         members = np.ones(len(mesh.nodes), bool) if material is None else material == number
         tensor = _tensor(L, problem)
         for part in _parts(mesh, members):

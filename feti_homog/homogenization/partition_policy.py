@@ -94,9 +94,8 @@ def can_be_cut_across(case: Case) -> bool:
     given = {*case.petsc, *given_options()} - TOLERANCES
     if "help" in given or any(name.startswith("feti_") for name in given):
         return False
-    kinds = {phase_laws.is_mixed(case, phase) for phase in case.materials}
     ratios = (isotropic_ratio(material) or 0.0 for material in case.materials.values())
-    return len(kinds) == 1 and max(ratios) <= MOST_POISSON and _contrast(case) <= MOST_CONTRAST
+    return max(ratios) <= MOST_POISSON and _contrast(case) <= MOST_CONTRAST
 
 
 def _contrast(case: Case) -> float:

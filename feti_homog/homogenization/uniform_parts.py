@@ -31,7 +31,8 @@ class UniformPart:
         place: of the subdomain among those of its rank.
         submesh, mesh: of the part.
         dofs: (cn,) the degrees of freedom of the subdomain that are the part's.
-        L, problem, is_mixed: as of `Subdomain`.
+        L, problem: as of `Subdomain`.
+        is_mixed: whether its elements have a bubble and a pressure of their own.
     """
 
     place: int
@@ -55,10 +56,10 @@ def parts_of(subdomains: Sequence[Subdomain], phase_of: Sequence[str]) -> Iterat
         order = np.lexsort((s.submesh.constituent, s.material))
         bodies = s.submesh.constituent[order]
         for members in np.split(order, np.flatnonzero(np.diff(bodies)) + 1):
-            body, law = int(s.submesh.constituent[members[0]]), s.laws[s.material[members[0]]]
+            body, law, is_mixed = int(s.submesh.constituent[members[0]]), *_law(s, members)
             submesh = replace(part(s.submesh, members), body=body, phase=phase_of[body])
             mesh, classes = _restricted(s.mesh, members)
-            yield UniformPart(place, submesh, mesh, s.problem.dofs(classes), law, s.problem, s.is_mixed)
+            yield UniformPart(place, submesh, mesh, s.problem.dofs(classes), law, s.problem, is_mixed)
 
 
 def nodes_of_parts(s: Subdomain) -> int:
@@ -87,8 +88,15 @@ def parts_of_phases(subdomains: Sequence[Subdomain], lattice: ReferenceLattice, 
             nodes = s.mesh.nodes[members]
             nodes = nodes if lattice is s.mesh.lattice else nodes[:, lattice.within(s.mesh.lattice)]
             mesh = replace(s.mesh, nodes=nodes, curved=s.mesh.curved[members], lattice=lattice)
-            law, dofs = s.laws[s.material[members[0]]], np.arange(s.n_dofs)
-            yield UniformPart(place, submesh, mesh, dofs, law, s.problem, s.is_mixed)
+            law, is_mixed = _law(s, members)
+            yield UniformPart(place, submesh, mesh, np.arange(s.n_dofs), law, s.problem, is_mixed)
+
+
+def _law(s: Subdomain, members: Int) -> tuple[Float, bool]:
+    """Return the stiffness of coarse triangles of one material, and whether their elements are mixed."""
+    assert s.material is not None
+    number = s.material[members[0]]
+    return s.laws[number], bool(np.broadcast_to(s.mixed, len(s.laws))[number])
 
 
 def _apart(bodies: Sequence[Int], corners: Int, material: Int, most: int) -> Iterator[Int]:
@@ -147,7 +155,8 @@ class ForcesBetweenParts:
         mesh, classes = _restricted(torn, beside)
         law = np.repeat(np.arange(len(parts)), [len(p.mesh.nodes) for p in parts])[beside]
         used, material = np.unique(law, return_inverse=True)
-        found = assemble(mesh, np.stack([parts[k].L for k in used]), problem, parts[0].is_mixed, material)
+        mixed = tuple(parts[k].is_mixed for k in used)
+        found = assemble(mesh, np.stack([parts[k].L for k in used]), problem, mixed, material)
         self._dofs, self._K, self._Q = problem.dofs(classes), found.K, found.Q
         self._inverse = NodeBlocks(comm, jumps, csr_matrix(jumps.B @ jumps.B.T)).inverse(
             np.ones(jumps.owned[1] - jumps.owned[0])

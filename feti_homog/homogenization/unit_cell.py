@@ -267,9 +267,13 @@ def _assemble(
     """Return the subdomains of this rank, refined and assembled."""
     problem, law = phase_laws.plane_problem(case), partial(phase_laws.plane_law, case)
     return [
-        Subdomain.build(s, lattice, _laws(summary, s, law), problem, _material(summary, s), **_flags(case, s.phase))
+        Subdomain.build(
+            s, lattice, _laws(summary, s, law), problem, _material(summary, s),
+            tuple(phase_laws.is_mixed(case, name) for name in _phases(summary, s)),
+            is_thin=s.phase == COATING, is_outer=s.phase == MATRIX,
+        )
         for s in submeshes.cut()
-    ]
+    ]  # fmt: skip
 
 
 def _laws(summary: CellSummary, submesh: Submesh, law: Callable[[str], Float]) -> Float:
@@ -290,10 +294,3 @@ def _phases(summary: CellSummary, submesh: Submesh) -> list[str]:
     if submesh.phase:
         return [submesh.phase]
     return [summary.phases[k] for k in np.unique(summary.constituent_phase[submesh.constituent]).tolist()]
-
-
-def _flags(case: Case, phase: str) -> dict[str, bool]:
-    """Return the flags of a subdomain of this phase; of one across materials, whose elements are all of a kind."""
-    if not phase:
-        return {"is_mixed": all(phase_laws.is_mixed(case, name) for name in case.materials)}
-    return {"is_thin": phase == COATING, "is_outer": phase == MATRIX, "is_mixed": phase_laws.is_mixed(case, phase)}

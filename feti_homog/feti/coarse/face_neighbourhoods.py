@@ -126,7 +126,7 @@ def _neighbourhood(
     outside = np.zeros_like(on_face)
     outside[body.mesh.node_class[np.delete(body.mesh.nodes, triangles, axis=0)]] = True
     piece = part(body.submesh, triangles)
-    own = Subdomain.build(piece, body.mesh.lattice, body.L, body.problem, is_thin=body.is_thin, is_mixed=body.is_mixed)
+    own = Subdomain.build(piece, body.mesh.lattice, body.L, body.problem, is_thin=body.is_thin, mixed=body.mixed)
     of_body = np.empty(own.mesh.n_classes, np.int64)
     of_body[own.mesh.node_class[own.mesh.nodes]] = body.mesh.node_class[body.mesh.nodes[triangles]]
     nodes = np.flatnonzero(on_face[of_body])

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from feti_homog.errors import MeshError
-from feti_homog.fem.assembly import assemble
+from feti_homog.fem.assembly import Mixed, assemble
 from feti_homog.fem.bubble import lame
 from feti_homog.fem.problem import PLANE, Problem
 from feti_homog.fem.void_boundary import void_integrals
@@ -41,7 +41,7 @@ class Subdomain:
         positions: (n, 2) unwrapped positions of the classes.
         is_thin: whether the body is, such as a ring much thinner than its radius: the inverse is ill-conditioned.
         is_outer: whether no other body lies around it.
-        is_mixed: whether its elements have a bubble and a pressure of their own, see `assemble`.
+        mixed: whether its elements have a bubble and a pressure of their own, see `assemble`.
     """
 
     submesh: Submesh
@@ -58,7 +58,7 @@ class Subdomain:
     _built_stiffness: csr_matrix | None = field(repr=False)
     is_thin: bool = False
     is_outer: bool = False
-    is_mixed: bool = False
+    mixed: Mixed = False
 
     @classmethod
     def build(
@@ -68,18 +68,19 @@ class Subdomain:
         laws: Float,
         problem: Problem = PLANE,
         material: Int | None = None,
+        mixed: Mixed = False,
         **flags: bool,
     ) -> Subdomain:
-        """Refine and assemble, without communication; `flags` are `is_thin`, `is_outer` and `is_mixed`.
+        """Refine and assemble, without communication; `flags` are `is_thin` and `is_outer`.
 
-        Of one material or several: `laws` and `material` as of `assemble`.
+        Of one material or several: `laws`, `material` and `mixed` as of `assemble`.
 
         Raises:
             MeshError: an element is inverted, or the rigid-body modes are not in the kernel of K.
         """
         mesh = refine(submesh, lattice)
         _check_corners(submesh, mesh)
-        return cls.on(submesh, mesh, laws, problem, material, **flags)
+        return cls.on(submesh, mesh, laws, problem, material, mixed, **flags)
 
     @classmethod
     def on(
@@ -89,10 +90,11 @@ class Subdomain:
         laws: Float,
         problem: Problem,
         material: Int | None = None,
+        mixed: Mixed = False,
         **flags: bool,
     ) -> Subdomain:
         """Assemble on a refined mesh, without communication.  Arguments and errors as of `build`."""
-        body = assemble(mesh, laws, problem, flags.get("is_mixed", False), material)
+        body = assemble(mesh, laws, problem, mixed, material)
         shift, closes = unwrap(submesh)
         positions = np.empty((mesh.n_classes, 2))
         positions[mesh.node_class[mesh.nodes]] = mesh.points[mesh.nodes] + shift[:, None]
@@ -104,7 +106,9 @@ class Subdomain:
             Q[problem.dofs(np.array([submesh.pinned]))], slopes[submesh.pinned] = 0.0, 0.0
         laws = laws.reshape(-1, *laws.shape[-2:])
         L = np.einsum("k,kij->ij", body.areas / body.area, laws) if len(laws) > 1 else laws[0]
-        return cls(submesh, mesh, problem, L, laws, material, Q, slopes, body.areas, R, positions, K, **flags)
+        return cls(
+            submesh, mesh, problem, L, laws, material, Q, slopes, body.areas, R, positions, K, mixed=mixed, **flags
+        )
 
     def mean_strain(self, dofs: Int) -> Float:
         """(k, m) whose transpose times the displacements u of `dofs` (k,) is their share in int eps*.
@@ -142,6 +146,11 @@ class Subdomain:
         return np.hstack([rigid - affine, answers[:, strains:]])
 
     @property
+    def is_mixed(self) -> bool:
+        """True if elements are mixed, those of any material."""
+        return bool(np.any(self.mixed))
+
+    @property
     def n_dofs(self) -> int:
         """cn."""
         return len(self.Q)
@@ -173,7 +182,7 @@ class Subdomain:
 
     def assemble_stiffness(self) -> csr_matrix:
         """(cn, cn) K, Eq. (28), the pinned class (15) eliminated by a unit row scaled like the others."""
-        body = assemble(self.mesh, self.laws, self.problem, self.is_mixed, self.material)
+        body = assemble(self.mesh, self.laws, self.problem, self.mixed, self.material)
         return _pinned(body.K, self.problem, self.submesh.pinned)
 
     def fixing(self, K: csr_matrix, candidates: Int) -> tuple[Int, Float]:

@@ -48,7 +48,7 @@ def test_stiffness_and_loads_are_those_of_element_loops(mesh, poisson):
         np.add.at(K, (dofs[:, None], dofs), k)
         np.add.at(Q, dofs, q)
         area += own
-    body = assemble(mesh, L, is_mixed=is_mixed)
+    body = assemble(mesh, L, mixed=is_mixed)
     assert mesh.curved.any() and (~mesh.curved).any()
     assert np.abs(body.K - K).max() < 1e-12 * np.abs(K).max()
     assert np.abs(body.Q - Q).max() < 1e-12 * np.abs(Q).max()
