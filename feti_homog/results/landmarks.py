@@ -22,7 +22,9 @@ from feti_homog.typing import Float
 # A fall of the stress, or a jump of the strain, by more than this share of the largest is a drop: saw teeth of single
 # nodes are none.
 LEAST_DROP = 0.01
-SO_FAR = "largest so far"
+# A path whose stress ends by less than this share below its largest ends near its peak.
+LEAST_FALL = 0.05
+PEAK, LARGEST, SO_FAR = "peak", "largest stress", "largest so far"
 
 
 def turning_points(values: Float, least: float) -> list[int]:
@@ -71,6 +73,20 @@ def peak_of(document: Document) -> dict[str, Any]:
     return {"strain_name": names[0], "stress_name": names[1], **found}
 
 
+def fall_of(document: Document, peak: Document) -> float:
+    """Return the share of its largest stress by which a path falls after it, to the valley or its end."""
+    component = voigt_names(len(document["path"][0]["stress"]))[1].index(peak["stress_name"])
+    left = (document["path"][-1]["stress"][component], peak.get("stress_left", peak["stress"]))
+    return max(1.0 - stress / peak["stress"] for stress in left) if peak["stress"] else 0.0
+
+
+def name_of(document: Document, peak: Document) -> str:
+    """Return PEAK of a largest stress after which the path falls, else LARGEST, of one that was cut off SO_FAR."""
+    if "so_far" in peak:
+        return SO_FAR
+    return LARGEST if fall_of(document, peak) < LEAST_FALL else PEAK
+
+
 def _deepest_fall(document: Document, stress: Float) -> tuple[int, float, int | None]:
     """Return the point of the largest stress (n,) up to the deepest fall in which bonds break, and the valley.
 
@@ -98,8 +114,8 @@ def _deepest_fall(document: Document, stress: Float) -> tuple[int, float, int | 
 def marks(document: Document) -> dict[int, str]:
     """Return what some points of a path are, by their rising numbers: first break, peak, valley after it and end."""
     peak = peak_of(document)
-    largest = SO_FAR if "so_far" in peak else "peak"
-    places = {"first break": "first_break_event", largest: "event", "after the peak": "event_left"}
+    largest = name_of(document, peak)
+    places = {"first break": "first_break_event", largest: "event", f"after the {largest}": "event_left"}
     found = {words: peak[name] for words, name in places.items() if name in peak}
     found["end"] = len(document["path"]) - 1
     numbers = sorted({int(number) for number in found.values()})

@@ -26,7 +26,7 @@ from feti_homog.report.plots.plot_helpers import (
     unit_label,
 )
 from feti_homog.results import landmarks, path_curves
-from feti_homog.results.landmarks import SO_FAR, peak_of
+from feti_homog.results.landmarks import name_of, peak_of
 from feti_homog.typing import Array, Document
 
 NUMBERED_POINTS = 6  # of a path
@@ -91,7 +91,7 @@ def figure(document: Document) -> Figure:
 def _mark_peak(axes: Axes, document: Document, ink: str) -> None:
     """Mark the peak, with its stress in words."""
     peak, unit = peak_of(document), document["case"].get("output", {}).get("stress_unit", "")
-    words = f"{SO_FAR if 'so_far' in peak else 'peak'} {peak['stress']:.4g} {plain(unit)}".rstrip()
+    words = f"{name_of(document, peak)} {peak['stress']:.4g} {plain(unit)}".rstrip()
     axes.plot(peak["strain"], peak["stress"], "*", color=ink, markersize=11, markeredgecolor="white", zorder=5,
               linestyle="none", label=words)  # fmt: skip
 

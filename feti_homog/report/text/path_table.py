@@ -13,7 +13,7 @@ from feti_homog.materials.voigt import voigt_names
 from feti_homog.report.text.point_tables import COUNTS, WIDTH, columns_without_noise, counts, debonded, energies
 from feti_homog.report.text.table import Column, Table, without_noise
 from feti_homog.results import path_curves
-from feti_homog.results.landmarks import SO_FAR, chosen, peak_of
+from feti_homog.results.landmarks import LARGEST, PEAK, chosen, fall_of, name_of, peak_of
 from feti_homog.typing import Document
 
 ROWS = 15  # of the table
@@ -42,10 +42,11 @@ def path_table(document: Document, label: str) -> Table:
 def peak_table(document: Document, label: str) -> Table:
     """Return first break, peak and valley: stress, strain and point."""
     peak = peak_of(document)
+    largest = name_of(document, peak)
     places = {
         "first break": ("first_break_stress", "first_break_strain", "first_break_event"),
-        _largest(peak)[1]: ("stress", "strain", "event"),
-        "left after the peak": ("stress_left", "", "event_left"),
+        largest: ("stress", "strain", "event"),
+        f"left after the {largest}": ("stress_left", "", "event_left"),
     }
     rows = [
         [words, *(without_noise(peak[name]) if name else "" for name in names)]
@@ -53,7 +54,8 @@ def peak_table(document: Document, label: str) -> Table:
         if names[0] in peak
     ]
     columns = [Column(""), Column(f"{peak['stress_name']}{label}"), Column(peak["strain_name"]), Column("point")]
-    return Table("Largest stress so far" if "so_far" in peak else "Peak of the path", columns, rows)
+    titles = {PEAK: "Peak of the path", LARGEST: "Largest stress of the path"}
+    return Table(titles.get(largest, "Largest stress so far"), columns, rows)
 
 
 def _path_columns(document: Document) -> dict[str, Any]:
@@ -74,17 +76,13 @@ def _path_columns(document: Document) -> dict[str, Any]:
     return found | {strains[k]: strain[:, k] for k in others if stresses[k] in given}
 
 
-def _largest(peak: Mapping[str, Any]) -> tuple[str, str]:
-    """Return the words before the largest stress, with a place for its name, and those for its point."""
-    return ("Largest {} so far, the path being cut off", SO_FAR) if "so_far" in peak else ("Peak {}", "peak")
-
-
 def _peak_lines(document: Document, peak: Mapping[str, Any], label: str) -> list[str]:
     """Return the peak with the first break and what is left after it, and whether it grows with the toughness."""
     strain, stress = (without_noise(peak[name]) for name in ("strain", "stress"))
-    text = (
-        f"{_largest(peak)[0].format(peak['stress_name'] + label)}: {stress:.6g} at {peak['strain_name']} = {strain:.6g}"
-    )
+    largest, name = name_of(document, peak), peak["stress_name"] + label
+    begins = {PEAK: f"Peak {name}", LARGEST: f"Largest {name}"}
+    text = begins.get(largest, f"Largest {name} so far, the path being cut off")
+    text += f": {stress:.6g} at {peak['strain_name']} = {strain:.6g}"
     text += f" (point {peak['event']})"
     if "first_break_event" in peak:
         first, at = peak["first_break_stress"], peak["first_break_strain"]
@@ -92,11 +90,11 @@ def _peak_lines(document: Document, peak: Mapping[str, Any], label: str) -> list
     if "event_left" in peak:
         lost = 1.0 - peak["stress_left"] / peak["stress"]
         rises = f" as the {path_curves.what_rises(document)} rises" if path_curves.is_proportional(document) else ""
-        text += f"; {peak['stress_left']:.6g} after the peak{rises}, {lost:.1%} less (point {peak['event_left']})"
-    events = {
-        "the first break": peak.get("first_break_event"),
-        f"the {_largest(peak)[1]}": peak["event"],
-    }
+        text += f"; {peak['stress_left']:.6g} after the {largest}{rises}, {lost:.1%} less (point {peak['event_left']})"
+    if largest == LARGEST:
+        at_end = peak["event"] == len(document["path"]) - 1
+        text += f"; the path ends {'there' if at_end else f'near its peak, {fall_of(document, peak):.1%} below it'}"
+    events = {"the first break": peak.get("first_break_event"), f"the {largest}": peak["event"]}
     errors = {words: document["path"][event].get("mesh_error") for words, event in events.items() if event is not None}
     known = [f"{error:.1e} at {words}" for words, error in errors.items() if error is not None]
     text += f"; mesh error of the energy {', '.join(known)}" if known else ""

@@ -163,7 +163,7 @@ def test_the_table_of_a_load() -> None:
 
 def test_many_points_are_some_rows(tmp_path: Path) -> None:
     peak, table = answers(path(500), page.MOST_ROWS)
-    assert peak.title == "Peak of the path" and peak.cells[0][0] in ("first break", "peak")
+    assert peak.title == "Largest stress of the path" and peak.cells[0][0] in ("first break", "largest stress")
     last = dict(zip((column.name for column in table.columns), table.cells[-1], strict=True))
     expected = {"bonded": "5", "open": "3", "closed": "2", "load_factor": "1", "S11": "3", "S22": "1", "S12": "0"}
     assert {name: last[name] for name in expected} == expected and table.title.endswith("stress (GPa)")

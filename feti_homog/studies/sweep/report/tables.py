@@ -68,7 +68,12 @@ OUTPUT_COLUMNS = (
     Column("work", STRESS, "work of the loads along a path, per area of the cell"),
     Column("onset_Sij", STRESS, "macroscopic stress where the first bond of a path breaks or softens"),
     Column("onset_STRAIN", "", "macroscopic strain where the first bond of a path breaks or softens"),
-    Column("peak_Sij", STRESS, "largest in magnitude of a path, with its sign; of the leading strain as `peak` has it"),
+    Column(
+        "peak_Sij",
+        STRESS,
+        "largest in magnitude of a path, with its sign, also where it ends before it falls; of the leading strain as "
+        "`peak` has it",
+    ),
     Column("peak_STRAIN", "", "strain at the peak of the stress of the component whose strain leads"),
     Column("end_Sij", STRESS, "macroscopic stress at the end of a path"),
     Column("end_STRAIN", "", "macroscopic strain at the end of a path"),

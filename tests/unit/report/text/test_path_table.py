@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+import pytest
+
 from feti_homog.report.text.path_table import _peak_lines
+from feti_homog.results.landmarks import marks, peak_of
 
 
 def test_what_is_left_is_that_after_the_peak() -> None:
@@ -14,8 +17,41 @@ def test_what_is_left_is_that_after_the_peak() -> None:
         "event_left": 3, "first_break_stress": 30.0, "first_break_strain": 0.005, "first_break_event": 2,
     }  # fmt: skip
     case = {"analysis": {"plane": "strain"}, "path": {"method": "events", "strain": [1.0, 0.0, 0.0]}}
-    lines = _peak_lines({"case": case, "path": [{}] * 4}, peak, " (MPa)")
+    lines = _peak_lines({"case": case, "path": [{"stress": [0.0, 0.0, 0.0]}] * 4}, peak, " (MPa)")
     assert " ".join(" ".join(lines).split()) == (
         "Peak S11 (MPa): 40 at E11 = 0.006 (point 1); first break 30 at 0.005 (point 2); "
         "20 after the peak as the strain rises, 50.0% less (point 3)"
     )
+
+
+def along(stresses: list[float], broke: int = 0) -> dict[str, Any]:
+    """Return a path to a strain of 0.01 with these stresses, whose last bonds break under the last but one."""
+    n = len(stresses)
+    points = [
+        {"load_factor": k / n, "strain": [0.01 * k / n, 0.0, 0.0], "stress": [s, 0.0, 0.0], "broke": broke * (k < n)}
+        for k, s in enumerate(stresses, start=1)
+    ]
+    case = {"analysis": {"plane": "strain"}, "path": {"method": "increments", "strain": [0.01, 0.0, 0.0]}}
+    return {"case": case, "path": points}
+
+
+@pytest.mark.parametrize(
+    ("stresses", "broke", "begins", "ends", "mark"),
+    [
+        ([30, 51.95, 51.75], 0, "Largest S11: 51.95 at", "; the path ends near its peak, 0.4% below it",
+         "largest stress"),
+        ([-30, -51.95, -51.75], 0, "Largest S11: -51.95 at", "near its peak, 0.4% below it", "largest stress"),
+        ([30, 100, 96], 1, "Largest S11: 100 at", "; 96 after the largest stress, 4.0% less (point 2); the path ends "
+         "near its peak, 4.0% below it", "largest stress"),
+        ([30, 100, 94], 1, "Peak S11: 100 at", "; 94 after the peak, 6.0% less (point 2)", "peak"),
+        ([10, 60, 40, 59], 1, "Peak S11: 60 at", "; 40 after the peak, 33.3% less (point 2)", "peak"),
+        ([10, 20, 30], 0, "Largest S11: 30 at", " (point 2); the path ends there", "largest stress and end"),
+        ([10, 30, -30], 0, "Peak S11: 30 at", "E11 = 0.00666667 (point 1)", "peak"),
+    ],
+)  # fmt: skip
+def test_a_peak_is_a_stress_after_which_the_path_falls(stresses, broke, begins, ends, mark) -> None:
+    document = along([float(stress) for stress in stresses], broke)
+    peak = peak_of(document)
+    words = " ".join(" ".join(_peak_lines(document, peak, "")).split())
+    assert words.startswith(begins) and words.endswith(ends)
+    assert marks(document)[peak["event"]].removeprefix("first break and ") == mark

@@ -167,10 +167,10 @@ def test_a_path_is_a_table_of_chosen_points() -> None:
     assert line(text, "Stored").endswith("per area (GPa): 70, 10 of it in springs")
     assert line(text, "Toughness").endswith("per area (GPa): 40; 1.2500 times it was dissipated")
     assert line(text, "Debonded") == "Debonded: 50.0 % of the interfaces"
-    assert line(text, "Peak") == "Peak S22 (GPa): -350 at E22 = -0.2 (point 100); first break 0 at 0 (point 0)"
+    assert line(text, "Largest") == "Largest S22 (GPa): -350 at E22 = -0.2 (point 100); first break 0 at 0 (point"
     points[100] |= {"mesh_error": 1e-4}
     words = " ".join(summary(document).split())
-    assert "; mesh error of the energy 1.0e-04 at the peak" in words
+    assert "; mesh error of the energy 1.0e-04 at the largest stress" in words
     rows = [words.split() for words in text.splitlines() if words[:5].strip().isdigit()]
     assert len(rows) == 15
     assert rows[0] == ["0", "0", "0", "0", "-2", "0.000000", "100", "9", "1"]
