@@ -207,7 +207,8 @@ class MeasuredCurve:
 
     file: Path = key(
         file_name("the name of a .csv file", ".csv"),
-        "A table with a head: a column of strains, such as E11, that rise with the load, and one of stresses, S11.",
+        "A table with a head: a column of strains, such as E11, that rise with the load, and one of stresses, S11. "
+        "Columns are parted as in tables of fibres.",
     )
     std: float = key(STD, "Standard deviation of each stress.", unit="stress")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -53,13 +54,20 @@ def add(actions: argparse._SubParsersAction[Any]) -> None:
     _add_case_options(scatter, _uncertainty)
 
 
+def integer(word: str) -> int:
+    """Return the integer that a word is, without the underscores that Python allows. Raises ValueError."""
+    if not re.fullmatch(r"[+-]?[0-9]{1,9}", word):
+        raise ValueError
+    return int(word)
+
+
 def _add_case_options(parser: argparse.ArgumentParser, action: Action) -> None:
     """Give a command that runs many cases its action and the options of all of them."""
     parser.set_defaults(action=action)
     parser.add_argument("--retry", action="store_true", help="compute failed cases again")
     parser.add_argument(
         "--ranks-per-case",
-        type=int,
+        type=integer,
         metavar="R",
         help="run as many cases at once as there are groups of R ranks (by default one, on all ranks)",
     )
@@ -72,7 +80,7 @@ def _add_sweep(actions: argparse._SubParsersAction[Any]) -> None:
     parser.add_argument("--out", type=folder, metavar="DIR", help="folder of the sweep, in which each case has its own")
     one = parser.add_mutually_exclusive_group()
     one.add_argument("--list", action="store_true", help="print the cases, with --out also their status; run none")
-    one.add_argument("--index", type=int, metavar="K", help="run case K alone, counted from 1, as a job array does")
+    one.add_argument("--index", type=integer, metavar="K", help="run case K alone, counted from 1, as a job array does")
     _add_case_options(parser, _sweep)
 
 

@@ -20,9 +20,12 @@ from feti_homog.microstructure.table_columns import (
     NUMBERS,
     SourceColumn,
     are_units,
+    cells_of,
+    delimiter_of,
     lines_of,
     misspelt,
     number_of,
+    row_fault,
     understood,
 )
 from feti_homog.schema.values import is_number
@@ -132,8 +135,8 @@ def read_table(path: Path, columns: Sequence[str] | None = None) -> FibreTable:
             lines.append((number, contents))
     if not lines:
         raise CaseError(*faults.lines, f"{name}: no rows; expected a line of names such as x, y, radius, then fibres")
-    delimiter = next((mark for mark in ";\t," if mark in lines[0][1]), None)
-    words = [_bare(word) for word in lines[0][1].split(delimiter)] if columns is None else list(columns)
+    delimiter = delimiter_of(lines[0][1])
+    words = cells_of(lines[0][1], delimiter) if columns is None else list(columns)
     read, others = understood(words, COLUMNS)
     _check_names(words, read, others, lines[0][0], faults)
     faults.throw()
@@ -173,14 +176,10 @@ class _Faults:
 
 def _below_names(lines: list[tuple[int, str]], has_names: bool, delimiter: str | None) -> list[tuple[int, str]]:
     """Return the lines of fibres: without the first if it has names, or no numbers, and without a next one of units."""
-    first, *others = [[_bare(word) for word in line.split(delimiter)] for _, line in lines[:2]]
+    first, *others = [cells_of(line, delimiter) for _, line in lines[:2]]
     if not has_names and any(number_of(word, delimiter) is not None for word in first):
         return lines
     return lines[2 if others and are_units(others[0]) else 1 :]
-
-
-def _bare(word: str) -> str:
-    return word.strip().strip('"').strip()
 
 
 def _read_sizes(comment: str, row: int, sizes: dict[str, float], faults: _Faults) -> None:
@@ -226,14 +225,11 @@ def _split(
 ) -> Iterator[tuple[int, dict[str, Any]]]:
     """Each row's number, and its cells by column: numbers, texts, and nothing for cells that are empty."""
     for row, line in lines:
-        if line.count('"') % 2:
-            faults.add(row, "a quotation mark is not closed")
-            continue
-        words = [_bare(word) for word in line.split(delimiter)]
-        if len(words) != count:
-            faults.add(row, f"has {len(words)} columns; expected {count}, as there are names")
-            continue
-        yield row, {c.name: c.read(words[c.place], delimiter) for c in columns if words[c.place]}
+        words = cells_of(line, delimiter)
+        if fault := row_fault(line, words, count):
+            faults.add(row, fault)
+        else:
+            yield row, {c.name: c.read(words[c.place], delimiter) for c in columns if words[c.place]}
 
 
 def _table(

@@ -70,6 +70,23 @@ def _text(path: Path) -> str:
         raise CaseError(f"{path.name}: expected text in UTF-8; it has other bytes at {place}") from error
 
 
+def delimiter_of(line: str) -> str | None:
+    """Return what parts the columns of a table whose first line this is; None of spaces."""
+    return next((mark for mark in ";\t," if mark in line), None)
+
+
+def cells_of(line: str, delimiter: str | None) -> list[str]:
+    """Return the cells of a row, without quotation marks."""
+    return [word.strip().strip('"').strip() for word in line.split(delimiter)]
+
+
+def row_fault(line: str, cells: Sequence[str], count: int) -> str:
+    """Return the fault of a row whose cells are not as many as the names are; empty if it has none."""
+    if line.count('"') % 2:
+        return "a quotation mark is not closed"
+    return "" if len(cells) == count else f"has {len(cells)} columns; expected {count}, as there are names"
+
+
 UNITS = "nm|um|µm|μm|mm|cm|m|px|pixels?|deg|degrees?"
 UNIT = re.compile(rf"\s*(\[[^]]*\]|\([^)]*\)|/\s*[^/]+|_({UNITS}))\s*$", re.IGNORECASE)
 ROW_UNIT = re.compile(rf"[\[(]?({UNITS}|°|-)[\])]?", re.IGNORECASE)

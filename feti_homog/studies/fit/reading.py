@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,13 +9,14 @@ from typing import Any
 
 from feti_homog.case.document import TomlPath
 from feti_homog.case.sections import CURVE, MEASURED, TEST, UNKNOWN, Measured, MeasuredCurve, Unknown
+from feti_homog.errors import CaseError
 from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES
+from feti_homog.microstructure.table_columns import cells_of, delimiter_of, lines_of, number_of, row_fault
 from feti_homog.schema.keys import TableReader, keys_of
 from feti_homog.schema.values import is_number
 from feti_homog.schema.wording import dotted_key, toml_value
 from feti_homog.studies.fit.predictions import Datum
 from feti_homog.studies.sweep.points import Assignment
-from feti_homog.system.runtime import input_files
 
 MOST_ROWS = 10_000
 LEAST_STD = 1e-12  # of the value: below it are the roundings of what is computed
@@ -99,8 +98,8 @@ class FitReader:
         path = self.folder / own.file
         try:
             names, rows = _curve_rows(path)
-        except (OSError, ValueError, csv.Error) as error:
-            words = error.strerror if isinstance(error, OSError) else error
+        except CaseError as error:
+            words = error.__cause__.strerror if isinstance(error.__cause__, OSError) else error
             self.faults.append(f"[{place}] {CURVE}.file = {toml_value(str(own.file))}: {words}")
             return []
         self._check_std(own.std, max((stress for _, stress in rows), key=abs), f"[{place}] {CURVE}.std")
@@ -124,25 +123,29 @@ def leaves(table: Mapping[str, Any], keys: Collection[str], above: TomlPath = ()
 
 
 def _curve_rows(path: Path) -> tuple[tuple[str, str], list[tuple[float, float]]]:
-    """Return the names of strain and stress, and the rows, of a table of a curve. Raises OSError, ValueError."""
-    reader = csv.DictReader(io.StringIO(input_files.read(path).decode("utf-8-sig")), skipinitialspace=True)
-    reader.fieldnames = named = [word.strip() for word in reader.fieldnames or ()]
-    strains, stresses = ([n for n in named if n in known] for known in (SPATIAL_STRAINS, SPATIAL_STRESSES))
-    if len(strains) != 1 or len(stresses) != 1:
-        raise ValueError(f"{path}: expected one column of a strain, as E11, and one of a stress, as S11")
-    names = strains[0], stresses[0]
-    rows = [_numbers(f"{path}, line {line}", row, names) for line, row in enumerate(reader, start=2)]
-    if not 0 < len(rows) <= MOST_ROWS:
-        raise ValueError(f"{path}: {len(rows)} rows; expected at least one and at most {MOST_ROWS}")
-    return names, rows
+    """Return the names of strain and stress, and the rows, of a table of a curve. Raises CaseError."""
+    lines = [(number, line) for number, line, _ in lines_of(path) if line]
+    head = lines[0][1] if lines else ""
+    delimiter = delimiter_of(head)
+    named = cells_of(head, delimiter)
+    strains, stresses = ([k for k, n in enumerate(named) if n in own] for own in (SPATIAL_STRAINS, SPATIAL_STRESSES))
+    if (len(strains), len(stresses)) != (1, 1):
+        raise CaseError(f"{path}: expected one column of a strain, as E11, and one of a stress, as S11")
+    if not 1 < len(lines) <= MOST_ROWS + 1:
+        raise CaseError(f"{path}: {len(lines) - 1} rows; expected at least one and at most {MOST_ROWS}")
+    rows = list[tuple[float, float]]()
+    for number, line in lines[1:]:
+        cells, place = cells_of(line, delimiter), f"{path}, line {number}"
+        if fault := row_fault(line, cells, len(named)):
+            raise CaseError(f"{place}: {fault}")
+        strain, stress = (_number(cells[k], delimiter, f"{place}: {named[k]}") for k in strains + stresses)
+        rows.append((strain, stress))
+    return (named[strains[0]], named[stresses[0]]), rows
 
 
-def _numbers(place: str, row: Mapping[str, Any], names: tuple[str, str]) -> tuple[float, float]:
-    """Return strain and stress of a row. Raises ValueError."""
-    try:
-        found = float(row[names[0]]), float(row[names[1]])
-    except (TypeError, ValueError):
-        raise ValueError(f"{place}: expected two numbers") from None
-    if not all(map(is_number, found)):
-        raise ValueError(f"{place}: expected finite numbers")
-    return found
+def _number(word: str, delimiter: str | None, place: str) -> float:
+    """Return the number that a cell is. Raises CaseError."""
+    value = number_of(word, delimiter)
+    if value is None or not is_number(value):
+        raise CaseError(f"{place} = {toml_value(word)}: expected a number")
+    return value

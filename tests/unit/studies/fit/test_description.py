@@ -87,7 +87,15 @@ def test_tests_are_changes_of_one_case(tmp_path):
     ("load", "table", "line"),
     [
         ("strain = [0.1, 0.0, 0.0]", "E11, S33\n0.01, 1.0\n", '[measured] curve: plane = "strain" has no S33'),
-        ("strain = [0.1, 0.0, 0.0]", f"E11, S11\n{'1' * 200_000}, 1.0\n", "field larger than field limit (131072)"),
+        ("strain = [0.1, 0.0, 0.0]", f"E11, S11\n{'1' * 200_000}, 1.0\n", "...: expected a number"),
+        ("strain = [0.1, 0.0, 0.0]", "E11,S11\n0,01,0,03\n", ", line 2: has 4 columns; expected 2, as there are names"),
+        ("strain = [0.1, 0.0, 0.0]", "E11,S11\n\n0.01\n", ", line 3: has 1 columns; expected 2, as there are names"),
+        ("strain = [0.1, 0.0, 0.0]", "E11,S11\n0.01,0_3.0\n", ', line 2: S11 = "0_3.0": expected a number'),
+        ("strain = [0.1, 0.0, 0.0]", "E11,S11\n0.01,nan\n", ', line 2: S11 = "nan": expected a number'),
+        ("strain = [0.1, 0.0, 0.0]", "E11,S11\n0.01,\n", ', line 2: S11 = "": expected a number'),
+        ("strain = [0.1, 0.0, 0.0]", 'E11,S11\n"0,01","3"\n', ", line 2: has 3 columns; expected 2, as there are"),
+        ("strain = [0.1, 0.0, 0.0]", "E11,E22,S11\n0.01,1,3\n", ": expected one column of a strain, as E11, and"),
+        ("strain = [0.1, 0.0, 0.0]", "", ": expected one column of a strain, as E11, and one of"),
         ("strain = [0.1, -0.2, 0.0]", "E11, S11\n0.01, 1.0\n",
          "[measured] curve: expected the strain that rises along the path, E22"),
         ("strain = [0.1, 0.0, 0.0]", "E11, S11\n0.0, 0.0\n-0.01, 1.0\n",
@@ -110,3 +118,11 @@ def test_curves_have_their_faults(tmp_path, load, table, line):
     text = (BASE if load is None else BASE.replace('"stiffness"', '"path"')) + unknown + end
     found = faults(text, tmp_path)
     assert len(found) == 1 and line in found[0], found
+
+
+def test_curves_may_have_decimal_commas_between_semicolons(tmp_path):
+    (tmp_path / "curve.csv").write_text("sep=;\nE11;time;S11\n0,01;2;3,5 # first\n")
+    end = '[measured]\ncurve = {file = "curve.csv", std = 0.1}\n' + PATH.partition("[path]")[0]
+    text = BASE.replace('"stiffness"', '"path"') + UNKNOWN + end + "[path]\nstrain = [0.1, 0.0, 0.0]\n"
+    (point,) = parse(tomllib.loads(text), tmp_path).data
+    assert (point.strain_name, point.strain, point.name, point.value) == ("E11", 0.01, "S11", 3.5)
