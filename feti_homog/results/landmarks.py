@@ -73,10 +73,15 @@ def peak_of(document: Document) -> dict[str, Any]:
     return {"strain_name": names[0], "stress_name": names[1], **found}
 
 
+def stresses_of(document: Document, peak: Document) -> list[float]:
+    """Return the stress of the component of a peak at each point."""
+    component = voigt_names(len(document["path"][0]["stress"]))[1].index(peak["stress_name"])
+    return [float(point["stress"][component]) for point in document["path"]]
+
+
 def fall_of(document: Document, peak: Document) -> float:
     """Return the share of its largest stress by which a path falls after it, to the valley or its end."""
-    component = voigt_names(len(document["path"][0]["stress"]))[1].index(peak["stress_name"])
-    left = (document["path"][-1]["stress"][component], peak.get("stress_left", peak["stress"]))
+    left = (stresses_of(document, peak)[-1], peak.get("stress_left", peak["stress"]))
     return max(1.0 - stress / peak["stress"] for stress in left) if peak["stress"] else 0.0
 
 

@@ -13,7 +13,7 @@ from feti_homog.materials.voigt import voigt_names
 from feti_homog.report.text.point_tables import COUNTS, WIDTH, columns_without_noise, counts, debonded, energies
 from feti_homog.report.text.table import Column, Table, without_noise
 from feti_homog.results import path_curves
-from feti_homog.results.landmarks import LARGEST, PEAK, chosen, fall_of, name_of, peak_of
+from feti_homog.results.landmarks import LARGEST, PEAK, chosen, fall_of, name_of, peak_of, stresses_of
 from feti_homog.typing import Document
 
 ROWS = 15  # of the table
@@ -87,13 +87,7 @@ def _peak_lines(document: Document, peak: Mapping[str, Any], label: str) -> list
     if "first_break_event" in peak:
         first, at = peak["first_break_stress"], peak["first_break_strain"]
         text += f"; first break {first:.6g} at {at:.6g} (point {peak['first_break_event']})"
-    if "event_left" in peak:
-        lost = 1.0 - peak["stress_left"] / peak["stress"]
-        rises = f" as the {path_curves.what_rises(document)} rises" if path_curves.is_proportional(document) else ""
-        text += f"; {peak['stress_left']:.6g} after the {largest}{rises}, {lost:.1%} less (point {peak['event_left']})"
-    if largest == LARGEST:
-        at_end = peak["event"] == len(document["path"]) - 1
-        text += f"; the path ends {'there' if at_end else f'near its peak, {fall_of(document, peak):.1%} below it'}"
+    text += _afterwards(document, peak, largest)
     events = {"the first break": peak.get("first_break_event"), f"the {largest}": peak["event"]}
     errors = {words: document["path"][event].get("mesh_error") for words, event in events.items() if event is not None}
     known = [f"{error:.1e} at {words}" for words, error in errors.items() if error is not None]
@@ -102,6 +96,22 @@ def _peak_lines(document: Document, peak: Mapping[str, Any], label: str) -> list
     if path_curves.scales_with_toughness(document):
         lines.append("Scaling: strains and stresses of the path are as the root of the toughness")
     return lines
+
+
+def _afterwards(document: Document, peak: Mapping[str, Any], largest: str) -> str:
+    """Return what comes after the largest stress in words: a valley, still larger stresses, an end near it."""
+    text, stresses = "", stresses_of(document, peak)
+    if "event_left" in peak:
+        lost = 1.0 - peak["stress_left"] / peak["stress"]
+        rises = f" as the {path_curves.what_rises(document)} rises" if path_curves.is_proportional(document) else ""
+        text += f"; {peak['stress_left']:.6g} after the {largest}{rises}, {lost:.1%} less (point {peak['event_left']})"
+    later = max(range(len(stresses)), key=lambda number: abs(stresses[number]))
+    if later > peak["event"] and abs(stresses[later]) > abs(peak["stress"]):
+        text += f"; later up to {stresses[later]:.6g} (point {later})"
+    if largest == LARGEST:
+        at_end = peak["event"] == len(stresses) - 1
+        text += f"; the path ends {'there' if at_end else f'near its peak, {fall_of(document, peak):.1%} below it'}"
+    return text
 
 
 def _closed_cycle(document: Document) -> str:
@@ -133,5 +143,6 @@ def _path_energies(document: Document, label: str) -> list[str]:
         lines.append(f"Heat of friction per area{label}: {last['friction_heat']:.6g}{_closed_cycle(document)}")
     if "dissipation_ratio" in last:
         ratio = f"{last['dissipation_ratio']:.4f} times it was dissipated"
-        lines.append(f"Toughness of broken bonds per area{label}: {last['fracture_energy']:.6g}; {ratio}")
+        bonds = "bonds that broke or softened" if "softened" in last else "broken bonds"
+        lines.append(f"Toughness of {bonds} per area{label}: {last['fracture_energy']:.6g}; {ratio}")
     return [*lines, *debonded(document, last)]

@@ -158,7 +158,8 @@ def _factorized(solver: Document) -> list[str]:
     if "factorizations" not in solver:
         return []
     coarse = f"coarse problem {_number(solver.get('coarse_factorizations', 0), 'time')}"
-    return _field("Factorized", [_number(solver["factorizations"], "subdomain"), coarse])
+    count = solver["factorizations"]  # of the axial problem too
+    return _field("Factorized", [f"{count} {'matrix' if count == 1 else 'matrices'} of subdomains", coarse])
 
 
 def _iterations(counts: Sequence[int]) -> list[str]:

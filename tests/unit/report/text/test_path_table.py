@@ -45,6 +45,8 @@ def along(stresses: list[float], broke: int = 0) -> dict[str, Any]:
          "near its peak, 4.0% below it", "largest stress"),
         ([30, 100, 94], 1, "Peak S11: 100 at", "; 94 after the peak, 6.0% less (point 2)", "peak"),
         ([10, 60, 40, 59], 1, "Peak S11: 60 at", "; 40 after the peak, 33.3% less (point 2)", "peak"),
+        ([10, 60, 40, 90], 1, "Peak S11: 60 at", "; 40 after the peak, 33.3% less (point 2); later up to 90 "
+         "(point 3)", "peak"),
         ([10, 20, 30], 0, "Largest S11: 30 at", " (point 2); the path ends there", "largest stress and end"),
         ([10, 30, -30], 0, "Peak S11: 30 at", "E11 = 0.00666667 (point 1)", "peak"),
     ],

@@ -176,7 +176,7 @@ def test_a_path_is_a_table_of_chosen_points() -> None:
     assert rows[0] == ["0", "0", "0", "0", "-2", "0.000000", "100", "9", "1"]
     assert rows[-1] == ["100", "-0.2", "0", "-350", "-2", "1.000000", "0", "9", "1"]
     assert line(text, "Iterations").endswith("5 to 29 a state, 425 for 25 states")
-    assert line(text, "Factorized").split(maxsplit=1)[1] == "3 subdomains, coarse problem 30 times"
+    assert line(text, "Factorized").split(maxsplit=1)[1] == "3 matrices of subdomains, coarse problem 30 times"
     assert line(text, "kkt_tension").endswith("pass") and line(text, "kkt_penetration").endswith("FAIL")
     assert "at most 1.0e-07; of contact 1.0e-06" in text
 
