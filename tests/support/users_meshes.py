@@ -21,10 +21,12 @@ def polar_cell(
     order: int = 1,
     size: float = 0.1,
     turn: float = 0.0,
+    **options: float,
 ) -> None:
     """Write a periodic mesh of the unit cell by gmsh's OpenCASCADE kernel, with one elliptic fibre about `centre`.
 
-    Its semi-axes are radius * stretch and radius, the first at `turn` radians from the horizontal."""
+    Its semi-axes are radius * stretch and radius, the first at `turn` radians from the horizontal.
+    `options` are those of gmsh's Mesh."""
     gmsh.initialize(interruptible=False)
     try:
         gmsh.option.setNumber("General.Terminal", 0)
@@ -45,7 +47,8 @@ def polar_cell(
         for axis in (0, 1):
             _make_periodic(axis)
         gmsh.option.setNumber("Mesh.MeshSizeMax", size)
-        gmsh.option.setNumber("Mesh.ElementOrder", order)
+        for name, value in {"ElementOrder": order, **options}.items():
+            gmsh.option.setNumber(f"Mesh.{name}", value)
         gmsh.model.mesh.generate(2)
         gmsh.write(str(path))
     finally:

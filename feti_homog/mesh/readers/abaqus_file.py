@@ -18,7 +18,7 @@ from feti_homog.typing import Int
 
 TRIANGLE = re.compile(r"(CPE|CPS|CPEG|DC2D|M3D|S|STRI|R3D)(3|6|65)[A-Z]*")
 # Quadrilaterals are cut in two, and rigid triangles have the shape of others.
-QUAD = re.compile(r"(CPE|CPS|CPEG|DC2D|M3D|S)4[A-Z]*5?|R3D4")
+QUAD = re.compile(r"(CPE|CPS|CPEG|DC2D|M3D|S|R3D)([489])[A-Z]*5?")
 LINE = re.compile(r"(T2D|T3D|B2|B3|DC1D)\w*")
 LINE_NODES = (2, 3)
 # Members that sets may have together, in any file; in one with more characters as many as these.
@@ -143,11 +143,11 @@ def _node_counts(kind: str) -> tuple[int, ...]:
     """Return the numbers of nodes that an element of this type may have."""
     if LINE.fullmatch(kind):
         return LINE_NODES
-    if QUAD.fullmatch(kind):
-        return (4,)
+    if quad := QUAD.fullmatch(kind):
+        return (int(quad[2]),)
     triangle = TRIANGLE.fullmatch(kind)
     if triangle is None:
-        expected = "only triangles of three or six nodes and quadrilaterals of four can be used"
+        expected = "only triangles of three or six nodes and quadrilaterals of four, eight or nine can be used"
         raise ValueError(f"elements are {kind or 'of no TYPE'}: {expected}")
     return (3,) if triangle[2] == "3" else (6,)
 

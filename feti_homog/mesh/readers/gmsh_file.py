@@ -19,7 +19,6 @@ from feti_homog.typing import Float, Int
 
 # What to do about other elements, by order and dimension.
 REMEDY = {
-    (2, 2): "do not recombine",
     (3, 1): "mesh with Mesh.ElementOrder = 1 or 2",
     (3, 2): "mesh with Mesh.ElementOrder = 1 or 2",
     (1, 3): "mesh the surfaces only",
@@ -27,8 +26,8 @@ REMEDY = {
     (3, 3): "mesh the surfaces only",
 }
 # gmsh's other types of elements; how many nodes a triangle of each type has, or a quadrilateral, which is cut in two.
-LINE_2, TRIANGLE_2, QUADRILATERAL = 8, 9, 3
-NODES_OF_TRIANGLES = {TRIANGLE: 3, TRIANGLE_2: 6, QUADRILATERAL: 4}
+LINE_2, TRIANGLE_2 = 8, 9
+NODES_OF_TRIANGLES = {TRIANGLE: 3, TRIANGLE_2: 6, 3: 4, 10: 9, 16: 8}
 
 # Numbers (m,), nodes (m, k) and entities (m,) of the elements of one type.
 Elements = tuple[Int, Int, Int]
@@ -99,7 +98,7 @@ def _lost(nodes: Int, elements: Mapping[int, Elements]) -> list[str]:
 
 
 def _other_kinds(nodes: Int, points: Float, elements: Mapping[int, Elements]) -> list[str]:
-    """Elements that are neither triangles of three or six nodes nor quadrilaterals of four, and the lack of these."""
+    """Elements that are neither triangles nor quadrilaterals of first or second order, and the lack of these."""
     faults = []
     kinds = [kind for kind in sorted(elements) if KINDS[kind][1] >= 1 and kind not in (LINE, LINE_2)]
     for kind in kinds:
@@ -108,8 +107,8 @@ def _other_kinds(nodes: Int, points: Float, elements: Mapping[int, Elements]) ->
             numbers, own, _ = elements[kind]
             centre = points[np.isin(nodes, own[0])].mean(axis=0)
             faults.append(
-                f"element {numbers[0]} at {at(centre)}, the first of {len(numbers)}, is a {name}: only "
-                f"triangles of three or six nodes, quadrilaterals of four and lines of two or three can be used "
+                f"element {numbers[0]} at {at(centre)}, the first of {len(numbers)}, is a {name}: only triangles of "
+                "three or six nodes, quadrilaterals of four, eight or nine and lines of two or three can be used "
                 f"({REMEDY[min(order, 3), dimension]})"
             )
     if not kinds:

@@ -13,12 +13,12 @@ from feti_homog.mesh.readers.scanner import Numbers
 from feti_homog.typing import Float, Int
 
 # Numbers of nodes by VTK's type of cell; quadrilaterals are cut in two triangles.
-TRIANGLES = {5: 3, 9: 4, 22: 6}
+TRIANGLES = {5: 3, 9: 4, 22: 6, 23: 8, 28: 9}
 LINES = {3: 2, 21: 3}
 POINTS = {1: 1}
 POLY_VERTEX, POLYGON, PIXEL = 2, 7, 8
 NAMES = {0: "empty cells", 4: "polylines", 6: "triangle strips", 7: "polygons", 10: "tetrahedra", 12: "hexahedra"}
-NAMES |= {13: "wedges", 14: "pyramids", 23: "quadrilaterals of eight nodes", 28: "quadrilaterals of nine nodes"}
+NAMES |= {13: "wedges", 14: "pyramids"}
 NAMES |= {34: "triangles of seven nodes", 42: "polyhedra", 69: "triangles of any order"}
 PHASE = "phase"
 # Cell data by which other programs number materials, in the order of precedence.
@@ -133,7 +133,7 @@ def _other_cells(grid: Grid) -> list[str]:
         wrong = own[counts[own] != known.get(kind, 0)]
         if kind not in known and kind not in POINTS:
             words = f"{len(own)} cells are {NAMES.get(kind, f'of type {kind}')}, the first is number"
-            expected = "only triangles of three or six nodes and quadrilaterals of four can be used"
+            expected = "only triangles of three or six nodes and quadrilaterals of four, eight or nine can be used"
             faults.append(f"{words} {own[0] + grid.first}: {expected}")
         elif kind in known and len(wrong):
             cell = f"cell {wrong[0] + grid.first}, of type {kind}, has {counts[wrong[0]]} nodes"

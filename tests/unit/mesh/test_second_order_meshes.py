@@ -32,6 +32,17 @@ def test_round_fibre_is_that_of_the_same_mesh_of_first_order(centre, tmp_path):
     assert len(second.points) == len(first.points) and len(second.triangles) == len(first.triangles)
 
 
+@pytest.mark.parametrize(("nodes", "suffix"), [(8, ".msh"), (9, ".msh"), (8, ".vtk"), (9, ".vtk"), (8, ".inp")])
+def test_quadrilaterals_of_second_order_are_round_fibres(nodes, suffix, tmp_path):
+    """Their middle nodes are on the circle, and diagonals have none."""
+    path = tmp_path / f"a{suffix}"
+    options = {"RecombineAll": 1, "SecondOrderIncomplete": int(nodes == 8), "SaveGroupsOfElements": 1}
+    polar_cell((0.5, 0.5), 0.3, path, order=2, size=0.2, **options)
+    mesh = read(path, phases={"matrix": (1,), "fibre": (2,)} if suffix == ".vtk" else {})
+    assert mesh.circles == pytest.approx(np.array([[0.5, 0.5, 0.3]]), abs=1e-8)
+    assert fibre_area(mesh, 2, 2) == pytest.approx(np.pi * 0.09, rel=1e-3)
+
+
 def test_few_edges_are_a_circle_if_their_middle_nodes_are_on_it(tmp_path):
     polar_cell((0.5, 0.5), 0.1, tmp_path / "round.msh", order=2, size=0.2)
     mesh = read(tmp_path / "round.msh")
