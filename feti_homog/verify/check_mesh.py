@@ -14,6 +14,10 @@ from feti_homog.verify.findings import Findings, relative
 
 # The mesher moves the tips of arcs by so many degrees at most; what is nearer to a tip is on neither side of it.
 AT_TIP = 0.06
+# Nodes of users' ellipses are within 1e-6 of these.
+OFF_ELLIPSE = 1e-5
+# Errors of lengths and normals of straight sides in place of unknown curves that turn by half a turn at most.
+MOST_OFF = np.pi / 2 - 1, np.sqrt(2.0)
 
 
 def check_arcs(findings: Findings, cell: DiscreteCell, states: Sequence[StateNumbers]) -> None:
@@ -88,43 +92,61 @@ def check_interface(findings: Findings, cell: DiscreteCell) -> None:
     misplaced = (faces.place >= 0) & (rows.pair != faces.pair[faces.place])
     findings.record("interface", np.where(misplaced, np.inf, 0.0), at)
     if (faces.place >= 0).all():
-        normal, length, is_round = _shape(cell)
-        turned, longer = np.hypot(*(rows.normal - normal).T), rows.length / length
-        # Of a fibre that is not round a side may be straight or an arc of half a turn at most.
-        rough = np.maximum(1.0 - longer, longer - np.pi / 2)
-        findings.record("interface", np.where(is_round, np.abs(longer - 1.0), np.maximum(rough, 0.0)), at)
-        findings.record("interface", np.where(is_round, turned, np.where(turned < np.sqrt(2.0), 0.0, turned)), at)
+        normal, length, slack = _shape(cell)
+        errors = np.abs(rows.length / length - 1.0), np.hypot(*(rows.normal - normal).T)
+        for error, most in zip(errors, MOST_OFF, strict=True):
+            findings.record("interface", np.where(error < np.minimum(slack, most), 0.0, error), at)
         findings.record("interface", np.abs(np.hypot(*rows.normal.T) - 1.0), at)
 
 
-def _shape(cell: DiscreteCell) -> tuple[Float, Float, Bool]:
-    """Return normals (k, 2) and tributary lengths (k,) that follow from the mesh, and whether (k,) fibres are round.
+def _shape(cell: DiscreteCell) -> tuple[Float, Float, Float]:
+    """Return normals (k, 2) and tributary lengths (k,) that follow from the mesh, and errors (k,) that both may have.
 
-    A round fibre has radial normals and sides that are arcs, 2 R arcsin(chord / 2 R); of others sides are taken as
-    straight, and a node has the mean normal of its sides.  Of its length a side gives each end one half or, of order 2,
-    one sixth, and its middle two thirds.
+    A round fibre has radial normals.  Each side adds to its nodes their shares of its dx / ds there, s in [0, 1]: one
+    half or, of order 2, one sixth of its ends and two thirds of its middle.
     """
-    files, sides, rows = cell.files, cell.sides, cell.files.interface
-    inner = cell.inner
-    # A coating has the number of its fibre and another radius.
-    own_radius = np.where(_is_fibre(cell), files.fibres.radius[rows.fibre - 1], np.nan)
-    row_of = np.full(len(files.mesh.points), -1)
+    files, rows, nodes = cell.files, cell.files.interface, cell.sides.nodes[cell.inner]
+    row_of, frames, k = np.full(len(files.mesh.points), -1), _frames(cell), len(rows.length)
     row_of[cell.nodes.node] = cell.faces.row
-    row = row_of[sides.nodes[inner]]
-    chord = np.hypot(*sides.normal[inner].T)
     # A side whose nodes are no interface nodes belongs to none of them.
-    radius = own_radius[row.max(axis=1)]
-    arc = np.where(np.isnan(radius), chord, 2 * radius * np.arcsin(np.minimum(chord / (2 * radius), 1.0)))
-    shares = np.array([0.5, 0.5] if row.shape[1] == 2 else [1 / 6, 1 / 6, 2 / 3])
-    known = row >= 0
-    k = len(rows.length)
-    length = np.bincount(row[known], (arc[:, None] * shares)[known], k)
-    parts = sides.normal[inner][:, None] * shares[:, None]
-    normal = np.stack([np.bincount(row[known], part[known], k) for part in np.moveaxis(parts, 2, 0)], axis=1)
-    centre, is_round = files.fibres.centre[rows.fibre - 1], ~np.isnan(own_radius)
-    radial = from_centre(rows.points, centre, files.size) / own_radius[:, None]
-    flat = normal / np.hypot(*normal.T)[:, None]
-    return np.asarray(np.where(is_round[:, None], radial, flat)), np.asarray(length, float), np.asarray(is_round)
+    row, is_quadratic = row_of[nodes], nodes.shape[1] == 3
+    parts = _tangents(files.mesh.points[nodes], frames[row.max(axis=1)])
+    parts *= np.array([1, 1, 4] if is_quadratic else [3, 3])[:, None] / 6
+    at, parts = row[row >= 0], parts[row >= 0]
+    length, y, x = (np.bincount(at, terms, k) for terms in (np.hypot(*parts.T), parts[:, 1], -parts[:, 0]))
+    normal = np.column_stack([y, x]) / np.hypot(x, y)[:, None]
+    radius = np.where(_is_fibre(cell), files.fibres.radius[rows.fibre - 1], np.nan)
+    is_round, is_ellipse = np.isfinite(radius), np.isfinite(frames[:, 0, 0])
+    radial = from_centre(rows.points, files.fibres.centre[rows.fibre - 1], files.size) / radius[:, None]
+    of_users = OFF_ELLIPSE if files.case["cell"]["geometry"] == "mesh" else 0.0
+    slack = np.select([is_round, is_ellipse, is_quadratic & _is_fibre(cell)], [0.0, of_users, 0.0], np.inf)
+    return np.where(is_round[:, None], radial, normal), np.asarray(length, float), np.asarray(slack)
+
+
+def _frames(cell: DiscreteCell) -> Float:
+    """(k, 2, 2) frame F of the circle or ellipse c + F p, |p| = 1, that each interface node is on; NaN if unknown."""
+    rows, own = cell.files.interface, cell.files.document["fibres"]
+    axes = np.array([fibre.get("semi_axes", [fibre.get("radius", np.nan)] * 2) for fibre in own], float)
+    angle = np.radians([fibre.get("angle", 0.0) for fibre in own])
+    thickness = np.array([fibre.get("coating", np.nan) for fibre in own], float)
+    around = np.stack([np.cos(angle), -np.sin(angle), np.sin(angle), np.cos(angle)], axis=1).reshape(-1, 2, 2)
+    of, coats = rows.fibre - 1, np.where(_is_fibre(cell), 0.0, thickness[rows.fibre - 1])
+    return np.asarray(around[of] * (axes[of] + coats[:, None])[:, None])
+
+
+def _tangents(points: Float, frame: Float) -> Float:
+    """(s, n, 2) dx / ds at the n nodes (s, n, 2) of sides, ends first, on ellipses of these frames (s, 2, 2).
+
+    The chord of a side is one of the unit circle that its ellipse is an image of; if that is NaN, the side is the arc
+    of a circle through its three nodes, or straight.
+    """
+    on_ellipse = np.isfinite(frame[:, 0, 0])
+    frame = np.where(on_ellipse[:, None, None], frame, np.eye(2))
+    chord = np.linalg.solve(frame, (points[:, 1] - points[:, 0])[..., None])[..., 0] @ [1, 1j]
+    bulge = (points[:, 2:].sum(axis=1) - points[:, :2].mean(axis=1)) @ [1, 1j] if points.shape[1] == 3 else 0.0
+    half = np.where(on_ellipse, np.arcsin(np.minimum(abs(chord) / 2, 1)), -2 * np.arctan(2 * (bulge / chord).imag))
+    ahead = (chord / np.sinc(half / np.pi))[:, None] * np.exp(1j * half[:, None] * [-1, 1, 0][: points.shape[1]])
+    return np.einsum("sij,snj->sni", frame, np.stack([ahead.real, ahead.imag], axis=2))
 
 
 def from_centre(points: Float, centres: Float, size: Float) -> Float:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import block_diag, helmert
 from scipy.sparse import coo_matrix, csr_matrix
 
-from feti_homog.feti.decomposition.shared_entities import SharedEntities, along, mean_speed
+from feti_homog.feti.decomposition.shared_entities import SharedEntities, along
 from feti_homog.mesh.refinement import FineMesh, ReferenceLattice, edge_node
 from feti_homog.mesh.submesh import Submesh
 from feti_homog.typing import Bool, Float, Int
@@ -158,24 +158,26 @@ class ConstraintLayout:
         """(i,) where fine node p of the entities is, in [0, 1] along edges."""
         return np.where(self.shared.is_edge[entity], (p + 1) / self.lattice.intervals, 0.0)
 
+    def _scaled_normals(self, entity: Int, p: Int) -> Float:
+        """(i, 2) normals at fine node p of the entities, as long as `SharedEntities.normal`."""
+        return along(self.shared.normal[entity], self.shared.turn[entity], self._places(entity, p))
+
     def _normals(self, entity: Int, p: Int) -> Float:
         """(i, 2) unit normals at fine node p of the entities."""
-        shared = self.shared
-        normal = along(shared.normal[entity], shared.turn[entity], self._places(entity, p))
+        normal = self._scaled_normals(entity, p)
         return np.asarray(normal / np.hypot(*normal.T)[:, None])
 
     def _lengths(self, entity: Int, p: Int) -> Float:
-        """(i,) row sums of the interface mass matrix.
+        """(i,) weights of integrals along the exact curve: trapezoidal rule, Simpson's of quadratic elements.
 
-        Halves of sides for linear elements, Simpson's rule for quadratic ones.
+        Each side that meets in a node adds its share of |dx / ds|, as long as it is on that side.
         """
-        shared, lattice = self.shared, self.lattice
-        is_edge = shared.is_edge[entity]
-        in_middle = is_edge & (p % 2 == 0) & (lattice.order == 2)
-        weight = np.where(in_middle, 4, 2) / 3 if lattice.order == 2 else np.ones(len(p))
-        place, reach = self._places(entity, p), np.where(in_middle, 1, lattice.order) / lattice.intervals
-        length = mean_speed(shared.normal[entity], shared.turn[entity], place - reach, place + reach)
-        return np.asarray(weight * np.where(is_edge, 1.0, 0.5) * length / lattice.intervals)
+        is_edge, order = self.shared.is_edge[entity], self.lattice.order
+        in_middle = is_edge & (p % 2 == 0) & (order == 2)
+        share = np.where(in_middle, 2 / 3, 1 / 6) if order == 2 else 1 / 2
+        # At vertices the normals of two sides are added already.
+        sides = np.where(is_edge & ~in_middle, 2, 1) * order / self.lattice.intervals
+        return np.asarray(share * sides * np.hypot(*self._scaled_normals(entity, p).T))
 
     def node_rows(self) -> tuple[Int, Int]:
         """First owned row and number of rows of each fine node whose rows are owned."""

@@ -1,12 +1,11 @@
-"""Normals and lengths along arcs: against the ellipse itself, and against straight lines."""
+"""Normals along arcs: against the ellipse itself, and against straight lines."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.special import ellipeinc
 
-from feti_homog.feti.decomposition.shared_entities import along, mean_speed
+from feti_homog.feti.decomposition.shared_entities import along
 from feti_homog.microstructure.shapes.ellipses import Ellipses
 
 A, B = 0.5, 0.2
@@ -27,18 +26,7 @@ def test_between_the_ends_of_an_arc_is_what_the_ellipse_has():
     assert normal == pytest.approx(own.normal(start + place * turn), abs=1e-14)
 
 
-def test_speeds_add_up_to_the_elliptic_integral():
-    corners = np.linspace(0, np.pi / 2, 9)
-    turn = np.diff(corners)
-    ends = np.stack([tangents(corners[:-1], turn), tangents(corners[1:], turn)], axis=1)
-    whole = mean_speed(ends, turn, np.zeros(8), np.ones(8)).sum()
-    assert whole == pytest.approx(A * ellipeinc(np.pi / 2, 1 - (B / A) ** 2), rel=1e-8)
-    halves = [mean_speed(ends, turn, np.full(8, s), np.full(8, s + 0.5)).sum() / 2 for s in (0, 0.5)]
-    assert sum(halves) == pytest.approx(whole, rel=1e-8)
-
-
 def test_along_straight_edges_nothing_turns():
     ends = np.repeat(np.random.default_rng(0).normal(size=(5, 1, 2)), 2, axis=1)
     place = np.linspace(0, 1, 5)
     assert along(ends, np.zeros(5), place) == pytest.approx(ends[:, 0], rel=1e-15)
-    assert mean_speed(ends, np.zeros(5), place, place + 1) == pytest.approx(np.hypot(*ends[:, 0].T), rel=1e-14)
