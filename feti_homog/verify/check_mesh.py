@@ -118,8 +118,9 @@ def _shape(cell: DiscreteCell) -> tuple[Float, Float, Float]:
     radius = np.where(_is_fibre(cell), files.fibres.radius[rows.fibre - 1], np.nan)
     is_round, is_ellipse = np.isfinite(radius), np.isfinite(frames[:, 0, 0])
     radial = from_centre(rows.points, files.fibres.centre[rows.fibre - 1], files.size) / radius[:, None]
-    of_users = OFF_ELLIPSE if files.case["cell"]["geometry"] == "mesh" else 0.0
-    slack = np.select([is_round, is_ellipse, is_quadratic & _is_fibre(cell)], [0.0, of_users, 0.0], np.inf)
+    of_users = files.case["cell"]["geometry"] == "mesh"
+    on_arcs = is_quadratic & (_is_fibre(cell) | (not of_users))
+    slack = np.select([is_round, is_ellipse, on_arcs], [0.0, OFF_ELLIPSE * of_users, 0.0], np.inf)
     return np.where(is_round[:, None], radial, normal), np.asarray(length, float), np.asarray(slack)
 
 
@@ -146,7 +147,7 @@ def _tangents(points: Float, frame: Float) -> Float:
     bulge = (points[:, 2:].sum(axis=1) - points[:, :2].mean(axis=1)) @ [1, 1j] if points.shape[1] == 3 else 0.0
     half = np.where(on_ellipse, np.arcsin(np.minimum(abs(chord) / 2, 1)), -2 * np.arctan(2 * (bulge / chord).imag))
     ahead = (chord / np.sinc(half / np.pi))[:, None] * np.exp(1j * half[:, None] * [-1, 1, 0][: points.shape[1]])
-    return np.einsum("sij,snj->sni", frame, np.stack([ahead.real, ahead.imag], axis=2))
+    return np.asarray(np.einsum("sij,snj->sni", frame, np.stack([ahead.real, ahead.imag], axis=2)))
 
 
 def from_centre(points: Float, centres: Float, size: Float) -> Float:

@@ -21,12 +21,14 @@ def polar_cell(
     order: int = 1,
     size: float = 0.1,
     turn: float = 0.0,
+    halvings: int = 0,
+    wave: float = 0.0,
     **options: float,
 ) -> None:
     """Write a periodic mesh of the unit cell by gmsh's OpenCASCADE kernel, with one elliptic fibre about `centre`.
 
-    Its semi-axes are radius * stretch and radius, the first at `turn` radians from the horizontal.
-    `options` are those of gmsh's Mesh."""
+    Its semi-axes are radius * stretch and radius, the first at `turn` radians from the horizontal. Elements are halved
+    so many times, and then all nodes are moved as `waved` moves them. `options` are those of gmsh's Mesh."""
     gmsh.initialize(interruptible=False)
     try:
         gmsh.option.setNumber("General.Terminal", 0)
@@ -47,12 +49,25 @@ def polar_cell(
         for axis in (0, 1):
             _make_periodic(axis)
         gmsh.option.setNumber("Mesh.MeshSizeMax", size)
-        for name, value in {"ElementOrder": order, **options}.items():
+        for name, value in options.items():
             gmsh.option.setNumber(f"Mesh.{name}", value)
         gmsh.model.mesh.generate(2)
+        for _ in range(halvings):
+            gmsh.model.mesh.refine()
+        gmsh.model.mesh.setOrder(order)
+        tags, places, _ = gmsh.model.mesh.getNodes()
+        moved = waved(places.reshape(-1, 3)[:, :2], wave)
+        for tag, (x, y) in zip(tags, moved, strict=True) if wave else ():
+            gmsh.model.mesh.setNode(tag, [x, y, 0.0], [])
         gmsh.write(str(path))
     finally:
         gmsh.finalize()
+
+
+def waved(points: np.ndarray, wave: float) -> np.ndarray:
+    """Points (n, 2) of the unit cell moved by a smooth map of the torus that keeps its sides."""
+    x, y = 2 * np.pi * points.T
+    return points + wave * np.stack([np.sin(x) * np.cos(y), np.sin(y) * np.sin(x)], axis=1)
 
 
 def _make_periodic(axis: int) -> None:
