@@ -14,8 +14,6 @@ from feti_homog.verify.findings import Findings, relative
 
 # The mesher moves the tips of arcs by so many degrees at most; what is nearer to a tip is on neither side of it.
 AT_TIP = 0.06
-# Nodes of users' ellipses are within 1e-6 of these.
-OFF_ELLIPSE = 1e-5
 # Errors of lengths and normals of straight sides in place of unknown curves that turn by half a turn at most.
 MOST_OFF = np.pi / 2 - 1, np.sqrt(2.0)
 
@@ -92,15 +90,15 @@ def check_interface(findings: Findings, cell: DiscreteCell) -> None:
     misplaced = (faces.place >= 0) & (rows.pair != faces.pair[faces.place])
     findings.record("interface", np.where(misplaced, np.inf, 0.0), at)
     if (faces.place >= 0).all():
-        normal, length, slack = _shape(cell)
+        normal, length, is_known = _shape(cell)
         errors = np.abs(rows.length / length - 1.0), np.hypot(*(rows.normal - normal).T)
         for error, most in zip(errors, MOST_OFF, strict=True):
-            findings.record("interface", np.where(error < np.minimum(slack, most), 0.0, error), at)
+            findings.record("interface", np.where(is_known | (error > most), error, 0.0), at)
         findings.record("interface", np.abs(np.hypot(*rows.normal.T) - 1.0), at)
 
 
-def _shape(cell: DiscreteCell) -> tuple[Float, Float, Float]:
-    """Return normals (k, 2) and tributary lengths (k,) that follow from the mesh, and errors (k,) that both may have.
+def _shape(cell: DiscreteCell) -> tuple[Float, Float, Bool]:
+    """Return normals (k, 2) and tributary lengths (k,) that follow from the mesh, and which (k,) do exactly.
 
     A round fibre has radial normals.  Each side adds to its nodes their shares of its dx / ds there, s in [0, 1]: one
     half or, of order 2, one sixth of its ends and two thirds of its middle.
@@ -116,12 +114,12 @@ def _shape(cell: DiscreteCell) -> tuple[Float, Float, Float]:
     length, y, x = (np.bincount(at, terms, k) for terms in (np.hypot(*parts.T), parts[:, 1], -parts[:, 0]))
     normal = np.column_stack([y, x]) / np.hypot(x, y)[:, None]
     radius = np.where(_is_fibre(cell), files.fibres.radius[rows.fibre - 1], np.nan)
-    is_round, is_ellipse = np.isfinite(radius), np.isfinite(frames[:, 0, 0])
+    is_round = np.isfinite(radius)
     radial = from_centre(rows.points, files.fibres.centre[rows.fibre - 1], files.size) / radius[:, None]
-    of_users = files.case["cell"]["geometry"] == "mesh"
-    on_arcs = is_quadratic & (_is_fibre(cell) | (not of_users))
-    slack = np.select([is_round, is_ellipse, on_arcs], [0.0, OFF_ELLIPSE * of_users, 0.0], np.inf)
-    return np.where(is_round[:, None], radial, normal), np.asarray(length, float), np.asarray(slack)
+    # Coatings of users' meshes may be on ellipses of which the files tell nothing.
+    on_arcs = is_quadratic & (_is_fibre(cell) | (files.case["cell"]["geometry"] != "mesh"))
+    is_known = is_round | np.isfinite(frames[:, 0, 0]) | on_arcs
+    return np.where(is_round[:, None], radial, normal), np.asarray(length, float), np.asarray(is_known)
 
 
 def _frames(cell: DiscreteCell) -> Float:
