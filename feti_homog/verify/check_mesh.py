@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.special import roots_legendre
 
 from feti_homog.typing import AnyInt, Bool, Float, Int
 from feti_homog.verify.check_fields import BONDED
@@ -100,19 +101,22 @@ def check_interface(findings: Findings, cell: DiscreteCell) -> None:
 def _shape(cell: DiscreteCell) -> tuple[Float, Float, Bool]:
     """Return normals (k, 2) and tributary lengths (k,) that follow from the mesh, and which (k,) do exactly.
 
-    A round fibre has radial normals.  Each side adds to its nodes their shares of its dx / ds there, s in [0, 1]: one
-    half or, of order 2, one sixth of its ends and two thirds of its middle.
+    A round fibre has radial normals.  Ends of linear sides have halves of their lengths, nodes of quadratic ones
+    int N ds; a node has the mean normal of its sides, weighted by these parts.
     """
     files, rows, nodes = cell.files, cell.files.interface, cell.sides.nodes[cell.inner]
     row_of, frames, k = np.full(len(files.mesh.points), -1), _frames(cell), len(rows.length)
     row_of[cell.nodes.node] = cell.faces.row
     # A side whose nodes are no interface nodes belongs to none of them.
     row, is_quadratic = row_of[nodes], nodes.shape[1] == 3
-    parts = _tangents(files.mesh.points[nodes], frames[row.max(axis=1)])
-    parts *= np.array([1, 1, 4] if is_quadratic else [3, 3])[:, None] / 6
-    at, parts = row[row >= 0], parts[row >= 0]
-    length, y, x = (np.bincount(at, terms, k) for terms in (np.hypot(*parts.T), parts[:, 1], -parts[:, 0]))
-    normal = np.column_stack([y, x]) / np.hypot(x, y)[:, None]
+    points, frame, (x, weights) = files.mesh.points[nodes], frames[row.max(axis=1)], roots_legendre(7)
+    shares = np.stack([x * (x - 1), x * (x + 1), 2 - 2 * x * x]) / 2 if is_quadratic else np.full((2, len(x)), 0.5)
+    parts = np.linalg.norm(_tangents(points, frame, x), axis=2) * weights / 2 @ shares.T
+    ahead = _tangents(points, frame, np.array([-1.0, 1.0, 0.0])[: nodes.shape[1]])
+    ahead *= (parts / np.linalg.norm(ahead, axis=2))[..., None]
+    at, known = row[row >= 0], row >= 0
+    length, right, up = (np.bincount(at, terms[known], k) for terms in (parts, ahead[..., 0], ahead[..., 1]))
+    normal = np.column_stack([up, -right]) / np.hypot(right, up)[:, None]
     radius = np.where(_is_fibre(cell), files.fibres.radius[rows.fibre - 1], np.nan)
     is_round = np.isfinite(radius)
     radial = from_centre(rows.points, files.fibres.centre[rows.fibre - 1], files.size) / radius[:, None]
@@ -133,18 +137,18 @@ def _frames(cell: DiscreteCell) -> Float:
     return np.asarray(around[of] * (axes[of] + coats[:, None])[:, None])
 
 
-def _tangents(points: Float, frame: Float) -> Float:
-    """(s, n, 2) dx / ds at the n nodes (s, n, 2) of sides, ends first, on ellipses of these frames (s, 2, 2).
+def _tangents(points: Float, frame: Float, places: Float) -> Float:
+    """(s, q, 2) dx / ds, s in [0, 1], of sides with these nodes (s, n, 2), ends first, at `places` (q,) in [-1, 1].
 
-    The chord of a side is one of the unit circle that its ellipse is an image of; if that is NaN, the side is the arc
-    of a circle through its three nodes, or straight.
+    The chord of a side is one of the unit circle that its ellipse, of frame (s, 2, 2), is an image of; if that is NaN,
+    the side is the arc of a circle through its three nodes, or straight.
     """
     on_ellipse = np.isfinite(frame[:, 0, 0])
     frame = np.where(on_ellipse[:, None, None], frame, np.eye(2))
     chord = np.linalg.solve(frame, (points[:, 1] - points[:, 0])[..., None])[..., 0] @ [1, 1j]
     bulge = (points[:, 2:].sum(axis=1) - points[:, :2].mean(axis=1)) @ [1, 1j] if points.shape[1] == 3 else 0.0
     half = np.where(on_ellipse, np.arcsin(np.minimum(abs(chord) / 2, 1)), -2 * np.arctan(2 * (bulge / chord).imag))
-    ahead = (chord / np.sinc(half / np.pi))[:, None] * np.exp(1j * half[:, None] * [-1, 1, 0][: points.shape[1]])
+    ahead = (chord / np.sinc(half / np.pi))[:, None] * np.exp(1j * half[:, None] * places)
     return np.asarray(np.einsum("sij,snj->sni", frame, np.stack([ahead.real, ahead.imag], axis=2)))
 
 

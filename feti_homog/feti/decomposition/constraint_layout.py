@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import block_diag, helmert
 from scipy.sparse import coo_matrix, csr_matrix
 
-from feti_homog.feti.decomposition.shared_entities import SharedEntities, along
+from feti_homog.feti.decomposition.shared_entities import SharedEntities, along, side_lengths
 from feti_homog.mesh.refinement import FineMesh, ReferenceLattice, edge_node
 from feti_homog.mesh.submesh import Submesh
 from feti_homog.typing import Bool, Float, Int
@@ -158,26 +158,23 @@ class ConstraintLayout:
         """(i,) where fine node p of the entities is, in [0, 1] along edges."""
         return np.where(self.shared.is_edge[entity], (p + 1) / self.lattice.intervals, 0.0)
 
-    def _scaled_normals(self, entity: Int, p: Int) -> Float:
-        """(i, 2) normals at fine node p of the entities, as long as `SharedEntities.normal`."""
-        return along(self.shared.normal[entity], self.shared.turn[entity], self._places(entity, p))
-
     def _normals(self, entity: Int, p: Int) -> Float:
         """(i, 2) unit normals at fine node p of the entities."""
-        normal = self._scaled_normals(entity, p)
+        shared = self.shared
+        normal = along(shared.normal[entity], shared.turn[entity], self._places(entity, p))
         return np.asarray(normal / np.hypot(*normal.T)[:, None])
 
     def _lengths(self, entity: Int, p: Int) -> Float:
-        """(i,) weights of integrals along the exact curve: trapezoidal rule, Simpson's of quadratic elements.
-
-        Each side that meets in a node adds its share of |dx / ds|, as long as it is on that side.
-        """
-        is_edge, order = self.shared.is_edge[entity], self.lattice.order
+        """(i,) sums over the sides at fine node p of int N ds along the curve; of linear elements, halves of these."""
+        shared, order = self.shared, self.lattice.order
+        normal, turn, place = shared.normal[entity], shared.turn[entity], self._places(entity, p)
+        side, is_edge = order / self.lattice.intervals, shared.is_edge[entity]
         in_middle = is_edge & (p % 2 == 0) & (order == 2)
-        share = np.where(in_middle, 2 / 3, 1 / 6) if order == 2 else 1 / 2
-        # At vertices the normals of two sides are added already.
-        sides = np.where(is_edge & ~in_middle, 2, 1) * order / self.lattice.intervals
-        return np.asarray(share * sides * np.hypot(*self._scaled_normals(entity, p).T))
+        before, after, around = (
+            side_lengths(normal, turn, place - part * side, order, side) for part in (1.0, 0.0, 0.5)
+        )
+        edge = np.where(in_middle, around[:, 1], before[:, -1] + after[:, 0])
+        return np.where(is_edge, edge, np.hypot(*normal[:, 0].T))
 
     def node_rows(self) -> tuple[Int, Int]:
         """First owned row and number of rows of each fine node whose rows are owned."""

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
+from scipy.special import roots_legendre
 
 from feti_homog.errors import MeshError
 from feti_homog.feti.decomposition.sharers import Sharers, entity_code, find_sharers
@@ -20,6 +21,10 @@ from feti_homog.system.parallel.distributed_arrays import exchange
 from feti_homog.system.parallel.mpi_errors import agree
 from feti_homog.typing import Array, Bool, Float, Int
 
+# Gauss points of one side of an element, on arcs that the mesh follows well.
+POINTS, WEIGHTS = roots_legendre(6)
+# (p + 1, points) parts that the nodes of a side of order p have of it: N_a, and halves of linear ones.
+SHARES = {1: np.full((2, 6), 0.5), 2: np.stack([POINTS**2 - POINTS, 2 - 2 * POINTS**2, POINTS**2 + POINTS]) / 2}
 # Two sides at a node are folded onto each other if their normals add up to no more than this share of their lengths.
 FOLDED = 1e-9
 
@@ -34,6 +39,13 @@ def along(ends: Float, turn: Float, place: Float) -> Float:
     of_start = np.where(turn > 0, np.sin((1 - place) * turn), 1 - place) / sine
     of_stop = np.where(turn > 0, np.sin(place * turn), place) / sine
     return np.asarray(of_start[:, None] * ends[:, 0] + of_stop[:, None] * ends[:, 1])
+
+
+def side_lengths(ends: Float, turn: Float, low: Float, order: int, side: float) -> Float:
+    """(k, order + 1) lengths of the nodes of sides from places `low` (k,), of span `side`; arguments as of `along`."""
+    places = low[:, None] + side * (1 + POINTS) / 2
+    speeds = [np.hypot(*along(ends, turn, place).T) for place in places.T]
+    return np.asarray(np.stack(speeds, axis=1) * WEIGHTS @ SHARES[order].T * (side / 2))
 
 
 @dataclass(frozen=True)
@@ -68,9 +80,17 @@ def breakable_pairs(own: SubmeshesOfRank, table: SubdomainTable, pairs: Int, fou
 
 
 def interface_geometry(
-    comm: MPI.Intracomm, own: SubmeshesOfRank, table: SubdomainTable, pairs: Int, found: Sharers
+    comm: MPI.Intracomm,
+    own: SubmeshesOfRank,
+    table: SubdomainTable,
+    pairs: Int,
+    found: Sharers,
+    lattice: ReferenceLattice,
 ) -> InterfaceGeometry:
-    """Return normals, turns and precracks of shared entities.  Collective.  `pairs` as in `share_entities`."""
+    """Return normals, turns and precracks of shared entities.  Collective.
+
+    `pairs` and `lattice` as in `share_entities`.
+    """
     n, owner = len(found.key), table.rank[found.innermost]
     can_part = (owner == comm.rank) & (breakable_pairs(own, table, pairs, found) >= 0)
     # The last sharer of an edge between two bodies is on the side of the fibre.
@@ -79,12 +99,15 @@ def interface_geometry(
     whole = own.whole
     plane = whole.triangle_edges[triangle, k]
     normals, turns, precracked = np.zeros((n, 2, 2)), np.zeros(n), np.zeros(n, bool)
-    normals[edges], turns[edges] = normal, _ = _edge_normals(whole, triangle, k)
+    normals[edges], turns[edges] = normal, turn = _edge_normals(whole, triangle, k)
     precracked[edges] = whole.debonded[whole.edge_class[plane]]
     ends = whole.class_keys[whole.vertex_class[whole.edges[plane]]]
-    length = np.linalg.norm(normal, axis=2, keepdims=True)
-    bonded = np.broadcast_to(~precracked[edges, None, None], length.shape)
-    parts = np.concatenate([normal, length, bonded], axis=2)
+    order, side = lattice.order, lattice.order / lattice.intervals
+    starts = np.zeros(len(edges)), np.full(len(edges), 1.0 - side)
+    length = np.stack([side_lengths(normal, turn, low, order, side)[:, -k] for k, low in enumerate(starts)], axis=1)
+    unit = normal / np.maximum(np.linalg.norm(normal, axis=2), 1e-300)[..., None]
+    bonded = np.broadcast_to(~precracked[edges, None], length.shape)
+    parts = np.concatenate([unit * length[..., None], length[..., None], bonded[..., None]], axis=2)
     sums = _sums_at_vertices(comm, found, owner, ends, found.key[edges], parts)
     vertices = ~found.is_edge
     scaled = sums[:, :2] * (sums[:, 2] / np.maximum(np.hypot(*sums[:, :2].T), 1e-300))[:, None]
@@ -177,7 +200,8 @@ class SharedEntities:
         fibre: (n,) the body that may debond here from the one around it, the inner one; or -1 where nothing can break.
         pair: (n,) the interface of the case that these two bodies have, -1 where nothing can break.
         normal: (n, 2, 2) normals from the inner to the outer body at the start and the end of the edge, as long as dx /
-            ds, s in [0, 1] the place along it; at a vertex, where edges meet, as long as dx / ds of these together.
+            ds, s in [0, 1] the place along it; at a vertex, where sides of elements meet, as long as its parts of these
+            together.
         turn: (n,) of the edge, as in `Submesh`; 0 at vertices.
         precracked: (n,) whether the mesh has the edge, or all edges that meet in the vertex, debonded.
         owned: (2,) first vector constraint of this rank and the one after its last.
@@ -215,7 +239,7 @@ def share_entities(
         lattice: of the coarse triangles.
     """
     found = find_sharers(comm, own, table)
-    geometry = interface_geometry(comm, own, table, pairs, found)
+    geometry = interface_geometry(comm, own, table, pairs, found, lattice)
     if lattice.intervals == 1:
         vertices = np.flatnonzero(~found.is_edge)
         found, geometry = found.chosen(vertices), geometry.chosen(vertices)
