@@ -115,7 +115,7 @@ class Result:
     schema: int = described("version of this layout", default=SCHEMA)
     version: str = described("version of the program")
     case: Mapping[str, Any] = described("the case with its defaults, as in a case file", entries={"KEY": "as there"})
-    digest: str = described("short digest of the case without its name, output and PETSc options")
+    digest: str = described("short digest of the case without its name, labels, pictures and PETSc options")
     cell: CellInfo = described("the meshed cell")
     fibres: tuple[FibreInfo, ...] = described("the fibres in the order of their numbers", default=())
     solver: SolverInfo = described("how the dual problem was solved")

@@ -49,7 +49,10 @@ def finished(directory: Path, case: Case) -> bool:
     document = result_json.read(directory)
     result = _restored(directory, document)
     if result.digest != case.digest():
-        raise CaseError(f"--resume: {directory} holds the result of another case; choose another folder")
+        now = case.resolved()
+        changed = [f"[{k}]" for k in now if k not in ("name", "petsc") and now[k] != result.case.get(k)]
+        words = f", which differs in {', '.join(changed)}" if changed else ""
+        raise CaseError(f"--resume: {directory} holds the result of another case{words}; choose another folder")
     if case.output.fields and not (directory / field_file.NAME).exists():
         return False
     if case.output.fields:

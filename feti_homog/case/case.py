@@ -55,7 +55,7 @@ from feti_homog.case.uncertainty import UNCERTAINTY, Uncertainty, read_uncertain
 from feti_homog.errors import CaseError
 from feti_homog.materials.forms import Material
 from feti_homog.materials.laws import contrast_faults, contrast_warnings
-from feti_homog.schema.keys import Selected, TableReader, selected_value, to_table
+from feti_homog.schema.keys import Selected, TableReader, keys_of, selected_value, to_table
 from feti_homog.schema.values import text
 from feti_homog.schema.wording import suggestion, toml_key, toml_value
 from feti_homog.system.runtime import input_files
@@ -165,9 +165,15 @@ class Case:
         uncertain = {UNCERTAINTY: self.uncertainty.to_table()} if self.uncertainty.std else {}
         return document | uncertain | {"petsc": dict(self.petsc)}
 
-    def digest(self) -> str:
-        """Short name of what the case computes: the same whatever its name, output, PETSc options and max_events."""
+    def digest(self, with_output: bool = True) -> str:
+        """Short name of what the case computes, and of what [output] asks for beside presentation if `with_output`.
+
+        It is the same whatever its name, PETSc options and max_events.
+        """
         document = {k: v for k, v in self.resolved().items() if k not in ("name", "output", "petsc")}
+        if with_output:
+            keys = [k for k, entry in keys_of(Output).items() if not entry.presentation]
+            document["output"] = {k: getattr(self.output, k) for k in keys}
         document.get("path", {}).pop("max_events", None)
         for key in ("file", "match"):
             document["cell"].pop(key, None)

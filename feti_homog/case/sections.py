@@ -159,13 +159,21 @@ class Output:
         "which every load takes as many solves more as there are unit loads. Faces with friction have none.",
         default=False,
     )
-    pictures: bool = key(boolean, "Draw the PNG files; without fields, the curves alone.", default=True)
-    report: bool = key(boolean, "Write report.html: tables, checks and pictures on one page.", default=False)
+    pictures: bool = key(
+        boolean, "Draw the PNG files; without fields, the curves alone.", default=True, presentation=True
+    )
+    report: bool = key(
+        boolean,
+        "Write report.html: tables, checks and pictures on one page.",
+        default=False,
+        presentation=True,
+    )
     stress: str = key(
         choice("auto", "S11", "S22", "S12", *OUT_OF_PLANE_STRESSES),
         'Component to draw; "auto": the component of the unit strain. "S33", "S23" and "S13" exist in generalized '
         "plane strain.",
         default="auto",
+        presentation=True,
     )
     deformation_scale: float | None = key(
         real(least=0.0),
@@ -173,9 +181,10 @@ class Output:
         "turns over, but at least 1 under a given strain.",
         default=None,
         default_words="automatic",
+        presentation=True,
     )
-    length_unit: str = key(text, "A label, such as mm; nothing is converted.", default="")
-    stress_unit: str = key(text, "A label, such as GPa; nothing is converted.", default="")
+    length_unit: str = key(text, "A label, such as mm; nothing is converted.", default="", presentation=True)
+    stress_unit: str = key(text, "A label, such as GPa; nothing is converted.", default="", presentation=True)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -66,6 +66,7 @@ class Key:
         instead: what to write where it does not belong; empty if there is nothing like it.
         unless: other keys of the table, beside any of which it is not required.
         by_pair: whether it may differ between several sections [[interface]].
+        presentation: whether it decides how results are drawn and labelled, and nothing of their numbers.
     """
 
     type: ValueType
@@ -77,6 +78,7 @@ class Key:
     instead: str = ""
     unless: tuple[str, ...] = ()
     by_pair: bool = False
+    presentation: bool = False
 
     def belongs(self, selected: Selected) -> bool:
         """Return whether the key belongs to the table; not, if that depends on a faulty selector."""
@@ -94,6 +96,7 @@ def key(
     instead: str = "",
     unless: tuple[str, ...] = (),
     by_pair: bool = False,
+    presentation: bool = False,
 ) -> Any:
     """Return a dataclass field read from the key of its name; required where it belongs if it has no default.
 
@@ -103,7 +106,7 @@ def key(
     required = default is dataclasses.MISSING
     written = toml_value(list(default) if isinstance(default, tuple) else default)
     words = default_words or ("" if required or default is None else written)
-    metadata = {"key": Key(type_, meaning, unit, words, conditions, required, instead, unless, by_pair)}
+    metadata = {"key": Key(type_, meaning, unit, words, conditions, required, instead, unless, by_pair, presentation)}
     if required and not conditions:
         return dataclasses.field(metadata=metadata)
     return dataclasses.field(default=None if required else default, metadata=metadata)

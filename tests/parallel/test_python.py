@@ -103,6 +103,17 @@ def test_with_files(comm, shared_path):
         run(with_fraction(0.4), comm).rising_strain()
 
 
+def test_a_finished_run_is_no_answer_to_a_case_that_asks_for_more(comm, shared_path):
+    """Sensitivities that the first run did not compute are not passed over."""
+    document = with_fraction(0.4, geometry="square").resolved() | {"output": {"fields": False, "pictures": False}}
+    run(Case.parse(document), comm, out=shared_path / "out")
+    document["output"] |= {"length_unit": "mm"}
+    assert run(Case.parse(document), comm, out=shared_path / "out", resume=True).sensitivities is None
+    document["output"] |= {"sensitivities": True}
+    with pytest.raises(CaseError, match=r"holds the result of another case, which differs in \[output\]; choose"):
+        run(Case.parse(document), comm, out=shared_path / "out", resume=True)
+
+
 def test_not_quiet_prints_what_the_command_line_prints(comm, capsys):
     case = with_fraction(0.4, geometry="square")
     run(case, comm)

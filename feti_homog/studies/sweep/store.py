@@ -224,6 +224,8 @@ def _refuse_another(directory: Path, known: Sequence[SweepCase], wanted: Sequenc
     for old, new in zip(known, wanted, strict=False):
         if old != new:
             words = f"its {old.folder} ({old.describe('')}) differs from this file ({new.describe('')})"
+            if old.inputs == new.inputs:
+                words = f"its {old.folder} differs from this file in keys that do not vary, or in the content of a mesh"
             raise CaseError(f"--out {directory} holds another sweep: {words}; choose another folder")
     if len(known) > len(wanted):
         raise CaseError(

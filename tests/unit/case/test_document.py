@@ -17,7 +17,9 @@ from unit.case.faulty_bonding import ANGLE, BARE_ARC, PATH, of_type
 from unit.case.valid_cases import MESH
 
 from feti_homog import Case
+from feti_homog.case.sections import Output
 from feti_homog.errors import CaseError
+from feti_homog.schema.keys import keys_of
 
 GENERATED = settings(deadline=None, derandomize=True)
 
@@ -37,6 +39,24 @@ def test_resolved_makes_an_equal_case(document):
 @given(documents())
 def test_numpy_values_make_an_equal_case(document):
     assert Case.parse(with_numpy_values(document)) == Case.parse(document)
+
+
+COMPUTED = {"fields": False, "states": 3, "mesh_error": False, "sensitivities": True}
+PRESENTED = {
+    "pictures": False, "report": True, "stress": "S22", "deformation_scale": 2.0, "length_unit": "mm",
+    "stress_unit": "GPa",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", keys_of(Output))
+def test_keys_of_output_that_decide_what_is_computed_are_in_the_digest(name):
+    """A new key has to be put into one of both tables."""
+    path = of_type("path", PATH, "[interface]", "normal_strength = 5.0")
+    document = document_of(BASE if name == "sensitivities" else path)
+    known = Case.parse(document)
+    changed = Case.parse(document | {"output": {name: (COMPUTED | PRESENTED)[name]}})
+    assert changed.output != known.output and (changed.digest() != known.digest()) == (name in COMPUTED)
+    assert changed.digest(False) == known.digest(False)  # the events of the path are the same
 
 
 def document_of(content: str) -> dict[str, Any]:

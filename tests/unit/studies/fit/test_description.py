@@ -11,6 +11,7 @@ from support.base_case import BASE
 from feti_homog.case.case import Case
 from feti_homog.errors import CaseError
 from feti_homog.studies.fit.description import parse
+from feti_homog.studies.uncertainty import scatter
 
 UNKNOWN = "[unknown]\nmaterial.fibre.young = {start = 150.0, lower = 50.0, upper = 500.0}\n"
 MEASURED = "[measured]\nC11 = {value = 150.0, std = 1.5}\n"
@@ -126,3 +127,15 @@ def test_curves_may_have_decimal_commas_between_semicolons(tmp_path):
     text = BASE.replace('"stiffness"', '"path"') + UNKNOWN + end + "[path]\nstrain = [0.1, 0.0, 0.0]\n"
     (point,) = parse(tomllib.loads(text), tmp_path).data
     assert (point.strain_name, point.strain, point.name, point.value) == ("E11", 0.01, "S11", 3.5)
+
+
+def test_a_fit_whose_output_asks_for_more_is_another():
+    """So is a study of scatter."""
+    text = BASE + UNKNOWN + MEASURED
+    fits = [parse(tomllib.loads(f"{text}[output]\nmesh_error = {words}\n"), Path()) for words in ("true", "false")]
+    assert fits[0].digest() != fits[1].digest()
+    text = BASE.replace("young = 88.0", "young = {mean = 88.0, cv = 0.1}")
+    studies = [
+        scatter.parse(tomllib.loads(f"{text}[output]\n{words}\n"), Path()) for words in ("", "mesh_error = false")
+    ]
+    assert studies[0].digest() != studies[1].digest()

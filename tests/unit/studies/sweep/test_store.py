@@ -122,3 +122,14 @@ def test_bonds_that_never_break_are_values_of_a_sweep(tmp_path):
     store.prepare_folder(out, sweep)
     assert store.read_index(out).entries == sweep.entries
     store.prepare_folder(out, sweep)
+
+
+@pytest.mark.parametrize("asked", ["sensitivities = true", "mesh_error = false", "fields = true"])
+def test_a_sweep_that_asks_for_more_is_another(tmp_path, asked):
+    path, out = sweep_file(tmp_path, '"cell.order" = [1, 2]\n'), tmp_path / "out"
+    sweep = plan.load(path)
+    store.prepare_folder(out, sweep)
+    old = "fields = false\n" if "fields" in asked else "[output]\n"
+    path.write_text(path.read_text().replace(old, f"{old.removeprefix('fields = false')}{asked}\n"))
+    with pytest.raises(CaseError, match="its case-0001 differs from this file in keys that do not vary"):
+        store.prepare_folder(out, plan.load(path))
