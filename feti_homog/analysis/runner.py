@@ -32,7 +32,7 @@ from feti_homog.results.events_in_memory import EventsInMemory
 from feti_homog.results.field_file import FieldFile
 from feti_homog.results.output_folder import EventLog
 from feti_homog.system.parallel.mpi_errors import all_raise, on_root, on_root_only
-from feti_homog.system.petsc.options import case_options, refuse_unused
+from feti_homog.system.petsc.options import case_options, refuse_unused, without_iterations
 from feti_homog.system.runtime import process_memory
 from feti_homog.system.runtime.progress import Progress
 
@@ -217,6 +217,8 @@ def _analyse(context: AnalysisContext) -> dict[str, Any]:
         analysis = analysis_of(context.case).run(context)
         iterations = context.checks.iterations
         words.append(f"{len(iterations)} states, {sum(iterations) or 'no'} iterations")
+    if not sum(iterations) and (line := without_iterations()):
+        context.progress.say(f"remark: {line}")
     return analysis
 
 

@@ -166,14 +166,11 @@ class Case:
         return document | uncertain | {"petsc": dict(self.petsc)}
 
     def digest(self, with_output: bool = True) -> str:
-        """Short name of what the case computes, and of what [output] asks for beside presentation if `with_output`.
-
-        It is the same whatever its name, PETSc options and max_events.
-        """
+        """Short name of what the case computes, and writes if `with_output`; not of its name, options, max_events."""
         document = {k: v for k, v in self.resolved().items() if k not in ("name", "output", "petsc")}
         if with_output:
-            keys = [k for k, entry in keys_of(Output).items() if not entry.presentation]
-            document["output"] = {k: getattr(self.output, k) for k in keys}
+            decisive = (k for k, entry in keys_of(Output).items() if not entry.presentation)
+            document["output"] = {k: getattr(self.output, k) for k in decisive}
         document.get("path", {}).pop("max_events", None)
         for key in ("file", "match"):
             document["cell"].pop(key, None)

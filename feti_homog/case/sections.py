@@ -125,7 +125,7 @@ class Decomposition:
         choice("auto", "bodies"),
         "What is cut: bodies one by one; or what is faster, which in cells up to 400 000 unknowns in which nothing can "
         "part is the whole cell, across its materials, unless stiffnesses differ by more than 1e4, or one of the other "
-        "keys or an option of the solver other than its tolerances is given.",
+        "keys or an option of the solver is given, other than its tolerances and those that only print.",
         default="auto",
     )
 
@@ -159,15 +159,8 @@ class Output:
         "which every load takes as many solves more as there are unit loads. Faces with friction have none.",
         default=False,
     )
-    pictures: bool = key(
-        boolean, "Draw the PNG files; without fields, the curves alone.", default=True, presentation=True
-    )
-    report: bool = key(
-        boolean,
-        "Write report.html: tables, checks and pictures on one page.",
-        default=False,
-        presentation=True,
-    )
+    pictures: bool = key(boolean, "Draw PNG files; without fields, the curves alone.", default=True, presentation=True)
+    report: bool = key(boolean, "Write tables, checks and pictures on one page, report.html.", default=False, presentation=True)
     stress: str = key(
         choice("auto", "S11", "S22", "S12", *OUT_OF_PLANE_STRESSES),
         'Component to draw; "auto": the component of the unit strain. "S33", "S23" and "S13" exist in generalized '

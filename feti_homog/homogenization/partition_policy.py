@@ -12,6 +12,7 @@ from feti_homog.homogenization import phase_laws
 from feti_homog.materials.laws import isotropic_ratio
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.mesh.tiles.tiles import DEFAULT_TILES, TilePolicy
+from feti_homog.system.petsc.option_table import only_prints
 from feti_homog.system.petsc.options import given_options
 from feti_homog.typing import Int
 
@@ -20,7 +21,7 @@ MOST_POISSON = 0.45
 # Ratio of stiffnesses up to which subdomains may have several phases: above, rounding in their dense matrices costs
 # accuracy (4e-7 at 1e6, 2e-10 at 9e3) and then convergence.
 MOST_CONTRAST = 1e3
-# Options of the solver that only set how exact it is: others ask for a dual problem, which one subdomain has not.
+# Options that only set how exact the solver is: others that choose ask for a dual problem, which one subdomain has not.
 TOLERANCES = {"feti_ksp_rtol", "feti_ksp_atol", "feti_ksp_max_it"}
 
 
@@ -92,7 +93,7 @@ def can_be_cut_across(case: Case) -> bool:
     if case.interfaces or (asked.cut, asked.subdomains, asked.max_dofs, case.cell.bodies) != free:
         return False
     given = {*case.petsc, *given_options()} - TOLERANCES
-    if "help" in given or any(name.startswith("feti_") for name in given):
+    if any(name.startswith("feti_") and not only_prints(name) for name in given):
         return False
     ratios = (isotropic_ratio(material) or 0.0 for material in case.materials.values())
     return max(ratios) <= MOST_POISSON and _contrast(case) <= MOST_CONTRAST

@@ -12,6 +12,7 @@ import pytest
 from matplotlib.image import imread
 from reference.references import BONDED
 from support.command_line import case_file, command_line
+from support.sweep_files import BY_BODIES
 
 PICTURES = ("cell.png", "partition.png", "mesh_error.png", "case_E11.png", "case_E22.png", "case_gamma12.png")
 FILES = {"result.json", "result.h5", "result.xdmf", "interface.xdmf", *PICTURES}
@@ -177,7 +178,8 @@ def test_help_with_one_dash_is_petscs(tmp_path):
 
 def test_petscs_monitor_and_log_are_printed(tmp_path):
     words = ["-feti_ksp_monitor", "-feti_ksp_converged_reason", "-log_view"]
-    job = command_line(2, "run", case_file(tmp_path), "--out", tmp_path / "results", *words)
+    path = case_file(tmp_path, f"[output]\npictures = false\n{BY_BODIES}")
+    job = command_line(2, "run", path, "--out", tmp_path / "results", *words)
     assert job.returncode == 0
     assert job.stdout.count("0 KSP Residual norm") >= 1
     assert job.stdout.count("Linear feti_ solve converged due to CONVERGED_RTOL") == 1

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -16,6 +18,7 @@ from feti_homog.homogenization.partition_policy import BY_COST, PartitionPolicy
 from feti_homog.homogenization.uniform_parts import nodes_of_parts
 from feti_homog.homogenization.unit_cell import tear
 from feti_homog.system.parallel.mpi_errors import on_root
+from feti_homog.system.petsc.option_table import OPTIONS, only_prints
 from feti_homog.system.runtime.progress import Progress
 from feti_homog.system.runtime.records import plain
 
@@ -62,6 +65,33 @@ def test_checks_of_one_subdomain_can_fail(fault, monkeypatch):
     checks = averages.respond(np.eye(3)[:1], averages.intact, [np.zeros(0)])[0].checks
     assert {law for law, error in checks.items() if not error < 1e-6} == {fault}
     assert "jump" not in checks  # nothing is glued
+
+
+PRINTING = (
+    *(option.name for option in OPTIONS if only_prints(option.name)),
+    *(f"feti_ksp_{name}" for name in ("monitor_true_residual", "view_eigenvalues", "converged_rate", "view_mat")),
+    *("feti_bonded_ksp_view", "feti_schur_ksp_view", "feti_sub_ksp_converged_reason", "feti_natural_ksp_monitor"),
+)
+
+
+@pytest.mark.parametrize("cut", ["auto", "bodies"])
+def test_options_that_print_change_no_number(comm, capfd, cut):
+    """Neither where a cell is not cut, or halved, without iterations, nor where iterations are to be seen."""
+    cell = {"geometry": "square", "mesh_size": 0.4, "output": {"fields": False}, "decomposition": {"cut": cut}}
+    expected, _ = _outcome(comm, capfd, cell, {})
+    for name in PRINTING:
+        found, printed = _outcome(comm, capfd, cell, {name: True})
+        assert found == expected, name
+        if comm.rank == 0 and name.startswith("feti_ksp_") and cut == "auto":
+            assert printed.count(f"remark: -{name}: the run has no iterations to print") == 1
+
+
+def _outcome(comm, capfd, cell, petsc):
+    """Return result.json without options, times and memory, and what the run prints."""
+    found = plain(run(make_case(**cell, petsc=petsc), comm, quiet=False).document)
+    del found["timings"], found["memory"], found["case"]["petsc"]
+    comm.barrier()
+    return json.dumps(found, default=np.ndarray.tolist), capfd.readouterr().out
 
 
 def document(cut):

@@ -6,7 +6,6 @@ from collections.abc import Generator
 
 import numpy as np
 from mpi4py import MPI
-from petsc4py import PETSc
 from scipy.sparse import csr_matrix, diags, hstack
 
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
@@ -17,6 +16,7 @@ from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.operators.with_springs import is_dense
 from feti_homog.feti.thresholds import ASSEMBLED_PARTS, DENSE_SHARE, MOST_DENSE_ROWS
 from feti_homog.system.parallel.distributed_arrays import share_columns
+from feti_homog.system.petsc.options import choices
 from feti_homog.typing import Float, Int
 
 # Entries of Z, which are cosines of angles or their products, that rounding leaves of zero.
@@ -110,7 +110,7 @@ def block_sum(comm: MPI.Intracomm, size: int, sizes: list[int]) -> DenseSum | De
     """
     entries = comm.allreduce(sum(n**2 for n in sizes))
     is_full = entries >= DENSE_SHARE * size**2 and size <= MOST_DENSE_ROWS
-    if is_full and not PETSc.Options("feti_bonded_").getAll():
+    if is_full and not choices("feti_bonded_"):
         return DenseSum(size)
     return DenseBlockSum((size, size))
 

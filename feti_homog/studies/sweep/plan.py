@@ -18,6 +18,7 @@ from feti_homog.errors import CaseError
 from feti_homog.report.text.table import unit
 from feti_homog.schema.wording import dotted_key, toml_value
 from feti_homog.studies.sweep.points import Assignment, read_points
+from feti_homog.system.petsc.option_table import only_prints
 
 MAX_NAMED_CASES = 4  # in one fault
 
@@ -114,8 +115,9 @@ def checked(name: str, unchecked: Sequence[CaseDocument], folder: Path) -> Sweep
 
 
 def identity_of(digest: str, petsc: Mapping[str, Any]) -> str:
-    """Short name of what is computed, and with which options."""
-    return hashlib.sha256((digest + json.dumps(dict(petsc), sort_keys=True)).encode()).hexdigest()[:16]
+    """Short name of what is computed, and with which options but those that only print."""
+    chosen = {name: value for name, value in petsc.items() if not only_prints(name)}
+    return hashlib.sha256((digest + json.dumps(chosen, sort_keys=True)).encode()).hexdigest()[:16]
 
 
 def case_names(numbers: list[int]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -109,6 +110,10 @@ PETSC_NAMES = (
 # More of each beginning, of which every release of PETSc has others.
 PETSC_BEGINNINGS = ("log_", "malloc_", "device_", "cuda_", "hip_", "sf_", "viewer_", "use_gpu_aware_mpi")
 
+# Words of the names of options that show what solvers are and do; a level of printing has a number.
+SHOWING = re.compile(r"(^|_)(view|monitor|converged_reason|converged_rate)(_|$)|_(compute|plot)_(singular|eigen)values")
+LEVEL = re.compile(r"_(print|printstat|statprint)$|_mumps_icntl_[1-4]$")
+
 CLOSE = 0.9
 """Similarity (difflib's, 1 for equal names) from which on a name is taken for a misspelt one: a letter or two."""
 
@@ -143,6 +148,11 @@ def without_prefix(names: Iterable[str]) -> list[str]:
     return [f"-{name}: not an option of this program; did you mean -feti_{name}?" for name in known]
 
 
+def only_prints(name: str) -> bool:
+    """Return whether an option (name without dash) shows what solvers do, and chooses nothing of it."""
+    return any(kind.search(name) for kind in (SHOWING, LEVEL))
+
+
 def almost_in_table(name: str) -> bool:
     """Return whether the name is probably one of OPTIONS misspelt, behind the prefix of a PETSc solver."""
     prefix = solver_prefix(name)
@@ -174,4 +184,4 @@ def help_text() -> str:
         f"  {usage:{width}}  {option.help}" + (f" (default {option.default})" if option.default else "")
         for usage, option in zip(usages, OPTIONS, strict=True)
     ]
-    return "\n".join(["PETSc's options of the solver, with a single dash:", *lines])
+    return "\n".join(["PETSc's options of the solver, with a single dash; what only prints changes no number:", *lines])

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from feti_homog.system.petsc.option_table import DIRECT_PREFIXES, OPTIONS
+from feti_homog.system.petsc.option_table import DIRECT_PREFIXES, OPTIONS, SHOWING
 from feti_homog.system.runtime import input_files
 
 Value = str | int | float | bool
@@ -91,7 +91,7 @@ def flag_value(value: Value) -> str | None:
 
 def is_flag(name: str) -> bool:
     """Return whether an option (name without dash) is a flag, which needs no value and may have that of a viewer."""
-    return name in FLAGS or name in VIEWERS
+    return name in FLAGS or name in VIEWERS or (name.startswith("feti_") and SHOWING.search(name) is not None)
 
 
 def is_own_flag(name: str) -> bool:

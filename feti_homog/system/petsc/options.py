@@ -15,6 +15,7 @@ from feti_homog.system.petsc.option_table import (
     MUMPS_PREFIXES,
     almost_in_table,
     is_in_table,
+    only_prints,
     solver_prefix,
     suggestion,
     unknown_options,
@@ -78,6 +79,17 @@ def given_options() -> dict[str, str]:
     return {name.lower(): value or "" for name, value in PETSc.Options().getAll().items()}
 
 
+def choices(prefix: str) -> list[str]:
+    """Return the given options under a prefix that choose something: not those that only print."""
+    return [name for name in given_options() if name.startswith(prefix) and not only_prints(name)]
+
+
+def without_iterations() -> str:
+    """Return a line on the given options that print iterations, for a run that has none; empty without any."""
+    given = [f"-{name}" for name in given_options() if name.startswith("feti_ksp_") and only_prints(name)]
+    return f"{', '.join(given)}: the run has no iterations to print" if given else ""
+
+
 def _refuse_early() -> None:
     """Refuse what solvers of a 1 x 1 matrix cannot be made with, and misspelt names that they do not read.
 
@@ -122,8 +134,8 @@ NO_SUCH_METHOD = "requested KSP type"
 def faults_of_solvers(given: Mapping[str, str]) -> list[str]:
     """Faults of the options in the database (names without dash) with which PETSc's solvers cannot be made.
 
-    Each solver is made and applied once: a method may lack what it needs only then.  PETSc marks what they read.
-    Options that print are hidden meanwhile.
+    Each solver is made and applied once: a method may lack what it needs only then.  PETSc marks what they read, and
+    prints all that they could with -help.  Options that print are hidden meanwhile.
     """
     trials = {"feti_": _solve_by_krylov_method} | {
         prefix: partial(_solve_directly, prefix) for prefix in DIRECT_PREFIXES
@@ -132,7 +144,7 @@ def faults_of_solvers(given: Mapping[str, str]) -> list[str]:
     with _hidden({name: value for name, value in given.items() if name in VIEWERS}):
         for prefix, solve in trials.items():
             own = [name for name in given if _prefix(name) == prefix and name not in (*OWN, *VIEWERS)]
-            words = _complaint(solve) if own else ""
+            words = _complaint(solve) if own or "help" in given else ""
             if words:
                 own.sort(key=lambda name: not name.endswith("_type"))  # types first: they decide what others mean
                 faults.append(f"{' '.join(in_words(name, given[name]) for name in own)}: {words}")

@@ -34,7 +34,7 @@ def test_only_cells_in_which_nothing_is_asked_of_bodies_are_cut_across_materials
 
 
 def test_options_of_the_command_line_count_like_those_of_the_case():
-    with case_options({"feti_ksp_view": ""}):
+    with case_options({"feti_ksp_type": "fcg"}):
         assert not can_be_cut_across(make_case())
     assert can_be_cut_across(make_case())
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from petsc4py import PETSc
 
+from feti_homog.system.petsc.option_table import only_prints
 from feti_homog.system.petsc.option_values import petsc_words
 from feti_homog.system.petsc.options import case_options
 
@@ -46,3 +47,19 @@ def test_the_command_line_comes_first_and_is_there_for_the_next_case(given):
 def test_only_flags_of_petsc_itself_are_settled_when_it_starts():
     words = petsc_words({"log_view": "false", "malloc_debug": "true", "feti_view": "false", "feti_pc_type": "lumped"})
     assert words == ["-malloc_debug", "-feti_view", "false", "-feti_pc_type", "lumped"]
+
+
+@pytest.mark.parametrize(
+    ("names", "prints"),
+    [
+        (
+            "ksp_view ksp_view_pre ksp_monitor_true_residual sub_ksp_converged_reason coarse_mat_view",
+            True,
+        ),
+        ("ksp_compute_singularvalues ksp_plot_eigenvalues schur_mat_mumps_icntl_4 sub_mat_cholmod_print view", True),
+        ("ksp_type ksp_converged_maxits ksp_max_it pc_type coarse_pc_gamg_threshold schur_mat_mumps_icntl_14", False),
+        ("schur_mat_mumps_icntl_7 ksp_error_if_not_converged ksp_converged_use_initial_residual_norm", False),
+    ],
+)
+def test_options_that_print_are_known_by_their_words(names, prints):
+    assert [only_prints(f"feti_{name}") for name in names.split()] == [prints] * len(names.split())
