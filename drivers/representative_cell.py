@@ -100,7 +100,7 @@ def draw(folder: Path, table: Any) -> Path:
 def _laws(statistics: Any, number: int) -> str:
     """Return whether the means are isotropic and between the Hashin-Shtrikman bounds, in words."""
     found = []
-    for name, words in (("anisotropy_axial", "C11 - C22"), ("anisotropy_shear", "C33 - (C11 + C22 - 2 C12)/4")):
+    for name, words in (("anisotropy_normal", "C11 - C22"), ("anisotropy_shear", "C33 - (C11 + C22 - 2 C12)/4")):
         mean, half = statistics[name].mean[number], statistics[name].ci95[number]
         found.append(f"{words} = {mean:.4f} +- {half:.4f}")
     for name in ("bulk", "shear"):

@@ -120,8 +120,8 @@ class Sensitivities:
     parameters: tuple[str, ...] = described("constants of the case, such as `material.fibre.young`")
     parameter_values: Float = described("their values, each in its unit", "", "(p,)")
     constants: tuple[str, ...] = described(
-        "entries `C11`, ... of the stiffness, moduli and ratios `E1`, ..., `thermal_stress.1`, ..., `expansion.1`, "
-        "...; of a load strains and stresses that it does not give, and `stored`"
+        "entries `C11`, ... of the stiffness, moduli and ratios `E1`, ..., `thermal_S11`, ..., `expansion_x1`, ...; "
+        "of a load strains and stresses that it does not give, and `stored`"
     )
     constant_values: Float = described("their values, each in its unit", "", "(n,)")
     derivatives: Float = described("of each constant by each parameter", "", "(n, p)")

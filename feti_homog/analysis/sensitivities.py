@@ -19,7 +19,7 @@ from feti_homog.homogenization.sensitivities import derivatives
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.loads.load import Load
 from feti_homog.materials.derivatives import composite_constants, constant_changes
-from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES
+from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, THERMAL_STRESSES
 from feti_homog.typing import Float
 
 
@@ -106,7 +106,7 @@ def _secants(energies: Sequence[Float]) -> tuple[Float, Float | None]:
 def _entries(C: Float, thermal: Float | None) -> dict[str, float]:
     """Return all entries of a secant stiffness, which is not symmetric, and the thermal stress by name."""
     found = {f"C{i + 1}{j + 1}": float(value) for (i, j), value in np.ndenumerate(C)}
-    return found | {f"thermal_stress.{k + 1}": float(x) for k, x in enumerate([] if thermal is None else thermal[:3])}
+    return found | dict(zip(THERMAL_STRESSES[:3], map(float, [] if thermal is None else thermal), strict=False))
 
 
 def _changes_with_contact(

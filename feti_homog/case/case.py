@@ -23,6 +23,7 @@ from feti_homog.case.load_section import (
     LoadPath,
     SingleLoad,
     Stiffness,
+    axes_lines,
     expansion_faults,
     load_faults,
     stress_free,
@@ -140,10 +141,11 @@ class Case:
 
     def remarks(self) -> tuple[str, ...]:
         """List the assumptions about settings that are not given, a line each."""
-        plane = self.analysis.plane
+        kind, section, plane = self.analysis.type, self.section, self.analysis.plane
         of_elements = element_sizes.remarks(self.materials, plane)
         of_table = () if self.cell.table is None else self.cell.table.remarks
-        return (*of_elements, *of_table, *stress_free(self.analysis.type, self.section.placed, plane))
+        of_load = *stress_free(kind, section.placed, plane), *axes_lines(kind, section, self.materials, plane)
+        return *of_elements, *of_table, *of_load
 
     def resolved(self) -> dict[str, Any]:
         """Return the case with its defaults as a plain document, of which `parse` makes an equal case."""
@@ -169,11 +171,9 @@ class Case:
         """Short name of what the case computes, and writes if `with_output`; not of its name, options, max_events."""
         document = {k: v for k, v in self.resolved().items() if k not in ("name", "output", "petsc")}
         if with_output:
-            decisive = (k for k, entry in keys_of(Output).items() if not entry.presentation)
-            document["output"] = {k: getattr(self.output, k) for k in decisive}
+            document["output"] = {k: getattr(self.output, k) for k, e in keys_of(Output).items() if not e.presentation}
         document.get("path", {}).pop("max_events", None)
-        for key in ("file", "match"):
-            document["cell"].pop(key, None)
+        document["cell"] = {k: v for k, v in document["cell"].items() if k not in ("file", "match")}
         content = b"".join(input_files.read(path) for path in (self.cell.file, self.cell.match) if path is not None)
         return hashlib.sha256(json.dumps(document, sort_keys=True).encode() + content).hexdigest()[:16]
 

@@ -11,7 +11,8 @@ from feti_homog.case.material_sections import missing_expansions
 from feti_homog.case.mixed_load import LOAD, TEMPERATURE, WAYPOINTS, MixedLoad, Strain, completed, first_named, named
 from feti_homog.case.section_values import OPENINGS, STRAIN
 from feti_homog.case.selectors import BY_EVENTS, BY_INCREMENTS, GENERALIZED, IN_THE_PLANE
-from feti_homog.materials.forms import Material
+from feti_homog.materials.forms import Material, Orthotropic
+from feti_homog.materials.plane_state import PLANE_STATES
 from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES
 from feti_homog.schema.keys import key
 from feti_homog.schema.values import choice, either, integer, list_of, real
@@ -42,6 +43,11 @@ class AnalysisSection:
     def solves(self, loads: int, one_sided: bool) -> int:
         """Equilibria of a problem with so many unit loads, under plus and minus each where faces touch one-sidedly."""
         return 2 * loads if one_sided else loads
+
+    @property
+    def components(self) -> list[str]:
+        """Names of the strains and stresses that its loads give, other than zero."""
+        return [name for load in self.placed.values() for name, value in named(load).items() if value]
 
 
 class Stiffness(AnalysisSection):
@@ -90,7 +96,8 @@ class Envelope(AnalysisSection):
     plane: tuple[str, str] = key(
         PLANE_OF_LOADS,
         "The two axes of the plane; all other stresses, or all other strains, are zero: in plane strain and plane "
-        'stress those in the plane, S11, S22, S12 or E11, E22, gamma12; in plane = "generalized" all six.',
+        'stress those in the plane, S11, S22, S12 or E11, E22, gamma12; in plane = "generalized" all six, of which S12 '
+        "is shear across the fibres, S13 and S23 are along them.",
     )
     directions: int = key(
         integer(least=4, most=100_000),
@@ -106,6 +113,11 @@ class Envelope(AnalysisSection):
         default=None,
         only=GENERALIZED,
     )
+
+    @property
+    def components(self) -> list[str]:
+        """Return the axes of the plane."""
+        return [*self.plane]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -224,6 +236,18 @@ def expansion_faults(path: LoadPath | None, load: SingleLoad | None, materials: 
     placed |= {} if path is None else {f"[path] {place}": each for place, each in path.placed.items()}
     place = next((place for place, load in placed.items() if TEMPERATURE in named(load)), None)
     return [] if place is None else missing_expansions(materials, f"{place}.{TEMPERATURE}")
+
+
+def axes_lines(kind: str, section: AnalysisSection, materials: Mapping[str, Material], plane: str) -> tuple[str, ...]:
+    """Return the axes of loads and of constants of phases that could be of a ply, in a line; none in a plane."""
+    if not PLANE_STATES[plane].is_spatial:
+        return ()
+    from feti_homog.materials.constant_names import axes_line  # which nothing in a plane needs
+
+    phases = [f"[material.{name}]" for name, own in materials.items() if isinstance(own, Orthotropic)]
+    of_loads, of_phases = axes_line(section.components), "E1 and E2 are across the fibres; along them E3"
+    lines = [f"[{kind}] {of_loads}"] * bool(of_loads) + [f"{', '.join(phases)} {of_phases}"] * bool(phases)
+    return (". ".join(lines),) if lines else ()
 
 
 def stress_free(section: str, placed: Mapping[str, Strain | MixedLoad], plane: str) -> tuple[str, ...]:

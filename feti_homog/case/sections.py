@@ -195,10 +195,10 @@ class Measured:
 
     value: float = key(
         real(),
-        "Measured value. Names of a stiffness are those of `sensitivities` in result.json, such as E1 or G_axial: E1 "
-        "and E2 are across the fibres, E_axial is along them. Those of a path are those of cases.csv, such as "
-        "onset_S11 and peak_S11. A section [[test]] has besides the keys in which its case differs, such as "
-        "cell.fibre_fraction = 0.5.",
+        "Measured value. Names of a stiffness are those of `sensitivities` in result.json, such as E1 or G_axial: E1, "
+        "E2, G12 are across the fibres, E_axial, G_axial, expansion_axial along them. Those of a path are those of "
+        "cases.csv, such as onset_S11 and peak_S11. A section [[test]] has besides the keys in which its case differs, "
+        "such as cell.fibre_fraction = 0.5.",
     )
     std: float = key(STD, "Standard deviation of the measurement.")
 

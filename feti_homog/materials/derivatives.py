@@ -19,7 +19,7 @@ from feti_homog.materials.forms import EXPANSION_PAIR, General, Isotropic, Mater
 from feti_homog.materials.laws import COUPLINGS, expansion, known_compliance, stiffness_of
 from feti_homog.materials.plane_state import PLANE_STATES
 from feti_homog.materials.spatial_constants import constants_about_fibres, constants_along_axes
-from feti_homog.materials.voigt import IN_PLANE, IN_PLANE_BLOCK, strain_rotation
+from feti_homog.materials.voigt import EXPANSIONS, IN_PLANE, IN_PLANE_BLOCK, THERMAL_STRESSES, strain_rotation
 from feti_homog.typing import Float
 
 STEP = 1e-30  # its square is lost beside 1
@@ -128,7 +128,7 @@ def composite_constants(C: NDArray[Any], thermal: NDArray[Any] | None) -> dict[s
     """Return the constants of a stiffness C, real or complex, (3, 3) or (6, 6).
 
     They are entries Cij of its upper half, moduli and ratios and, with the stress `thermal` (6,) under a unit of
-    temperature, `thermal_stress` and `expansion` along axes 1, 2 and 3.
+    temperature, normal stresses and strains under it.
 
     Raises numpy.linalg.LinAlgError if C is singular.
     """
@@ -140,8 +140,9 @@ def composite_constants(C: NDArray[Any], thermal: NDArray[Any] | None) -> dict[s
     found |= constants_along_axes(S) | constants_about_fibres(C)
     if thermal is not None:
         strains = -S @ thermal
-        found |= {f"{name}.{i + 1}": x[i] for name, x in (("thermal_stress", thermal), ("expansion", strains))
-                  for i in range(3)}  # fmt: skip
+        for names, x in ((THERMAL_STRESSES, thermal), (EXPANSIONS, strains)):
+            found |= dict(zip(names[:3], x, strict=False))
+        found["expansion_transverse"] = (strains[0] + strains[1]) / 2
     return found
 
 

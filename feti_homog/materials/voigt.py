@@ -15,6 +15,9 @@ SPATIAL_STRAINS = ("E11", "E22", "E33", "gamma23", "gamma13", "gamma12")
 AXIAL_STRESSES = ("S23", "S13")
 STIFFNESSES = tuple(f"C{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))
 SPATIAL_STIFFNESSES = tuple(f"C{i}{j}" for i in range(1, 7) for j in range(1, 7))
+THERMAL_STRESSES = tuple(f"thermal_{name}" for name in SPATIAL_STRESSES)
+EXPANSIONS = ("expansion_x1", "expansion_x2", "expansion_axial", *(f"expansion_{name}" for name in SPATIAL_STRAINS[3:]))
+"""Names of the strains per unit of temperature, x3 along the fibres."""
 IN_PLANE = [0, 1, 5]
 """Where [11, 22, 12] stand in the order of space."""
 IN_PLANE_BLOCK = np.ix_(IN_PLANE, IN_PLANE)

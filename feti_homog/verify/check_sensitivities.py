@@ -287,5 +287,5 @@ def _constants(C: Float, heat: Float | None) -> dict[str, float]:
     found |= engineering_constants(C) | {name: value for name, value in about.items() if value is not None}
     if heat is None or strains is None:
         return found
-    numbers = {"thermal_stress": heat, "expansion": strains}
-    return found | {f"{name}.{k + 1}": float(x[k]) for name, x in numbers.items() for k in range(3)}
+    found |= {"expansion_x1": float(strains[0]), "expansion_x2": float(strains[1])}
+    return found | {f"thermal_S{k + 1}{k + 1}": float(heat[k]) for k in range(3)}

@@ -71,6 +71,20 @@ def test_an_interrupted_fit_goes_on_with_what_it_has(comm, shared_path, glass, m
         run_fit(other, out, comm)
 
 
+def test_a_fit_of_a_plys_axes_that_fails_says_which_axes_are_the_cells(comm, shared_path, glass, capfd):
+    """The modulus along the fibres in place of that across them."""
+    document = copy.deepcopy(glass)
+    document["unknown"] = {"material.fibre.young": {"start": 60.0, "lower": 50.0, "upper": 80.0}}
+    document["material"] = {"fibre": {"poisson": 0.22}, "matrix": {"young": 3.45, "poisson": 0.35}}
+    document["measured"] = {"E1": {"value": 1.0, "std": 100.0}}
+    with pytest.raises(ConvergenceError, match="hardly determine"):
+        run_fit(document, shared_path / "out", comm, quiet=False)
+    comm.barrier()
+    printed = capfd.readouterr().out
+    line = "remark: [measured] E1 is Young's modulus across the fibres; along them E_axial"
+    assert comm.rank or printed.splitlines().count(line) == 1
+
+
 def stamps(out: Path) -> dict[str, int]:
     return {str(path): path.stat().st_mtime_ns for path in out.glob("evaluation-*/case-*/result.json")}
 

@@ -95,9 +95,9 @@ def read_csv(text: str) -> Card:
     """From the entries of the stiffness; that the engineering constants are the same has its own test."""
     rows = {row["name"]: float(row["value"]) for row in csv.DictReader(io.StringIO(text))}
     C = np.array([[rows[f"C{min(i, j)}{max(i, j)}"] for j in range(1, 7)] for i in range(1, 7)])
-    if "expansion_11" not in rows:
+    if "expansion_axial" not in rows:
         return tensor_of_stiffness(C), None
-    alpha = np.diag([rows[f"expansion_{i}{i}"] for i in (1, 2, 3)])
+    alpha = np.diag([rows[f"expansion_{axis}"] for axis in ("axial", "x1", "x2")])
     for i, j in PAIRS[3:]:
         alpha[i, j] = alpha[j, i] = rows[f"expansion_gamma{i + 1}{j + 1}"] / 2
     return tensor_of_stiffness(C), alpha

@@ -9,7 +9,7 @@ import numpy as np
 
 from feti_homog import Case, run
 
-NAMES = ("E1", "E3", "G12", "G23", "nu12", "K_transverse", "expansion.1", "expansion.3")
+NAMES = ("E1", "E3", "G12", "G23", "nu12", "K_transverse", "expansion_x1", "expansion_axial")
 BORON = {"young": 379.3, "poisson": 0.1, "expansion": 8.1}
 ALUMINIUM = {"young": 68.3, "poisson": 0.3, "expansion": 23.0}
 AS4 = {

@@ -7,6 +7,7 @@ import io
 from collections.abc import Iterator
 from itertools import combinations_with_replacement
 
+from feti_homog.materials.constant_names import MATERIAL_EXPANSIONS
 from feti_homog.report.cards.effective_material import PAIRS, EffectiveMaterial, number
 
 COLUMNS = ("name", "value", "unit", "meaning")
@@ -28,13 +29,8 @@ def _rows(material: EffectiveMaterial) -> Iterator[tuple[str, float, str, str]]:
         axes = [int(digit) for digit in name if digit.isdigit()]
         yield name, value, "" if name.startswith("nu") else material.stress_unit, _meaning(name, axes)
     if material.expansion is not None:
-        for component, value in zip(COMPONENTS, material.expansion, strict=True):
-            yield (
-                f"expansion_{component}",
-                float(value),
-                "1 / temperature",
-                f"thermal strain {component} per unit of temperature",
-            )
+        for name, component, value in zip(MATERIAL_EXPANSIONS, COMPONENTS, material.expansion, strict=True):
+            yield name, float(value), "1 / temperature", f"thermal strain {component} per unit of temperature"
     C = material.stiffness
     for i, j in combinations_with_replacement(range(6), 2):
         digits = "".join(str(axis + 1) for axis in PAIRS[i])

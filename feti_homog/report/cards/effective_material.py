@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.errors import CaseError
+from feti_homog.materials.constant_names import ABOUT_FIBRES, OF_THE_CELL
 from feti_homog.materials.voigt import is_positive_definite
 from feti_homog.report.text import constant_tables
 from feti_homog.typing import Document, Float
@@ -27,17 +28,10 @@ ORDER = [PAIRS.index(tuple(sorted((FIBRE_FIRST[i], FIBRE_FIRST[j])))) for i, j i
 COUPLINGS = ~np.eye(6, dtype=bool)
 """(6, 6) where the stiffness of an orthotropic material is 0 in its axes."""
 COUPLINGS[:3, :3] = False
-# The constants about the fibre that are those of a transversely isotropic material in the axes of a card.
-ABOUT_THE_FIBRE = {
-    "E1": "E_axial", "E2": "E_transverse", "E3": "E_transverse", "nu12": "nu_axial", "nu13": "nu_axial",
-    "nu23": "nu_transverse", "G12": "G_axial", "G13": "G_axial", "G23": "G_transverse",
-    "alpha1": "expansion_axial", "alpha2": "expansion_transverse", "alpha3": "expansion_transverse",
-}  # fmt: skip
 LONGEST = 100
 AXES = (
-    "Axis 1 is the fibre, x3 of the cell; axes 2 and 3 are x1 and x2 of the cell. So E1, E2, E3, nu12, nu13, nu23, "
-    "G12, G13, G23 of this card are E3, E1, E2, nu31, nu32, nu12, G13, G23, G12 of the cell. nu_ij = -eps_j/eps_i "
-    "under stress along i."
+    f"Axis 1 is the fibre, x3 of the cell; axes 2 and 3 are x1 and x2 of the cell. So {', '.join(OF_THE_CELL)} of this "
+    f"card are {', '.join(OF_THE_CELL.values())} of the cell. nu_ij = -eps_j/eps_i under stress along i."
 )
 TINY = float(np.finfo(float).tiny)
 NEGLIGIBLE = 1e-3
@@ -57,7 +51,7 @@ class EffectiveMaterial:
         compliance: (6, 6) in Voigt's order [11, 22, 33, 23, 13, 12] with engineering shears, symmetric
             positive definite.
         expansion: (6,) strains per unit of temperature in the same order, or None.
-        errors: estimated errors of `constants` and of alpha1, alpha2, alpha3 by the mesh, of those that are known.
+        errors: estimated errors of `constants` and of expansions by the mesh, of those that are known.
         scatter: their standard deviations by uncertain constants of the case, of those that are known.
     """
 
@@ -126,8 +120,8 @@ def in_axes_of_the_cell(document: Document) -> EffectiveMaterial:
         symmetry=symmetry,
         compliance=(compliance + compliance.T) / 2.0,
         expansion=expansion,
-        errors=constant_tables.errors(document),
-        scatter=constant_tables.scatter(document),
+        errors=constant_tables.in_material_axes(constant_tables.mesh_errors(document)),
+        scatter=constant_tables.in_material_axes(constant_tables.standard_deviations(document)),
     )
 
 
@@ -159,9 +153,14 @@ def nearest_transversely_isotropic(document: Document) -> EffectiveMaterial:
         symmetry=symmetry,
         compliance=compliance,
         expansion=expansion,
-        errors={name: float(errors[own]) for name, own in ABOUT_THE_FIBRE.items() if own in errors},
-        scatter={name: scatter[own] for name, own in ABOUT_THE_FIBRE.items() if own in scatter},
+        errors=_on_card(errors),
+        scatter=_on_card(scatter),
     )
+
+
+def _on_card(known: Mapping[str, float]) -> dict[str, float]:
+    """Return numbers of constants about the fibres by their names on the card of a transversely isotropic material."""
+    return {name: float(known[own]) for own, each in ABOUT_FIBRES.items() if own in known for name in each.card}
 
 
 def _origin(document: Document) -> dict[str, Any]:

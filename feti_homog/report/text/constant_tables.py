@@ -5,61 +5,42 @@ Axes 1, 2, 3 of the material, as data sheets and cards have them, are x3, along 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from feti_homog.report.text.stiffness_tables import SHORT, UNKNOWN, abreast, with_errors
+from feti_homog.materials.constant_names import (
+    ABOUT_FIBRES,
+    MATERIAL_AXES,
+    MATERIAL_EXPANSIONS,
+    OF_THE_CELL,
+)
+from feti_homog.materials.voigt import EXPANSIONS
+from feti_homog.report.text.stiffness_tables import UNKNOWN, abreast, with_errors
 from feti_homog.report.text.table import Column, Table, in_brackets, without_noise
 from feti_homog.typing import Document
 
-TITLE = "Material axes: 1 along the fibres (x3 of the cell), 2 and 3 across (x1, x2)"
-# The constants of the cell with the same value, those that only estimates of errors have, and the axes of the cell in
-# whose order thermal expansions are.
-IN_THE_CELL = {"E1": "E3", "E2": "E1", "E3": "E2", "G12": "G13", "G13": "G23", "G23": "G12", "nu23": "nu12"}
-RATIOS = {"nu12": "nu31", "nu13": "nu32"}
-ROWS = (("E1", "E2", "E3"), ("G12", "G13", "G23"), ("nu12", "nu13", "nu23"), ("alpha1", "alpha2", "alpha3"))
-EXPANSIONS = {"alpha1": 2, "alpha2": 0, "alpha3": 1}
+ROWS = (("E1", "E2", "E3"), ("G12", "G13", "G23"), ("nu12", "nu13", "nu23"))
 
 
 def constants(document: Document) -> dict[str, float]:
-    """Return the constants, in the order of ROWS, those that follow from what the result has.
+    """Return the constants in material axes, in the order of ROWS, those that follow from what the result has.
 
     nu_ij = -eps_j / eps_i under stress along i: nu12 = nu13' E3' / E1' of those with a dash, in the axes of the cell.
     """
-    cell, expansion = document.get("constants") or {}, document.get("thermal_expansion")
-    found = {name: cell[own] for name, own in IN_THE_CELL.items() if own in cell}
-    for name, ratio, across in (("nu12", "nu13", "E1"), ("nu13", "nu23", "E2")):
+    cell: dict[str, float] = dict(document.get("constants") or {})
+    for name, ratio, across in (("nu31", "nu13", "E1"), ("nu32", "nu23", "E2")):
         if {ratio, across, "E3"} <= cell.keys():
-            found[name] = cell[ratio] * cell["E3"] / cell[across]
-    if cell and expansion is not None:
-        found |= {name: float(expansion[place]) for name, place in EXPANSIONS.items()}
-    return _in_rows(found)
+            cell[name] = cell[ratio] * cell["E3"] / cell[across]
+    return in_material_axes(cell)
 
 
-def errors(document: Document) -> dict[str, float]:
-    """Return the estimated errors of the constants by the mesh, of those that the result has."""
-    known: Document = document.get("mesh_error") or {}
-    of_constants, of_expansion = known.get("constants", {}), known.get("thermal_expansion")
-    places = (IN_THE_CELL | RATIOS).items()
-    found = {name: float(of_constants[own]) for name, own in places if own in of_constants}
-    if of_expansion is not None:
-        found |= {name: float(of_expansion[place]) for name, place in EXPANSIONS.items()}
-    return _in_rows(found)
-
-
-def scatter(document: Document) -> dict[str, float]:
-    """Return the standard deviations of the constants by uncertain constants of the case, of those that are known."""
-    known = standard_deviations(document)
-    places = IN_THE_CELL | {name: f"expansion.{place + 1}" for name, place in EXPANSIONS.items()}
-    found = {name: known[own] for name, own in places.items() if own in known}
-    return _in_rows(found)
-
-
-def _in_rows(found: dict[str, float]) -> dict[str, float]:
-    """Return the numbers in the order of ROWS."""
-    return {name: found[name] for names in ROWS for name in names if name in found}
+def in_material_axes(known: Mapping[str, float]) -> dict[str, float]:
+    """Return numbers of constants of the cell by their names in material axes, in which expansions keep theirs."""
+    places = {name: OF_THE_CELL[name] for names in ROWS for name in names}
+    places |= {name: name for name in MATERIAL_EXPANSIONS[:3]}
+    return {name: known[own] for name, own in places.items() if own in known}
 
 
 def standard_deviations(document: Document) -> dict[str, float]:
@@ -70,25 +51,22 @@ def standard_deviations(document: Document) -> dict[str, float]:
 
 def table(document: Document, label: str) -> list[Table]:
     """Return the constants as a table; `label` is the unit of stresses in brackets, or empty."""
-    found = constants(document)
-    return [with_errors(f"{TITLE}{label}", found, errors(document))] if found else []
+    found, off = constants(document), in_material_axes(mesh_errors(document))
+    return [with_errors(f"{MATERIAL_AXES}{label}", found, off)] if found else []
 
 
 def lines(document: Document, label: str) -> list[str]:
     """Return the same as text, with the estimated errors of the mesh."""
-    found, off = constants(document), errors(document)
-    title = f"{TITLE}{label}{'; +- error of the mesh' if off else ''}"
+    found, off = constants(document), in_material_axes(mesh_errors(document))
+    title = f"{MATERIAL_AXES}{label}{'; +- error of the mesh' if off else ''}"
     return [title, *abreast(ROWS, found, off, width=6)] if found else []
 
 
 # Constants of which sensitivities are shown, by whether the cell is in space; all are in result.json.
 SHOWN = {
     False: ("C11", "C22", "C12", "C33", "E1", "E2", "nu12", "G12"),
-    True: ("E_axial", "E_transverse", "nu_axial", "nu_transverse", "G_axial", "G_transverse", "expansion.3",
-           "expansion.1"),
-}  # fmt: skip
-# Of expansions in the axes of the cell, x3 along the fibres.
-SHORT_NAMES = SHORT | {"expansion.3": "exp. axial", "expansion.1": "exp. x1"}
+    True: tuple(name for name in ABOUT_FIBRES if name != "K_transverse"),
+}
 MOST = 9  # of other constants
 
 
@@ -107,9 +85,9 @@ def sensitivities(document: Document) -> list[Table]:
         )
     words = "Elasticities, the relative change of a constant by that of a parameter"
     words += "; contact at fixed status" * bool(found.get("at_fixed_status"))
-    names = [SHORT_NAMES.get(constants[k], constants[k]) for k in at]
+    heads = [(constants[k], max(12, len(constants[k]) + 2)) for k in at]
     return [
-        Table(title, [Column("", -width), *(Column(name, 12, form) for name in names)], rows)
+        Table(title, [Column("", -width), *(Column(*head, form) for head in heads)], rows)
         for title, form, rows in ((words, ".4f", shares), ("Derivatives by the same parameters", ".3g", slopes))
     ]
 
@@ -121,11 +99,11 @@ def uncertainty(document: Document) -> list[Table]:
     names, values = found["constants"], document["sensitivities"]["constant_values"]
     errors = mesh_errors(document)
     inputs = [name.removeprefix("material.") for name in found["parameters"]]
-    columns = [Column("", -16), Column("value"), Column("+- phases"), Column("+- mesh")]
+    columns = [Column("", -24), Column("value"), Column("+- phases"), Column("+- mesh")]
     columns += [Column(name, max(12, len(name) + 2), ".1f") for name in inputs]
     rows = [
         [
-            SHORT_NAMES.get(name, name),
+            name,
             values[k],
             found["std"][k],
             errors.get(name, UNKNOWN),
@@ -142,9 +120,9 @@ def mesh_errors(document: Document) -> dict[str, float]:
     """Return the estimated errors of constants by the mesh, of entries and expansions by their places, too."""
     known: Document = document.get("mesh_error") or {}
     entries = np.ndenumerate(np.array(known.get("effective_stiffness", [])))
-    along = enumerate(known.get("thermal_expansion", ()))
+    strains = dict(zip(EXPANSIONS[:3], map(float, known.get("thermal_expansion", ())), strict=False))
     named = {f"C{i + 1}{j + 1}": float(error) for (i, j), error in entries}
-    return named | {**known.get("constants", {})} | {f"expansion.{k + 1}": float(error) for k, error in along}
+    return named | {**known.get("constants", {})} | strains
 
 
 def shown(names: Sequence[str]) -> list[str]:

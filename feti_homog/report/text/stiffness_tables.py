@@ -8,6 +8,7 @@ from itertools import zip_longest
 from math import floor, log10
 from typing import Any
 
+from feti_homog.materials.constant_names import ABOUT_FIBRES, CELL_AXES
 from feti_homog.materials.voigt import SPATIAL_STRESSES, STRAINS, voigt_names
 from feti_homog.microstructure.phase_names import COATING
 from feti_homog.report.text.table import Column, Table, number, with_unit
@@ -28,19 +29,7 @@ MESH_ERROR = "Mesh error, estimated"
 # Of a value by which an error is below the digits that are printed without it.
 NO_ERROR = 1e-7
 LEAST_DECIMAL, MOST_DECIMAL = 1e-4, 1e8  # numbers between these are printed to the digits of their errors
-CELL_AXES = ", axes of the cell, x3 along the fibres"
 ABREAST = 5  # constants beside each other in text
-SHORT = {
-    "E_axial": "E axial",
-    "E_transverse": "E transv.",
-    "nu_axial": "nu axial",
-    "nu_transverse": "nu transv.",
-    "G_axial": "G axial",
-    "G_transverse": "G transv.",
-    "K_transverse": "K transv.",
-    "expansion_axial": "exp. axial",
-    "expansion_transverse": "exp. transv.",
-}
 
 
 def stiffnesses(document: Document, label: str, under_minus: str = "Under minus E") -> list[Table]:
@@ -52,7 +41,7 @@ def stiffnesses(document: Document, label: str, under_minus: str = "Under minus 
     found, errors = list[Table](), _errors(document)
     for key, title in titles.items():
         if document.get(key) is not None:
-            axes = "" if len(document[key]) == len(STRAINS) else CELL_AXES
+            axes = "" if len(document[key]) == len(STRAINS) else f", {CELL_AXES}"
             found.append(_matrix(f"{title}{axes}{label}", document[key]))
         if errors.get(key) is not None:
             found.append(_matrix(f"{MESH_ERROR}{label}", errors[key], ".1e"))
@@ -123,7 +112,7 @@ def thermal(document: Document, label: str) -> list[Table]:
     rows = list(zip(names, *(_rounded(document[key]) for key in known), *errors.values(), strict=True))
     columns = [Column("", -6), *(Column(title, 22, ".7g") for title in known.values())]
     columns += [Column(f"{key.rpartition('_')[2]}: error", 18, ".1e") for key in errors]
-    return [Table(f"Per unit of temperature, axes of the cell{label}", columns, rows)] if known else []
+    return [Table(f"Per unit of temperature, {CELL_AXES}{label}", columns, rows)] if known else []
 
 
 def _rounded(numbers: Sequence[float]) -> list[float]:
@@ -169,7 +158,7 @@ def constants(document: Document, label: str) -> list[Table]:
     """Engineering constants in space, their range across the fibres, and closed estimates and bounds beside them."""
     found, errors = list[Table](), _errors(document).get("constants", {})
     if (values := document.get("constants")) is not None:
-        found.append(with_errors(f"Engineering constants in the axes of the cell{label}", values, errors))
+        found.append(with_errors(f"Engineering constants, {CELL_AXES}{label}", values, errors))
     if (across := document.get("transverse_moduli")) is not None:
         ends = ("least", "largest")
         rows = [[name, *(across[f"{name}_{end}"] for end in ends)] for name in ("E", "G")]
@@ -183,7 +172,7 @@ def constants_lines(document: Document, label: str) -> list[list[str]]:
     values, block = document.get("constants"), list[str]()
     if values is not None:
         rows = abreast(ENGINEERING, values, _errors(document).get("constants", {}), width=5)
-        block = [f"Engineering constants in the axes of the cell{label}", *rows]
+        block = [f"Engineering constants, {CELL_AXES}{label}", *rows]
     return [block, *(_estimates_lines(document, table) for table in estimates(document, label))]
 
 
@@ -195,14 +184,14 @@ def estimates(document: Document, label: str) -> list[Table]:
     if document.get("transversely_isotropic") is None:
         return []
     rows = {title: _known(row) for title, row in _sources(document).items()}
-    names = [name for name in SHORT if any(name in row for row in rows.values())]
+    names = [name for name in ABOUT_FIBRES if any(name in row for row in rows.values())]
     forms = {ITS_ERROR: ".1e"}
     cells = [
         [title, *(_short(row.get(name), forms.get(title, ".5g")) for name in names)]
         for title, row in rows.items()
         if row
     ]
-    columns = [Column("", -22), *(Column(SHORT[name], 13) for name in names)]
+    columns = [Column("", -22), *(Column(name, max(13, len(name) + 2)) for name in names)]
     return [Table(f"Along the fibres and across them{label}", columns, cells)]
 
 
@@ -210,7 +199,7 @@ def _sources(document: Document) -> dict[str, Document]:
     """Return the constants of this cell, by each method, and the bounds."""
     limits = _known(document.get("fibre_bounds") or {})
     errors, sources = _errors(document).get("constants", {}), {THIS_CELL: document["transversely_isotropic"]}
-    sources |= {ITS_ERROR: {name: errors[name] for name in SHORT if name in errors}} if errors else {}
+    sources |= {ITS_ERROR: {name: errors[name] for name in ABOUT_FIBRES if name in errors}} if errors else {}
     sources |= {name.replace("_", " "): row for name, row in (document.get("estimates") or {}).items()}
     return sources | {name: {key: limits[key][k] for key in limits} for k, name in enumerate((LOWER, UPPER))}
 

@@ -14,6 +14,7 @@ from feti_homog.case.document import TomlPath, read_document, to_document
 from feti_homog.case.mixed_load import TEMPERATURE
 from feti_homog.case.sections import CURVE, MEASURED, SWEEP, TEST, UNKNOWN, Unknown
 from feti_homog.errors import CaseError
+from feti_homog.materials.constant_names import FORMER, axes_line
 from feti_homog.materials.plane_state import PLANE_STATES
 from feti_homog.materials.voigt import voigt_names
 from feti_homog.results.path_curves import SAME_LOAD
@@ -77,6 +78,13 @@ class Fit:
         first = next(k for k, datum in enumerate(self.data) if datum.test == test)
         return slice(first, first + len(self.data_of(test)))
 
+    def axes(self) -> str:
+        """Return the axes of measured values that could be of a ply, in a line; empty without any."""
+        cases = self.at([each.start for each in self.unknowns.values()]).cases
+        spatial = [each for each in self.data if PLANE_STATES[cases[each.test].analysis.plane].is_spatial]
+        line = axes_line(name for each in spatial for name in (each.name, each.strain_name))
+        return f"[{MEASURED}] {line}" if line else ""
+
     def digest(self) -> str:
         """Short name of the fit: the same for the same cases, unknowns and data."""
         start = self.at([each.start for each in self.unknowns.values()])
@@ -139,8 +147,9 @@ def of_document(document: Mapping[str, Any], folder: Path, comm: Intracomm) -> s
     """
     fit = on_root(comm, parse, document, folder)
     sweep = on_root(comm, fit.at, [each.start for each in fit.unknowns.values()])
+    line = f"remark     {axes}\n" if (axes := on_root(comm, fit.axes)) else ""
     counts = f"{len(fit.unknowns)} unknowns, {len(fit.data)} measured values of {len(fit.tests)} tests"
-    return description.first_of(sweep, f"fit        {counts}; the first at the start:", comm)
+    return description.first_of(sweep, f"{line}fit        {counts}; the first at the start:", comm)
 
 
 def _case_faults(fit: Fit) -> Iterator[str]:
@@ -170,7 +179,9 @@ def _name_faults(place: str, case: Case, data: Sequence[Datum]) -> Iterator[str]
         return
     yield from _curve_faults(place, case, [each for each in data if each.strain is not None])
     for name in dict.fromkeys(each.name for each in data if each.strain is None):
-        if name not in known:
+        if name in FORMER:
+            yield f"{place}{toml_key(name)}: its name is {FORMER[name]}"
+        elif name not in known:
             yield f"{place}{toml_key(name)}: the analysis does not give it; {suggestion(name, known, {})}"
 
 

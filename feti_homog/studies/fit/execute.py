@@ -48,6 +48,8 @@ def run(fit: Fit, directory: Path, comm: Intracomm, ranks_per_case: int, retry: 
     digest = on_root(comm, fit.digest)
     with output_folder.held(directory, comm, lambda line: complain(line) if comm.rank == 0 else None):
         on_root(comm, files.begin, directory / files.NAME, digest)
+        if comm.rank == 0 and not quiet and (line := fit.axes()):
+            say(f"remark: {line}")
         estimates = Evaluations(fit, directory, comm, ranks_per_case, retry, quiet).estimate()
         document = on_root(comm, files.write, directory, digest, fit, estimates)
     if comm.rank == 0 and not quiet:

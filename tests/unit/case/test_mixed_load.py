@@ -7,6 +7,7 @@ import tomllib
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.base_case import fibre
 from unit.case.documents import documents, loads
 from unit.case.faulty_bonding import of_type
 from unit.case.valid_cases import VALID_CASES, in_space
@@ -102,9 +103,24 @@ def test_what_is_free_of_stress_is_reported():
     assert path("[{temperature = -100}, {S33 = 1}]", "generalized").remarks() == (
         "[path] S33: stress-free until waypoints[1]",
         "[path] S11, S22, S23, S13, S12: never named: stress-free",
+        "[path] S33 is stress along the fibres; across them S11, S22",
     )
     assert parsed(VALID_CASES["load on a sheet"]).remarks() == ("[load] S11, S22: never named: stress-free",)
     assert parsed(VALID_CASES["load"]).remarks() == parsed(VALID_CASES["base"]).remarks() == ()
+
+
+def test_names_that_a_ply_has_the_other_way_are_reported_in_one_line():
+    """S13 and S22 have the same way in both axes; a plane has no axis along the fibres."""
+    line = "S12 is shear across the fibres; along them S13, S23"
+    loads = "[{E11 = 0.1, S12 = 1, S33 = 0}, {S13 = 1, S22 = 1}]"
+    of_strain = "E11 is strain across the fibres; along them E33"
+    assert path(loads, "generalized").remarks()[-1] == f"[path] {of_strain}. {line}"
+    assert parsed(VALID_CASES["envelope"]).remarks() == ()
+    envelope = Case.parse(tomllib.loads(VALID_CASES["envelope"].replace('"strain"', '"generalized"')))
+    assert envelope.remarks() == (f"[envelope] {line}",)
+    phase = "E1 = 9.0\nE2 = 5.0\nE3 = 5.0\nnu12 = 0.3\nnu13 = 0.3\nnu23 = 0.3\nG12 = 2.0\nG13 = 2.0\nG23 = 2.0\n"
+    of_phase = "[material.fibre] E1 and E2 are across the fibres; along them E3"
+    assert parsed(fibre(phase, "generalized")).remarks() == (of_phase,)
 
 
 def test_the_section_load_and_the_method_that_reads_a_file(tmp_path):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.materials.plane_state import GENERALIZED, PLANE_STRAIN
-from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, STRESSES, voigt_names
+from feti_homog.materials.voigt import EXPANSIONS, SPATIAL_STRESSES, STRESSES, THERMAL_STRESSES, voigt_names
 from feti_homog.report.text import point_tables
 from feti_homog.results.landmarks import peak_of
 from feti_homog.typing import Document
@@ -71,11 +71,8 @@ def _entries(stiffness: Any, numbers: Sequence[int], suffix: str = "") -> dict[s
 
 def _thermal(document: Document) -> dict[str, float]:
     """Stress and strain per unit of temperature, if they are known."""
-    found = {
-        f"thermal_{name}": v for name, v in zip(SPATIAL_STRESSES, document.get("thermal_stress", ()), strict=False)
-    }
-    named = zip(SPATIAL_STRAINS, document.get("thermal_expansion", ()), strict=False)
-    return found | {f"expansion_{name}": value for name, value in named}
+    found = dict(zip(THERMAL_STRESSES, document.get("thermal_stress", ()), strict=False))
+    return found | dict(zip(EXPANSIONS, document.get("thermal_expansion", ()), strict=False))
 
 
 def _mesh_errors(errors: Document, numbers: Sequence[int]) -> dict[str, float]:
@@ -109,7 +106,7 @@ def _anisotropy(stiffness: Any) -> dict[str, float]:
         return {}
     C = np.asarray(stiffness)
     return {
-        "anisotropy_axial": float(C[0, 0] - C[1, 1]),
+        "anisotropy_normal": float(C[0, 0] - C[1, 1]),
         "anisotropy_shear": float(C[-1, -1] - (C[0, 0] + C[1, 1] - 2 * C[0, 1]) / 4),
     }
 

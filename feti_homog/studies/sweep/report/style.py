@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
+from feti_homog.materials.constant_names import ABOUT_FIBRES
 from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES
 from feti_homog.report.plots.plot_helpers import SYMBOLS, faint_grid, stress_label
 from feti_homog.studies.sweep.report.sweep_table import Series, SweepTable
@@ -22,14 +23,13 @@ MESH_ERROR_STYLE: dict[str, Any] = {
     "fmt": "none", "elinewidth": 7.0, "alpha": 0.35, "zorder": 1, "label": "estimated error of the mesh",
 }  # fmt: skip
 LEGEND_HANDLE, LEGEND_CHARACTER = 0.7, 0.085  # inches of an entry: its line with the space around, a letter
-WAYS = {"axial": "along", "transverse": "across"}
 NAMES = {
     "C11": "$C_{11}$",
     **{name: f"$C_{{{name[1:]}}}$" for name in ("C33", "C44", "C66")},
-    **{f"E_{way}": f"$E$ {words} the fibres" for way, words in WAYS.items()},
-    **{f"G_{way}": f"$G$ {words} the fibres" for way, words in WAYS.items()},
-    **{f"nu_{way}": f"$\\nu$ {words} the fibres" for way, words in WAYS.items()},
-    **{f"expansion_{way}": f"$\\alpha$ {words} the fibres (1 / temperature)" for way, words in WAYS.items()},
+    **{
+        name: f"{each.symbol} {each.way} the fibres{' (1 / temperature)' * name.startswith('expansion')}"
+        for name, each in ABOUT_FIBRES.items()
+    },
     "bulk": "plane bulk modulus $k$",
     "shear": "shear modulus $\\mu$",
     **{f"onset_{name}": f"$\\Sigma_{{{name[1:]}}}$ at the first break" for name in SPATIAL_STRESSES},

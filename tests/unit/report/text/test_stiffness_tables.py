@@ -20,7 +20,7 @@ def test_a_row_for_each_source_and_a_column_for_each_constant_that_one_knows():
     document["fibre_bounds"] = {"E_axial": [40.0, 43.0], "nu_axial": None}
     axes, table = constants_lines(document, " (GPa)")
     assert len(axes) == 4 and axes[0].endswith("(GPa)")
-    assert "0.2 %" in table[0] and table[1].split() == ["E", "axial", "G", "transv."]
+    assert "0.2 %" in table[0] and table[1].split() == ["E_axial", "G_transverse"]
     assert [line.split()[-2:] for line in table[2:-1]] == [
         ["41.7", "3.7"], ["41.6", "-"], ["40", "-"], ["43", "-"],
     ]  # fmt: skip

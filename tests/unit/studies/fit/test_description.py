@@ -139,3 +139,27 @@ def test_a_fit_whose_output_asks_for_more_is_another():
         scatter.parse(tomllib.loads(f"{text}[output]\n{words}\n"), Path()) for words in ("", "mesh_error = false")
     ]
     assert studies[0].digest() != studies[1].digest()
+
+
+def spatial_fit(names: str) -> str:
+    measured = "".join(f'"{name}" = {{value = 3.0, std = 0.1}}\n' for name in names.split())
+    return BASE.replace('"strain"', '"generalized"') + UNKNOWN + f"[measured]\n{measured}"
+
+
+def test_constants_of_a_data_sheet_are_read_in_the_axes_of_the_cell():
+    """E2 is across the fibres in both; names with axial and transverse need no words."""
+    fit = parse(tomllib.loads(spatial_fit("E1 E2 G12 E_axial nu12")), Path())
+    assert fit.axes() == (
+        "[measured] E1 is Young's modulus across the fibres; along them E_axial. "
+        "G12 is shear across the fibres; along them G_axial. "
+        "nu12 is contraction under stress across the fibres; along them nu_axial"
+    )
+    assert parse(tomllib.loads(spatial_fit("E_axial G_transverse")), Path()).axes() == ""
+    assert parse(tomllib.loads(BASE + UNKNOWN + MEASURED.replace("C11", "E1")), Path()).axes() == ""
+
+
+def test_former_names_have_the_names_in_their_place():
+    assert faults(spatial_fit("expansion.3 thermal_stress.1")) == (
+        '[measured] "expansion.3": its name is expansion_axial',
+        '[measured] "thermal_stress.1": its name is thermal_S11',
+    )
