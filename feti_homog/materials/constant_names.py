@@ -57,6 +57,7 @@ OF_THE_CELL = {
 FORMER = {
     **{f"expansion.{k + 1}": EXPANSIONS[k] for k in range(3)},
     **{f"thermal_stress.{k + 1}": THERMAL_STRESSES[k] for k in range(3)},
+    **{f"alpha{k + 1}": MATERIAL_EXPANSIONS[k] for k in range(3)},
 }
 """By names that are no more, those in their place."""
 # Components and constants that a ply's axes have the other way: their kind, their way in a cell, and the other way.

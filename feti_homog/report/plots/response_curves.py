@@ -173,7 +173,7 @@ def sensitivities(document: Document) -> Figure | None:
     names = [plain(str(row[0])) for row in tables[0].rows]
     values = np.array([[np.nan if isinstance(entry, str) else entry for entry in row[1:]] for row in tables[0].rows])
     left = 0.4 + LETTER * max(map(len, names))
-    size = left + CELL[0] * values.shape[1] + 1.2, 1.2 + CELL[1] * len(names)
+    size = left + CELL[0] * values.shape[1] + 1.2, 1.4 + CELL[1] * len(names)
     picture = Figure(figsize=size, layout="constrained")
     axes = picture.subplots()
     most = max(float(np.abs(values[np.isfinite(values)]).max(initial=0.0)), FAINTEST)
@@ -181,7 +181,8 @@ def sensitivities(document: Document) -> Figure | None:
     for (row, column), value in np.ndenumerate(values):
         words = "-" if np.isnan(value) else f"{value:.2f}" if abs(value) >= FAINTEST else ""
         axes.text(column, row, words, ha="center", va="center", color="white" if abs(value) > DARK * most else "black")
-    axes.set_xticks(range(values.shape[1]), [column.name for column in tables[0].columns[1:]])
+    heads = [column.name.replace("_", "_\n") for column in tables[0].columns[1:]]
+    axes.set_xticks(range(values.shape[1]), heads)
     axes.set_yticks(range(len(names)), names)
     axes.tick_params(length=0, labeltop=True, labelbottom=False)
     axes.spines[:].set_visible(False)

@@ -159,7 +159,8 @@ def test_constants_of_a_data_sheet_are_read_in_the_axes_of_the_cell():
 
 
 def test_former_names_have_the_names_in_their_place():
-    assert faults(spatial_fit("expansion.3 thermal_stress.1")) == (
+    assert faults(spatial_fit("expansion.3 thermal_stress.1 alpha2")) == (
         '[measured] "expansion.3": its name is expansion_axial',
         '[measured] "thermal_stress.1": its name is thermal_S11',
+        "[measured] alpha2: its name is expansion_x1",
     )
