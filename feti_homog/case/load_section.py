@@ -44,11 +44,6 @@ class AnalysisSection:
         """Equilibria of a problem with so many unit loads, under plus and minus each where faces touch one-sidedly."""
         return 2 * loads if one_sided else loads
 
-    @property
-    def components(self) -> list[str]:
-        """Names of the strains and stresses that its loads give, other than zero."""
-        return [name for load in self.placed.values() for name, value in named(load).items() if value]
-
 
 class Stiffness(AnalysisSection):
     """The effective stiffness, which has no section."""
@@ -113,11 +108,6 @@ class Envelope(AnalysisSection):
         default=None,
         only=GENERALIZED,
     )
-
-    @property
-    def components(self) -> list[str]:
-        """Return the axes of the plane."""
-        return [*self.plane]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -244,9 +234,11 @@ def axes_lines(kind: str, section: AnalysisSection, materials: Mapping[str, Mate
         return ()
     from feti_homog.materials.constant_names import axes_line  # which nothing in a plane needs
 
+    loaded = [name for load in section.placed.values() for name, value in named(load).items() if value]
+    of_loads = axes_line(section.plane if isinstance(section, Envelope) else loaded)
     phases = [f"[material.{name}]" for name, own in materials.items() if isinstance(own, Orthotropic)]
-    of_loads, of_phases = axes_line(section.components), "E1 and E2 are across the fibres; along them E3"
-    lines = [f"[{kind}] {of_loads}"] * bool(of_loads) + [f"{', '.join(phases)} {of_phases}"] * bool(phases)
+    lines = [f"[{kind}] {of_loads}"] if of_loads else []
+    lines += [f"{', '.join(phases)} E1 and E2 are across the fibres; along them E3"] if phases else []
     return (". ".join(lines),) if lines else ()
 
 

@@ -21,14 +21,6 @@ FLAGS = (
     *("feti_view", "malloc_debug", "malloc_test", "log_view_memory", "log_view_gpu_time"),
     *("options_left", "skip_petscrc", "on_error_abort", "on_error_mpiabort", "no_signal_handler"),
 )
-VIEWERS = (
-    *(option.name for option in OPTIONS if not option.value and option.name != "feti_view"),
-    *(f"feti_ksp_{name}" for name in ("monitor_true_residual", "monitor_singular_value", "view_final_residual")),
-    *(f"feti_ksp_{name}" for name in ("converged_rate", "view_eigenvalues", "view_rhs", "view_solution")),
-    "log_view",
-    "options_view",
-)
-"""Flags that print, whose value may be a place."""
 OWN_SHORT = ("-h",)
 CASE_FILE = ".toml"
 
@@ -72,9 +64,9 @@ def faulty_values(options: Mapping[str, Value]) -> list[str]:
     """One fault for each option (name without dash) that cannot have its value."""
     texts = {name: _text(value) for name, value in options.items()}
     return sorted(
-        f"{in_words(name, texts[name])}: expected {rule.expected}"
-        for name, rule in RULES.items()
-        if name in texts and not rule.holds(texts[name])
+        f"{in_words(name, text)}: expected {rule.expected}"
+        for name, text in texts.items()
+        if (rule := PRINTS if is_viewer(name) else RULES.get(name)) and not rule.holds(text)
     )
 
 
@@ -91,7 +83,12 @@ def flag_value(value: Value) -> str | None:
 
 def is_flag(name: str) -> bool:
     """Return whether an option (name without dash) is a flag, which needs no value and may have that of a viewer."""
-    return name in FLAGS or name in VIEWERS or (name.startswith("feti_") and SHOWING.search(name) is not None)
+    return name in FLAGS or is_viewer(name) or (name.startswith("feti_") and SHOWING.search(name) is not None)
+
+
+def is_viewer(name: str) -> bool:
+    """Return whether a flag (name without dash) prints, and its value may be a place."""
+    return name in ("log_view", "options_view") or (name.startswith("feti_ksp_") and SHOWING.search(name) is not None)
 
 
 def is_own_flag(name: str) -> bool:
@@ -163,7 +160,6 @@ NOT_NEGATIVE = _real("a number of at least 0", lambda number: 0.0 <= number < ma
 # With a relative tolerance of 1 or more nothing is solved.
 RULES: dict[str, Rule] = {
     **{name: SWITCH for name in FLAGS},
-    **{name: PRINTS for name in VIEWERS},
     **{
         option.name: Rule(f"one of {option.value.replace('|', ', ')}", option.value.split("|").__contains__)
         for option in OPTIONS

@@ -22,13 +22,13 @@ from feti_homog.system.petsc.option_table import (
     without_prefix,
 )
 from feti_homog.system.petsc.option_values import (
-    VIEWERS,
     Value,
     faulty_values,
     flag_value,
     in_words,
     is_flag,
     is_own_flag,
+    is_viewer,
 )
 
 # Options that PETSc looks for only in KSPSolve.
@@ -140,10 +140,10 @@ def faults_of_solvers(given: Mapping[str, str]) -> list[str]:
     trials = {"feti_": _solve_by_krylov_method} | {
         prefix: partial(_solve_directly, prefix) for prefix in DIRECT_PREFIXES
     }
-    faults = []
-    with _hidden({name: value for name, value in given.items() if name in VIEWERS}):
+    faults, viewers = [], {name: value for name, value in given.items() if is_viewer(name)}
+    with _hidden(viewers):
         for prefix, solve in trials.items():
-            own = [name for name in given if _prefix(name) == prefix and name not in (*OWN, *VIEWERS)]
+            own = [name for name in given if _prefix(name) == prefix and name not in (*OWN, *viewers)]
             words = _complaint(solve) if own or "help" in given else ""
             if words:
                 own.sort(key=lambda name: not name.endswith("_type"))  # types first: they decide what others mean

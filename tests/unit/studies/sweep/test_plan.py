@@ -213,3 +213,9 @@ def test_values_may_be_numpys():
 def test_a_base_that_is_no_section():
     with pytest.raises(CaseError, match=r"cell\.order: \"cell\" is no section"):
         plan.expand({"cell": 3, "sweep": {"cell.order": [1]}}, Path())
+
+
+def test_options_that_print_make_no_other_sweep():
+    options = "", "feti_ksp_monitor = true", 'feti_pc_type = "lumped"'
+    known, looked, other = (expanded("cell.order = [1, 2]", f"{CASE}[petsc]\n{option}\n").entries for option in options)
+    assert known == looked and all(a.identity != b.identity for a, b in zip(known, other, strict=True))
