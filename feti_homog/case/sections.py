@@ -160,7 +160,7 @@ class Output:
         default=False,
     )
     pictures: bool = key(boolean, "Draw PNG files; without fields, the curves alone.", default=True, presentation=True)
-    report: bool = key(boolean, "Write tables, checks and pictures on one page, report.html.", default=False, presentation=True)
+    report: bool = key(boolean, "Write report.html: tables, checks, pictures.", default=False, presentation=True)
     stress: str = key(
         choice("auto", "S11", "S22", "S12", *OUT_OF_PLANE_STRESSES),
         'Component to draw; "auto": the component of the unit strain. "S33", "S23" and "S13" exist in generalized '

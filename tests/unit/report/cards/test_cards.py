@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import re
 
 import numpy as np
 import pytest
@@ -112,11 +111,12 @@ def test_comments_say_what_the_axes_and_units_are(form, mark):
         assert words in comments
 
 
+EXPANSIONS = ("expansion_x1", "expansion_x2", "expansion_axial")
 AXES_IN_THE_CELL = {1: 3, 2: 1, 3: 2}  # the fibre is axis 1 of a card, and x3 of the cell
 ABOUT_THE_FIBRE = {
     "E1": "E_axial", "E2": "E_transverse", "E3": "E_transverse", "nu12": "nu_axial", "nu13": "nu_axial",
-    "nu23": "nu_transverse", "G12": "G_axial", "G13": "G_axial", "G23": "G_transverse", "alpha1": "expansion_axial",
-    "alpha2": "expansion_transverse", "alpha3": "expansion_transverse",
+    "nu23": "nu_transverse", "G12": "G_axial", "G13": "G_axial", "G23": "G_transverse",
+    "expansion_axial": "expansion_axial", "expansion_transverse": "expansion_transverse",
 }  # fmt: skip
 
 
@@ -137,10 +137,10 @@ def listed(text, words):
 def test_comments_have_the_errors_of_the_mesh_in_the_axes_of_the_card(form):
     """Every constant of a card has the error of its own, all unlike, and no other constant's."""
     cell = {f"{k}{i}{j}": 0.0 for k in ("nu", "G") for i in (1, 2, 3) for j in (1, 2, 3)}
-    names = [*CONSTANTS.split(), "alpha1", "alpha2", "alpha3"]
+    names = [*CONSTANTS.split(), *EXPANSIONS]
     errors = {name: round(0.011 * (k + 1), 3) for k, name in enumerate(names)}
     found = {"constants": cell | {in_the_cell(name): errors[name] for name in CONSTANTS.split()}}
-    found["thermal_expansion"] = [errors["alpha2"], errors["alpha3"], errors["alpha1"], 0.5, 0.5, 0.5]
+    found["thermal_expansion"] = [*(errors[name] for name in EXPANSIONS), 0.5, 0.5, 0.5]
     printed = listed(FORMATS[form](in_axes_of_the_cell(document(DISTINCT, mesh_error=found))), "by the mesh")
     assert printed == pytest.approx(errors, rel=0.05)
     known = {own: 0.011 * (k + 1) for k, own in enumerate(dict.fromkeys(ABOUT_THE_FIBRE.values()))}
@@ -152,13 +152,13 @@ def test_comments_have_the_errors_of_the_mesh_in_the_axes_of_the_card(form):
 @pytest.mark.parametrize("form", ["abaqus", "ansys", "moose"])
 def test_comments_have_the_scatter_by_uncertain_phases_in_the_axes_of_the_card(form):
     """Sensitivities are of nu12, nu13, nu23 of the cell, of which a card has the first."""
-    names = ("E1", "E2", "E3", "nu12", "nu13", "nu23", "G12", "G13", "G23", "expansion.1", "expansion.2", "expansion.3")
+    names = ("E1", "E2", "E3", "nu12", "nu13", "nu23", "G12", "G13", "G23", *EXPANSIONS)
     std = {name: 0.011 * (k + 1) for k, name in enumerate((*names, *dict.fromkeys(ABOUT_THE_FIBRE.values())))}
     found = {"constants": [*std], "std": [*std.values()]}
     words = "constants of the phases"
     printed = listed(FORMATS[form](in_axes_of_the_cell(document(DISTINCT, uncertainty=found))), words)
     expected = {name: std[own] for name in CONSTANTS.split() if (own := in_the_cell(name)) in std}
-    expected |= {f"alpha{axis}": std[f"expansion.{own}"] for axis, own in AXES_IN_THE_CELL.items()}
+    expected |= {name: std[name] for name in EXPANSIONS}
     assert printed == pytest.approx(expected, rel=0.05) and len(printed) == 10
     printed = listed(FORMATS[form](nearest_transversely_isotropic(document(DISTINCT, uncertainty=found))), words)
     assert printed == pytest.approx({name: std[own] for name, own in ABOUT_THE_FIBRE.items()}, rel=0.05)
