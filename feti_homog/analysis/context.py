@@ -18,6 +18,7 @@ from feti_homog.homogenization.averaging import Homogenization, Response
 from feti_homog.homogenization.fibre_debonding import FibreInterfaces
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
+from feti_homog.interface.contact.load_scales import ABSURD
 from feti_homog.interface.contact.states import OPEN, BondState, Equilibrium
 from feti_homog.interface.loads.load import Load
 from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS
@@ -72,6 +73,11 @@ class CellLoads:
         masks = np.concatenate([problem.interface.undetermined(own.state) for problem, own in pairs])
         return [name for name, found in zip(self.names, masks, strict=True) if found]
 
+    def excess(self, responses: Sequence[Response]) -> float:
+        """Return how many times as large as those of the bonded cell strains under a load are.  Collective."""
+        states = [(problem.interface.scales, own.state) for problem, own in zip(self.problems, responses, strict=True)]
+        return max(scales.excess(state.solution.strain, state.asked) for scales, state in states)
+
     def secants(self, responses: Sequence[Response], sign: float) -> dict[str, Float]:
         """Return the secant stiffness (39), and the thermal stress if a temperature is a load.
 
@@ -104,6 +110,7 @@ class AnalysisContext:
         checkpoint: where the events of a path go; `resume` goes on from it.
         log: called with a line about each event of a path; `events` is where all of them are.
         undetermined: of every point under one load, the strains that nothing determines.
+        excess: the largest strain under one load, relative to that of the bonded cell.
         notes: remarks on the result.
         earlier: what the mesh lacked on which the cell was solved before.
     """
@@ -117,6 +124,7 @@ class AnalysisContext:
     log: Callable[[str], object] = lambda line: None
     events: str = "result.path"
     undetermined: list[list[str]] = field(default_factory=list)
+    excess: float = 0.0
     notes: list[str] = field(default_factory=list)
     earlier: CoarseMeshError | None = None
 
@@ -220,6 +228,7 @@ class AnalysisContext:
     def loaded_point(self, responses: Sequence[Response]) -> dict[str, Any]:
         """Means, energies and debonding at a point of result.json under one load.  Collective."""
         self.undetermined.append(self.loads.undetermined(responses))
+        self.excess = max(self.excess, self.loads.excess(responses))
         energies = {
             "stored": sum(response.stored for response in responses),
             "stored_in_springs": sum(response.in_springs for response in responses),
@@ -228,17 +237,16 @@ class AnalysisContext:
         return self.loads.means(responses) | energies | self.point(responses[:1]) | {"iterations": iterations}
 
     def remarks(self) -> list[str]:
-        """List the notes and, in one line, the strains that nothing determines."""
-        points = sum(map(bool, self.undetermined))
-        names = [name for name in SPATIAL_STRAINS if any(name in each for each in self.undetermined)]
-        if not names:
-            return self.notes
-        where = f" at {points} of {len(self.undetermined)} points" if self.case.section.is_followed else ""
-        return [
-            *self.notes,
-            f"[{self.case.analysis.type}] {', '.join(names)}: undetermined{where}: with a given stress nothing resists "
-            "them, and the result has one value of many",
-        ]
+        """List the notes, and a line each on strains that nothing determines or that are absurd."""
+        found, points, label = [*self.notes], sum(map(bool, self.undetermined)), f"[{self.case.analysis.type}]"
+        if names := [name for name in SPATIAL_STRAINS if any(name in each for each in self.undetermined)]:
+            where = f" at {points} of {len(self.undetermined)} points" if self.case.section.is_followed else ""
+            words = "with a given stress nothing resists them, and the result has one value of many"
+            found.append(f"{label} {', '.join(names)}: undetermined{where}: {words}")
+        if self.excess > ABSURD:
+            words = "hardly anything carries the stresses"
+            found.append(f"{label} strains {self.excess:.1e} times those of the bonded cell: {words}")
+        return found
 
     def warnings(self) -> list[str]:
         """List the warnings about settings that a user may not have intended."""

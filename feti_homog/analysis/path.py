@@ -26,10 +26,12 @@ from feti_homog.interface.path.path_following import events, increments
 from feti_homog.interface.path.path_points import Energies, Point, unloaded
 from feti_homog.interface.path.sliding_increments import sliding_increments
 from feti_homog.interface.path.sliding_path import sliding_events
+from feti_homog.materials.voigt import voigt_names
 from feti_homog.results.checkpoint_file import is_whole
 from feti_homog.results.landmarks import kept, marks, peak_of
 
 MOST_NAMED = 8  # fibres in a remark
+SHOWN = 1e-9  # least stress in a fault, relative to the largest
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
@@ -131,13 +133,14 @@ def _points(
     """
     cell, waypoints = context.loads.interfaces, [context.loads.load(target) for target in context.case.targets]
     begin = unloaded(cell, context.bonds(None))
+    responses: list[Response] = []
     for number in range(known):
         event = context.checkpoint.read(number)
         point, energies = restored(event, cell)
         if number == known - 1 and not is_whole(event):  # whoever removed the files after it
             point = found_again(point, cell, law)
-        begin = point.after
-        yield point, energies, averages(event, point, context.loads)
+        begin, responses = point.after, averages(event, point, context.loads)
+        yield point, energies, responses
     by_events, steps = path.method == "events", (path.increments or 1, path.release == "worst", begin)
     if not context.case.has_friction:
         whole = events(cell, law, waypoints, begin) if by_events else increments(cell, law, waypoints, *steps)
@@ -148,11 +151,20 @@ def _points(
     count = known
     try:
         for count, point in enumerate(whole, known + 1):  # noqa: B007
-            yield point, None, context.loads.responses(point.state, point.scale, brief=True)
+            responses = context.loads.responses(point.state, point.scale, brief=True)
+            yield point, None, responses
     except NotCarriedError as error:
         if count == 0:
             raise _with_advice(error, "", path) from error
-        context.checks.faults.append(str(_with_advice(error, " beyond the last point", path)))
+        context.checks.faults.append(str(_with_advice(error, _place_of(context, responses), path)))
+
+
+def _place_of(context: AnalysisContext, responses: list[Response]) -> str:
+    """Return where a path ended, in words: beyond the last point, with the stresses that it reached."""
+    stress = np.asarray(context.loads.means(responses)["stress"])
+    pairs = zip(voigt_names(len(stress))[1], stress, strict=True)
+    shown = [f", {name} {value:.6g}" for name, value in pairs if abs(value) > SHOWN * np.abs(stress).max()]
+    return f" beyond the last point{''.join(shown)}"
 
 
 def _with_advice(error: NotCarriedError, place: str, path: LoadPath) -> NotCarriedError:

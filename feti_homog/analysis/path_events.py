@@ -188,6 +188,7 @@ def _taken_apart(state: Equilibrium, kernel: int) -> tuple[dict[str, Any], Array
         "strain": solution.strain,
         "alpha": np.full(kernel, np.nan) if solution.alpha is None else solution.alpha,
         "residual": solution.residual,
+        "asked": state.asked,
         "certificate": [state.certificate.get(law, np.nan) for law in KKT_LAWS],
     }
     return whole, {"lam": solution.lam, "jump": solution.jump} | _bonds_apart(state.bonds, "")
@@ -205,7 +206,8 @@ def _put_together(event: Arrays, interface: ContactProblem, suffix: str) -> Equi
     bonds = _bonds_together(event, suffix)
     residual, C = float(event[f"residual{suffix}"]), interface.compliance(bonds)
     solution = DualSolution(strain, lam, jump, None if np.isnan(alpha).any() else alpha, last, reason, residual, C)
-    return Equilibrium(load, bonds, solution, iterations, solves, free_motions, certificate)
+    asked = event[f"asked{suffix}"]
+    return Equilibrium(load, bonds, solution, iterations, solves, free_motions, certificate, asked)
 
 
 def _bonds_apart(bonds: BondState, suffix: str) -> Arrays:

@@ -139,7 +139,7 @@ class Homogenization:
         opening = allreduce_sum(self.cell.comm, self._strain_of_jumps.T @ opened)
         energy += self._stretched(state)
         rubbing = self._rubbing(state)
-        acting = self.interface.acting(state.bonds, strain)
+        acting = self.interface.acting(state.bonds, strain, state.asked)
         largest = (self._largest(u) + self.interface.scales.imposed(acting)) or 1.0
         imposed = float(self.interface.scales.imposed_strain(acting).max()) or 1.0
         least = self.interface.scales.stress_scale(acting) * imposed
@@ -185,11 +185,10 @@ class Homogenization:
         return float(self.cell.comm.allreduce(own)) / self.cell.summary.area
 
     def _unmet_stress(self, state: Equilibrium, stress: Float) -> float:
-        """Return the error of the prescribed stresses. Collective."""
+        """Return the error of the prescribed stresses, relative to the load and to the stresses. Collective."""
         load, scales = state.load, self.interface.scales
         # Scaled by the roots of their stiffnesses, so that none is small beside another.
-        acting = self.interface.acting(state.bonds, state.solution.strain)
-        root, imposed = scales.roots, scales.imposed_strain(acting)
+        root, imposed = scales.roots, scales.imposed_strain(state.asked)
         off = np.abs((stress - load.values)[load.by_stress] / root[load.by_stress]).max()
         largest = max(np.abs(stress / root)[: len(imposed)].max(), (root[: len(imposed)] * imposed).max())
         return float(off / (largest or 1.0))

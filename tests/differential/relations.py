@@ -11,6 +11,7 @@ import numpy as np
 from differential import other_results, same_results
 from differential.brute_force import by_brute_force, is_affordable
 from differential.comparison import DIFFERENT
+from differential.limit_loads import limit_load
 from differential.random_cases import Drawn
 from differential.setting import Compared, Setting
 from differential.twin import SolvedAnew
@@ -100,5 +101,6 @@ DRAWN = (
     Relation("resume", same_results.resume, _is_path, weight=4),
     Relation("brute force", by_brute_force, is_affordable, weight=4),
     Relation(STRESS_BACK, other_results.stress_back, _is_linear, weight=2, refusals=(NotCarriedError,)),
+    Relation("limit load", limit_load, _is_path, weight=3),
     Relation("onset", other_results.onset, _is_envelope, weight=6),
 )

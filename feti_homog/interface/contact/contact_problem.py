@@ -241,13 +241,14 @@ class ContactProblem:
         self, load: Load, bonds: BondState, solution: DualSolution, iterations: int, solves: int
     ) -> Equilibrium:
         """Return the state that a search ended with, its free motions and its certificate."""
-        certificate = self.certificate(bonds, solution)
+        asked = self.scales.asked(load)
+        certificate = self.certificate(bonds, solution, asked)
         status, motions = self._without_idle(bonds.status, solution)
-        return Equilibrium(load, bonds.with_status(status), solution, iterations, solves, motions, certificate)
+        return Equilibrium(load, bonds.with_status(status), solution, iterations, solves, motions, certificate, asked)
 
-    def certificate(self, bonds: BondState, solution: DualSolution) -> dict[str, float]:
-        """Return the errors of the KKT conditions.  Collective."""
-        status, gained, acting = bonds.status, self._gained(bonds), self.acting(bonds, solution.strain)
+    def certificate(self, bonds: BondState, solution: DualSolution, asked: Float) -> dict[str, float]:
+        """Return the errors of the KKT conditions; `asked` as of `Equilibrium`.  Collective."""
+        status, gained, acting = bonds.status, self._gained(bonds), self.acting(bonds, solution.strain, asked)
         damaged = gained > 0.0
         # A pulled bond opens by its damage; one that is found pulled under pressure overlaps.
         overlap = np.minimum(gained * solution.lam[self.nodes.row], 0.0)
@@ -263,16 +264,13 @@ class ContactProblem:
             self.scales.over_interface,
         )
 
-    def acting(self, bonds: BondState, strain: Float) -> Float:
-        """(v,) strains that errors are relative to: of the load, and with friction of the jumps that it left.
-
-        Collective.
-        """
-        if bonds.gap_and_slip is None:
-            return strain
-        jump = self.solver.comm.allreduce(float(np.abs(bonds.gap_and_slip).max(initial=0.0)), MPI.MAX)
-        is_strain = np.arange(len(strain)) < self.solver.problem.strains
-        return np.maximum(np.abs(strain), np.where(is_strain, jump / self.size.max(), 0.0))
+    def acting(self, bonds: BondState, strain: Float, asked: Float) -> Float:
+        """(v,) as `LoadScales.acting`, of the strain and with friction of the jumps that loads left.  Collective."""
+        if bonds.gap_and_slip is not None:
+            jump = self.solver.comm.allreduce(float(np.abs(bonds.gap_and_slip).max(initial=0.0)), MPI.MAX)
+            is_strain = np.arange(len(strain)) < self.solver.problem.strains
+            strain = np.maximum(np.abs(strain), np.where(is_strain, jump / self.size.max(), 0.0))
+        return self.scales.acting(strain, asked)
 
     def _without_idle(self, status: Status, solution: DualSolution) -> tuple[Status, int]:
         """Return the status and the number of rigid motions that nothing resists.

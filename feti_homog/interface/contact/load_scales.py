@@ -9,9 +9,12 @@ from mpi4py import MPI
 
 from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.feti.solver import FetiSolver
+from feti_homog.interface.loads.load import Load
 from feti_homog.materials.bounds import reuss, voigt
 from feti_homog.typing import Float
 
+# A strain that is as many times that of the bonded cell is no scale for errors.
+ABSURD = 1e3
 # A force or a gap has a sign if it is larger than this many relative tolerances of the Krylov method, times the
 # largest force or imposed displacement; below, the solver's error may have made it.
 SIGN_NOISE_PER_RTOL = 10.0
@@ -157,6 +160,27 @@ class LoadScales:
         forces = np.abs(solution.lam[pairs]).max(axis=1, initial=0.0)
         caused = self.bond_stress(solution.strain) * self.longest
         return np.asarray(self.sign_noise * np.maximum(self.over_interface(forces), caused))
+
+    def asked(self, load: Load) -> Float:
+        """(v,) sizes of the strains of a load: those given, and the bonded cell's under its stresses.  Collective."""
+        k = self._solver.problem.stresses
+        given = np.abs(np.where(load.by_stress, 0.0, load.values))
+        stress = np.abs(np.where(load.by_stress, load.values, 0.0))[:k]
+        given[:k] += np.abs(np.linalg.inv(self.least_bonded_stiffness[:k, :k])) @ stress
+        return np.asarray(given)
+
+    def acting(self, strain: Float, asked: Float) -> Float:
+        """(v,) sizes of strains that errors are relative to: those of a state, up to an absurd multiple of `asked`.
+
+        Collective.
+        """
+        most = ABSURD * self.imposed_strain(asked).max()
+        is_strain = np.arange(len(strain)) < self._solver.problem.strains
+        return np.where(is_strain, np.minimum(np.abs(strain), most), np.abs(strain))
+
+    def excess(self, strain: Float, asked: Float) -> float:
+        """Return how many times as large as `asked` the strains (v,) of a state are.  Collective."""
+        return float(self.imposed_strain(strain).max() / (self.imposed_strain(asked).max() or np.inf))
 
     def imposed_strain(self, loads: Float) -> Float:
         """(m,) or (m, n) sizes of the strains that the loads (v,) or (v, n) make.  Collective."""

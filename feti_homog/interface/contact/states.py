@@ -82,6 +82,7 @@ class Equilibrium:
         free_motions: number of rigid motions of bodies that no interface force resists; a face that touches without
             a force resists none.
         certificate: errors of the KKT conditions, `contact_certificate.kkt_errors`.
+        asked: (v,) sizes of the strains that the load would make with all bonds; with friction all loads up to it.
         axial: the same of the displacement along the fibres with these bonds, where that is a problem.
     """
 
@@ -92,6 +93,7 @@ class Equilibrium:
     solves: int
     free_motions: int
     certificate: dict[str, float]
+    asked: Float
     axial: Equilibrium | None = None
 
     @property

@@ -23,6 +23,8 @@ from feti_homog.typing import Float, Int
 
 # Steps by which what is held is let go of again.
 REFINEMENTS = 3
+# Stiffness, relative to that with all bonds, that is what rounding leaves of none.
+NO_STIFFNESS = 1e-10
 
 
 class CondensedProblem:
@@ -106,10 +108,19 @@ class AxialFaces:
         self._jumps = np.zeros_like(b)
         for _ in range(1 + REFINEMENTS):
             self._jumps += lu_solve(held, b - K @ self._jumps)
-        loose = L - b.T @ self._jumps
-        self.stiffness = (loose + loose.T) / 2
+        self.stiffness = _without_rounding(L - b.T @ self._jumps, L)
 
     def parts(self, y: Float) -> tuple[Float, Float]:
         """Return jumps (n,) and strains (v,) of y, strains or strains and jumps."""
         strain, jump = np.split(y, [len(self.problem.solver.problem.loads)])
         return (jump if self._jumps is None else self._jumps @ strain), strain
+
+
+def _without_rounding(stiffness: Float, bonded: Float) -> Float:
+    """(v, v) a stiffness that has none where it is rounding beside that with all bonds, which would carry a load."""
+    diagonal = bonded.diagonal()
+    roots = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
+    values, vectors = np.linalg.eigh((stiffness + stiffness.T) / (2.0 * np.outer(roots, roots)))
+    left = (vectors * np.where(values > NO_STIFFNESS, values, 0.0)) @ vectors.T
+    resists = left.diagonal() > NO_STIFFNESS
+    return np.asarray(left * np.outer(resists * roots, resists * roots))

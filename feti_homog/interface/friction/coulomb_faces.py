@@ -21,11 +21,12 @@ import numpy as np
 from feti_homog.errors import NotCarriedError
 from feti_homog.interface.contact.states import Status
 from feti_homog.interface.friction.face_system import FaceSystem, Prescribed
-from feti_homog.interface.friction.status_search import StatusSearch
+from feti_homog.interface.friction.status_search import SOLVES_OF_A_STEP, StatusSearch
 from feti_homog.interface.friction.status_system import BACKWARD, FORWARD, OPEN_FACE, STICK
 from feti_homog.typing import Bool, Float
 
 SEARCHED = "friction: no admissible statuses of the faces were found"
+FREE = "nothing carries more: the faces slide freely"
 INDEFINITE = "friction: the sliding faces resist no more (an indefinite pivot)"
 
 
@@ -40,11 +41,13 @@ class CoulombFaces(FaceSystem):
         """Return statuses (n,) and scaled x that are admissible, from a first guess; arguments as of `StatusSearch`.
 
         Raises:
+            NotCarriedError: forces drive a motion that nothing resists.
             StuckError: none was found.
         """
-        found = StatusSearch(self, allowed, given, start).run(self._known(status))
+        search = StatusSearch(self, allowed, given, start)
+        found = search.run(self._known(status))
         if found is None:
-            raise StuckError(SEARCHED)
+            raise NotCarriedError(FREE) if search.slides_freely(self._known(status)) else StuckError(SEARCHED)
         return found
 
     def all_allowed(self) -> Bool:
@@ -75,6 +78,14 @@ class CoulombFaces(FaceSystem):
             StuckError: as `rates`.
         """
         return self._resisting(status, self.all_allowed(), given, start)
+
+    def carries(self, status: Status, given: Prescribed, start: Float) -> bool:
+        """Return whether there is such a step; sure of it where few pivots find that it is so, or that it is not."""
+        search = StatusSearch(self, self.all_allowed(), given, start)
+        found = search.by_pivots(self._known(status), SOLVES_OF_A_STEP)
+        if found is not None or search.slides_freely(self._known(status)):
+            return found is not None
+        return search.run(self._known(status)) is not None
 
     def _resisting(self, status: Status, allowed: Bool, given: Prescribed, start: Float) -> tuple[Status, Float]:
         """Return admissible statuses whose determinant is not negative, and scaled x; arguments as of `search`.
@@ -143,5 +154,5 @@ class CoulombFaces(FaceSystem):
         They let go of it behind the step, up to which they keep their jumps; others stay as with the `old` statuses.
         """
         opened = np.where(status == OPEN_FACE, OPEN_FACE, old).astype(np.int8)
-        kept, left = (np.where(self.alone, self.linear(each, given, start), 0.0) for each in (old, opened))
+        kept, left = (np.where(self.alone, self.linear(each, given, start)[0], 0.0) for each in (old, opened))
         return self.losses(opened, kept, left)[0]

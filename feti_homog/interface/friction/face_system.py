@@ -71,8 +71,8 @@ class FaceSystem:
         f = -self.solver.product(x)[: 2 * self.nodes]
         return f[::2], f[1::2]
 
-    def linear(self, status: Status, given: Prescribed, start: Float) -> Float:
-        """(m,) scaled x with these statuses; what nothing determines stays as it is at the start (m,)."""
+    def linear(self, status: Status, given: Prescribed, start: Float) -> tuple[Float, bool]:
+        """(m,) scaled x with these statuses, and whether it is a solution; from a start as of `StatusSystem.solve`."""
         return self.solver.solve(*self.free(status, given.by_stress), *self.prescribed(status, given, start))
 
     def free(self, status: Status, by_stress: Bool) -> tuple[Bool, Float]:
@@ -91,10 +91,10 @@ class FaceSystem:
         """
         free = self.free(status, given.by_stress)
         if self.solver.sign(*free):
-            return status, self.linear(status, given, x)
+            return status, self.linear(status, given, x)[0]
         if not len(self.tied):
             return status, x
-        return status, np.where(self.alone, self.linear(status, given, x), x)
+        return status, np.where(self.alone, self.linear(status, given, x)[0], x)
 
     @cached_property
     def alone(self) -> Bool:

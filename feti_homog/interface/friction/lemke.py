@@ -45,7 +45,8 @@ def complementary(
     columns[entry, 1 + np.arange(len(entry))] = sign
     given = np.zeros_like(columns)
     given[:, 0] = rows
-    forces = S[: 2 * n] @ system.solve(columns, given)
+    solutions = [system.solve(*pair)[0] for pair in zip(columns.T, given.T, strict=True)]
+    forces = S[: 2 * n] @ np.stack(solutions, axis=1)
     pressure, node = forces[::2], entry // 2
     sliding = friction[node, None] * pressure[node] + sign[:, None] * forces[1::2][node]
     w = np.where((kind == OPEN_FACE)[:, None], pressure[node], sliding)

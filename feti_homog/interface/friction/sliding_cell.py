@@ -207,13 +207,18 @@ class SlidingCell:
         size = self.faces.size[self.faces.loads]
         return np.where(load.by_stress, self.area * load.values / size, load.values * size)
 
-    def equilibrium(self, load: Load, bonds: BondState, x: Float) -> Equilibrium:
-        """Return the state of scaled x, with its certificate.  Collective."""
-        loads, states = self.cell.parts(load), list[Equilibrium]()
-        for own, (problem, (jump, strain)) in zip(loads, self._parts(x), strict=True):
+    def equilibrium(self, loads: Sequence[Load], bonds: BondState, x: Float) -> Equilibrium:
+        """Return the state of scaled x, with its certificate, under the last of the loads up to it.  Collective."""
+        states, of_problems = list[Equilibrium](), list(zip(*map(self.cell.parts, loads), strict=True))
+        scales = [each.scales for each in self.cell.problems]
+        asked = [np.max([own.asked(load) for load in of], axis=0) for own, of in zip(scales, of_problems, strict=True)]
+        # What rounding leaves of an unloaded problem is that of the others.
+        most = max(own.imposed_strain(strain).max() for own, strain in zip(scales, asked, strict=True))
+        for of, strains, (problem, (jump, strain)) in zip(of_problems, asked, self._parts(x), strict=True):
             solution = problem.solution(bonds, jump, strain)
-            certificate = problem.interface.certificate(bonds, solution)
-            states.append(Equilibrium(own, bonds, solution, 0, 1, 0, certificate))
+            strains[: problem.solver.problem.strains] = most
+            certificate = problem.interface.certificate(bonds, solution, strains)
+            states.append(Equilibrium(of[-1], bonds, solution, 0, 1, 0, certificate, strains))
         plane, *axial = states
         plane = replace(plane, free_motions=self._free_motions(bonds, plane.solution))
         excess = {"kkt_friction": self._excess(bonds, states, x)}
@@ -241,7 +246,7 @@ class SlidingCell:
         off = coulomb_errors(force, friction, bonds.sliding_signs, tied)
         largest = self.interface.scales.over_interface(np.abs(traction).max(axis=1, initial=0.0))
         for each, state in zip(self.cell.problems, states, strict=True):
-            stress = each.scales.bond_stress(each.acting(bonds, state.solution.strain))
+            stress = each.scales.bond_stress(each.acting(bonds, state.solution.strain, state.asked))
             largest = np.maximum(largest, stress)
         off = np.where((bonds.status == BONDED) & ~self._damaged, 0.0, off) / np.where(largest > 0.0, largest, 1.0)
         return float(self.solver.comm.allreduce(off.max(initial=0.0), MPI.MAX))

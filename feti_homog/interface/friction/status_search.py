@@ -49,25 +49,43 @@ class StatusSearch:
 
     def run(self, status: Status) -> Found:
         """Return what is found from a first guess by one method after the other."""
-        found = self.by_pivots(status, LEAST_SOLVES + SOLVES_PER_NODE * self.faces.nodes)
+        found = self.by_pivots(status, self._solves)
         return found or self.by_trial(status) or self.by_continuation(status) or self.by_rays()
 
+    @property
+    def _solves(self) -> int:
+        """Number of solves after which other searches take over."""
+        return LEAST_SOLVES + SOLVES_PER_NODE * self.faces.nodes
+
     def by_pivots(self, status: Status, solves: int) -> Found:
-        """Return what changes of all wrong statuses at once lead to, or of one at random where they lead nowhere."""
+        """Return the statuses to which pivots lead, if the forces balance."""
+        found, balanced = self._pivoted(status, solves)
+        return found if balanced else None
+
+    def slides_freely(self, status: Status) -> bool:
+        """Return whether pivots lead to statuses that hold on a free motion, but leave forces that drive it."""
+        found, balanced = self._pivoted(status, self._solves)
+        return found is not None and not balanced
+
+    def _pivoted(self, status: Status, solves: int) -> tuple[Found, bool]:
+        """Return what changes of all wrong statuses at once lead to, or of one at random where they lead nowhere.
+
+        And whether its forces balance.
+        """
         fewest, left, random = self.faces.nodes + 1, 0, np.random.default_rng(0)
         for _ in range(solves):
-            x = self.faces.linear(status, self.given, self.start)
+            x, balanced = self.faces.linear(status, self.given, self.start)
             better = self._improved(status, x)
             wrong = np.flatnonzero(better != status)
             if not len(wrong):
-                return (status, x) if self._is_balanced(status, x) else None
+                return (status, x), balanced and self._is_balanced(status, x)
             left -= 1
             if len(wrong) < fewest:
                 fewest, left = len(wrong), BLOCK_PIVOTS
             chosen = wrong if left > 0 else random.choice(wrong, 1)
             status = status.copy()
             status[chosen] = better[chosen]
-        return None
+        return None, False
 
     def jammed(self, status: Status) -> Iterator[tuple[Status, Float]]:
         """Yield others beside admissible statuses: from all faces that slide stuck, from each alone, and by trial."""
@@ -122,17 +140,21 @@ class StatusSearch:
 
     def _checked(self, status: Status) -> Found:
         """Return statuses with their x if they are admissible."""
-        x = self.faces.linear(status, self.given, self.start)
-        return (status, x) if (self._improved(status, x) == status).all() and self._is_balanced(status, x) else None
+        x, balanced = self.faces.linear(status, self.given, self.start)
+        balanced = balanced and self._is_balanced(status, x)
+        return (status, x) if balanced and (self._improved(status, x) == status).all() else None
 
     def _is_balanced(self, status: Status, x: Float) -> bool:
         """Return False if a free motion, such as the turning of a fibre that slides all around, has a force on it."""
         faces, given, terms = self.faces, self.given, self.faces.solver.terms
         held = np.zeros(len(x))
-        held[faces.loads], held[1 : 2 * faces.nodes : 2] = x[faces.loads], given.slip
+        # Not of strains and slips that came out: a free motion is as large as its force over what holds it.
+        held[faces.loads] = np.where(given.by_stress, 0.0, given.values)
+        held[1 : 2 * faces.nodes : 2] = np.where(status == STICK, given.slip, 0.0)
         rows = faces.prescribed(status, given, self.start)[1]
         free = faces.free(status, given.by_stress)
-        left = residual(faces.solver.product(x), rows, *free)
+        left = np.abs(residual(faces.solver.product(x), rows, *free))
+        left = np.maximum(left - np.finfo(float).eps * np.abs(x).max(initial=0.0), 0.0)
         # Of the forces of what is prescribed, at a node and at those that it is coupled with.
         return largest_share(left, np.abs(rows) + terms(terms(held)), free[1]) <= UNBALANCED
 

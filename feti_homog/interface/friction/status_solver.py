@@ -60,11 +60,8 @@ class StatusSolver:
         self._products.append((x, y))
         return y
 
-    def solve(self, free: Bool, slope: Float, x: Float, given: Float) -> Float:
-        """(m,) x with the rows `given` (m,), from a start that has the entries that are not free.
-
-        What nothing determines stays as it was at the start.
-        """
+    def solve(self, free: Bool, slope: Float, x: Float, given: Float) -> tuple[Float, bool]:
+        """(m,) x with the rows `given` (m,), and whether it is a solution; as `StatusSystem.solve`."""
         followed = self._turned(free, slope)
         if followed is None:
             return self._system(free, slope).solve(x, given)
@@ -73,7 +70,7 @@ class StatusSolver:
             self._followed, self._factored = None, 0
             return self._system(free, slope).solve(x, given)
         self.keep(*found)
-        return found[0]
+        return found[0], True
 
     def sign(self, free: Bool, slope: Float) -> int:
         """Return that of the determinant, 0 where motions are free."""

@@ -81,14 +81,15 @@ class StatusSystem:
         swaps = int((pivots != np.arange(len(pivots))).sum())
         return int(np.prod(np.sign(lu.diagonal()))) * (-1 if swaps % 2 else 1)
 
-    def solve(self, x: Float, given: Float) -> Float:
-        """(m,) or (m, k) x with the rows `given`, (m,) or (m, k), from a start that has the entries that are not free.
+    def solve(self, x: Float, given: Float) -> tuple[Float, bool]:
+        """(m,) x with the rows `given` (m,), from a start with the entries that are not free, and whether it is one.
 
-        What nothing determines stays as it was at the start.
+        What nothing determines stays as it was at the start.  If forces drive it there is no solution: x is then that
+        of a cell that is held.
         """
         start, x = x, x.copy()
         if self._factor is None:
-            return x
+            return x, True
         terms, rows = np.abs(self._rows), given[self.free]
         for _ in range(MOST_REFINEMENTS):
             left = rows - self._rows @ x
@@ -97,12 +98,14 @@ class StatusSystem:
                 break
             x[self.free] += lu_solve(self._factor, left, check_finite=False)
         if not self._free_motions.shape[1]:
-            return x
+            return x, True
         # Where forces balance, rounding over what holds has driven free motions, otherwise on other numbers of ranks.
         stays = x.copy()
         stays[self.free] -= self._free_motions @ (self._free_motions.T @ (x - start)[self.free])
-        left = rows - self._rows @ stays
-        return stays if (np.abs(left) <= BALANCED * (terms @ np.abs(stays) + np.abs(rows))).all() else x
+        # A row without any stiffness, of shear along fibres that slide there, is rounding of others.
+        left = np.abs(rows - self._rows @ stays) - np.finfo(float).eps * np.abs(stays).max(initial=0.0)
+        balanced = bool((left <= BALANCED * (terms @ np.abs(stays) + np.abs(rows))).all())
+        return stays if balanced else x, balanced
 
     @cached_property
     def _free_motions(self) -> Float:

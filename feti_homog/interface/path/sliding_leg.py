@@ -45,7 +45,7 @@ class SlidingLeg:
     ) -> None:
         """Stand at `begin`, where the next change of statuses is the `_first` if it is a waypoint.  Collective."""
         self.cell, self.sliding, self.law, self.end = cell, sliding, law, waypoints[leg]
-        self.leg, self.legs = leg, len(waypoints)
+        self.leg, self.legs, self._before = leg, len(waypoints), waypoints[:leg]
         self.origin = begin.last if begin.position == 0.0 else begin.origin
         self.start = cell.leg_start(self.origin, waypoints[leg - 1] if leg else None, self.end)
         self._share, self._bonds, self._energies = begin.position, begin.bonds, NO_ENERGIES
@@ -114,8 +114,8 @@ class SlidingLeg:
     def _state(self) -> Equilibrium:
         """Return the state here, which is found once.  Collective."""
         if self._found is None or self._found[0] is not self._here:
-            load = self.start.after(self._share, self.end)
-            self._found = self._here, self.sliding.equilibrium(load, self._bonds, self._here.x)
+            loads = [*self._before, self.start.after(self._share, self.end)]
+            self._found = self._here, self.sliding.equilibrium(loads, self._bonds, self._here.x)
         return self._found[1]
 
     def _path_state(self) -> PathState:

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from feti_homog.errors import NotCarriedError
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BondState, Status
 from feti_homog.interface.friction.coulomb_faces import StuckError
@@ -36,7 +37,7 @@ def sliding_events(
     Collective.
 
     Raises:
-        StuckError: nothing goes on from the last point.
+        NotCarriedError: nothing goes on from the last point, the limit of the load.
     """
     for leg in range(begin.leg, len(waypoints)):
         for point in SlidingEvents(cell, sliding, law, waypoints, leg, begin).points():
@@ -57,7 +58,12 @@ class SlidingEvents(SlidingLeg):
         changes = 0
         while self._share < 1.0:
             before = self._share
-            status, rate = self._rates()
+            try:
+                status, rate = self._rates()
+            except NotCarriedError:
+                if self._share > self._reported:
+                    yield self._point(0, 0, self._path_state())
+                raise
             yield from self._advance(status, rate)
             changes = 0 if self._share > before + SAME_LOAD else changes + 1
             if changes > MOST_CHANGES_AT_A_LOAD:

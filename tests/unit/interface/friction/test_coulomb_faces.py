@@ -11,7 +11,8 @@ from reference.condensed_cell import MixedLoad
 from reference.friction import RubbingFaces
 from reference.friction_path import FrictionPath
 
-from feti_homog.interface.friction.coulomb_faces import INDEFINITE, SEARCHED, CoulombFaces, StuckError
+from feti_homog.errors import NotCarriedError
+from feti_homog.interface.friction.coulomb_faces import FREE, INDEFINITE, SEARCHED, CoulombFaces, StuckError
 from feti_homog.interface.friction.face_system import Prescribed
 from feti_homog.interface.friction.lemke import lemke
 from feti_homog.interface.friction.status_search import STATUSES, StatusSearch
@@ -189,7 +190,7 @@ def test_what_nothing_resists_stays_whatever_the_rounding():
     for stiffness in (S, S * (1.0 + 1e-16 * (noise + noise.T))):
         system = StatusSystem(stiffness, free, np.zeros(len(S)))
         assert system.sign == 0
-        found.append(system.solve(start, np.zeros(len(S))))
+        found.append(system.solve(start, np.zeros(len(S)))[0])
     assert np.abs(found[1] - found[0]).max() < 1e-12
     assert abs(motion @ (found[0] - start)) < 1e-12 and np.abs(S @ found[0])[free].max() < 1e-12
 
@@ -227,3 +228,32 @@ def test_lemke_solves_a_problem_whose_matrix_is_not_symmetric():
     z = lemke(M, q, np.ones(3))
     w = q + M @ z
     assert z.min() >= 0.0 and w.min() >= -1e-12 and abs(w @ z) < 1e-12
+
+
+@pytest.mark.parametrize("force", [1e-13, 1e-6, 1.0])
+def test_what_holds_a_free_motion_carries_no_force(force):
+    """Two nodes that slide together, which nothing but a force that rounding leaves may act on."""
+    S = np.array([[1.0, 0.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, -1.0, 0.0], [0.0, 0.0, 1.0, 0.0, 0.0],
+                  [0.0, -1.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 0.0, 1.0]])  # fmt: skip
+    free = np.array([False, True, False, True, False])
+    given = np.array([0.0, 1.0, 0.0, -1.0 + force, 0.0])
+    x, balanced = StatusSystem(S, free, np.zeros(5)).solve(np.zeros(5), given)
+    assert balanced == (force < 1e-9)
+    if balanced:
+        np.testing.assert_allclose(x[[1, 3]], [0.5, -0.5], rtol=1e-9)
+
+
+def test_faces_that_slide_freely_are_told_from_those_for_which_nothing_is_found():
+    """One node under a pressure of 1 and a shear: it sticks up to mu, and beyond nothing carries it."""
+    faces, by_stress = (
+        CoulombFaces(np.eye(4) - np.eye(4)[[2, 3, 0, 1]], np.array([0.5])),
+        [True] * 2,
+    )
+    for shear, carried in ((0.4, True), (0.6, False)):
+        given = Prescribed(np.array(by_stress), np.array([-1.0, shear]), np.zeros(1))
+        if carried:
+            faces.step(np.zeros(1, np.int8), given, np.zeros(4))
+        else:
+            with pytest.raises(NotCarriedError, match=FREE) as error:
+                faces.step(np.zeros(1, np.int8), given, np.zeros(4))
+            assert not isinstance(error.value, StuckError)
