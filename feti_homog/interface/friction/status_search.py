@@ -1,8 +1,7 @@
 """Search of admissible statuses of debonded faces under what is prescribed.
 
 Pivots change all wrong statuses at once while their number falls, and nearly always come to an end.  If they do not,
-all sets of statuses are tried where these are few; the coefficients are raised from where pivots find statuses; and
-Lemke's method has the last word in small problems.
+all sets of statuses are tried where these are few; then the coefficients are raised from where pivots find statuses.
 """
 
 from __future__ import annotations
@@ -16,7 +15,6 @@ import numpy as np
 
 from feti_homog.interface.contact.states import Status
 from feti_homog.interface.friction.face_system import FaceSystem, Prescribed
-from feti_homog.interface.friction.lemke import complementary, first_guess
 from feti_homog.interface.friction.status_system import BACKWARD, FORWARD, OPEN_FACE, STICK, largest_share, residual
 from feti_homog.typing import Bool, Float
 
@@ -25,9 +23,8 @@ UNBALANCED = 1e-7
 # Pivots of blocks without progress, after which one node at random changes at a time: with friction a fixed order may
 # come back to where it was.  And solves after which other searches take over; those of a step of the continuation.
 BLOCK_PIVOTS, LEAST_SOLVES, SOLVES_PER_NODE, SOLVES_OF_A_STEP = 11, 50, 4, 50
-# Sets of statuses that are tried one after the other, the least step of mu, and statuses that all nodes together may
-# have in Lemke's tableau.
-MOST_TRIED, LEAST_STEP, MOST_OF_LEMKE = 256.0, 1.0 / 256.0, 500
+# Sets of statuses that are tried one after the other, and the least step of mu.
+MOST_TRIED, LEAST_STEP = 256.0, 1.0 / 256.0
 STATUSES = np.array([STICK, FORWARD, OPEN_FACE, BACKWARD], np.int8)
 Found = tuple[Status, Float] | None
 
@@ -50,7 +47,7 @@ class StatusSearch:
     def run(self, status: Status) -> Found:
         """Return what is found from a first guess by one method after the other."""
         found = self.by_pivots(status, self._solves)
-        return found or self.by_trial(status) or self.by_continuation(status) or self.by_rays()
+        return found or self.by_trial(status) or self.by_continuation(status)
 
     @property
     def _solves(self) -> int:
@@ -127,16 +124,6 @@ class StatusSearch:
             else:
                 share, status = share + step, found[0]
         return None
-
-    def by_rays(self) -> Found:
-        """Return what Lemke's method finds."""
-        faces, guess = self.faces, first_guess(self.faces.friction, self.allowed)
-        if self.allowed.sum() > MOST_OF_LEMKE:
-            return None
-        free = faces.free(guess, self.given.by_stress)[0][2 * faces.nodes :]
-        x, rows = faces.prescribed(guess, self.given, self.start)
-        found = complementary(faces.S, faces.friction, self.allowed, free, x, rows)
-        return None if found is None else self._checked(found)
 
     def _checked(self, status: Status) -> Found:
         """Return statuses with their x if they are admissible."""
