@@ -93,7 +93,7 @@ class Checks:
     kkt_tension: float | None = described("contact: no closed node is pulled", default=None)
     kkt_friction: float | None = described(
         "friction: shear on closed faces is within mu p, that of sliding ones opposes the slip, and along the fibres "
-        "none is borne but by tied faces",
+        "none is borne",
         default=None,
     )
     symmetry: float | None = described("L^ef is symmetric; of bonded or frictionless free faces only", default=None)

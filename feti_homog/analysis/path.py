@@ -178,8 +178,8 @@ def _with_advice(error: NotCarriedError, place: str, path: LoadPath) -> NotCarri
 def _sliding_cell(context: AnalysisContext) -> SlidingCell:
     """Return the faces of the case with the friction of its interfaces.  Collective; raises as `SlidingCell`."""
     cell, pair = context.loads.interfaces, context.loads.interfaces.nodes.pair
-    friction, of_damage, tied = np.array([each.rubbing for each in context.case.interfaces]).T
-    return SlidingCell(cell, friction[pair], of_damage[pair], tied[pair] > 0.0 if tied.any() else None)
+    friction, of_damage = np.array([each.rubbing for each in context.case.interfaces]).T
+    return SlidingCell(cell, friction[pair], of_damage[pair])
 
 
 def _report(context: AnalysisContext, shown: EventProgress, name: str, responses: Sequence[Response]) -> None:

@@ -162,11 +162,7 @@ class PathPoint:
         "friction and `friction_heat`",
         STRESS,
     )
-    dissipated: float = described(
-        'energy lost to breaks so far per area of the cell, along all equilibria; with axial_friction = "prevented" '
-        "also what faces lose that open",
-        STRESS,
-    )
+    dissipated: float = described("energy lost to breaks so far per area of the cell, along all equilibria", STRESS)
     dissipated_strain_controlled: float = described("the same if the load only rises on the first leg", STRESS)
     friction_heat: float | None = described(
         "heat of friction so far per area of the cell: `work` is `stored`, `dissipated` and this", STRESS, default=None

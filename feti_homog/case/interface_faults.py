@@ -113,10 +113,9 @@ def idle_friction_keys(interfaces: tuple[InterfaceSection, ...]) -> list[str]:
     """List the keys of friction that have no effect because there is none, a line each."""
     found = []
     for number, each in enumerate(interfaces):
-        given = {"friction_on_damage": each.friction_on_damage, "axial_friction": each.axial_friction != "free"}
-        words = [f"{name} = {toml_value(getattr(each, name))}" for name, is_given in given.items() if is_given]
-        label = interface_label(number, len(interfaces))
-        found += [f"[{label}] {word}: without effect, for friction = 0" for word in words if each.friction == 0.0]
+        if each.friction_on_damage and each.friction == 0.0:
+            label = interface_label(number, len(interfaces))
+            found.append(f"[{label}] friction_on_damage = true: without effect, for friction = 0")
     return found
 
 

@@ -92,7 +92,9 @@ class InterfaceSection:
         real(least=0.0),
         "Coulomb's coefficient mu of debonded faces: they stick while |t_t| < mu |t_n|, and slide at that traction. "
         "The load is controlled from the first leg on, without snap-back. Cells too large for influence columns are "
-        "refused. Increments are implicit steps, whose stresses and heat tend to those of events.",
+        "refused. Increments are implicit steps, whose stresses and heat tend to those of events. Along the fibres "
+        "debonded faces slip freely: Coulomb's cone of both shears is round, so no path would be straight between "
+        "changes of status.",
         default=0.0,
         only=PATH_ANALYSIS,
     )
@@ -102,16 +104,6 @@ class InterfaceSection:
         "broken bonds alone.",
         default=False,
         only=(PATH_ANALYSIS, SOFTENING),
-    )
-    axial_friction: str = pair_key(
-        choice("free", "prevented"),
-        'Slip along the fibre of debonded faces with friction: "free": they bear no shear along it, as without '
-        'friction; "prevented": while they touch they bear any, and keep their slip along it. The default is the one '
-        "that never bears more than Coulomb's law lets them, and without shear along the fibres, as under cooling and "
-        "transverse loads, both are the same. The cone of both shears is round, so no path would be straight between "
-        "changes of status: it is not offered.",
-        default="free",
-        only=(PATH_ANALYSIS, GENERALIZED),
     )
     debonded: tuple[Arc, ...] = pair_key(
         ARCS,
@@ -272,10 +264,9 @@ class InterfaceSection:
     )
 
     @property
-    def rubbing(self) -> tuple[float, float, bool]:
-        """Coefficients of debonded faces and of damaged shares; whether faces that touch are tied along the fibres."""
-        tied = self.friction > 0.0 and self.axial_friction == "prevented"
-        return self.friction, self.friction * self.friction_on_damage, tied
+    def rubbing(self) -> tuple[float, float]:
+        """Coefficients of debonded faces and of damaged shares."""
+        return self.friction, self.friction * self.friction_on_damage
 
 
 def interface_tables(document: Mapping[str, Any]) -> list[Any]:

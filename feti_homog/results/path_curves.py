@@ -131,10 +131,6 @@ def scales_with_toughness(document: Document) -> bool:
     return bool(document.get("path")) and bool(laws) and all(by_energy)
 
 
-# Faces that are tied along the fibres lose energy as they open.
-LOST = {False: "lost in breaks", True: "lost in breaks and openings"}
-
-
 class Energies(NamedTuple):
     """Parts of the work of the loads per area along a path, at r places from the unloaded cell on.
 
@@ -168,8 +164,7 @@ def energies(document: Document) -> Energies | None:
 
     stored, springs, lost = (column(name) for name in ("stored", "stored_in_springs", "dissipated"))
     fracture = np.minimum(column("fracture_energy"), lost)
-    tied = any(section.get("axial_friction") == "prevented" for section in interface_sections(document))
-    rest = LOST[tied] + (" beyond it" if fracture.any() else "")
+    rest = "lost in breaks" + (" beyond it" if fracture.any() else "")
     parts = {"stored in the bodies": stored - springs, "stored in springs": springs, "fracture energy": fracture}
     parts |= {rest: lost - fracture, "heat of friction": column("friction_heat")}
     shown = {name: values for name, values in parts.items() if np.abs(values).max() > ZERO * np.abs(stored).max()}

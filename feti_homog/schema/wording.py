@@ -26,7 +26,8 @@ SYNONYMS: Mapping[str, tuple[str, ...]] = {
 ABSENT = {
     "strength": "phases do not break; bonds do, see normal_strength and tangential_strength in [interface]",
     "g": "it follows from young and poisson",
-    "cone": "Coulomb's cone of both shears is round, so no path is straight between changes; see axial_friction",
+    "cone": "Coulomb's cone of both shears is round, so no path is straight between changes",
+    "axial_friction": "leave it out: debonded faces slip freely along the fibres",
 }
 # What a key takes the place of, by the key and how it follows.
 IN_PLACE = dict.fromkeys(

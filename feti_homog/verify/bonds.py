@@ -54,13 +54,6 @@ def friction_of_damage_at(files: ResultFiles) -> Float:
     return _of_pairs(files, on) * friction_at(files)
 
 
-def tied_at(files: ResultFiles) -> Bool:
-    """(k,) nodes whose faces do not slip along the fibres while they touch."""
-    sections = files.interfaces or [{}]
-    tied = [section.get("axial_friction") == "prevented" and section["friction"] > 0.0 for section in sections]
-    return _of_pairs(files, tied) > 0.0
-
-
 def _of_pairs(files: ResultFiles, values: Sequence[float]) -> Float:
     """(k,) the value of the section of each interface node."""
     found: Float = np.array(values, float)[np.minimum(files.interface.pair, len(values) - 1)]

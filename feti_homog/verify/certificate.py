@@ -19,7 +19,6 @@ from feti_homog.verify.check_fields import (
     check_fields,
     check_interface_state,
     check_step_heat,
-    check_tied_faces,
 )
 from feti_homog.verify.check_loads import StateNumbers, check_load
 from feti_homog.verify.check_mesh import check_arcs, check_interface, check_mesh
@@ -151,7 +150,6 @@ def _verified(files: ResultFiles, directory: Path) -> Certificate:
         check_mesh_error(findings, cell, state)
         check_interface_state(findings, cell, state)
         if before is not None and "path" in files.document:
-            check_tied_faces(findings, cell, before, state)
             check_step_heat(findings, cell, before, state)
         before = state
         states.append(StateNumbers.of(cell, state, fields))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from feti_homog.typing import Bool, Float, Int
-from feti_homog.verify.bonds import friction_at, friction_of_damage_at, law_at, rubbing_force, tied_at
+from feti_homog.verify.bonds import friction_at, friction_of_damage_at, law_at, rubbing_force
 from feti_homog.verify.cell_tables import State
 from feti_homog.verify.constitutive_law import out_of_plane
 from feti_homog.verify.discrete_cell import ROUNDED_TERMS, DiscreteCell
@@ -54,8 +54,7 @@ def _check_contact(findings: Findings, cell: DiscreteCell, state: State, rubs: B
     at = f"{state.name}, interface node {{}}".format
     debonded, closed = state.status != BONDED, state.status == CLOSED
     gap = (state.jump - law_at(cell.files, damage=state.damage).jumps(state.traction))[:, 0]
-    normal, shear = state.traction[:, 0], np.abs(state.traction[:, 1:])
-    shear = np.where(tied_at(cell.files) & closed, shear[:, 0], shear.max(axis=1))
+    normal, shear = state.traction[:, 0], np.abs(state.traction[:, 1:]).max(axis=1)
     friction = friction_at(cell.files) * np.maximum(-normal, 0.0)
     length, imposed, least = cell.files.interface.length, cell.imposed(state), cell.least_stress(state)
     pull, force = max(float(np.abs(state.traction).max()), least), np.abs(normal) * length
@@ -71,27 +70,6 @@ def _check_contact(findings: Findings, cell: DiscreteCell, state: State, rubs: B
         findings.record("penetration", relative(np.where(debonded, np.maximum(-gap, 0.0), 0.0), imposed), at)
         findings.record("tension", relative(np.where(closed, np.maximum(normal, 0.0), 0.0), pull), at)
         findings.record("complementarity", relative(np.where(debonded, force * gap, 0.0), push * imposed), at)
-
-
-def check_tied_faces(findings: Findings, cell: DiscreteCell, before: State, state: State) -> None:
-    """Check that tied faces which touch at a point of a path and the next one keep their slip along the fibres.
-
-    Points at which they have opened lie between others; in an increment in which bonds break they may open and close.
-    """
-    files = cell.files
-    if not files.is_spatial or state.point != before.point + 1:
-        return
-    if files.case["path"]["method"] == "increments" and damaged_at(files.document["path"][state.point]):
-        return
-    kept = tied_at(files) & (before.status == CLOSED) & (state.status == CLOSED)
-    if not kept.any():
-        return
-    slips = [each.jump - law_at(files, damage=each.damage).jumps(each.traction) for each in (before, state)]
-    scale = max(largest_displacement(cell, each) for each in (before, state))
-    off = np.where(kept, np.abs(slips[1] - slips[0])[:, 2], 0.0)
-    findings.record(
-        "sliding", relative(off, scale), f"{state.name}, slip along the fibres of interface node {{}}".format
-    )
 
 
 def check_step_heat(findings: Findings, cell: DiscreteCell, before: State, state: State) -> None:

@@ -155,7 +155,7 @@ def checks(rtol: float, users_mesh: bool, has_coatings: bool, mixed: Pair = (0.0
         ("free faces", "open faces bear nothing, closed ones friction only, relative to the largest traction", contact),
         (
             "sliding",
-            "friction opposes the slip of sliding faces, relative to the largest traction; tied ones keep theirs",
+            "friction opposes the slip of sliding faces, relative to the largest traction",
             contact,
         ),
         ("mean stress", "the mean of the stresses is the state's, relative to the largest component", balance),

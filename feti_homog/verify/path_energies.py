@@ -27,7 +27,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from feti_homog.typing import Float
-from feti_homog.verify.bonds import tied_at
 from feti_homog.verify.check_loads import StateNumbers
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.findings import Findings
@@ -92,7 +91,7 @@ def check_path_energies(
     """`work`, `stored` and what was dissipated at all points; fields are kept of those of `states`."""
     if "friction_heat" in points[0]:
         by_events = cell.files.case["path"]["method"] == "events"
-        _check_heat(findings, states, points, by_events, bool(tied_at(cell.files).any()))
+        _check_heat(findings, states, points, by_events)
         return
     numbers = _numbers(cell, states, points)
     scale = max(each.stored for each in numbers) + cell.rounded_energy or 1e-300
@@ -105,13 +104,11 @@ def check_path_energies(
         _check_increments(findings, _stiffest(cell), numbers, points, scale)
 
 
-def _check_heat(
-    findings: Findings, states: Sequence[StateNumbers], points: Sequence[Point], by_events: bool, tied: bool
-) -> None:
+def _check_heat(findings: Findings, states: Sequence[StateNumbers], points: Sequence[Point], by_events: bool) -> None:
     """Check that the work is stored, lost to breaks or heat, which never falls; breaks alone lose what is `dissipated`.
 
-    With friction the energy depends on the way, so nothing bounds what breaks lose.  Faces that are `tied` along the
-    fibres lose energy where they open, too.  Bonds break behind a point of events, before one of increments.
+    With friction the energy depends on the way, so nothing bounds what breaks lose.  Bonds break behind a point of
+    events, before one of increments.
     """
     stored = {number: float(point["stored"]) for number, point in enumerate(points)}
     stored |= {state.point: state.stored for state in states}
@@ -125,7 +122,7 @@ def _check_heat(
         cooled = before["friction_heat"] - after["friction_heat"]
         findings.record("heat", max(cooled, 0.0) / of_step[number], f"path[{number}].friction_heat")
         lost = after["dissipated"] - before["dissipated"]
-        left = 0.0 if damaged_at(before if by_events else after) else max(-lost, 0.0) if tied else abs(lost)
+        left = 0.0 if damaged_at(before if by_events else after) else abs(lost)
         findings.record("heat", left / of_step[number], f"path[{number}].dissipated")
 
 

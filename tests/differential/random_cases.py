@@ -98,6 +98,6 @@ def draw(seed: int, number: int, folder: Path) -> Drawn:
     random_softening(stream(seed, number, SOFTENING), document, length)
     random_scatter(stream(seed, number, SCATTER), document)
     if analysis == "path":
-        random_friction(stream(seed, number, FRICTION), sections(document), plane)
+        random_friction(stream(seed, number, FRICTION), sections(document))
         random_rubbing(stream(seed, number, RUBBING), document)
     return Drawn(seed, number, document, folder)

@@ -60,7 +60,7 @@ def _law(rng: np.random.Generator, common: Document, breaks: bool, plane: str, l
     return law
 
 
-def random_friction(rng: np.random.Generator, sections: list[Document], plane: str) -> None:
+def random_friction(rng: np.random.Generator, sections: list[Document]) -> None:
     """Give the faces of a path with contact a coefficient of friction, of each pair its own; not of every path."""
     if not sections or not sections[0]["contact"] or rng.random() > RUB:
         return
@@ -68,8 +68,6 @@ def random_friction(rng: np.random.Generator, sections: list[Document], plane: s
         section["friction"] = float(rng.uniform(0.1, 0.9))
         if section.get("growth") == "released":
             section["growth"] = "springs"
-        if plane == "generalized" and rng.random() < 0.5:
-            section["axial_friction"] = "prevented"
 
 
 def _arcs(rng: np.random.Generator, analysis: str, fibres: int) -> list[Document]:

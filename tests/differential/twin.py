@@ -125,12 +125,10 @@ class SolvedAnew:
         self.joined = np.where(parted, np.arange(self.n), first[place_of])
         pair = own["pair"][()] if "pair" in own else np.zeros(self.k, int)
         self.springs = self._springs()[pair] if self.k else np.zeros((0, 3))
-        rubbing = [(each.get("friction", 0.0), each.get("axial_friction") == "prevented",
-                    each.get("friction_on_damage", False))
+        rubbing = [(each.get("friction", 0.0), each.get("friction_on_damage", False))
                    for each in sections(self.document["case"]) or [{}]]  # fmt: skip
-        self.friction, tied, on_damage = np.array(rubbing, float)[pair].T if self.k else np.zeros((3, 0))
+        self.friction, on_damage = np.array(rubbing, float)[pair].T if self.k else np.zeros((2, 0))
         self.rubs_on_damage = (on_damage > 0.0) & (self.friction > 0.0)
-        self.tied = (tied > 0.0) & (self.friction > 0.0)
 
     def _springs(self) -> np.ndarray:
         """(sections, 3) stiffnesses of bonds, inf of glue."""
@@ -146,7 +144,10 @@ class SolvedAnew:
         status = state["status"][()]
         load, stress = self._loads(state)
         holds = np.column_stack([status != OPEN, status == BONDED, status == BONDED])
-        rubs = np.column_stack([np.zeros(self.k, bool), self.friction > 0.0, self.tied]) & (status == CLOSED)[:, None]
+        rubs = (
+            np.column_stack([np.zeros(self.k, bool), self.friction > 0.0, np.zeros(self.k, bool)])
+            & (status == CLOSED)[:, None]
+        )
         damage = state["damage"][()]
         softened = (status == BONDED) & (damage > 0.0)
         rubs[:, 1] |= softened & self.rubs_on_damage

@@ -70,9 +70,9 @@ def test_paths_are_those_of_a_slow_twin(comm, waypoints, springs):
     [
         ("strain", {}),
         ("strain", SOFTENING),
-        ("generalized", SOFTENING | {"axial_friction": "prevented", "friction_on_damage": True}),
+        ("generalized", SOFTENING | {"friction_on_damage": True}),
     ],
-    ids=["strength", "softening", "tied along fibres"],
+    ids=["strength", "softening", "generalized"],
 )
 def test_breaks_with_friction_obey_every_law_resumed_too(comm, shared_path, plane, law):
     interface = {"normal_strength": 0.05, "tangential_strength": 0.05, "friction": 0.3} | law

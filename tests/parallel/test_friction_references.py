@@ -150,36 +150,6 @@ PATHS = {
         STRENGTHS | {"friction": 0.4, "axial_strength": 0.03},
         [COLD, COLD | {"S22": -0.02, "gamma13": 0.004}, COLD | {"gamma12": 0.03, "S23": 0.002}, {"gamma12": -0.02}],
     ),
-    "generalized, tied along the fibres": (
-        {},
-        EPOXY_GLASS,
-        STRENGTHS | {"friction": 0.4, "axial_strength": 0.04, "axial_friction": "prevented"},
-        [
-            *(COLD | {"gamma12": 0.02}, COLD | {"gamma13": 0.02, "gamma12": 0.02}),
-            *(COLD | {"S11": 0.05, "gamma13": 0.01}, COLD | {"S11": -0.05, "gamma13": -0.01}),
-        ],
-    ),
-    # The fibre comes free, and no face bears its shear any more.
-    "generalized, tied faces that all open": (
-        {},
-        EPOXY_GLASS,
-        WHOLE | {"friction": 0.3, "axial_friction": "prevented"},
-        [
-            *(AROUND, AROUND | {"gamma12": 0.02}, AROUND | SHEARS),
-            *(SHEARS | {"E11": 0.03, "E22": 0.03, "E33": 0.0},),
-        ],
-    ),
-    # What opening faces let go of breaks a bond.
-    "generalized, tied faces that let go": (
-        {},
-        EPOXY_GLASS,
-        {"normal_strength": 1e9, "tangential_strength": 1e9, "axial_strength": 0.15, "axial_friction": "prevented"}
-        | {"friction": 0.3, "debonded": [{"fibre": 1, "angle": 200.0}]},
-        [
-            *(AROUND, AROUND | SHEARS, {"E11": 0.1, "E22": 0.1, "E33": 0.0, "gamma13": 0.0, "gamma23": 0.0}),
-            *(AROUND, AROUND | {"gamma12": 0.02}),
-        ],
-    ),
     "generalized, on springs": (
         {"geometry": "hexagonal"},
         EPOXY_GLASS,
@@ -193,7 +163,7 @@ PATHS = {
     ("name", "release"),
     [
         *(("fibres that come free", "all"), ("breaks on springs", "all"), ("breaks on springs", "worst")),
-        *(("generalized, tied along the fibres", "worst"), ("generalized, tied faces that all open", "all")),
+        ("generalized", "worst"),
     ],
 )
 def test_increments_are_those_of_the_twin(comm, name, release):
@@ -206,7 +176,6 @@ def test_increments_are_those_of_the_twin(comm, name, release):
 
     def followed():
         faces = RubbingFaces.of(twin.cell, twin.bonded, interface["friction"])
-        faces.tied = "axial_friction" in interface
         return FrictionPath(faces, twin.cell, twin._law).increments(twin.loads, steps, release == "worst")
 
     known = on_root(comm, followed)
@@ -232,7 +201,6 @@ def test_paths_are_those_of_the_twin(comm, name):
 
     def followed():
         faces = RubbingFaces.of(twin.cell, twin.bonded, interface["friction"])
-        faces.tied = "axial_friction" in interface
         return FrictionPath(faces, twin.cell, twin._law).follow(twin.loads)
 
     every = on_root(comm, followed)

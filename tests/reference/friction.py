@@ -6,7 +6,7 @@ pressure and -(A z)_t = f the shear force on the fibre.  On debonded nodes
 
     gap >= 0, p >= 0, gap p = 0;   |f| <= mu p;   f d slip >= 0, and d slip = 0 where |f| < mu p.
 
-Along the fibres debonded faces slide without a force, or are `tied`: they keep their slip while they touch.
+Along the fibres debonded faces slide without a force.
 """
 
 from __future__ import annotations
@@ -58,8 +58,6 @@ class RubbingFaces:
     `d` is 2, or 3 with slips along the fibres.
     """
 
-    tied = False  # debonded faces along the fibres
-
     def __init__(self, A, bonded, friction, area=1.0, d=2):
         self.k, self.m, self.area = len(bonded), len(A) - d * len(bonded), area
         self.unit = np.abs(np.diag(A)).max()
@@ -92,8 +90,7 @@ class RubbingFaces:
 
     def holds(self, status):
         """(..., k) or (..., 0) nodes that do not slip along the fibres."""
-        held = (status == BONDED) | (self.tied & (status != OPEN))
-        return held[..., : len(self.a)]
+        return (status == BONDED)[..., : len(self.a)]
 
     def linear(self, status, load, before=None):
         """Return the states (s,) of given statuses (s, k) and a load, or their rates if there is no state `before`."""

@@ -67,15 +67,12 @@ class FrictionPath:
         return self.points
 
     def _increment(self, load):
-        """Go to a load by one implicit step; tied faces that open let go of their shear behind it."""
+        """Go to a load by one implicit step."""
         before, faces = self.state, self.faces
         after = faces.increment(before, load)
         heat = after.shear @ (after.slip - before.slip) / faces.area
-        opened = np.where(after.status == OPEN, OPEN, before.status)
-        kept, left = faces.linear(np.stack([before.status, opened]), load, before)
-        lost = kept.axial @ (left.along - kept.along) / 2 / faces.area if faces.tied else 0.0
-        self.heat, self.dissipated = self.heat + heat, self.dissipated + lost
-        self.work += after.stored(faces.area) - before.stored(faces.area) + heat + lost
+        self.heat += heat
+        self.work += after.stored(faces.area) - before.stored(faces.area) + heat
         self._stand(after)
 
     def _leg(self, load, leg, legs):
@@ -91,11 +88,6 @@ class FrictionPath:
             def after(share, rate=rate):
                 return self.faces.linear(rate.status, start.towards(load, share), self.state)[0]
 
-            if self.faces.tied:  # what opens lets go of its shear along the fibres
-                self._lose(after(s), 0.0)
-                if (which := self._overloaded(1.0 + TOGETHER)).any():
-                    self._break_all(which, start.towards(load, s), (leg + s) / legs)
-                    continue
             there = 1.0 if step >= 1.0 - s else s + step
             broken = self.used(after(there)).max() > 1.0
             s = self._break_between(after, s, there) if broken else there

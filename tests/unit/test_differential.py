@@ -45,7 +45,6 @@ def kinds(drawn):
         law = str(section.get("law", section.get("criterion")))
         has |= {f"contact {section['contact']}", law, str(section.get("growth")), *(COHESIVE & section.keys())}
         has |= {"friction"} if section.get("friction") else set()
-        has |= {f"axial friction {section['axial_friction']}"} if "axial_friction" in section else set()
         has |= {"springs" if "normal_stiffness" in section else "glue", "arcs" * bool(section.get("debonded"))}
     has |= {"bonded"} if not sections else {f"{len(sections)} interfaces"}
     has |= {path.get("method", "events")} if path else set()
@@ -67,7 +66,7 @@ def test_the_cases_of_ci_cover_the_language(tmp_path):
         "plane strain", "plane stress", "plane generalized", "order 1", "order 2", "torus", "plane", *SHAPES, "voids",
         "refined", "pieces", "contact True", "contact False", "max", "quadratic", "energy", "released", "springs",
         "glue", "arcs", "bonded", "1 interfaces", "2 interfaces", "events", "increments", "legs", "stresses",
-        "temperature", "friction", "axial friction prevented", *SOFTENING, *COHESIVE, "own strengths",
+        "temperature", "friction", *SOFTENING, *COHESIVE, "own strengths",
     }  # fmt: skip
     assert expected <= found.keys(), expected - found.keys()
 

@@ -54,15 +54,14 @@ def kkt_errors(
     return dict(zip(("kkt_penetration", "kkt_tension", "kkt_complementarity"), worst.tolist(), strict=True))
 
 
-def coulomb_errors(force: Float, friction: Float, sliding: Status, tied: Bool) -> Float:
-    """(k,) how far shear is beyond mu p, or off s mu p, and shear along the fibres of faces that bear none there.
+def coulomb_errors(force: Float, friction: Float, sliding: Status) -> Float:
+    """(k,) how far shear is beyond mu p, or off s mu p, and shear along the fibres, of which faces bear none.
 
     Args:
         force: (k, c) normal, tangential and axial traction of faces, and of damaged bonds what is beside their springs.
         friction, sliding: (k,) mu, and the sign s with which the slip grows, 0 of faces that stick.
-        tied: (k,) which faces bear shear along the fibres.
     """
     limit, shear = friction * np.maximum(-force[:, 0], 0.0), force[:, 1]
     off = np.where(sliding == 0, np.maximum(np.abs(shear) - limit, 0.0), np.abs(sliding * shear - limit))
     along = np.abs(force[:, 2:]).max(axis=1, initial=0.0)
-    return np.asarray(np.maximum(off, np.where(tied, 0.0, along)))
+    return np.asarray(np.maximum(off, along))

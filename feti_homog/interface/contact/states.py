@@ -27,7 +27,7 @@ class BondState:
         pressed: (k,) which of the bonds that hold have the normal stiffness of compression, where damage makes that
             another one than in tension.
         gap_and_slip: (k, 2) of debonded faces with friction and what damaged bonds give beside their intact springs, 0
-            of other bonds; (k, 3) with jumps along the fibres where faces are tied there; None without friction.
+            of other bonds; None without friction.
         sliding: (k,) the sign with which the slip of a closed node grows, 0 where it sticks; None without friction.
     """
 

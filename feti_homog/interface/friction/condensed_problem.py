@@ -89,31 +89,27 @@ class CondensedProblem:
 class AxialFaces:
     """The axial problem, a few rows and columns of the matrix S of `coulomb_faces` behind those of the plane.
 
-    Where no face is tied along the fibres the jumps g = K^-1 b E are eliminated, K g = b E.  What nothing holds is held
-    by a share of its own row: a share of the largest would measure by the stiffest spring.
+    The jumps g = K^-1 b E are eliminated, K g = b E.  What nothing holds is held by a share of its own row: a share of
+    the largest would measure by the stiffest spring.
 
     Attributes:
         problem: the axial one.
-        stiffness: (v, v) of its strains, L - b^T K^-1 b; or (v + n, v + n) of strains and jumps.
+        stiffness: (v, v) of its strains, L - b^T K^-1 b.
     """
 
-    def __init__(self, problem: CondensedProblem, rows: Int, springs: Float, is_tied: bool) -> None:
+    def __init__(self, problem: CondensedProblem, rows: Int, springs: Float) -> None:
         """Take rows (n,) with springs (n,), 0 of faces that nothing ties.  Collective."""
         self.problem = problem
         K, b, L = problem.take(rows, springs)
-        if is_tied:
-            self._jumps, self.stiffness = None, np.block([[L, -b.T], [-b, K]])
-            return
         held = lu_factor(K + HELD * np.diag(K.diagonal()))
         self._jumps = np.zeros_like(b)
         for _ in range(1 + REFINEMENTS):
             self._jumps += lu_solve(held, b - K @ self._jumps)
         self.stiffness = _without_rounding(L - b.T @ self._jumps, L)
 
-    def parts(self, y: Float) -> tuple[Float, Float]:
-        """Return jumps (n,) and strains (v,) of y, strains or strains and jumps."""
-        strain, jump = np.split(y, [len(self.problem.solver.problem.loads)])
-        return (jump if self._jumps is None else self._jumps @ strain), strain
+    def parts(self, strain: Float) -> tuple[Float, Float]:
+        """Return jumps (n,) of strains (v,), and these."""
+        return self._jumps @ strain, strain
 
 
 def _without_rounding(stiffness: Float, bonded: Float) -> Float:

@@ -9,9 +9,6 @@ pressure p = -f_n
 A node is apart (f = 0), sticks (g_n = 0, g_t as it was), or slides (g_n = 0, f_t = s mu p).  Springs between the faces
 of a node are part of S, and f the force beside theirs: a damaged bond is a node without friction on springs of
 1 / (C - C_0), apart while it is pulled.
-
-Jumps along the fibres may stand behind the loads: those of `tied` nodes stay while these touch, the others bear no
-force.  No status depends on them.
 """
 
 from __future__ import annotations
@@ -147,12 +144,3 @@ class CoulombFaces(FaceSystem):
         """Return the heat of one implicit step: slips times the forces behind it, of faces that slide behind it."""
         slips = (after - before)[1 : 2 * self.nodes : 2]
         return float((self.forces(after)[1] * slips)[np.abs(status) == 1].sum())
-
-    def let_go(self, old: Status, status: Status, given: Prescribed, start: Float) -> float:
-        """Return what tied faces that open in an implicit step from a start lose of their shear along the fibres.
-
-        They let go of it behind the step, up to which they keep their jumps; others stay as with the `old` statuses.
-        """
-        opened = np.where(status == OPEN_FACE, OPEN_FACE, old).astype(np.int8)
-        kept, left = (np.where(self.alone, self.linear(each, given, start)[0], 0.0) for each in (old, opened))
-        return self.losses(opened, kept, left)[0]

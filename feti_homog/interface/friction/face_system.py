@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -14,7 +13,6 @@ from feti_homog.typing import Bool, Float
 
 # Forces and jumps of a node, scaled by its stiffness, that are rounding, relative to the terms of its rows of S x.
 NOISE = 1e-11
-NOTHING = np.zeros(0, bool)
 
 
 @dataclass(frozen=True)
@@ -37,19 +35,15 @@ class FaceSystem:
 
     Attributes:
         friction: (n,) mu.
-        tied: (n,) which nodes do not slip along the fibres while they touch; (0,) where x has no such jumps.
         S: (m, m) the scaled stiffness, of 1 on the diagonal of a node, and `size` (m,): S_ij size_i size_j is that of
             the cell.
         solver: of systems with it.
     """
 
-    def __init__(self, stiffness: Float, friction: Float, tied: Bool = NOTHING) -> None:
-        """`stiffness` (m, m) of normal and tangential jumps of each node, then of the v loads, then along the fibres.
-
-        m is 2n + v, with jumps along the fibres 3n + v.
-        """
+    def __init__(self, stiffness: Float, friction: Float) -> None:
+        """`stiffness` (m, m) of normal and tangential jumps of each node, then of the v loads: m is 2n + v."""
         n, diagonal = len(friction), stiffness.diagonal()
-        self.friction, self.tied = friction, tied
+        self.friction = friction
         nodes = np.repeat(diagonal[: 2 * n].reshape(n, 2).max(axis=1, initial=0.0), 2)
         size = np.sqrt(np.concatenate([nodes, np.maximum(diagonal[2 * n :], 0.0)]))
         self.size = np.where(size > 0.0, size, 1.0)
@@ -64,7 +58,7 @@ class FaceSystem:
     @property
     def loads(self) -> slice:
         """Place of the loads in x."""
-        return slice(2 * self.nodes, len(self.S) - len(self.tied))
+        return slice(2 * self.nodes, len(self.S))
 
     def forces(self, x: Float) -> tuple[Float, Float]:
         """(n,) scaled normal and tangential forces."""
@@ -77,29 +71,15 @@ class FaceSystem:
 
     def free(self, status: Status, by_stress: Bool) -> tuple[Bool, Float]:
         """Return `free_rows` of statuses."""
-        return free_rows(status, self.friction, self._given_by_force(status, by_stress))
-
-    def _given_by_force(self, status: Status, by_stress: Bool) -> Bool:
-        """(m - 2n,) which of the loads, and of the jumps along the fibres, are given by what works on them."""
-        return np.concatenate([by_stress, ~self.tied | (status == OPEN_FACE)]) if len(self.tied) else by_stress
+        return free_rows(status, self.friction, by_stress)
 
     def settled(self, status: Status, given: Prescribed, x: Float) -> tuple[Status, Float]:
         """Return the statuses, and x (m,) without the rounding of the way to it.
 
-        Where a motion is free, which rounding would drive, x is as it was, but for what S does not couple with the
-        jumps in the plane: there faces that opened let go of their shear along the fibres.
+        Where a motion is free, which rounding would drive, x is as it was.
         """
-        free = self.free(status, given.by_stress)
-        if self.solver.sign(*free):
-            return status, self.linear(status, given, x)[0]
-        if not len(self.tied):
-            return status, x
-        return status, np.where(self.alone, self.linear(status, given, x)[0], x)
-
-    @cached_property
-    def alone(self) -> Bool:
-        """(m,) which entries of x are not coupled with the jumps in the plane."""
-        return np.asarray(~self.S[: 2 * self.nodes].any(axis=0))
+        is_free = self.solver.sign(*self.free(status, given.by_stress)) == 0
+        return status, x if is_free else self.linear(status, given, x)[0]
 
     def prescribed(self, status: Status, given: Prescribed, start: Float) -> tuple[Float, Float]:
         """(m,) x with what is prescribed, and (m,) S x on the rows of loads."""

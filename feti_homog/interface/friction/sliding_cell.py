@@ -20,7 +20,6 @@ from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, Equilibrium, Status
 from feti_homog.interface.friction.condensed_problem import AxialFaces, CondensedProblem
 from feti_homog.interface.friction.coulomb_faces import CoulombFaces
-from feti_homog.interface.friction.face_system import NOTHING
 from feti_homog.interface.friction.status_system import OPEN_FACE, STICK
 from feti_homog.interface.loads.load import CoupledSolution, Load, Macroscopic, Multipliers
 from feti_homog.typing import Bool, Float, Int
@@ -32,21 +31,18 @@ class SlidingCell:
     Attributes:
         interface: the contact problem of the plane.
         friction, friction_of_damage: (k,) mu of the nodes of this rank; of the damaged share of bonds that hold.
-        tied: (k,) which of them do not slip along the fibres while they touch; None where none of any rank is.
         rows: (n,) global normal rows of the debonded nodes, rising.
         faces: of these nodes, on every rank.
     """
 
-    def __init__(
-        self, cell: CoupledInterfaces, friction: Float, friction_of_damage: Float, tied: Bool | None = None
-    ) -> None:
+    def __init__(self, cell: CoupledInterfaces, friction: Float, friction_of_damage: Float) -> None:
         """Find the response of the bonded cell to its loads.  Collective; raises as `CondensedProblem`."""
-        self.cell, self.interface, self.tied = cell, cell.plane, tied
+        self.cell, self.interface = cell, cell.plane
         self.friction, self.friction_of_damage = friction, friction_of_damage
         self.solver = self.interface.solver
         self._plane, *self._axial = (CondensedProblem(each) for each in cell.problems)
         self._loads = len(self.solver.problem.loads)
-        self.rows, self.springs = np.zeros(0, np.int64), (np.zeros(0), np.zeros(0))
+        self.rows, self.springs = np.zeros(0, np.int64), np.zeros(0)
         self.faces = CoulombFaces(np.zeros((0, 0)), np.zeros(0))
 
     def take(self, bonds: BondState) -> None:
@@ -64,21 +60,19 @@ class SlidingCell:
         self._springs = springs
         friction = np.where(self._damaged, self.friction_of_damage, self.friction)
         along = [each.first + each.interface.nodes.row for each in self._axial]
-        tied = np.zeros(len(row), bool) if self.tied is None else self.tied & ~self._damaged
-        own = np.column_stack([first + row, friction, tied, *along, springs])[self._own]
+        own = np.column_stack([first + row, friction, *along, springs])[self._own]
         whole = np.concatenate(comm.allgather(own))
         whole = whole[np.argsort(whole[:, 0])]
         faces, before, held = self.faces, self.rows, self.springs
         self.rows, springs = whole[:, 0].astype(np.int64), whole[:, -more.shape[1] :]
-        self.springs = springs[:, :2].ravel(), springs[: 0 if self.tied is None else None, -1]
+        self.springs = springs[:, :2].ravel()
         self._place = np.searchsorted(self.rows, first + row[self._own])
-        K, b, L = self._plane.take((self.rows[:, None] + np.arange(2)).ravel(), self.springs[0])
-        nodes, has_jumps = whole[:, 3].astype(np.int64), self.tied is not None
-        self._along = [AxialFaces(each, nodes, springs[:, 2], has_jumps) for each in self._axial]
+        K, b, L = self._plane.take((self.rows[:, None] + np.arange(2)).ravel(), self.springs)
+        nodes = whole[:, 2].astype(np.int64)
+        self._along = [AxialFaces(each, nodes, springs[:, 2]) for each in self._axial]
         S = block_diag(L, *(each.stiffness for each in self._along))
         b = np.pad(b, [(0, 0), (0, len(S) - self._loads)])
-        tied = whole[:, 2] > 0.0 if has_jumps else NOTHING
-        self.faces = CoulombFaces(np.block([[K, -b], [-b.T, S]]), whole[:, 1], tied)
+        self.faces = CoulombFaces(np.block([[K, -b], [-b.T, S]]), whole[:, 1])
         old = self._places_of(before)
         if len(old):
             units = faces.size / self.faces.size[old]
@@ -89,20 +83,16 @@ class SlidingCell:
         if not len(rows) or not np.isin(rows, self.rows).all():
             return np.zeros(0, np.int64)
         nodes, loads = np.searchsorted(self.rows, rows), self.faces.loads
-        along = nodes if self.tied is not None else nodes[:0]
         pairs = (2 * nodes[:, None] + np.arange(2)).ravel()
-        return np.asarray(np.concatenate([pairs, np.arange(loads.start, loads.stop), loads.stop + along]))
+        return np.asarray(np.concatenate([pairs, np.arange(loads.start, loads.stop)]))
 
-    def _changed(self, old: Int, rows: Int, springs: tuple[Float, Float]) -> Bool:
+    def _changed(self, old: Int, rows: Int, springs: Float) -> Bool:
         """(m',) which entries of `_places_of` are on other springs, or loads whose stiffness all jumps change."""
         nodes, changed = np.searchsorted(self.rows, rows), np.zeros(len(old), bool)
         pairs = (2 * nodes[:, None] + np.arange(2)).ravel()
         last = len(pairs)
-        changed[:last] = np.repeat((self.springs[0][pairs] != springs[0]).reshape(-1, 2).any(axis=1), 2)
-        if self.tied is None:
-            changed[last + self._loads :] = True
-        else:
-            changed[len(old) - len(rows) :] = self.springs[1][nodes] != springs[1]
+        changed[:last] = np.repeat((self.springs[pairs] != springs).reshape(-1, 2).any(axis=1), 2)
+        changed[last + self._loads :] = True
         return changed
 
     @staticmethod
@@ -124,25 +114,18 @@ class SlidingCell:
         Without a history the faces just touch.
         """
         self.take(bonds)
-        jump = np.zeros((len(bonds.status), self._jumps)) if bonds.gap_and_slip is None else bonds.gap_and_slip
+        jump = np.zeros((len(bonds.status), 2)) if bonds.gap_and_slip is None else bonds.gap_and_slip
         apart = np.where(self._damaged, ~bonds.pressed, bonds.status == OPEN)
         own = np.column_stack([np.where(apart, OPEN_FACE, bonds.sliding_signs), jump])[self._own]
         whole = np.concatenate(self.solver.comm.allgather(np.column_stack([self._place, own])))
         whole = whole[np.argsort(whole[:, 0])]
         status: Status = whole[:, 1].astype(np.int8)
-        return status, np.concatenate([whole[:, 2:4].ravel(), strain, whole[:, 4:].ravel()]) * self.faces.size
-
-    @property
-    def _jumps(self) -> int:
-        """Number of jumps of a node that x has."""
-        return 2 if self.tied is None else 3
+        return status, np.concatenate([whole[:, 2:].ravel(), strain]) * self.faces.size
 
     def bonds(self, before: BondState, status: Status, x: Float) -> BondState:
         """Return the state of the nodes of this rank with statuses (n,) and scaled x of the faces."""
-        own, jump = status[self._place], np.zeros((len(before.status), self._jumps))
-        plane, along = self._jumps_of(x)
-        whole = np.hstack([plane.reshape(-1, 2), along.reshape(len(status), self._jumps - 2)])
-        jump[self._own] = whole[self._place]
+        own, jump = status[self._place], np.zeros((len(before.status), 2))
+        jump[self._own] = self._jumps_of(x).reshape(-1, 2)[self._place]
         nodes, sliding = before.status.copy(), np.zeros(len(before.status), np.int8)
         holds, pressed = self._damaged[self._own], before.pressed.copy()
         nodes[self._own] = np.where(holds, BONDED, np.where(own == OPEN_FACE, OPEN, CLOSED))
@@ -157,13 +140,11 @@ class SlidingCell:
 
     def stretched(self, x: Float) -> float:
         """Return the energy per area of the springs in scaled x by which damaged bonds have become softer."""
-        pairs = zip(self.springs, self._jumps_of(x), strict=True)
-        return float(sum(springs @ jump**2 for springs, jump in pairs)) / (2.0 * self.area)
+        return float(self.springs @ self._jumps_of(x) ** 2) / (2.0 * self.area)
 
-    def _jumps_of(self, x: Float) -> tuple[Float, Float]:
-        """(2n,) jumps in the plane and (n,) or (0,) along the fibres of scaled x."""
-        loads, plain = self.faces.loads, x / self.faces.size
-        return plain[: loads.start], plain[loads.stop :]
+    def _jumps_of(self, x: Float) -> Float:
+        """(2n,) jumps in the plane of scaled x."""
+        return np.asarray((x / self.faces.size)[: self.faces.loads.start])
 
     def multipliers(self, x: Float) -> Multipliers:
         """(owned rows,) lam of scaled x in each problem."""
@@ -177,7 +158,7 @@ class SlidingCell:
         force = np.zeros((len(self.friction), sum(rows.shape[1] for rows in self._held_rows)))
         parts = zip(self._held_rows, self._parts(x), strict=True)
         force[self._held] = np.hstack([problem.some_multipliers(rows, *own) for rows, (problem, own) in parts])
-        damaged, slip = self._damaged[self._own], self._jumps_of(x)[0][1::2][self._place]
+        damaged, slip = self._damaged[self._own], self._jumps_of(x)[1::2][self._place]
         node, C = self._own[damaged], self.solver.intact_compliance[self.interface.nodes.row[self._own[damaged]] + 1]
         force[node, 1] = (C * force[node, 1] + slip[damaged]) / (C + self._more[node])
         return np.asarray(force / self.interface.nodes.length[:, None])
@@ -188,9 +169,7 @@ class SlidingCell:
         return [(self._plane, (jump, plane)), *((each.problem, each.parts(along)) for each in self._along)]
 
     def released_along(self, before: Macroscopic, after: Macroscopic) -> float:
-        """Return the energy per area that a break at constant load loses along fibres, if x has no jumps there."""
-        if self.tied is not None:
-            return 0.0
+        """Return the energy per area that a break at constant load loses along fibres."""
         parts = (Macroscopic(each.strain[self._loads :], each.stress[self._loads :]) for each in (before, after))
         return next(parts).released_to(next(parts))
 
@@ -242,8 +221,7 @@ class SlidingCell:
         force, own = traction.copy(), self._own
         force[own] -= jumps[self._place] * self._springs[own] / self.interface.nodes.length[own, None]
         friction = np.where(self._damaged, self.friction_of_damage, self.friction)
-        tied = np.zeros(len(friction), bool) if self.tied is None else self.tied & (bonds.status == CLOSED)
-        off = coulomb_errors(force, friction, bonds.sliding_signs, tied)
+        off = coulomb_errors(force, friction, bonds.sliding_signs)
         largest = self.interface.scales.over_interface(np.abs(traction).max(axis=1, initial=0.0))
         for each, state in zip(self.cell.problems, states, strict=True):
             stress = each.scales.bond_stress(each.acting(bonds, state.solution.strain, state.asked))

@@ -128,9 +128,6 @@ class SlidingSteps(SlidingLeg):
         given, self._share = self._given(share, here.x), share
         status, x = self._on_root(faces.step, here.status, given, here.x)
         heat = faces.heat_behind(status, here.x, x) / area
-        lost = 0.0
-        if self._opened_tied(here.status, status):
-            lost = on_root(self.cell.comm, faces.let_go, here.status, status, given, here.x) / area
         stored = self.sliding.stored(x) - self.sliding.stored(here.x)
-        self._energies = self._energies.plus(Energies(stored + heat + lost, lost, 0.0, heat))
+        self._energies = self._energies.plus(Energies(stored + heat, 0.0, 0.0, heat))
         self._here, self._bonds = self._standing(status, x), self.sliding.bonds(self._bonds, status, x)

@@ -10,7 +10,6 @@ from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import Equilibrium, Status
 from feti_homog.interface.friction.face_system import Prescribed
 from feti_homog.interface.friction.sliding_cell import SlidingCell
-from feti_homog.interface.friction.status_system import OPEN_FACE
 from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.loads.load import Load, Macroscopic
 from feti_homog.interface.path.path_points import NO_ENERGIES, Energies, PathState, break_bonds
@@ -74,11 +73,6 @@ class SlidingLeg:
 
     def _standing(self, status: Status, x: Float) -> Standing:
         return Standing(status, x, Macroscopic(self.sliding.strain(x), self.sliding.stress(x)))
-
-    def _opened_tied(self, before: Status, status: Status) -> bool:
-        """Return whether tied faces opened, whose shear along the fibres went to bonds."""
-        tied, opened = self.sliding.faces.tied, (status == OPEN_FACE) & (before != OPEN_FACE)
-        return bool((tied & opened[: len(tied)]).any())
 
     def _add(self, after: Standing, released: float, heat: float, fracture: float = 0.0) -> None:
         """Add the energies of the straight way to a state."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from feti_homog.errors import NotCarriedError
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.contact.states import BondState, Status
+from feti_homog.interface.contact.states import Status
 from feti_homog.interface.friction.coulomb_faces import StuckError
 from feti_homog.interface.friction.sliding_cell import SlidingCell
 from feti_homog.interface.laws.bond_law import BondLaw
@@ -93,37 +93,19 @@ class SlidingEvents(SlidingLeg):
         there[rounded] = 0.0
         if not rounded.any():
             faces.solver.keep(there, faces.solver.product(x) + way * faces.solver.product(rate))
-        self._let_go(status, x)
-        opened = self._opened_tied(here.status, status)
-        if opened and self._most_used(bonds) > 1.0 + UTILISATION_TIE:
-            yield from self._break()
-            yield from self._break_overloaded()
-            return
         self._go(status, x, there)
         at_end = breaks > 1.0 and change >= rest
         self._share = 1.0 if at_end else self._share + way
         if breaks <= 1.0:
             yield from self._break()
             yield from self._break_overloaded()
-        elif not at_end and (opened or self._is_point()):
+        elif not at_end and self._is_point():
             self._first = False
             yield self._point(0, 0, self._path_state())
-
-    def _let_go(self, status: Status, x: Float) -> None:
-        """Go to x with these statuses at the same load: faces that opened bear no shear along the fibres any more."""
-        if len(self.sliding.faces.tied):
-            lost, _ = self.sliding.faces.losses(status, self._here.x, x)
-            self._add(self._standing(status, x), lost / self.sliding.area, 0.0)
-            self._here = self._standing(status, x)
 
     def _is_point(self) -> bool:
         """Return whether a change of statuses here is a point."""
         return self._first or self._share - self._reported >= LEAST_SHARE
-
-    def _most_used(self, bonds: BondState) -> float:
-        """Stand with these bonds, and return the largest share of their strength that they use.  Collective."""
-        self._bonds = bonds
-        return most_utilised(self.cell, self.law, self._state())[1]
 
     def _go(self, status: Status, x: Float, there: Float) -> None:
         """Go straight from x to `there`, with these statuses."""

@@ -44,8 +44,8 @@ AREAS = {
     "stored in the bodies": "#9db8de",
     "stored in springs": "#5d86c4",
     "fracture energy": "#d98a54",
-    **{f"{lost} beyond it": "#f0cfb3" for lost in path_curves.LOST.values()},
-    **dict.fromkeys(path_curves.LOST.values(), "#d98a54"),
+    "lost in breaks beyond it": "#f0cfb3",
+    "lost in breaks": "#d98a54",
     "heat of friction": "#b8455f",
 }
 

@@ -12,6 +12,10 @@ SOFTENING = [
 BRANCH = ['law = "table"', "tangential_stiffness = 10.0", "tangential_strength = 1.0", "tangential_toughness = 2.0"]
 
 FAULTY_COHESIVE_LAWS: dict[str, tuple[str, tuple[str, ...]]] = {
+    "friction_along_the_fibres": (
+        of_type("path", PATH, "[interface]", "friction = 0.3", 'axial_friction = "prevented"'),
+        ('[interface] axial_friction = "prevented": unknown key; leave it out: debonded faces slip freely along ',),
+    ),
     "softening_without_toughness": (
         of_type("path", PATH, "[interface]", *SOFTENING[1:3], 'law = "bilinear"', "normal_strength = 1.0"),
         (

@@ -195,7 +195,9 @@ def test_high_contrast_is_warned_of(tmp_path, plane):
 
 
 def test_keys_of_friction_without_friction_are_warned_of():
-    interface = {"friction": 0.0, "axial_friction": "prevented", "debonded": [{"fibre": 1, "angle": 90.0}]}
+    numbers = {"stiffness": 10.0, "strength": 1.0, "toughness": 1.0}
+    interface = {f"{side}_{name}": value for side in ("normal", "tangential") for name, value in numbers.items()}
+    interface |= {"law": "bilinear", "friction": 0.0, "friction_on_damage": True}
     asked = {
         "cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.3},
         "material": {name: {"young": 1.0, "poisson": 0.3} for name in ("matrix", "fibre")},
@@ -203,7 +205,7 @@ def test_keys_of_friction_without_friction_are_warned_of():
         "path": {"waypoints": [{"E11": 0.01}]},
     }
     (words,) = parse(asked | {"interface": interface}, Path()).warnings()
-    assert words == '[interface] axial_friction = "prevented": without effect, for friction = 0'
+    assert words == "[interface] friction_on_damage = true: without effect, for friction = 0"
     assert parse(asked | {"interface": interface | {"friction": 0.3}}, Path()).warnings() == ()
 
 

@@ -22,7 +22,7 @@ def test_free_faces_are_not_held_by_the_springs_of_others(stiff):
     H, springs = A.T @ A, stiff * np.array([1.0, 3.0, 0.0, 0.0])
     L = 10.0 * np.eye(2)
     problem = SimpleNamespace(take=lambda rows, own: (H + np.diag(own), b, L))
-    found = AxialFaces(problem, np.arange(4), springs, is_tied=False).stiffness
+    found = AxialFaces(problem, np.arange(4), springs).stiffness
     soft = H[2:, 2:] - H[2:, :2] @ np.linalg.solve(H[:2, :2] + np.diag(springs[:2]), H[:2, 2:])
     held = np.linalg.solve(H[:2, :2] + np.diag(springs[:2]), b[:2])
     rest = b[2:] - H[2:, :2] @ held
@@ -42,21 +42,21 @@ def test_damaged_bonds_slip_by_their_tangential_rows_alone(components, known):
 
 
 def test_forces_that_no_face_may_bear_are_errors():
-    """Sticking within its limit and beyond it, sliding off its limit; along the fibres tied, loose and open."""
+    """Sticking within its limit and beyond it, sliding off its limit; along the fibres loose and open."""
     force = np.array(
         [[-1, 0.2, 0], [-1, 0.5, 0], [-2, -0.7, 0], [-1, 0, 0.4], [-1, 0, -0.4], [0, 0, 0.1], [-1, 0.3, 0]]
     )
-    sliding, tied = np.array([0, 0, -1, 0, 0, 0, 1], np.int8), np.array([0, 0, 0, 1, 0, 0, 0], bool)
-    found = coulomb_errors(force, np.full(7, 0.3), sliding, tied)
-    np.testing.assert_allclose(found, [0.0, 0.2, 0.1, 0.0, 0.4, 0.1, 0.0], atol=1e-15)
-    np.testing.assert_allclose(coulomb_errors(force[:3, :2], np.full(3, 0.3), sliding[:3], tied[:3]), found[:3])
+    sliding = np.array([0, 0, -1, 0, 0, 0, 1], np.int8)
+    found = coulomb_errors(force, np.full(7, 0.3), sliding)
+    np.testing.assert_allclose(found, [0.0, 0.2, 0.1, 0.4, 0.4, 0.1, 0.0], atol=1e-15)
+    np.testing.assert_allclose(coulomb_errors(force[:3, :2], np.full(3, 0.3), sliding[:3]), found[:3])
 
 
 def test_faces_without_friction_have_no_sign_of_slip():
     """Put a face without friction beside one that slides and one that sticks."""
     faces = SimpleNamespace(friction=np.array([0.3, 0.0, 0.3]))
-    of = {"_place": np.arange(3), "_own": np.arange(3), "_damaged": np.zeros(3, bool), "_jumps": 2, "faces": faces}
-    cell = SimpleNamespace(**of, _jumps_of=lambda x: (x, np.zeros(0)))
+    of = {"_place": np.arange(3), "_own": np.arange(3), "_damaged": np.zeros(3, bool), "faces": faces}
+    cell = SimpleNamespace(**of, _jumps_of=lambda x: x)
     bonds = BondState.without_memory(np.full(3, OPEN, np.int8))
     found = SlidingCell.bonds(cell, bonds, np.array([FORWARD, FORWARD, STICK], np.int8), np.zeros(6))
     np.testing.assert_array_equal(found.sliding, [1, 0, 0])

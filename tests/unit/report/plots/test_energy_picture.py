@@ -64,11 +64,3 @@ def test_a_load_that_falls_leaves_numbers_of_points() -> None:
 
 def test_results_without_energies_have_no_stack() -> None:
     assert path_picture.energies(path([0.5, 0.6, 1.0])) is None
-
-
-def test_what_tied_faces_lose_as_they_open_has_its_name() -> None:
-    document = path([0.25, 0.5, 1.0], **ENERGIES)
-    document["case"]["interface"] = {"friction": 0.3, "axial_friction": "prevented"}
-    figure = path_picture.energies(document)
-    assert figure is not None
-    assert "lost in breaks and openings" in [area.get_label() for area in figure.axes[0].collections]
