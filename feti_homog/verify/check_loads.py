@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
@@ -108,7 +108,7 @@ def check_load(findings: Findings, cell: DiscreteCell, states: Sequence[StateNum
     same = json.loads(str(cell.files.file.attrs["case"])) == case
     findings.record("tables", 0.0 if same else np.inf, "the case, which differs between the two files")
     rows = list(_rows(document, case, _unit_loads(cell)))
-    scales = _Scales.of(cell, states)
+    scales = _Scales.of(cell, states, [load for load, _ in rows])
     if "path" in document:
         _check_kept(findings, document, case, [state.point for state in states])
         for number, (load, entries) in enumerate(rows):
@@ -128,16 +128,20 @@ def check_load(findings: Findings, cell: DiscreteCell, states: Sequence[StateNum
 
 @dataclass(frozen=True)
 class _Scales:
-    """Sizes of the strains and stresses of all states, and of stresses that loads make where Sigma is none."""
+    """Sizes of the strains and stresses of all states, and of stresses that the loads make in the bonded cell."""
 
     strain: float
     stress: float
     imposed: float
 
     @classmethod
-    def of(cls, cell: DiscreteCell, states: Sequence[StateNumbers]) -> _Scales:
-        largest = max((float(np.abs(state.stress).max()) for state in states), default=0.0)
-        imposed = max((cell.least_stress(state) for state in states), default=0.0)
+    def of(cls, cell: DiscreteCell, states: Sequence[StateNumbers], loads: Sequence[Prescribed]) -> _Scales:
+        largest, imposed = max((float(np.abs(state.stress).max()) for state in states), default=0.0), 0.0
+        for state, load in product(states[:1], loads):
+            # Strains that came out are no scale of the stresses that are asked for.
+            given, n = np.where(load.by_stress, 0.0, load.values), len(state.strain)
+            asked = replace(state, strain=given[:n], temperature=float(given[n:].sum()))
+            imposed = max(imposed, float(np.abs(cell.reuss @ cell.loads(asked)).max()))
         return cls(cell.largest_strain or 1.0, largest or 1.0, max(largest, imposed) or 1.0)
 
 
