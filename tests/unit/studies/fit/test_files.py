@@ -40,3 +40,32 @@ def test_a_fit_that_its_bounds_keep_from_the_data_has_a_remark(computed, words):
     found = summarize(bounds[1], np.array([computed]), measured, np.array([[1.0]]), bounds)
     last = files.text(files.content(fit, found)).splitlines()[-1]
     assert last.endswith(words) and ("material.fibre.young at its upper bound" in last) == bool(words)
+
+
+def test_every_printed_number_is_that_of_the_normal_equations():
+    """Two unknowns of three values: estimates, intervals, shares, correlation and residuals, in their columns."""
+    more = "material.matrix.young = {start = 90.0, lower = 50.0, upper = 120.0}\n[measured]"
+    values = "C22 = {value = 160.0, std = 3.0}\nG12 = {value = 40.0, std = 0.5}\n"
+    asked = parse(tomllib.loads(BASE + TEXT.replace("[measured]", more) + values), Path())
+    x, y, std = np.array([200.0, 88.0]), np.array([150.0, 160.0, 40.0]), np.array([1.5, 3.0, 0.5])
+    J, computed = np.array([[0.2, 1.0], [0.4, 0.5], [0.05, 0.3]]), y + np.array([3.0, -1.5, 0.25])
+    bounds = np.array([50.0, 50.0]), np.array([500.0, 120.0])
+    text = files.text(files.content(asked, summarize(x, computed, (y, std), J, bounds)))
+    covariance = np.linalg.inv(J.T @ (J / std[:, None] ** 2))
+    deviation, shares = np.sqrt(covariance.diagonal()), (covariance @ J.T / std) ** 2
+    blocks = [[line.split() for line in part.splitlines()] for part in text.split("\n\n")]
+    unknowns, correlation, measured, (last,) = blocks[1:5]
+    for k, row in enumerate(unknowns[1:]):
+        ends = x[k] + 1.959964 * deviation[k] * np.array([-1, 1])
+        np.testing.assert_allclose([float(cell) for cell in row[1:5]], [x[k], deviation[k], *ends], rtol=1e-4)
+        order = np.argsort(-shares[k])
+        total = shares[k] / covariance[k, k]
+        named = dict(zip(row[5::2], row[6::2], strict=True))
+        expected = {("C11", "C22", "G12")[j]: f"{total[j]:.0%}" for j in order if total[j] >= 0.01}
+        assert {name: share.rstrip(",") for name, share in named.items()} == expected and [*named] == [*expected]
+    cross = covariance[0, 1] / deviation.prod()
+    found = np.array([[float(cell) for cell in row[1:]] for row in correlation[1:]])
+    np.testing.assert_allclose(found, [[1.0, cross], [cross, 1.0]], atol=6e-4)
+    rows = [[float(cell) for cell in row[1:]] for row in measured[1:]]
+    assert rows == [[*own] for own in zip(y, std, computed, [2.0, -0.5, 0.5], strict=True)]
+    assert measured[0][1:] == ["value", "std", "computed", "in", "std"] and last[:4] == ["Sum", "of", "squares", "4.5,"]
