@@ -55,6 +55,7 @@ def test_every_printed_number_is_that_of_the_normal_equations():
     deviation, shares = np.sqrt(covariance.diagonal()), (covariance @ J.T / std) ** 2
     blocks = [[line.split() for line in part.splitlines()] for part in text.split("\n\n")]
     unknowns, correlation, measured, (last,) = blocks[1:5]
+    assert [row[0] for row in unknowns[1:]] == [row[0] for row in correlation[1:]] == [*asked.unknowns]
     for k, row in enumerate(unknowns[1:]):
         ends = x[k] + 1.959964 * deviation[k] * np.array([-1, 1])
         np.testing.assert_allclose([float(cell) for cell in row[1:5]], [x[k], deviation[k], *ends], rtol=1e-4)
