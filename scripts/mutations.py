@@ -21,7 +21,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 TABLE = ROOT / "tests" / "mutations.toml"
 PYTEST = ("pytest", "-q", "--color=no", "--tb=no", "-rfE", "-p", "no:cacheprovider")
-NOTICED = re.compile(r"^(?:FAILED|ERROR) (\S+)", re.MULTILINE)
+NOTICED = re.compile(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", re.MULTILINE)
 # Ranks that wait for each other have noticed the error, too: after this many times as long as the tests take without.
 TIMES, LEAST_S, LIMIT_S = 4.0, 90.0, 1200.0
 PASSED, FAILED, LATE = 0, 1, (124, 137, -9)

@@ -42,13 +42,13 @@ def test_damaged_bonds_slip_by_their_tangential_rows_alone(components, known):
 
 
 def test_forces_that_no_face_may_bear_are_errors():
-    """Sticking within its limit and beyond it, sliding off its limit; along the fibres loose and open."""
+    """Sticking within its limit, beyond it and pulled, sliding off it; along the fibres loose and open."""
     force = np.array(
-        [[-1, 0.2, 0], [-1, 0.5, 0], [-2, -0.7, 0], [-1, 0, 0.4], [-1, 0, -0.4], [0, 0, 0.1], [-1, 0.3, 0]]
+        [[-1, 0.2, 0], [-1, 0.5, 0], [-2, -0.7, 0], [-1, 0, 0.4], [-1, 0, -0.4], [0, 0, 0.1], [-1, 0.3, 0], [1, 0.2, 0]]
     )
-    sliding = np.array([0, 0, -1, 0, 0, 0, 1], np.int8)
-    found = coulomb_errors(force, np.full(7, 0.3), sliding)
-    np.testing.assert_allclose(found, [0.0, 0.2, 0.1, 0.4, 0.4, 0.1, 0.0], atol=1e-15)
+    sliding = np.array([0, 0, -1, 0, 0, 0, 1, 0], np.int8)
+    found = coulomb_errors(force, np.full(8, 0.3), sliding)
+    np.testing.assert_allclose(found, [0.0, 0.2, 0.1, 0.4, 0.4, 0.1, 0.0, 0.2], atol=1e-15)
     np.testing.assert_allclose(coulomb_errors(force[:3, :2], np.full(3, 0.3), sliding[:3]), found[:3])
 
 
