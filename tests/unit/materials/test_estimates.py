@@ -118,6 +118,16 @@ def test_moduli_of_halpin_and_tsai_that_are_not_fitted_are_mori_and_tanakas(matr
     assert of(found, names) == pytest.approx(of(expected, names), rel=1e-12)
 
 
+def test_the_transverse_expansion_of_chamis_is_that_of_his_report():
+    """alpha_T = sqrt(c) alpha_Tf + (1 - sqrt(c)) (1 + c nu_m E_f / E_A) alpha_m, at c = 0.49 of an isotropic matrix."""
+    matrix, fibre = EPOXY, CARBON
+    E = 0.49 * fibre.E_axial + 0.51 * matrix.E_axial
+    expected = 0.7 * fibre.expansion_transverse
+    expected += 0.3 * (1 + 0.49 * matrix.nu_axial * fibre.E_axial / E) * matrix.expansion_axial
+    found = METHODS["chamis"](matrix, [Fibres(0.49, fibre)])
+    assert found.expansion_transverse == pytest.approx(expected, rel=1e-12)
+
+
 @every_pair
 @pytest.mark.parametrize("c", [0.05, 0.3, 0.6, 0.9])
 def test_self_consistent_shear_lies_between_the_bounds(matrix, fibre, c):
