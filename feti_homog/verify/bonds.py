@@ -22,25 +22,20 @@ NUMBERS = ("normal_stiffness", "tangential_stiffness", "axial_stiffness", "norma
 DEFAULTS = {"axial_stiffness": "tangential_stiffness", "axial_strength": "tangential_strength"}
 
 
-def _section_at(files: ResultFiles, nodes: AnyInt | Bool | slice) -> Mapping[str, Any]:
-    """Return the section [interface].
+def law_at(files: ResultFiles, nodes: AnyInt | Bool | slice = slice(None), damage: Float | None = None) -> BondLaw:
+    """Law of the bonds at some interface nodes; those of a state with the damage (k,) of all nodes.
 
-    Of several, or of fibres of different strengths, it has the numbers (p,) of each of the `nodes` in place of one.
+    Its section has, of several or of fibres of different strengths, numbers (p,) of each node in place of one.
     """
     sections, strength = files.interfaces, files.fibres.strength
-    if not sections or (len(sections) == 1 and (strength == 1).all()):
-        return sections[0] if sections else {}
-    pair, factor = files.interface.pair[nodes], strength[files.interface.fibre[nodes] - 1]
-    numbers = {name: np.array([_number(section, name) for section in sections])[pair] for name in NUMBERS}
-    scaled = {name: numbers[name] * factor for name in NUMBERS if name.endswith("strength")}
-    scaled |= {name: numbers[name] * factor**2 for name in NUMBERS if name.endswith("toughness")}
-    return {**sections[0], **numbers, **scaled}
-
-
-def law_at(files: ResultFiles, nodes: AnyInt | Bool | slice = slice(None), damage: Float | None = None) -> BondLaw:
-    """Law of the bonds at some interface nodes; those of a state with the damage (k,) of all nodes."""
-    section = _section_at(files, nodes)
-    return law_of(section if damage is None else {**section, "damage": damage[nodes]})
+    section = {**sections[0]} if sections else {}
+    if sections and (len(sections) > 1 or (strength != 1).any()):
+        pair, factor = files.interface.pair[nodes], strength[files.interface.fibre[nodes] - 1]
+        numbers = {name: np.array([_number(own, name) for own in sections])[pair] for name in NUMBERS}
+        section |= numbers
+        section |= {name: numbers[name] * factor for name in NUMBERS if name.endswith("strength")}
+        section |= {name: numbers[name] * factor**2 for name in NUMBERS if name.endswith("toughness")}
+    return law_of(section if damage is None else section | {"damage": damage[nodes]})
 
 
 def friction_at(files: ResultFiles) -> Float:

@@ -12,12 +12,9 @@ from feti_homog.typing import AnyInt, Float, Int
 
 @dataclass(frozen=True)
 class Mesh:
-    """n nodes and m elements; each subdomain has nodes of its own.
+    """Nodes (n, 2) and elements (m, 3 or 6): vertices, then the nodes on the sides 01, 12, 20; phase 0 is the matrix.
 
-    Attributes:
-        points: (n, 2).
-        triangles: (m, 3 or 6) vertices, then the nodes on the sides 01, 12, 20.
-        subdomain, phase, body: (m,) of the elements; phase 0 is the matrix.
+    Each subdomain has nodes of its own.
     """
 
     points: Float
@@ -29,15 +26,9 @@ class Mesh:
 
 @dataclass(frozen=True)
 class InterfaceRows:
-    """The k interface nodes.
+    """The k interface nodes: points, and normals from fibre to matrix, (k, 2); tributary lengths (k,).
 
-    Attributes:
-        points: (k, 2).
-        normal: (k, 2) from fibre to matrix.
-        length: (k,) tributary length.
-        fibre: (k,) number of the fibre, from 1.
-        body: (k,) of the fibre, or of its coating.
-        pair: (k,) place of its section among those of the interfaces.
+    Numbers of the fibre from 1, bodies of the fibre or of its coating, places of sections of interfaces (k,).
     """
 
     points: Float
@@ -69,20 +60,11 @@ class State:
     """A state: what /state/K holds, and `name`, under which a violation is reported.
 
     Strains and stresses have v = 3 components [11, 22, 12], displacements c = 2; of generalized plane strain 6, in the
-    order [11, 22, 33, 23, 13, 12], and 3.
-
-    Attributes:
-        strain, mean_stress: (v,) macroscopic.
-        point: number of its point in `path` or `angle` of result.json.
-        displacement, fluctuation: (n, c); the latter is the displacement less that of the strain.
-        stress: (m, v) means over the elements.
-        traction, jump: (k, c) normal, tangential and along the fibres.
-        status: (k,) 0 bonded, 1 closed, 2 open.
-        damage: (k,) 0 intact to 1 broken, also of bonds that break at once.
-        sliding: (k,) sign of the growing slip of closed nodes that slide.
-        mesh_error: (m,) shares of the estimated error, of the energy of the cell; NaN of none.
-        derived: the tables of `DERIVED` or `SPATIAL_DERIVED`, which follow from those above.
-        temperature: its change.
+    order [11, 22, 33, 23, 13, 12], and 3.  Macroscopic strain and stress (v,); `point` is the number in `path` or
+    `angle` of result.json; displacements (n, c), and less those of the strain; means of stresses (m, v); traction and
+    jump (k, c) normal, tangential and along the fibres; status (k,) 0 bonded, 1 closed, 2 open; damage (k,) 0 intact to
+    1 broken; sliding (k,) the sign of the growing slip of closed nodes that slide; mesh_error (m,) shares of the
+    energy's estimated error, NaN of none; `derived` the tables that follow from these; a change of temperature.
     """
 
     name: str

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import signal
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -13,22 +13,18 @@ from typing import Any, TypeVar
 import numpy as np
 
 from feti_homog.errors import CaseError
-from feti_homog.verify.bonds import COATING
-from feti_homog.verify.check_fields import (
-    check_derived,
-    check_fields,
-    check_interface_state,
-    check_step_heat,
-)
-from feti_homog.verify.check_loads import StateNumbers, check_load
+from feti_homog.verify.check_fields import check_fields, check_step_heat
+from feti_homog.verify.check_loads import StateNumbers, States, check_load
 from feti_homog.verify.check_mesh import check_arcs, check_interface, check_mesh
-from feti_homog.verify.check_mesh_error import check_mesh_error
+from feti_homog.verify.check_mesh_error import check_errors, check_mesh_error
 from feti_homog.verify.check_path import check_envelope, check_path
 from feti_homog.verify.check_points import check_points
+from feti_homog.verify.check_record import check_record, checks_of
 from feti_homog.verify.check_sensitivities import check_sensitivities
 from feti_homog.verify.check_summary import check_spatial, check_summary, check_tables
 from feti_homog.verify.discrete_cell import DiscreteCell
-from feti_homog.verify.findings import Finding, Findings, checks
+from feti_homog.verify.findings import Finding, Findings
+from feti_homog.verify.leaves import unchecked
 from feti_homog.verify.reading import ResultFiles, altered, opened
 
 # What reading numbers of another kind or shape than expected raises.
@@ -39,11 +35,7 @@ PATIENCE = 300.0  # seconds
 
 
 def in_own_process(directory: Path, function: Callable[[Path], T], patience: float = PATIENCE) -> T:
-    """function(directory).
-
-    Raises:
-        CaseError: of the function, or its process crashed or took longer than `patience`.
-    """
+    """function(directory). Raises CaseError: of the function, or its process crashed or took longer than `patience`."""
     context = multiprocessing.get_context("fork")
     ours, theirs = context.Pipe(duplex=False)
     process = context.Process(target=_send, args=(theirs, function, directory), daemon=True)
@@ -81,17 +73,15 @@ def _send(end: Connection, function: Callable[[Path], T], directory: Path) -> No
 
 @dataclass(frozen=True)
 class Certificate:
-    """Findings in a folder.
+    """Findings of every law that applies to a folder; case, mesh and states in words; the run's status and faults.
 
-    Attributes:
-        findings: of every law that applies.
-        title: case, mesh and states in words.
-        status: that of the run, with its faults if it has any.
+    `unchecked` are names of numbers of result.json that no law reads, by the reason for it.
     """
 
     findings: tuple[Finding, ...]
     title: str
     status: str
+    unchecked: Mapping[str, Sequence[str]]
 
     @property
     def holds(self) -> bool:
@@ -103,21 +93,20 @@ class Certificate:
         """A line for each law."""
         broken = sum(not finding.holds for finding in self.findings)
         verdict = f"{broken} of {len(self.findings)} laws are broken" if broken else "every law holds"
-        return "\n".join([self.title, self.status, *(finding.line() for finding in self.findings), verdict])
+        left = [f"  {', '.join(names)}: {reason}" for reason, names in self.unchecked.items()]
+        lines = [finding.line() for finding in self.findings]
+        return "\n".join([self.title, self.status, *lines, verdict, *(["not checked:"] if left else []), *left])
 
     @property
     def document(self) -> dict[str, Any]:
         """Certificate for programs."""
         laws = [dict(finding.document) for finding in self.findings]
-        return {"title": self.title, "status": self.status, "holds": self.holds, "laws": laws}
+        about = {"title": self.title, "status": self.status, "holds": self.holds}
+        return about | {"laws": laws, "not_checked": self.unchecked}
 
 
 def verify(directory: Path) -> Certificate:
-    """Check the laws on all states of the result in a folder.
-
-    Raises:
-        CaseError: it has no result, or one whose files cannot be read; one line.
-    """
+    """Check the laws on all states of the result in a folder; CaseError, one line, if it has none to be read."""
     return in_own_process(directory, _of) if altered(directory) else _of(directory)
 
 
@@ -132,48 +121,54 @@ def _of(directory: Path) -> Certificate:
 
 
 def _verified(files: ResultFiles, directory: Path) -> Certificate:
-    rtol, users_mesh = float(files.document["solver"]["rtol"]), files.case["cell"]["geometry"] == "mesh"
     cell = DiscreteCell.of(files)
-    mixed = cell.elements.lame_ratio, cell.elements.shear_contrast
-    findings = Findings(checks(rtol, users_mesh, COATING in files.case["material"], mixed))
+    findings = Findings(checks_of(cell))
     findings.record("files", len(files.altered), ", ".join(files.altered))
+    for name in ("schema", "checksum", "result_h5"):
+        files.document.covers(name)  # or they could not be read, or are altered
+    states, faults = laws_of_fields(findings, cell), files.document.hint("faults", [])
+    laws_of_numbers(findings, cell, states)
+    check_tables(findings, directory, files.document)
+    kind, n, m = files.case["analysis"]["type"], len(files.mesh.points), len(files.mesh.triangles)
+    title = f"{files.case['name']}: {kind}, {m} elements, {n} nodes, {len(states)} states"
+    status = ": ".join(["the run reports", files.document.hint("status"), *(["; ".join(faults)] if faults else [])])
+    return Certificate(findings.worst(), title, status, unchecked(files.document))
+
+
+def laws_of_fields(findings: Findings, cell: DiscreteCell) -> list[StateNumbers]:
+    """Check the mesh and all states; returns their numbers."""
+    files = cell.files
     check_mesh(findings, cell)
     check_interface(findings, cell)
-    states, before = [], None
+    states, before = list[StateNumbers](), None
     for state in files.states():
         arrays = (state.displacement, state.fluctuation, state.stress, state.traction, state.jump, state.strain)
         findings.record("numbers", [np.count_nonzero(~np.isfinite(array)) for array in arrays], state.name)
         terms = np.abs(state.displacement) + np.abs(state.fluctuation)
         fields = cell.elements.fields(state.displacement, terms, state.along, cell.free_strains(state))
         check_fields(findings, cell, state, fields)
-        check_derived(findings, cell, state)
         check_mesh_error(findings, cell, state)
-        check_interface_state(findings, cell, state)
         if before is not None and "path" in files.document:
             check_step_heat(findings, cell, before, state)
         before = state
         states.append(StateNumbers.of(cell, state, fields))
+    return states
+
+
+def laws_of_numbers(findings: Findings, cell: DiscreteCell, states: States) -> None:
+    """Check the numbers of result.json against those of the states."""
+    document = cell.files.document
     check_load(findings, cell, states)
     check_arcs(findings, cell, states)
     check_points(findings, cell, states)
-    if "path" in files.document:
+    if "path" in document:
         check_path(findings, cell, states)
-    if "envelope" in files.document:
+    if "envelope" in document:
         check_envelope(findings, cell, states)
     check_summary(findings, cell)
-    check_tables(findings, directory, files.document)
-    if files.is_spatial:
+    if cell.files.is_spatial:
         check_spatial(findings, cell, states)
     check_sensitivities(findings, cell)
-    return Certificate(findings.worst(), _title(files, states), _status(files))
-
-
-def _title(files: ResultFiles, states: Sequence[StateNumbers]) -> str:
-    kind, n, m = files.case["analysis"]["type"], len(files.mesh.points), len(files.mesh.triangles)
-    return f"{files.case['name']}: {kind}, {m} elements, {n} nodes, {len(states)} states"
-
-
-def _status(files: ResultFiles) -> str:
-    faults = files.document["faults"]
-    words = f"the run reports: {files.document['status']}"
-    return f"{words}: {'; '.join(faults)}" if faults else words
+    if "mesh_error" in document:
+        check_errors(findings, document)
+    check_record(findings, cell)

@@ -18,35 +18,32 @@ BONDED, CLOSED, OPEN = 0, 1, 2
 LEAST_HEAT = 1e-4
 
 
-def check_interface_state(findings: Findings, cell: DiscreteCell, state: State) -> None:
-    """Check that jumps are those of the displacements, bonds hold, and debonded faces obey the contact conditions."""
+def _check_interface_state(findings: Findings, cell: DiscreteCell, state: State) -> None:
+    """Check that jumps are those of the displacements, bonds hold, and debonded faces obey the contact conditions.
+
+    The shear on the damaged share of bonds is within mu p, and s mu p where it slides.
+    """
     at = f"{state.name}, interface node {{}}".format
-    values = state.fluctuation[cell.nodes.node]
+    values, bonded = state.fluctuation[cell.nodes.node], state.status == BONDED
     parted = cell.faces.means(values, of_fibre=False) - cell.faces.means(values, of_fibre=True)
     largest = largest_displacement(cell, state)
     findings.record("jump", relative(np.abs(in_axes(cell, state.jump) - parted).max(axis=1, initial=0.0), largest), at)
-    most = np.where(state.status == BONDED, np.nextafter(1.0, 0.0), 1.0)
-    off = np.abs(state.damage.clip(np.where(state.status == BONDED, 0.0, 1.0), most) - state.damage)
+    most = np.where(bonded, np.nextafter(1.0, 0.0), 1.0)
+    off = np.abs(state.damage.clip(np.where(bonded, 0.0, 1.0), most) - state.damage)
     findings.record("bond", off, f"{state.name}, damage of node {{}}".format)
     slack = state.jump - law_at(cell.files, damage=state.damage).jumps(state.traction)
-    rubs = (friction_of_damage_at(cell.files) > 0.0) & (state.status == BONDED) & (state.damage > 0.0)
+    rubs = (friction_of_damage_at(cell.files) > 0.0) & bonded & (state.damage > 0.0)
     slack[rubs, 1] = 0.0
-    findings.record("bond", relative(np.where(state.status != OPEN, np.abs(slack[:, 0]), 0.0), largest), at)
-    findings.record(
-        "bond", relative(np.where(state.status == BONDED, np.abs(slack[:, 1:]).max(axis=1), 0.0), largest), at
-    )
-    if (state.status != BONDED).any():
+    slack = np.abs(np.where(bonded[:, None], slack, np.where(np.arange(slack.shape[1]) == 0, slack, 0.0)))
+    findings.record("bond", relative(np.where(state.status != OPEN, slack.max(axis=1, initial=0.0), 0.0), largest), at)
+    if not bonded.all():
         _check_contact(findings, cell, state, rubs)
     if rubs.any():
-        _check_rubbing_bonds(findings, cell, state, rubs)
-
-
-def _check_rubbing_bonds(findings: Findings, cell: DiscreteCell, state: State, rubs: Bool) -> None:
-    """Check that the shear on the damaged share of bonds is within mu p, and s mu p where it slides."""
-    force, pull = rubbing_force(cell.files, state), max(float(np.abs(state.traction).max()), cell.least_stress(state))
-    limit = friction_of_damage_at(cell.files) * np.maximum(-state.traction[:, 0], 0.0)
-    off = np.where(state.sliding != 0, np.abs(state.sliding * force - limit), np.maximum(np.abs(force) - limit, 0.0))
-    findings.record("sliding", relative(np.where(rubs, off, 0.0), pull), f"{state.name}, bond {{}}".format)
+        force, pull = rubbing_force(cell.files, state), float(np.abs(state.traction).max())
+        limit = friction_of_damage_at(cell.files) * np.maximum(-state.traction[:, 0], 0.0)
+        sticks, pull = np.maximum(np.abs(force) - limit, 0.0), max(pull, cell.least_stress(state))
+        off = np.where(state.sliding != 0, np.abs(state.sliding * force - limit), sticks)
+        findings.record("sliding", relative(np.where(rubs, off, 0.0), pull), at)
 
 
 def _check_contact(findings: Findings, cell: DiscreteCell, state: State, rubs: Bool) -> None:
@@ -95,7 +92,7 @@ def check_step_heat(findings: Findings, cell: DiscreteCell, before: State, state
 
 
 def check_fields(findings: Findings, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
-    """Everything that the fields of a state obey by themselves; `fields` are what its displacements make."""
+    """Check what the fields of a state obey by themselves; `fields` are what its displacements make."""
     element = f"{state.name}, element {{}}".format
     stiffest = np.abs(cell.stiffnesses).max(axis=(1, 2))[cell.files.mesh.phase]
     off = np.abs(state.stress - fields.stress).max(axis=1)
@@ -103,6 +100,8 @@ def check_fields(findings: Findings, cell: DiscreteCell, state: State, fields: E
     _check_copies(findings, cell, state)
     _check_equilibrium(findings, cell, state, fields)
     _check_averages(findings, cell, state, fields)
+    _check_derived(findings, cell, state)
+    _check_interface_state(findings, cell, state)
 
 
 def interface_forces(cell: DiscreteCell, state: State) -> Float:
@@ -123,29 +122,22 @@ def largest_displacement(cell: DiscreteCell, state: State) -> float:
 
 
 def _check_copies(findings: Findings, cell: DiscreteCell, state: State) -> None:
-    """Check that copies of a node have one fluctuation.
-
-    In a subdomain they do by periodicity, elsewhere but across a bond by gluing.
-    """
+    """Check that copies of a node have one fluctuation: in a subdomain by periodicity, elsewhere by gluing."""
     nodes, scale = cell.nodes, largest_displacement(cell, state)
     values = state.fluctuation[nodes.node]
     sides = _sides(cell)
     for law, group in (("periodicity", nodes.place * (int(nodes.subdomain.max()) + 1) + nodes.subdomain),
                        ("continuity", sides)):  # fmt: skip
-        off = np.abs(values - _group_means(group, values)).max(axis=1)
+        _, inverse, count = np.unique(group, return_inverse=True, return_counts=True)
+        own = inverse.ravel()
+        means = np.stack([(np.bincount(own, column) / count)[own] for column in values.T], axis=1)
+        off = np.abs(values - means).max(axis=1)
         findings.record(law, relative(off, scale), lambda i: f"{state.name}, mesh node {nodes.node[i]}")
 
 
 def _sides(cell: DiscreteCell) -> Int:
     """(b,) a number for each place and, at interface nodes, for each face: torn nodes of one number are glued."""
     return np.asarray(2 * cell.nodes.place + ((cell.faces.row >= 0) & cell.faces.is_fibre))
-
-
-def _group_means(group: Int, values: Float) -> Float:
-    """(b, c) mean of each value's group."""
-    _, inverse, count = np.unique(group, return_inverse=True, return_counts=True)
-    inverse = inverse.ravel()
-    return np.stack([(np.bincount(inverse, column) / count)[inverse] for column in values.T], axis=1)
 
 
 def _check_equilibrium(findings: Findings, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
@@ -174,10 +166,9 @@ def _check_equilibrium(findings: Findings, cell: DiscreteCell, state: State, fie
     external = np.where(at < 0, 0.0, np.where(side % 2 == 1, 1.0, -1.0))
     sums[at >= 0] -= external[at >= 0, None] * traction[at[at >= 0]]
     first = np.unique(inverse.ravel(), return_index=True)[1]
-    where = f"{state.name}, mesh node {{}}{{}}"
 
     def name(i: int) -> str:
-        return where.format(nodes.node[first[i]], f" (interface node {at[i]})" if at[i] >= 0 else "")
+        return f"{state.name}, mesh node {nodes.node[first[i]]}" + f" (interface node {at[i]})" * bool(at[i] >= 0)
 
     is_held = np.bincount(inverse.ravel(), held[nodes.node], len(side)) > 0
     scales = scale + ROUNDED_TERMS * np.where(is_held, of_all, most)
@@ -196,7 +187,10 @@ def _check_averages(findings: Findings, cell: DiscreteCell, state: State, fields
     integral = cell.faces.sums(cell.node_integrals[cell.nodes.node], of_fibre=False)
     opening = np.einsum("ki,kj->ij", jump, integral)
     opened = np.bincount(PLACES[len(mean)].ravel(), opening.ravel(), len(mean)) / area
-    off = (weights * fields.strain).sum(axis=0) / area + _void_strain(cell, state) - state.strain - opened
+    # Of voids their share of E, and int sym(u* (x) n) ds along them, which closes where the cell's boundary cuts one.
+    slope = np.einsum("ni,nd->id", state.fluctuation, cell.void_integrals)
+    of_voids = np.bincount(PLACES[len(mean)].ravel(), slope.ravel(), len(mean)) / area + cell.porosity * state.strain
+    off = (weights * fields.strain).sum(axis=0) / area + of_voids - state.strain - opened
     scale = cell.strain_size(state)
     findings.record("mean strain", relative(off, scale), state.name)
     work = area * float(state.mean_stress @ state.strain) - float((interface_forces(cell, state) * jump).sum())
@@ -204,31 +198,15 @@ def _check_averages(findings: Findings, cell: DiscreteCell, state: State, fields
     findings.record("Hill", relative(np.array(fields.energy - work), scale), state.name)
 
 
-def _void_strain(cell: DiscreteCell, state: State) -> Float:
-    """(v,) mean over the cell of the strain of voids.
-
-    It is their share of E, and int sym(u* (x) n) ds along them, which is periodic and so closes around voids that the
-    cell's boundary cuts.
-    """
-    v = len(state.strain)
-    slope = np.einsum("ni,nd->id", state.fluctuation, cell.void_integrals)
-    strain = np.bincount(PLACES[v].ravel(), slope.ravel(), v) / cell.area
-    return np.asarray(strain + cell.porosity * state.strain)
-
-
-def check_derived(findings: Findings, cell: DiscreteCell, state: State) -> None:
+def _check_derived(findings: Findings, cell: DiscreteCell, state: State) -> None:
     """Check stresses out of the plane, vectors, and the faces' displacements."""
     if not cell.files.is_spatial:
         rules = out_of_plane(cell.files.case, cell.files.phases)[cell.files.mesh.phase, 0]
         S33, terms = (np.einsum("ei,ei->e", *pair) for pair in ((rules, state.stress), np.abs((rules, state.stress))))
-        shown = state.derived["stress_33"]
-        same = np.isnan(S33) & np.isnan(shown)  # where the constants do not determine them
-        off = np.where(same, 0.0, relative(np.where(same, 0.0, shown - S33), np.where(same, 1.0, terms)))
+        same = np.isnan(S33) & np.isnan(state.derived["stress_33"])  # where the constants do not determine them
+        off = np.where(same, 0.0, state.derived["stress_33"] - S33)
+        off = np.where(same, 0.0, relative(off, np.where(same, 1.0, terms)))
         findings.record("stress 33", off, f"{state.name}, element {{}}".format)
-    _check_interface(findings, cell, state)
-
-
-def _check_interface(findings: Findings, cell: DiscreteCell, state: State) -> None:
     node = f"{state.name}, interface node {{}}".format
     shown, opening = state.derived, in_axes(cell, state.jump)
     fibre = state.displacement[cell.files.faces[:, 0]]

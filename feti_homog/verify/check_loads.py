@@ -26,20 +26,11 @@ SPATIAL_ORDER = [0, 1, 5, 2, 4, 3]  # of the unit strains of generalized plane s
 
 @dataclass(frozen=True)
 class StateNumbers:
-    """Numbers of a state that the laws of paths and tables need.
+    """Numbers of a state that the laws of paths and tables need; others as in `State`.
 
-    Attributes:
-        strain, stress: (v,) macroscopic.
-        point: number of its point in `path` or `angle` of result.json.
-        stored: energy per area of the cell, <sigma : (eps - alpha T)> / 2 and that of the springs, from the fields.
-        in_springs: that of the springs in it.
-        traction: (k, c) normal, tangential and along the fibres.
-        released: (k,) which bonds are tips of which the energy counts that their break would release.
-        used: (k,) share of the strength that the bonded nodes use, 0 elsewhere; NaN at these tips, for that energy is
-            not in the files.
-        temperature: its change.
-        heat: what works on it, - <alpha : sigma>; 0 if the expansions alpha of the phases are not known.
-        expanding: mean of alpha : L : strain, likewise.
+    Energies per area `stored`, <sigma : (eps - alpha T)> / 2 and `in_springs`, from the fields; `released` (k,) tips
+    whose break counts by what it would release; `used` (k,) shares of the strength of bonded nodes, NaN at these tips;
+    `heat`, what works on the temperature, - <alpha : sigma>, and `expanding`, <alpha : L : strain>, 0 if not known.
     """
 
     name: str
@@ -66,31 +57,21 @@ class StateNumbers:
         held = held_traction(cell.files, state)
         used = np.where(state.status == BONDED, law.utilisation(held), 0.0)
         used[released] = np.nan
-        in_springs = energy_of_springs(cell.files, state) / cell.area
-        heat = _heat(cell, state)
+        in_springs, heat, expanding = energy_of_springs(cell.files, state) / cell.area, 0.0, 0.0
+        if cell.expansions is not None:
+            weights, phase = cell.elements.area / cell.area, cell.files.mesh.phase
+            heat = -float(weights @ (cell.expansions[phase] * state.stress).sum(axis=1))
+            thermal = np.einsum("pij,pj->pi", cell.stiffnesses, cell.expansions)[phase]
+            expanding = float(weights @ (thermal * fields.strain).sum(axis=1))
         energies = fields.energy / (2 * cell.area) + state.temperature * heat / 2 + in_springs, in_springs
         means = state.strain, state.mean_stress
         return cls(
             state.name, state.load_factor, state.point, *means, *energies, held, state.status,
-            state.damage, released,
-            used, state.temperature, heat, _expanding(cell, fields),
+            state.damage, released, used, state.temperature, heat, expanding,
         )  # fmt: skip
 
 
-def _heat(cell: DiscreteCell, state: State) -> float:
-    """- <alpha : sigma>, the derivative of the energy by the temperature."""
-    if cell.expansions is None:
-        return 0.0
-    own = (cell.expansions[cell.files.mesh.phase] * state.stress).sum(axis=1)
-    return -float(cell.elements.area @ own) / cell.area
-
-
-def _expanding(cell: DiscreteCell, fields: ElementFields) -> float:
-    """Mean of alpha : L : strain over the cell."""
-    if cell.expansions is None:
-        return 0.0
-    thermal = np.einsum("pij,pj->pi", cell.stiffnesses, cell.expansions)[cell.files.mesh.phase]
-    return float(cell.elements.area @ (thermal * fields.strain).sum(axis=1)) / cell.area
+States = Sequence[StateNumbers]
 
 
 def tips(cell: DiscreteCell, status: AnyInt) -> Bool:
@@ -102,108 +83,81 @@ def tips(cell: DiscreteCell, status: AnyInt) -> Bool:
     return np.asarray(tips & ~broken)
 
 
-def check_load(findings: Findings, cell: DiscreteCell, states: Sequence[StateNumbers]) -> None:
-    """Check loads against the case, and points or columns of result.json against the states."""
+def check_load(findings: Findings, cell: DiscreteCell, states: States) -> None:
+    """Check loads against the case, and points or columns of result.json against the states.
+
+    States of a path are those of the points that result.json lists, in order, the first and the last among them, and as
+    many as the case asks for; of other analyses all.
+    """
     document, case = cell.files.document, cell.files.case
     same = json.loads(str(cell.files.file.attrs["case"])) == case
-    findings.record("tables", 0.0 if same else np.inf, "the case, which differs between the two files")
-    rows = list(_rows(document, case, _unit_loads(cell)))
-    scales = _Scales.of(cell, states, [load for load, _ in rows])
+    findings.require("tables", same, "the case, which differs between the two files")
+    # The unit strains, and the unit of temperature, in the order of their states.
+    order = np.eye(6)[SPATIAL_ORDER] if cell.files.is_spatial else np.eye(3)
+    unit = [Prescribed.strain(strain, 0.0) for strain in order]
+    unit[4:4] = [] if cell.expansions is None else [Prescribed.strain(np.zeros(6), 1.0)]
+    rows, numbers = list(_rows(document, case, unit)), [state.point for state in states]
+    scales = _scales(cell, states, [load for load, _ in rows])
     if "path" in document:
-        _check_kept(findings, document, case, [state.point for state in states])
+        _check_kept(findings, case["output"]["states"], numbers, list(document["states"]), len(rows))
         for number, (load, entries) in enumerate(rows):
-            strain, stress = np.array(entries["strain"]), np.array(entries["stress"])
-            warmer = float(entries.get(TEMPERATURE, 0.0))
-            _check_prescribed(findings, load, strain, stress, warmer, scales, f"path[{number}]")
+            _check_prescribed(findings, load, entries, scales, f"path[{number}]")
         pairs = [(state, rows[state.point]) for state in states if 0 <= state.point < len(rows)]
     else:
-        _check_all(findings, document, states, len(rows))
-        pairs = list(zip(states, rows, strict=False))
-    for state, (load, entries) in pairs:
-        _check_prescribed(findings, load, state.strain, state.stress, state.temperature, scales, state.name)
-        _check_entries(findings, state, entries, scales)
-    for place, matrix in _linear_stiffnesses(document, cell.files.contact):
+        pairs, each = list(zip(states, rows, strict=False)), len(rows) // len(document.get("angle", [None]))
+        off = [abs(number - k // each) for k, number in enumerate(numbers)]
+        findings.record("tables", off, lambda k: f"{states[k].name}, point")
+        findings.record("load", abs(len(rows) - len(states)), f"{len(states)} states, {len(rows)} asked for")
+    for state, row in pairs:
+        _check_entries(findings, state, *row, scales)
+    for place, matrix in linear_stiffnesses(document, cell.files.contact):
         findings.record("symmetry", relative(matrix - matrix.T, float(np.abs(matrix).max())), place)
 
 
-@dataclass(frozen=True)
-class _Scales:
+def _scales(cell: DiscreteCell, states: States, loads: Sequence[Prescribed]) -> tuple[float, float, float]:
     """Sizes of the strains and stresses of all states, and of stresses that the loads make in the bonded cell."""
-
-    strain: float
-    stress: float
-    imposed: float
-
-    @classmethod
-    def of(cls, cell: DiscreteCell, states: Sequence[StateNumbers], loads: Sequence[Prescribed]) -> _Scales:
-        largest, imposed = max((float(np.abs(state.stress).max()) for state in states), default=0.0), 0.0
-        for state, load in product(states[:1], loads):
-            # Strains that came out are no scale of the stresses that are asked for.
-            given, n = np.where(load.by_stress, 0.0, load.values), len(state.strain)
-            asked = replace(state, strain=given[:n], temperature=float(given[n:].sum()))
-            imposed = max(imposed, float(np.abs(cell.reuss @ cell.loads(asked)).max()))
-        return cls(cell.largest_strain or 1.0, largest or 1.0, max(largest, imposed) or 1.0)
+    largest, imposed = max((float(np.abs(state.stress).max()) for state in states), default=0.0), 0.0
+    for state, load in product(states[:1], loads):
+        # Strains that came out are no scale of the stresses that are asked for.
+        given, n = np.where(load.by_stress, 0.0, load.values), len(state.strain)
+        asked = replace(state, strain=given[:n], temperature=float(given[n:].sum()))
+        imposed = max(imposed, float(np.abs(cell.reuss @ cell.loads(asked)).max()))
+    return cell.largest_strain or 1.0, largest or 1.0, max(largest, imposed) or 1.0
 
 
-def _check_prescribed(
-    findings: Findings, load: Prescribed, strain: Float, stress: Float, temperature: float, scales: _Scales, place: str
-) -> None:
-    """Strains, stresses and the temperature that a load prescribes."""
-    given, by_stress = load.values[: len(strain)], load.by_stress[: len(strain)]
-    findings.record("load", np.abs(strain - given)[~by_stress] / scales.strain, f"{place}, strain")
-    findings.record("stress load", np.abs(stress - given)[by_stress] / scales.imposed, f"{place}, stress")
-    warmer = float(load.values[-1]) if len(load.values) > len(given) else 0.0
-    findings.record("load", abs(temperature - warmer) / max(abs(warmer), 1.0), f"{place}, temperature")
-
-
-def _check_kept(
-    findings: Findings, document: Mapping[str, Any], case: Mapping[str, Any], numbers: Sequence[int]
-) -> None:
-    """Check that the states of a path are those of the points that result.json lists, in order.
-
-    They include the first and the last, and are as many as the case asks for.
-    """
-    count, asked = len(document["path"]), case["output"]["states"]
-    given = list(document["states"]) == list(numbers)
-    findings.record("tables", 0.0 if given else np.inf, "states, which differ between the two files")
-    rising = all(a < b for a, b in pairwise(numbers))
-    ends = len(numbers) > 0 and numbers[0] == 0 and numbers[-1] == count - 1
-    findings.record(
-        "load", 0.0 if rising and ends else np.inf, "states, which are not from the first point to the last"
-    )
-    wanted = count if asked == "all" else len(numbers) if asked == "peaks" else min(asked, count)
+def _check_kept(findings: Findings, asked: str | int, numbers: list[int], given: list[int], points: int) -> None:
+    """Check the numbers of the kept states of a path with so many points."""
+    findings.require("tables", given == numbers, "states, which differ between the two files")
+    ends, rises = numbers[:1] == [0] and numbers[-1:] == [points - 1], all(a < b for a, b in pairwise(numbers))
+    findings.require("load", ends and rises, "states, which are not from the first point to the last")
+    wanted = min(asked, points) if isinstance(asked, int) else points if asked == "all" else len(numbers)
     findings.record("load", abs(wanted - len(numbers)), f"{len(numbers)} states, {wanted} asked for")
 
 
-def _check_all(findings: Findings, document: Mapping[str, Any], states: Sequence[StateNumbers], count: int) -> None:
-    """Check that the states of other analyses are all that the case asks for, with their points."""
-    findings.record("load", abs(count - len(states)), f"{len(states)} states, {count} asked for")
-    each = count // len(document["angle"]) if "angle" in document else count
-    off = [abs(state.point - number // each) for number, state in enumerate(states)]
-    findings.record("tables", off, lambda i: f"{states[i].name}, point")
+def _check_entries(
+    findings: Findings, state: StateNumbers, load: Prescribed, entries: Mapping[str, Any], scales: tuple[float, ...]
+) -> None:
+    """Check the numbers of a state against its load and in result.json."""
+    own: dict[str, Any] = {"strain": state.strain, "stress": state.stress, TEMPERATURE: state.temperature}
+    _check_prescribed(findings, load, own, scales, state.name)
+    own |= {name: np.count_nonzero(state.status == status) for name, status in COUNTS.items()}
+    own |= {"load_factor": state.load_factor}
+    sizes = {"strain": scales[0], "stress": scales[1], TEMPERATURE: max(abs(state.temperature), 1.0)}
+    for name in own.keys() & entries.keys():
+        off = relative(np.array(entries[name]) - own[name], sizes.get(name, 1.0))
+        findings.record("tables", off, f"{state.name}, {name}")
 
 
-def _check_entries(findings: Findings, state: StateNumbers, entries: Mapping[str, Any], scales: _Scales) -> None:
-    """Check the numbers of a state in result.json."""
-    given = {"strain": (state.strain, scales.strain), "stress": (state.stress, scales.stress)}
-    given |= {TEMPERATURE: (np.array(state.temperature), max(abs(state.temperature), 1.0))}
-    for name in given.keys() & entries.keys():
-        value, scale = given[name]
-        findings.record("tables", relative(np.array(entries[name]) - value, scale), f"{state.name}, {name}")
-    if "load_factor" in entries:
-        findings.record("tables", abs(entries["load_factor"] - state.load_factor), f"{state.name}, load_factor")
-    for name in COUNTS.keys() & entries.keys():
-        counted = np.count_nonzero(state.status == COUNTS[name])
-        findings.record("tables", abs(entries[name] - counted), f"{state.name}, {name}")
-
-
-def _unit_loads(cell: DiscreteCell) -> list[Prescribed]:
-    """Return the unit strains, and the unit of temperature, in the order of their states."""
-    if not cell.files.is_spatial:
-        return [Prescribed.strain(strain, 0.0) for strain in np.eye(3)]
-    unit = [Prescribed.strain(strain, 0.0) for strain in np.eye(6)[SPATIAL_ORDER]]
-    thermal = [] if cell.expansions is None else [Prescribed.strain(np.zeros(6), 1.0)]
-    return [*unit[:4], *thermal, *unit[4:]]
+def _check_prescribed(
+    findings: Findings, load: Prescribed, own: Mapping[str, Any], scales: tuple[float, ...], place: str
+) -> None:
+    """Strains, stresses and the temperature that a load prescribes."""
+    strain, stress, temperature = np.array(own["strain"]), np.array(own["stress"]), float(own.get(TEMPERATURE, 0.0))
+    given, by_stress = load.values[: len(strain)], load.by_stress[: len(strain)]
+    findings.record("load", np.abs(strain - given)[~by_stress] / scales[0], f"{place}, strain")
+    findings.record("stress load", np.abs(stress - given)[by_stress] / scales[2], f"{place}, stress")
+    warmer = float(load.values[-1]) if len(load.values) > len(given) else 0.0
+    findings.record("load", abs(temperature - warmer) / max(abs(warmer), 1.0), f"{place}, temperature")
 
 
 def _rows(
@@ -240,7 +194,7 @@ def _columns(
         yield replace(load, values=sign * load.values), {"stress": sign * stress}
 
 
-def _linear_stiffnesses(document: Mapping[str, Any], contact: bool) -> Iterator[tuple[str, Float]]:
+def linear_stiffnesses(document: Mapping[str, Any], contact: bool) -> Iterator[tuple[str, Float]]:
     """Yield the stiffnesses in result.json of cells without one-sided contact, and what they are called."""
     if "effective_stiffness" in document and "effective_stiffness_compression" not in document:
         yield "effective_stiffness", np.array(document["effective_stiffness"])

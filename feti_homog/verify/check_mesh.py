@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from scipy.special import roots_legendre
 
 from feti_homog.typing import AnyInt, Bool, Float, Int
 from feti_homog.verify.check_fields import BONDED
-from feti_homog.verify.check_loads import StateNumbers
+from feti_homog.verify.check_loads import States
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.findings import Findings, relative
+from feti_homog.verify.leaves import Section
 
 # The mesher moves the tips of arcs by so many degrees at most; what is nearer to a tip is on neither side of it.
 AT_TIP = 0.06
@@ -19,7 +18,7 @@ AT_TIP = 0.06
 MOST_OFF = np.pi / 2 - 1, np.sqrt(2.0)
 
 
-def check_arcs(findings: Findings, cell: DiscreteCell, states: Sequence[StateNumbers]) -> None:
+def check_arcs(findings: Findings, cell: DiscreteCell, states: States) -> None:
     """Nodes inside the arcs are debonded in all states; those outside are bonded, before the load breaks them.
 
     In a user's mesh a curve may be debonded that is not in the files, so that only the first is known.
@@ -27,6 +26,8 @@ def check_arcs(findings: Findings, cell: DiscreteCell, states: Sequence[StateNum
     document, case = cell.files.document, cell.files.case
     from_mesh = case["cell"]["geometry"] == "mesh"
     points = document.get("angle", ())
+    for point, angle in zip(points, case.get("angle", {}).get("values") or (), strict=False):
+        findings.record("arcs", abs(point["angle"] - angle), "the angle of a point")
     for state in states:
         # A number that is wrong breaks the law of the tables.
         opening = points[min(max(state.point, 0), len(points) - 1)]["angle"] if points else None
@@ -37,6 +38,14 @@ def check_arcs(findings: Findings, cell: DiscreteCell, states: Sequence[StateNum
         intact = "path" not in document or (state.point == 0 and case["path"]["method"] == "events")
         if intact and not (from_mesh and "interface" in case):
             findings.record("arcs", np.count_nonzero(outside & ~bonded), f"{state.name}, debonded outside of arcs")
+
+
+def check_first_step(findings: Findings, cell: DiscreteCell, first: Section) -> None:
+    """Check that the bonds before the first increment are those outside of the arcs of the case."""
+    if cell.files.case["cell"]["geometry"] != "mesh" or "interface" not in cell.files.case:
+        (inside, outside), count = _sides(cell, None), first["bonded"] + first["broke"]
+        off = max(np.count_nonzero(outside) - count, count - np.count_nonzero(~inside), 0)
+        findings.record("arcs", off, "path[0].broke")
 
 
 def _sides(cell: DiscreteCell, opening: float | None) -> tuple[Bool, Bool]:
@@ -158,12 +167,6 @@ def from_centre(points: Float, centres: Float, size: Float) -> Float:
     return np.asarray(away - np.round(away / size) * size)
 
 
-def _is_fibre(cell: DiscreteCell) -> Bool:
-    """(k,) whether the inner body is the fibre of the number itself, not a coating of it."""
-    rows, fibres = cell.files.interface, cell.files.fibres
-    return np.asarray(rows.body == fibres.body[rows.fibre - 1])
-
-
 def _strangers(cell: DiscreteCell) -> Float:
     """(k,) with how many nodes each shares its body in one of two ways, but not in the other.
 
@@ -182,3 +185,9 @@ def _alike(labels: AnyInt) -> Int:
     """(k,) how many have the same label as each."""
     _, inverse, count = np.unique(labels, return_inverse=True, return_counts=True)
     return np.asarray(count[inverse.ravel()])
+
+
+def _is_fibre(cell: DiscreteCell) -> Bool:
+    """(k,) whether the inner body is the fibre of the number itself, not a coating of it."""
+    rows, fibres = cell.files.interface, cell.files.fibres
+    return np.asarray(rows.body == fibres.body[rows.fibre - 1])

@@ -1,4 +1,8 @@
-"""Elements' shares in the estimated error of the mesh, held against averages at nodes (Zienkiewicz and Zhu 1987)."""
+"""Estimated errors of the mesh.
+
+Elements' shares are held against averages at nodes (Zienkiewicz and Zhu 1987), those of entries, constants and
+energies against each other: estimates of elements and of arcs may cancel up to LEAST_SHARE.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +12,11 @@ import numpy as np
 
 from feti_homog.typing import Float, Int
 from feti_homog.verify.cell_tables import State
+from feti_homog.verify.check_sensitivities import changed, constants_of
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.elements import PLACES
 from feti_homog.verify.findings import Findings
+from feti_homog.verify.leaves import Section
 
 # Relative errors of the energy below this are rounding, of fields that are uniform.
 LEAST = 1e-9
@@ -18,18 +24,78 @@ LEAST = 1e-9
 # 0.76 to 1.6, of hexagonal and random cells with contrasts of 1e-3 and 1e3, refined up to twice; of elements as large
 # as a fibre, up to a quarter more.
 WITHOUT_BUBBLE = 1.7
+LEAST_SHARE = 0.05
+# Relative difference of an entry of a symmetric matrix of errors and its mirror image that is rounding.
+SYMMETRY = 1e-6
 # Of linear elements, by nodes: places in which squares of linear functions are integrated exactly.
 MIDDLES = np.array([[0.5, 0.5, 0.0], [0.0, 0.5, 0.5], [0.5, 0.0, 0.5]])
 
 
 def check_mesh_error(findings: Findings, cell: DiscreteCell, state: State) -> None:
-    """Check the sum of the elements' shares under a unit load of a stiffness: one estimate is near the other."""
-    energy = float(state.strain @ state.mean_stress) * cell.area
+    """Check the sum of the elements' shares under a unit load of a stiffness: one estimate is near the other.
+
+    No error of the energy is less than the share of theirs that arcs leave.
+    """
+    energy, given = float(state.strain @ state.mean_stress) * cell.area, _error_of(cell, state)
+    if given is not None and not np.isnan(state.mesh_error).any():
+        least = LEAST_SHARE * float(state.mesh_error.sum())
+        findings.record("mesh error", (least + LEAST) / (given + LEAST) - 1, f"{state.name}, the error of its energy")
     if cell.files.case["analysis"]["type"] != "stiffness" or energy <= 0 or np.isnan(state.mesh_error).all():
         return
     written, own = float(state.mesh_error.sum()), _averaged(cell, state) / energy
     ratio = (written + LEAST) / (own + LEAST)
     findings.record("mesh error", max(ratio, 1 / ratio) - 1, state.name)
+
+
+def _error_of(cell: DiscreteCell, state: State) -> float | None:
+    """Relative error of the energy of a state in result.json, if it has one."""
+    document, k, found = cell.files.document, int(np.abs(state.strain).argmax()), None
+    if "path" in document or "load" in document:
+        found = (document["path"][state.point] if "path" in document else document["load"]).hint("mesh_error")
+    elif "mesh_error" in document and not state.temperature:
+        name = f"effective_stiffness{'_compression' if state.strain[k] < 0 else ''}"
+        found = document["mesh_error"].hint(name)[k][k] / abs(document.hint(name)[k][k])
+    return None if found is None else float(found)
+
+
+def check_errors(findings: Findings, document: Section) -> None:
+    """Check that errors of entries A are symmetric, and bound those of the energy and of constants.
+
+    Under unit strains the energy errs by A_ii / C_ii, and nowhere by more than the norm of |C^-1/2| A |C^-1/2|.
+    """
+    given, C = document["mesh_error"], np.array(document["effective_stiffness"])
+    matrices = {name: np.array(given.hint(name)) for name in given if name.startswith("effective_stiffness")}
+    for name, A in matrices.items():
+        off = np.abs(A - A.T) / (SYMMETRY * np.sqrt(np.outer(np.diag(A), np.diag(A))) + 1e-300)
+        findings.record("mesh error", np.where((off < 1) & (A >= 0), 0.0, np.inf), f"mesh_error.{name}")
+    A, energy = matrices["effective_stiffness"], given.hint("energy")
+    least = float((np.diag(A) / np.abs(np.diag(C))).max())
+    findings.record("mesh error", (least + LEAST) / (energy + LEAST) - 1, "mesh_error.energy")
+    values, vectors = np.linalg.eigh((C + C.T) / 2)
+    if values[0] > 0:
+        root = np.abs(vectors / np.sqrt(values) @ vectors.T)
+        most = float(np.linalg.norm(root @ A @ root, 2))
+        findings.record("mesh error", (energy + LEAST) / (most + LEAST) - 1, "mesh_error.energy")
+    _check_constants(findings, document, C, A)
+
+
+def _check_constants(findings: Findings, document: Section, C: Float, A: Float) -> None:
+    """Check that a constant f(C) errs by sum |df / dC_ij| A_ij at most."""
+    given = document["mesh_error"]
+    heat, of_heat = (each.hint("thermal_stress") for each in (document, given))
+    heat, of_heat = (None if own is None else np.array(own) for own in (heat, of_heat))
+    here, most_of, n = constants_of(C, heat), dict[str, float](), len(C)
+    whole = np.column_stack([A, np.zeros(n) if of_heat is None else of_heat])
+    for i, j in np.argwhere(np.triu(whole)):
+        one: Float = np.zeros(whole.shape)
+        one[i, j] = whole[i, j]
+        one[:, :n] = np.maximum(one[:, :n], one[:, :n].T)
+        ends = [constants_of(*changed(C, heat, sign * one)) for sign in (1, -1)]
+        most_of = {name: most_of.get(name, 0.0) + max(abs(end[name] - here[name]) for end in ends) for name in here}
+    for name in given["constants"].keys() & here.keys():
+        least = LEAST * max(abs(here[name]), 1.0)
+        off = (given["constants"].hint(name) + least) / (most_of[name] + least) - 1
+        findings.record("mesh error", off, f"mesh_error.constants.{name}")
 
 
 def _averaged(cell: DiscreteCell, state: State) -> float:
@@ -46,8 +112,10 @@ def _averaged(cell: DiscreteCell, state: State) -> float:
     worked_on, total = np.unique(PLACES[v]), 0.0
     flexibility, lost = np.linalg.inv(cell.stiffnesses[:, worked_on[:, None], worked_on]), _lost(cell, worked_on)
     for part, r, w, stress in _stresses(cell, state):
-        phase = mesh.phase[part]
-        off = (_functions(r, mesh.triangles.shape[1]) @ averages[mesh.triangles[part]] - stress)[..., worked_on]
+        phase, is_linear = mesh.phase[part], mesh.triangles.shape[1] == 3
+        # (q, nodes) N_a, r_a or r_a (2 r_a - 1) and 4 r_a r_b.
+        functions = r if is_linear else np.hstack([r * (2 * r - 1), 4 * r * np.roll(r, -1, axis=1)])
+        off = (functions @ averages[mesh.triangles[part]] - stress)[..., worked_on]
         off *= lost[phase, None]
         total += float(np.einsum("eq,eqi,eij,eqj->", w, off, flexibility[phase], off, optimize=True))
     return total
@@ -56,7 +124,7 @@ def _averaged(cell: DiscreteCell, state: State) -> float:
 def _lost(cell: DiscreteCell, components: Int) -> Float:
     """(phases, components) factors of differences of stresses; bubbles are in the plane."""
     plane, is_linear = PLACES[cell.stiffnesses.shape[1]][:2], cell.files.mesh.triangles.shape[1] == 3
-    has_none = ~(cell.elements.has_bubble[:, None] & np.isin(components, plane)) & (not is_linear)
+    has_none = ~(cell.elements.mixed[:, None] & np.isin(components, plane)) & (not is_linear)
     return np.asarray(np.where(has_none, np.sqrt(WITHOUT_BUBBLE), 1.0))
 
 
@@ -76,8 +144,3 @@ def _at_nodes(r: Float, stress: Float, nodes: int) -> Float:
         return stress
     corners = np.linalg.pinv(r) @ stress
     return np.concatenate([corners, (corners + np.roll(corners, -1, axis=1)) / 2], axis=1)
-
-
-def _functions(r: Float, nodes: int) -> Float:
-    """(q, nodes) N_a, r_a or r_a (2 r_a - 1) and 4 r_a r_b."""
-    return r if nodes == 3 else np.hstack([r * (2 * r - 1), 4 * r * np.roll(r, -1, axis=1)])

@@ -4,30 +4,39 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.special import gammaln
 
 from feti_homog.system.runtime import input_files
 from feti_homog.typing import Float
+from feti_homog.verify.bonds import COATING
 from feti_homog.verify.check_fields import BONDED
-from feti_homog.verify.check_loads import StateNumbers
+from feti_homog.verify.check_loads import States
+from feti_homog.verify.check_mesh import from_centre
 from feti_homog.verify.constitutive_law import VOIGT, turned
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.findings import Findings, relative
-from feti_homog.verify.prescribed import NAMES
+from feti_homog.verify.leaves import Section
 
-Section = Mapping[str, Any]
 DIRECTIONS = 720  # across the fibres, in half a turn
 
 
 def check_summary(findings: Findings, cell: DiscreteCell) -> None:
     """Check the sections `cell`, `moduli` and `bounds` of result.json, if present."""
-    document = cell.files.document
-    _check_cell(findings, cell, document["cell"])
+    document, given, mesh = cell.files.document, cell.files.document["cell"], cell.files.mesh
+    (width, height), names = cell.files.size, cell.files.phases
+    fibres = [number for number, name in enumerate(names) if name not in ("matrix", COATING)]
+    expected = {"width": width, "height": height, "area": width * height, "elements": len(mesh.triangles)}
+    expected |= {"nodes": len(mesh.points)}
+    shares = {"fibre_fraction": float(cell.fractions[fibres].sum()), "porosity": cell.porosity}
+    for name, value in (expected | shares).items():
+        scale = 1.0 if name in shares else abs(value) or 1.0
+        findings.record("cell", abs(given.get(name, 0.0) - value) / scale, f"cell.{name}")
+    for name, value in zip(names, cell.fractions, strict=True):
+        findings.record("cell", abs(given["fractions"][name] - value), f"cell.fractions.{name}")
     _check_fibres(findings, cell, document["fibres"])
     if document.get("moduli") is not None:
         values = moduli(np.array(document["effective_stiffness"]))
@@ -36,44 +45,53 @@ def check_summary(findings: Findings, cell: DiscreteCell) -> None:
         _check_bounds(findings, cell, document["bounds"], np.array(document["effective_stiffness"]))
 
 
-def _check_cell(findings: Findings, cell: DiscreteCell, given: Section) -> None:
-    width, height = cell.files.size
-    names, mesh = cell.files.phases, cell.files.mesh
-    fibres = [number for number, name in enumerate(names) if name not in ("matrix", "coating")]
-    expected = {"width": width, "height": height, "area": width * height, "elements": len(mesh.triangles)}
-    expected |= {"porosity": cell.porosity}
-    expected |= {"nodes": len(mesh.points), "fibre_fraction": float(cell.fractions[fibres].sum())}
-    for name, value in expected.items():
-        scale = 1.0 if name in ("fibre_fraction", "porosity") else abs(value) or 1.0
-        findings.record("cell", abs(given.get(name, 0.0) - value) / scale, f"cell.{name}")
-    for name, value in zip(names, cell.fractions, strict=True):
-        findings.record("cell", abs(given["fractions"][name] - value), f"cell.fractions.{name}")
-
-
 def _check_fibres(findings: Findings, cell: DiscreteCell, given: Sequence[Section]) -> None:
-    """Check that the list of fibres is that of result.h5, in the order of their numbers."""
-    fibres, phases = cell.files.fibres, cell.files.phases
+    """Check that the list of fibres is that of result.h5, in the order of their numbers, and their shapes."""
+    fibres, phases, rows, size = cell.files.fibres, cell.files.phases, cell.files.interface, cell.files.size
     numbers = np.arange(1, len(fibres.number) + 1)
-    findings.record("tables", np.where(np.array_equal(fibres.number, numbers), 0.0, np.inf), "/fibre/number")
+    findings.require("tables", np.array_equal(fibres.number, numbers), "/fibre/number")
     listed = [(fibre["number"], fibre["phase"]) for fibre in given]
-    expected = [(number, phases[phase]) for number, phase in zip(numbers, fibres.phase, strict=True)]
-    findings.record("tables", np.where(listed == expected, 0.0, np.inf), "fibres")
-    if listed == expected:
-        circles = np.array([[*fibre.get("centre", (None, None)), fibre.get("radius")] for fibre in given], float)
-        circles = circles.reshape(-1, 3)  # of a cell without fibres too
-        stored = np.column_stack([fibres.centre, fibres.radius])
-        off = np.where(np.isnan(circles) & np.isnan(stored), 0.0, circles - stored)
-        findings.record("tables", relative(off, cell.files.size.max()).max(axis=1), lambda i: f"fibres[{i}]")
-        factors = np.array([fibre.get("strength", 1.0) for fibre in given]) - fibres.strength
-        findings.record("tables", np.abs(factors), lambda i: f"fibres[{i}].strength")
-        findings.record("tables", _unlike_scatter(cell), "/fibre/strength at fibre {}".format)
+    same = listed == [(number, phases[phase]) for number, phase in zip(numbers, fibres.phase, strict=True)]
+    findings.require("tables", same, "fibres")
+    if not same:
+        return
+    circles = np.array([[*fibre.get("centre", (None, None)), fibre.get("radius")] for fibre in given], float)
+    circles = circles.reshape(-1, 3)  # of a cell without fibres too
+    stored = np.column_stack([fibres.centre, fibres.radius])
+    off = np.where(np.isnan(circles) & np.isnan(stored), 0.0, circles - stored)
+    findings.record("tables", relative(off, size.max()).max(axis=1), lambda i: f"fibres[{i}]")
+    factors = np.array([fibre.get("strength", 1.0) for fibre in given]) - fibres.strength
+    findings.record("tables", np.abs(factors), lambda i: f"fibres[{i}].strength")
+    findings.record("tables", _unlike_scatter(cell), "/fibre/strength at fibre {}".format)
+    thickness = _coatings(cell)
+    for number, fibre in enumerate(given):
+        if (axes := fibre.get("semi_axes")) is not None:
+            c, s = np.cos(turn := np.radians(fibre["angle"])), np.sin(turn)
+            own = (rows.fibre == number + 1) & (rows.body == fibres.body[number])
+            away = from_centre(rows.points[own], fibres.centre[number], size) @ np.array([[c, -s], [s, c]]) / axes
+            findings.record("interface", np.abs(np.hypot(*away.T) - 1.0), f"fibres[{number}].semi_axes")
+        if number in thickness:
+            off = thickness[number] / fibre.get("coating", np.nan) - 1.0
+            findings.record("interface", np.abs(off), f"fibres[{number}].coating")
+
+
+def _coatings(cell: DiscreteCell) -> dict[int, float]:
+    """Thickness of the coatings of round fibres, by fibre: of each body of them the farthest node from the nearest."""
+    mesh, fibres, found = cell.files.mesh, cell.files.fibres, dict[int, float]()
+    if COATING not in cell.files.phases or np.isnan(fibres.radius).any():
+        return found
+    phase = cell.files.phases.index(COATING)
+    for body in np.unique(mesh.body[mesh.phase == phase]):
+        points = mesh.points[np.unique(mesh.triangles[(mesh.phase == phase) & (mesh.body == body)])]
+        circles = zip(fibres.centre, fibres.radius, strict=True)
+        heights = np.stack([np.hypot(*from_centre(points, c, cell.files.size).T) - R for c, R in circles])
+        nearest = int(heights.min(axis=1).argmin())
+        found[nearest] = float(heights[nearest].max())
+    return found
 
 
 def _unlike_scatter(cell: DiscreteCell) -> Float:
-    """(f,) errors of the strengths of fibres, but for those that a table may have given.
-
-    Quantiles of Weibull's distribution with mean 1.
-    """
+    """(f,) errors of the strengths of fibres, quantiles of Weibull's distribution with mean 1, unless of a table."""
     strength, scatter = cell.files.fibres.strength, next(iter(cell.files.interfaces), {}).get("scatter")
     if cell.files.case["cell"]["geometry"] == "table":
         return np.zeros_like(strength)
@@ -120,70 +138,51 @@ def _check_bounds(findings: Findings, cell: DiscreteCell, given: Section, stiffn
         least = float(np.linalg.eigvalsh((gap + gap.T) / 2).min())
         findings.record("bounds", max(-least, 0.0) / size, f"the least eigenvalue of {place}")
     if given["hashin_shtrikman"] is not None:
-        expected = _hashin_shtrikman(cell)
-        for name, pair in expected.items():
+        # 1 / <1 / (m + m*)> - m* with m* = mu0 for m = k, k0 mu0 / (k0 + 2 mu0) for m = mu (Walpole 1969).
+        bulk, shear = np.array([_isotropic_part(c) for c in cell.stiffnesses]).T
+        k0, mu0 = (np.array([own.min(), own.max()]) for own in (bulk, shear))
+        for name, own, added in (("bulk", bulk, mu0), ("shear", shear, k0 * mu0 / (k0 + 2 * mu0))):
+            pair = 1 / (cell.fractions @ (1 / (own[:, None] + added))) - added
             off = np.array(given["hashin_shtrikman"][name]) - pair
             findings.record("bounds", relative(off, pair[1]), f"bounds.hashin_shtrikman.{name}")
 
 
-def _hashin_shtrikman(cell: DiscreteCell) -> dict[str, tuple[float, float]]:
-    """1 / <1 / (m + m*)> - m* with m* = mu0 for m = k, k0 mu0 / (k0 + 2 mu0) for m = mu (Walpole 1969)."""
-    bulk, shear = np.array([_isotropic_part(c) for c in cell.stiffnesses]).T
-    found: dict[str, list[float]] = {"bulk": [], "shear": []}
-    for choose in (np.min, np.max):
-        k0, mu0 = choose(bulk), choose(shear)
-        for name, moduli, added in (("bulk", bulk, mu0), ("shear", shear, k0 * mu0 / (k0 + 2 * mu0))):
-            found[name].append(float(1 / (cell.fractions @ (1 / (moduli + added))) - added))
-    return {name: (pair[0], pair[1]) for name, pair in found.items()}
+# Of points, in the order of the columns of a table.
+VECTORS = ("stiffness", "thermal_stress", "strain", "stress")
 
 
-LISTS = ("angle", "path", "load", "envelope")
+def check_tables(findings: Findings, directory: Path, document: Section) -> None:
+    """Check that angle.csv, path.csv, load.csv and envelope.csv have a row a point, with its numbers."""
+    for name in document.keys() & {"angle", "path", "load", "envelope"}:
+        path, points = directory / f"{name}.csv", document.hint(name)
+        points = points if isinstance(points, list) else [points]
+        if path.is_file():
+            text = input_files.read(path).decode("utf-8", "replace")
+            rows = list(csv.DictReader(io.StringIO(text, newline="")))
+            findings.require("CSV", len(rows) == len(points), f"{path.name}, the number of its rows")
+            for number, (row, point) in enumerate(zip(rows, points, strict=False)):
+                findings.require("CSV", _is_row_of(row, point), f"{path.name}, row {number}")
 
 
-def check_tables(findings: Findings, directory: Path, document: Mapping[str, Any]) -> None:
-    """angle.csv, path.csv, load.csv and envelope.csv, each with a row a point."""
-    for name in LISTS:
-        path = directory / f"{name}.csv"
-        if name in document and path.is_file():
-            points = document[name] if isinstance(document[name], list) else [document[name]]
-            _check_table(findings, path, [dict(_columns(point)) for point in points])
+def _is_row_of(row: Mapping[str, str], point: Section) -> bool:
+    """Return whether a row has the numbers of a point under their names, and its vectors in their order."""
+    single = ((key, value) for key, value in dict.items(point) if not isinstance(value, list | dict))
+    texts = {key: "" if value is None else str(value) for key, value in single}
+    rest = [*filter(None, (cell for column, cell in row.items() if column not in texts))]
+    vectors = [str(x) for key in VECTORS if key in point for x in np.ravel(point.hint(key)).tolist()]
+    return rest == vectors and texts == {key: row.get(key) for key in texts}
 
 
-def _check_table(findings: Findings, path: Path, points: Sequence[Mapping[str, str]]) -> None:
-    stream = io.StringIO(input_files.read(path).decode("utf-8", "replace"), newline="")
-    rows = list(csv.DictReader(stream))
-    columns = list(dict.fromkeys(name for point in points for name in point))
-    given = [*rows[0]] if rows else columns
-    findings.record("CSV", 0.0 if len(rows) == len(points) else np.inf, f"{path.name}, the number of its rows")
-    findings.record("CSV", 0.0 if sorted(given) == sorted(columns) else np.inf, f"{path.name}, its columns")
-    for number, (row, point) in enumerate(zip(rows, points, strict=False)):
-        wrong = next((name for name in columns if row.get(name) != point.get(name, "")), None)
-        findings.record("CSV", 0.0 if wrong is None else np.inf, f"{path.name}, row {number}, {wrong}")
-
-
-def _columns(point: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    """Yield the names of the numbers of a point, and how a table writes them."""
-    for name, value in point.items():
-        if name in ("strain", "stress", "thermal_stress"):
-            components = NAMES[len(value)][name != "strain"]
-            prefix = "thermal_" if name == "thermal_stress" else ""
-            yield from zip([f"{prefix}{component}" for component in components], map(str, value), strict=True)
-        elif name == "stiffness":
-            yield from ((f"C{i}{j}", str(C)) for i, row in enumerate(value, 1) for j, C in enumerate(row, 1))
-        elif value is None or isinstance(value, int | float | str):
-            yield name, "" if value is None else str(value)
-
-
-def check_spatial(findings: Findings, cell: DiscreteCell, states: Sequence[StateNumbers]) -> None:
-    """Check the quantities that follow from the stiffness, and the thermal stress.
-
-    The thermal stress follows from the states under unit strains.
-    """
+def check_spatial(findings: Findings, cell: DiscreteCell, states: States) -> None:
+    """Check the quantities that follow from the stiffness, and thermal stresses by the states under unit strains."""
     document = cell.files.document
     if "effective_stiffness" in document:
         _check_stiffness(findings, document)
-    for place, thermal, own in _thermal_stresses(cell, states):
-        _check_levin(findings, cell, place, thermal, own)
+    if "effective_stiffness" in document and cell.expansions is not None:
+        _check_levin(findings, cell, "thermal_stress", document["thermal_stress"], states)
+    for number, point in enumerate(document.get("angle", ()) if cell.expansions is not None else ()):
+        own = [state for state in states if state.point == number]
+        _check_levin(findings, cell, f"angle[{number}].thermal_stress", point["thermal_stress"], own)
 
 
 def _check_stiffness(findings: Findings, document: Section) -> None:
@@ -191,7 +190,7 @@ def _check_stiffness(findings: Findings, document: Section) -> None:
     thermal = document.get("thermal_stress")
     # Columns that are secants of one load each have no inverse that means anything.
     is_linear = "effective_stiffness_compression" not in document
-    findings.record("compliance", 0.0 if is_linear is ("compliance" in document) else np.inf, "compliance")
+    findings.require("compliance", is_linear is ("compliance" in document), "compliance")
     if "compliance" in document:
         compliance = np.array(document["compliance"])
         off = np.abs(compliance @ stiffness - np.eye(6)).max(axis=1)
@@ -218,7 +217,7 @@ def _check_numbers(
     for name, value in values.items():
         place = f"{section}.{name}"
         if value is None or given[name] is None:
-            findings.record("moduli", 0.0 if value is given[name] else np.inf, place)
+            findings.require("moduli", value is given[name], place)
         else:
             scale = max(abs(value), 1.0) if name.startswith(ratios) else abs(value)
             findings.record("moduli", relative(np.array(given[name] - value), scale), place)
@@ -251,38 +250,22 @@ def about_fibres(stiffness: Float, strains: Float | None) -> dict[str, float | N
 
 
 def _across_fibres(stiffness: Float) -> dict[str, float]:
-    """Return the ranges of E1 and G12 in axes turned about x3."""
-    angles = 180.0 * np.arange(DIRECTIONS) / DIRECTIONS
-    constants = [engineering_constants(turned(stiffness, angle)) for angle in angles]
-    E, G = (np.array([own[name] for own in constants]) for name in ("E1", "G12"))
+    """Return the ranges of E1 and G12 in axes turned about x3, from the energies of stresses of size one."""
+    angle = np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    c, s, none = np.cos(angle), np.sin(angle), np.zeros((3, DIRECTIONS))
+    tension, shear = np.vstack([c**2, s**2, none, c * s]), np.vstack([-2 * c * s, 2 * c * s, none, c**2 - s**2])
+    E, G = (1 / np.einsum("ia,ij,ja->a", own, np.linalg.inv(stiffness), own) for own in (tension, shear))
     return {
         "E_least": float(E.min()), "E_largest": float(E.max()),
         "G_least": float(G.min()), "G_largest": float(G.max()),
     }  # fmt: skip
 
 
-def _thermal_stresses(
-    cell: DiscreteCell, states: Sequence[StateNumbers]
-) -> Iterator[tuple[str, Float, Sequence[StateNumbers]]]:
-    """Yield each reported thermal stress, its place, and the states of the same stiffness."""
-    document = cell.files.document
-    if cell.expansions is None:
-        return
-    if "effective_stiffness" in document:
-        yield "thermal_stress", np.array(document["thermal_stress"]), states
-    for number, point in enumerate(document.get("angle", ())):
-        own = [state for state in states if state.point == number]
-        yield f"angle[{number}].thermal_stress", np.array(point["thermal_stress"]), own
-
-
-def _check_levin(
-    findings: Findings, cell: DiscreteCell, place: str, thermal: Float, states: Sequence[StateNumbers]
-) -> None:
+def _check_levin(findings: Findings, cell: DiscreteCell, place: str, thermal: Sequence[float], states: States) -> None:
     """Check a thermal stress by reciprocity, which does not hold with contact without tension."""
     if cell.files.contact and any((state.status != BONDED).any() for state in states):
         return
-    scale = float(np.abs(thermal).max())
     for state in states:
         if not state.temperature:
-            off = float(thermal @ state.strain) + state.expanding
-            findings.record("Levin", relative(np.array(off), scale), f"{place}, {state.name}")
+            off = float(np.dot(thermal, state.strain)) + state.expanding
+            findings.record("Levin", relative(np.array(off), np.abs(thermal).max()), f"{place}, {state.name}")

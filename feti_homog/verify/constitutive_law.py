@@ -19,27 +19,20 @@ VOIGT = {3: np.array([[0, 2], [2, 1]]), 6: np.array([[0, 5, 4], [5, 1, 3], [4, 3
 def laws(case: Mapping[str, Any], phases: Sequence[str]) -> tuple[Float, Float | None]:
     """Return the stiffnesses (phases, v, v) of the plane state of a case, and strains (phases, v) per temperature.
 
-    Stiffnesses turn [E11, E22, gamma12] into [S11, S22, S12], in generalized plane strain [E11, E22, E33, gamma23,
-    gamma13, gamma12] into stresses.  Strains are None but there, and where a phase does not give them.
-
-    Raises:
-        CaseError: a phase of the mesh has no material in the case.
+    Strains are None but in generalized plane strain, and where a phase does not give them.  Raises CaseError for a
+    phase of the mesh without a material.
     """
     constants, plane = [_constants(case, phase) for phase in phases], case["analysis"]["plane"]
-    if plane != "generalized":
-        return np.stack([_plane_stiffness(own, plane) for own in constants]), None
+    stiffnesses = np.stack([_stiffness(own, plane) for own in constants])
     strains = [strain for own in constants if (strain := _expansion(own)) is not None]
-    known = len(strains) == len(constants)
-    return np.stack([_spatial_stiffness(own) for own in constants]), np.stack(strains) if known else None
+    known = plane == "generalized" and len(strains) == len(constants)
+    return stiffnesses, np.stack(strains) if known else None
 
 
 def mixed_phases(case: Mapping[str, Any], phases: Sequence[str]) -> Bool:
     """(phases,) whether quadratic elements have a bubble and a pressure: those of isotropic phases but in plane stress.
 
-    Unless the case has another `element`; cases of older versions have none.
-
-    Raises:
-        CaseError: a phase of the mesh has no material in the case.
+    Unless the case has another `element`; cases of older versions have none.  Raises CaseError as `laws` does.
     """
     wanted = case["cell"].get("element") == "mixed" and case["analysis"]["plane"] != "stress"
     return np.array([wanted and _is_isotropic(_constants(case, phase)) for phase in phases], bool)
@@ -57,11 +50,7 @@ def _is_isotropic(constants: Mapping[str, Any]) -> bool:
 
 
 def out_of_plane(case: Mapping[str, Any], phases: Sequence[str]) -> Float:
-    """(phases, 2, 3) matrices that turn [S11, S22, S12] into [S33, E33]; NaN where the constants leave it open.
-
-    Raises:
-        CaseError: a phase of the mesh has no material in the case.
-    """
+    """(phases, 2, 3) from [S11, S22, S12] to [S33, E33]; NaN where constants leave it open.  Raises as `laws`."""
     return np.stack([_out_of_plane(_constants(case, phase), case["analysis"]["plane"]) for phase in phases])
 
 
@@ -100,24 +89,17 @@ def _says_out_of_plane(constants: Mapping[str, Any], plane: str) -> bool:
     return all(constants.get(name) is not None for name in (*wanted[form], *third))
 
 
-def _plane_stiffness(constants: Mapping[str, Any], plane: str) -> Float:
-    """In plane stress S33 = S13 = S23 = 0; in plane strain E33 = gamma13 = gamma23 = 0."""
+def _stiffness(constants: Mapping[str, Any], plane: str) -> Float:
+    """In the axes of the cell; without E33, gamma13 and gamma23, or in plane stress S33, S13 and S23."""
     given = _given(constants)
     if len(given) == 3:
         return given
+    law = given if len(given) else np.asarray(np.linalg.inv(_compliance(constants)), float)
     if plane == "stress":
-        own = np.linalg.inv(_compliance(constants)[np.ix_(PLANE, PLANE)])
-    else:
-        law = given if len(given) else np.linalg.inv(_compliance(constants))
-        own = law[np.ix_(PLANE, PLANE)]
-    return turned(np.asarray(own, float), float(constants.get("angle", 0.0)))
-
-
-def _spatial_stiffness(constants: Mapping[str, Any]) -> Float:
-    """In the axes of the cell; x3 is one of the material's."""
-    given = _given(constants)
-    law = given if len(given) else np.linalg.inv(_compliance(constants))
-    return turned(np.asarray(law, float), float(constants.get("angle", 0.0)))
+        law = np.asarray(np.linalg.inv(_compliance(constants)[np.ix_(PLANE, PLANE)]), float)
+    elif plane == "strain":
+        law = law[np.ix_(PLANE, PLANE)]
+    return turned(law, float(constants.get("angle", 0.0)))
 
 
 def _expansion(constants: Mapping[str, Any]) -> Float | None:

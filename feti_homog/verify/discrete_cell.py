@@ -38,13 +38,11 @@ class Faces:
     """Torn nodes that make up the two faces at each of the k interface nodes.
 
     Attributes:
-        row: (b,) the interface node at the place of each torn node, -1 if there is none.
-        is_fibre: (b,) whether the torn node belongs to a fibre, the inner of the two bodies.
+        row, is_fibre: (b,) the interface node at each torn node, or -1, and whether it is of the inner of two bodies.
         copies: (b,) how many copies of the torn node its subdomain has, periodic images of each other.
-        distance: (k,) of each interface node from its place, infinite if there is no such place.
+        distance, place: (k,) of each interface node from its place, and that; infinite and -1 if there is none.
         pair: (places,) place of the section of the two bodies that meet there alone and along one line; -1 where they
             never part.
-        place: (k,) of each interface node, -1 if there is none.
     """
 
     row: Int
@@ -71,14 +69,9 @@ class Faces:
 class DiscreteCell:
     """Mesh, materials and interface of a result.
 
-    Attributes:
-        stiffnesses: (phases, v, v), v = 3 or in generalized plane strain 6.
-        expansions: (phases, v) strains per unit of temperature, or None if they are not known.
-        constituent: (subdomains,) part of a phase that each subdomain belongs to.
-        inner: (s,) which of the torn sides are the inner faces of bonds that may break.
-        fractions: (phases,) shares of the cell.
-        radius: how near copies of a node are.
-        largest_strain: the largest component of the strains of all states.
+    Stiffnesses (phases, v, v), v = 3 or in generalized plane strain 6; expansions (phases, v), None if not known; parts
+    of phases that subdomains belong to (subdomains,); which torn sides are inner faces of bonds that may break (s,);
+    shares of phases (phases,); how near copies of a node are; the largest component of the strains of all states.
     """
 
     files: ResultFiles
@@ -105,7 +98,9 @@ class DiscreteCell:
         inwards = inwardness(mesh, files.phases, sides, parts)
         on_line = along_one_line(sides, nodes, parts[mesh.subdomain])
         faces = _faces(files, nodes, on_line, parts, inwards, radius)
-        inner = _inner_sides(files, sides, inwards[parts[mesh.subdomain]])
+        depth, other = inwards[parts[mesh.subdomain]], sides.element[sides.partner]
+        may_part = (sides.partner >= 0) & (pairs_of(files)[mesh.phase[sides.element], mesh.phase[other]] >= 0)
+        inner = may_part & (depth[sides.element] > depth[other])
         areas = np.bincount(mesh.phase, elements.area, len(files.phases))
         strains = [np.abs(state.attrs["strain"]).max() for state in files.file.get("state", {}).values()]
         largest = float(np.max(strains, initial=0.0))
@@ -131,10 +126,7 @@ class DiscreteCell:
 
     @cached_property
     def node_integrals(self) -> Float:
-        """(n, 2) int dN/dx over all elements of each node, and over the voids that it lies at.
-
-        There it is int N n ds, n outward from the void.
-        """
+        """(n, 2) int dN/dx over all elements of each node, and over voids, where it is int N n ds."""
         return np.asarray(self.elements.node_integrals + self.void_integrals)
 
     @cached_property
@@ -172,14 +164,10 @@ class DiscreteCell:
         """(v,) strains that the loads of a state make, for scales: E, and the largest that temperature makes."""
         free = self.free_strains(state)
         own = state.strain if free is None else np.asarray(state.strain + np.abs(free).max(axis=0))
-        # Slips that friction holds load an unloaded cell.
-        slip = float(np.abs(state.jump).max(initial=0.0)) if isinstance(state, State) and self._has_friction else 0.0
+        slip = 0.0  # those that friction holds load an unloaded cell
+        if isinstance(state, State) and friction_at(self.files).any():
+            slip = float(np.abs(state.jump).max(initial=0.0))
         return np.asarray(own + np.copysign(slip / float(self.files.size.max()), own))
-
-    @property
-    def _has_friction(self) -> bool:
-        """True where faces of the result resist sliding."""
-        return bool(friction_at(self.files).any())
 
     def imposed(self, state: Loaded) -> float:
         """Largest displacement E x that a state imposes across the cell, at least that of a faint strain."""
@@ -191,10 +179,7 @@ class DiscreteCell:
         return max(own, LEAST_SHARE * self.largest_strain * float(self.files.size.max()))
 
     def least_stress(self, state: Loaded) -> float:
-        """Return a stress that a state makes in the bonded cell at least.
-
-        It is for scales that debonding does not make zero.
-        """
+        """Return a stress that a state makes in the bonded cell at least: a scale that debonding keeps."""
         own, most = np.abs(self.reuss @ self.loads(state)).max(), np.abs(self.reuss).max() * self.largest_strain
         return float(max(own, LEAST_SHARE * most))
 
@@ -212,18 +197,8 @@ class DiscreteCell:
         return max(float(np.abs(self.loads(state)).max()), LEAST_SHARE * self.largest_strain)
 
 
-def _inner_sides(files: ResultFiles, sides: TornSides, inwards: Int) -> Bool:
-    """(s,) whether a torn side faces a body farther outwards from which it may part; `inwards` (m,) of the elements."""
-    phase, other = files.mesh.phase, sides.element[sides.partner]
-    may_part = (sides.partner >= 0) & (pairs_of(files)[phase[sides.element], phase[other]] >= 0)
-    return np.asarray(may_part & (inwards[sides.element] > inwards[other]))
-
-
 def _faces(files: ResultFiles, nodes: TornNodes, on_line: Bool, parts: Int, inwards: Int, radius: float) -> Faces:
-    """Return where the interface nodes of a result are on its mesh.
-
-    `inwards` (parts,) as `inwardness` has it, `on_line` (places,) as `along_one_line`.
-    """
+    """Return where interface nodes are on the mesh, with `inwardness` (parts,) and `along_one_line` (places,)."""
     depth = inwards[parts[nodes.subdomain]]
     members = np.unique(np.column_stack([nodes.place, depth, nodes.phase]), axis=0)
     two = np.flatnonzero((np.bincount(members[:, 0], minlength=nodes.places) == 2) & on_line)

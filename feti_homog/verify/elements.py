@@ -32,17 +32,10 @@ NORMAL = {3: [0, 1], 6: [0, 1, 2]}
 
 @dataclass(frozen=True)
 class ElementFields:
-    """Fields that displacements (n, c) make in the elements.
+    """Means of strains and stresses (m, v) that displacements (n, c) make in the elements, and int sigma : eps.
 
-    Attributes:
-        strain, stress: (m, v) means.
-        strain_size: (m,) sum t_a |dN_a/dx| with the terms t of u, du/dx times the same of places, and the other
-            strains, of whose rounding the strain has its share.
-        force: (n, c) int B^T sigma, what the elements of a node resist with.
-        force_size: (n,) the larger sum of |dN/dx| |L| strain_size over the elements of a node, of whose rounding the
-            forces have their share: large where a phase is far stiffer than it is strained.
-        largest_force: the largest that a single element exerts on a node.
-        energy: int sigma : eps.
+    Forces (n, c) are int B^T sigma, with the largest that a single element exerts; strain_size (m,) and force_size (n,)
+    are sizes of the terms of which strains and forces are summed, with whose rounding they err.
     """
 
     strain: Float
@@ -55,31 +48,18 @@ class ElementFields:
 
 
 class Elements:
-    """The elements of a mesh whose phases have the stiffnesses (phases, v, v).
-
-    Quadratic ones of `mixed` phases (phases,) have a bubble and a pressure.
-    """
+    """Elements of phases with stiffnesses (phases, v, v); quadratic `mixed` ones have bubbles and pressures."""
 
     def __init__(self, mesh: Mesh, stiffnesses: Float, mixed: Bool) -> None:
         self._mesh, self._stiffnesses = mesh, stiffnesses
-        self._mixed = mixed & (mesh.triangles.shape[1] == 6)
+        self.mixed = mixed & (mesh.triangles.shape[1] == 6)
 
     @property
-    def has_bubble(self) -> Bool:
-        """(phases,) whether elements have a bubble and a pressure."""
-        return self._mixed
-
-    @property
-    def lame_ratio(self) -> float:
-        """Largest lambda / mu of phases whose elements have a pressure."""
-        L = self._stiffnesses[self._mixed]
-        return float((L[:, 0, 1] / L[:, -1, -1]).max(initial=0.0))
-
-    @property
-    def shear_contrast(self) -> float:
-        """Largest mu of all phases over the least of those whose elements have a pressure; 0 without such."""
-        mu = self._stiffnesses[:, -1, -1]
-        return float((mu.max() / mu[self._mixed]).max(initial=0.0))
+    def contrasts(self) -> tuple[float, float]:
+        """Largest lambda / mu of elements that have a pressure, and largest mu over the least of theirs, or 0."""
+        L, mu = self._stiffnesses[self.mixed], self._stiffnesses[:, -1, -1]
+        ratio, contrast = L[:, 0, 1] / L[:, -1, -1], mu.max() / mu[self.mixed]
+        return float(ratio.max(initial=0.0)), float(contrast.max(initial=0.0))
 
     @cached_property
     def area(self) -> Float:
@@ -116,7 +96,10 @@ class Elements:
             own_free = free[self._mesh.phase[part]]
             strain[part], stress[part] = (np.einsum("eqi,eq->ei", field, share) for field in (local, answer))
             size[part] = np.einsum("eqad,eai->eq", np.abs(gradients), terms_of_u[nodes]).max(axis=1)
-            size[part] += self._rounded_places(part, gradients, slope) + abs(along) + np.abs(own_free).max(axis=1)
+            # |du/dx| sum |x_a| |dN_a/dx|: gradients are off by the rounding of places, in small elements most.
+            lengths = np.einsum("eqad,ead->eq", np.abs(gradients), np.abs(self._mesh.points)[nodes])
+            size[part] += (np.abs(slope).max(axis=(2, 3)) * lengths).max(axis=1)
+            size[part] += abs(along) + np.abs(own_free).max(axis=1)
             tensor = answer[..., PLACES[v]]
             own = np.einsum("eqad,eqid,eq->eai", gradients, tensor, weights, optimize=True)
             _add(force, nodes, own)
@@ -153,7 +136,7 @@ class Elements:
     def _add_bubbles(self, part: slice, gradients: Float, weights: Float, local: Float, free: Float) -> Float:
         """(e, q) pressure of mixed elements less lambda tr eps, 0 in others; adds the bubbles' strains to `local`."""
         excess, phase = np.zeros(local.shape[:2]), self._mesh.phase[part]
-        own = np.flatnonzero(self._mixed[phase])
+        own = np.flatnonzero(self.mixed[phase])
         if not len(own):
             return excess
         v, lame = (
@@ -168,12 +151,6 @@ class Elements:
         local[own] += bubble
         excess[own] = pressure - lame[:, :1] * (elastic + bubble)[..., NORMAL[v]].sum(axis=2)
         return excess
-
-    def _rounded_places(self, part: slice, gradients: Float, slope: Float) -> Float:
-        """(e,) |du/dx| sum |x_a| |dN_a/dx|: gradients are off by the rounding of places, in small elements most."""
-        places = np.abs(self._mesh.points)[self._mesh.triangles[part]]
-        lengths = np.einsum("eqad,ead->eq", np.abs(gradients), places)
-        return np.asarray((np.abs(slope).max(axis=(2, 3)) * lengths).max(axis=1))
 
     def _parts(self) -> Iterator[tuple[slice, Float, Float]]:
         """Elements in portions, with gradients (e, q, a, 2) and weights (e, q) at their quadrature points."""
@@ -250,11 +227,8 @@ def inner_fields(
 ) -> tuple[Float, Float]:  # fmt: skip
     """Return (e, q, 2, 2) du_i/dx_d of the bubble, and (e, q) the pressure.
 
-    Args:
-        places: (q, 3) barycentric coordinates of the quadrature points.
-        gradients, weights: (e, q, 6, 2) of the functions of the nodes, and (e, q).
-        strain: (e, q, v) elastic strains of the displacements of the nodes.
-        lame: (e, 2) lambda and mu.
+    Of places (q, 3), barycentric, gradients of the nodes' functions (e, q, 6, 2), weights (e, q), elastic strains of
+    their displacements (e, q, v), and lambda and mu (e, 2).
     """
     first, shear = lame.T
     slopes = np.einsum("ab,eqbd->eqad", OF_NODES, gradients)

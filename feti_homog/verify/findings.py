@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 
 from feti_homog.typing import Float
 
-CHECK_PER_RTOL, LARGEST_CHECK = 1e3, 1e-4
+CHECK_PER_RTOL, LARGEST_CHECK, KKT = 1e3, 1e-4, 1e-6
 # Signs of forces and gaps are the solver's error below 10 rtol of the largest; the check of contact allows 1e-6.
 CONTACT_PER_RTOL, LEAST_CONTACT = 100.0, 1e-6
 # Bonds whose utilisation differs by 1e-6 break together.
@@ -99,6 +99,10 @@ class Findings:
         if name not in self._worst or value > self._worst[name][0]:
             self._worst[name] = value, where if isinstance(where, str) else where(worst)
 
+    def require(self, name: str, holds: bool | np.bool_, where: str) -> None:
+        """Record that a check holds, or does not at all."""
+        self.record(name, 0.0 if holds else np.inf, where)
+
     def worst(self) -> tuple[Finding, ...]:
         """Return the findings of all checks that apply, in their order."""
         return tuple(Finding(check, *self._worst[name]) for name, check in self._checks.items() if name in self._worst)
@@ -109,33 +113,20 @@ def solver_limit(rtol: float) -> float:
     return min(CHECK_PER_RTOL * rtol, LARGEST_CHECK)
 
 
-def same_state_limit(rtol: float) -> float:
-    """Most that strains and stresses move, relative to the largest, while contact changes at one load.
-
-    Signs are sure where a force or a gap is 20 rtol beyond zero.  All else has moved by 115 rtol then, the median of
-    276 changes, and by 2100 rtol at most.
-    """
-    return max(STRENGTH, 10.0 * solver_limit(rtol))
-
-
-def _lost_digits(ratio: float, contrast: float) -> tuple[float, float, float]:
-    """Return factors of limits: of what is computed from stiffnesses, of forces, and of stresses with a pressure."""
-    of_balance, of_pressure = min(ratio, contrast / LARGE_CONTRAST), min(PRESSURE * ratio, contrast / LARGE_OF_PRESSURE)
-    return max(1.0, ratio), max(1.0, of_balance), max(1.0, of_pressure)
-
-
 def checks(rtol: float, users_mesh: bool, has_coatings: bool, mixed: Pair = (0.0, 0.0)) -> tuple[Check, ...]:
-    """List the checks of a result whose dual problems were solved to the relative tolerance `rtol`.
+    """List the checks of a result whose dual problems were solved to `rtol`.
 
-    Args:
-        mixed: largest lambda / mu of elements that have a pressure of their own, and largest mu over theirs.
+    `mixed` is the largest lambda / mu of elements that have a pressure, and the largest mu over theirs.
     """
-    lost, of_balance, of_pressure = _lost_digits(mixed[0] / LARGE_RATIO, mixed[1])
+    ratio, contrast = mixed[0] / LARGE_RATIO, mixed[1]
+    lost, of_balance = max(1.0, ratio), max(1.0, min(ratio, contrast / LARGE_CONTRAST))
+    of_pressure = max(1.0, min(PRESSURE * ratio, contrast / LARGE_OF_PRESSURE))
     sums, balance, rounding = 1e-10 * lost, 1e-10 * of_balance, max(COATINGS * has_coatings, WHOLE_BODIES * lost)
     shape, solver = USERS_MESH if users_mesh else OWN_MESH, solver_limit(rtol)
     contact = min(max(CONTACT_PER_RTOL * rtol, LEAST_CONTACT), LARGEST_CHECK)
     rows = (
         ("files", "the files are unchanged since the run, by their checksums", 0.0),
+        ("status", "status, faults and remarks follow from the checks and the mesh, tolerances from rtol", 1e-9),
         ("numbers", "all numbers are finite", 0.0),
         ("mesh", "elements have positive areas and fill the cell; torn sides meet in pairs", shape),
         ("interface", "interface nodes are where one fibre meets the matrix, with its normals and lengths", shape),
@@ -153,11 +144,7 @@ def checks(rtol: float, users_mesh: bool, has_coatings: bool, mixed: Pair = (0.0
         ("tension", "closed faces are not pulled, relative to the largest traction", contact),
         ("complementarity", "gap times traction vanishes, relative to the largest force and displacement", contact),
         ("free faces", "open faces bear nothing, closed ones friction only, relative to the largest traction", contact),
-        (
-            "sliding",
-            "friction opposes the slip of sliding faces, relative to the largest traction",
-            contact,
-        ),
+        ("sliding", "friction opposes the slip of sliding faces, relative to the largest traction", contact),
         ("mean stress", "the mean of the stresses is the state's, relative to the largest component", balance),
         ("mean strain", "the mean of the strains is E and the opening of the faces, relative to E", solver),
         ("Hill", "mean of stress : strain = mean stress : E less the interface's work, relative to it", solver),
@@ -165,6 +152,7 @@ def checks(rtol: float, users_mesh: bool, has_coatings: bool, mixed: Pair = (0.0
         ("stress load", "the states have the stresses that the case asks for, relative to the largest", solver),
         ("tables", "points and columns in result.json are the states in result.h5, relative to the largest", 1e-12),
         ("CSV", "the tables of points agree with result.json", 0.0),
+        ("rates", "release rates at tips of arcs agree with their modes, and tips with the mesh, relative to G", 1e-9),
         ("symmetry", "stiffnesses of bonded or free faces are symmetric, relative to the largest entry", solver),
         ("breaks", "bonds break as the points report and never heal, in numbers of bonds", 0.0),
         ("strength", "bonds that hold are within their strength, those that break are at it", STRENGTH),
@@ -178,7 +166,7 @@ def checks(rtol: float, users_mesh: bool, has_coatings: bool, mixed: Pair = (0.0
         ("constants", "constants at fixed status are those of the fields, relative to each", solver),
         (
             "sensitivities",
-            "constants change with the materials and springs of the case as in the file, relative to each",
+            "constants change with those of the case as in the file, relative to each",
             max(SLOPE, solver),
         ),
         ("bounds", "bounds follow from fractions and materials, and the stiffness is between them", sums),

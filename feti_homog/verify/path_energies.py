@@ -27,9 +27,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from feti_homog.typing import Float
-from feti_homog.verify.check_loads import StateNumbers
+from feti_homog.verify.check_loads import States
 from feti_homog.verify.discrete_cell import DiscreteCell
-from feti_homog.verify.findings import Findings
+from feti_homog.verify.findings import Findings, relative
+from feti_homog.verify.leaves import Points
 from feti_homog.verify.prescribed import SAME_SHARE, TEMPERATURE, Prescribed, at_points, damaged_at, targets
 
 # Loads whose components differ by so much, relatively, are in proportion.
@@ -51,13 +52,9 @@ class Loads(NamedTuple):
 
 @dataclass(frozen=True)
 class PointNumbers:
-    """Numbers of a point that the laws of energy need.
+    """Strains and stresses (n,), with the temperature and what works on it, NaN where no file has it; energies.
 
-    Attributes:
-        strain, stress: (n,) with the temperature and what works on it, which is NaN where no file has it.
-        stored: per area.
-        load: what is prescribed.
-        terms: energy per area of which the stored one is summed at least.
+    `load` is what is prescribed, `terms` the energy per area of which the stored one is summed at least.
     """
 
     name: str
@@ -85,12 +82,11 @@ class PointNumbers:
         return self.load.values[own], self.strain[own]
 
 
-def check_path_energies(
-    findings: Findings, cell: DiscreteCell, states: Sequence[StateNumbers], points: Sequence[Point]
-) -> None:
+def check_path_energies(findings: Findings, cell: DiscreteCell, states: States, points: Points) -> None:
     """`work`, `stored` and what was dissipated at all points; fields are kept of those of `states`."""
+    by_events = cell.files.case["path"]["method"] == "events"
+    _check_rising(findings, points, 1.0 / len(targets(cell.files.case)) if by_events else 0.0)
     if "friction_heat" in points[0]:
-        by_events = cell.files.case["path"]["method"] == "events"
         _check_heat(findings, states, points, by_events)
         return
     numbers = _numbers(cell, states, points)
@@ -98,13 +94,33 @@ def check_path_energies(
     for each, point in zip(numbers, points, strict=True):
         off = point["work"] - each.stored - point["dissipated"]
         findings.record("energy", abs(off) / scale, f"{each.name}, work less stored and dissipated")
-    if cell.files.case["path"]["method"] == "events":
-        _check_events(findings, numbers, points, 1.0 / len(targets(cell.files.case)), scale)
+    if by_events:
+        _check_events(findings, numbers, points, scale)
     else:
-        _check_increments(findings, _stiffest(cell), numbers, points, scale)
+        C: Float = np.einsum("p,pij->ij", cell.fractions, cell.stiffnesses)  # Voigt's, of strains and temperature
+        if cell.files.is_spatial:
+            alpha = np.zeros(cell.stiffnesses.shape[:2]) if cell.expansions is None else cell.expansions
+            thermal = np.einsum("p,pij,pj->i", cell.fractions, cell.stiffnesses, alpha)
+            square = np.einsum("p,pi,pij,pj->", cell.fractions, alpha, cell.stiffnesses, alpha)
+            C = np.block([[C, -thermal[:, None]], [-thermal[None], square]])
+        _check_increments(findings, C, numbers, points, scale)
 
 
-def _check_heat(findings: Findings, states: Sequence[StateNumbers], points: Sequence[Point], by_events: bool) -> None:
+def _check_rising(findings: Findings, points: Points, first_leg: float) -> None:
+    """Check what is lost if the load only rises on the first leg of events, which ends at the load factor `first_leg`.
+
+    Breaks at a load below the largest so far lose as much more as energies grow up to that.
+    """
+    names = "dissipated", "dissipated_strain_controlled", "load_factor"
+    lost, rising, load = np.array([[point[name] for name in names] for point in points]).T
+    falls = (load > 0.0) & (load < first_leg - SAME_SHARE)
+    rise = np.where(falls, np.maximum.accumulate(load) / np.where(falls, load, 1.0), 1.0)
+    expected = lost[0] + np.cumsum(np.r_[0.0, rise[:-1] ** 2 * np.diff(lost)])
+    scale = max(float(np.abs(expected).max()), *(abs(point["stored"]) for point in points))
+    findings.record("energy", relative(rising - expected, scale), "path[{}].dissipated_strain_controlled".format)
+
+
+def _check_heat(findings: Findings, states: States, points: Points, by_events: bool) -> None:
     """Check that the work is stored, lost to breaks or heat, which never falls; breaks alone lose what is `dissipated`.
 
     With friction the energy depends on the way, so nothing bounds what breaks lose.  Bonds break behind a point of
@@ -126,7 +142,7 @@ def _check_heat(findings: Findings, states: Sequence[StateNumbers], points: Sequ
         findings.record("heat", left / of_step[number], f"path[{number}].dissipated")
 
 
-def _numbers(cell: DiscreteCell, states: Sequence[StateNumbers], points: Sequence[Point]) -> list[PointNumbers]:
+def _numbers(cell: DiscreteCell, states: States, points: Points) -> list[PointNumbers]:
     """Return those of every point, the energy from the fields where they are kept, else by Hill E.Sigma / 2.
 
     What works on a temperature follows from what is stored.
@@ -149,34 +165,20 @@ def _numbers(cell: DiscreteCell, states: Sequence[StateNumbers], points: Sequenc
     return found
 
 
-def _check_events(
-    findings: Findings, numbers: Sequence[PointNumbers], points: Sequence[Point], first_leg: float, scale: float
-) -> None:
-    """Check that the energy lost between two points is lost by the bonds that break at the first of them.
-
-    The first leg ends at the load factor `first_leg`.
-    """
+def _check_events(findings: Findings, numbers: Sequence[PointNumbers], points: Points, scale: float) -> None:
+    """Check that the energy lost between two points is lost by the bonds that break at the first of them."""
     findings.record("energy", abs(points[0]["dissipated"]) / scale, f"{numbers[0].name}, dissipated")
-    findings.record("energy", abs(points[0]["dissipated_strain_controlled"]) / scale, f"{numbers[0].name}, dissipated")
-    largest = 0.0
     for (state, before), (after, now) in pairwise(zip(numbers, points, strict=True)):
-        largest = max(largest, before["load_factor"])
-        low, high = (0.0, 0.0) if damaged_at(before) == 0 else _losses(state, after)
+        low, high = 0.0, 0.0
+        if damaged_at(before):
+            least, most = potentials(state.load, after)
+            low, high = max(state.potential - most, 0.0), state.potential - least
         lost = now["dissipated"] - before["dissipated"]
         findings.record("energy", max(low - lost, lost - high, 0.0) / scale, f"{after.name}, dissipated")
         if damaged_at(before) == 0:
             straight = _work(after.strain - state.strain, state.stress + after.stress) / 2
             off = np.nan_to_num(now["work"] - before["work"] - straight)
             findings.record("energy", abs(off) / scale, f"{after.name}, work")
-        rise = largest / before["load_factor"] if 0.0 < before["load_factor"] < first_leg - SAME_SHARE else 1.0
-        off = now["dissipated_strain_controlled"] - before["dissipated_strain_controlled"] - rise**2 * lost
-        findings.record("energy", abs(off) / scale, f"{after.name}, dissipated_strain_controlled")
-
-
-def _losses(state: PointNumbers, after: PointNumbers) -> tuple[float, float]:
-    """Least and largest energy that the breaks at a point can have lost, with the next point in the same leg."""
-    least, most = potentials(state.load, after)
-    return max(state.potential - most, 0.0), state.potential - least
 
 
 def potentials(load: Prescribed, other: PointNumbers) -> tuple[float, float]:
@@ -209,12 +211,11 @@ def _work(one: Float, other: Float) -> float:
 
 
 def _check_increments(
-    findings: Findings, stiffest: Float, numbers: Sequence[PointNumbers], points: Sequence[Point], scale: float
+    findings: Findings, stiffest: Float, numbers: Sequence[PointNumbers], points: Points, scale: float
 ) -> None:
-    """Check the energy lost at the load of each step.
+    """Check the energy lost at the load of each step: the potential of the old bonds, by (P), less that of the new.
 
-    It is the potential of the old bonds, which (P) bounds by the step before, less that of the new; the strain of the
-    new ones in bonded phases stores no less than the old bonds would have.
+    The strain of the new ones in bonded phases stores no less than the old bonds would have.
     """
     total = 0.0
     for number, (point, now) in enumerate(zip(points, numbers, strict=True)):
@@ -225,17 +226,4 @@ def _check_increments(
             least, most = potentials(now.load, numbers[number - 1]) if number else (-np.inf, np.inf)
             low, high = max(least - now.potential, 0.0), min(high, most - now.potential)
         findings.record("energy", max(low - lost, lost - high, 0.0) / scale, f"{now.name}, dissipated")
-        off = point["dissipated_strain_controlled"] - point["dissipated"]
-        findings.record("energy", abs(off) / scale, f"{now.name}, dissipated_strain_controlled")
         total = point["dissipated"]
-
-
-def _stiffest(cell: DiscreteCell) -> Float:
-    """Voigt's mean stiffness of strains and temperature, (3, 3) or (7, 7)."""
-    C: Float = np.einsum("p,pij->ij", cell.fractions, cell.stiffnesses)
-    if not cell.files.is_spatial:
-        return C
-    alpha = np.zeros((len(cell.fractions), len(C))) if cell.expansions is None else cell.expansions
-    thermal = np.einsum("p,pij,pj->i", cell.fractions, cell.stiffnesses, alpha)
-    square = np.einsum("p,pi,pij,pj->", cell.fractions, alpha, cell.stiffnesses, alpha)
-    return np.asarray(np.block([[C, -thermal[:, None]], [-thermal[None], square]]))

@@ -50,22 +50,15 @@ def targets(case: Document) -> list[Prescribed]:
     places = {name: (k, False) for k, name in enumerate([*strains, TEMPERATURE][:n])}
     places |= {name: (k, True) for k, name in enumerate(stresses)}
     values, by_stress, found = np.zeros(n), np.arange(n) < v, []
-    for load in _given(case):
+    path = case.get("path", {})
+    single = [path[name] for name in ("strain", "to") if path.get(name)]
+    for load in [case["load"]["to"]] if "load" in case else path.get("waypoints") or single:
         values, by_stress = values.copy(), by_stress.copy()
         for name, value in (load if isinstance(load, Mapping) else dict(zip(strains, load, strict=True))).items():
             place, by_stress[places[name][0]] = places[name]
             values[place] = value
         found.append(Prescribed(values, by_stress))
     return found
-
-
-def _given(case: Document) -> Sequence[Any]:
-    """Return the loads as they stand in the case: strains, or tables of names."""
-    if "load" in case:
-        return [case["load"]["to"]]
-    path = case["path"]
-    single = [path[name] for name in ("strain", "to") if path.get(name)]
-    return path.get("waypoints") or single
 
 
 def at_points(case: Document, points: Sequence[Document]) -> Iterator[Prescribed]:

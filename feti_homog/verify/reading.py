@@ -19,6 +19,7 @@ from feti_homog.errors import CaseError
 from feti_homog.system.runtime import input_files
 from feti_homog.typing import Float, Int
 from feti_homog.verify.cell_tables import Fibres, InterfaceRows, Mesh, State, gradient
+from feti_homog.verify.leaves import Section
 
 JSON, FIELDS = "result.json", "result.h5"
 SCHEMA = 1
@@ -37,17 +38,13 @@ BLOCK = 1 << 26  # bytes
 
 @dataclass(frozen=True)
 class ResultFiles:
-    """A folder of results, opened.
+    """A folder of results, opened: result.json, which notes what laws read; the size (2,) of the cell; names of phases.
 
-    Attributes:
-        document: result.json.
-        size: (2,) width and height of the cell.
-        phases: names of the phases, the matrix first.
-        faces: (k, 2) a node of the mesh on each face of the interface nodes, fibre and matrix.
-        altered: names of the files that are not as the run wrote them.
+    `faces` (k, 2) is a node of the mesh on each face of the interface nodes, fibre and matrix; `altered` are the names
+    of the files that are not as the run wrote them.
     """
 
-    document: Mapping[str, Any]
+    document: Section
     size: Float
     phases: tuple[str, ...]
     mesh: Mesh
@@ -93,8 +90,11 @@ class ResultFiles:
         arrays, others = (
             {name: self._table(number, name, shape) for name, shape in shapes.items()} for shapes in (basic, derived)
         )
-        if self.is_spatial:
-            arrays |= self._spatial(number, arrays)
+        if self.is_spatial:  # with what is along the fibres
+            for name, rows in (("displacement", n), ("traction", k), ("jump", k)):
+                arrays[name] = np.column_stack([arrays[name], self._table(number, f"axial_{name}", (rows,))])
+            S33, along = self._table(number, "stress_33", (m,)), self._table(number, "axial_stress", (m, 2))
+            arrays["stress"] = np.column_stack([arrays["stress"][:, :2], S33, along, arrays["stress"][:, 2]])
         # Older results have no damage, nothing that slides, and no estimated errors.
         missing = (arrays["status"] != 0).astype(float), np.zeros(k, np.int8), np.full(m, np.nan)
         for name, old in zip(("damage", "sliding", "mesh_error"), missing, strict=True):
@@ -105,23 +105,10 @@ class ResultFiles:
             strain.shape == mean.shape == (v,), f"/state/{number} has a strain or a stress of another size than {v}"
         )
         label, factor, point = str(group.attrs["label"]), float(group.attrs["load_factor"]), int(group.attrs["point"])
-        warmer = float(group.attrs["temperature"]) if self.is_spatial else 0.0
+        warmer = float(group.attrs.get("temperature", 0.0))
         arrays["fluctuation"] = arrays["displacement"] - self.mesh.points @ gradient(strain).T
         name = f"state {number} ({label})"
         return State(name, strain, mean, factor, point, **arrays, derived=others, temperature=warmer)
-
-    def _spatial(self, number: int, plane: Mapping[str, Float]) -> dict[str, Float]:
-        """Return the tables of a state with what is along the fibres."""
-        rows = {"displacement": "n", "traction": "k", "jump": "k"}
-        count = {"n": len(self.mesh.points), "k": len(self.interface.points)}
-        whole = {
-            name: np.column_stack([plane[name], self._table(number, f"axial_{name}", (count[of],))])
-            for name, of in rows.items()
-        }
-        m = len(self.mesh.triangles)
-        S33, (S23, S13) = self._table(number, "stress_33", (m,)), self._table(number, "axial_stress", (m, 2)).T
-        S11, S22, S12 = plane["stress"].T
-        return whole | {"stress": np.column_stack([S11, S22, S33, S23, S13, S12])}
 
     def _table(self, number: int, name: str, shape: tuple[int, ...]) -> Any:
         """Return a table of a state, of the shape that it must have."""
@@ -131,11 +118,7 @@ class ResultFiles:
 
 
 def altered(directory: Path) -> tuple[str, ...]:
-    """Names of the files of a result that are not as the run wrote them, by their checksums.
-
-    Raises:
-        CaseError: one is missing or cannot be read; one line.
-    """
+    """Names of the files that are not as the run wrote them; CaseError, one line, if one cannot be read."""
     document, path = _document(directory / JSON), directory / FIELDS
     if not path.is_file():
         asked = document["case"].get("output", {}).get("fields", False)
@@ -148,11 +131,7 @@ def altered(directory: Path) -> tuple[str, ...]:
 
 @contextmanager
 def opened(directory: Path) -> Iterator[ResultFiles]:
-    """Provide the results in a folder, while the block lasts.
-
-    Raises:
-        CaseError: there are none that can be read; one line.
-    """
+    """Provide the results in a folder, while the block lasts; CaseError, one line, if they cannot be read."""
     changed, path = altered(directory), directory / FIELDS
     with _reading(path):
         file = h5py.File(path, "r")
@@ -177,50 +156,42 @@ def _document(path: Path) -> Mapping[str, Any]:
 def _contents(document: Mapping[str, Any], file: h5py.File, altered: tuple[str, ...]) -> ResultFiles:
     """Return the whole of both files but the states."""
     mesh = Mesh(*(_rows(file[f"mesh/{name}"]) for name in ("points", "triangles", "subdomain", "phase", "body")))
-    own = file["interface"]
-    # Results of before there were several sections have no pairs.
+    own, of_fibre = file["interface"], file["fibre"]
+    # Results of before there were several sections have no pairs, of before bonds could scatter no strengths.
     pair = _rows(own["pair"]) if "pair" in own else np.zeros(len(own["points"]), np.int32)
-    points, normal, length, number, body = (_rows(own[name]) for name in ROWS)
-    rows = InterfaceRows(points, normal, length, number, body, pair)
-    fibres = _fibres(file["fibre"])
-    faces = np.stack([_rows(file[f"interface/{name}"]) for name in ("fibre_node", "matrix_node")], axis=1)
+    rows = InterfaceRows(*[*(_rows(own[name]) for name in ROWS), pair])
+    strength = _rows(of_fibre["strength"]) if "strength" in of_fibre else np.ones(len(of_fibre["number"]))
+    fibres = Fibres(*[*(_rows(of_fibre[name]) for name in ("number", "body", "phase", "centre", "radius")), strength])
+    faces = np.stack([_rows(own[name]) for name in ("fibre_node", "matrix_node")], axis=1)
     size = np.array([file.attrs["width"], file.attrs["height"]], float)
-    phases = tuple(map(str, file.attrs["phases"]))
-    n, m, k = len(mesh.points), len(mesh.triangles), len(rows.points)
-    _expect(mesh.points.shape == (n, 2) and n > 0, "/mesh/points is no table of positions")
-    _expect(mesh.triangles.shape in ((m, 3), (m, 6)) and m > 0, "/mesh/triangles is no table of triangles")
-    _expect(bool((mesh.triangles >= 0).all() and (mesh.triangles < n).all()), "/mesh/triangles names unknown nodes")
-    _expect(
-        mesh.subdomain.shape == mesh.phase.shape == mesh.body.shape == (m,),
-        "/mesh has labels of another number of elements",
-    )
-    _expect(bool((mesh.phase >= 0).all() and (mesh.phase < len(phases)).all()), "/mesh/phase names unknown phases")
-    lengths = {table.shape for table in (rows.length, rows.fibre, rows.body, rows.pair)}
-    alike = rows.points.shape == rows.normal.shape == faces.shape == (k, 2) and lengths == {(k,)}
-    _expect(alike, "/interface has tables of different lengths")
-    _expect_known_pairs(_interfaces(document["case"]), rows, phases)
-    _expect(bool((faces >= 0).all() and (faces < n).all()), "/interface names unknown nodes")
-    within = (rows.fibre >= 1) & (rows.fibre <= len(fibres.radius))
-    _expect(bool(within.all()), "/interface/fibre_number names unknown fibres")
-    return ResultFiles(document, size, phases, mesh, rows, fibres, faces, file, altered)
-
-
-def _fibres(own: h5py.Group) -> Fibres:
-    number, body, phase, centre, radius = (_rows(own[name]) for name in ("number", "body", "phase", "centre", "radius"))
-    # Results of before bonds could scatter have no strengths.
-    strength = _rows(own["strength"]) if "strength" in own else np.ones(len(number))
-    fibres = Fibres(number, body, phase, centre, radius, strength)
-    lengths = {table.shape for table in (fibres.body, fibres.radius, fibres.strength)}
-    alike = len(lengths) == 1 and fibres.centre.shape == (len(fibres.radius), 2)
-    _expect(alike, "/fibre has tables of different lengths")
-    return fibres
-
-
-def _expect_known_pairs(sections: Sequence[Mapping[str, Any]], rows: InterfaceRows, phases: tuple[str, ...]) -> None:
-    known = (rows.pair >= 0) & (rows.pair < max(len(sections), 1))
-    _expect(bool(known.all()), "/interface/pair names unknown interfaces")
+    phases, sections = tuple(map(str, file.attrs["phases"])), _interfaces(document["case"])
+    _expect_shapes(mesh, rows, fibres, faces)
+    for name, table, low, high in (
+        ("/mesh/triangles names unknown nodes", mesh.triangles, 0, len(mesh.points)),
+        ("/mesh/phase names unknown phases", mesh.phase, 0, len(phases)),
+        ("/interface/pair names unknown interfaces", rows.pair, 0, max(len(sections), 1)),
+        ("/interface names unknown nodes", faces, 0, len(mesh.points)),
+        ("/interface/fibre_number names unknown fibres", rows.fibre, 1, len(fibres.radius) + 1),
+    ):
+        _expect(bool(((table >= low) & (table < high)).all()), name)
     named = {name for section in sections for name in section.get("between", ())}
     _expect(named <= set(phases), "the case has interfaces between unknown phases")
+    return ResultFiles(Section(document), size, phases, mesh, rows, fibres, faces, file, altered)
+
+
+def _expect_shapes(mesh: Mesh, rows: InterfaceRows, fibres: Fibres, faces: Int) -> None:
+    n, m, k, f = len(mesh.points), len(mesh.triangles), len(rows.points), len(fibres.radius)
+    columns = 6 if mesh.triangles.shape[1:] == (6,) else 3
+    tables = {
+        "/mesh/points": (mesh.points, (n, 2)), "/mesh/triangles": (mesh.triangles, (m, columns)),
+        **{f"/mesh/{name}": (getattr(mesh, name), (m,)) for name in ("subdomain", "phase", "body")},
+        "/interface/points": (rows.points, (k, 2)), "/interface/normal": (rows.normal, (k, 2)),
+        **{f"/interface/{name}": (getattr(rows, name), (k,)) for name in ("length", "fibre", "body", "pair")},
+        "/interface/fibre_node": (faces, (k, 2)), "/fibre/centre": (fibres.centre, (f, 2)),
+        **{f"/fibre/{name}": (getattr(fibres, name), (f,)) for name in ("body", "phase", "strength")},
+    }  # fmt: skip
+    for name, (table, shape) in tables.items():
+        _expect(table.shape == shape and n > 0 and m > 0, f"{name} has shape {table.shape}, expected {shape}")
 
 
 def _interfaces(case: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:

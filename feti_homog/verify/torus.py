@@ -21,12 +21,8 @@ SAME_PLACE = 1e-2
 class TornSides:
     """The s sides that only one element of its subdomain has: on cuts, interfaces and the boundary of the cell.
 
-    Attributes:
-        element: (s,) the element.
-        nodes: (s, 2 or 3) its ends and, of order 2, the node between them.
-        normal: (s, 2) outward, times the length of the chord.
-        partner: (s,) the side at the same place of the torus, -1 if there is not exactly one.
-        at_void: (s,) whether there is none.
+    Elements (s,), ends and middle nodes (s, 2 or 3), outward normals times the length of the chord (s, 2), the side at
+    the same place of the torus, -1 if there is not exactly one (s,), and whether there is none (s,).
     """
 
     element: Int
@@ -44,13 +40,7 @@ class TornSides:
 
 @dataclass(frozen=True)
 class TornNodes:
-    """The b nodes on torn sides, and which are copies of each other.
-
-    Attributes:
-        node: (b,) number in the mesh.
-        place: (b,) number of its place on the torus, 0..places-1.
-        subdomain, phase: (b,) to which it belongs.
-    """
+    """The b nodes on torn sides: numbers in the mesh and of their places on the torus, subdomains and phases (b,)."""
 
     node: Int
     place: Int
@@ -64,18 +54,24 @@ class TornNodes:
 
 
 def torn(mesh: Mesh, size: Float) -> tuple[TornSides, TornNodes, float]:
-    """Return the torn sides and nodes of a mesh on the torus of the given size (2,), and a distance.
-
-    The distance is how near the same places are.
-    """
-    element, nodes = _torn_sides(mesh)
+    """Return the torn sides and nodes of a mesh on the torus of a size (2,), and how near the same places are."""
+    m, columns = mesh.triangles.shape
+    local = [(*side, 3 + number)[: columns // 3 + 1] for number, side in enumerate(SIDES)]
+    every = mesh.triangles[:, local].reshape(3 * m, -1)
+    low, high = np.sort(every[:, :2], axis=1).T
+    _, first, count = np.unique(low * len(mesh.points) + high, return_index=True, return_counts=True)
+    once = np.sort(first[count == 1])  # nodes are those of one subdomain
+    element, nodes = once // 3, every[once]
     ends = mesh.points[nodes[:, :2]]
     chord = ends[:, 1] - ends[:, 0]
     normal = np.stack([chord[:, 1], -chord[:, 0]], axis=1)
     radius = SAME_PLACE * float(np.hypot(*normal.T).min(initial=float(size.min())))
     side_place = same_places(ends.mean(axis=1), size, radius)
-    alone = np.bincount(side_place, minlength=1)[side_place] == 1
-    sides = TornSides(element, nodes, normal, _partners(side_place), np.asarray(alone))
+    order, sharers = np.argsort(side_place, kind="stable"), np.bincount(side_place, minlength=1)
+    pairs = (np.cumsum(sharers) - sharers)[sharers == 2]
+    partner = np.full(len(side_place), -1)
+    partner[order[pairs]], partner[order[pairs + 1]] = order[pairs + 1], order[pairs]
+    sides = TornSides(element, nodes, normal, partner, np.asarray(sharers[side_place] == 1))
     number, first = np.unique(nodes, return_index=True)
     owner = element[first // nodes.shape[1]]
     place = same_places(mesh.points[number], size, radius)
@@ -121,26 +117,3 @@ def constituents(mesh: Mesh, sides: TornSides) -> Int:
     links = (mesh.subdomain[a[joined]], mesh.subdomain[b[joined]])
     graph = coo_matrix((np.ones(len(links[0])), links), shape=(n, n))
     return np.asarray(connected_components(graph, directed=False)[1], np.int64)
-
-
-def _torn_sides(mesh: Mesh) -> tuple[Int, Int]:
-    """Elements (s,) and nodes (s, 2 or 3) of the sides that occur once; nodes are those of one subdomain."""
-    m, columns = mesh.triangles.shape
-    local = [(*side, 3 + number)[: columns // 3 + 1] for number, side in enumerate(SIDES)]
-    nodes = mesh.triangles[:, local].reshape(3 * m, -1)
-    low, high = np.sort(nodes[:, :2], axis=1).T
-    _, first, count = np.unique(low * len(mesh.points) + high, return_index=True, return_counts=True)
-    once = np.sort(first[count == 1])
-    return once // 3, nodes[once]
-
-
-def _partners(place: Int) -> Int:
-    """(s,) the other side of the same place, -1 where there are not exactly two."""
-    order = np.argsort(place, kind="stable")
-    count = np.bincount(place)
-    first = np.cumsum(count) - count
-    partner = np.full(len(place), -1)
-    pairs = first[count == 2]
-    a, b = order[pairs], order[pairs + 1]
-    partner[a], partner[b] = b, a
-    return partner

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import shutil
+
 import numpy as np
 
+from feti_homog.results import seals
 from feti_homog.verify.certificate import verify
+from feti_homog.verify.leaves import NO_REASON, THINNED
 
 SMALL = 1e-6
 MATRIX = ("material", "matrix")
@@ -13,6 +17,24 @@ MATRIX = ("material", "matrix")
 def broken(folder):
     """Return the laws that a result breaks."""
     return {finding.check.name for finding in verify(folder).findings if not finding.holds}
+
+
+def check_what_is_left(kind, certificate):
+    """Nothing that a reader relies on is left unchecked, and nothing without a reason."""
+    assert NO_REASON not in certificate.unchecked
+    assert (THINNED in certificate.unchecked) == (kind in ("peaks", "thinned", "cooled, thinned"))
+    left = {name for names in certificate.unchecked.values() for name in names}
+    relied = {"effective_stiffness", "moduli", "bounds", "constants", "status", "check_tolerance", "peak", "compliance"}
+    relied |= {f"path[].{name}" for name in ("stored", "work", "dissipated", "load_factor", "strain", "broke")}
+    relied |= {"envelope[].factor", "load.stress", "angle[].stiffness", "tips", "checks.symmetry", "solver.rtol"}
+    assert not relied & left and {"version", "memory", "timings", "digest"} <= left
+
+
+def resealed(folder, copy, content):
+    """Return a copy of a result with another document, under the checksum that belongs to it."""
+    shutil.copytree(folder, copy, ignore=shutil.ignore_patterns("*.csv"))
+    (copy / "result.json").write_text(seals.dumps(content))
+    return copy
 
 
 def scale(name, factor=1 + SMALL, state=0):

@@ -130,6 +130,15 @@ CASES: dict[str, dict[str, Any]] = {
         "path": {"waypoints": WAYPOINTS, "method": "increments", "increments": 12},
     },
 }
+RUBBING = {
+    "cell": SQUARE,
+    "interface": STRENGTHS | {"friction": 0.3, "debonded": [ARC | {"angle": 150.0}]},
+    "path": {"waypoints": [{"E22": -0.05}, {"E22": -0.05, "gamma12": 0.08}, {"E22": -0.05, "gamma12": -0.02}]},
+}
+CASES |= {
+    "friction": RUBBING,
+    "friction by steps": RUBBING | {"path": RUBBING["path"] | {"method": "increments", "increments": 12}},
+}
 
 IN_SPACE = {"cell": SQUARE, "matrix": WARM, "fibre": WARM_FIBRE, "plane": "generalized"}
 COOLED = [{"temperature": -1000.0}, {"S22": 6.0}, {"S22": -1.0}, {"temperature": 0.0, "S22": 1.0}]
@@ -185,7 +194,17 @@ LOADS: dict[str, dict[str, Any]] = {
         "load": {"to": {"E11": -0.02, "S22": 0.5}},
     },
 }
-CASES |= MIXED_PATHS | LOADS
+# Derivatives of constants, and those of energies under contact.
+DERIVATIVES: dict[str, dict[str, Any]] = {
+    "derivatives": IN_SPACE
+    | {"interface": SPRINGS, "output": {"sensitivities": True}, "petsc": {"feti_ksp_rtol": 1e-10}},
+    "derivatives under contact": {
+        "cell": SQUARE,
+        "interface": SPRINGS | {"debonded": [ARC | {"angle": 90.0}]},
+        "output": {"sensitivities": True},
+    },
+}
+CASES |= MIXED_PATHS | LOADS | DERIVATIVES
 
 
 def document(kind: str) -> dict[str, Any]:
@@ -195,6 +214,7 @@ def document(kind: str) -> dict[str, Any]:
     material = {"matrix": parts.pop("matrix", MATRIX), "fibre": parts.pop("fibre", FIBRE)}
     plane = {"type": analysis, "plane": parts.pop("plane", "strain")}
     output = {"pictures": False} | ({"states": parts.pop("states", "all")} if "path" in parts else {})
+    output |= parts.pop("output", {})
     return {"name": kind, "material": material, "analysis": plane, "output": output} | parts
 
 

@@ -14,12 +14,9 @@ from feti_homog.typing import Float
 
 
 class BondLaw(ABC):
-    """Law of some bonds.
+    """Law of some bonds, whose section has one number of all or one of each (k,).
 
-    Attributes:
-        section: [interface], with one number of all bonds or one of each (k,).
-        has_toughness: breaking bonds take the energy `lost`.
-        has_tips: result.json has the energies at the tips of debonding.
+    With toughness, breaking bonds take the energy `lost`; with tips, result.json has energies at those of debonding.
     """
 
     has_toughness: ClassVar[bool] = False

@@ -15,7 +15,7 @@ import numpy as np
 from feti_homog.typing import Float
 from feti_homog.verify.bond_laws.law import BondLaw, pulled
 
-HALVINGS = 200
+HALVINGS = 80
 # The traction at which the last exponential tooth begins, over the peak.
 TAIL = 0.01
 MODES = np.linspace(0.0, np.pi / 2, 33)
