@@ -1,0 +1,151 @@
+"""Every law of the certificate has a result that breaks it: no check always holds, and none is never called."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from support.falsifications import attribute, both, broken, document, raised
+from support.verified_results import falsified
+from unit.verify import (
+    test_falsified_envelopes,
+    test_falsified_loads,
+    test_falsified_results,
+    test_falsified_spatial_results,
+)
+
+from feti_homog.verify.findings import checks
+
+pytestmark = pytest.mark.slow
+
+TABLES = (
+    test_falsified_results.FALSE,
+    test_falsified_loads.FALSE,
+    test_falsified_spatial_results.FALSE,
+    test_falsified_envelopes.FALSIFICATIONS,
+)
+
+
+def turned_element(_, file):
+    file["mesh/triangles"][5] = file["mesh/triangles"][5][[0, 2, 1, 5, 4, 3]]
+
+
+def moved_subdomain(_, file):
+    """Move a part of the matrix, which is glued to others."""
+    subdomain, phase = file["mesh/subdomain"][()], file["mesh/phase"][()]
+    own = np.unique(file["mesh/triangles"][()][subdomain == subdomain[phase == 0][0]])
+    values = file["state/0/displacement"][()]
+    values[own] += 1e-3
+    file["state/0/displacement"][()] = values
+
+
+def pulled_face(_, file):
+    state = next(state for state in file["state"].values() if (state["status"][()] == 1).any())
+    tractions = state["traction"][()]
+    tractions[state["status"][()] == 1, 0] *= -1.0
+    state["traction"][()] = tractions
+
+
+def other_way(_, file):
+    """Faces slide with their friction."""
+    slid = next(state for state in file["state"].values() if state["sliding"][()].any())
+    slid["sliding"][()] = -slid["sliding"][()]
+
+
+def scaled_derivatives(content, _):
+    data = content["sensitivities"]
+    data["derivatives"] = (1.01 * np.array(data["derivatives"])).tolist()
+
+
+def scaled_constants(content, _):
+    data = content["sensitivities"]
+    data["constant_values"] = (1.01 * np.array(data["constant_values"])).tolist()
+
+
+# Of laws beside those of the tables: a kind of result, and edits each of which breaks the law.
+BREAK = {
+    "files": ("bonded", [lambda content, _: content.update(version="2.0.0")]),
+    "status": (
+        "bonded",
+        [
+            document("status", to="not converged"),
+            both(document("status", to="not converged"), document("faults", to=["E11: check hill: 1.0e-04, expected"])),
+            document("checks", "hill", to=1e-4),
+            document("check_tolerance", factor=10.0),
+            document("kkt_tolerance", factor=10.0),
+            document("solver", "rtol", factor=10.0),
+            document("solver", "converged_reason", to=[2, -3, 2]),
+            document("checks", "symmetry", factor=10.0),
+            document("remarks", to=["[cell] order = 1: polygons have 3.0% less area than the fibres asked for"]),
+        ],
+    ),
+    "cell": (
+        "plane",
+        [
+            document("cell", "mesh_size", factor=0.5),
+            document("cell", "refine", to=0),
+            document("cell", "refine", to=2),
+            document("case", "cell", "order", to=2),
+            both(document("cell", "mesh_size", factor=0.1), document("case", "cell", "mesh_size", factor=0.1)),
+        ],
+    ),
+    "mesh error": (
+        "bonded",
+        [
+            document("mesh_error", "energy", factor=100.0),
+            document("mesh_error", "energy", factor=0.01),
+            document("mesh_error", "effective_stiffness", 0, 1, factor=1.01),
+            document("mesh_error", "effective_stiffness", 0, 0, factor=1e-3),
+            document("mesh_error", "effective_stiffness", 0, 0, factor=1e3),
+            document("mesh_error", "constants", "E1", factor=10.0),
+        ],
+    ),
+    "mesh": ("bonded", [turned_element]),
+    "continuity": ("bonded", [moved_subdomain]),
+    "mean strain": ("bonded", [attribute("strain", factor=1.01)]),
+    "symmetry": ("bonded", [document("effective_stiffness", 0, 1, factor=1.01)]),
+    "tension": ("contact", [pulled_face]),
+    "rates": (
+        "contact",
+        [
+            *(document("tips", name, 0, factor=1.01) for name in ("G", "G_I", "G_II", "psi", "angle", "length")),
+            document("tips", "fibre", 0, to=2),
+            document("tips", "load", 0, to="E33"),
+        ],
+    ),
+    "sliding": ("friction", [other_way]),
+    # Energies stay balanced: heat that falls, heat of slips that there are none of, loss without breaks.
+    "heat": ("friction", [
+        document("path", 5, "work", factor=1.01), raised(5, -1e-3, "friction_heat", "work"),
+        raised(5, 1e-3, "dissipated", "dissipated_strain_controlled", "work"),
+    ]),
+    "sensitivities": ("derivatives", [scaled_derivatives]),
+    "constants": ("derivatives under contact", [scaled_constants]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("law", BREAK)
+def test_false_results_break_the_law(results, tmp_path, law):
+    kind, edits = BREAK[law]
+    for number, edit in enumerate(edits):
+        assert law in broken(falsified(results(kind), tmp_path / str(number), edit)), number
+
+
+def test_the_heat_of_an_increment_is_that_of_its_slips_in_a_whole_result(results, tmp_path):
+    """The balance of work holds, and heat grows: only the slips in the fields tell."""
+    path = json.loads((results("friction by steps") / "result.json").read_text())["path"]
+    step = next(k for k, point in enumerate(path) if k and not point["broke"])
+    edit = raised(step, 1e-4, "friction_heat", "work")
+    assert broken(falsified(results("friction by steps"), tmp_path / "copy", edit)) == {"files", "heat"}
+
+
+def test_a_table_beside_the_result_breaks_its_law(results, tmp_path):
+    copy = falsified(results("path"), tmp_path / "copy", lambda content, _: None)
+    (copy / "path.csv").write_text("load_factor\n0.5\n")
+    assert "CSV" in broken(copy)
+
+
+def test_every_law_is_broken_by_some_example():
+    known = {*BREAK, "CSV"}.union(*(laws for table in TABLES for _, _, laws in table.values()))
+    assert {check.name for check in checks(1e-8, users_mesh=False, has_coatings=False)} <= known
