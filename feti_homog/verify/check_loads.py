@@ -92,11 +92,7 @@ def check_load(findings: Findings, cell: DiscreteCell, states: States) -> None:
     document, case = cell.files.document, cell.files.case
     same = json.loads(str(cell.files.file.attrs["case"])) == case
     findings.require("tables", same, "the case, which differs between the two files")
-    # The unit strains, and the unit of temperature, in the order of their states.
-    order = np.eye(6)[SPATIAL_ORDER] if cell.files.is_spatial else np.eye(3)
-    unit = [Prescribed.strain(strain, 0.0) for strain in order]
-    unit[4:4] = [] if cell.expansions is None else [Prescribed.strain(np.zeros(6), 1.0)]
-    rows, numbers = list(_rows(document, case, unit)), [state.point for state in states]
+    rows, numbers = list(_rows(document, case, _unit_loads(cell))), [state.point for state in states]
     scales = _scales(cell, states, [load for load, _ in rows])
     if "path" in document:
         _check_kept(findings, case["output"]["states"], numbers, list(document["states"]), len(rows))
@@ -112,6 +108,14 @@ def check_load(findings: Findings, cell: DiscreteCell, states: States) -> None:
         _check_entries(findings, state, *row, scales)
     for place, matrix in linear_stiffnesses(document, cell.files.contact):
         findings.record("symmetry", relative(matrix - matrix.T, float(np.abs(matrix).max())), place)
+
+
+def _unit_loads(cell: DiscreteCell) -> list[Prescribed]:
+    """Return the unit strains, and the unit of temperature, in the order of their states."""
+    order = np.eye(6)[SPATIAL_ORDER] if cell.files.is_spatial else np.eye(3)
+    unit = [Prescribed.strain(strain, 0.0) for strain in order]
+    unit[4:4] = [] if cell.expansions is None else [Prescribed.strain(np.zeros(6), 1.0)]
+    return unit
 
 
 def _scales(cell: DiscreteCell, states: States, loads: Sequence[Prescribed]) -> tuple[float, float, float]:

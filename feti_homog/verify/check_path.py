@@ -28,6 +28,8 @@ from feti_homog.verify.prescribed import NAMES, SAME_SHARE, TEMPERATURE, damaged
 NOISE_PER_RTOL = 20.0
 # Directions of bonds are distinguished to so many degrees.
 SAME_DIRECTION = 1e-6
+# A largest stress is a peak if the path falls by this share of it afterwards.
+LEAST_FALL = 0.05
 Point = Mapping[str, Any]
 
 
@@ -168,11 +170,19 @@ def _check_landmarks(findings: Findings, peak: Section, points: Points, stress: 
         findings.record("tables", off if left >= peak["event"] else np.inf, "peak.stress_left")
     cut = left is None and bool(load[-1] < 1.0 - SAME_SHARE)
     findings.require("tables", peak.get("so_far", cut) == cut, "peak.so_far")
-    marks = {"first break": first, "largest so far" if cut else "peak": peak["event"], "after the peak": left}
+    name = "largest so far" if cut else _name_of_largest(peak, stress)
+    marks = {"first break": first, name: peak["event"], f"after the {name}": left}
     marks["end"] = len(points) - 1
     for number, point in enumerate(points):
         words = " and ".join(name for name, own in marks.items() if own == number)
         findings.require("tables", point.get("mark", words) == words, f"path[{number}].mark")
+
+
+def _name_of_largest(peak: Section, stress: Float) -> str:
+    """Return what the largest stress of a whole path is: a peak, if the path falls afterwards."""
+    top = peak["stress"]
+    falls = bool(top) and 1.0 - min(stress[-1] / top, peak.get("stress_left", top) / top) >= LEAST_FALL
+    return "peak" if falls else "largest stress"
 
 
 def _check_breaks(findings: Findings, states: States, points: Points, by_events: bool) -> None:

@@ -115,7 +115,7 @@ def _check_energies(
     data = document["sensitivities"]
     data.leaves_open("derivatives")
     known = {f"C{i + 1}{j + 1}": C for (i, j), C in np.ndenumerate(np.array(document["effective_stiffness"]))}
-    known |= {f"thermal_stress.{k + 1}": heat for k, heat in enumerate(document.get("thermal_stress", ()))}
+    known |= {f"thermal_S{k + 1}{k + 1}": heat for k, heat in enumerate(document.get("thermal_stress", ()))}
     for name, value in zip(data["constants"], data["constant_values"], strict=True):
         findings.record("constants", abs(value - known.get(name, np.inf)) / (abs(value) or 1e-300), name)
     strains, _ = _in_order(states[: len(states) // 2])  # those under minus the unit loads follow

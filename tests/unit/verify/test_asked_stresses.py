@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from feti_homog.verify.check_loads import _check_prescribed, _Scales
+from feti_homog.verify.check_loads import _check_prescribed, _scales
 from feti_homog.verify.findings import Findings, checks
 from feti_homog.verify.prescribed import Prescribed
 
@@ -21,7 +21,8 @@ def test_a_stress_that_is_missed_is_measured_by_the_load(strain, missed, holds):
     state = State(np.array([-0.001, 0.0, strain]), np.array([-0.004, 0.0, 0.008 - missed]), 0.0)
     cell = SimpleNamespace(reuss=np.diag([4.0, 4.0, 1.0]), largest_strain=strain, loads=lambda state: state.strain)
     findings = Findings(checks(1e-8, False, has_coatings=False))
-    scales = _Scales.of(cell, [state], [load])
-    assert scales.imposed == pytest.approx(0.008 - missed)
-    _check_prescribed(findings, load, state.strain, state.stress, 0.0, scales, "a state")
+    scales = _scales(cell, [state], [load])
+    assert scales[2] == pytest.approx(0.008 - missed)
+    entries = {"strain": state.strain, "stress": state.stress, "temperature": 0.0}
+    _check_prescribed(findings, load, entries, scales, "a state")
     assert all(finding.holds for finding in findings.worst()) is holds

@@ -110,7 +110,7 @@ def test_constants_in_space():
     alpha = -S @ raw["thermal_stress"]
     E, G = 1 / S.diagonal()[:3], 1 / S.diagonal()[3:]  # G23, G13, G12 of the cell
     material = [E[2], E[0], E[1], G[1], G[0], G[2], -S[2, 0] * E[2], -S[2, 1] * E[2], -S[0, 1] * E[0]]
-    np.testing.assert_allclose(without_errors(blocks, "Material axes"), [*material, *alpha[[2, 0, 1]]], rtol=2e-2)
+    np.testing.assert_allclose(without_errors(blocks, "Material axes"), material, rtol=2e-2)
     ratios = [-S[0, 1] * E[0], -S[0, 2] * E[0], -S[1, 2] * E[1]]
     np.testing.assert_allclose(without_errors(blocks, "Engineering constants"), [*E, *G[::-1], *ratios], rtol=2e-2)
     angle = np.linspace(0.0, np.pi, 2000)
