@@ -29,6 +29,8 @@ Named = Mapping[str, Float]
 LEAST_RATE = 2.0
 # Halvings that a repetition takes at most: 16 times the unknowns.
 MOST_HALVINGS = 2
+# True errors of the energy / estimated ones, at the most.
+OFF = 3.0
 # Share of a bound by which rounding may leave a value outside.
 ROUNDING = 1e-9
 
@@ -59,7 +61,7 @@ def mesh_error(
     """Return the entry `mesh_error` of `Result`, empty without errors.
 
     A constant f(C) errs by |f(C - signed) - f(C)| or, if that is more, |f(C - least) - f(C)|.  Notes where the error is
-    more than the case asked for, and values outside their bounds, which are faults if they are by more than it.
+    more than the case asked for, and values outside their bounds, which are faults beyond any error of the mesh.
 
     Args:
         secants: `effective_stiffness` and what follows from it, as in `Result`.
@@ -68,17 +70,17 @@ def mesh_error(
     """
     if not of_plus:
         return {}
-    parts = {name: _secants(of_plus, name) for name in ("absolute", "signed", "least", "apart")}
+    parts = {name: _secants(of_plus, name) for name in ("absolute", "signed", "least")}
     found = parts["absolute"]
     found |= {f"{name}_compression": entry for name, entry in _secants(of_minus, "absolute").items()}
     stiffness, heat = secants["effective_stiffness"], secants.get("thermal_stress")
     constants, energy = dict[str, float](), _of_energy(stiffness, parts)
     if "moduli" in secants or "constants" in secants:
         here = _constants(stiffness, heat)
-        changed = {name: _constants(*_changed(stiffness, heat, parts[name])) for name in ("signed", "least", "apart")}
+        changed = {name: _constants(*_changed(stiffness, heat, parts[name])) for name in ("signed", "least")}
         off = {part: {name: np.abs(each[name] - here[name]) for name in here} for part, each in changed.items()}
         errors = {name: np.maximum(off["signed"][name], off["least"][name]) for name in here}
-        _note_bounds(context, secants, here, errors, off["apart"])
+        _note_bounds(context, secants, here, errors, energy)
         expansion = errors.pop("thermal_expansion", None)
         found |= {} if expansion is None else {"thermal_expansion": expansion}
         constants = {name: float(value) for name, value in errors.items()}
@@ -120,11 +122,12 @@ def _rate(cell: Cell, energy: float, before: CoarseMeshError | None) -> float:
 
 
 def _note_bounds(
-    context: AnalysisContext, secants: Mapping[str, Any], here: Named, errors: Named, apart: Named
+    context: AnalysisContext, secants: Mapping[str, Any], here: Named, errors: Named, energy: float
 ) -> None:
-    """Note constants outside the bounds of their phases, of a cell as symmetric as these ask for, within its errors.
+    """Note constants outside the bounds of their phases; report a fault beyond any possible error of the mesh.
 
-    The bounds are those of the phases' meshed shares, from which the elements alone err.
+    No constant errs relatively by more than `energy`, the largest relative error of the strain energy, of which the
+    estimate counts OFF times.  Bounds apply to cells of their symmetry, and follow from the meshed shares of phases.
     """
     limits: dict[str, Sequence[float]] = {}
     if (known := secants.get("bounds")) is not None and known.hashin_shtrikman is not None:
@@ -136,17 +139,16 @@ def _note_bounds(
     if secants.get("fibre_bounds") is not None and here["deviation"] <= errors["deviation"]:
         limits |= {name: pair for name, pair in plain(secants["fibre_bounds"]).items() if pair is not None}
     for name, (lower, upper) in limits.items():
-        value, error = float(here[name]), float(max(errors[name], apart[name]))
+        value, error = float(here[name]), float(errors[name])
         outside = max(lower - value, value - upper)
         if outside <= ROUNDING * abs(upper):
             continue
         words = f"{name} = {value:.6g} is outside its bounds, {lower:.6g} and {upper:.6g}, by {outside:.1e}"
-        if outside > error:
-            context.checks.faults.append(
-                f"{words}, more than the estimated error of the mesh, {error:.1e}; result marked"
-            )
+        possible = OFF * max(error, energy * abs(value))
+        if outside > possible:
+            context.checks.faults.append(f"{words}, more than any error of the mesh, {possible:.1e}; result marked")
         else:
-            context.notes.append(f"{words}, within the estimated error of the mesh, {error:.1e}: refine")
+            context.notes.append(f"{words}; the estimated error of the mesh is {error:.1e}: refine")
 
 
 def state_error(context: AnalysisContext, responses: Sequence[Response]) -> tuple[dict[str, float], list[Response]]:
