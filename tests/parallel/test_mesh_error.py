@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from reference.closed_forms import cubic
@@ -11,10 +9,9 @@ from reference.references import ARC_OF_120_DEGREES_FINE, AXIAL_SHEAR, BONDED, E
 from support.cases import FIBRE, MATRIX, make_case, solve
 
 from feti_homog import Case, run
-from feti_homog.analysis.mesh_errors import mesh_error
 from feti_homog.fem.arc_error import ArcSides, arc_energy
 from feti_homog.fem.stress_recovery import RecoveredStress
-from feti_homog.homogenization.mesh_error import EnergyErrors, energy_errors
+from feti_homog.homogenization.mesh_error import energy_errors
 from feti_homog.homogenization.partition_policy import BY_COST
 
 pytestmark = pytest.mark.parallel
@@ -276,37 +273,3 @@ def test_states_of_other_analyses_have_theirs(comm, kind):
     # S11 of the arc with contact under E11 = -1 and free under E11 = 1.
     exact = ARC_OF_120_DEGREES_FINE.value[4 if kind == "load" else 0]
     assert 0.5 < abs(point.stress[0] / exact - 1) / point.mesh_error < 2.0
-
-
-def test_what_is_outside_its_bounds_within_its_error_is_remarked(comm):
-    # Soft fibres: the hexagonal cell is near the upper bound, and elements are too stiff.
-    stiff, soft = {"young": 73.0, "poisson": 0.45}, {"young": 1.0, "poisson": 0.3}
-    found = result(comm, phases=(stiff, soft), cell={"mesh_size": 0.5, "fibre_fraction": 0.1})
-    value, (_, upper) = found.moduli.bulk, found.bounds.hashin_shtrikman.bulk
-    assert value > upper
-    assert any(f"bulk = {value:.6g} is outside its bounds" in remark for remark in found.remarks)
-
-
-@pytest.mark.parametrize("fraction", [0.1, 0.25, 0.5])
-def test_an_estimate_is_no_limit_of_what_is_wrong(comm, fraction):
-    """A bound is passed by 1.0e-05 where the estimate is 8.0e-06: the mesh may err by a little more than that."""
-    cell = {"geometry": "hexagonal", "fibre_fraction": fraction, "accuracy": 0.03}
-    material = {"matrix": {"young": 1.0, "poisson": 0.25}, "fibre": {"young": 0.01, "poisson": 0.25}}
-    kind = {"analysis": {"type": "stiffness", "plane": "strain"}}
-    found = run(Case.parse({"cell": cell, "material": material, **kind}), comm)
-    error, (_, upper) = found.mesh_error.constants["bulk"], found.bounds.hashin_shtrikman.bulk
-    assert found.status == "done" and (fraction > 0.1 or found.moduli.bulk > upper + error)
-    assert (found.moduli.bulk > upper) == any("outside its bounds" in remark for remark in found.remarks)
-
-
-@pytest.mark.parametrize(("size", "is_fault"), [(1e-3, True), (0.1, False)])
-def test_what_is_outside_its_bounds_by_more_than_its_error_is_a_fault(size, is_fault):
-    faults, notes = [], []
-    case = Case.parse(CASE)
-    context = SimpleNamespace(case=case, notes=notes, checks=SimpleNamespace(faults=faults))
-    bounds = SimpleNamespace(hashin_shtrikman=SimpleNamespace(bulk=(1.0, 1.95), shear=(0.4, 0.5)))
-    secants = {"effective_stiffness": cubic(2.5, 1.5, 0.5), "moduli": None, "bounds": bounds}
-    mesh_error(context, secants, [EnergyErrors(size * np.eye(3), np.zeros((3, 3)), np.zeros((0, 3)))], [])
-    (words,) = faults if is_fault else notes
-    assert not (notes if is_fault else faults)
-    assert words.startswith("bulk = 2 is outside its bounds, 1 and 1.95, by 5.0e-02")
