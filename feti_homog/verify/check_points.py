@@ -12,7 +12,7 @@ from feti_homog.typing import Bool, Float, Int
 from feti_homog.verify.bonds import law_at
 from feti_homog.verify.check_fields import BONDED
 from feti_homog.verify.check_loads import COUNTS, StateNumbers, States, tips
-from feti_homog.verify.check_mesh import directions
+from feti_homog.verify.check_mesh import directions, from_centre
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.findings import Findings, relative
 from feti_homog.verify.leaves import Points, Section
@@ -149,7 +149,10 @@ def _check_rates(findings: Findings, cell: DiscreteCell, given: Section | None, 
     findings.record("rates", relative(first * np.sin(turn) ** 2 - second * np.cos(turn) ** 2, np.abs(G)), at)
     findings.record("rates", np.where(np.isin(load, LOADS), 0.0, np.inf), at)
     for t in range(len(G)):
-        own, radius = (rows.fibre == number[t]) & (rows.pair == pair[t] - 1), cell.files.fibres.radius[: number[t]][-1]
+        own = (rows.fibre == number[t]) & (rows.pair == pair[t] - 1)
+        # A coating has the number of its fibre and another radius.
+        away = from_centre(rows.points[own], cell.files.fibres.centre[rows.fibre[own] - 1], cell.files.size)
+        radius = float(np.hypot(*away.T).mean()) if own.any() else np.nan
         chords = np.append(2 * radius * np.abs(np.sin(np.radians(about[own] - angle[t]) / 2)), MODE_LENGTH * radius)
         off = np.abs(chords - length[t]).min() / length[t] + (chords[:-1].min(initial=np.inf) > AT_NODE * radius)
         findings.record("rates", max(off - AT_NODE, 0.0), at(t))

@@ -62,10 +62,10 @@ def chained_sets(path: Path) -> None:
 
 NODE = ("*NODE, NSET=all", "*NODE, NSET=all, {}")
 MESHES: dict[str, tuple[Content, str]] = {
-    "a pipe.msh": (os.mkfifo, "no such file"),
-    "endless.msh": (lambda path: path.symlink_to("/dev/zero"), "no such file"),
-    "endless.vtu": (lambda path: path.symlink_to("/dev/zero"), "no such file"),
-    "endless.inp": (lambda path: path.symlink_to("/dev/zero"), "no such file"),
+    "a pipe.msh": (os.mkfifo, "a pipe or device"),
+    "endless.msh": (lambda path: path.symlink_to("/dev/zero"), "a pipe or device"),
+    "endless.vtu": (lambda path: path.symlink_to("/dev/zero"), "a pipe or device"),
+    "endless.inp": (lambda path: path.symlink_to("/dev/zero"), "a pipe or device"),
     "sparse.msh": (lambda path: os.truncate(os.open(path, os.O_CREAT | os.O_RDWR), 20 << 30), "more than 1024 MiB"),
     "empty.msh": ("", ""),
     "empty.inp": ("", ""),

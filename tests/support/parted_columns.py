@@ -100,7 +100,7 @@ class Columns:
         pairs = [{"between": ["matrix", PHASES[tag]], "friction": self.friction[tag]} | debonded for tag in tags]
         name = "S11" if self.across == 0 else "S22"
         return {
-            "cell": {"geometry": "mesh", "file": "cell.msh"},
+            "cell": {"geometry": "mesh", "file": "cell.msh", "voids": True},
             "material": {PHASES[tag]: {"young": 1.0 + tag, "poisson": 0.2 + 0.02 * tag} for tag in (1, *tags)},
             "analysis": {"type": "path", "plane": plane},
             "interface": pairs if len(pairs) > 1 else pairs[0],
