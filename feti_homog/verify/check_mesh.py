@@ -138,7 +138,7 @@ def _shape(cell: DiscreteCell) -> tuple[Float, Float, Bool]:
 def _frames(cell: DiscreteCell) -> Float:
     """(k, 2, 2) frame F of the circle or ellipse c + F p, |p| = 1, that each interface node is on; NaN if unknown."""
     rows, own = cell.files.interface, cell.files.document["fibres"]
-    axes = np.array([fibre.get("semi_axes", [fibre.get("radius", np.nan)] * 2) for fibre in own], float)
+    axes = np.array([fibre.get("semi_axes", [fibre.get("radius", np.nan)] * 2) for fibre in own], float).reshape(-1, 2)
     angle = np.radians([fibre.get("angle", 0.0) for fibre in own])
     thickness = np.array([fibre.get("coating", np.nan) for fibre in own], float)
     around = np.stack([np.cos(angle), -np.sin(angle), np.sin(angle), np.cos(angle)], axis=1).reshape(-1, 2, 2)
