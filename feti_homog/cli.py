@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 LAUNCHER_HELP = "Switches of Open MPI go to mpirun: --allow-run-as-root, --oversubscribe (more ranks than cores)."
 GONE = {"statistics": "is drivers/fibre_statistics.py now", "schema": "is gone: `feti-homog keys` has all keys"}
-"""Commands of earlier versions, and what replaces them."""
+"""Removed commands, each with its replacement."""
 COMMANDS = (run.add, products.add, fibres.add, sweep.add, run.add_reference)
 
 

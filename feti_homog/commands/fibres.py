@@ -20,7 +20,7 @@ FIBRES_HELP = (
 
 
 def add(actions: argparse._SubParsersAction[Any]) -> None:
-    """Add the command to those of a parser."""
+    """Add the command `fibres` to a parser."""
     parser = actions.add_parser("fibres", help="print the fibres of a cell as a table", description=FIBRES_HELP)
     parser.add_argument("source", type=folder, metavar="CASE.toml|DIR", help="a case file, or a folder of results")
     parser.add_argument("--out", type=Path, metavar="FILE.csv", help="write the table to a file instead of printing it")

@@ -43,7 +43,7 @@ OF_THE_CELL = {"E1": "E3", "E2": "E1", "E3": "E2", "G12": "G13", "G13": "G23", "
 """By the name of a constant in material axes, its name in the axes of the cell."""
 _PLACES = (("expansion.", EXPANSIONS), ("thermal_stress.", THERMAL_STRESSES), ("alpha", MATERIAL_EXPANSIONS))
 FORMER = {f"{former}{k + 1}": names[k] for former, names in _PLACES for k in range(3)}
-"""By names that are no more, those in their place."""
+"""Removed names, each with its replacement."""
 # Names that a ply has the other way: what they are, in a cell, and the names of that the other way.
 _READ_EITHER_WAY = {
     "E1": ("Young's modulus", ACROSS, "E_axial"), "E3": ("Young's modulus", ALONG, "E_transverse"),

@@ -147,7 +147,7 @@ class Subdomain:
 
     @property
     def is_mixed(self) -> bool:
-        """True if elements are mixed, those of any material."""
+        """True if any material has mixed elements."""
         return bool(np.any(self.mixed))
 
     @property

@@ -173,7 +173,7 @@ def assembled(
 
 
 def _in_triangles(blocks: Sequence[Block], known: Int, points: Float) -> list[Block]:
-    """Return triangles of three nodes, those of quadrilaterals last, two of each."""
+    """Return triangles of three nodes; two triangles for each quadrilateral come last."""
     found = [replace(block, nodes=block.corners) for block in blocks]
     quads = [block for block in found if block.nodes.shape[1] == 4]
     if not quads:
