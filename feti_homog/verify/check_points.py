@@ -152,7 +152,7 @@ def _check_rates(findings: Findings, cell: DiscreteCell, given: Section | None, 
         own = (rows.fibre == number[t]) & (rows.pair == pair[t] - 1)
         # A coating has the number of its fibre and another radius.
         away = from_centre(rows.points[own], cell.files.fibres.centre[rows.fibre[own] - 1], cell.files.size)
-        radius = float(np.hypot(*away.T).mean()) if own.any() else np.nan
+        radius = float(np.median(np.hypot(*away.T))) if own.any() else np.nan
         chords = np.append(2 * radius * np.abs(np.sin(np.radians(about[own] - angle[t]) / 2)), MODE_LENGTH * radius)
         off = np.abs(chords - length[t]).min() / length[t] + (chords[:-1].min(initial=np.inf) > AT_NODE * radius)
         findings.record("rates", max(off - AT_NODE, 0.0), at(t))
