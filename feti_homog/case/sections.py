@@ -147,8 +147,8 @@ class Output:
         boolean,
         "Estimate the error that the mesh makes of every constant: about a twentieth of a run that writes fields where "
         "refine >= 1, up to a sixth of large cells without fields and of those with elements of order 2, a seventh of "
-        "a case in sweeps of small cells; else, with polygons, and beside debonded arcs with elements of order 2 or a "
-        "tip_size, up to three fifths of one without fields.",
+        "a case in sweeps of small cells, a fifth of bonded cells with linear elements; else, with polygons, and "
+        "beside debonded arcs with elements of order 2 or a tip_size, up to three fifths of one without fields.",
         default=True,
     )
     sensitivities: bool = key(

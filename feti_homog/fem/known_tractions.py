@@ -31,16 +31,11 @@ class KnownTractions:
     traction: Float
 
     @classmethod
-    def at(cls, node: Int, normals: Float, traction: Float) -> KnownTractions:
-        """Make them of the ends of sides, of which a vertex has several; its normal is their mean.
-
-        Vertices at which the normals cancel are left out.
-        """
-        own, first, of, count = np.unique(node, return_index=True, return_inverse=True, return_counts=True)
-        mean = np.stack([np.bincount(of, normal, len(own)) for normal in normals.T], axis=1) / count[:, None]
+    def at(cls, node: Int, mean: Float, traction: Float) -> KnownTractions:
+        """Make them of the mean normals (n, 2) of the sides at vertices, but for those at which these cancel."""
         length = np.hypot(*mean.T)
         kept = length > NO_NORMAL
-        return cls(own[kept], mean[kept] / length[kept, None], traction[first[kept]])
+        return cls(node[kept], mean[kept] / length[kept, None], traction[kept])
 
     def imposed(self, stress: Float, vertex: Int, voigt: Int, flexibility: Float) -> Float:
         """Return stresses (vertices, m, k) with these tractions at `vertex` (n,).

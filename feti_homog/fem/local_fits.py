@@ -61,11 +61,11 @@ class Neighbours:
         moved = one, moved_x, moved_y, xx + a * (x + moved_x), xy + a * y + b * moved_x, yy + b * (y + moved_y)
         return NEIGHBOURS[1] * np.stack([np.bincount(self.at, row, moments.shape[1]) for row in moved])
 
-    def with_moments(self, moments: Float, order: int) -> Float:
-        """(vertices, p, p) moments and a share of those of neighbours."""
+    def shared_matrices(self, moments: Float, order: int) -> Float:
+        """(vertices, p, p) the same of moments (vertices, p, p)."""
         T = _translations(self.vector, order)
         moved = T @ moments[self.other] @ T.transpose(0, 2, 1)
-        return moments + NEIGHBOURS[order] * gathered(self.at, moved, len(moments))
+        return NEIGHBOURS[order] * gathered(self.at, moved, len(moments))
 
 
 def linear_values(vertices: Int, away: Float, weights: Float, values: Float, neighbours: Neighbours) -> Float:
@@ -135,7 +135,8 @@ def gathered(place: Int, values: Float, size: int) -> Float:
     return np.asarray(sums.reshape(size, *shape))
 
 
-def normalized(moments: Float) -> tuple[Float, Float]:
-    """Moments (n, p, p) scaled to a diagonal of 1 and a little more, and the scales (n, p, 1)."""
+def fitted(moments: Float, sums: Float) -> Float:
+    """(n, p, k) coefficients of the polynomials with these moments (n, p, p) and sums (n, p, k)."""
     scale = 1 / np.sqrt(np.einsum("nii->ni", moments))[..., None]
-    return moments * scale * scale.transpose(0, 2, 1) + RIDGE * np.eye(moments.shape[1]), scale
+    normalized = moments * scale * scale.transpose(0, 2, 1) + RIDGE * np.eye(moments.shape[1])
+    return np.asarray(scale * np.linalg.solve(normalized, scale * sums))

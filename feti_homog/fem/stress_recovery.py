@@ -3,7 +3,7 @@
 Zienkiewicz and Zhu (IJNME 33 (1992) 1331): about each vertex a polynomial of the elements' order is fitted to the
 stresses at the points of integration of the elements around it; within an element the fits of its three vertices are
 blended by its barycentric coordinates, of order 1 their values there.  A subdomain is of one phase, so that no fit
-reaches across an interface, where stresses jump.
+reaches across an interface, where stresses jump; about a vertex that pieces of one body share it is one of the body.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 from feti_homog.fem import bubble
 from feti_homog.fem.assembly import ELEMENTS_AT_ONCE
 from feti_homog.fem.known_tractions import KnownTractions
-from feti_homog.fem.local_fits import Neighbours, gathered, linear_values, normalized, polynomials
+from feti_homog.fem.local_fits import Neighbours, fitted, gathered, linear_values, polynomials
 from feti_homog.fem.problem import Problem
 from feti_homog.fem.shape_functions import barycentric, gradients, shape_functions
 from feti_homog.mesh.refinement import FineMesh
@@ -53,6 +53,7 @@ class RecoveredStress:
         loads: (v, k) the strains and other loads.
         is_mixed: whether the elements have a bubble and a pressure of their own.
         known: tractions that the recovered stresses of linear elements obey.
+        shared: (n,) classes of vertices whose fits (n, p, m k) take in elements of other pieces of their body.
     """
 
     points: Float
@@ -64,6 +65,7 @@ class RecoveredStress:
     loads: Float
     is_mixed: bool = False
     known: KnownTractions | None = None
+    shared: tuple[Int, Float] | None = None
 
     @classmethod
     def on(
@@ -95,10 +97,10 @@ class RecoveredStress:
     @cached_property
     def vertices(self) -> Int:
         """(e, 3) vertices of the elements, numbered from 0; periodic images are one."""
-        return np.asarray(np.take(self._numbers, np.take(self.node_class, self._rows)).T)
+        return np.asarray(np.take(self.numbers, np.take(self.node_class, self._rows)).T)
 
     @cached_property
-    def _numbers(self) -> Int:
+    def numbers(self) -> Int:
         """(classes,) numbers of those that are vertices."""
         is_vertex = np.zeros(len(self.u), bool)
         is_vertex[self.node_class[self.triangles[:, :3]]] = True
@@ -171,11 +173,18 @@ class RecoveredStress:
             points, weights, stress = (self._of_all(name) for name in ("points", "weights", "stress"))
             away = np.stack([own - np.take(x, self._rows) for own, x in zip(points.T, self._coordinates, strict=True)])
             values = linear_values(self.vertices.T, away, weights, stress.reshape(len(stress), -1), neighbours)
+            values = self._with_shared(values[:, None])[:, 0]
             if self.known is not None:
                 tensors = values.reshape(-1, *stress.shape[1:])
-                at = self._numbers[self.known.node]
+                at = self.numbers[self.known.node]
                 values = self.known.imposed(tensors, at, self.problem.voigt, self.flexibility).reshape(values.shape)
             return values[:, None]
+        moments, sums = self.patch_sums()
+        moments = moments + neighbours.shared_matrices(moments, self.order)
+        return self._with_shared(fitted(moments, sums + neighbours.shared(sums, self.order)))
+
+    def patch_sums(self) -> tuple[Float, Float]:
+        """(vertices, p, p) moments of the elements around each vertex, and (vertices, p, m k) of their stresses."""
         moments, sums, size = np.zeros(()), np.zeros(()), int(self.vertices.max()) + 1
         for own in self.elements:
             corners = self.points[self.triangles[own.part, :3]]
@@ -184,9 +193,13 @@ class RecoveredStress:
             stress = own.stress.reshape(len(corners), 1, own.points.shape[1], -1)
             moments = moments + gathered(self.vertices[own.part], weighted @ basis, size)
             sums = sums + gathered(self.vertices[own.part], weighted @ stress, size)
-        scaled, scale = normalized(neighbours.with_moments(moments, self.order))
-        sums = sums + neighbours.shared(sums, self.order)
-        return np.asarray(scale * np.linalg.solve(scaled, scale * sums))
+        return moments, sums
+
+    def _with_shared(self, fits: Float) -> Float:
+        """Return fits (vertices, p, m k) with those that are known."""
+        if self.shared is not None:
+            fits[self.numbers[self.shared[0]]] = self.shared[1][:, : fits.shape[1]]
+        return fits
 
     def _of_all(self, name: str) -> Float:
         """Return an array of uniform stresses for all elements."""

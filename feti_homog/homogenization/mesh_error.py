@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from mpi4py import MPI
@@ -13,15 +14,20 @@ from feti_homog.fem.known_tractions import KnownTractions
 from feti_homog.fem.stress_recovery import RecoveredStress
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.homogenization.averaging import Response
-from feti_homog.homogenization.boundary_tractions import boundary_tractions
+from feti_homog.homogenization.boundary_forces import boundary_forces
 from feti_homog.homogenization.nested_interiors import groups, locks, nested_interiors
 from feti_homog.homogenization.uniform_parts import UniformPart, parts_of_phases
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.mesh.refinement import FineMesh, ReferenceLattice, joined
+from feti_homog.mesh.submesh import Submesh
 from feti_homog.system.parallel.distributed_arrays import allreduce_sum
-from feti_homog.typing import Bool, Float, Int
+from feti_homog.typing import Float, Int
+
+if TYPE_CHECKING:
+    from feti_homog.homogenization.shared_vertices import SharedVertices
 
 Members = list[Subdomain] | list[UniformPart]
+Recovered = tuple[RecoveredStress, ArcSides, Int]
 Displacements = Iterator[tuple[Members, FineMesh, Float, Int]]
 # Elements of one phase that are looked at together, where subdomains are across materials.
 SAMPLED_AT_ONCE = 1 << 15
@@ -97,10 +103,8 @@ def energy_errors(
     lattice = cell.nested_lattice if nested else cell.lattice
     fewer = cell.lattice.halvings - lattice.halvings
     found, shares = np.zeros((2, k, k)), [np.zeros((0, k))]
-    tractions, (of_elements, of_arcs) = boundary_tractions(cell, responses), factors(cell, fewer)
-    for members, stress, place in _recovered(cell, responses, keep, nested):
-        sides = ArcSides.of(stress, [s.submesh for s in members], lattice)
-        stress = _with_tractions(stress, sides, place, *tractions)
+    of_elements, of_arcs = factors(cell, fewer)
+    for stress, sides in _recovered(cell, responses, keep, lattice):
         total, each = stress.difference(keep)
         arcs = arc_energy(stress, sides)
         found += of_elements * total, of_arcs * arcs
@@ -131,7 +135,7 @@ def is_nested(cell: TornCell, responses: Sequence[Response]) -> bool:
     summary, lattice = cell.summary, cell.lattice
     if not lattice.halvings or _has_corners(cell) or _has_straight_voids(cell):
         return False
-    if summary.across:
+    if not cell.case.interfaces:
         return lattice.order == 2  # with linear ones elements and arcs cancel too often
     graded = cell.case.cell.tip_size is None and not cell.case.section.breaks
     return (lattice.order == 1 and graded) or not any(response.debonded for response in responses)
@@ -150,21 +154,47 @@ def _has_straight_voids(cell: TornCell) -> bool:
 
 
 def _recovered(
-    cell: TornCell, responses: Sequence[Response], keep: bool, nested: bool
-) -> Iterator[tuple[Members, RecoveredStress, Int]]:
-    """Yield some of this rank's subdomains after the other, those of each group of one phase, and their stresses.
+    cell: TornCell, responses: Sequence[Response], keep: bool, lattice: ReferenceLattice
+) -> Iterator[tuple[RecoveredStress, ArcSides]]:
+    """Yield the stresses of some of this rank's subdomains after the other, those of each group of one phase.
 
-    Behind them (classes,) places of nodes on boundaries, see `boundary_tractions`.
+    On the mesh that the lattice makes.  Collective before the first.
     """
     u = np.stack([response.u for response in responses], axis=1)
     loads = np.stack([response.strain for response in responses], axis=1)
-    if cell.summary.across:
-        displacements = _sampled(cell, u, loads, keep, cell.nested_lattice if nested else cell.lattice)
+    if cell.summary.across and lattice.order == 2:
+        displacements = _sampled(cell, u, loads, keep, lattice)
     else:
-        displacements = (_nested if nested else _whole)(cell, u, loads, keep)
+        displacements = (_whole if lattice is cell.lattice else _nested)(cell, u, loads, keep)
+    found, meshes = list[Recovered](), list[tuple[list[Submesh], FineMesh]]()
     for members, mesh, own, place in displacements:
-        first, c = members[0], members[0].problem.components
-        yield members, RecoveredStress.on(mesh, first.L, first.problem, own, loads, first.is_mixed), place[::c]
+        first, submeshes = members[0], [s.submesh for s in members]
+        stress = RecoveredStress.on(mesh, first.L, first.problem, own, loads, first.is_mixed)
+        found.append((stress, ArcSides.of(stress, submeshes, lattice), place[:: first.problem.components]))
+        meshes.append((submeshes, mesh))
+    shared, fits = _across_cuts(cell, [stress for stress, _, _ in found], meshes)
+    known = dict[int, KnownTractions]()
+    if lattice.order == 1:
+        bodies = [stress.u for stress, _, _ in found]
+        forces = boundary_forces(cell, responses, bodies, loads)
+        known = _known_tractions(shared, found, *forces, lattice is not cell.lattice)
+    for number in range(len(found)):
+        stress, sides, _ = found.pop(0)
+        yield replace(stress, known=known.get(number), shared=fits.get(number)), sides
+
+
+def _across_cuts(
+    cell: TornCell, bodies: Sequence[RecoveredStress], meshes: Sequence[tuple[list[Submesh], FineMesh]]
+) -> tuple[SharedVertices | None, dict[int, tuple[Int, Float]]]:
+    """Return the vertices that pieces of one body share and, by the mesh, the fits there.  Collective."""
+    pieces = cell.table.body
+    if not ((len(pieces) > 1) if cell.summary.across else (np.bincount(pieces) > 1).any()):
+        return None, {}
+    from feti_homog.homogenization.fits_across_cuts import fits_across_cuts  # most bodies are not cut
+    from feti_homog.homogenization.shared_vertices import SharedVertices
+
+    shared = SharedVertices(cell.comm, meshes)
+    return shared, fits_across_cuts(shared, bodies)
 
 
 def _nested(cell: TornCell, u: Float, loads: Float, keep: bool) -> Displacements:
@@ -181,17 +211,19 @@ def _nested(cell: TornCell, u: Float, loads: Float, keep: bool) -> Displacements
 
 
 def _whole(cell: TornCell, u: Float, loads: Float, keep: bool) -> Displacements:
-    """Yield the same on the mesh itself."""
+    """Yield the same on the mesh itself; places of parts of subdomains across materials are those of their dofs."""
     boundary, displacements = cell.solver.interface_operators, cell.displacements(u, loads, keep)
-    of_all = [np.full(s.n_dofs, INSIDE) for s in cell.subdomains]
-    for place, dofs, first in zip(of_all, boundary.dofs, boundary.offsets, strict=False):
-        place[dofs] = first + np.arange(len(dofs))
+    places = [np.full(len(part.dofs), INSIDE) for part in cell.parts]
+    if cell.summary.across:
+        places = [first + np.arange(len(part.dofs)) for part, first in zip(cell.parts, cell.offsets, strict=False)]
+    else:
+        for place, dofs, first in zip(places, boundary.dofs, boundary.offsets, strict=False):
+            place[dofs] = first + np.arange(len(dofs))
     for group in groups(cell.parts, cell.lattice):
         members = [cell.parts[k] for k in group]
         own = np.concatenate([next(displacements)[1] for _ in group])
         own = own.reshape(-1, members[0].problem.components, u.shape[1])
-        place = np.concatenate([of_all[part.place][part.dofs] for part in members])
-        yield members, joined([part.mesh for part in members]), own, place
+        yield members, joined([part.mesh for part in members]), own, np.concatenate([places[k] for k in group])
 
 
 def _sampled(cell: TornCell, u: Float, loads: Float, keep: bool, lattice: ReferenceLattice) -> Displacements:
@@ -206,20 +238,36 @@ def _sampled(cell: TornCell, u: Float, loads: Float, keep: bool, lattice: Refere
         yield [part], part.mesh, own.reshape(-1, part.problem.components, u.shape[1]), np.full(len(own), INSIDE)
 
 
-def _with_tractions(
-    stress: RecoveredStress, sides: ArcSides, place: Int, traction: Float, known: Bool
-) -> RecoveredStress:
-    """Let recovered stresses of linear elements obey the tractions that are known on arcs, none at voids."""
-    if stress.order == 2 or not len(sides.element):
-        return stress
-    at = stress.node_class[stress.triangles[sides.element[:, None], sides.ends]].ravel()
-    free, first = np.repeat(sides.at_void, 2), place[at]
-    own = np.flatnonzero(free | ((first >= 0) & known[first]) if len(known) else free)
-    if not len(own):
-        return stress
-    steps = np.arange(stress.problem.components)
-    values = np.zeros((len(own), len(steps), traction.shape[1]))
-    given = ~free[own]
-    values[given] = traction[first[own][given, None] + steps]
-    normals = sides.normals[:, [0, -1]].reshape(-1, 2)
-    return replace(stress, known=KnownTractions.at(at[own], normals[own], values))
+def _known_tractions(
+    shared: SharedVertices | None, found: Sequence[Recovered], force: Float, length: Float, is_nested: bool
+) -> dict[int, KnownTractions]:
+    """Return, by the mesh, tractions for recovered stresses to obey where two sides on arcs meet, none at voids.
+
+    Forces over the lengths of nodes, or of sides if these are those of the forces' own mesh, so that the tractions of
+    uniform stresses are exact.  Collective.
+    """
+    sums, of_node = list[Float](), np.append(length, 0.0)  # which is at INSIDE
+    for stress, sides, place in found:
+        ends = stress.node_class[stress.triangles[sides.element[:, None], sides.ends]].ravel()
+        half = np.repeat(sides.points[:, -1] - sides.points[:, 0], 2, axis=0) / 2
+        free = np.repeat(sides.at_void, 2)
+        rows = np.column_stack([half[:, 1], -half[:, 0], np.hypot(*half.T), np.ones(len(ends)), free])
+        own = np.flatnonzero(free | (of_node[place[ends]] > 0))
+        sums.append(np.stack([np.bincount(ends[own], row, len(place)) for row in rows[own].T], axis=1))
+    if shared is not None:
+        parts = [sums[number][own] for number, own in zip(shared.meshes, shared.classes, strict=True)]
+        for number, classes, whole in zip(shared.meshes, shared.classes, shared.sum(parts), strict=True):
+            sums[number][classes] = whole
+    by_mesh = dict[int, KnownTractions]()
+    for number, ((stress, _, place), (*area, size, count, free)) in enumerate(
+        zip(found, (own.T for own in sums), strict=True)
+    ):
+        at = np.flatnonzero((count == 2) | (free > 0))
+        if len(at):
+            on = force[np.maximum(place[at], 0)[:, None] + np.arange(stress.problem.components)]
+            on[free[at] > 0] = 0.0
+            areas = np.stack(area, axis=1)[at]
+            lengths = of_node[place[at]] if is_nested else np.hypot(*areas.T)
+            on /= np.where(free[at] > 0, 1.0, np.maximum(lengths, 1e-300))[:, None, None]
+            by_mesh[number] = KnownTractions.at(at, areas / size[at, None], on)
+    return by_mesh

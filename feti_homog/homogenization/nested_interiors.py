@@ -76,7 +76,7 @@ class NestedInterior:
         return found.reshape(-1, problem.components, u.shape[1])
 
 
-def locks(subdomains: Sequence[Subdomain], comm: MPI.Intracomm) -> bool:
+def locks(subdomains: Sequence[Subdomain | UniformPart], comm: MPI.Intracomm) -> bool:
     """Return whether linear elements of a phase of any rank hardly change their volume.  Collective."""
     own = any(s.problem.components == 2 and s.L[0, 1] > LOCKING * s.L[2, 2] for s in subdomains)
     return bool(comm.allreduce(own, MPI.LOR))
