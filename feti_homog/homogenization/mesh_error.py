@@ -18,7 +18,6 @@ from feti_homog.homogenization.boundary_forces import boundary_forces
 from feti_homog.homogenization.nested_interiors import groups, locks, nested_interiors
 from feti_homog.homogenization.uniform_parts import UniformPart, parts_of_phases
 from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.interface.tips.debonded_arcs import InterfaceChains
 from feti_homog.mesh.refinement import FineMesh, ReferenceLattice, joined
 from feti_homog.mesh.submesh import Submesh
 from feti_homog.system.parallel.distributed_arrays import allreduce_sum
@@ -52,9 +51,9 @@ class EnergyErrors:
     """Errors of E_i . Sigma_j, (k, k), of k responses under the strains E_i of a cell of area |UC|.
 
     Attributes:
-        elements: 1/|UC| int ds_i : S : ds_j of recovered stresses less those of elements, and `_beyond_tips`: the
-            stiffness is too high.
-        arcs: what the sides of elements make of arcs, of either sign.
+        elements: 1/|UC| int ds_i : S : ds_j of recovered stresses less those of elements, and what springs have
+            beyond tips: the stiffness is too high.
+        arcs: what the sides of elements, and springs of unlike ones, make of arcs, of either sign.
         shares: (m, k) what each element of this rank has of the first one's diagonal, none if they are not kept.
         least_of_two: share of both parts, as if they did not cancel, that is left at least off the diagonal.
     """
@@ -112,32 +111,13 @@ def energy_errors(
         found += of_elements * total, of_arcs * arcs
         shares.append(np.repeat(of_elements * each / 4**fewer, 4**fewer, axis=0))
     elements, arcs = allreduce_sum(cell.comm, found) / area
-    elements += _beyond_tips(cell, responses) / area
+    if cell.case.interfaces:
+        from feti_homog.homogenization.spring_errors import spring_errors  # most cells have no springs
+
+        elements, arcs = np.stack([elements, arcs]) + np.stack(spring_errors(cell, responses)) / area
     is_uneven = _has_corners(cell) or (lattice.order == 2 and bool(cell.case.interfaces))
     least = LEAST_OF_TWO_UNEVEN if is_uneven else LEAST_OF_TWO[lattice.order]
     return EnergyErrors(elements, arcs, np.concatenate(shares) / area, LEAST_OF_TWO_TOUCHING if contact else least)
-
-
-def _beyond_tips(cell: TornCell, responses: Sequence[Response]) -> Float:
-    """(k, k) int t_i . C t_j on what nodes at tips hold of debonded faces: a tip is bonded on its whole length.
-
-    Collective.
-    """
-    k, nodes, state = len(responses), cell.solver.jump_operator.nodes, responses[0].state
-    if not any(response.debonded for response in responses):
-        return np.zeros((k, k))
-    from feti_homog.feti.decomposition.neighbours import InterfaceNeighbours  # most cells have no tips
-
-    rows = nodes.row[:, None] + np.arange(cell.solver.jump_operator.components)
-    lam = np.stack([response.scale * response.state.solution.lam[rows] for response in responses], axis=2)
-    of_ranks = cell.comm.allgather((state.status, nodes.points, lam, state.solution.compliance[rows]))
-    status, points, lam, C = (np.concatenate(each) for each in zip(*of_ranks, strict=True))
-    chains = InterfaceChains(InterfaceNeighbours(cell.comm, cell.solver.jump_operator, cell.subdomains).adjacency)
-    tips = chains.tips(status)
-    ends = points[np.stack([tips.behind, tips.ahead])] - points[tips.node]
-    behind, ahead = np.linalg.norm(ends - np.round(ends / cell.summary.period) * cell.summary.period, axis=2)
-    weights = (behind / (behind + ahead))[:, None] * C[tips.node]
-    return np.asarray(np.einsum("tc,tci,tcj->ij", weights, lam[tips.node], lam[tips.node]))
 
 
 def factors(cell: TornCell, fewer: int) -> tuple[float, float]:
