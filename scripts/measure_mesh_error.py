@@ -141,7 +141,21 @@ def twins() -> list[Known]:
         "locking square 0.4999": case(lattice("square", 0.3), locking(0.4999, 100)),
         "locking random 0.4999": case(lattice("random", 0.5, **cell), locking(0.4999, 10)),
     }
+    cases |= ellipses_on_springs()
     return [(name, document, None, 0.0) for name, document in cases.items()]
+
+
+def ellipses_on_springs() -> dict[str, dict[str, Any]]:
+    """Ellipses of 2:1 on soft, medium and stiff springs, alike in both directions and not, and an arc on springs."""
+    pairs = ((1, 1), (10, 10), (10, 2), (2, 10), (100, 25))
+    phases = {"matrix": {"young": 1.0, "poisson": 0.3}, "fibre": {"young": 10.0, "poisson": 0.2}}
+    fibre = {"x": 0.5, "y": 0.5, "a": 0.36, "b": 0.18, "angle": 20.0}
+    cell = {"geometry": "table", "width": 1.0, "height": 1.0, "fibre_list": [fibre]}
+    found = {f"ellipse on springs {n} {t}": case(cell, phases, springs(n, t)) for n, t in pairs}
+    found["ellipse on springs in space"] = case(cell, phases, springs(10, 2), plane="generalized")
+    circle = cell | {"fibre_list": [{"x": 0.5, "y": 0.5, "radius": 0.3}]}
+    found["arc of 120 degrees on springs"] = case(circle, phases, springs(10, 4) | arc(120.0))
+    return found
 
 
 def solved(document: dict[str, Any], **mesh: Any) -> tuple[Float, Float]:

@@ -53,7 +53,7 @@ class EnergyErrors:
     Attributes:
         elements: 1/|UC| int ds_i : S : ds_j of recovered stresses less those of elements, and what springs have
             beyond tips: the stiffness is too high.
-        arcs: what the sides of elements, and springs of unlike ones, make of arcs, of either sign.
+        arcs: what sides of elements make of arcs and of springs along them, of either sign.
         shares: (m, k) what each element of this rank has of the first one's diagonal, none if they are not kept.
         least_of_two: share of both parts, as if they did not cancel, that is left at least off the diagonal.
     """
@@ -111,7 +111,7 @@ def energy_errors(
         found += of_elements * total, of_arcs * arcs
         shares.append(np.repeat(of_elements * each / 4**fewer, 4**fewer, axis=0))
     elements, arcs = allreduce_sum(cell.comm, found) / area
-    if cell.case.interfaces:
+    if cell.case.interfaces and not cell.summary.across:
         from feti_homog.homogenization.spring_errors import spring_errors  # most cells have no springs
 
         elements, arcs = np.stack([elements, arcs]) + np.stack(spring_errors(cell, responses)) / area
@@ -137,7 +137,7 @@ def is_nested(cell: TornCell, responses: Sequence[Response]) -> bool:
     arcs with quadratic elements or with tips to which the mesh is not graded: those of a given `tip_size`, and where
     bonds break.  Collective.
     """
-    summary, lattice = cell.summary, cell.lattice
+    lattice = cell.lattice
     if not lattice.halvings or _has_corners(cell) or _has_straight_voids(cell):
         return False
     if not cell.case.interfaces:

@@ -12,10 +12,10 @@ import numpy as np
 from mpi4py import MPI
 
 from feti_homog.feti.decomposition.sharers import entity_code
-from feti_homog.mesh.refinement import FineMesh, ReferenceLattice
+from feti_homog.mesh.refinement import FineMesh
 from feti_homog.mesh.submesh import Submesh
 from feti_homog.system.parallel.distributed_arrays import exchange
-from feti_homog.typing import Array, Bool, Float, Int
+from feti_homog.typing import Array, Bool, Float, Int, Int32
 
 NO_ROWS = np.zeros((0, 3), np.int64)
 
@@ -94,20 +94,16 @@ def _border(submeshes: Sequence[Submesh], mesh: FineMesh) -> tuple[Int, Int, Int
 
     Their classes (n,), the coarse edges there in the same terms (e, 3), and the classes of vertices along these (e, m).
     """
-    lattice, first, found = mesh.lattice, 0, []
-    sides = _along_sides(lattice)
+    first, found = 0, []
     for s in submeshes:
-        t = len(s.triangles)
-        nodes, edge = mesh.nodes[first : first + t], s.edge_class[s.triangle_edges]
-        first += t
-        triangle, k = np.nonzero(np.bincount(edge.ravel(), minlength=len(s.edge_keys))[edge] == 1)
-        line = mesh.node_class[nodes[triangle[:, None], sides[k]]].astype(np.int64)
+        triangle, k, line = border_lines(s, mesh, mesh.node_class[mesh.nodes[first : first + len(s.triangles)]])
+        first, line = first + len(s.triangles), line[:, :: mesh.lattice.order]
         ends = s.vertex_class[s.triangles[triangle[:, None], np.stack([k, (k + 1) % 3], axis=1)]]
         back = s.backwards[triangle, k]
-        line[back], ends[back] = line[back, ::-1], ends[back, ::-1]
+        ends[back] = ends[back, ::-1]
         place = np.arange(line.shape[1])
         place[-1] = 0
-        key = np.tile(entity_code(s.edge_keys[edge[triangle, k]], True)[:, None], len(place))
+        key = np.tile(entity_code(s.edge_keys[s.edge_class[s.triangle_edges[triangle, k]]], True)[:, None], len(place))
         edges = np.column_stack([s.constituent[triangle], key[:, 0], np.zeros(len(key), np.int64)])
         key[:, [0, -1]] = entity_code(s.class_keys[ends], False)
         rows = np.stack(np.broadcast_arrays(s.constituent[triangle][:, None], key, place), axis=2).reshape(-1, 3)
@@ -117,8 +113,15 @@ def _border(submeshes: Sequence[Submesh], mesh: FineMesh) -> tuple[Int, Int, Int
     return vertices, classes, edges, lines
 
 
-def _along_sides(lattice: ReferenceLattice) -> Int:
-    """(3, m) lattice nodes that are vertices of elements along each side of the coarse triangle."""
-    inner = np.arange(lattice.intervals - 1)
-    sides = [np.r_[k, 3 + k * len(inner) + inner, (k + 1) % 3] for k in range(3)]
-    return np.asarray(np.stack(sides)[:, :: lattice.order])
+def border_lines(s: Submesh, mesh: FineMesh, classes: Int32) -> tuple[Int, Int, Int]:
+    """Return the triangles (e,) at the border of a piece, their edges (e,) there, and the nodes (e, M + 1) along these.
+
+    In the direction of the edges; `classes` (t, q) of the nodes.
+    """
+    edge, inner = s.edge_class[s.triangle_edges], np.arange(mesh.lattice.intervals - 1)
+    triangle, k = np.nonzero(np.bincount(edge.ravel(), minlength=len(s.edge_keys))[edge] == 1)
+    sides = np.stack([np.r_[j, 3 + j * len(inner) + inner, (j + 1) % 3] for j in range(3)])
+    line = classes[triangle[:, None], sides[k]].astype(np.int64)
+    back = s.backwards[triangle, k]
+    line[back] = line[back, ::-1]
+    return triangle, k, line

@@ -3,65 +3,134 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import roots_legendre
 
 from feti_homog.feti.decomposition.neighbours import InterfaceNeighbours
+from feti_homog.feti.decomposition.shared_entities import along, edge_normals
 from feti_homog.homogenization.averaging import Response
+from feti_homog.homogenization.shared_vertices import border_lines
+from feti_homog.homogenization.uniform_parts import UniformPart
 from feti_homog.homogenization.unit_cell import TornCell
+from feti_homog.interface.contact.states import BONDED, Status
 from feti_homog.interface.tips.debonded_arcs import InterfaceChains
-from feti_homog.typing import Float, Int
+from feti_homog.mesh.refinement import ReferenceLattice
+from feti_homog.system.parallel.distributed_arrays import allreduce_sum
+from feti_homog.typing import Bool, Float, Int
+
+# Gauss points of a side, by which ellipses and products of quadratic functions are exact to rounding or nearly so.
+POINTS, WEIGHTS = roots_legendre(6)
+
+
+@dataclass(frozen=True)
+class _Springs:
+    """The interface nodes of all ranks; forces and jumps of k responses along normal, tangent and fibre.
+
+    Attributes:
+        holds: (n,) whether it is bonded by springs in all directions.
+        fibre: (n,) inner body.
+        points, normal: (n, 2).
+        stiffness: (n, c) stress per jump.
+        force, jump: (n, c, k).
+    """
+
+    holds: Bool
+    fibre: Int
+    points: Float
+    normal: Float
+    stiffness: Float
+    force: Float
+    jump: Float
+
+    @classmethod
+    def of(cls, cell: TornCell, responses: Sequence[Response]) -> _Springs:
+        """Gather them.  Collective."""
+        jumps, state = cell.solver.jump_operator, responses[0].state
+        nodes = jumps.nodes
+        rows = nodes.row[:, None] + np.arange(jumps.components)
+        force = np.stack([response.scale * response.state.solution.lam[rows] for response in responses], axis=2)
+        C = state.solution.compliance[rows]
+        holds = (state.status == BONDED) & (C > 0).all(axis=1)
+        stiffness = 1 / (np.where(holds[:, None], C, 1.0) * nodes.length[:, None])
+        own = holds, nodes.bodies[:, 1], nodes.points, nodes.normal, stiffness, force, force * C[:, :, None]
+        return cls(*(np.concatenate(each) for each in zip(*cell.comm.allgather(own), strict=True)))
+
+    def in_space(self, components: Float) -> Float:
+        """(n, 2, k) vectors in the plane of components (n, 2, k) along normal and tangent; (n, 1, k) stay."""
+        if components.shape[1] == 1:
+            return components
+        tangent = np.column_stack([-self.normal[:, 1], self.normal[:, 0]])
+        return np.asarray(self.normal[..., None] * components[:, None, 0] + tangent[..., None] * components[:, None, 1])
 
 
 def spring_errors(cell: TornCell, responses: Sequence[Response]) -> tuple[Float, Float]:
-    """(k, k) each: `_beyond_tips`, and `_of_unlike_sides` of linear elements in the plane.  Collective."""
-    nodes, state = cell.solver.jump_operator.nodes, responses[0].state
-    rows = nodes.row[:, None] + np.arange(cell.solver.jump_operator.components)
-    force = np.stack([response.scale * response.state.solution.lam[rows] for response in responses], axis=2)
-    jump = force * state.solution.compliance[rows][:, :, None]
-    of_ranks = cell.comm.allgather((state.status, nodes.points, nodes.normal, nodes.length, force, jump))
-    status, points, normal, length, force, jump = (np.concatenate(each) for each in zip(*of_ranks, strict=True))
-    chains = InterfaceChains(InterfaceNeighbours(cell.comm, cell.solver.jump_operator, cell.subdomains).adjacency)
+    """(k, k) each: what tips have beyond them, and what sides have but for what `arc_energy` knows.  Collective."""
+    springs = _Springs.of(cell, responses)
+    neighbours = InterfaceNeighbours(cell.comm, cell.solver.jump_operator, cell.subdomains)
+    status = np.concatenate(cell.comm.allgather(responses[0].state.status))
+    beyond = _beyond_tips(springs, InterfaceChains(neighbours.adjacency), status, cell.summary.period)
+    number, of_sides, first = neighbours.node_numbers(cell.solver.jump_operator), np.zeros(beyond.shape), 0
+    for part in cell.parts:
+        own = number[first : first + part.mesh.n_classes]
+        first += part.mesh.n_classes
+        of_sides += _of_sides(springs, part, own, cell.lattice)
+    return beyond, allreduce_sum(cell.comm, of_sides)
 
-    def between(start: Int, stop: Int) -> Float:
-        """(n, 2) from nodes to nodes, images the nearest."""
-        ends = points[stop] - points[start]
-        return np.asarray(ends - np.round(ends / cell.summary.period) * cell.summary.period)
 
+def _beyond_tips(springs: _Springs, chains: InterfaceChains, status: Status, period: Float) -> Float:
+    """(k, k) int t_i . d_j on what nodes at tips hold of debonded faces: a tip is bonded on its whole length."""
     tips = chains.tips(status)
-    behind, ahead = (np.hypot(*between(tips.node, other).T) for other in (tips.behind, tips.ahead))
-    beyond = _beyond_tips(behind / (behind + ahead), force[tips.node], jump[tips.node])
-    if cell.lattice.order == 2 or force.shape[1] == 1:
-        return beyond, np.zeros(beyond.shape)
-    at = np.flatnonzero(chains.neighbours[:, 0] >= 0)
-    sides = np.stack([between(at, other) for other in chains.neighbours[at].T])
-    turn = np.diff(normal[chains.neighbours[at]], axis=1)[:, 0]
-    return beyond, _of_unlike_sides(sides, turn, normal[at], force[at] / length[at, None, None], jump[at])
+    ends = springs.points[np.stack([tips.behind, tips.ahead])] - springs.points[tips.node]
+    behind, ahead = np.linalg.norm(ends - np.round(ends / period) * period, axis=2)
+    return np.asarray(
+        np.einsum("t,tci,tcj->ij", behind / (behind + ahead), springs.force[tips.node], springs.jump[tips.node])
+    )
 
 
-def _beyond_tips(share: Float, force: Float, jump: Float) -> Float:
-    """(k, k) int t_i . d_j on what nodes (t,) at tips hold of debonded faces: a tip is bonded on its whole length.
+def _of_sides(springs: _Springs, part: UniformPart, number: Int, lattice: ReferenceLattice) -> Float:
+    """(k, k) energy of springs at nodes less that of springs along the sides of a fibre, less what is known on arcs.
 
-    `share` (t,) of the length, `force` and `jump` (t, c, k).
+    `number` (classes,) among the springs, -1 of others.  Both energies are those of the functions on sides that nodes
+    have; the exact jump d adds to the energy of springs and of t on how far d is from these as much as these lack.
     """
-    return np.asarray(np.einsum("t,tci,tcj->ij", share, force, jump))
-
-
-def _of_unlike_sides(sides: Float, turn: Float, normal: Float, traction: Float, jump: Float) -> Float:
-    """(k, k) sum over sides h^2 / 12 (d_i . K' d_j), from start to end, which unlike sides leave if K turns with n.
-
-    The trapezoidal rule and the interpolation of u err by h^2 / 12 (t_i'' . d_j - t_j . d_i'') more than `arc_energy`
-    has, with t = K d, K = k_n n n + k_t t t and K' = (k_n - k_t) (n . t') (n t + t n) along the interface.
-
-    Args:
-        sides: (2, n, 2) from each node to both neighbours.
-        turn: (n, 2) normal of the second less that of the first.
-        normal: (n, 2).
-        traction, jump: (n, 2, k) along normal and tangent.
-    """
-    tangent = np.column_stack([-normal[:, 1], normal[:, 0]])
-    squares = (sides**2).sum(axis=2)
-    curvature = (turn * tangent).sum(axis=1) / np.abs(((sides[1] - sides[0]) * tangent).sum(axis=1))
-    weight = curvature * (squares[0] - squares[1]) / 12
-    half = np.einsum("n,nki,nkj->ij", weight, traction[:, [0, 1]] * [[1.0], [-1.0]], jump[:, [1, 0]])
-    return np.asarray(half + half.T)
+    order = lattice.order
+    triangle, k, line = border_lines(part.submesh, part.mesh, part.mesh.node_class[part.mesh.nodes])
+    at = number[line]
+    known = at.min(axis=1) >= 0
+    known[known] = (springs.fibre[at[known]] == part.submesh.constituent[triangle[known], None]).all(axis=1)
+    normal, turn = edge_normals(part.submesh, triangle[known], k[known])
+    first = np.arange(0, lattice.intervals, order)
+    nodes = at[known][:, first[:, None] + np.arange(order + 1)]
+    edge, side = np.nonzero(springs.holds[nodes].all(axis=2))
+    nodes, normal, turn = nodes[edge, side], normal[edge], turn[edge]
+    places = (side[:, None] + (1 + POINTS) / 2) * order / lattice.intervals
+    ahead = np.stack([along(normal, turn, place) for place in places.T], axis=1)
+    speed = np.hypot(*np.moveaxis(ahead, 2, 0))
+    ds = speed * WEIGHTS / 2 * order / lattice.intervals
+    length = ds.sum(axis=1)
+    # Functions of linear elements are linear in place on the chord, so nearly in length along the arc.
+    xi = np.broadcast_to((1 + POINTS) / 2, ds.shape)
+    if order == 1:
+        bend = 3 * (ds @ POINTS) / length
+        xi = xi - bend[:, None] * xi * (1 - xi)
+        shape, weights = np.stack([1 - xi, xi]), np.repeat(length[:, None] / 2, 2, axis=1)
+    else:
+        shape = np.stack([(1 - xi) * (1 - 2 * xi), 4 * xi * (1 - xi), xi * (2 * xi - 1)])
+        weights = np.einsum("fq,afq->fa", ds, shape)
+    stiffness, jump = springs.stiffness[nodes], springs.jump[nodes]
+    moved = springs.in_space(springs.jump)[nodes]
+    traction = springs.in_space(springs.stiffness[:, :, None] * springs.jump)[nodes]
+    blended = np.einsum("afq,fadi->fqdi", shape, moved)
+    if moved.shape[2] == 2:
+        unit = ahead / speed[:, :, None]
+        frame = np.stack([unit, np.stack([-unit[..., 1], unit[..., 0]], axis=2)], axis=2)
+        blended = np.einsum("fqcd,fqdi->fqci", frame, blended)
+    at_nodes = np.einsum("fa,fac,faci,facj->ij", weights, stiffness, jump, jump, optimize=True)
+    between = np.einsum("afq,fac->fqc", shape, stiffness)
+    on_sides = np.einsum("fq,fqc,fqci,fqcj->ij", ds, between, blended, blended, optimize=True)
+    share = np.where(turn > 0, length, 0.0) / {1: 12, 2: 60}[order]
+    differences = (np.diff(each, n=order, axis=1)[:, 0] for each in (traction, moved))
+    on_arcs = np.einsum("f,fdi,fdj->ij", share, *differences, optimize=True)
+    return np.asarray(at_nodes - on_sides - on_arcs - on_arcs.T)

@@ -191,7 +191,7 @@ def test_springs_at_tips_hold_a_part_of_debonded_faces(comm, order):
     assert 0.8 < (stored - found.stored) / stored / found.mesh_error < 1.25  # 1.9 and 6.7 without
 
 
-def test_springs_that_turn_with_an_ellipse_err_by_unlike_sides(comm):
+def test_springs_that_turn_with_an_ellipse_err_on_unlike_sides(comm):
     fibre = {"x": 0.5, "y": 0.5, "a": 0.36, "b": 0.18, "angle": 20.0}
     cell = {"geometry": "table", "width": 1.0, "height": 1.0, "fibre_list": [fibre], "mesh_size": 0.2, "refine": 2}
     document = {"material": {"matrix": {"young": 1.0, "poisson": 0.3}, "fibre": {"young": 10.0, "poisson": 0.2}}}

@@ -105,7 +105,7 @@ class InterfaceNeighbours:
         self.rows: Int = np.concatenate(comm.allgather(own))
         self.first = int(np.searchsorted(self.rows, own[0])) if len(own) else 0
         bodies, n = np.concatenate(comm.allgather(jump_operator.nodes.bodies)), len(self.rows)
-        number = self._node_numbers(jump_operator)
+        number = self.node_numbers(jump_operator)
         # Both bodies have the side of an interface once: twice is within a body that is cut, and a void has none.
         outer, inner = (np.concatenate(comm.allgather(_sides(subdomains, number, body, n))) for body in bodies.T)
         a, b = np.divmod(np.intersect1d(_once(outer), _once(inner)), n)
@@ -129,7 +129,7 @@ class InterfaceNeighbours:
                 return near
             bonds = reached
 
-    def _node_numbers(self, jump_operator: JumpOperator) -> Int:
+    def node_numbers(self, jump_operator: JumpOperator) -> Int:
         """(fine nodes of this rank,) number of the interface node that each is a copy of, or -1."""
         number = np.full(jump_operator.B.shape[1] // jump_operator.components, -1)
         normal = np.searchsorted(jump_operator.rows, self.rows)
@@ -143,7 +143,7 @@ class InterfaceNeighbours:
 def _sides(subdomains: Sequence[Subdomain], number: Int, body: Int, n: int) -> Int:
     """(e,) codes a n + b, a < b, of the outer sides of these subdomains between interface nodes a and b of n.
 
-    `body` (n,) is the one of each node whose subdomains count, `number` as of `_node_numbers`.
+    `body` (n,) is the one of each node whose subdomains count, `number` as of `node_numbers`.
     """
     found, first = [np.zeros(0, np.int64)], 0
     for s in subdomains:

@@ -99,7 +99,7 @@ def interface_geometry(
     whole = own.whole
     plane = whole.triangle_edges[triangle, k]
     normals, turns, precracked = np.zeros((n, 2, 2)), np.zeros(n), np.zeros(n, bool)
-    normals[edges], turns[edges] = normal, turn = _edge_normals(whole, triangle, k)
+    normals[edges], turns[edges] = normal, turn = edge_normals(whole, triangle, k)
     precracked[edges] = whole.debonded[whole.edge_class[plane]]
     ends = whole.class_keys[whole.vertex_class[whole.edges[plane]]]
     order, side = lattice.order, lattice.order / lattice.intervals
@@ -164,7 +164,7 @@ def _triangles_beside(own: SubmeshesOfRank, key: Int, subdomain: Int) -> tuple[I
     return triangle[place], k[place]
 
 
-def _edge_normals(mesh: Submesh, triangle: Int, k: Int) -> tuple[Float, Float]:
+def edge_normals(mesh: Submesh, triangle: Int, k: Int) -> tuple[Float, Float]:
     """Return normals (n, 2, 2) out of triangles (n,) at the start and end of their edges k (n,).
 
     As in `SharedEntities`, and the turns (n,) of these.
