@@ -11,7 +11,9 @@ import numpy as np
 from differential import other_results, same_results
 from differential.brute_force import by_brute_force, is_affordable
 from differential.comparison import DIFFERENT
+from differential.finer_meshes import finer_mesh, quadrilateral_mesh
 from differential.limit_loads import limit_load
+from differential.other_files import card, mesh_format
 from differential.random_cases import Drawn
 from differential.setting import Compared, Setting
 from differential.twin import SolvedAnew
@@ -66,6 +68,20 @@ def _is_linear(drawn: Drawn, base: Any) -> bool:
     return drawn.analysis in ("stiffness", "load") or (drawn.analysis == "angle" and "file" in drawn.document["cell"])
 
 
+def _has_estimate(drawn: Drawn, base: Any) -> bool:
+    return drawn.analysis in ("stiffness", "load", "path")
+
+
+def _has_file(drawn: Drawn, base: Any) -> bool:
+    return "file" in drawn.document["cell"]
+
+
+def _has_card(drawn: Drawn, base: Any) -> bool:
+    # Of linear materials: faces in contact have another stiffness under compression.
+    one = "effective_stiffness_compression" not in base
+    return one and np.shape(base.get("effective_stiffness", ())) == (6, 6)
+
+
 def _is_envelope(drawn: Drawn, base: Any) -> bool:
     return drawn.analysis == "envelope"
 
@@ -101,6 +117,10 @@ DRAWN = (
     Relation("resume", same_results.resume, _is_path, weight=4),
     Relation("brute force", by_brute_force, is_affordable, weight=4),
     Relation(STRESS_BACK, other_results.stress_back, _is_linear, weight=2, refusals=(NotCarriedError,)),
+    Relation("finer mesh", finer_mesh, _has_estimate, weight=2, exact=True),
+    Relation("quadrilaterals", quadrilateral_mesh, _is_linear, weight=1, exact=True),
+    Relation("format of the mesh", mesh_format, _has_file, weight=6),
+    Relation("card", card, _has_card, weight=6),
     Relation("limit load", limit_load, _is_path, weight=3),
     Relation("onset", other_results.onset, _is_envelope, weight=6),
 )
