@@ -54,6 +54,8 @@ def mpirun() -> Callable[..., Any]:
 def pytest_addoption(parser: pytest.Parser) -> None:
     words = "of the cases of each parametrized test only every N-th, from the first"
     parser.addoption("--every", type=int, default=1, metavar="N", help=words)
+    words = "or from another one: of a test with fewer cases from as many less"
+    parser.addoption("--from-case", type=int, default=0, metavar="K", help=words)
     words = "of those not the cases that `-m 'not few_ranks' --every N` runs on more ranks"
     parser.addoption("--but-every", type=int, metavar="N", help=words)
 
@@ -61,14 +63,16 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Leave out what --every and --but-every do, of the tests that marks and names have left."""
-    every, others = config.getoption("every"), config.getoption("but_every")
+    every, others, first = (config.getoption(name) for name in ("every", "but_every", "from_case"))
+    count = Counter(item.nodeid.partition("[")[0] for item in items)
     chosen: list[pytest.Item] = []
     dropped: list[pytest.Item] = []
     cases: Counter[str] = Counter()
     for item in items:
         test = item.nodeid.partition("[")[0]
         runs_elsewhere = others and cases[test] % others == 0 and item.get_closest_marker("few_ranks") is None
-        (chosen if cases[test] % every == 0 and not runs_elsewhere else dropped).append(item)
+        is_chosen = cases[test] % every == first % min(every, count[test])
+        (chosen if is_chosen and not runs_elsewhere else dropped).append(item)
         cases[test] += 1
     items[:] = chosen
     if dropped:

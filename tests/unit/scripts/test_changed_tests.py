@@ -1,0 +1,31 @@
+"""A change selects the tests that import what it changed, also through other modules of the tests."""
+
+from __future__ import annotations
+
+import pytest
+from changed_tests import module_name, touched
+
+
+@pytest.mark.parametrize(
+    ("path", "name"),
+    [
+        ("feti_homog/mesh/submesh.py", "feti_homog.mesh.submesh"),
+        ("feti_homog/mesh/__init__.py", "feti_homog.mesh"),
+        ("tests/support/cases.py", "support.cases"),
+        ("scripts/mutations.py", "mutations"),
+    ],
+)
+def test_modules_have_the_names_of_imports(path, name):
+    assert module_name(path) == name
+
+
+def test_a_module_selects_what_imports_it():
+    assert touched({"scripts/changed_tests.py"}) == ["tests/unit/scripts/test_changed_tests.py"]
+
+
+def test_modules_of_the_tests_pass_a_change_on():
+    assert touched({"tests/differential/finer_meshes.py"}) == ["tests/unit/test_differential.py"]
+
+
+def test_documents_and_new_tests():
+    assert touched({"README.md", "tests/unit/test_differential.py"}) == ["tests/unit/test_differential.py"]
