@@ -22,6 +22,7 @@ MOST = 5.0
 STRONG = {"strength": 1e3, "toughness": 1e6, "tractions": 1e3, "openings": 1e3}
 PIXELS, FORMATS = (5, 10), (".msh", ".inp", ".vtk", ".vtu", ".mesh")
 NUMBERS = {"matrix": 0, "fibre": 1}  # of Medit's references, which have no names
+SIZES, ACCURACIES = {"mesh_size", "interface_size", "refine"}, (0.02, 0.2)
 ROUNDING = 1e-10
 
 
@@ -41,6 +42,27 @@ def finer_mesh(setting: Setting) -> Compared:
         return _ratio(change, coarse["mesh_error"]["effective_stiffness"], "effective_stiffness")
     a, b = (each["load"] if "load" in each else each["path"][-1] for each in (coarse, fine))
     return _ratio(b["stored"] - a["stored"], a["mesh_error"] * a["stored"], f"{setting.drawn.analysis}.stored")
+
+
+def accuracy(setting: Setting) -> Compared:
+    """Let an accuracy choose the mesh: no constant is beyond its bounds, and results agree within their errors.
+
+    Collective.
+    """
+    document = setting.drawn.document
+    cell = {key: value for key, value in document["cell"].items() if key not in SIZES}
+    asked = float(10 ** setting.rng.uniform(*np.log10(ACCURACIES)))
+    other = setting.solved(document | {"cell": cell | {"accuracy": asked}})
+    if other["faults"]:
+        return Compared(DIFFERENT, "; ".join(other["faults"]))
+    if setting.drawn.analysis == "stiffness":
+        errors = [np.array(each["mesh_error"]["effective_stiffness"]) for each in (setting.base, other)]
+        change = np.subtract(other["effective_stiffness"], setting.base["effective_stiffness"])
+        return _ratio(change, sum(errors), "effective_stiffness")
+    if setting.drawn.analysis == "load":
+        a, b = setting.base["load"], other["load"]
+        return _ratio(b["stored"] - a["stored"], sum(x["mesh_error"] * x["stored"] for x in (a, b)), "load.stored")
+    return Compared(0.0, "no constant is beyond its bounds")
 
 
 def _strong(document: Document) -> Document:

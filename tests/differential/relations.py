@@ -11,7 +11,7 @@ import numpy as np
 from differential import other_results, same_results
 from differential.brute_force import by_brute_force, is_affordable
 from differential.comparison import DIFFERENT
-from differential.finer_meshes import finer_mesh, quadrilateral_mesh
+from differential.finer_meshes import accuracy, finer_mesh, quadrilateral_mesh
 from differential.limit_loads import limit_load
 from differential.other_files import card, mesh_format
 from differential.random_cases import Drawn
@@ -72,6 +72,10 @@ def _has_estimate(drawn: Drawn, base: Any) -> bool:
     return drawn.analysis in ("stiffness", "load", "path")
 
 
+def _is_meshed(drawn: Drawn, base: Any) -> bool:
+    return drawn.analysis != "path" and "file" not in drawn.document["cell"]
+
+
 def _has_file(drawn: Drawn, base: Any) -> bool:
     return "file" in drawn.document["cell"]
 
@@ -118,6 +122,7 @@ DRAWN = (
     Relation("brute force", by_brute_force, is_affordable, weight=4),
     Relation(STRESS_BACK, other_results.stress_back, _is_linear, weight=2, refusals=(NotCarriedError,)),
     Relation("finer mesh", finer_mesh, _has_estimate, weight=2, exact=True),
+    Relation("accuracy", accuracy, _is_meshed, weight=2, exact=True),
     Relation("quadrilaterals", quadrilateral_mesh, _is_linear, weight=1, exact=True),
     Relation("format of the mesh", mesh_format, _has_file, weight=6),
     Relation("card", card, _has_card, weight=6),
