@@ -135,7 +135,7 @@ class Case:
 
     def warnings(self) -> tuple[str, ...]:
         """List settings that are valid but probably unintended, a line each."""
-        of_elements = element_sizes.warnings(self.cell, self.materials, self.analysis.plane)
+        of_elements = element_sizes.warnings(self.materials, self.analysis.plane)
         contrast = contrast_warnings(self.materials, self.analysis.plane)
         return (*of_elements, *contrast, *idle_friction_keys(self.interfaces))
 

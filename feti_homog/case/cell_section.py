@@ -114,35 +114,18 @@ class Cell:
         real(least=1e-7, most=0.1),
         "Largest relative error of the strain energy under any macroscopic strain, and so of the entries of the "
         "effective stiffness: mesh_size and refine are chosen, which it excludes with interface_size and tip_size, and "
-        "order, unless it is given. It is not that of paths after bonds break, nor of polygons with sharp corners.",
-        default=None, default_words="none", only=MESHED,
-    )  # fmt: skip
-    accuracy_check: str | None = key(
-        choice("remark", "repeat"),
-        'What follows if the estimated error is more than accuracy. "remark": a remark that names the mesh that would '
-        'do; "repeat": the cell is solved on it too, unless it has over 16 times the unknowns or that fails.',
-        default=None, default_words='"remark" beside accuracy', only=MESHED,
-    )  # fmt: skip
-    element_size: float | None = key(
-        real(least=1e-6, most=0.5),
-        "Size of the elements, after refine, / width of the cell: mesh_size and refine are chosen, as with accuracy. "
-        "Mean edges are 0.8 to 1 of it, unless circles of 16 edges or narrow gaps need smaller ones.",
+        "order, unless it is given. If the estimated error is more, a remark names the mesh that would do. It is not "
+        "that of paths after bonds break, nor of polygons with sharp corners.",
         default=None, default_words="none", only=MESHED,
     )  # fmt: skip
     order: int = key(
         integer(least=1, most=2),
         "Order of the triangles. 1: linear; they lock above poisson = 0.49, but in plane stress. 2: quadratic, curved "
-        "on round interfaces. With accuracy that of the two which takes fewer nodes, unless it is given.",
+        "on round interfaces; those of phases with isotropic constants, but in plane stress, have a cubic bubble and a "
+        "linear pressure of their own and serve up to poisson = 0.5. With accuracy that of the two which takes fewer "
+        "nodes, unless it is given.",
         default=1,
         default_words="1, or 2 above poisson = 0.49",
-    )
-    element: str = key(
-        choice("mixed", "displacement"),
-        "Quadratic triangles of isotropic phases, also of those that are given as transversely isotropic, in plane "
-        'strain and generalized plane strain. "mixed": with a cubic '
-        "bubble and a linear pressure of their own, which serve up to poisson = 0.5 and err less everywhere; "
-        '"displacement": without.',
-        default="mixed",
     )
     bodies: str = key(
         choice("torus", "plane"),

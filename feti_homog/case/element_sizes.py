@@ -1,7 +1,6 @@
 """The elements of a cell: their order and kind, and the coarse mesh and its refinement.
 
-The latter follow where a cell gives its accuracy, or how small its elements are.  Mixed elements have a bubble and a
-pressure of their own.
+The latter follow where a cell gives its accuracy.  Mixed elements have a bubble and a pressure of their own.
 """
 
 from __future__ import annotations
@@ -23,18 +22,16 @@ from feti_homog.microstructure.phase_names import COATING
 from feti_homog.schema.wording import toml_key
 from feti_homog.typing import Float
 
-MIXED = "mixed"
 LOCKING_POISSON = 0.49
 """Linear triangles lock above it."""
 # Rounding takes checks to their tolerance beside fibres of a thousandth of the matrix: from 2e-4 to 1e-9 of energies
-# at 0.4999999 for mixed elements, whose products are refined; the others' are not.
-ROUNDING_POISSON = {MIXED: 0.49999999, "displacement": 0.49999}
+# at 0.4999999, with products that are refined.
+ROUNDING_POISSON = 0.49999999
 
 
-def is_mixed(element: str, order: int, material: Material, plane: str) -> bool:
+def is_mixed(order: int, material: Material, plane: str) -> bool:
     """Return whether the elements of a phase have a bubble and a pressure of their own in the plane problem."""
-    has_pressure = isotropic_ratio(material) is not None and not PLANE_STATES[plane].is_sheet
-    return has_pressure and order == 2 and element == MIXED
+    return order == 2 and isotropic_ratio(material) is not None and not PLANE_STATES[plane].is_sheet
 
 
 def orders(
@@ -52,17 +49,11 @@ def orders(
     return (cell.order,)
 
 
-def warnings(cell: Cell, materials: Mapping[str, Material], plane: str) -> list[str]:
-    """List the phases whose elements err by locking or by rounding, a line each."""
-    most = ROUNDING_POISSON[cell.element]
-    locking = _above(LOCKING_POISSON, materials, plane) if cell.element != MIXED else []
-    return [
-        f'{line}: displacements alone err the more the nearer it is to 0.5; use element = "{MIXED}" in [cell]'
-        for line in locking
-    ] + [
-        f"{line}: so near to 0.5 that rounding may exceed the tolerance of the checks; use at most {most:.10g}"
-        for line in _above(most, materials, plane)
-    ]
+def warnings(materials: Mapping[str, Material], plane: str) -> list[str]:
+    """List the phases whose elements err by rounding, a line each."""
+    words = "so near to 0.5 that rounding may exceed the tolerance of the checks"
+    lines = _above(ROUNDING_POISSON, materials, plane)
+    return [f"{line}: {words}; use at most {ROUNDING_POISSON:.10g}" for line in lines]
 
 
 def remarks(materials: Mapping[str, Material], plane: str) -> tuple[str, ...]:
@@ -80,9 +71,8 @@ def _above(limit: float, materials: Mapping[str, Material], plane: str) -> list[
     return [f"[material.{toml_key(phase)}] {names[phase]} = {nu}" for phase, nu in ratios.items() if nu and nu > limit]
 
 
-ASKED = ("accuracy", "element_size")
 CHOSEN = ("mesh_size", "interface_size", "tip_size", "refine")
-"""Keys that a cell has either of the one kind or of the other."""
+"""Keys that an accuracy excludes."""
 
 # Error of the coarsest mesh of elements of each order with stiff inclusions / (kappa beta^2), and how much larger it is
 # with soft ones: 1.5 times the largest that `scripts/measure_accuracy.py` finds.
@@ -94,9 +84,6 @@ MIXED_CONDITION = 33.0
 # gaps have smaller ones; still coarser meshes have hardly less elements.
 PITCH_SHARE, LARGEST = 0.5, 0.5
 MOST_REFINED = 8
-# Coarse edges around a circle at least, as in `mesh.sizes`, and size of elements / those edges, up to which the mean
-# edge of a mesh is 0.8 to 0.95 of its size.
-EDGES_AROUND, FREE_SHARE = 16, 0.7
 
 
 def with_sizes(
@@ -107,26 +94,20 @@ def with_sizes(
     orders: Sequence[int],
     faults: list[str],
 ) -> Cell:
-    """Return the cell with the mesh_size, the refine and the order that its accuracy or its element_size asks for.
+    """Return the cell with the mesh_size, the refine and the order that its accuracy asks for.
 
     Of an accuracy eps, the coarsest mesh is refined r times, with r the least for which `coarse_error` / 4^(p r) <= eps
     for elements of order p; of orders the one with the fewest nodes, about p^2 4^r. It is a fault if more than
-    MOST_REFINED were needed. Of an element_size e, the coarse elements have the size e 2^r with r the most for which
-    it is that of all but the narrowest places: at most that of the coarsest mesh, and FREE_SHARE of the edges that
-    circles have at most. Were they larger, circles would set how fine the mesh is, whatever e.
+    MOST_REFINED were needed.
 
     Args:
         free_faces: whether there are faces that no other phase holds firmly: of voids, of bonds that are soft or part.
         orders: among which an accuracy chooses; without one it is the first.
     """
     cell = replace(cell, order=orders[0])
-    if cell.element_size is not None:
-        largest = min(coarsest(cell), FREE_SHARE * 2 * math.pi * _mean_radius(cell) / EDGES_AROUND)
-        refine = min(MOST_REFINED, max(0, math.floor(math.log2(largest / cell.element_size))))
-        return replace(cell, mesh_size=min(coarsest(cell), cell.element_size * 2**refine), refine=refine)
     if cell.accuracy is None:
         return cell
-    errors = {order: coarse_error(materials, plane, order, free_faces, cell.element) for order in orders}
+    errors = {order: coarse_error(materials, plane, order, free_faces) for order in orders}
     refinements = {order: _refinements(error, cell.accuracy, order) for order, error in errors.items()}
     order = min(refinements, key=lambda p: (p**2 * 4 ** refinements[p], p))
     if refinements[order] > MOST_REFINED:
@@ -143,18 +124,9 @@ def _refinements(error: float, accuracy: float, order: int) -> int:
     return max(0, math.ceil(math.log(error / accuracy, 4**order))) if error > 0 else 0
 
 
-def asked(cell: Cell) -> str:
-    """Return the key of which the sizes follow, with its value, as "accuracy = 0.001".
-
-    Empty if the cell gives them itself.
-    """
-    values = {name: getattr(cell, name) for name in ASKED}
-    return next((f"{name} = {value:g}" for name, value in values.items() if value is not None), "")
-
-
 def without_chosen(cell: Cell, table: dict[str, Any]) -> dict[str, Any]:
-    """Return the table [cell] of a cell without the sizes that it does not give but chooses."""
-    return {name: value for name, value in table.items() if not (asked(cell) and name in CHOSEN)}
+    """Return the table [cell] of a cell without the sizes that its accuracy chooses."""
+    return table if cell.accuracy is None else {name: table[name] for name in table if name not in CHOSEN}
 
 
 def coarsest(cell: Cell) -> float:
@@ -175,17 +147,7 @@ def _fibres(cell: Cell) -> tuple[int, float]:
     return fibres, math.sqrt(3.0) if cell.geometry == "hexagonal" else 1.0
 
 
-def _mean_radius(cell: Cell) -> float:
-    """Return that of the fibres / width of the cell."""
-    if cell.table is not None:
-        return float(cell.table.radius.mean()) / (cell.table.width or 1.0)
-    fibres, height = _fibres(cell)
-    return math.sqrt(math.fsum(cell.fractions.values()) * height / (math.pi * fibres))
-
-
-def coarse_error(
-    materials: Mapping[str, Material], plane: str, order: int, free_faces: bool, element: str = MIXED
-) -> float:
+def coarse_error(materials: Mapping[str, Material], plane: str, order: int, free_faces: bool) -> float:
     """Return an upper estimate of the relative error of the strain energy on the coarsest mesh,
 
         C_p kappa max s beta^2,  beta = |lambda - 1| / (lambda + 1),
@@ -202,7 +164,7 @@ def coarse_error(
     ]
     if free_faces:
         ratios.append(np.zeros(1))
-    mixed = [is_mixed(element, order, material, plane) for material in materials.values()]
+    mixed = [is_mixed(order, material, plane) for material in materials.values()]
     kappa = max(
         min(float(np.linalg.cond(_orthonormal(plane_stiffness(material, plane)))), MIXED_CONDITION if own else math.inf)
         for material, own in zip(materials.values(), mixed, strict=True)

@@ -13,7 +13,7 @@ from typing import Any
 from feti_homog.case.bond_laws import REGISTRY, STIFFNESSES, STRENGTHS
 from feti_homog.case.cell_files import FEWEST_MATCHED
 from feti_homog.case.cell_section import MESH, MESHED, RANDOM, TABLE, Cell
-from feti_homog.case.element_sizes import ASKED, CHOSEN
+from feti_homog.case.element_sizes import CHOSEN
 from feti_homog.case.interface_section import ARCS, Arc, Scatter
 from feti_homog.case.mixed_load import MixedLoad
 from feti_homog.case.section_values import MESH_FILE, MESH_SUFFIXES, TABLE_SUFFIXES, VOIDS_OF_A_RANDOM_CELL
@@ -113,8 +113,7 @@ def _document(holds: Test, line: str, *when: Condition) -> Rule:
 def _cell() -> Iterator[Rule]:
     """Yield the requirements and exclusions among the keys of [cell]."""
     yield exclusive(CELL, "width", "fibre_radius")
-    yield exclusive(CELL, *ASKED)
-    yield Rule(CELL, lambda cell: not any(has(cell, *pair) for pair in product(ASKED, CHOSEN)), _sizes)
+    yield Rule(CELL, lambda cell: not any(has(cell, "accuracy", name) for name in CHOSEN), _sizes)
     yield exclusive(CELL, "fibre_fraction", "mix")
     yield exclusive(CELL, "match", "mix")
     yield misplaced(CELL, "radii", "mix", "; use fibre_radius")
@@ -130,7 +129,6 @@ def _cell() -> Iterator[Rule]:
     yield refused((*CELL, "voids"), lambda value: isinstance(value, bool), line, RANDOM)
     line = "expected true or false: the mesh has its voids"
     yield refused((*CELL, "voids"), lambda value: not isinstance(value, bool), line, MESH)
-    yield misplaced(CELL, "accuracy_check", "accuracy")
     yield exclusive(CELL, "match", "voids", words="exclude each other; cells that match a table have no voids")
     line = "exclude each other; the table gives the radii"
     yield Rule(
@@ -152,9 +150,9 @@ def _below(value: Any, limit: float, or_equal: bool = False) -> bool:
 
 
 def _sizes(place: Place) -> str:
-    """Return the fault of a cell that asks for a size or an accuracy, and gives sizes too."""
-    asked, *others = [name for name in (*ASKED, *CHOSEN) if name in place.value]
-    return f"{place.named(asked, *others)}: exclude each other; {asked} chooses the sizes"
+    """Return the fault of a cell that asks for an accuracy and gives sizes too."""
+    given = [name for name in CHOSEN if name in place.value]
+    return f"{place.named('accuracy', *given)}: exclude each other; accuracy chooses the sizes"
 
 
 def _files() -> Iterator[Rule]:
@@ -184,15 +182,6 @@ def _output() -> Iterator[Rule]:
     others = ANALYSIS_TYPE.among(*(name for name in _values(ANALYSIS_TYPE) if name not in DIFFERENTIABLE))
     line = f"belongs to [analysis] type = {' or '.join(map(toml_value, DIFFERENTIABLE))}"
     yield refused(("output", "sensitivities"), lambda value: value is True, line, others)
-    line = '[output] mesh_error = false: expected true with [cell] accuracy_check = "repeat"'
-    yield _document(lambda document: not _repeats_unestimated(document), line)
-
-
-def _repeats_unestimated(document: Any) -> bool:
-    """Return whether a second mesh is to follow from an error that is not estimated."""
-    cell, output = document.get("cell"), document.get("output")
-    repeats = has(cell, "accuracy_check") and cell["accuracy_check"] == "repeat"
-    return repeats and has(output, "mesh_error") and output["mesh_error"] is False
 
 
 def _loads() -> Iterator[Rule]:

@@ -55,8 +55,7 @@ def plane_law(case: Case, phase: str) -> Float:
 
 def is_mixed(case: Case, phase: str) -> bool:
     """Return whether the elements of a phase have a bubble and a pressure of their own in the plane problem."""
-    cell = case.cell
-    return element_sizes.is_mixed(cell.element, cell.order, case.material_of(phase), case.analysis.plane)
+    return element_sizes.is_mixed(case.cell.order, case.material_of(phase), case.analysis.plane)
 
 
 def axial_law(case: Case, phase: str) -> Float:
