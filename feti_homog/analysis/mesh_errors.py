@@ -15,7 +15,7 @@ from feti_homog.analysis.result_records import MeshError
 from feti_homog.errors import NotCarriedError
 from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response
-from feti_homog.materials import bounds, spatial_constants
+from feti_homog.materials import constants as named_constants
 from feti_homog.system.runtime.records import plain
 from feti_homog.typing import Float
 
@@ -180,12 +180,12 @@ def _changed(stiffness: Float, heat: Float | None, errors: Mapping[str, Float]) 
 def _constants(stiffness: Float, heat: Float | None) -> dict[str, Float]:
     """Return the constants of a stiffness by name, and the `thermal_expansion`."""
     if len(stiffness) == 3:
-        return {name: np.asarray(value) for name, value in plain(bounds.engineering_moduli(stiffness)).items()}
+        return {name: np.asarray(value) for name, value in plain(named_constants.engineering_moduli(stiffness)).items()}
     strains = None if heat is None else -np.linalg.solve(stiffness, heat)
     records = (
-        spatial_constants.engineering_constants(stiffness),
-        spatial_constants.transversely_isotropic_part(stiffness, strains),
-        spatial_constants.transverse_moduli(stiffness),
+        named_constants.engineering_constants(stiffness),
+        named_constants.transversely_isotropic_part(stiffness, strains),
+        named_constants.transverse_moduli(stiffness),
     )
     named = {name: value for record in records for name, value in plain(record).items() if value is not None}
     found = {name: np.asarray(value) for name, value in named.items()}

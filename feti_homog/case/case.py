@@ -55,7 +55,7 @@ from feti_homog.case.selectors import ANALYSIS_TYPE, CRITERION, METHOD, PLANE
 from feti_homog.case.uncertainty import UNCERTAINTY, Uncertainty, read_uncertainty
 from feti_homog.errors import CaseError
 from feti_homog.materials.forms import Material
-from feti_homog.materials.laws import contrast_faults, contrast_warnings
+from feti_homog.materials.laws import contrast_lines
 from feti_homog.schema.keys import Selected, TableReader, keys_of, selected_value, to_table
 from feti_homog.schema.values import text
 from feti_homog.schema.wording import suggestion, toml_key, toml_value
@@ -136,7 +136,7 @@ class Case:
     def warnings(self) -> tuple[str, ...]:
         """List settings that are valid but probably unintended, a line each."""
         of_elements = element_sizes.warnings(self.materials, self.analysis.plane)
-        contrast = contrast_warnings(self.materials, self.analysis.plane)
+        _, contrast = contrast_lines(self.materials, self.analysis.plane)
         return (*of_elements, *contrast, *idle_friction_keys(self.interfaces))
 
     def remarks(self) -> tuple[str, ...]:
@@ -195,7 +195,7 @@ def parse(values: Mapping[str, Any], folder: Path) -> Case:
     document = to_document(values)
     sections, faults = _read_sections(document, folder)
     if not faults:
-        faults += contrast_faults(sections["materials"], sections["analysis"].plane)
+        faults += contrast_lines(sections["materials"], sections["analysis"].plane)[0]
     if not faults:
         sections["cell"] = _sized_cell(document["cell"], sections, faults)
     if faults:

@@ -17,7 +17,7 @@ from feti_homog.case.cell_section import FIBRES_OF, Cell
 from feti_homog.case.mixed_cell import fibre_counts
 from feti_homog.materials.forms import Isotropic, Material
 from feti_homog.materials.laws import isotropic_ratio, plane_stiffness, stiffness_of
-from feti_homog.materials.plane_state import PLANE_STATES
+from feti_homog.materials.voigt import PLANE_STATES
 from feti_homog.microstructure.phase_names import COATING
 from feti_homog.schema.wording import toml_key
 from feti_homog.typing import Float

@@ -12,8 +12,7 @@ from feti_homog.case.mixed_load import LOAD, TEMPERATURE, WAYPOINTS, MixedLoad, 
 from feti_homog.case.section_values import OPENINGS, STRAIN
 from feti_homog.case.selectors import BY_EVENTS, BY_INCREMENTS, GENERALIZED, IN_THE_PLANE
 from feti_homog.materials.forms import Material, Orthotropic
-from feti_homog.materials.plane_state import PLANE_STATES
-from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES
+from feti_homog.materials.voigt import PLANE_STATES, SPATIAL_STRAINS, SPATIAL_STRESSES
 from feti_homog.schema.keys import key
 from feti_homog.schema.values import choice, either, integer, list_of, real
 from feti_homog.schema.wording import toml_value
@@ -232,7 +231,7 @@ def axes_lines(kind: str, section: AnalysisSection, materials: Mapping[str, Mate
     """Return the axes of loads and of constants of phases that could be of a ply, in a line; none in a plane."""
     if not PLANE_STATES[plane].is_spatial:
         return ()
-    from feti_homog.materials.constant_names import axes_line  # which nothing in a plane needs
+    from feti_homog.materials.constants import axes_line  # which nothing in a plane needs
 
     loaded = [name for load in section.placed.values() for name, value in named(load).items() if value]
     of_loads = axes_line(section.plane if isinstance(section, Envelope) else loaded)

@@ -10,8 +10,7 @@ from typing import Any
 
 from feti_homog.case.section_values import STRAIN, STRAIN_COMPONENTS
 from feti_homog.case.selectors import GENERALIZED
-from feti_homog.materials.plane_state import PLANE_STATES
-from feti_homog.materials.voigt import STRAINS
+from feti_homog.materials.voigt import PLANE_STATES, STRAINS
 from feti_homog.schema.keys import Condition, key
 from feti_homog.schema.values import either, list_of, real, table_of
 

@@ -29,8 +29,7 @@ from feti_homog.case.selectors import (
     PLANE,
 )
 from feti_homog.case.uncertainty import DIFFERENTIABLE
-from feti_homog.materials import plane_state
-from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS, STRESSES
+from feti_homog.materials.voigt import PLANE_STATES, SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS, STRESSES
 from feti_homog.schema.keys import Condition, Selector, keys_of
 from feti_homog.schema.rules import (
     ITEMS,
@@ -194,7 +193,7 @@ def _loads() -> Iterator[Rule]:
     yield exclusive(("path",), *LOADS)
     line = f"expected a table such as {{E11 = 0.01}} in {GENERALIZED.in_words('path')}"
     yield refused(("path", "waypoints", ITEMS), lambda value: isinstance(value, list), line, GENERALIZED)
-    for path, pair in product(PLACES_OF_LOADS, plane_state.GENERALIZED.components):
+    for path, pair in product(PLACES_OF_LOADS, PLANE_STATES["generalized"].components):
         yield exclusive(path, *pair)
 
 

@@ -16,7 +16,7 @@ from feti_homog.case.case import Case
 from feti_homog.fem.problem import AXIAL, GENERALIZED, PLANE, Problem
 from feti_homog.materials.derivatives import LawChange
 from feti_homog.materials.laws import expansion, plane_stiffness, spatial_stiffness
-from feti_homog.materials.plane_state import PLANE_STATES
+from feti_homog.materials.voigt import PLANE_STATES
 from feti_homog.typing import Float
 
 IN_PLANE, AXIAL_SHEAR = [0, 1, 5, 2], [4, 3]

@@ -12,8 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.materials.bounds import Moduli
-from feti_homog.materials.spatial_constants import EngineeringConstants, TransverselyIsotropic
+from feti_homog.materials.constants import EngineeringConstants, Moduli, TransverseIsotropy
 from feti_homog.report.text.point_tables import STATES
 from feti_homog.report.text.table import unit
 from feti_homog.results import atomic
@@ -53,7 +52,7 @@ OUTPUT_COLUMNS = (
     Column("anisotropy_shear", STRESS, "C33 - (C11 + C22 - 2 C12) / 4; with generalized plane strain C66 - ..."),
     *columns(Moduli),
     *(column for column in columns(EngineeringConstants) if column.name not in MODULI),
-    *columns(TransverselyIsotropic),
+    *columns(TransverseIsotropy),
     Column("NAME_mesh_error", "that of NAME", "estimated error of an entry or constant by its mesh"),
     Column("energy_mesh_error", "", "estimated relative error of the strain energy, the largest under any strain"),
     Column("Cii_reuss", STRESS, "lower bound of Cii"),
