@@ -13,14 +13,14 @@ from typing import Any
 
 from feti_homog.case.cell_section import Cell
 from feti_homog.case.interface_section import Arc, InterfaceSection, Scatter
-from feti_homog.case.load_section import Angle, Envelope, LoadPath, SingleLoad
-from feti_homog.case.mixed_load import MixedLoad
-from feti_homog.case.section_values import SEED, STATES
-from feti_homog.case.selectors import (
+from feti_homog.case.loads import Angle, Envelope, LoadPath, MixedLoad, SingleLoad
+from feti_homog.case.section_values import (
     ANGLE_ANALYSIS,
     ENVELOPE_ANALYSIS,
     LOAD_ANALYSIS,
     PATH_ANALYSIS,
+    SEED,
+    STATES,
 )
 from feti_homog.case.uncertainty import UNCERTAINTY
 from feti_homog.materials.forms import MATERIAL_FORMS
@@ -112,14 +112,12 @@ class Decomposition:
     subdomains: int | None = key(
         integer(least=1, most=1_000_000),
         "Number of subdomains, at least that of the bodies; large bodies are cut to the fastest size.",
-        default=None,
-        default_words="automatic",
+        absent="automatic",
     )
     max_dofs: int | None = key(
         integer(least=100, most=10**9),
         "Bodies are cut such that no subdomain has many more unknowns than this.",
-        default=None,
-        default_words="automatic",
+        absent="automatic",
     )
     cut: str = key(
         choice("auto", "bodies"),
@@ -172,8 +170,7 @@ class Output:
         real(least=0.0),
         "Factor of the displacements drawn; by default such that displacements and openings are seen and no element "
         "turns over, but at least 1 under a given strain.",
-        default=None,
-        default_words="automatic",
+        absent="automatic",
         presentation=True,
     )
     length_unit: str = key(text, "A label, such as mm; nothing is converted.", default="", presentation=True)

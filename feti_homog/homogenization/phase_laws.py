@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from feti_homog.case import element_sizes
+from feti_homog.case import cell_sizes
 from feti_homog.case.case import Case
 from feti_homog.fem.problem import AXIAL, GENERALIZED, PLANE, Problem
 from feti_homog.materials.derivatives import LawChange
@@ -55,7 +55,7 @@ def plane_law(case: Case, phase: str) -> Float:
 
 def is_mixed(case: Case, phase: str) -> bool:
     """Return whether the elements of a phase have a bubble and a pressure of their own in the plane problem."""
-    return element_sizes.is_mixed(case.cell.order, case.material_of(phase), case.analysis.plane)
+    return cell_sizes.is_mixed(case.cell.order, case.material_of(phase), case.analysis.plane)
 
 
 def axial_law(case: Case, phase: str) -> Float:

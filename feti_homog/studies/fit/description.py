@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from feti_homog.case.case import Case
 from feti_homog.case.document import TomlPath, read_document, to_document
-from feti_homog.case.mixed_load import TEMPERATURE
+from feti_homog.case.loads import TEMPERATURE
 from feti_homog.case.sections import CURVE, MEASURED, SWEEP, TEST, UNKNOWN, Unknown
 from feti_homog.errors import CaseError
 from feti_homog.materials.constants import FORMER, axes_line

@@ -20,7 +20,7 @@ from unit.case.valid_cases import MESH, VALID_CASES
 
 from feti_homog.case.case import check_phases, load, parse
 from feti_homog.case.interface_section import Arc, InterfaceSection
-from feti_homog.case.load_section import Angle, LoadPath
+from feti_homog.case.loads import Angle, LoadPath
 from feti_homog.errors import CaseError
 from feti_homog.materials.forms import General, Isotropic, Orthotropic
 
@@ -149,10 +149,10 @@ def test_openings_are_read(tmp_path):
 def test_targets_of_a_path_are_read(tmp_path):
     case = case_of(tmp_path, of_type("path", PATH))
     assert case.path == LoadPath(strain=(0.2, 0.0, 0.0))
-    assert case.path.targets == ((0.2, 0.0, 0.0),)
+    assert tuple(case.path.placed.values()) == ((0.2, 0.0, 0.0),)
     assert (case.path.method, case.path.increments, case.path.max_events) == ("events", None, 100_000)
     there_and_back = case_of(tmp_path, of_type("path", "[path]\nwaypoints = [[1, 0, 0], [0, 0, 0]]"))
-    assert there_and_back.path.targets == ((1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    assert tuple(there_and_back.path.placed.values()) == ((1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
 def test_the_keys_of_a_material_choose_its_kind(tmp_path):

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from feti_homog.case import case as cases
-from feti_homog.case.element_sizes import COARSE_ERROR, SOFT_FACTOR, coarse_error
+from feti_homog.case.cell_sizes import COARSE_ERROR, SOFT_FACTOR, coarse_error
 from feti_homog.materials.forms import Isotropic, TransverselyIsotropic
 
 MATRIX = {"young": 3.5, "poisson": 0.35}

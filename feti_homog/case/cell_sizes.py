@@ -1,27 +1,28 @@
-"""The elements of a cell: their order and kind, and the coarse mesh and its refinement.
+"""Sizes that follow from a cell: the numbers of its fibres, its width, and the order and size of its elements.
 
-The latter follow where a cell gives its accuracy.  Mixed elements have a bubble and a pressure of their own.
+Fibres of several phases have a fraction and a radius each: `mix` and `radii`.  Order and size of elements follow where
+a cell gives its accuracy.  Mixed elements have a bubble and a pressure of their own.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import permutations
+from math import ceil, fsum, inf, log, pi, sqrt
 from typing import Any
 
 import numpy as np
 
-from feti_homog.case.cell_section import FIBRES_OF, Cell
-from feti_homog.case.mixed_cell import fibre_counts
+from feti_homog.case.cell_section import FIBRES_OF, MOST_FIBRES, Cell
 from feti_homog.materials.forms import Isotropic, Material
 from feti_homog.materials.laws import isotropic_ratio, plane_stiffness, stiffness_of
 from feti_homog.materials.voigt import PLANE_STATES
 from feti_homog.microstructure.phase_names import COATING
-from feti_homog.schema.wording import toml_key
+from feti_homog.schema.wording import toml_key, toml_value
 from feti_homog.typing import Float
 
+FEWEST = 0.5  # fibres of a phase, below which one would be another phase's worth
 LOCKING_POISSON = 0.49
 """Linear triangles lock above it."""
 # Rounding takes checks to their tolerance beside fibres of a thousandth of the matrix: from 2e-4 to 1e-9 of energies
@@ -121,7 +122,7 @@ def with_sizes(
 
 def _refinements(error: float, accuracy: float, order: int) -> int:
     """Return the least r for which error / 4^(p r) is at most the accuracy."""
-    return max(0, math.ceil(math.log(error / accuracy, 4**order))) if error > 0 else 0
+    return max(0, ceil(log(error / accuracy, 4**order))) if error > 0 else 0
 
 
 def without_chosen(cell: Cell, table: dict[str, Any]) -> dict[str, Any]:
@@ -135,7 +136,7 @@ def coarsest(cell: Cell) -> float:
     Half the distance of as many fibres on a square lattice / width of the cell, in two digits.
     """
     fibres, height = _fibres(cell)
-    return min(LARGEST, float(f"{PITCH_SHARE * math.sqrt(height / fibres):.2g}"))
+    return min(LARGEST, float(f"{PITCH_SHARE * sqrt(height / fibres):.2g}"))
 
 
 def _fibres(cell: Cell) -> tuple[int, float]:
@@ -144,7 +145,7 @@ def _fibres(cell: Cell) -> tuple[int, float]:
         assert cell.table.width is not None and cell.table.height is not None
         return len(cell.table.row), cell.table.height / cell.table.width
     fibres = FIBRES_OF.get(cell.geometry) or sum(fibre_counts(cell).values())
-    return fibres, math.sqrt(3.0) if cell.geometry == "hexagonal" else 1.0
+    return fibres, sqrt(3.0) if cell.geometry == "hexagonal" else 1.0
 
 
 def coarse_error(materials: Mapping[str, Material], plane: str, order: int, free_faces: bool) -> float:
@@ -166,10 +167,10 @@ def coarse_error(materials: Mapping[str, Material], plane: str, order: int, free
         ratios.append(np.zeros(1))
     mixed = [is_mixed(order, material, plane) for material in materials.values()]
     kappa = max(
-        min(float(np.linalg.cond(_orthonormal(plane_stiffness(material, plane)))), MIXED_CONDITION if own else math.inf)
+        min(float(np.linalg.cond(_orthonormal(plane_stiffness(material, plane)))), MIXED_CONDITION if own else inf)
         for material, own in zip(materials.values(), mixed, strict=True)
     )
-    return COARSE_ERROR[order] * _contrast(ratios, kappa, MIXED_CONDITION if all(mixed) else math.inf)
+    return COARSE_ERROR[order] * _contrast(ratios, kappa, MIXED_CONDITION if all(mixed) else inf)
 
 
 def _contrast(ratios: Iterable[Float], kappa: float, most: float) -> float:
@@ -183,3 +184,78 @@ def _orthonormal(stiffness: Float) -> Float:
     """Return a stiffness in the plane (3, 3) as one of orthonormal components, of [E11, E22, gamma12 / sqrt(2)]."""
     scale = np.sqrt([1.0, 1.0, 2.0])
     return np.asarray(stiffness * np.outer(scale, scale))
+
+
+def fibre_counts(cell: Cell) -> dict[str, int]:
+    """Return how many fibres of each phase a random cell has.
+
+    Fibres of the fraction c_p and the radius r_p are as many as e_p ~ c_p / r_p^2. Each phase has one, and each further
+    fibre is of the phase with the largest e_p / (2 n_p + 1), the rule of Sainte-Lague: whole numbers next to e_p.
+    """
+    expected = _expected_counts(cell)
+    count = max(len(expected), round(fsum(expected.values())))
+    quotients = np.array(list(expected.values()))[:, None] / (2 * np.arange(1, count) + 1)
+    phase = np.repeat(np.arange(len(expected)), count - 1)
+    further = phase[np.argsort(-quotients.ravel(), kind="stable")[: count - len(expected)]]
+    return dict(zip(expected, (1 + np.bincount(further, minlength=len(expected))).tolist(), strict=True))
+
+
+def _expected_counts(cell: Cell) -> dict[str, float]:
+    """Numbers of fibres of each phase that are not whole; their sum is `fibres`, or what the width holds."""
+    per_area = {phase: share / (pi * _radius(cell, phase) ** 2) for phase, share in cell.fractions.items()}
+    area = cell.fibres / fsum(per_area.values()) if cell.fibres is not None else (cell.width or 1.0) ** 2
+    return {phase: area * density for phase, density in per_area.items()}
+
+
+def _radius(cell: Cell, phase: str) -> float:
+    return 1.0 if cell.radii is None else cell.radii[phase]
+
+
+def void_count(cell: Cell, fibre_radius: float) -> int:
+    """Return the number of voids of a random cell of width 1 whose fibres have this mean radius.
+
+    It is the whole number next to that of their radius, at least one.
+    """
+    if not cell.voids:
+        return 0
+    radius = fibre_radius * (1.0 if cell.void_radius is None else cell.void_radius)
+    return max(1, round(cell.voids / (pi * radius**2)))
+
+
+def fractions_in_words(cell: Cell) -> str:
+    """Return the keys with the fractions of a cell without a file, and their values."""
+    fibres = f"fibre_fraction = {cell.fibre_fraction:g}" if cell.mix is None else f"mix = {toml_value(dict(cell.mix))}"
+    return f"{fibres}, voids = {cell.voids:g}" if cell.voids else fibres
+
+
+def mixed_width(cell: Cell) -> float | None:
+    """Width of the cell, or None where `fibre_radius` or the default make it.
+
+    In it `fibres` fibres have these radii and fractions, W^2 = sum n_p pi r_p^2 / sum c_p.
+    """
+    if cell.radii is None or cell.fibres is None:
+        return cell.width
+    filled = fsum(count * pi * cell.radii[phase] ** 2 for phase, count in fibre_counts(cell).items())
+    return sqrt(filled / fsum(cell.fractions.values()))
+
+
+def mix_faults(cell: Cell) -> list[str]:
+    """List the faults of the numbers of a mix together."""
+    if cell.mix is None:
+        return []
+    faults, given = [], f"[cell] mix = {toml_value(dict(cell.mix))}"
+    if fsum(cell.mix.values()) >= 1:
+        faults.append(f"{given}: expected a sum below 1")
+    if cell.radii is not None and set(cell.radii) != set(cell.mix):
+        expected = ", ".join(cell.mix)
+        faults.append(f"[cell] radii = {toml_value(dict(cell.radii))}: expected a radius of each of mix: {expected}")
+    if faults:
+        return faults
+    expected_counts = _expected_counts(cell)
+    if (count := fsum(expected_counts.values())) > MOST_FIBRES:
+        return [f"{given}: makes {count:.2g} fibres; expected at most {MOST_FIBRES}, of larger radii or a smaller cell"]
+    return [
+        f"{given}: makes {expected:.2g} fibres of {phase}; expected at least {FEWEST}, of more fibres or a wider cell"
+        for phase, expected in expected_counts.items()
+        if expected < FEWEST
+    ]
