@@ -179,7 +179,9 @@ def parse(values: Mapping[str, Any], folder: Path) -> Case:
     if not faults:
         faults += contrast_lines(sections["materials"], sections["analysis"].plane)[0]
     if not faults:
-        sections["cell"] = _sized_cell(document["cell"], sections, faults)
+        cell, materials = sections["cell"], sections["materials"]
+        plane, free_faces = sections["analysis"].plane, bool(sections["interfaces"]) or cell.has_voids
+        sections["cell"] = cell_sizes.sized(cell, document["cell"], materials, plane, free_faces, faults)
     if faults:
         raise CaseError(*faults)
     return Case(name=document.get("name", "case"), **sections)
@@ -258,14 +260,6 @@ def _read_section(document: Mapping[str, Any], section: str, reader: TableReader
     if section not in document and section in (*REQUIRED, *SECTIONS_OF_AN_ANALYSIS):
         return None
     return reader.read(SECTIONS[section], document.get(section, {}), section)
-
-
-def _sized_cell(table: Mapping[str, Any], sections: Mapping[str, Any], faults: list[str]) -> Cell:
-    """Return the cell with the sizes of elements, and the order unless its table gives it, that it asks for."""
-    cell: Cell = sections["cell"]
-    plane, free_faces = sections["analysis"].plane, bool(sections["interfaces"]) or cell.has_voids
-    orders = cell_sizes.orders(cell, table, sections["materials"], plane, faults)
-    return cell_sizes.with_sizes(cell, sections["materials"], plane, free_faces, orders, faults)
 
 
 def check_phases(case: Case, phases: Iterable[str]) -> None:

@@ -6,7 +6,7 @@ a cell gives its accuracy.  Mixed elements have a bubble and a pressure of their
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from itertools import permutations
 from math import ceil, fsum, inf, log, pi, sqrt
@@ -20,7 +20,6 @@ from feti_homog.materials.laws import isotropic_ratio, plane_stiffness, stiffnes
 from feti_homog.materials.voigt import PLANE_STATES
 from feti_homog.microstructure.phase_names import COATING
 from feti_homog.schema.wording import toml_key, toml_value
-from feti_homog.typing import Float
 
 FEWEST = 0.5  # fibres of a phase, below which one would be another phase's worth
 LOCKING_POISSON = 0.49
@@ -33,21 +32,6 @@ ROUNDING_POISSON = 0.49999999
 def is_mixed(order: int, material: Material, plane: str) -> bool:
     """Return whether the elements of a phase have a bubble and a pressure of their own in the plane problem."""
     return order == 2 and isotropic_ratio(material) is not None and not PLANE_STATES[plane].is_sheet
-
-
-def orders(
-    cell: Cell, table: Mapping[str, Any], materials: Mapping[str, Material], plane: str, faults: list[str]
-) -> tuple[int, ...]:
-    """Return the orders that a cell may have, its own if its table gives it; a linear one that locks is a fault.
-
-    Without `accuracy` it is the first of them.
-    """
-    locking = _above(LOCKING_POISSON, materials, plane)
-    if "order" not in table:
-        return (2,) if locking else (1, 2)
-    if cell.order == 1:
-        faults += [f"[cell] order = 1: linear triangles lock: {line}; expected order = 2" for line in locking]
-    return (cell.order,)
 
 
 def warnings(materials: Mapping[str, Material], plane: str) -> list[str]:
@@ -87,29 +71,34 @@ PITCH_SHARE, LARGEST = 0.5, 0.5
 MOST_REFINED = 8
 
 
-def with_sizes(
+def sized(
     cell: Cell,
+    table: Mapping[str, Any],
     materials: Mapping[str, Material],
     plane: str,
     free_faces: bool,
-    orders: Sequence[int],
     faults: list[str],
 ) -> Cell:
     """Return the cell with the mesh_size, the refine and the order that its accuracy asks for.
 
     Of an accuracy eps, the coarsest mesh is refined r times, with r the least for which `coarse_error` / 4^(p r) <= eps
     for elements of order p; of orders the one with the fewest nodes, about p^2 4^r. It is a fault if more than
-    MOST_REFINED were needed.
+    MOST_REFINED were needed, and so is a linear order of the table if its elements lock.
 
     Args:
+        table: [cell] as it is given, with the order or without.
         free_faces: whether there are faces that no other phase holds firmly: of voids, of bonds that are soft or part.
-        orders: among which an accuracy chooses; without one it is the first.
     """
-    cell = replace(cell, order=orders[0])
+    locking, is_given = _above(LOCKING_POISSON, materials, plane), "order" in table
+    if is_given and cell.order == 1:
+        faults += [f"[cell] order = 1: linear triangles lock: {line}; expected order = 2" for line in locking]
+    orders = (cell.order,) if is_given else (2,) if locking else (1, 2)
     if cell.accuracy is None:
-        return cell
-    errors = {order: coarse_error(materials, plane, order, free_faces) for order in orders}
-    refinements = {order: _refinements(error, cell.accuracy, order) for order, error in errors.items()}
+        return replace(cell, order=orders[0])
+    refinements = {}
+    for p in orders:
+        error = coarse_error(materials, plane, p, free_faces)
+        refinements[p] = max(0, ceil(log(error / cell.accuracy, 4**p))) if error > 0 else 0
     order = min(refinements, key=lambda p: (p**2 * 4 ** refinements[p], p))
     if refinements[order] > MOST_REFINED:
         better = "a larger one, or order = 2" if order == 1 else "a larger one"
@@ -117,35 +106,23 @@ def with_sizes(
             f"[cell] accuracy = {cell.accuracy:g}: would need elements split {refinements[order]} times, more than "
             f"{MOST_REFINED}; expected {better}"
         )
-    return replace(cell, mesh_size=coarsest(cell), refine=refinements[order], order=order)
+    return replace(cell, mesh_size=_coarsest(cell), refine=refinements[order], order=order)
 
 
-def _refinements(error: float, accuracy: float, order: int) -> int:
-    """Return the least r for which error / 4^(p r) is at most the accuracy."""
-    return max(0, ceil(log(error / accuracy, 4**order))) if error > 0 else 0
+def _coarsest(cell: Cell) -> float:
+    """mesh_size of the coarsest mesh: half the distance of as many fibres on a square lattice, in two digits."""
+    if cell.table is not None:
+        assert cell.table.width is not None and cell.table.height is not None
+        fibres, height = len(cell.table.row), cell.table.height / cell.table.width
+    else:
+        fibres = FIBRES_OF.get(cell.geometry) or sum(fibre_counts(cell).values())
+        height = sqrt(3.0) if cell.geometry == "hexagonal" else 1.0
+    return min(LARGEST, float(f"{PITCH_SHARE * sqrt(height / fibres):.2g}"))
 
 
 def without_chosen(cell: Cell, table: dict[str, Any]) -> dict[str, Any]:
     """Return the table [cell] of a cell without the sizes that its accuracy chooses."""
     return table if cell.accuracy is None else {name: table[name] for name in table if name not in CHOSEN}
-
-
-def coarsest(cell: Cell) -> float:
-    """mesh_size of the coarsest mesh.
-
-    Half the distance of as many fibres on a square lattice / width of the cell, in two digits.
-    """
-    fibres, height = _fibres(cell)
-    return min(LARGEST, float(f"{PITCH_SHARE * sqrt(height / fibres):.2g}"))
-
-
-def _fibres(cell: Cell) -> tuple[int, float]:
-    """Return the number of fibres, and height / width of the cell."""
-    if cell.table is not None:
-        assert cell.table.width is not None and cell.table.height is not None
-        return len(cell.table.row), cell.table.height / cell.table.width
-    fibres = FIBRES_OF.get(cell.geometry) or sum(fibre_counts(cell).values())
-    return fibres, sqrt(3.0) if cell.geometry == "hexagonal" else 1.0
 
 
 def coarse_error(materials: Mapping[str, Material], plane: str, order: int, free_faces: bool) -> float:
@@ -166,24 +143,14 @@ def coarse_error(materials: Mapping[str, Material], plane: str, order: int, free
     if free_faces:
         ratios.append(np.zeros(1))
     mixed = [is_mixed(order, material, plane) for material in materials.values()]
-    kappa = max(
-        min(float(np.linalg.cond(_orthonormal(plane_stiffness(material, plane)))), MIXED_CONDITION if own else inf)
-        for material, own in zip(materials.values(), mixed, strict=True)
-    )
-    return COARSE_ERROR[order] * _contrast(ratios, kappa, MIXED_CONDITION if all(mixed) else inf)
-
-
-def _contrast(ratios: Iterable[Float], kappa: float, most: float) -> float:
-    """max min(kappa s, most) beta^2."""
-    of_all = np.concatenate([np.ones(1), *ratios])
-    beta = (of_all - 1) / (of_all + 1)
-    return float(np.max(np.minimum(kappa * np.where(beta < 0, SOFT_FACTOR, 1.0), most) * beta**2))
-
-
-def _orthonormal(stiffness: Float) -> Float:
-    """Return a stiffness in the plane (3, 3) as one of orthonormal components, of [E11, E22, gamma12 / sqrt(2)]."""
-    scale = np.sqrt([1.0, 1.0, 2.0])
-    return np.asarray(stiffness * np.outer(scale, scale))
+    scale, conditions = np.sqrt([1.0, 1.0, 2.0]), []  # to orthonormal components, [E11, E22, gamma12 / sqrt(2)]
+    for material, has_pressure in zip(materials.values(), mixed, strict=True):
+        condition = float(np.linalg.cond(plane_stiffness(material, plane) * np.outer(scale, scale)))
+        conditions.append(min(condition, MIXED_CONDITION if has_pressure else inf))
+    eigenvalues = np.concatenate([np.ones(1), *ratios])
+    beta = (eigenvalues - 1) / (eigenvalues + 1)
+    factors = max(conditions) * np.where(beta < 0, SOFT_FACTOR, 1.0)
+    return COARSE_ERROR[order] * float(np.max(np.minimum(factors, MIXED_CONDITION if all(mixed) else inf) * beta**2))
 
 
 def fibre_counts(cell: Cell) -> dict[str, int]:
@@ -202,13 +169,10 @@ def fibre_counts(cell: Cell) -> dict[str, int]:
 
 def _expected_counts(cell: Cell) -> dict[str, float]:
     """Numbers of fibres of each phase that are not whole; their sum is `fibres`, or what the width holds."""
-    per_area = {phase: share / (pi * _radius(cell, phase) ** 2) for phase, share in cell.fractions.items()}
+    radii = cell.radii or dict.fromkeys(cell.fractions, 1.0)
+    per_area = {phase: share / (pi * radii[phase] ** 2) for phase, share in cell.fractions.items()}
     area = cell.fibres / fsum(per_area.values()) if cell.fibres is not None else (cell.width or 1.0) ** 2
     return {phase: area * density for phase, density in per_area.items()}
-
-
-def _radius(cell: Cell, phase: str) -> float:
-    return 1.0 if cell.radii is None else cell.radii[phase]
 
 
 def void_count(cell: Cell, fibre_radius: float) -> int:

@@ -263,11 +263,10 @@ TABLES = (
 )
 
 
-def _places(name: str) -> str:
-    return " or ".join(table.place for table in TABLES if name in keys_of(table.contents))
-
-
-KEY_OWNERS = {name: _places(name) for table in TABLES for name in keys_of(table.contents)}
+KEY_OWNERS = {
+    name: " or ".join(table.place for table in TABLES if name in keys_of(table.contents))
+    for name in dict.fromkeys(name for table in TABLES for name in keys_of(table.contents))
+}
 """By key, the tables to which it belongs, in words."""
 
 
@@ -276,19 +275,12 @@ def read_petsc(table: object, faults: list[str]) -> dict[str, Scalar]:
     if not isinstance(table, dict):
         faults.append(f"petsc = {toml_value(table)}: expected a section [petsc]")
         return {}
-    wrong = {name: _option_fault(name, value) for name, value in table.items()}
-    faults += [
-        f"[petsc] {toml_key(name)} = {toml_value(table[name])}: {words}" for name, words in wrong.items() if words
-    ]
+    for name, value in table.items():
+        start = f"[petsc] {toml_key(name)} = {toml_value(value)}: expected"
+        if name.startswith("-"):
+            faults.append(f"{start} the option's name without its dash")
+        elif not re.fullmatch(PREFIXED, name):
+            faults.append(f"{start} the prefix feti_; PETSc's own options are for the command line")
+        elif not (isinstance(value, bool) or is_number(value) or text.accepts(value)):
+            faults.append(f"{start} {OPTION_EXPECTED}")
     return dict(table)
-
-
-def _option_fault(name: str, value: object) -> str:
-    """Return the fault of an option, empty if there is none."""
-    if name.startswith("-"):
-        return "expected the option's name without its dash"
-    if not re.fullmatch(PREFIXED, name):
-        return "expected the prefix feti_; PETSc's own options are for the command line"
-    if not (isinstance(value, bool) or is_number(value) or text.accepts(value)):
-        return f"expected {OPTION_EXPECTED}"
-    return ""
