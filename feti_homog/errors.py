@@ -67,20 +67,6 @@ class NotCarriedError(ConvergenceError):
     """Stresses are prescribed that nothing in the cell carries."""
 
 
-class CoarseMeshError(FetiHomogError):
-    """A mesh of elements split `refine` times errs by `energy`, more than the case asks for; `finer` times would do.
-
-    `failure` is why these were not solved, if they were tried.
-    """
-
-    def __init__(self, words: str, energy: float, refine: int, finer: int, failure: str = "") -> None:
-        super().__init__(words)
-        self.energy, self.refine, self.finer, self.failure = energy, refine, finer, failure
-
-    def __reduce__(self) -> tuple[type[FetiHomogError], tuple[Any, ...]]:
-        return type(self), (*self.faults, self.energy, self.refine, self.finer, self.failure)
-
-
 class NoMemoryError(FetiHomogError):
     """A rank has no memory left, of which all ranks know."""
 

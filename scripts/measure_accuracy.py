@@ -3,7 +3,7 @@
     .venv/bin/python scripts/measure_accuracy.py
 
 For each cell and each refinement of its coarsest mesh the largest relative error of the strain energy and, in brackets,
-that error relative to the estimate of `feti_homog.case.element_sizes`, which is to be at most about 2/3. The exact
+that error relative to the estimate of `feti_homog.case.cell_sizes`, which is to be at most about 2/3. The exact
 stiffness is that of quadratic elements after one refinement more, which err 16 times less.
 """
 
@@ -17,7 +17,7 @@ from mpi4py import MPI
 from scipy.linalg import eigh
 
 from feti_homog import Case, run
-from feti_homog.case.element_sizes import LOCKING_POISSON, coarse_error
+from feti_homog.case.cell_sizes import LOCKING_POISSON, coarse_error
 from feti_homog.typing import Float
 
 LADDERS = {1: range(4), 2: range(3)}  # refinements by the order of elements

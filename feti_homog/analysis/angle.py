@@ -10,7 +10,7 @@ from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.mesh_errors import energy_error, note_accuracy, state_error, unit_errors
 from feti_homog.analysis.registry import Analysis
 from feti_homog.analysis.result_records import AnglePoint
-from feti_homog.case.load_section import Angle
+from feti_homog.case.loads import Angle
 from feti_homog.homogenization.averaging import Response, asymmetry
 
 

@@ -8,6 +8,7 @@ from typing import Any
 from feti_homog.analysis.cell_records import StiffnessBounds
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.materials import bounds
+from feti_homog.materials.constants import engineering_moduli
 from feti_homog.materials.laws import plane_stiffness
 from feti_homog.typing import Float
 
@@ -27,7 +28,7 @@ def _moduli_and_bounds(cell: TornCell, stiffness: Float) -> dict[str, Any]:
     case, shares = cell.case, list(fractions.values())
     phases = [plane_stiffness(case.material_of(phase), case.analysis.plane) for phase in fractions]
     isotropic = all(bounds.is_isotropic(phase) for phase in phases)
-    found: dict[str, Any] = {"moduli": bounds.engineering_moduli(stiffness)}
+    found: dict[str, Any] = {"moduli": engineering_moduli(stiffness)}
     # With voids the lower bounds are zero.
     if not cell.summary.voids:
         found["bounds"] = StiffnessBounds(

@@ -9,16 +9,16 @@ import numpy as np
 
 from feti_homog.homogenization import bonds
 from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.materials.estimates.constituents import Fibres, Springs
-from feti_homog.materials.estimates.methods import estimates, fibre_bounds
-from feti_homog.materials.laws import expansion, spatial_stiffness
-from feti_homog.materials.spatial_constants import (
-    TransverselyIsotropic,
+from feti_homog.materials.bounds import Fibres, Springs, fibre_bounds
+from feti_homog.materials.constants import (
+    TransverseIsotropy,
     engineering_constants,
     is_transversely_isotropic,
     transverse_moduli,
     transversely_isotropic_part,
 )
+from feti_homog.materials.estimates import estimates
+from feti_homog.materials.laws import expansion, spatial_stiffness
 from feti_homog.microstructure.phase_names import COATING
 from feti_homog.typing import Bool, Float
 
@@ -89,7 +89,7 @@ def _no_estimate(radii: Float, has_springs: bool) -> bool:
     return bool(np.isnan(radii).any() or (has_springs and np.ptp(radii) > SAME_RADIUS * radii.max()))
 
 
-def _constants_of(cell: TornCell, phase: str) -> TransverselyIsotropic:
+def _constants_of(cell: TornCell, phase: str) -> TransverseIsotropy:
     material = cell.case.material_of(phase)
     return transversely_isotropic_part(spatial_stiffness(material), expansion(material))
 

@@ -12,7 +12,6 @@ import numpy as np
 from feti_homog.analysis.checks import Checks
 from feti_homog.analysis.state_recorder import StateRecorder
 from feti_homog.case.case import Case
-from feti_homog.errors import CoarseMeshError
 from feti_homog.homogenization import phase_laws, process_zone
 from feti_homog.homogenization.averaging import Homogenization, Response
 from feti_homog.homogenization.fibre_debonding import FibreInterfaces
@@ -112,7 +111,6 @@ class AnalysisContext:
         undetermined: of every point under one load, the strains that nothing determines.
         excess: the largest strain under one load, relative to that of the bonded cell.
         notes: remarks on the result.
-        earlier: what the mesh lacked on which the cell was solved before.
     """
 
     loads: CellLoads
@@ -126,22 +124,13 @@ class AnalysisContext:
     undetermined: list[list[str]] = field(default_factory=list)
     excess: float = 0.0
     notes: list[str] = field(default_factory=list)
-    earlier: CoarseMeshError | None = None
 
     @classmethod
-    def of(
-        cls,
-        cell: TornCell,
-        progress: Progress,
-        states: StateRecorder | None = None,
-        earlier: CoarseMeshError | None = None,
-    ) -> AnalysisContext:
+    def of(cls, cell: TornCell, progress: Progress, states: StateRecorder | None = None) -> AnalysisContext:
         """Make the context of a cell without a checkpoint; by default no states are recorded."""
         contact = cell.case.interface is not None and cell.case.interface.contact
         recorder = StateRecorder(cell, None, False, progress.say) if states is None else states
-        checks, checkpoint = Checks(cell.solver.rtol), NoCheckpoint(cell.comm)
-        loads, notes = CellLoads(cell, contact), [] if earlier is None else [*earlier.faults]
-        return cls(loads, checks, recorder, progress, checkpoint, notes=notes, earlier=earlier)
+        return cls(CellLoads(cell, contact), Checks(cell.solver.rtol), recorder, progress, NoCheckpoint(cell.comm))
 
     @property
     def plane(self) -> Homogenization:

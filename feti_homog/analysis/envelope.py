@@ -19,7 +19,7 @@ from feti_homog.analysis.mesh_errors import mesh_error, unit_errors
 from feti_homog.analysis.registry import Analysis
 from feti_homog.analysis.result_records import EnvelopePoint
 from feti_homog.analysis.tip_records import DIRECTION_DIGITS, bond_directions
-from feti_homog.case.load_section import Envelope
+from feti_homog.case.loads import Envelope
 from feti_homog.errors import CaseError
 from feti_homog.homogenization.averaging import Response, asymmetry
 from feti_homog.interface.path.onset import Onset

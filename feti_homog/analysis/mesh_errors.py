@@ -12,12 +12,10 @@ from scipy.linalg import eigh
 
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result_records import MeshError
-from feti_homog.case.cell_section import Cell
-from feti_homog.case.element_sizes import MOST_REFINED
-from feti_homog.errors import CoarseMeshError, NotCarriedError
+from feti_homog.errors import NotCarriedError
 from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response
-from feti_homog.materials import bounds, spatial_constants
+from feti_homog.materials import constants as named_constants
 from feti_homog.system.runtime.records import plain
 from feti_homog.typing import Float
 
@@ -25,10 +23,6 @@ if TYPE_CHECKING:
     from feti_homog.homogenization.mesh_error import EnergyErrors
 
 Named = Mapping[str, Float]
-# Of errors of the energy by a halving of elements, at the least: a crack's is 2.
-LEAST_RATE = 2.0
-# Halvings that a repetition takes at most: 16 times the unknowns.
-MOST_HALVINGS = 2
 # True errors of the energy / estimated ones, at the most.
 OFF = 3.0
 # Share of a bound by which rounding may leave a value outside.
@@ -89,36 +83,15 @@ def mesh_error(
 
 
 def note_accuracy(context: AnalysisContext, energy: float) -> None:
-    """Note which mesh would do if the relative error of the energy is more than the case asks for.  Collective.
-
-    Raises:
-        CoarseMeshError: the case asks for a solution on that mesh, and this is its first one.
-    """
+    """Note which mesh would do if the relative error of the energy is more than the case asks for.  Collective."""
     cell = context.case.cell
     if cell.accuracy is None or (energy := context.cell.comm.bcast(energy)) <= cell.accuracy:
         return
-    before = context.earlier
-    finer = cell.refine + math.ceil(math.log(energy / cell.accuracy, _rate(cell, energy, before)))
+    finer = cell.refine + math.ceil(math.log(energy / cell.accuracy, 4**cell.order))
     words = f"[cell] accuracy = {cell.accuracy:g}: the estimated error of the strain energy is {energy:.1e}"
-    repeats, halvings = cell.accuracy_check == "repeat", finer - cell.refine
-    if repeats and before is None and halvings <= MOST_HALVINGS and finer <= MOST_REFINED:
-        words += f" with refine = {cell.refine}: solved once more with refine = {finer}"
-        raise CoarseMeshError(words, energy, cell.refine, finer)
-    if repeats and before is None:
-        words += f", not solved once more with {4**halvings} times the unknowns"
-    elif before is not None and before.failure:
-        words += f", for with refine = {before.finer} it could not be solved: {before.failure}"
     context.notes.append(
         f"{words}; mesh_size = {cell.mesh_size:g}, refine = {finer} and order = {cell.order} in its place would do"
     )
-
-
-def _rate(cell: Cell, energy: float, before: CoarseMeshError | None) -> float:
-    """Factor by which a halving of elements lowers the error: at corners and tips less than that of smooth fields."""
-    halvings, smooth = 0 if before is None else cell.refine - before.refine, float(4**cell.order)
-    if before is None or not halvings:
-        return smooth
-    return min(smooth, max(LEAST_RATE, float((before.energy / energy) ** (1 / halvings))))
 
 
 def _note_bounds(
@@ -173,9 +146,6 @@ def check_accuracy(context: AnalysisContext) -> None:
     """Note, of a case that asks for an accuracy, the error of the cell under the first load, before any bond breaks.
 
     Collective.
-
-    Raises:
-        CoarseMeshError: as `note_accuracy`.
     """
     if context.case.cell.accuracy is None or not context.case.output.mesh_error:
         return
@@ -210,12 +180,12 @@ def _changed(stiffness: Float, heat: Float | None, errors: Mapping[str, Float]) 
 def _constants(stiffness: Float, heat: Float | None) -> dict[str, Float]:
     """Return the constants of a stiffness by name, and the `thermal_expansion`."""
     if len(stiffness) == 3:
-        return {name: np.asarray(value) for name, value in plain(bounds.engineering_moduli(stiffness)).items()}
+        return {name: np.asarray(value) for name, value in plain(named_constants.engineering_moduli(stiffness)).items()}
     strains = None if heat is None else -np.linalg.solve(stiffness, heat)
     records = (
-        spatial_constants.engineering_constants(stiffness),
-        spatial_constants.transversely_isotropic_part(stiffness, strains),
-        spatial_constants.transverse_moduli(stiffness),
+        named_constants.engineering_constants(stiffness),
+        named_constants.transversely_isotropic_part(stiffness, strains),
+        named_constants.transverse_moduli(stiffness),
     )
     named = {name: value for record in records for name, value in plain(record).items() if value is not None}
     found = {name: np.asarray(value) for name, value in named.items()}

@@ -16,7 +16,7 @@ from feti_homog.analysis.path_events import Work, averages, found_again, holding
 from feti_homog.analysis.registry import Analysis
 from feti_homog.analysis.result_records import PathPoint, Peak
 from feti_homog.analysis.tip_records import TipRecorder
-from feti_homog.case.load_section import LoadPath
+from feti_homog.case.loads import LoadPath
 from feti_homog.errors import NotCarriedError
 from feti_homog.homogenization.averaging import Response
 from feti_homog.interface.friction.coulomb_faces import StuckError

@@ -28,9 +28,8 @@ from feti_homog.analysis.result_records import (
     Peak,
     TipRates,
 )
-from feti_homog.materials.bounds import Moduli
-from feti_homog.materials.estimates.constituents import Estimates, FibreBounds
-from feti_homog.materials.spatial_constants import EngineeringConstants, TransverselyIsotropic, TransverseModuli
+from feti_homog.materials.bounds import Estimates, FibreBounds
+from feti_homog.materials.constants import EngineeringConstants, Moduli, TransverseIsotropy, TransverseModuli
 from feti_homog.materials.voigt import voigt_names
 from feti_homog.results.field_layout import FibrePart, Header, InterfacePart, MeshPart, StatePart, tables
 from feti_homog.results.result_json import SCHEMA
@@ -155,7 +154,7 @@ class Result:
     constants: EngineeringConstants | None = described(
         "of generalized plane strain: constants in the axes of the cell", default=None
     )
-    transversely_isotropic: TransverselyIsotropic | None = described(
+    transversely_isotropic: TransverseIsotropy | None = described(
         "constants of the nearest transversely isotropic stiffness about x3", default=None
     )
     transverse_moduli: TransverseModuli | None = described(

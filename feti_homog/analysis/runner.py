@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import closing, contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -17,7 +17,7 @@ from feti_homog.analysis.registry import analysis_of
 from feti_homog.analysis.result import Result
 from feti_homog.analysis.state_recorder import StateRecorder
 from feti_homog.case.case import Case
-from feti_homog.errors import CheckpointError, CoarseMeshError, ConvergenceError, MeshError, NoMemoryError
+from feti_homog.errors import ConvergenceError
 from feti_homog.homogenization.partition_policy import BY_COST
 from feti_homog.homogenization.unit_cell import TornCell, tear
 from feti_homog.results import (
@@ -59,13 +59,8 @@ def run(
         return Result.of(on_root(comm, result_json.read, directory))
     on_root(comm, output_folder.usable, directory)
     on_root(comm, output_folder.refuse_files_of_others, directory)
-    with output_folder.held(directory, comm, progress.say):
-
-        def solved(case: Case, earlier: CoarseMeshError | None, resume: bool) -> Result:
-            with _torn(case, comm, progress) as cell:
-                return _run_and_write(cell, directory, progress, resume, keep_fields, earlier)
-
-        result = _accurate(case, solved, progress, resume)
+    with output_folder.held(directory, comm, progress.say), _torn(case, comm, progress) as cell:
+        result = _run_and_write(cell, directory, progress, resume, keep_fields)
     if result.faults:
         raise ConvergenceError(*result.faults)
     return result
@@ -79,57 +74,17 @@ def compute(case: Case, comm: MPI.Intracomm, keep_fields: bool = False, quiet: b
         ConvergenceError: a solve did not converge or a check failed.
     """
     progress = _begun(case, comm, quiet)
-
-    def solved(case: Case, earlier: CoarseMeshError | None, resume: bool) -> Result:
-        with _torn(case, comm, progress) as cell:
-            states = StateRecorder(cell, None, keep_fields, progress.say)
-            context = AnalysisContext.of(cell, progress, states, earlier)
-            if keep_fields or context.plane.law.has_toughness:
-                context = replace(context, checkpoint=EventsInMemory(comm, room_of(case)))
-            _warn(context)
-            return result_builder.result(context, _analyse(context), states.kept())
-
-    result = _accurate(case, solved, progress)
+    with _torn(case, comm, progress) as cell:
+        states = StateRecorder(cell, None, keep_fields, progress.say)
+        context = AnalysisContext.of(cell, progress, states)
+        if keep_fields or context.plane.law.has_toughness:
+            context = replace(context, checkpoint=EventsInMemory(comm, room_of(case)))
+        _warn(context)
+        result = result_builder.result(context, _analyse(context), states.kept())
     _print_summary(result, progress)
     if result.faults:
         raise ConvergenceError(*result.faults)
     return result
-
-
-def _accurate(
-    case: Case,
-    solved: Callable[[Case, CoarseMeshError | None, bool], Result],
-    progress: Progress,
-    resume: bool = False,
-) -> Result:
-    """Return solved(case, fault of an earlier mesh, resume), once more on the finer mesh that the case may ask for.
-
-    If that fails, also for want of memory of which all ranks know, on the first mesh again.  To resume finds the
-    checkpoint of either; that of the first mesh is left by a run that could not solve the finer one.  Collective.
-    """
-    try:
-        return solved(case, None, resume)
-    except CoarseMeshError as error:
-        earlier = error
-    progress.say(f"remark: {earlier}")
-    of_first = False
-    try:
-        finer = solved(replace(case, cell=replace(case.cell, refine=earlier.finer)), earlier, resume)
-        failure = "; ".join(finer.faults)
-        if not failure:
-            return finer
-    except (MeshError, ConvergenceError, NoMemoryError) as error:
-        failure = str(error)
-    except CheckpointError as error:
-        failure, of_first = f"an earlier run failed ({error})", True
-    except MemoryError as error:
-        if progress.comm.size > 1:
-            raise  # one rank may have met it alone
-        failure = f"no memory left: {error}"
-    failure = progress.comm.bcast(failure)
-    progress.say(f"remark: refine = {earlier.finer}: {failure}; solved with refine = {earlier.refine} again")
-    again = CoarseMeshError(str(earlier), earlier.energy, earlier.refine, earlier.finer, failure)
-    return solved(case, again, of_first)
 
 
 def _begun(case: Case, comm: MPI.Intracomm, quiet: bool) -> Progress:
@@ -163,20 +118,13 @@ def _torn(case: Case, comm: MPI.Intracomm, progress: Progress) -> Iterator[TornC
         cell.destroy()
 
 
-def _run_and_write(
-    cell: TornCell,
-    directory: Path,
-    progress: Progress,
-    resume: bool,
-    keep_fields: bool,
-    earlier: CoarseMeshError | None,
-) -> Result:
+def _run_and_write(cell: TornCell, directory: Path, progress: Progress, resume: bool, keep_fields: bool) -> Result:
     """Analyse and write; the result may have faults."""
     output = cell.case.output
     file = _field_file(cell, directory, progress) if output.fields else None
     with file or nullcontext(), closing(EventLog(directory, cell.comm, cell.case.name, progress.say)) as log:
         states = StateRecorder(cell, file, keep_fields, progress.say)
-        context = AnalysisContext.of(cell, progress, states, earlier)
+        context = AnalysisContext.of(cell, progress, states)
         context = replace(context, checkpoint=_checkpoint(cell, directory), resume=resume)
         context = replace(context, log=log.write, events=output_folder.LOG)
         _warn(context)

@@ -18,7 +18,8 @@ from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.sensitivities import derivatives
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.loads.load import Load
-from feti_homog.materials.derivatives import composite_constants, constant_changes
+from feti_homog.materials.constants import constants
+from feti_homog.materials.derivatives import constant_changes
 from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, THERMAL_STRESSES
 from feti_homog.typing import Float
 
@@ -39,7 +40,7 @@ def sensitivities(
         changes = _changes_with_contact(context, responses)
         columns = {key: [*_entries(*own).values()] for key, own in changes.items()}
     else:
-        values = composite_constants(C, thermal)
+        values = constants(C, thermal)
         found = derivatives(_cells(context), _by_problem(context, responses))
         columns = {
             (each.name, each.value): [*constant_changes(C, thermal, *_secants(each.energies)).values()]

@@ -10,33 +10,16 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from feti_homog.case import element_sizes
+from feti_homog.case import cell_sizes
 from feti_homog.case.cell_files import checked_cell
 from feti_homog.case.cell_section import GEOMETRY, Cell
 from feti_homog.case.document import read_document, to_document
-from feti_homog.case.interface_faults import idle_friction_keys, read_interfaces
 from feti_homog.case.interface_section import Arc, InterfaceSection, interface_tables
-from feti_homog.case.load_section import (
-    AnalysisSection,
-    Angle,
-    Envelope,
-    LoadPath,
-    SingleLoad,
-    Stiffness,
-    axes_lines,
-    expansion_faults,
-    load_faults,
-    stress_free,
-)
-from feti_homog.case.material_sections import (
-    coating_faults,
-    missing_expansions,
-    phase_faults,
-    provider,
-    read_materials,
-)
-from feti_homog.case.mixed_load import completed
+from feti_homog.case.loads import AnalysisSection, Angle, Envelope, LoadPath, SingleLoad, Stiffness, completed
+from feti_homog.case.material_sections import phase_faults, provider, read_materials
+from feti_homog.case.relations import axes_lines, idle_friction_keys, read_interfaces, relation_faults, stress_free
 from feti_homog.case.rules import RULES
+from feti_homog.case.section_values import ANALYSIS_TYPE, CRITERION, METHOD, PLANE
 from feti_homog.case.sections import (
     FIT_SECTIONS,
     KEY_OWNERS,
@@ -51,12 +34,11 @@ from feti_homog.case.sections import (
     Scalar,
     read_petsc,
 )
-from feti_homog.case.selectors import ANALYSIS_TYPE, CRITERION, METHOD, PLANE
 from feti_homog.case.uncertainty import UNCERTAINTY, Uncertainty, read_uncertainty
 from feti_homog.errors import CaseError
 from feti_homog.materials.forms import Material
-from feti_homog.materials.laws import contrast_faults, contrast_warnings
-from feti_homog.schema.keys import Selected, TableReader, keys_of, selected_value, to_table
+from feti_homog.materials.laws import contrast_lines
+from feti_homog.schema.keys import Selected, Selector, TableReader, keys_of, to_table
 from feti_homog.schema.values import text
 from feti_homog.schema.wording import suggestion, toml_key, toml_value
 from feti_homog.system.runtime import input_files
@@ -135,14 +117,14 @@ class Case:
 
     def warnings(self) -> tuple[str, ...]:
         """List settings that are valid but probably unintended, a line each."""
-        of_elements = element_sizes.warnings(self.cell, self.materials, self.analysis.plane)
-        contrast = contrast_warnings(self.materials, self.analysis.plane)
+        of_elements = cell_sizes.warnings(self.materials, self.analysis.plane)
+        _, contrast = contrast_lines(self.materials, self.analysis.plane)
         return (*of_elements, *contrast, *idle_friction_keys(self.interfaces))
 
     def remarks(self) -> tuple[str, ...]:
         """List the assumptions about settings that are not given, a line each."""
         kind, section, plane = self.analysis.type, self.section, self.analysis.plane
-        of_elements = element_sizes.remarks(self.materials, plane)
+        of_elements = cell_sizes.remarks(self.materials, plane)
         of_table = () if self.cell.table is None else self.cell.table.remarks
         of_load = *stress_free(kind, section.placed, plane), *axes_lines(kind, section, self.materials, plane)
         return *of_elements, *of_table, *of_load
@@ -156,7 +138,7 @@ class Case:
             METHOD: None if self.path is None else self.path.method,
             CRITERION: None if self.interface is None else self.interface.criterion,
         }
-        cell = element_sizes.without_chosen(self.cell, to_table(self.cell, selected))
+        cell = cell_sizes.without_chosen(self.cell, to_table(self.cell, selected))
         document: dict[str, Any] = {"name": self.name, "cell": cell}
         document["material"] = {phase: to_table(material, selected) for phase, material in self.materials.items()}
         sections = {section: getattr(self, FIELDS.get(section, section)) for section in SECTIONS if section != "cell"}
@@ -195,9 +177,11 @@ def parse(values: Mapping[str, Any], folder: Path) -> Case:
     document = to_document(values)
     sections, faults = _read_sections(document, folder)
     if not faults:
-        faults += contrast_faults(sections["materials"], sections["analysis"].plane)
+        faults += contrast_lines(sections["materials"], sections["analysis"].plane)[0]
     if not faults:
-        sections["cell"] = _sized_cell(document["cell"], sections, faults)
+        cell, materials = sections["cell"], sections["materials"]
+        plane, free_faces = sections["analysis"].plane, bool(sections["interfaces"]) or cell.has_voids
+        sections["cell"] = cell_sizes.sized(cell, document["cell"], materials, plane, free_faces, faults)
     if faults:
         raise CaseError(*faults)
     return Case(name=document.get("name", "case"), **sections)
@@ -231,21 +215,8 @@ def _read_sections(document: dict[str, Any], folder: Path | None) -> tuple[dict[
     }
     faults += chain.from_iterable(of_rules)
     # What has keys of other cases is not looked into.
-    faults += _relations(sections | {FIELDS.get(name, name): None for name in foreign}, document, selected)
+    faults += relation_faults(sections | {FIELDS.get(name, name): None for name in foreign}, document, selected[PLANE])
     return sections, faults
-
-
-def _relations(sections: Mapping[str, Any], document: Mapping[str, Any], selected: Selected) -> list[str]:
-    """Faults between the values of sections, of those that are not faulty themselves."""
-    path, load, angle, envelope = (sections[name] for name in ("path", "single_load", "angle", "envelope"))
-    faults = load_faults(path, load, selected[PLANE]) + expansion_faults(path, load, sections["materials"])
-    if isinstance(document.get("material"), dict) and sections["cell"]:
-        faults += coating_faults(sections["cell"], document["material"])
-    if angle is not None and angle.strain is not None and not any(angle.strain):
-        faults.append("[angle] strain: expected a strain other than zero")
-    if envelope is not None and envelope.temperature is not None:
-        faults += missing_expansions(sections["materials"], "[envelope] temperature")
-    return faults
 
 
 def _selected(document: Mapping[str, Any]) -> Selected:
@@ -254,8 +225,13 @@ def _selected(document: Mapping[str, Any]) -> Selected:
     first = next(iter(interface_tables(document)), None)
     if isinstance(first, dict) and "law" in first:
         first = first | {"criterion": first["law"]}
-    tables = dict(document) | {"interface": first}
-    return {s: selected_value(SECTIONS[s.section], tables.get(s.section), s.key) for s in selectors}
+    tables, selected = dict(document) | {"interface": first}, dict[Selector, str | None]()
+    for selector in selectors:
+        section, table = SECTIONS[selector.section], tables.get(selector.section)
+        default = getattr(section, selector.key, None)
+        value = table.get(selector.key, default) if isinstance(table, Mapping) else default
+        selected[selector] = value if keys_of(section)[selector.key].type.accepts(value) else None
+    return selected
 
 
 def _top_level_faults(document: Mapping[str, Any]) -> list[str]:
@@ -284,14 +260,6 @@ def _read_section(document: Mapping[str, Any], section: str, reader: TableReader
     if section not in document and section in (*REQUIRED, *SECTIONS_OF_AN_ANALYSIS):
         return None
     return reader.read(SECTIONS[section], document.get(section, {}), section)
-
-
-def _sized_cell(table: Mapping[str, Any], sections: Mapping[str, Any], faults: list[str]) -> Cell:
-    """Return the cell with the sizes of elements, and the order unless its table gives it, that it asks for."""
-    cell: Cell = sections["cell"]
-    plane, free_faces = sections["analysis"].plane, bool(sections["interfaces"]) or cell.has_voids
-    orders = element_sizes.orders(cell, table, sections["materials"], plane, faults)
-    return element_sizes.with_sizes(cell, sections["materials"], plane, free_faces, orders, faults)
 
 
 def check_phases(case: Case, phases: Iterable[str]) -> None:

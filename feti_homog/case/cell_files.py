@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from feti_homog.case.cell_section import TOUCHING, Cell, size_faults
-from feti_homog.case.mixed_cell import mix_faults
+from feti_homog.case.cell_sizes import mix_faults
 from feti_homog.case.section_values import MESH_SUFFIXES, TABLE_SUFFIXES
 from feti_homog.errors import CaseError
 from feti_homog.microstructure.shapes.shapes import BOTH_SIZES, SHAPES, given_shapes, have_both_sizes

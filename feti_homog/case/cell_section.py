@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -39,6 +40,7 @@ GEOMETRY = Selector("cell", "geometry")
 ALL_CIRCULAR, RANDOM, TABLE = GEOMETRY.among(*CIRCULAR), GEOMETRY.among("random"), GEOMETRY.among("table")
 MESH = GEOMETRY.among("mesh")
 MESHED, FROM_A_FILE = GEOMETRY.among(*CIRCULAR, "table"), GEOMETRY.among("table", "mesh")
+random_key, meshed_key = partial(key, only=RANDOM), partial(key, only=MESHED)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,86 +65,68 @@ class Cell:
         unless=("match", "mix"),
         default_words="required, or given by match or mix",
     )
-    width: float | None = key(
-        real(least=1e-9, most=1e9), "Width of the cell.", unit="length", default=None, only=MESHED,
-        default_words="1, or given by fibre_radius or the table",
-    )  # fmt: skip
+    width: float | None = meshed_key(
+        real(least=1e-9, most=1e9),
+        "Width of the cell.",
+        unit="length",
+        absent="1, or given by fibre_radius or the table",
+    )
     height: float | None = key(
-        real(least=1e-9, most=1e9), "Height of the cell.", unit="length", default=None, only=TABLE,
-        default_words="given by the table",
-    )  # fmt: skip
+        real(least=1e-9, most=1e9), "Height of the cell.", unit="length", only=TABLE, absent="given by the table"
+    )
     fibre_radius: float | None = key(
-        real(least=1e-9, most=1e9), "Mean radius of the fibres, in place of width.", unit="length", default=None,
-        only=ALL_CIRCULAR, default_words="given by width",
-    )  # fmt: skip
-    coating: float | None = key(
+        real(least=1e-9, most=1e9),
+        "Mean radius of the fibres, in place of width.",
+        unit="length",
+        only=ALL_CIRCULAR,
+        absent="given by width",
+    )
+    coating: float | None = meshed_key(
         real(least=0.01, most=1.0),
         'Thickness of the coatings of all fibres / radius of the fibre, which is within; of the phase "coating". '
         "fibre_fraction and fibre_radius are those without them, gaps those with them. Coatings of ellipses make both "
         "semi-axes longer by coating sqrt(a b).",
-        default=None,
-        only=MESHED,
-        default_words="none, or the column coating of a table",
+        absent="none, or the column coating of a table",
     )
-    mesh_size: float = key(
+    mesh_size: float = meshed_key(
         real(least=1e-4, most=0.5),
         "Size of the elements, before refine, / width of the cell. At most 1000000 are made, 20000000 in cells of 400 "
         "or more round fibres and voids, counting the small ones in narrow gaps and thin coatings.",
         default=0.05,
-        only=MESHED,
     )
-    interface_size: float | None = key(
+    interface_size: float | None = meshed_key(
         real(least=1e-5, most=0.5),
         "Size of the elements on interfaces, before refine, / width of the cell; from there they grow to mesh_size, by "
         "0.4 of the distance. At most mesh_size.",
-        default=None, default_words="mesh_size", only=MESHED,
-    )  # fmt: skip
-    tip_size: float | None = key(
+        absent="mesh_size",
+    )
+    tip_size: float | None = meshed_key(
         real(least=1e-6, most=0.5),
         "Size of the elements at the tips of debonded arcs, before refine, / width of the cell; from there they grow "
         "like those on interfaces. At most interface_size.",
-        default=None,
-        default_words="such that tips err no more than the rest; of paths and envelopes interface_size",
-        only=MESHED,
+        absent="such that tips err no more than the rest; of paths and envelopes interface_size",
     )
     refine: int = key(
         integer(least=0, most=8),
         "How many times every element is split in four, on the ranks; new nodes follow round and elliptic interfaces.",
         default=0,
     )
-    accuracy: float | None = key(
+    accuracy: float | None = meshed_key(
         real(least=1e-7, most=0.1),
         "Largest relative error of the strain energy under any macroscopic strain, and so of the entries of the "
         "effective stiffness: mesh_size and refine are chosen, which it excludes with interface_size and tip_size, and "
-        "order, unless it is given. It is not that of paths after bonds break, nor of polygons with sharp corners.",
-        default=None, default_words="none", only=MESHED,
-    )  # fmt: skip
-    accuracy_check: str | None = key(
-        choice("remark", "repeat"),
-        'What follows if the estimated error is more than accuracy. "remark": a remark that names the mesh that would '
-        'do; "repeat": the cell is solved on it too, unless it has over 16 times the unknowns or that fails.',
-        default=None, default_words='"remark" beside accuracy', only=MESHED,
-    )  # fmt: skip
-    element_size: float | None = key(
-        real(least=1e-6, most=0.5),
-        "Size of the elements, after refine, / width of the cell: mesh_size and refine are chosen, as with accuracy. "
-        "Mean edges are 0.8 to 1 of it, unless circles of 16 edges or narrow gaps need smaller ones.",
-        default=None, default_words="none", only=MESHED,
-    )  # fmt: skip
+        "order, unless it is given. If the estimated error is more, a remark names the mesh that would do. It is not "
+        "that of paths after bonds break, nor of polygons with sharp corners.",
+        absent="none",
+    )
     order: int = key(
         integer(least=1, most=2),
         "Order of the triangles. 1: linear; they lock above poisson = 0.49, but in plane stress. 2: quadratic, curved "
-        "on round interfaces. With accuracy that of the two which takes fewer nodes, unless it is given.",
+        "on round interfaces; those of phases with isotropic constants, but in plane stress, have a cubic bubble and a "
+        "linear pressure of their own and serve up to poisson = 0.5. With accuracy that of the two which takes fewer "
+        "nodes, unless it is given.",
         default=1,
         default_words="1, or 2 above poisson = 0.49",
-    )
-    element: str = key(
-        choice("mixed", "displacement"),
-        "Quadratic triangles of isotropic phases, also of those that are given as transversely isotropic, in plane "
-        'strain and generalized plane strain. "mixed": with a cubic '
-        "bubble and a linear pressure of their own, which serve up to poisson = 0.5 and err less everywhere; "
-        '"displacement": without.',
-        default="mixed",
     )
     bodies: str = key(
         choice("torus", "plane"),
@@ -150,41 +134,37 @@ class Cell:
         "The stiffness is the same.",
         default="torus",
     )
-    fibres: int | None = key(
-        integer(least=1, most=MOST_FIBRES), "Number of fibres.", only=RANDOM, unless=("match", "radii"),
+    fibres: int | None = random_key(
+        integer(least=1, most=MOST_FIBRES),
+        "Number of fibres.",
+        unless=("match", "radii"),
         default_words="required, or given by match, or by width and radii",
-    )  # fmt: skip
-    mix: Mapping[str, float] | None = key(
+    )
+    mix: Mapping[str, float] | None = random_key(
         FRACTIONS,
         "Fibres of several phases, in place of fibre_fraction: the area of those of each / area of the cell. Each "
         "needs its [material.NAME].",
-        default=None,
-        only=RANDOM,
-        default_words="none",
+        absent="none",
     )
-    radii: Mapping[str, float] | None = key(
+    radii: Mapping[str, float] | None = random_key(
         RADII,
         "Mean radius of the fibres of each phase of mix, in place of fibre_radius. Of fibres, or of as many as a cell "
         "of this width takes, each phase gets the nearest whole number, at least one; its radii are then scaled such "
         "that its fraction is exact.",
         unit="length",
-        default=None,
-        only=RANDOM,
-        default_words="equal ones",
+        absent="equal ones",
     )
     voids: float | bool | None = key(
         VOIDS,
         "Of a random cell voids among the fibres, min_gap from them and from each other: their area / area of the "
         "cell. Of a mesh, true: where it has no elements there are voids; without it such holes are faults.",
-        default=None, default_words="none", only=GEOMETRY.among("random", "mesh"),
+        absent="none", only=GEOMETRY.among("random", "mesh"),
     )  # fmt: skip
-    void_radius: float | None = key(
+    void_radius: float | None = random_key(
         real(least=0.05, most=20.0),
         "Radius of the voids / mean radius of the fibres. There is the nearest whole number of voids, at least one; "
         "their radius is then scaled such that their fraction is exact.",
-        default=None,
-        only=RANDOM,
-        default_words="1",
+        absent="1",
     )
     match: Path | None = key(
         TABLE_FILE,
@@ -192,24 +172,19 @@ class Cell:
         'comment such as "# width = 120, height = 80". The cell gets its radii and, as near as can be, its '
         "distributions of the distances of nearest and second neighbours, but none below min_gap. Ellipses count as "
         "discs of the same area.",
-        default=None,
+        absent="none",
         only=RANDOM,
-        default_words="none",
     )
-    min_gap: float = key(
-        real(least=0.0, most=1.0), "Smallest gap between fibres / their mean diameter.", default=0.05, only=RANDOM
+    min_gap: float = random_key(
+        real(least=0.0, most=1.0), "Smallest gap between fibres / their mean diameter.", default=0.05
     )
-    seed: int = key(
+    seed: int = random_key(
         SEED,
         "Seed of the random arrangement; the same seed gives the same cell on any machine and any number of ranks.",
         default=0,
-        only=RANDOM,
     )
-    radius_spread: float = key(
-        real(least=0.0, most=0.5),
-        "Largest difference of a radius from the mean / mean radius.",
-        default=0.0,
-        only=RANDOM,
+    radius_spread: float = random_key(
+        real(least=0.0, most=0.5), "Largest difference of a radius from the mean / mean radius.", default=0.0
     )
     file: Path | None = key(
         CELL_FILE,
@@ -222,18 +197,16 @@ class Cell:
         "from x to a in degrees; of hollow fibres inner_radius; of rounded polygons sides and corner, with the angle "
         "of the first corner. Rows of the phase void are voids. What "
         'follows # is a comment, of which "# width = 120, height = 80" gives the size of the cell.',
-        default=None,
         only=FROM_A_FILE,
-        default_words="required, or fibre_list of a table",
+        absent="required, or fibre_list of a table",
     )
     phases: Mapping[str, tuple[str | int, ...]] | None = key(
         PHASES,
         "Names and numbers in the file, by the phase that they are of, where they are not the phases' names: physical "
         "surfaces of gmsh; element sets and materials of sections of Abaqus; numbers of VTK's cell data and Medit's "
         "references. Capitals do not matter. debonded has those of lines that are debonded from the start.",
-        default=None,
         only=MESH,
-        default_words="none",
+        absent="none",
     )
     repair: str = key(
         choice("none", "snap", "overlaps"),
@@ -252,12 +225,11 @@ class Cell:
     columns: tuple[str, ...] | None = key(
         NAMES_OF_COLUMNS,
         "Names of the columns of a table, in place of a line of names; others than those of file are not read.",
-        default=None,
         only=TABLE,
-        default_words="the first line of the table",
+        absent="the first line of the table",
     )
     fibre_list: tuple[Mapping[str, Any], ...] | None = key(
-        FIBRE_LIST, "The fibres, in place of file.", default=None, only=TABLE, default_words="given by file"
+        FIBRE_LIST, "The fibres, in place of file.", only=TABLE, absent="given by file"
     )
     window: str = key(
         choice("periodic", "cut"),

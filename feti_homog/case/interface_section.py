@@ -8,17 +8,23 @@ from functools import partial
 from typing import Any
 
 from feti_homog.case.bond_laws import DEFAULT, LAWS, REGISTRY
-from feti_homog.case.section_values import FIBRES, NUMBERS_ABOVE, PAIR, SEED, STIFFNESS, STRENGTH, TOUGHNESS
-from feti_homog.case.selectors import (
+from feti_homog.case.section_values import (
     ANALYSIS_TYPE,
     BREAKING,
     BY_AXIAL_STRENGTH,
     BY_ENERGY,
     BY_STRENGTH,
     BY_TABLE,
+    FIBRES,
     GENERALIZED,
+    NUMBERS_ABOVE,
+    PAIR,
     PATH_ANALYSIS,
+    SEED,
     SOFTENING,
+    STIFFNESS,
+    STRENGTH,
+    TOUGHNESS,
 )
 from feti_homog.schema.keys import key
 from feti_homog.schema.values import POSITIVE_OR_INF, boolean, choice, integer, list_of, real, table_of
@@ -115,22 +121,16 @@ class InterfaceSection:
         STIFFNESS,
         "Normal traction / opening, k_n: of bonds that hold in tension and compression, of broken faces in contact.",
         unit="stress / length",
-        default=None,
-        default_words="inf",
+        absent="inf",
     )
     tangential_stiffness: float | None = pair_key(
-        STIFFNESS,
-        "Tangential traction / slip, k_t, of the bonds that hold.",
-        unit="stress / length",
-        default=None,
-        default_words="inf",
+        STIFFNESS, "Tangential traction / slip, k_t, of the bonds that hold.", unit="stress / length", absent="inf"
     )
     axial_stiffness: float | None = pair_key(
         POSITIVE_OR_INF,
         "Traction along the fibre / slip along it, k_a, of the bonds that hold; inf: no slip along it.",
         unit="stress / length",
-        default=None,
-        default_words="tangential_stiffness",
+        absent="tangential_stiffness",
         only=GENERALIZED,
     )
     normal_strength: float | None = pair_key(
@@ -138,8 +138,7 @@ class InterfaceSection:
         "R^n: the normal traction at which a bond breaks, or N: at which its damage begins. A force per area: it does "
         "not depend on the mesh.",
         unit="stress",
-        default=None,
-        default_words="inf",
+        absent="inf",
         only=(BREAKING, BY_STRENGTH),
     )
     tangential_strength: float | None = pair_key(
@@ -147,16 +146,14 @@ class InterfaceSection:
         "R^t: the tangential traction at which a bond breaks, or S: at which its damage begins; of cohesive laws along "
         "the fibre, too.",
         unit="stress",
-        default=None,
-        default_words="inf",
+        absent="inf",
         only=(BREAKING, BY_STRENGTH),
     )
     axial_strength: float | None = pair_key(
         POSITIVE_OR_INF,
         "R^a: the traction along the fibre at which a bond breaks; inf: it breaks none.",
         unit="stress",
-        default=None,
-        default_words="tangential_strength",
+        absent="tangential_strength",
         only=(BREAKING, GENERALIZED, BY_AXIAL_STRENGTH),
     )
     law: str | None = key(
@@ -167,8 +164,7 @@ class InterfaceSection:
         + "; ".join(f'"{law.name}": {law.description}' for law in REGISTRY if law.softens)
         + '. Compression neither breaks nor damages a bond. With teeth = 1 a cohesive law is "energy" with growth = '
         '"springs" in pure modes.',
-        default=None,
-        default_words="criterion",
+        absent="criterion",
         only=BREAKING,
     )
     criterion: str = key(
@@ -198,8 +194,7 @@ class InterfaceSection:
     teeth: int | None = key(
         integer(least=1, most=10_000),
         "Steps of damage; each is an event. Any number takes the energy of the law.",
-        default=None,
-        default_words="as few as softening_tolerance allows",
+        absent="as few as softening_tolerance allows",
         only=(BREAKING, SOFTENING),
     )
     softening_tolerance: float = key(
@@ -251,16 +246,14 @@ class InterfaceSection:
         "of its interfaces are multiplied, and toughnesses by f^2; stiffnesses stay, and so does the length of the "
         "process zone. Strengths and toughness of this section are then those of a mean fibre, f = 1. The column "
         "strength of a table of fibres gives factors too; both are multiplied.",
-        default=None,
-        default_words="none",
+        absent="none",
         only=BREAKING,
     )
     between: tuple[str, str] | None = pair_key(
         PAIR,
         "The two phases whose interfaces these are, in any order; pairs that no section names never part. Needed where "
         "there are several sections [[interface]].",
-        default=None,
-        default_words="the matrix and all others",
+        absent="the matrix and all others",
     )
 
     @property

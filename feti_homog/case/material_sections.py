@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
+from functools import partial
 from typing import Any
 
 from feti_homog.case.cell_section import CIRCULAR, GEOMETRY, Cell
@@ -91,42 +93,15 @@ def _read_material(table: object, section: str, plane: str | None, reader: Table
         return None
     material: Material | None = reader.read(MATERIAL_FORMS[forms[0]], table, section)
     if material is not None:
-        reader.faults += [f"[{section}] {fault}" for fault in _law_faults(material, plane)]
-    return material
-
-
-def _law_faults(material: Material, plane: str | None) -> list[str]:
-    """List the faults of the constants of a material together; of its stiffness only if the plane state is known."""
-    faults = []
-    try:
+        laws: list[Callable[[], Any]] = [partial(expansion, material)]
         if plane is not None:
-            stiffness_of(material, plane)
-    except ValueError as error:
-        faults.append(str(error))
-    try:
-        expansion(material)
-    except ValueError as error:
-        faults.append(str(error))
-    return faults
-
-
-def missing_expansions(materials: Mapping[str, Material], needed_by: str) -> list[str]:
-    """Faults of materials without thermal expansion, which something needs.
-
-    Their other faults are reported elsewhere.
-    """
-    return [
-        f"[material.{toml_key(phase)}] expansion: missing; {needed_by} needs it"
-        for phase, material in materials.items()
-        if _expands_unknown(material)
-    ]
-
-
-def _expands_unknown(material: Material) -> bool:
-    try:
-        return expansion(material) is None
-    except ValueError:
-        return False
+            laws.insert(0, partial(stiffness_of, material, plane))
+        for law in laws:
+            try:
+                law()
+            except ValueError as error:
+                reader.faults.append(f"[{section}] {error}")
+    return material
 
 
 def _keys_by_form(table: object) -> dict[str, list[str]]:
@@ -138,6 +113,19 @@ def _keys_by_form(table: object) -> dict[str, list[str]]:
         for form, cls in MATERIAL_FORMS.items()
     }
     return {form: names for form, names in given.items() if names}
+
+
+def missing_expansions(materials: Mapping[str, Material], needed_by: str) -> list[str]:
+    """Faults of materials without thermal expansion, which something needs.
+
+    Their other faults are reported elsewhere.
+    """
+    faults = []
+    for phase, material in materials.items():
+        with suppress(ValueError):
+            if expansion(material) is None:
+                faults.append(f"[material.{toml_key(phase)}] expansion: missing; {needed_by} needs it")
+    return faults
 
 
 def provider(phase: str, materials: Mapping[str, Material]) -> str:

@@ -15,6 +15,7 @@ from feti_homog.case.sections import (
     MEASURED,
     OPTION_EXPECTED,
     RANGE_KEYS,
+    SECTIONS,
     SECTIONS_OF_AN_ANALYSIS,
     SWEEP,
     TABLES,
@@ -31,24 +32,7 @@ from feti_homog.materials.forms import Isotropic
 from feti_homog.schema.keys import Key, keys_of
 from feti_homog.schema.values import text
 
-ORDER = (
-    "name",
-    "cell",
-    "material",
-    "analysis",
-    "interface",
-    "angle",
-    "path",
-    "load",
-    "envelope",
-    "decomposition",
-    "output",
-    "petsc",
-    UNCERTAINTY,
-    SWEEP,
-    UNKNOWN,
-    MEASURED,
-)
+ORDER = ("name", "cell", "material", *[*SECTIONS][1:], "petsc", UNCERTAINTY, SWEEP, UNKNOWN, MEASURED)
 """Sections in the order of the reference."""
 
 FIT_TABLES = (
@@ -104,6 +88,28 @@ class TableReference:
 
 NAME = KeyRow("name", "before the first section", "name", text.expected, "", "the file's name", "", "Name of the case.")
 RANGE = f"a range in [{SWEEP}]"
+PETSC_MEANING = (
+    "PETSc's options without their dash. Those of the command line come first; PETSc's own, as -log_view, belong there "
+    "alone."
+)
+PETSC_OPTION = KeyRow(
+    "petsc", "[petsc]", "feti_OPTION", OPTION_EXPECTED, "", "", "",
+    "An option of the solver, such as feti_ksp_rtol = 1e-10; `feti-homog options` lists them.",
+)  # fmt: skip
+UNCERTAINTY_MEANING = (
+    "scatter of constants, which a stiffness or a load passes on to all its results, of first order. "
+    "`feti-homog uncertainty` does so for any number of a case, also of sizes, strengths and loads."
+)
+DEVIATION = KeyRow(
+    UNCERTAINTY, f"[{UNCERTAINTY}]", "SECTION.KEY", "a number above 0", "that of the key", "", "",
+    "Standard deviation of a constant of [material.PHASE], or of a stiffness of [interface], whose value is the "
+    "mean. In place of both, the constant itself may be {mean, std} or {mean, cv}, cv = std / |mean|.",
+)  # fmt: skip
+PAIRS = KeyRow(
+    UNCERTAINTY, f"[{UNCERTAINTY}]", CORRELATION, "a list of [KEY, KEY, VALUE], values from -1 to 1", "", "", "",
+    "Correlation of pairs of these constants.",
+)  # fmt: skip
+AXIS = KeyRow(SWEEP, f"[{SWEEP}]", "SECTION.KEY", AXIS_EXPECTED, "", "", "", AXIS_MEANING)
 
 
 def tables() -> list[TableReference]:
@@ -111,9 +117,9 @@ def tables() -> list[TableReference]:
     found = [
         TableReference("name", NAME.table, "the case as a whole.", (NAME,)),
         *map(_table, (*TABLES, *FIT_TABLES)),
-        _petsc_table(),
-        _uncertainty_table(),
-        _sweep_table(),
+        TableReference("petsc", "[petsc]", PETSC_MEANING, (PETSC_OPTION,)),
+        TableReference(UNCERTAINTY, f"[{UNCERTAINTY}]", UNCERTAINTY_MEANING, (DEVIATION, PAIRS)),
+        _table(Table(SWEEP, f"[{SWEEP}]", SweepSection), AXIS),
         TableReference(SWEEP, RANGE, "Values of a key that lie between two ends.", _rows(SWEEP, RANGE, RANGE_KEYS)),
     ]
     return sorted(found, key=lambda table: ORDER.index(table.section))
@@ -133,61 +139,30 @@ def rows() -> Iterator[KeyRow]:
         yield from table.rows
 
 
-def _table(table: Table) -> TableReference:
+def _table(table: Table, *rows: KeyRow) -> TableReference:
     place = f"{table.place}, {table.form}" if table.form else table.place
-    meaning = _first_paragraph(table.contents)
+    first_paragraph = (inspect.getdoc(table.contents) or "").partition("\n\n")[0]
+    meaning = " ".join(first_paragraph.split())
     if table.contents is Isotropic:  # the first form
         meaning = f"{MATERIAL_MEANING} {meaning}"
-    return TableReference(table.section, place, meaning, _rows(table.section, place, keys_of(table.contents)))
+    return TableReference(table.section, place, meaning, (*rows, *_rows(table.section, place, keys_of(table.contents))))
 
 
 def _rows(section: str, place: str, keys: Mapping[str, Key]) -> tuple[KeyRow, ...]:
-    return tuple(_row(section, place, name, entry) for name, entry in keys.items())
-
-
-def _row(section: str, place: str, name: str, entry: Key) -> KeyRow:
-    of_section = [SECTIONS_OF_AN_ANALYSIS[section]] if section in SECTIONS_OF_AN_ANALYSIS else []
-    applies = ", ".join(condition.in_words(section) for condition in (*of_section, *entry.only))
-    default = "required" if entry.required and not entry.unless else entry.default
-    return KeyRow(section, place, name, entry.type.expected, entry.unit, default, applies, entry.meaning)
-
-
-def _first_paragraph(cls: type[Any]) -> str:
-    """Return the first paragraph of a docstring, in one line."""
-    return " ".join((inspect.getdoc(cls) or "").partition("\n\n")[0].split())
-
-
-def _petsc_table() -> TableReference:
-    words = "An option of the solver, such as feti_ksp_rtol = 1e-10; `feti-homog options` lists them."
-    option = KeyRow("petsc", "[petsc]", "feti_OPTION", OPTION_EXPECTED, "", "", "", words)
-    meaning = (
-        "PETSc's options without their dash. Those of the command line come first; PETSc's own, as -log_view, "
-        "belong there alone."
+    above = [SECTIONS_OF_AN_ANALYSIS[section]] if section in SECTIONS_OF_AN_ANALYSIS else []
+    return tuple(
+        KeyRow(
+            section,
+            place,
+            name,
+            entry.type.expected,
+            entry.unit,
+            "required" if entry.required and not entry.unless else entry.default,
+            ", ".join(condition.in_words(section) for condition in (*above, *entry.only)),
+            entry.meaning,
+        )
+        for name, entry in keys.items()
     )
-    return TableReference("petsc", "[petsc]", meaning, (option,))
-
-
-def _uncertainty_table() -> TableReference:
-    place = f"[{UNCERTAINTY}]"
-    words = (
-        "Standard deviation of a constant of [material.PHASE], or of a stiffness of [interface], whose value is the "
-        "mean. In place of both, the constant itself may be {mean, std} or {mean, cv}, cv = std / |mean|."
-    )
-    std = KeyRow(UNCERTAINTY, place, "SECTION.KEY", "a number above 0", "that of the key", "", "", words)
-    accepts = "a list of [KEY, KEY, VALUE], values from -1 to 1"
-    pairs = KeyRow(UNCERTAINTY, place, CORRELATION, accepts, "", "", "", "Correlation of pairs of these constants.")
-    meaning = (
-        "scatter of constants, which a stiffness or a load passes on to all its results, of first order. "
-        "`feti-homog uncertainty` does so for any number of a case, also of sizes, strengths and loads."
-    )
-    return TableReference(UNCERTAINTY, place, meaning, (std, pairs))
-
-
-def _sweep_table() -> TableReference:
-    place = f"[{SWEEP}]"
-    axis = KeyRow(SWEEP, place, "SECTION.KEY", AXIS_EXPECTED, "", "", "", AXIS_MEANING)
-    settings = _rows(SWEEP, place, keys_of(SweepSection))
-    return TableReference(SWEEP, place, _first_paragraph(SweepSection), (axis, *settings))
 
 
 def as_text(references: Sequence[TableReference]) -> str:
@@ -199,13 +174,8 @@ def as_text(references: Sequence[TableReference]) -> str:
 
 def _row_text(row: KeyRow) -> str:
     unit = f" ({row.unit})" if row.unit else ""
-    lines = (f"{row.accepts}{unit}; {_presence(row)}", row.meaning)
-    return "\n".join([f"\n  {row.key}", *(textwrap.fill(line, WIDTH, **INDENT) for line in lines)])
-
-
-def _presence(row: KeyRow) -> str:
-    """Return whether, and when, a key must or may be given."""
-    if row.default == "required":
-        return f"required if {row.applies}" if row.applies else "required"
     default = f"default {row.default}" if row.default else "optional"
-    return f"{default}; only if {row.applies}" if row.applies else default
+    presence, only = ("required", " if") if row.default == "required" else (default, "; only if")
+    when = f"{only} {row.applies}" if row.applies else ""
+    lines = (f"{row.accepts}{unit}; {presence}{when}", row.meaning)
+    return "\n".join([f"\n  {row.key}", *(textwrap.fill(line, WIDTH, **INDENT) for line in lines)])

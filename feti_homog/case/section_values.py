@@ -1,4 +1,4 @@
-"""Types of values that stand in the sections of a case file: fibres, arcs, strengths, strains, stiffnesses."""
+"""Types of values in the sections of a case file, and the keys whose values decide which other keys belong to it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
+from feti_homog.case.bond_laws import laws_with
 from feti_homog.microstructure.phase_names import FIBRE_PHASE, PHASE
+from feti_homog.schema.keys import Selector
 from feti_homog.schema.values import (
     ValueType,
     boolean,
@@ -87,3 +89,19 @@ NUMBERS_ABOVE = list_of(real(least=0.0), "a list of two numbers or more, none be
 _ANGLES = list_of(real(least=0.0, most=360.0), "a rising list of numbers from 0 to 360", least=1, unique=True)
 OPENINGS = replace(_ANGLES, accepts=lambda v: _ANGLES.accepts(v) and all(a < b for a, b in pairwise(v)))
 STRAIN = list_of(real(), f"a list of three numbers {STRAIN_COMPONENTS}", count=3)
+
+ANALYSIS_TYPE = Selector("analysis", "type")
+PLANE = Selector("analysis", "plane")
+METHOD = Selector("path", "method")
+CRITERION = Selector("interface", "criterion", word="law")
+
+ANGLE_ANALYSIS, PATH_ANALYSIS = ANALYSIS_TYPE.among("angle"), ANALYSIS_TYPE.among("path")
+LOAD_ANALYSIS = ANALYSIS_TYPE.among("load")
+ENVELOPE_ANALYSIS, BREAKING = ANALYSIS_TYPE.among("envelope"), ANALYSIS_TYPE.among("path", "envelope")
+BY_ENERGY, BY_STRENGTH, BY_AXIAL_STRENGTH, SOFTENING, BY_TABLE = (
+    CRITERION.among(*laws_with(key))
+    for key in ("toughness", "normal_strength", "axial_strength", "mixing_exponent", "openings")
+)
+
+IN_THE_PLANE, GENERALIZED = PLANE.among("strain", "stress"), PLANE.among("generalized")
+BY_EVENTS, BY_INCREMENTS = METHOD.among("events"), METHOD.among("increments")

@@ -13,14 +13,14 @@ from typing import Any
 
 from feti_homog.case.cell_section import Cell
 from feti_homog.case.interface_section import Arc, InterfaceSection, Scatter
-from feti_homog.case.load_section import Angle, Envelope, LoadPath, SingleLoad
-from feti_homog.case.mixed_load import MixedLoad
-from feti_homog.case.section_values import SEED, STATES
-from feti_homog.case.selectors import (
+from feti_homog.case.loads import Angle, Envelope, LoadPath, MixedLoad, SingleLoad
+from feti_homog.case.section_values import (
     ANGLE_ANALYSIS,
     ENVELOPE_ANALYSIS,
     LOAD_ANALYSIS,
     PATH_ANALYSIS,
+    SEED,
+    STATES,
 )
 from feti_homog.case.uncertainty import UNCERTAINTY
 from feti_homog.materials.forms import MATERIAL_FORMS
@@ -112,14 +112,12 @@ class Decomposition:
     subdomains: int | None = key(
         integer(least=1, most=1_000_000),
         "Number of subdomains, at least that of the bodies; large bodies are cut to the fastest size.",
-        default=None,
-        default_words="automatic",
+        absent="automatic",
     )
     max_dofs: int | None = key(
         integer(least=100, most=10**9),
         "Bodies are cut such that no subdomain has many more unknowns than this.",
-        default=None,
-        default_words="automatic",
+        absent="automatic",
     )
     cut: str = key(
         choice("auto", "bodies"),
@@ -172,8 +170,7 @@ class Output:
         real(least=0.0),
         "Factor of the displacements drawn; by default such that displacements and openings are seen and no element "
         "turns over, but at least 1 under a given strain.",
-        default=None,
-        default_words="automatic",
+        absent="automatic",
         presentation=True,
     )
     length_unit: str = key(text, "A label, such as mm; nothing is converted.", default="", presentation=True)
@@ -266,11 +263,10 @@ TABLES = (
 )
 
 
-def _places(name: str) -> str:
-    return " or ".join(table.place for table in TABLES if name in keys_of(table.contents))
-
-
-KEY_OWNERS = {name: _places(name) for table in TABLES for name in keys_of(table.contents)}
+KEY_OWNERS = {
+    name: " or ".join(table.place for table in TABLES if name in keys_of(table.contents))
+    for name in dict.fromkeys(name for table in TABLES for name in keys_of(table.contents))
+}
 """By key, the tables to which it belongs, in words."""
 
 
@@ -279,19 +275,12 @@ def read_petsc(table: object, faults: list[str]) -> dict[str, Scalar]:
     if not isinstance(table, dict):
         faults.append(f"petsc = {toml_value(table)}: expected a section [petsc]")
         return {}
-    wrong = {name: _option_fault(name, value) for name, value in table.items()}
-    faults += [
-        f"[petsc] {toml_key(name)} = {toml_value(table[name])}: {words}" for name, words in wrong.items() if words
-    ]
+    for name, value in table.items():
+        start = f"[petsc] {toml_key(name)} = {toml_value(value)}: expected"
+        if name.startswith("-"):
+            faults.append(f"{start} the option's name without its dash")
+        elif not re.fullmatch(PREFIXED, name):
+            faults.append(f"{start} the prefix feti_; PETSc's own options are for the command line")
+        elif not (isinstance(value, bool) or is_number(value) or text.accepts(value)):
+            faults.append(f"{start} {OPTION_EXPECTED}")
     return dict(table)
-
-
-def _option_fault(name: str, value: object) -> str:
-    """Return the fault of an option, empty if there is none."""
-    if name.startswith("-"):
-        return "expected the option's name without its dash"
-    if not re.fullmatch(PREFIXED, name):
-        return "expected the prefix feti_; PETSc's own options are for the command line"
-    if not (isinstance(value, bool) or is_number(value) or text.accepts(value)):
-        return f"expected {OPTION_EXPECTED}"
-    return ""

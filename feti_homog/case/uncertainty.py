@@ -79,7 +79,10 @@ def _checked(
     """Return the uncertainties of standard deviations and correlated pairs; empty, with faults, of faulty ones."""
     named = {".".join(path): value for path, value in dict(given).items()}
     faults += [*_deviation_faults(document, given, anywhere), *_pair_faults(pairs, named)]
-    faults += [] if anywhere or not given else _analysis_faults(document)
+    analysis = document.get("analysis")
+    if given and not anywhere and isinstance(analysis, dict) and analysis.get("type") not in DIFFERENTIABLE:
+        types = " or ".join(map(toml_value, DIFFERENTIABLE))
+        faults.append(f"[{UNCERTAINTY}]: belongs to [analysis] type = {types}")
     if faults:
         return Uncertainty({})
     found = Uncertainty(named, tuple((first, second, float(value)) for first, second, value in pairs))
@@ -109,14 +112,6 @@ def _deviation_faults(
 def is_constant(path: TomlPath) -> bool:
     """Return whether there are derivatives by the key."""
     return path[0] == "material" or (path[0] == "interface" and path[-1].endswith("_stiffness"))
-
-
-def _analysis_faults(document: Mapping[str, Any]) -> list[str]:
-    """List the fault of an analysis without derivatives."""
-    analysis = document.get("analysis")
-    if not isinstance(analysis, dict) or analysis.get("type") in DIFFERENTIABLE:
-        return []
-    return [f"[{UNCERTAINTY}]: belongs to [analysis] type = {' or '.join(map(toml_value, DIFFERENTIABLE))}"]
 
 
 def _pair_faults(pairs: Any, named: Mapping[str, Any]) -> Iterator[str]:

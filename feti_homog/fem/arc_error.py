@@ -1,9 +1,7 @@
-"""Energy that the elements' error along arcs costs.
+"""Energy error of elements along arcs.
 
-Their sides take area from a body or add to it, and their displacements and those of a bond on springs follow
-polynomials between nodes.
-
-Of each body alone, so that nothing is communicated; what two bodies that are glued have of it in common cancels.
+Sides of elements take area from a body or add to it, and their displacements follow polynomials between nodes.
+Each body has its energy alone, without communication; the share that two glued bodies have in common cancels.
 """
 
 from __future__ import annotations
@@ -91,39 +89,34 @@ def arc_energy(body: RecoveredStress, sides: ArcSides) -> Float:
     """
     if not len(sides.element):
         return np.zeros((body.loads.shape[1],) * 2)
-    rate = _rate(body, sides)
-    chord = sides.points[:, -1] - sides.points[:, 0]
-    order, last = body.order, len(sides.nodes[0]) - 1
-    stress = np.stack([_at(body, sides, place) for place in np.arange(last + 1) / last], axis=1)
-    tractions = np.diff(_tractions(body, stress, sides.normals), n=order, axis=1)[:, 0]
-    imposed = np.einsum("cdk,fpd->fpck", _macroscopic(body), sides.points)
-    u = np.diff(body.u[body.node_class[sides.nodes]] + imposed, n=order, axis=1)[:, 0]
-    share = np.hypot(*chord.T) / {1: 12, 2: 60}[order]
-    between = _summed(share, tractions, u)
-    return -np.asarray(rate + between + between.T)
-
-
-def _rate(body: RecoveredStress, sides: ArcSides) -> Float:
-    """(k, k) sum over the sides of area (sigma_i : eps_j - t_i . du_j/dn - t_j . du_i/dn) in their middle."""
+    # sum over the sides of area (sigma_i : eps_j - t_i . du_j/dn - t_j . du_i/dn) in their middle
     m, stress = body.problem.strains, _at(body, sides, 0.5)
+    macroscopic = np.stack([body.problem.gradient(load[:m]) for load in body.loads.T], axis=-1)  # (c, 2, k)
     loads = np.tile(body.loads, (len(stress), 1, 1))
     loads[:, :m] = body.flexibility @ (stress - body.L[:m, m:] @ body.loads[m:])
     chord = sides.points[:, -1] - sides.points[:, 0]
     h = np.hypot(*chord.T)[:, None]
     tangent = chord / h
     normal = np.column_stack([tangent[:, 1], -tangent[:, 0]])
-    traction = _tractions(body, stress[:, None], normal[:, None])[:, 0]
     gradient = loads[:, body.problem.voigt]
     if body.problem.components == 2:  # of which the strains have the symmetric part, and the nodes du/ds along the side
         gradient[:, [0, 1], [1, 0]] /= 2
         u = body.u[body.node_class[sides.nodes]]
-        along = (u[:, -1] - u[:, 0]) / h[..., None] + np.einsum("cdk,fd->fck", _macroscopic(body), tangent)
+        along = (u[:, -1] - u[:, 0]) / h[..., None] + np.einsum("cdk,fd->fck", macroscopic, tangent)
         turn = (normal[..., None] * (along - _along(gradient, tangent))).sum(axis=1)
         turn *= (normal[:, 0] * tangent[:, 1] - normal[:, 1] * tangent[:, 0])[:, None]
         gradient[:, 0, 1] += turn
         gradient[:, 1, 0] -= turn
-    work = _summed(sides.area, traction, _along(gradient, normal))
-    return _summed(sides.area, loads, body.L @ loads) - work - work.T
+    work = _summed(sides.area, _along(stress[:, body.problem.voigt], normal), _along(gradient, normal))
+    rate = _summed(sides.area, loads, body.L @ loads) - work - work.T
+    order, last = body.order, len(sides.nodes[0]) - 1
+    stress = np.stack([_at(body, sides, place) for place in np.arange(last + 1) / last], axis=1)
+    tractions = np.diff(_along(stress[:, :, body.problem.voigt], sides.normals), n=order, axis=1)[:, 0]
+    imposed = np.einsum("cdk,fpd->fpck", macroscopic, sides.points)
+    u = np.diff(body.u[body.node_class[sides.nodes]] + imposed, n=order, axis=1)[:, 0]
+    share = h[:, 0] / {1: 12, 2: 60}[order]
+    between = _summed(share, tractions, u)
+    return -np.asarray(rate + between + between.T)
 
 
 def _at(body: RecoveredStress, sides: ArcSides, place: float) -> Float:
@@ -136,11 +129,6 @@ def _at(body: RecoveredStress, sides: ArcSides, place: float) -> Float:
     return found
 
 
-def _tractions(body: RecoveredStress, stress: Float, normal: Float) -> Float:
-    """(f, p, c, k) tractions of stresses (f, p, m, k) on normals (f, p, 2)."""
-    return _along(stress[:, :, body.problem.voigt], normal)
-
-
 def _along(tensors: Float, vectors: Float) -> Float:
     """(.., c, k) tensors (.., c, 2, k) times vectors (.., 2)."""
     x, y = vectors[..., None, 0, None], vectors[..., None, 1, None]
@@ -151,12 +139,6 @@ def _summed(weights: Float, left: Float, right: Float) -> Float:
     """(k, k) sum_f w_f left_f^T right_f of (f, c, k) each."""
     k = left.shape[2]
     return np.asarray((left * weights[:, None, None]).reshape(-1, k).T @ right.reshape(-1, k))
-
-
-def _macroscopic(body: RecoveredStress) -> Float:
-    """(c, 2, k) gradients that the loads impose."""
-    m = body.problem.strains
-    return np.stack([body.problem.gradient(load[:m]) for load in body.loads.T], axis=-1)
 
 
 def _cross(a: Float, b: Float) -> Float:

@@ -1,4 +1,4 @@
-"""Assembly of one subdomain: stiffness, load of the unit strains, averages.
+"""Assembly of one subdomain: stiffness, load of the unit strains, averages, integrals along voids.
 
 Engineering shears; degrees of freedom are (node, displacement), node-major.  Elements
 are summed triangle by coarse triangle first: a refined one is an element of its own, `MacroElement`, and affine ones
@@ -8,7 +8,6 @@ share its integrals.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -19,10 +18,14 @@ from feti_homog.fem import bubble
 from feti_homog.fem.problem import PLANE, Problem
 from feti_homog.fem.shape_functions import gradients
 from feti_homog.mesh.refinement import FineMesh, ReferenceLattice
+from feti_homog.mesh.submesh import Submesh
 from feti_homog.typing import Bool, Float, Int, Int32
 
 # Elements that are integrated at once: bounds the memory of their gradients, about 100 MB of quadratic ones.
 ELEMENTS_AT_ONCE = 1 << 16
+# int N_i dN_j along a side: of two nodes, and of two and the one between them.
+LINEAR = np.array([[-0.5, 0.5], [-0.5, 0.5]])
+QUADRATIC = np.array([[-3.0, 4.0, -1.0], [-4.0, 0.0, 4.0], [1.0, -4.0, 3.0]]) / 6
 Mixed = bool | tuple[bool, ...]
 
 
@@ -68,11 +71,12 @@ def assemble(
     Q, slopes, areas = np.zeros((c * n, laws.shape[-1])), np.zeros((n, 2)), np.zeros(len(stiffnesses))
     for number, (L, is_mixed) in enumerate(zip(stiffnesses, np.broadcast_to(mixed, len(stiffnesses)), strict=True)):
         members = np.ones(len(mesh.nodes), bool) if material is None else material == number
-        tensor = _tensor(L, problem)
-        for part in _parts(mesh, members):
-            integrate = _curved if mesh.curved[part[0]] else _affine
-            couples[part], loads[part], area = integrate(macro, mesh, part, tensor, L if is_mixed else None)
-            areas[number] += area
+        # Turns int dN_a/dx_k dN_b/dx_l into K_(a i)(b j), with (k, l) and (i, j) flat.
+        tensor = L[problem.voigt[:, :, None, None], problem.voigt].transpose(1, 3, 0, 2).reshape(4, c * c)
+        for kind, integrate in ((members & ~mesh.curved, _affine), (members & mesh.curved, _curved)):
+            for part in _chunks(np.flatnonzero(kind), ELEMENTS_AT_ONCE // len(mesh.lattice.triangles)):
+                couples[part], loads[part], area = integrate(macro, mesh, part, tensor, L if is_mixed else None)
+                areas[number] += area
         nodes = classes[members].ravel()
         own = np.stack([np.bincount(nodes, loads[members, :, k].ravel(), n) for k in range(2)], axis=1)
         # sum_k int dN/dx_k L[(i,k), :]
@@ -81,20 +85,14 @@ def assemble(
     return Assembly(_sparse(couples, classes[:, macro.rows], classes[:, macro.columns], n), Q, slopes, areas)
 
 
-def element_gradients(points: Float, triangles: Int32) -> Iterator[tuple[slice, Float, Float]]:
-    """Gradients (e, q, a, 2) and weights (e, q) by chunks of elements, so that memory stays bounded."""
-    for first in range(0, len(triangles), ELEMENTS_AT_ONCE):
-        part = slice(first, min(first + ELEMENTS_AT_ONCE, len(triangles)))
-        yield part, *gradients(points[triangles[part]])
-
-
 def element_strain(
     points: Float, triangles: Int32, node_class: Int32, u: Float, problem: Problem = PLANE
 ) -> tuple[Float, Float]:
     """Mean strains (e, m) of the elements under nodal displacements u (classes, c), and their areas (e,)."""
     strain, area = np.empty((len(triangles), problem.strains)), np.empty(len(triangles))
     parts_of = [np.nonzero(problem.voigt == number) for number in range(problem.strains)]
-    for part, g, w in element_gradients(points, triangles):
+    for part in _chunks(np.arange(len(triangles)), ELEMENTS_AT_ONCE):
+        g, w = gradients(points[triangles[part]])
         area[part] = w.sum(axis=1)
         mean = np.einsum("eqad,eq->ead", g, w) / area[part, None, None]
         gradient = np.einsum("eai,ead->eid", u[node_class[triangles[part]]], mean)
@@ -102,12 +100,9 @@ def element_strain(
     return strain, area
 
 
-def _parts(mesh: FineMesh, members: Bool) -> Iterator[Int]:
-    """Yield the coarse triangles `members` (t,), affine and curved ones apart, in groups that keep memory bounded."""
-    most = max(1, ELEMENTS_AT_ONCE // len(mesh.lattice.triangles))
-    for kind in (members & ~mesh.curved, members & mesh.curved):
-        triangles = np.flatnonzero(kind)
-        yield from (triangles[first : first + most] for first in range(0, len(triangles), most))
+def _chunks(numbers: Int, size: int) -> list[Int]:
+    """Cut numbers into chunks that keep memory bounded."""
+    return [numbers[first : first + max(size, 1)] for first in range(0, len(numbers), max(size, 1))]
 
 
 def _affine(
@@ -140,13 +135,6 @@ def _curved(
     else:
         couples = macro.couples(bubble.Elements.of(points, mixed).couples())
     return couples, macro.nodes(integrals(g, w)), float(w.sum())
-
-
-def _tensor(L: Float, problem: Problem) -> Float:
-    """(4, c^2) that turns int dN_a/dx_k dN_b/dx_l into K_(a i)(b j), with (k, l) and (i, j) flat."""
-    voigt, c = problem.voigt, problem.components
-    tensor: Float = L[voigt[:, :, None, None], voigt[None, None]].transpose(1, 3, 0, 2).reshape(4, c * c)
-    return tensor
 
 
 def _sparse(couples: Float, rows: Int32, columns: Int32, n_classes: int) -> csr_matrix:
@@ -239,3 +227,27 @@ def integrals(g: Float, w: Float) -> Float:
     """(e, a, 2) int dN_a/dx_k, from the same."""
     integral: Float = np.einsum("eqak,eq->eak", g, w)
     return integral
+
+
+def void_integrals(submesh: Submesh, mesh: FineMesh) -> Float:
+    """(classes, 2) int N n ds along the sides at voids, n outward from the void: u^T of it is int grad u there."""
+    sums, nodes = np.zeros((mesh.n_classes, 2)), nodes_along(submesh, mesh, submesh.at_void)
+    products = LINEAR if mesh.lattice.triangles.shape[1] == 3 else QUADRATIC
+    step = len(products) - 1
+    for first in range(0, nodes.shape[1] - 1, step):
+        own = nodes[:, first : first + step + 1]
+        # The body is on the left, the void on the right: n ds = (-dy, dx).
+        tangent = np.einsum("ij,tjk->tik", products, mesh.points[own])
+        for k, part in enumerate((-tangent[..., 1], tangent[..., 0])):
+            sums[:, k] += np.bincount(mesh.node_class[own].ravel(), part.ravel(), mesh.n_classes)
+    return sums
+
+
+def nodes_along(submesh: Submesh, mesh: FineMesh, edges: Bool) -> Int:
+    """(sides, M + 1) the nodes of each side of a triangle on one of the marked torus `edges`, the body on the left."""
+    triangle, side = np.nonzero(edges[submesh.edge_class[submesh.triangle_edges]])
+    lattice, sides = mesh.lattice.nodes, []
+    for k in range(3):  # from vertex k to vertex k + 1
+        nodes = np.flatnonzero(lattice[:, (k + 2) % 3] == 0)
+        sides.append(nodes[np.argsort(lattice[nodes, (k + 1) % 3])])
+    return np.take_along_axis(mesh.nodes[triangle].astype(np.int64), np.array(sides)[side], axis=1)

@@ -1,4 +1,7 @@
-"""Polynomials fitted to values of the elements around each vertex, by least squares weighted with areas."""
+"""Polynomials fitted to values of the elements around each vertex, by least squares weighted with areas.
+
+On a boundary, where fits have elements on one side alone, known tractions correct them.
+"""
 
 from __future__ import annotations
 
@@ -15,6 +18,9 @@ from feti_homog.typing import Float, Int
 NEIGHBOURS = {1: 0.1, 2: 0.001}
 # Of the moments of a fit, whose diagonal is 1: where all points lie on a line, a fit does not vary across it.
 RIDGE = 1e-9
+# Length of the mean of the normals of the sides at a vertex below which it has no direction: sides meet in a cusp, as
+# where two fibres touch.
+NO_NORMAL = 0.1
 
 
 @dataclass(frozen=True)
@@ -84,7 +90,14 @@ def linear_values(vertices: Int, away: Float, weights: Float, values: Float, nei
     basis = np.broadcast_to(weights, x.shape), weights * x, weights * y
     parts = (*basis, basis[1] * x, basis[1] * y, basis[2] * y)
     moments = np.stack([np.bincount(at, part.ravel()).astype(float) for part in parts])
-    first = _first_rows(moments + neighbours.shared_moments(moments))
+    moments += neighbours.shared_moments(moments)
+    # The first row of the inverse of each normalized symmetric matrix.
+    scale = 1 / np.sqrt(moments[[0, 3, 5]])
+    xx = yy = 1.0 + RIDGE
+    mx, my, xy = (moments[k] * scale[i] * scale[j] for k, i, j in ((1, 0, 1), (2, 0, 2), (4, 1, 2)))
+    cofactors = np.stack([xx * yy - xy * xy, xy * my - mx * yy, mx * xy - xx * my])
+    determinant = (1.0 + RIDGE) * cofactors[0] + mx * cofactors[1] + my * cofactors[2]
+    first = cofactors * scale * (scale[0] / determinant)
     share = sum(np.take(row, vertices) * own for row, own in zip(first, basis, strict=True))
     found = csc_matrix((share.T.ravel(), vertices.T.ravel(), np.arange(0, 3 * e + 1, 3)), (size, e)) @ values
     is_shared = np.zeros(size, bool)
@@ -97,16 +110,6 @@ def linear_values(vertices: Int, away: Float, weights: Float, values: Float, nei
     (a, b), (f, g, h) = neighbours.vector.T, first[:, neighbours.at]
     moved = (f + a * g + b * h)[:, None] * zero + g[:, None] * one + h[:, None] * two
     return np.asarray(found + NEIGHBOURS[1] * gathered(neighbours.at, moved[:, None], size)[:, 0])
-
-
-def _first_rows(moments: Float) -> Float:
-    """(3, n) the first row of the inverse of each normalized symmetric matrix of these entries (6, n)."""
-    scale = 1 / np.sqrt(moments[[0, 3, 5]])
-    xx = yy = 1.0 + RIDGE
-    x, y, xy = (moments[k] * scale[i] * scale[j] for k, i, j in ((1, 0, 1), (2, 0, 2), (4, 1, 2)))
-    cofactors = np.stack([xx * yy - xy * xy, xy * y - x * yy, x * xy - xx * y])
-    determinant = (1.0 + RIDGE) * cofactors[0] + x * cofactors[1] + y * cofactors[2]
-    return np.asarray(cofactors * scale * (scale[0] / determinant))
 
 
 def polynomials(x: Float, order: int) -> Float:
@@ -140,3 +143,51 @@ def fitted(moments: Float, sums: Float) -> Float:
     scale = 1 / np.sqrt(np.einsum("nii->ni", moments))[..., None]
     normalized = moments * scale * scale.transpose(0, 2, 1) + RIDGE * np.eye(moments.shape[1])
     return np.asarray(scale * np.linalg.solve(normalized, scale * sums))
+
+
+@dataclass(frozen=True)
+class KnownTractions:
+    """Tractions of k loads at n vertices.
+
+    Attributes:
+        node: (n,) their classes of nodes.
+        normal: (n, 2) unit vectors out of the body.
+        traction: (n, c, k).
+    """
+
+    node: Int
+    normal: Float
+    traction: Float
+
+    @classmethod
+    def at(cls, node: Int, mean: Float, traction: Float) -> KnownTractions:
+        """Make them of the mean normals (n, 2) of the sides at vertices, but for those at which these cancel."""
+        length = np.hypot(*mean.T)
+        kept = length > NO_NORMAL
+        return cls(node[kept], mean[kept] / length[kept, None], traction[kept])
+
+    def imposed(self, stress: Float, vertex: Int, voigt: Int, flexibility: Float) -> Float:
+        """Return stresses (vertices, m, k) with these tractions at `vertex` (n,).
+
+        Of components `voigt` (c, 2) and a flexibility (m, m).
+
+        sigma + d n + n d - (d . n) n n + a t t in the plane, with d = traction - sigma n and a such that the strain
+        along the boundary stays, as it is known on both of its sides; along the fibres sigma + d n.
+        """
+        n, own = self.normal, stress[vertex]
+        d = self.traction - np.einsum("ncdk,nd->nck", own[:, voigt], n)
+        off = np.einsum("nck,nd->ncdk", d, n)
+        entries = [tuple(np.argwhere(voigt == number)[0]) for number in range(stress.shape[1])]
+        if len(voigt) == 2:
+            both = n[:, :, None, None] * n[:, None, :, None]
+            off += off.transpose(0, 2, 1, 3) - both * np.einsum("nck,nc->nk", d, n)[:, None, None]
+        found = np.stack([off[:, i, j] for i, j in entries], axis=1)
+        if len(voigt) == 2:
+            t = np.column_stack([-n[:, 1], n[:, 0]])
+            along = np.stack([t[:, i] * t[:, j] for i, j in entries], axis=1)
+            strain = along @ flexibility
+            share = np.einsum("nv,nvk->nk", strain, found) / (strain * along).sum(axis=1)[:, None]
+            found -= along[..., None] * share[:, None]
+        whole = stress.copy()
+        whole[vertex] += found
+        return whole

@@ -1,4 +1,7 @@
-"""Strains and stresses of elements at their quadrature points, with the bubble and the pressure of mixed ones."""
+"""Fields of elements at their quadrature points, with the bubble and pressure of mixed ones, and energies of cracks.
+
+A growing crack releases the energy that elements lose when their nodes are moved.
+"""
 
 from __future__ import annotations
 
@@ -50,3 +53,25 @@ def voigt(gradient: Float) -> Float:
     """(e, q, 3) strains [11, 22, 12] of displacement gradients (e, q, 2, 2)."""
     shear = gradient[..., 0, 1] + gradient[..., 1, 0]
     return np.stack([gradient[..., 0, 0], gradient[..., 1, 1], shear], axis=-1)
+
+
+def energy_change(points: Float, u: Float, L: Float, moved: Float, changed: Float, is_mixed: bool = False) -> float:
+    """d/ds of sum_e int W at s = 0 where nodes lie at x + s dx and have the displacements u + s du:
+
+        int sigma : (grad du - grad u grad dx) + W div dx.
+
+    Exact for the elements as they are (deLorenzi, Int. J. Fract. 19 (1982) 183): at the bubble and the pressure of
+    mixed ones, which stay as they are, the energy is stationary.
+
+    Args:
+        points, u: (e, a, 2) nodes of the elements and their displacements.
+        L: (3, 3) stiffness.
+        moved, changed: (e, a, 2) dx and du.
+        is_mixed: whether the elements have a bubble and a pressure of their own.
+    """
+    fields, nodes = point_fields(points, u, L, is_mixed), points.shape[1]
+    grad_u = np.einsum("eai,eqad->eqid", fields.u, fields.gradients)
+    of_nodes = fields.gradients[:, :, :nodes]
+    grad_moved, grad_changed = (np.einsum("eai,eqad->eqid", field, of_nodes) for field in (moved, changed))
+    change = (fields.stress * voigt(grad_changed - grad_u @ grad_moved)).sum(axis=2)
+    return float((fields.weights * (change + fields.density * np.trace(grad_moved, axis1=2, axis2=3))).sum())

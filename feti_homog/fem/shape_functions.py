@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -18,37 +17,29 @@ _P2_POINTS = np.array(
 _P2_WEIGHTS = np.tile([0.223381589678011, 0.109951743655322], 3) / 2
 
 
-@dataclass(frozen=True)
-class Quadrature:
-    """Reference gradients (q, a, 2) of a functions and weights (q,) at the q quadrature points of a triangle."""
-
-    gradients: Float
-    weights: Float
-
-
 @cache
-def quadrature(functions: int) -> Quadrature:
-    """Return the rule for the 3- or 6-node triangle; the seventh function is the bubble 27 r_0 r_1 r_2."""
+def quadrature(functions: int) -> tuple[Float, Float]:
+    """(q, a, 2) reference gradients of 3, 6 or, with the bubble 27 r_0 r_1 r_2, 7 functions, and (q,) weights."""
     if functions == 3:
-        return Quadrature(np.array([[[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]]]), np.array([0.5]))
+        return np.array([[[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]]]), np.array([0.5])
     x, y = _P2_POINTS.T
     z, o = 1 - x - y, np.zeros_like(x)
     by_x = np.stack([1 - 4 * z, 4 * x - 1, o, 4 * (z - x), 4 * y, -4 * y, 27 * y * (z - x)], axis=1)
     by_y = np.stack([1 - 4 * z, o, 4 * y - 1, -4 * x, 4 * x, 4 * (z - y), 27 * x * (z - y)], axis=1)
-    return Quadrature(np.stack([by_x, by_y], axis=2)[:, :functions], _P2_WEIGHTS)
+    return np.stack([by_x, by_y], axis=2)[:, :functions], _P2_WEIGHTS
 
 
 def gradients(corners: Float, with_bubble: bool = False) -> tuple[Float, Float]:
     """Physical gradients (e, q, a, 2) and weights times Jacobian (e, q) of elements with nodes (e, a, 2)."""
     nodes = corners.shape[1]
-    rule = quadrature(nodes + with_bubble)
-    (xr, xs), (yr, ys) = np.moveaxis(np.tensordot(corners, rule.gradients[:, :nodes], (1, 1)), (1, 3), (0, 1))
+    reference, weights = quadrature(nodes + with_bubble)
+    (xr, xs), (yr, ys) = np.moveaxis(np.tensordot(corners, reference[:, :nodes], (1, 1)), (1, 3), (0, 1))
     determinant = xr * ys - yr * xs
-    by_r, by_s = np.moveaxis(rule.gradients, 2, 0)
+    by_r, by_s = np.moveaxis(reference, 2, 0)
     # x_d = J_rd r_r, so dN/dx_d = (J^-1)_dr dN/dr_r.
     by_x = ys[..., None] * by_r - yr[..., None] * by_s
     by_y = xr[..., None] * by_s - xs[..., None] * by_r
-    return np.stack([by_x, by_y], axis=3) / determinant[..., None, None], determinant * rule.weights
+    return np.stack([by_x, by_y], axis=3) / determinant[..., None, None], determinant * weights
 
 
 def barycentric(nodes: int) -> Float:

@@ -8,7 +8,6 @@ reaches across an interface, where stresses jump; about a vertex that pieces of 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -16,8 +15,7 @@ import numpy as np
 
 from feti_homog.fem import bubble
 from feti_homog.fem.assembly import ELEMENTS_AT_ONCE
-from feti_homog.fem.known_tractions import KnownTractions
-from feti_homog.fem.local_fits import Neighbours, fitted, gathered, linear_values, polynomials
+from feti_homog.fem.local_fits import KnownTractions, Neighbours, fitted, gathered, linear_values, polynomials
 from feti_homog.fem.problem import Problem
 from feti_homog.fem.shape_functions import barycentric, gradients, shape_functions
 from feti_homog.mesh.refinement import FineMesh
@@ -115,35 +113,27 @@ class RecoveredStress:
     @cached_property
     def elements(self) -> list[ElementStresses]:
         """The stresses of the elements at their points of integration, in chunks."""
-        return list(self._elements())
-
-    def _elements(self) -> Iterator[ElementStresses]:
-        at_once = LINEAR_AT_ONCE if self.order == 1 else ELEMENTS_AT_ONCE
-        for first in range(0, len(self.triangles), at_once):
-            part = slice(first, min(first + at_once, len(self.triangles)))
-            yield self._uniform(part) if self.order == 1 else self._varying(part)
+        at_once, size = LINEAR_AT_ONCE if self.order == 1 else ELEMENTS_AT_ONCE, len(self.triangles)
+        parts = (slice(first, min(first + at_once, size)) for first in range(0, size, at_once))
+        return [self._uniform(part) if self.order == 1 else self._varying(part) for part in parts]
 
     def _varying(self, part: slice) -> ElementStresses:
         """Return the stresses of quadratic elements."""
-        corners = self.points[self.triangles[part]]
-        fluctuating, w = self._fluctuating(part, corners)
-        stress = fluctuating + self.L[: self.problem.strains] @ self.loads
-        return ElementStresses(part, shape_functions(6, barycentric(6)) @ corners, w, stress)
-
-    def _fluctuating(self, part: slice, corners: Float) -> tuple[Float, Float]:
-        """(e, q, m, k) stresses that u makes in the elements `part` of nodes (e, a, 2), and weights (e, q)."""
+        m, nodes = self.problem.strains, self.triangles[part]
+        corners, u = self.points[nodes], self.u[self.node_class[nodes]]
         if self.is_mixed:
             elements = bubble.Elements.of(corners, self.L)
-            return elements.stress(
-                elements.with_bubble(self.u[self.node_class[self.triangles[part]]])
-            ), elements.weights
-        (g, w), u = gradients(corners), self.u[self.node_class[self.triangles[part]]]
-        (e, a, c, k), q, m = u.shape, g.shape[1], self.problem.strains
-        flat = g.transpose(0, 1, 3, 2).reshape(e, 2 * q, a) @ u.reshape(e, a, c * k)
-        gradient, strain = flat.reshape(e, q, 2, c, k), np.zeros((e, q, m, k))
-        for number, (i, d) in enumerate(np.nonzero(self.problem.voigt == n) for n in range(m)):
-            strain[:, :, number] = gradient[:, :, d, i].sum(axis=2)
-        return self.L[:m, :m] @ strain, w
+            stress, weights = elements.stress(elements.with_bubble(u)), elements.weights
+        else:
+            g, weights = gradients(corners)
+            (e, a, c, k), q = u.shape, g.shape[1]
+            flat = g.transpose(0, 1, 3, 2).reshape(e, 2 * q, a) @ u.reshape(e, a, c * k)
+            gradient, strain = flat.reshape(e, q, 2, c, k), np.zeros((e, q, m, k))
+            for number, (i, d) in enumerate(np.nonzero(self.problem.voigt == n) for n in range(m)):
+                strain[:, :, number] = gradient[:, :, d, i].sum(axis=2)
+            stress = self.L[:m, :m] @ strain
+        points = shape_functions(6, barycentric(6)) @ corners
+        return ElementStresses(part, points, weights, stress + self.L[:m] @ self.loads)
 
     def _uniform(self, part: slice) -> ElementStresses:
         """Return the stresses of linear elements; loops of NumPy run over the elements."""
@@ -170,7 +160,8 @@ class RecoveredStress:
         """(vertices, p, m k) coefficients of the polynomials about each vertex, see `polynomials`; p = 1 of order 1."""
         neighbours = Neighbours.of(self.vertices, self.points[self.triangles[:, :3]])
         if self.order == 1:
-            points, weights, stress = (self._of_all(name) for name in ("points", "weights", "stress"))
+            chunks = [(chunk.points[:, 0], chunk.weights[:, 0], chunk.stress[:, 0]) for chunk in self.elements]
+            points, weights, stress = map(np.concatenate, zip(*chunks, strict=True))
             away = np.stack([own - np.take(x, self._rows) for own, x in zip(points.T, self._coordinates, strict=True)])
             values = linear_values(self.vertices.T, away, weights, stress.reshape(len(stress), -1), neighbours)
             values = self._with_shared(values[:, None])[:, 0]
@@ -200,11 +191,6 @@ class RecoveredStress:
         if self.shared is not None:
             fits[self.numbers[self.shared[0]]] = self.shared[1][:, : fits.shape[1]]
         return fits
-
-    def _of_all(self, name: str) -> Float:
-        """Return an array of uniform stresses for all elements."""
-        found = [getattr(own, name)[:, 0] for own in self.elements]
-        return found[0] if len(found) == 1 else np.concatenate(found)
 
     def recovered(self, part: Int | slice, lam: Float) -> Float:
         """(e, q, m, k) recovered stresses in the elements `part` at the barycentric coordinates lam (q, 3)."""
@@ -236,8 +222,8 @@ class RecoveredStress:
     def _off(self, own: ElementStresses) -> Float:
         """(q, e, m, k) recovered less own stress at places of the elements, times the root of their weights."""
         if self.order == 2:
-            off = (self.recovered(own.part, barycentric(6)) - own.stress) * _roots(own.weights)
-            return np.asarray(off.swapaxes(0, 1))
+            off = self.recovered(own.part, barycentric(6)) - own.stress
+            return np.asarray((off * np.sqrt(own.weights)[..., None, None]).swapaxes(0, 1))
         # Linear less uniform stresses d, of which d_i at the vertices have the sum s:
         # int d d = w/12 (sum_i d_i d_i + s s) = w/12 sum_i (d_i + s/3)^2.
         e, _, m, k = own.stress.shape
@@ -246,8 +232,3 @@ class RecoveredStress:
         off += (off[0] + off[1] + off[2]) / 3 - 2 * own.stress.reshape(e, m * k)
         off *= np.sqrt(own.weights / 12)
         return off.reshape(3, e, m, k)
-
-
-def _roots(weights: Float) -> Float:
-    """(e, q, 1, 1) roots of weights (e, q)."""
-    return np.sqrt(weights)[..., None, None]

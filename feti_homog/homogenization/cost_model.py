@@ -21,7 +21,7 @@ from feti_homog.case.interface_section import InterfaceSection
 from feti_homog.fem.problem import AXIAL, Problem
 from feti_homog.feti.thresholds import INFLUENCE_COLUMNS, NEVER_REFACTORED_ROWS
 from feti_homog.homogenization import phase_laws
-from feti_homog.materials.plane_state import PLANE_STATES
+from feti_homog.materials.voigt import PLANE_STATES
 from feti_homog.microstructure.phase_names import COATING
 
 # Seconds to start Python, MPI, PETSc and gmsh.

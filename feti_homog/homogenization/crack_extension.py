@@ -15,8 +15,8 @@ from mpi4py import MPI
 from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
-from feti_homog.fem.virtual_extension import energy_change
-from feti_homog.fem.void_boundary import nodes_along
+from feti_homog.fem.assembly import nodes_along
+from feti_homog.fem.point_fields import energy_change
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.typing import Float, Int
 

@@ -10,7 +10,7 @@ import numpy as np
 from mpi4py import MPI
 
 from feti_homog.fem.arc_error import ArcSides, arc_energy
-from feti_homog.fem.known_tractions import KnownTractions
+from feti_homog.fem.local_fits import KnownTractions
 from feti_homog.fem.stress_recovery import RecoveredStress
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.homogenization.averaging import Response

@@ -11,12 +11,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from feti_homog.case import element_sizes
+from feti_homog.case import cell_sizes
 from feti_homog.case.case import Case
 from feti_homog.fem.problem import AXIAL, GENERALIZED, PLANE, Problem
 from feti_homog.materials.derivatives import LawChange
 from feti_homog.materials.laws import expansion, plane_stiffness, spatial_stiffness
-from feti_homog.materials.plane_state import PLANE_STATES
+from feti_homog.materials.voigt import PLANE_STATES
 from feti_homog.typing import Float
 
 IN_PLANE, AXIAL_SHEAR = [0, 1, 5, 2], [4, 3]
@@ -55,8 +55,7 @@ def plane_law(case: Case, phase: str) -> Float:
 
 def is_mixed(case: Case, phase: str) -> bool:
     """Return whether the elements of a phase have a bubble and a pressure of their own in the plane problem."""
-    cell = case.cell
-    return element_sizes.is_mixed(cell.element, cell.order, case.material_of(phase), case.analysis.plane)
+    return cell_sizes.is_mixed(case.cell.order, case.material_of(phase), case.analysis.plane)
 
 
 def axial_law(case: Case, phase: str) -> Float:

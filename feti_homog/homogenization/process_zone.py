@@ -9,7 +9,7 @@ import numpy as np
 from feti_homog.case.case import Case
 from feti_homog.case.interface_section import InterfaceSection, interface_label
 from feti_homog.homogenization.bonds import bond_law, has_process_zone, has_softening
-from feti_homog.materials.bounds import engineering_moduli
+from feti_homog.materials.constants import engineering_moduli
 from feti_homog.materials.laws import plane_stiffness
 from feti_homog.mesh.coarse_mesh import CoarseMesh, interface_edges
 

@@ -1,4 +1,4 @@
 """Materials: their constants, laws and bounds, Voigt's notation, closed formulas of the mechanics of composites.
 
-Imports `schema` and `system`.  Main entries: `forms`, `laws`, `bounds`, `spatial_constants`, `estimates.methods`.
+Imports `schema` and `system`.  Main entries: `forms`, `laws`, `constants`, `bounds`, `estimates`.
 """

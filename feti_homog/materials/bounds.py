@@ -1,87 +1,118 @@
-"""Engineering moduli of a plane stiffness, and bounds that its phases set to it.
+"""Bounds and closed estimates of composites: their records, and the aligned cylinders that both are made of.
 
-Stiffnesses are (3, 3) in Voigt order [11, 22, 12] with engineering shear, in any unit of stress.
+Stiffnesses of the plane are (3, 3) in Voigt order [11, 22, 12] with engineering shear, in any unit of stress.  Phases
+of cylinders have Hill's moduli k, l = 2 nu_A k, n = E_A + 4 nu_A^2 k, m = G_T and p = G_A, so that under an axial
+strain e, a change of area theta and a change of temperature T
+
+    s = k theta + l e - b T,  b = 2 k alpha_T + l alpha_A,
+    sigma_33 = l theta + n e - g T,  g = 2 l alpha_T + n alpha_A,
+
+s being the mean of sigma_11 and sigma_22.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from feti_homog.materials.constants import TransverseIsotropy, anisotropy, isotropic_part, transverse_constants
+from feti_homog.materials.forms import PER_TEMPERATURE
 from feti_homog.system.runtime.records import STRESS, described
-from feti_homog.typing import Array, Float
+from feti_homog.typing import Float
 
-
-@dataclass(frozen=True)
-class Moduli:
-    """Moduli in the plane; in plane strain E and nu are those of the plane state, not of the bulk material.
-
-    nu_ij = -eps_j/eps_i under stress along i; eta_i = gamma_12/eps_i under the same (mutual influence);
-    `bulk` and `shear` are those of the nearest isotropic stiffness, `anisotropy` the relative distance to it.
-    """
-
-    E1: float = described("Young's modulus along x1", STRESS)
-    E2: float = described("Young's modulus along x2", STRESS)
-    nu12: float = described("contraction along x2 under stress along x1")
-    nu21: float = described("contraction along x1 under stress along x2")
-    G12: float = described("shear modulus in the axes of the cell", STRESS)
-    eta1: float = described("shear strain gamma12 over the strain along x1 under stress along x1")
-    eta2: float = described("shear strain gamma12 over the strain along x2 under stress along x2")
-    bulk: float = described("plane bulk modulus of the nearest isotropic stiffness", STRESS)
-    shear: float = described("shear modulus of the nearest isotropic stiffness", STRESS)
-    anisotropy: float = described("relative distance to the nearest isotropic stiffness")
+Pair = tuple[float, float]
 
 
 @dataclass(frozen=True)
 class Bounds:
     """Lower and upper bound of the plane bulk modulus and of the shear modulus."""
 
-    bulk: tuple[float, float] = described("lower and upper bound of the plane bulk modulus", STRESS, "(2,)")
-    shear: tuple[float, float] = described("lower and upper bound of the shear modulus", STRESS, "(2,)")
+    bulk: Pair = described("lower and upper bound of the plane bulk modulus", STRESS, "(2,)")
+    shear: Pair = described("lower and upper bound of the shear modulus", STRESS, "(2,)")
 
 
-def engineering_moduli(stiffness: ArrayLike) -> Moduli:
-    """Return the moduli of a stiffness. Raises numpy.linalg.LinAlgError if it is singular."""
-    s = np.linalg.inv(np.asarray(stiffness, dtype=float))
-    bulk, shear = isotropic_part(stiffness)
-    values = plane_constants(s) | {"eta1": s[2, 0] / s[0, 0], "eta2": s[2, 1] / s[1, 1]}
-    values |= {"bulk": bulk, "shear": shear, "anisotropy": anisotropy(stiffness)}
-    return Moduli(**{name: float(value) for name, value in values.items()})
+@dataclass(frozen=True)
+class FibreBounds:
+    """Lower and upper bounds of the constants of any arrangement of bonded fibres."""
+
+    E_axial: Pair = described("of Young's modulus along the fibres", STRESS, "(2,)")
+    nu_axial: Pair | None = described(
+        "of the contraction across the fibres under stress along them; null of more than two phases", shape="(2,)"
+    )
+    G_axial: Pair = described("of the shear modulus along the fibres", STRESS, "(2,)")
+    G_transverse: Pair = described("of the shear modulus across the fibres", STRESS, "(2,)")
+    K_transverse: Pair = described("of the bulk modulus across the fibres in plane strain", STRESS, "(2,)")
 
 
-def plane_constants(S: Array) -> dict[str, Any]:
-    """E_i = 1/S_ii, nu_ij = -S_ji/S_ii and G12 = 1/S_33 of a compliance (3, 3), real or complex."""
-    found = {"E1": 1 / S[0, 0], "E2": 1 / S[1, 1], "nu12": -S[1, 0] / S[0, 0], "nu21": -S[0, 1] / S[1, 1]}
-    return found | {"G12": 1 / S[2, 2]}
+@dataclass(frozen=True)
+class Springs:
+    """An elastic interface of round fibres of one radius: tractions over jumps, positive; infinite is bonded.
 
-
-def isotropic_part(stiffness: ArrayLike) -> tuple[float, float]:
-    """Plane bulk modulus k and shear modulus mu of the isotropic stiffness nearest in the Frobenius norm.
-
-    k = (C11 + C22 + C12 + C21)/4, mu = (C11 + C22 - C12 - C21 + 4 C33)/8; both are the same in all axes.
+    Attributes:
+        normal: k_n, of the opening.
+        tangential: k_t, of the slip around the fibre.
+        axial: k_a, of the slip along it.
+        radius: a, in the unit of length of the stiffnesses.
     """
-    c = np.asarray(stiffness, dtype=float)
-    bulk = (c[0, 0] + c[1, 1] + c[0, 1] + c[1, 0]) / 4
-    shear = (c[0, 0] + c[1, 1] - c[0, 1] - c[1, 0] + 4 * c[2, 2]) / 8
-    return float(bulk), float(shear)
+
+    normal: float
+    tangential: float
+    axial: float
+    radius: float
+
+    @property
+    def compliances(self) -> tuple[float, float, float]:
+        """1/(k_n a), 1/(k_t a), 1/(k_a a)."""
+        a = self.radius
+        return 1 / (self.normal * a), 1 / (self.tangential * a), 1 / (self.axial * a)
 
 
-def isotropic_stiffness(bulk: float, shear: float) -> Float:
-    """C11 = C22 = k + mu, C12 = k - mu, C33 = mu."""
-    plus, minus = bulk + shear, bulk - shear
-    return np.array([[plus, minus, 0.0], [minus, plus, 0.0], [0.0, 0.0, shear]])
+@dataclass(frozen=True)
+class Fibres:
+    """Fibres of one material, and of one radius if they are on springs: their share of the cell, and constants."""
+
+    fraction: float
+    constants: TransverseIsotropy
+    springs: Springs | None = None
 
 
-def anisotropy(stiffness: ArrayLike) -> float:
-    """||C - C_iso|| / ||C|| as fourth-order tensors, C_iso the nearest isotropic; the same in all axes."""
-    c = np.asarray(stiffness, dtype=float)
-    mandel = np.outer([1, 1, np.sqrt(2)], [1, 1, np.sqrt(2)])  # turns the norm into that of the tensor
-    rest = c - isotropic_stiffness(*isotropic_part(c))
-    return float(np.linalg.norm(mandel * rest) / np.linalg.norm(mandel * c))
+@dataclass(frozen=True)
+class Estimate:
+    """Constants by one method; null where it gives none."""
+
+    E_axial: float | None = described("Young's modulus along the fibres", STRESS)
+    E_transverse: float | None = described("Young's modulus across the fibres", STRESS)
+    nu_axial: float | None = described("contraction across the fibres under stress along them")
+    nu_transverse: float | None = described("contraction across the fibres under stress across them")
+    G_axial: float | None = described("shear modulus along the fibres", STRESS)
+    G_transverse: float | None = described("shear modulus across the fibres", STRESS)
+    K_transverse: float | None = described("bulk modulus across the fibres in plane strain", STRESS)
+    expansion_axial: float | None = described("expansion along the fibres", PER_TEMPERATURE)
+    expansion_transverse: float | None = described("expansion across the fibres", PER_TEMPERATURE)
+
+    @classmethod
+    def of(cls, constants: TransverseIsotropy) -> Estimate:
+        """Return the estimate of all constants."""
+        return cls(**{name: getattr(constants, name) for name in CONSTANTS})
+
+
+CONSTANTS = tuple(field.name for field in fields(Estimate))
+NOTHING = Estimate(**dict.fromkeys(CONSTANTS))
+
+
+@dataclass(frozen=True)
+class Estimates:
+    """Constants by each method."""
+
+    rule_of_mixtures: Estimate = described("rule of mixtures: Voigt along the fibres, Reuss across them")
+    chamis: Estimate = described("Chamis 1984")
+    halpin_tsai: Estimate = described("Halpin and Tsai 1969")
+    mori_tanaka: Estimate = described("Mori and Tanaka 1973, of aligned cylinders")
+    composite_cylinders: Estimate = described("Hashin and Rosen 1964: exact of composite cylinders")
+    self_consistent: Estimate = described("Christensen and Lo 1979, generalized self-consistent")
 
 
 def voigt(fractions: ArrayLike, stiffnesses: ArrayLike) -> Float:
@@ -103,7 +134,7 @@ def hashin_shtrikman(fractions: ArrayLike, stiffnesses: Sequence[ArrayLike]) -> 
 
     k* = (sum c_i/(k_i + mu0))^-1 - mu0, mu* = (sum c_i/(mu_i + h0))^-1 - h0, h0 = k0 mu0/(k0 + 2 mu0), with
     k0, mu0 the least moduli of the phases for the lower bound and the greatest for the upper (Hashin 1965,
-    Walpole 1969). That of k holds for a composite of square symmetry too. Raises ValueError if a phase is not
+    Walpole 1969). The bound of k holds for a composite of square symmetry too. Raises ValueError if a phase is not
     isotropic.
     """
     if not all(map(is_isotropic, stiffnesses)):
@@ -117,3 +148,111 @@ def hashin_shtrikman(fractions: ArrayLike, stiffnesses: Sequence[ArrayLike]) -> 
 
     lower, upper = bounds(bulk.min(), shear.min()), bounds(bulk.max(), shear.max())
     return Bounds(bulk=(lower[0], upper[0]), shear=(lower[1], upper[1]))
+
+
+def aligned_cylinders(
+    fractions: Sequence[float], phases: Sequence[TransverseIsotropy], surroundings: tuple[float, float, float]
+) -> TransverseIsotropy:
+    """Estimate the constants where every phase is a cylinder in the same surroundings k0, m0, p0 and far field.
+
+    With x_i = k_i + m0 and h0 = k0 m0/(k0 + 2 m0),
+
+        1/(k* + m0) = sum c/x,  1/(m* + h0) = sum c/(m + h0),  1/(p* + p0) = sum c/(p + p0),
+        l* = (k* + m0) L,  L = sum c l/x,  n* = sum c (n - l^2/x) + l* L,
+        b* = (k* + m0) B,  B = sum c b/x,  g* = sum c (g - l b/x) + l* B,
+
+    for s + m0 theta is the same in all cylinders.  Hill 1964, Hashin 1965, Walpole 1969; b and g by the same steps.
+    """
+    c, (k0, m0, p0) = np.asarray(fractions, dtype=float), surroundings
+    k, nu, E, m, p = np.array(
+        [[x.K_transverse, x.nu_axial, x.E_axial, x.G_transverse, x.G_axial] for x in phases], dtype=float
+    ).T
+    across, along, x = 2 * nu * k, E + 4 * nu**2 * k, k + m0
+    h = k0 * m0 / (k0 + 2 * m0)
+    stiff = 1 / np.sum(c / x)  # k* + m0
+    bulk, shear = stiff - m0, 1 / np.sum(c / (m + h)) - h
+    mean = np.sum(c * across / x)  # L
+    coupling = stiff * mean
+    poisson = coupling / (2 * bulk)
+    young = np.sum(c * (along - across**2 / x)) + coupling * mean - coupling**2 / bulk
+    E_transverse, nu_transverse = transverse_constants(young, poisson, bulk, shear)
+    strains: tuple[float | None, float | None] = (None, None)
+    if None not in (free := [expansions(phase) for phase in phases]):
+        axial, transverse = np.array(free, dtype=float).T
+        b, g = 2 * k * transverse + across * axial, 2 * across * transverse + along * axial
+        B = np.sum(c * b / x)
+        stresses = [B / np.sum(c / x), np.sum(c * (g - across * b / x)) + coupling * B]
+        area, length = np.linalg.solve([[bulk, coupling], [coupling, young + coupling**2 / bulk]], stresses)
+        strains = float(length), float(area / 2)
+    return TransverseIsotropy(
+        E_axial=float(young),
+        E_transverse=float(E_transverse),
+        nu_axial=float(poisson),
+        nu_transverse=float(nu_transverse),
+        G_axial=float(1 / np.sum(c / (p + p0)) - p0),
+        G_transverse=float(shear),
+        K_transverse=float(bulk),
+        expansion_axial=strains[0],
+        expansion_transverse=strains[1],
+        deviation=0.0,
+    )
+
+
+def expansions(phase: TransverseIsotropy) -> Pair | None:
+    """Axial and transverse expansion, if the phase has both."""
+    if phase.expansion_axial is None or phase.expansion_transverse is None:
+        return None
+    return phase.expansion_axial, phase.expansion_transverse
+
+
+def equivalent_fibre(family: Fibres, matrix: TransverseIsotropy) -> TransverseIsotropy:
+    """Return the bonded fibre that replaces one on springs in a matrix whose field is uniform far away.
+
+    E_axial, nu_axial and the expansions stay;
+
+        1/k_e = 1/k + 2/(k_n a),  1/p_e = 1/p + 1/(k_a a),
+        1/m_e = 1/m + (x (q_n + q_t) + 12 q_n q_t) / (x + 3 (q_n + q_t)),  x = 1/m + 2/k + 1/m_m,  q_i = 1/(k_i a),
+
+    with the bulk modulus k, the shear moduli m across and p along the fibre, and m_m of the matrix.  k_e and p_e hold
+    in a composite cylinder too (Hashin 1990); m_e does not, for shear across a coated fibre is not uniform in it.
+    """
+    fibre, springs = family.constants, family.springs
+    if springs is None:
+        return fibre
+    normal, tangential, axial = springs.compliances
+    k, m, total = fibre.K_transverse, fibre.G_transverse, normal + tangential
+    x = 1 / m + 2 / k + 1 / matrix.G_transverse
+    bulk = 1 / (1 / k + 2 * normal)
+    shear = 1 / (1 / m + (x * total + 12 * normal * tangential) / (x + 3 * total))
+    E_transverse, nu_transverse = transverse_constants(fibre.E_axial, fibre.nu_axial, bulk, shear)
+    return replace(
+        fibre,
+        E_transverse=E_transverse,
+        nu_transverse=nu_transverse,
+        G_axial=1 / (1 / fibre.G_axial + axial),
+        G_transverse=shear,
+        K_transverse=bulk,
+    )
+
+
+def fibre_bounds(fractions: Sequence[float], phases: Sequence[TransverseIsotropy]) -> FibreBounds:
+    """Bounds of bonded, transversely isotropic phases that are cylinders along x3 of any section.
+
+    `aligned_cylinders` with the least moduli of the phases around, and with the greatest.  Bounds of nu_A are the
+    values of Hill's relation at the bounds of k, so of two phases only.  All but the bounds of G_T hold for square
+    symmetry too.  Hill 1964, Hashin 1965, Walpole 1969.
+    """
+
+    def extreme(pick: Callable[[Iterable[float]], float]) -> tuple[float, float, float]:
+        k, m, p = ([getattr(x, name) for x in phases] for name in ("K_transverse", "G_transverse", "G_axial"))
+        return pick(k), pick(m), pick(p)
+
+    lower, upper = (aligned_cylinders(fractions, phases, extreme(pick)) for pick in (min, max))
+    nu = min(lower.nu_axial, upper.nu_axial), max(lower.nu_axial, upper.nu_axial)
+    return FibreBounds(
+        E_axial=(lower.E_axial, upper.E_axial),
+        nu_axial=nu if len(phases) == 2 else None,
+        G_axial=(lower.G_axial, upper.G_axial),
+        G_transverse=(lower.G_transverse, upper.G_transverse),
+        K_transverse=(lower.K_transverse, upper.K_transverse),
+    )

@@ -14,12 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from feti_homog.materials.bounds import plane_constants
+from feti_homog.materials.constants import constants
 from feti_homog.materials.forms import EXPANSION_PAIR, General, Isotropic, Material, Orthotropic, TransverselyIsotropic
 from feti_homog.materials.laws import COUPLINGS, expansion, known_compliance, stiffness_of
-from feti_homog.materials.plane_state import PLANE_STATES
-from feti_homog.materials.spatial_constants import constants_about_fibres, constants_along_axes
-from feti_homog.materials.voigt import EXPANSIONS, IN_PLANE, IN_PLANE_BLOCK, THERMAL_STRESSES, strain_rotation
+from feti_homog.materials.voigt import IN_PLANE, IN_PLANE_BLOCK, PLANE_STATES, strain_rotation
 from feti_homog.typing import Float
 
 STEP = 1e-30  # its square is lost beside 1
@@ -124,31 +122,9 @@ def _expansions(material: Material) -> Iterator[tuple[str, float, Float]]:
             yield name, getattr(material, name), np.array(axes)
 
 
-def composite_constants(C: NDArray[Any], thermal: NDArray[Any] | None) -> dict[str, Any]:
-    """Return the constants of a stiffness C, real or complex, (3, 3) or (6, 6).
-
-    They are entries Cij of its upper half, moduli and ratios and, with the stress `thermal` (6,) under a unit of
-    temperature, normal stresses and strains under it.
-
-    Raises numpy.linalg.LinAlgError if C is singular.
-    """
-    S, n = np.linalg.inv(C), len(C)
-    entries = [(i, j) for i in range(n) for j in range(i, n) if n == 3 or (i, j) not in COUPLINGS]
-    found = {f"C{i + 1}{j + 1}": C[i, j] for i, j in entries}
-    if n == 3:
-        return found | plane_constants(S)
-    found |= constants_along_axes(S) | constants_about_fibres(C)
-    if thermal is not None:
-        strains = -S @ thermal
-        for names, x in ((THERMAL_STRESSES, thermal), (EXPANSIONS, strains)):
-            found |= dict(zip(names[:3], x, strict=False))
-        found["expansion_transverse"] = (strains[0] + strains[1]) / 2
-    return found
-
-
 def constant_changes(C: Float, thermal: Float | None, dC: Float, dthermal: Float | None) -> dict[str, float]:
-    """Return the derivatives of `composite_constants` where C and the thermal stress have these."""
+    """Return the derivatives of `constants` where C and the thermal stress have these."""
     size = float(np.abs(dC).max() / np.abs(C).max()) or 1.0
     h = STEP / size
     heat = None if thermal is None or dthermal is None else thermal + 1j * h * dthermal
-    return {name: float(value.imag / h) for name, value in composite_constants(C + 1j * h * dC, heat).items()}
+    return {name: float(value.imag / h) for name, value in constants(C + 1j * h * dC, heat).items()}

@@ -48,22 +48,18 @@ class Orthotropic:
     nu23: float | None = key(real(), "Poisson's ratio out of the plane; plane strain needs it.", default=None)
     G12: float = key(POSITIVE, "Shear modulus in the plane.", unit="stress")
     G13: float | None = key(
-        POSITIVE,
-        "Shear modulus between axis 1 and x3; generalized plane strain needs it.",
-        unit="stress",
-        default=None,
+        POSITIVE, "Shear modulus between axis 1 and x3; generalized plane strain needs it.", unit="stress", default=None
     )
     G23: float | None = key(
-        POSITIVE,
-        "Shear modulus between axis 2 and x3; generalized plane strain needs it.",
-        unit="stress",
-        default=None,
+        POSITIVE, "Shear modulus between axis 2 and x3; generalized plane strain needs it.", unit="stress", default=None
     )
     angle: float = key(real(), "Direction of axis 1, from x1 towards x2.", unit="degrees", default=0.0)
     expansion: float | tuple[float, ...] | None = key(
-        EXPANSION, "Thermal expansion, the same in all directions or along axes 1, 2, 3.", unit=PER_TEMPERATURE,
+        EXPANSION,
+        "Thermal expansion, the same in all directions or along axes 1, 2, 3.",
+        unit=PER_TEMPERATURE,
         default=None,
-    )  # fmt: skip
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,9 +111,11 @@ class General:
         unit="stress",
     )
     expansion: float | tuple[float, ...] | None = key(
-        EXPANSION, "Thermal expansion, the same in all directions or along x1, x2, x3.", unit=PER_TEMPERATURE,
+        EXPANSION,
+        "Thermal expansion, the same in all directions or along x1, x2, x3.",
+        unit=PER_TEMPERATURE,
         default=None,
-    )  # fmt: skip
+    )
 
 
 Material = Isotropic | Orthotropic | TransverselyIsotropic | General

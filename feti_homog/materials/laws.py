@@ -19,8 +19,16 @@ from feti_homog.materials.forms import (
     Orthotropic,
     TransverselyIsotropic,
 )
-from feti_homog.materials.plane_state import GENERALIZED, PLANE_STATES, PLANE_STRAIN
-from feti_homog.materials.voigt import IN_PLANE, IN_PLANE_BLOCK, is_positive_definite, rotated, strain_rotation
+from feti_homog.materials.voigt import (
+    GENERALIZED,
+    IN_PLANE,
+    IN_PLANE_BLOCK,
+    PLANE_STATES,
+    PLANE_STRAIN,
+    is_positive_definite,
+    rotated,
+    strain_rotation,
+)
 from feti_homog.schema.wording import limit_in_words, toml_key, toml_value
 from feti_homog.typing import Float
 
@@ -37,6 +45,7 @@ NEEDED: dict[type[Orthotropic] | type[TransverselyIsotropic], dict[str, tuple[st
     },
 }
 """The optional constants that a plane state needs."""
+OF_DATA_SHEETS = "axis 3 is along the fibres: with constants of a data sheet give E_axial, E_transverse, nu_axial, ..."
 # Relative difference of constants of one material.
 ISOTROPY = 1e-9
 # Beyond the first, rounding of displacements makes stresses as large as those of the soft phase are allowed to be off;
@@ -61,11 +70,16 @@ def plane_stiffness(material: Material, plane: str) -> Float:
     if isinstance(material, Isotropic):
         lame, shear = _lame(material, plane)
         return np.array([[lame + 2 * shear, lame, 0.0], [lame, lame + 2 * shear, 0.0], [0.0, 0.0, shear]])
+    is_sheet = PLANE_STATES[plane].is_sheet
     if isinstance(material, General):
-        return _general_in_plane(_given_stiffness(material), plane)
+        stiffness = _checked_stiffness(material)
+        if len(stiffness) == 3:
+            return stiffness
+        block, out = stiffness[IN_PLANE_BLOCK], stiffness[IN_PLANE, 2]
+        return np.asarray(block - np.outer(out, out) / stiffness[2, 2]) if is_sheet else block
     compliance = stable_compliance(material, plane)
     reduced = compliance[IN_PLANE_BLOCK]
-    if not PLANE_STATES[plane].is_sheet:
+    if not is_sheet:
         out = compliance[IN_PLANE, 2]
         reduced = reduced - np.outer(out, out) / compliance[2, 2]
     return rotated(np.asarray(np.linalg.inv(reduced), float), _angle(material))
@@ -96,7 +110,7 @@ def spatial_stiffness(material: Material) -> Float:
         stiffness[:3, :3] += lame
         return stiffness
     if isinstance(material, General):
-        stiffness = _given_stiffness(material)
+        stiffness = _checked_stiffness(material)
         if len(stiffness) == 3:
             raise ValueError("stiffness: expected 6x6 in generalized plane strain; 3x3 serves one plane state only")
         return stiffness
@@ -108,9 +122,20 @@ def expansion(material: Material) -> Float | None:
 
     Raises ValueError, with the keys at fault, if they are given twice or by half.
     """
-    along_axes = _expansion_along_axes(material)
-    if along_axes is None:
+    free = material.expansion
+    if isinstance(material, TransverselyIsotropic):
+        pair = [name for name in EXPANSION_PAIR if getattr(material, name) is not None]
+        if pair and free is not None:
+            raise ValueError(f"expansion, {', '.join(pair)}: exclude each other; give one or a pair")
+        if len(pair) == 1:
+            (absent,) = set(EXPANSION_PAIR).difference(pair)
+            raise ValueError(f"{absent}: missing; {pair[0]} needs it")
+        axial, transverse = material.expansion_axial, material.expansion_transverse
+        if axial is not None and transverse is not None:
+            free = (transverse, transverse, axial)
+    if free is None:
         return None
+    along_axes = free if isinstance(free, tuple) else (free,) * 3
     return np.asarray(strain_rotation(-_angle(material)) @ [*along_axes, 0.0, 0.0, 0.0])
 
 
@@ -119,24 +144,20 @@ def out_of_plane(material: Material, plane: str) -> tuple[Float, Float]:
 
     S33 vanishes in plane stress, E33 in plane strain. NaN if the constants of the material leave it open.
     """
-    row, young = _compliance_33(material)
-    return (np.zeros(3), row) if PLANE_STATES[plane].is_sheet else (-young * row, np.zeros(3))
-
-
-def _compliance_33(material: Material) -> tuple[Float, float]:
-    """c (3,) and E3 of E33 = c . [S11, S22, S12] + S33 / E3; NaN where the constants leave it open."""
+    # E33 = row . [S11, S22, S12] + S33 / young
     if isinstance(material, Isotropic):
         ratio = -material.poisson / material.young
-        return np.array([ratio, ratio, 0.0]), material.young
-    if isinstance(material, General):
-        stiffness = _given_stiffness(material)
+        row, young = np.array([ratio, ratio, 0.0]), material.young
+    elif isinstance(material, General):
+        stiffness = _checked_stiffness(material)
         compliance = np.full((6, 6), np.nan) if len(stiffness) == 3 else np.linalg.inv(stiffness)
-        return np.asarray(compliance[2, IN_PLANE]), 1.0 / compliance[2, 2]
-    compliance = known_compliance(material)
-    # Stresses turn as the transpose of strains that turn the other way.
-    to_axes = strain_rotation(-_angle(material)).T[IN_PLANE_BLOCK]
-    row = np.array([compliance[2, 0], compliance[2, 1], 0.0]) @ to_axes
-    return np.asarray(row), 1.0 / compliance[2, 2]
+        row, young = compliance[2, IN_PLANE], 1.0 / compliance[2, 2]
+    else:
+        compliance = known_compliance(material)
+        # Stresses turn as the transpose of strains that turn the other way.
+        to_axes = strain_rotation(-_angle(material)).T[IN_PLANE_BLOCK]
+        row, young = np.array([compliance[2, 0], compliance[2, 1], 0.0]) @ to_axes, 1.0 / compliance[2, 2]
+    return (np.zeros(3), row) if PLANE_STATES[plane].is_sheet else (-young * row, np.zeros(3))
 
 
 def _lame(material: Isotropic, plane: str) -> tuple[float, float]:
@@ -154,15 +175,7 @@ def _angle(material: Material) -> float:
     return material.angle if isinstance(material, Orthotropic) else 0.0
 
 
-def _general_in_plane(stiffness: Float, plane: str) -> Float:
-    """Return the block of plane strain of a stiffness in space, or what is left in plane stress."""
-    if len(stiffness) == 3:
-        return stiffness
-    block, out = stiffness[IN_PLANE_BLOCK], stiffness[IN_PLANE, 2]
-    return np.asarray(block - np.outer(out, out) / stiffness[2, 2]) if PLANE_STATES[plane].is_sheet else block
-
-
-def _given_stiffness(material: General) -> Float:
+def _checked_stiffness(material: General) -> Float:
     """Return the stiffness of a phase that gives it, (3, 3) or (6, 6), checked."""
     given = np.array(material.stiffness)
     noise = 1e-9 * np.abs(given).max()
@@ -170,65 +183,39 @@ def _given_stiffness(material: General) -> Float:
         raise ValueError(f"stiffness = {toml_value(material.stiffness)}: expected a symmetric matrix")
     stiffness = np.asarray((given + given.T) / 2.0)
     if len(stiffness) == 6:
-        stiffness = _uncoupled(stiffness, noise)
+        i, j = max(COUPLINGS, key=lambda entry: float(abs(stiffness[entry])))
+        if abs(stiffness[i, j]) > noise:
+            entry = f"C{i + 1}{j + 1} = {float(stiffness[i, j])}"
+            raise ValueError(f"stiffness: {entry}: expected 0; x3 must be normal to a plane of symmetry")
+        rows, columns = np.transpose(COUPLINGS)
+        stiffness[rows, columns] = stiffness[columns, rows] = 0.0
     if not is_positive_definite(stiffness):
         raise ValueError(f"stiffness = {toml_value(material.stiffness)}: expected a positive definite matrix")
     return stiffness
-
-
-def _uncoupled(stiffness: Float, noise: float) -> Float:
-    """Return the stiffness (6, 6) with zeros in place of couplings that are noise; ValueError if one is more."""
-    i, j = max(COUPLINGS, key=lambda entry: float(abs(stiffness[entry])))
-    if abs(stiffness[i, j]) > noise:
-        entry = f"C{i + 1}{j + 1} = {float(stiffness[i, j])}"
-        raise ValueError(f"stiffness: {entry}: expected 0; x3 must be normal to a plane of symmetry")
-    uncoupled = stiffness.copy()
-    rows, columns = np.transpose(COUPLINGS)
-    uncoupled[rows, columns] = uncoupled[columns, rows] = 0.0
-    return uncoupled
-
-
-def _expansion_along_axes(material: Material) -> tuple[float, ...] | None:
-    """Strains along the three material axes; None if they are not given."""
-    if isinstance(material, TransverselyIsotropic):
-        _check_expansions(material)
-        axial, transverse = material.expansion_axial, material.expansion_transverse
-        if axial is not None and transverse is not None:
-            return transverse, transverse, axial
-    if material.expansion is None or isinstance(material.expansion, tuple):
-        return material.expansion
-    return (material.expansion,) * 3
-
-
-def _check_expansions(material: TransverselyIsotropic) -> None:
-    """ValueError if the expansion is given twice or by half."""
-    given = [name for name in EXPANSION_PAIR if getattr(material, name) is not None]
-    if given and material.expansion is not None:
-        raise ValueError(f"expansion, {', '.join(given)}: exclude each other; give one or a pair")
-    if len(given) == 1:
-        (absent,) = set(EXPANSION_PAIR).difference(given)
-        raise ValueError(f"{absent}: missing; {given[0]} needs it")
 
 
 def stable_compliance(material: Orthotropic | TransverselyIsotropic, plane: str) -> Float:
     """Compliance (6, 6) in the material axes, checked as far as the plane state needs it."""
     compliance, state = known_compliance(material), PLANE_STATES[plane]
     if not is_positive_definite(compliance[:2, :2]):
-        raise ValueError(f"{_limit_in_plane(material)}; no material is stable otherwise")
+        if isinstance(material, Orthotropic):
+            limit = limit_in_words(material.E1 / material.E2, material.nu12**2, 6)
+            fault = f"nu12 = {material.nu12}: expected nu12^2 < E1/E2 = {limit}"
+        else:
+            fault = f"nu_transverse = {material.nu_transverse}: expected a number above -1 and below 1"
+        raise ValueError(f"{fault}; no material is stable otherwise")
     absent = [name for name in NEEDED[type(material)].get(plane, ()) if getattr(material, name) is None]
     if absent:
-        needs = "needs it" if len(absent) == 1 else "needs them"
-        raise ValueError(f"{', '.join(absent)}: missing; {state.title} {needs}{_of_data_sheets(material)}")
-    if not state.is_sheet and not is_positive_definite(compliance[:3, :3]):
-        raise ValueError(_limit_in_space(material))
-    return compliance
-
-
-def _of_data_sheets(material: Orthotropic | TransverselyIsotropic) -> str:
-    """Return the way out of constants of a fibre whose axis 1 is its own, which is x3 of the cell."""
-    if isinstance(material, TransverselyIsotropic):
-        return ""
-    return "; axis 3 is along the fibres: with constants of a data sheet give E_axial, E_transverse, nu_axial, ..."
+        fault = f"{', '.join(absent)}: missing; {state.title} {'needs it' if len(absent) == 1 else 'needs them'}"
+        raise ValueError(f"{fault}; {OF_DATA_SHEETS}" if isinstance(material, Orthotropic) else fault)
+    if state.is_sheet or is_positive_definite(compliance[:3, :3]):
+        return compliance
+    if isinstance(material, Orthotropic):
+        raise ValueError("E1, E2, E3, nu12, nu13, nu23: expected a positive definite compliance")
+    E_transverse, E_axial, nu_axial = _numbers(material.E_transverse, material.E_axial, material.nu_axial)
+    limit = limit_in_words((1.0 - material.nu_transverse) * E_axial / (2.0 * E_transverse), nu_axial**2, 6)
+    words = "nu_axial^2 < (1 - nu_transverse) E_axial/(2 E_transverse)"
+    raise ValueError(f"nu_axial = {nu_axial}: expected {words} = {limit}; no material is stable otherwise")
 
 
 def known_compliance(material: Orthotropic | TransverselyIsotropic) -> Float:
@@ -253,44 +240,17 @@ def _numbers(*constants: float | None) -> list[float]:
     return [np.nan if constant is None else constant for constant in constants]
 
 
-def _limit_in_plane(material: Orthotropic | TransverselyIsotropic) -> str:
-    """Return the fault of the constants of the plane, empty if there is none."""
-    if isinstance(material, TransverselyIsotropic):
-        return f"nu_transverse = {material.nu_transverse}: expected a number above -1 and below 1"
-    limit = limit_in_words(material.E1 / material.E2, material.nu12**2, 6)
-    return f"nu12 = {material.nu12}: expected nu12^2 < E1/E2 = {limit}"
-
-
-def _limit_in_space(material: Orthotropic | TransverselyIsotropic) -> str:
-    """Return the fault of constants whose plane part is valid, empty if there is none."""
-    if isinstance(material, Orthotropic):
-        return "E1, E2, E3, nu12, nu13, nu23: expected a positive definite compliance"
-    E_transverse, E_axial, nu_axial = _numbers(material.E_transverse, material.E_axial, material.nu_axial)
-    limit = limit_in_words((1.0 - material.nu_transverse) * E_axial / (2.0 * E_transverse), nu_axial**2, 6)
-    words = "nu_axial^2 < (1 - nu_transverse) E_axial/(2 E_transverse)"
-    return f"nu_axial = {nu_axial}: expected {words} = {limit}; no material is stable otherwise"
-
-
-def contrast_faults(materials: Mapping[str, Material], plane: str) -> list[str]:
-    """Return a fault if the phases are too far apart; their constants are those of stable materials."""
-    contrast, phases = _contrast(materials, plane)
-    if contrast <= LARGEST_CONTRAST:
-        return []
-    return [f"{phases}: stiffnesses that differ by a factor of {contrast:.1e}: expected at most {LARGEST_CONTRAST:g}"]
-
-
-def contrast_warnings(materials: Mapping[str, Material], plane: str) -> list[str]:
-    """Return a warning if rounding may matter."""
-    contrast, phases = _contrast(materials, plane)
-    if contrast <= WORRYING_CONTRAST:
-        return []
-    return [f"{phases}: stiffnesses differ by {contrast:.1e}: rounding may exceed the tolerance of the checks"]
-
-
-def _contrast(materials: Mapping[str, Material], plane: str) -> tuple[float, str]:
-    """Return the largest ratio of the largest entries of two phases' stiffnesses, and the sections of these phases."""
+def contrast_lines(materials: Mapping[str, Material], plane: str) -> tuple[list[str], list[str]]:
+    """Return a fault if the stiffnesses of two stable phases are too far apart, a warning if rounding may matter."""
     with np.errstate(over="ignore"):
         sizes = {phase: float(np.abs(stiffness_of(material, plane)).max()) for phase, material in materials.items()}
     stiffest, softest = max(sizes, key=sizes.__getitem__), min(sizes, key=sizes.__getitem__)
-    names = ", ".join(f"[material.{toml_key(phase)}]" for phase in (stiffest, softest))
-    return sizes[stiffest] / sizes[softest], names
+    phases = ", ".join(f"[material.{toml_key(phase)}]" for phase in (stiffest, softest))
+    contrast = sizes[stiffest] / sizes[softest]
+    if contrast > LARGEST_CONTRAST:
+        words = f"stiffnesses that differ by a factor of {contrast:.1e}: expected at most {LARGEST_CONTRAST:g}"
+        return [f"{phases}: {words}"], []
+    if contrast > WORRYING_CONTRAST:
+        words = f"stiffnesses differ by {contrast:.1e}: rounding may exceed the tolerance of the checks"
+        return [], [f"{phases}: {words}"]
+    return [], []

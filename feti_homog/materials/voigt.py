@@ -1,9 +1,13 @@
-"""Voigt orders with engineering shear strains: names of the components, tensors, rotated matrices, stress measures.
+"""Voigt orders with engineering shears: names of components, plane states, tensors, rotations, stress measures.
 
-[11, 22, 12] in the plane, [11, 22, 33, 23, 13, 12] in space.
+[11, 22, 12] in plane strain and plane stress, [11, 22, 33, 23, 13, 12] in space and generalized plane strain.
 """
 
 from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -21,6 +25,52 @@ EXPANSIONS = ("expansion_x1", "expansion_x2", "expansion_axial", *(f"expansion_{
 IN_PLANE = [0, 1, 5]
 """Where [11, 22, 12] stand in the order of space."""
 IN_PLANE_BLOCK = np.ix_(IN_PLANE, IN_PLANE)
+
+
+@dataclass(frozen=True)
+class PlaneState:
+    """A plane state.
+
+    Attributes:
+        name: value of [analysis] plane.
+        title: its name in words.
+        strains, stresses: names of the components, in Voigt order.
+        is_sheet: whether S33 vanishes; else E33 does, or is a load.
+        is_spatial: whether all six strains are loads, and with them a temperature: then axial shear is a problem of its
+            own, the stiffness is (6, 6), and constants, estimates and bounds are those of space.
+        numbers: i and j in the names Cij of the entries of strains of the plane.
+    """
+
+    name: str
+    title: str
+    strains: tuple[str, ...] = STRAINS
+    stresses: tuple[str, ...] = STRESSES
+    is_sheet: bool = False
+    is_spatial: bool = False
+    numbers: tuple[int, int, int] = (1, 2, 3)
+
+    @property
+    def components(self) -> tuple[tuple[str, str], ...]:
+        """Names of strain and stress of each component."""
+        return tuple(zip(self.strains, self.stresses, strict=True))
+
+    @property
+    def normals(self) -> int:
+        """Return how many components, the first ones, are normal strains that are loads."""
+        return len(self.strains) - (3 if self.is_spatial else 1)
+
+
+PLANE_STRAIN = PlaneState("strain", "plane strain")
+PLANE_STRESS = PlaneState("stress", "plane stress", is_sheet=True)
+GENERALIZED = PlaneState(
+    "generalized", "generalized plane strain", SPATIAL_STRAINS, SPATIAL_STRESSES, is_spatial=True, numbers=(1, 2, 6)
+)
+PLANE_STATES = {state.name: state for state in (PLANE_STRAIN, PLANE_STRESS, GENERALIZED)}
+
+
+def plane_state_of(document: Mapping[str, Any]) -> PlaneState:
+    """Return the plane state of a result.json."""
+    return PLANE_STATES[document["case"]["analysis"]["plane"]]
 
 
 def voigt_names(count: int) -> tuple[tuple[str, ...], tuple[str, ...]]:

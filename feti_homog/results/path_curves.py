@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from feti_homog.case.bond_laws import DEFAULT, LAWS
-from feti_homog.case.mixed_load import TEMPERATURE, MixedLoad, Strain, completed, first_named
-from feti_homog.materials.plane_state import plane_state_of
+from feti_homog.case.loads import TEMPERATURE, MixedLoad, Strain, completed, first_named
+from feti_homog.materials.voigt import plane_state_of
 from feti_homog.typing import Float
 
 SAME_LOAD = 1e-9  # load factors that differ by less, relatively, are one

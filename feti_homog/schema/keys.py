@@ -1,18 +1,21 @@
-"""Reading a table of a case file into a frozen dataclass whose fields carry their rules and their meaning."""
+"""Reading tables of a case file into frozen dataclasses whose fields carry their rules, and relations between keys."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-from feti_homog.schema.values import INF, ValueType
+from feti_homog.schema.values import INF, Test, ValueType
 from feti_homog.schema.wording import suggestion, toml_key, toml_value
 
 T = TypeVar("T")
+TablePath = tuple[str, ...]
+ITEMS = "items"
+"""In a path: the entries of a list."""
 
 
 @dataclass(frozen=True)
@@ -30,11 +33,6 @@ class Selector:
         """Return the condition that the key has one of these values."""
         return Condition(self, values)
 
-    def in_words(self, section: str) -> str:
-        """Return the key as a fault in a section names it."""
-        word = self.word or self.key
-        return word if section == self.section else f"[{self.section}] {word}"
-
 
 @dataclass(frozen=True)
 class Condition:
@@ -43,13 +41,19 @@ class Condition:
     selector: Selector
     values: tuple[str, ...]
 
+    def holds(self, selected: Selected) -> bool:
+        """Return whether the condition holds; not, if the selector is faulty."""
+        return selected.get(self.selector) in self.values
+
     def in_words(self, section: str) -> str:
-        """Return the condition as it is read in a section."""
-        return f"{self.selector.in_words(section)} = {' or '.join(map(toml_value, self.values))}"
+        """Return the condition as a fault in a section names it."""
+        word = self.selector.word or self.selector.key
+        name = word if section == self.selector.section else f"[{self.selector.section}] {word}"
+        return f"{name} = {' or '.join(map(toml_value, self.values))}"
 
 
 Selected = Mapping[Selector, str | None]
-"""The value of each selector, None if that is faulty: then what depends on it is not checked."""
+"""The value of each selector, None if it is faulty: then nothing that depends on it is checked."""
 
 
 @dataclass(frozen=True)
@@ -57,13 +61,13 @@ class Key:
     """A key of a table.
 
     Attributes:
-        type: what its value must be.
+        type: type of its value.
         meaning: a sentence or two for the reference.
         unit: of the value, empty if it has none.
         default: in words; empty if there is none.
-        only: when it belongs to the table: all of these conditions hold.
+        only: conditions under all of which it belongs to the table.
         required: whether it must be there where it belongs.
-        instead: what to write where it does not belong; empty if there is nothing like it.
+        instead: replacement where it does not belong; empty if there is none.
         unless: other keys of the table, beside any of which it is not required.
         by_pair: whether it may differ between several sections [[interface]].
         presentation: whether it decides how results are drawn and labelled, and nothing of their numbers.
@@ -80,53 +84,48 @@ class Key:
     by_pair: bool = False
     presentation: bool = False
 
-    def belongs(self, selected: Selected) -> bool:
-        """Return whether the key belongs to the table; not, if that depends on a faulty selector."""
-        return all(selected.get(condition.selector) in condition.values for condition in self.only)
+    def fault(self, name: str, table: Mapping[str, Any]) -> str:
+        """Return the fault of the key of this name in a table, whatever the case; empty if there is none."""
+        if name not in table:
+            return f": missing; expected {self.type.expected}" if self.required and not self.only else ""
+        words = self.type.complaint(table[name])
+        return words and f" = {toml_value(table[name])}: {words}"
 
 
 def key(
     type_: ValueType,
     meaning: str,
     *,
-    unit: str = "",
     default: Any = dataclasses.MISSING,
     default_words: str = "",
+    absent: str = "",
     only: Condition | tuple[Condition, ...] = (),
-    instead: str = "",
-    unless: tuple[str, ...] = (),
-    by_pair: bool = False,
-    presentation: bool = False,
+    **attributes: Any,
 ) -> Any:
     """Return a dataclass field read from the key of its name; required where it belongs if it has no default.
 
-    `default_words` stand for a default of None.
+    Without the key its value is None if `absent` says the meaning; `default_words` stand for another default, and
+    `attributes` are further ones of `Key`.
     """
     conditions = only if isinstance(only, tuple) else (only,)
+    default = None if absent else default
     required = default is dataclasses.MISSING
     written = toml_value(list(default) if isinstance(default, tuple) else default)
-    words = default_words or ("" if required or default is None else written)
-    metadata = {"key": Key(type_, meaning, unit, words, conditions, required, instead, unless, by_pair, presentation)}
+    words = absent or default_words or ("" if required or default is None else written)
+    entry = Key(type_, meaning, default=words, only=conditions, required=required, **attributes)
     if required and not conditions:
-        return dataclasses.field(metadata=metadata)
-    return dataclasses.field(default=None if required else default, metadata=metadata)
+        return dataclasses.field(metadata={"key": entry})
+    return dataclasses.field(default=None if required else default, metadata={"key": entry})
 
 
 def keys_of(table_class: type[Any]) -> dict[str, Key]:
-    """Return the keys of a table by name; fields that are made of them are none."""
+    """Return the keys of a table by name; derived fields are none."""
     return {each.name: each.metadata["key"] for each in dataclasses.fields(table_class) if "key" in each.metadata}
-
-
-def selected_value(table_class: type[Any], table: object, name: str) -> Any:
-    """Return the value of a key if it is right, its default if it is not there, None if it is faulty."""
-    default = getattr(table_class, name, None)
-    value = table.get(name, default) if isinstance(table, Mapping) else default
-    return value if keys_of(table_class)[name].type.accepts(value) else None
 
 
 @dataclass
 class TableReader:
-    """Reads tables and gathers what is wrong with them.
+    """Reads tables and gathers their faults.
 
     Attributes:
         selected: the values that decide which keys belong to the case.
@@ -147,55 +146,140 @@ class TableReader:
             self.faults.append(f"{section} = {toml_value(table)}: expected a section [{section}]")
             return None
         keys, before = keys_of(table_class), len(self.faults)
-        unknown = {
-            name: f" = {toml_value(value)}: unknown key; {suggestion(name, keys, self.owners)}"
-            for name, value in table.items()
+        faults = {
+            name: f" = {toml_value(table[name])}: unknown key; {suggestion(name, keys, self.owners)}"
+            for name in table
             if name not in keys
         }
-        known = {name: self._fault(name, entry, table) for name, entry in keys.items()}
-        faulty = {name: words for name, words in (unknown | known).items() if words}
-        self.faults += [f"[{section}] {prefix}{toml_key(name)}{words}" for name, words in faulty.items()]
-        values = {
-            name: self._stored(keys[name].type, value, section, f"{prefix}{name}")
-            for name, value in table.items()
-            if name in keys and keys[name].type.accepts(value)
-        }
+        faults |= {name: words for name, entry in keys.items() if (words := entry.fault(name, table))}
+        self.faults += [f"[{section}] {prefix}{toml_key(name)}{words}" for name, words in faults.items()]
+        good = {name: value for name, value in table.items() if name not in faults}
+        values = {k: self._stored(keys[k].type, value, section, f"{prefix}{k}") for k, value in good.items()}
         return table_class(**values) if len(self.faults) == before else None
 
     def _stored(self, type_: ValueType, value: Any, section: str, place: str) -> Any:
-        """Return a right value as its dataclass keeps it, with the tables in it read."""
+        """Return a valid value as its dataclass keeps it, with its tables read."""
         if type_.item is not None:
             return tuple(self._stored(type_.item, item, section, f"{place}[{k}]") for k, item in enumerate(value))
         if type_.table is not None and isinstance(value, dict):
             return self.read(type_.table, value, section, f"{place}.")
         return type_.store(value)
 
-    def _fault(self, name: str, entry: Key, table: Mapping[str, Any]) -> str:
-        """Return the fault of one known key, whatever the case, empty if there is none."""
-        if name not in table:
-            return f": missing; expected {entry.type.expected}" if entry.required and not entry.only else ""
-        complaint = entry.type.complaint(table[name])
-        return f" = {toml_value(table[name])}: {complaint}" if complaint else ""
-
 
 def to_table(instance: Any, selected: Selected) -> dict[str, Any]:
     """Return the table, of TOML's values, that `TableReader.read` makes the instance of.
 
-    It has neither the keys that do not belong to the case nor those without a value.
+    It has neither the keys that do not belong to the case nor keys without a value.
     """
+
+    def to_toml(value: Any) -> Any:
+        if isinstance(value, tuple):
+            return [to_toml(entry) for entry in value]
+        if isinstance(value, Path):
+            return str(value)
+        if value == math.inf:
+            return INF
+        return to_table(value, selected) if dataclasses.is_dataclass(value) else value
+
     return {
-        name: _to_toml(getattr(instance, name), selected)
+        name: to_toml(value)
         for name, entry in keys_of(type(instance)).items()
-        if getattr(instance, name) is not None and entry.belongs(selected)
+        if (value := getattr(instance, name)) is not None and all(each.holds(selected) for each in entry.only)
     }
 
 
-def _to_toml(value: Any, selected: Selected) -> Any:
-    """Return the value as TOML has it."""
-    if isinstance(value, tuple):
-        return [_to_toml(entry, selected) for entry in value]
-    if isinstance(value, Path):
-        return str(value)
-    if value == math.inf:
-        return INF
-    return to_table(value, selected) if dataclasses.is_dataclass(value) else value
+@dataclass(frozen=True)
+class Rule:
+    """Requirement at a path of a document under some conditions.
+
+    Attributes:
+        path: from the section to a table or value; where there is none, the rule holds. Empty: the whole document.
+        holds: whether the value there is valid; None if no value may stand there.
+        words: expectation that an invalid value fails, or the end of the line made of the value and the selection.
+        when: conditions all of which must hold.
+        names: keys of the table that the fault names, the given ones if there are any; empty: it names the value.
+    """
+
+    path: TablePath
+    holds: Test | None
+    words: str | Callable[[Any, Selected], str]
+    when: tuple[Condition, ...] = ()
+    names: tuple[str, ...] = ()
+
+    def faults(self, document: Mapping[str, Any], selected: Selected) -> Iterator[str]:
+        """Yield a line for each invalid place of the document."""
+        if not all(condition.holds(selected) for condition in self.when):
+            return
+        for section, place, value in _places(document, self.path):
+            if self.holds is None or not self.holds(value):
+                words = f": {self.words}" if isinstance(self.words, str) else self.words(value, selected)
+                yield f"[{section}]{self._keys(place, value)}{words}" if self.path else words[2:]
+
+    def _keys(self, place: str, value: Any) -> str:
+        """Return the keys of a table, or a value with its key, as the fault of a place names them."""
+        if not self.names:
+            return f" {place} = {toml_value(value)}" if place else ""
+        above, given = f"{place}." if place else "", [name for name in self.names if name in value]
+        return f" {', '.join(above + name for name in given or self.names)}"
+
+
+def has(table: Any, *names: str) -> bool:
+    """Return whether the value is a table with all of these keys."""
+    return isinstance(table, dict) and {*names} <= table.keys()
+
+
+def exclusive(path: TablePath, *names: str, words: str = "exclude each other; give one") -> Rule:
+    """Allow at most one of these keys."""
+    return Rule(path, lambda table: sum(has(table, name) for name in names) < 2, words, names=names)
+
+
+def needed(
+    path: TablePath, name: str, words: str, *when: Condition, beside: str = "", unless: Sequence[str] = ()
+) -> Rule:
+    """Require a key, or one of others in its place, under some conditions or beside another key."""
+
+    def holds(table: Any) -> bool:
+        is_asked = isinstance(table, dict) and (not beside or beside in table)
+        return not is_asked or any(each in table for each in (name, *unless))
+
+    return Rule(path, holds, words, when, (name,))
+
+
+def belonging(
+    path: TablePath, condition: Condition, values: Sequence[str], *when: Condition, instead: str = ""
+) -> Rule:
+    """Refuse the key or section at the end of the path where the selector has other values than the condition."""
+    others = tuple(value for value in values if value not in condition.values)
+
+    def words(_: Any, selected: Selected) -> str:
+        owner = f"{condition.in_words(path[0])}, not {toml_value(selected[condition.selector])}"
+        return f": belongs to {owner}{f'; use {instead}' if instead else ''}"
+
+    return Rule(path, None, words, (*when, condition.selector.among(*others)))
+
+
+def refused(path: TablePath, is_refused: Test, words: str, *when: Condition) -> Rule:
+    """Refuse values by a test, under some conditions."""
+    return Rule(path, lambda value: not is_refused(value), words, when)
+
+
+def _places(document: Mapping[str, Any], path: TablePath) -> Iterator[tuple[str, str, Any]]:
+    """Yield section, place there and value at a path; of a list of sections, numbered from 1, each one's."""
+
+    def within(section: str, place: str, value: Any, rest: TablePath) -> Iterator[tuple[str, str, Any]]:
+        if not rest:
+            if value is not None:
+                yield section, place, value
+        elif rest[0] == ITEMS and isinstance(value, list):
+            for k, item in enumerate(value):
+                yield from within(section, f"{place}[{k}]", item, rest[1:])
+        elif isinstance(value, dict) and rest[0] in value:
+            yield from within(section, f"{place}.{rest[0]}" if place else rest[0], value[rest[0]], rest[1:])
+
+    if not path:
+        yield "", "", document
+        return
+    content = document.get(path[0])
+    sections = content if isinstance(content, list) else [content]
+    for number, section in enumerate(sections, 1):
+        yield from within(path[0] if len(sections) == 1 else f"{path[0]} {number}", "", section, path[1:])

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+import operator
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from feti_homog.schema.wording import toml_value
 
 SMALLEST, LARGEST = 1e-100, 1e100
 """Magnitudes of numbers other than 0: no product of a few over- or underflows."""
+Test = Callable[[Any], bool]
 INF = "inf"
 """An infinite number in resolved cases, which are written as JSON."""
 MAGNITUDES = f"; numbers other than 0 have magnitudes from {SMALLEST:g} to {LARGEST:g}"
@@ -23,15 +25,15 @@ class ValueType:
 
     Attributes:
         expected: in words, for faults and for the reference.
-        accepts: whether a value, of TOML's types, is right.
-        store: of a right value, what the dataclass of its table keeps.
+        accepts: whether a value, of TOML's types, is valid.
+        store: the form in which the dataclass of its table keeps a valid value.
         table: the dataclass of the value if it is a table; `TableReader` reads it.
         item: of a list with tables in it, the type of its entries.
         options: of a choice, the texts that it may be.
     """
 
     expected: str
-    accepts: Callable[[Any], bool]
+    accepts: Test
     store: Callable[[Any], Any]
     table: type[Any] | None = None
     item: ValueType | None = None
@@ -43,13 +45,11 @@ class ValueType:
 
     def complaint(self, value: Any) -> str:
         """Return the expectation that a value fails, empty if it is valid."""
-        return "" if self.accepts(value) else f"expected {self.expected}{magnitudes_in_words(value)}{_scatter(value)}"
-
-
-def _scatter(value: Any) -> str:
-    """Return which command takes a value with its scatter, {mean, std} or {mean, cv}; else empty."""
-    has_scatter = isinstance(value, dict) and set(value) in ({"mean", "std"}, {"mean", "cv"})
-    return "; `feti-homog uncertainty` takes scatter" if has_scatter else ""
+        if self.accepts(value):
+            return ""
+        has_scatter = isinstance(value, dict) and set(value) in ({"mean", "std"}, {"mean", "cv"})
+        command = "; `feti-homog uncertainty` takes scatter" if has_scatter else ""
+        return f"expected {self.expected}{magnitudes_in_words(value)}{command}"
 
 
 def magnitudes_in_words(value: Any) -> str:
@@ -67,44 +67,27 @@ def is_number(value: object) -> bool:
     return value == 0 or SMALLEST <= abs(value) <= LARGEST
 
 
-@dataclass(frozen=True, kw_only=True)
-class Limits:
-    """Limits of a number: `above` and `below` are outside, `least` and `most` inside."""
-
-    above: float = -math.inf
-    least: float = -math.inf
-    below: float = math.inf
-    most: float = math.inf
-
-    def hold(self, value: float) -> bool:
-        return self.above < value < self.below and self.least <= value <= self.most
-
-    def in_words(self) -> str:
-        limits = {"above": self.above, "at least": self.least, "below": self.below, "at most": self.most}
-        return " and ".join(f"{word} {_short(limit)}" for word, limit in limits.items() if math.isfinite(limit))
-
-
-def _short(limit: float) -> str:
-    return str(limit) if isinstance(limit, int) else f"{limit:.6g}"
-
-
 def real(**limits: float) -> ValueType:
-    """Return a number within `Limits`."""
-    return _numeric("number", is_number, float, Limits(**limits))
+    """Return a number within limits: `above` and `below` are outside, `least` and `most` inside."""
+    return _within("a number", is_number, float, limits)
 
 
 def integer(**limits: float) -> ValueType:
-    """Return an integer within `Limits`."""
-    return _numeric("integer", lambda value: is_number(value) and isinstance(value, int), int, Limits(**limits))
+    """Return an integer within limits, as `real`."""
+    return _within("an integer", lambda value: is_number(value) and isinstance(value, int), int, limits)
 
 
-def _numeric(name: str, is_of_type: Callable[[Any], bool], store: Callable[[Any], Any], limits: Limits) -> ValueType:
-    article = "an" if name == "integer" else "a"
-    return ValueType(
-        f"{article} {name} {limits.in_words()}".strip(),
-        lambda value: is_of_type(value) and limits.hold(value),
-        store,
-    )
+def _within(name: str, is_of_type: Test, store: Callable[[Any], Any], limits: Mapping[str, float]) -> ValueType:
+    tests = {"above": operator.gt, "least": operator.ge, "below": operator.lt, "most": operator.le}
+    words = {"above": "above", "least": "at least", "below": "below", "most": "at most"}
+    finite = {kind: limits[kind] for kind in tests if math.isfinite(limits.get(kind, math.inf))}
+    texts = {kind: str(limit) if isinstance(limit, int) else f"{limit:.6g}" for kind, limit in finite.items()}
+    expected = f"{name} {' and '.join(f'{words[kind]} {text}' for kind, text in texts.items())}".strip()
+
+    def accepts(value: Any) -> bool:
+        return is_of_type(value) and all(tests[kind](value, limit) for kind, limit in finite.items())
+
+    return ValueType(expected, accepts, store)
 
 
 def list_of(
@@ -149,14 +132,8 @@ def choice(*options: str) -> ValueType:
 
 
 POSITIVE_OR_INF = ValueType(
-    "a positive number, or inf",
-    lambda value: value in (math.inf, INF) or (is_number(value) and value > 0),
-    float,
+    "a positive number, or inf", lambda value: value in (math.inf, INF) or (is_number(value) and value > 0), float
 )
 """Where inf is another thing than no value."""
 boolean = ValueType("true or false", lambda value: isinstance(value, bool), bool)
-text = ValueType(
-    "a text in one line",
-    lambda value: isinstance(value, str) and value.isprintable(),
-    str,
-)
+text = ValueType("a text in one line", lambda value: isinstance(value, str) and value.isprintable(), str)

@@ -28,6 +28,9 @@ ABSENT = {
     "g": "it follows from young and poisson",
     "cone": "Coulomb's cone of both shears is round, so no path is straight between changes",
     "axial_friction": "leave it out: debonded faces slip freely along the fibres",
+    "accuracy_check": "leave it out: a remark names the mesh that would do",
+    "element": "leave it out: quadratic elements of isotropic phases have a pressure of their own",
+    "element_size": "give mesh_size and refine: elements have the size mesh_size / 2^refine",
 }
 # What a key takes the place of, by the key and how it follows.
 IN_PLACE = dict.fromkeys(

@@ -32,9 +32,9 @@ def laws(case: Mapping[str, Any], phases: Sequence[str]) -> tuple[Float, Float |
 def mixed_phases(case: Mapping[str, Any], phases: Sequence[str]) -> Bool:
     """(phases,) whether quadratic elements have a bubble and a pressure: those of isotropic phases but in plane stress.
 
-    Unless the case has another `element`; cases of older versions have none.  Raises CaseError as `laws` does.
+    Cases of older versions may have another `element`.  Raises CaseError as `laws` does.
     """
-    wanted = case["cell"].get("element") == "mixed" and case["analysis"]["plane"] != "stress"
+    wanted = case["cell"].get("element", "mixed") == "mixed" and case["analysis"]["plane"] != "stress"
     return np.array([wanted and _is_isotropic(_constants(case, phase)) for phase in phases], bool)
 
 

@@ -96,7 +96,7 @@ class SolvedAnew:
             material = case["material"].get(name, case["material"].get(name.split(":")[0]))
             C, alpha = phase_law(material, plane)
             is_mixed = own.shape[1] == 6 and "young" in material and plane != "stress"
-            k, q, area = elements(self.points[own], C, alpha, is_mixed and case["cell"]["element"] == "mixed")
+            k, q, area = elements(self.points[own], C, alpha, is_mixed)
             dofs = (3 * self.node[own][:, :, None] + np.arange(3)).reshape(len(own), -1)
             np.add.at(Q, dofs, q)
             K.append(k.ravel())

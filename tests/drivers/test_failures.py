@@ -182,42 +182,6 @@ def test_a_rank_without_memory_ends_the_job(tmp_path, name):
     assert (out / "result.json").exists() == (name in ("table", "picture"))
 
 
-CORNERS = """[cell]
-geometry = "table"
-width = 1.0
-height = 1.0
-order = 2
-accuracy = 2e-4
-accuracy_check = "repeat"
-fibre_list = [{x = 0.5, y = 0.5, radius = 0.35, sides = 4, angle = 45.0}]
-
-[material]
-matrix = {young = 1.0, poisson = 0.3}
-fibre = {young = 1000.0, poisson = 0.3}
-
-[analysis]
-type = "stiffness"
-plane = "strain"
-
-[decomposition]
-cut = "bodies"
-
-[output]
-pictures = false
-"""
-
-
-def test_the_first_mesh_stays_if_one_rank_has_no_memory_for_the_finer_one(tmp_path):
-    case, out = tmp_path / "corners.toml", tmp_path / "out"
-    case.write_text(CORNERS)
-    refine = "args[1].halvings > __import__('feti_homog').Case.load(CASE).cell.refine".replace("CASE", repr(str(case)))
-    hook = Hook("feti_homog.feti.decomposition.subdomain:Subdomain.build", NO_MEMORY, rank=1, when=refine)
-    job = hooked(2, [hook], "run", case, "--out", out)
-    assert job.returncode == 0, job.stderr
-    remarks = json.loads((out / "result.json").read_text())["remarks"]
-    assert any("could not be solved: rank 1 of 2 has no memory left: none left" in remark for remark in remarks)
-
-
 @pytest.mark.parametrize(
     ("fault", "code", "words"),
     [

@@ -114,11 +114,3 @@ def test_a_debonded_arc(order, accuracy):
     bonding = {"contact": False, "debonded": [{"fibre": "all", "angle": 120.0}]}
     found = stiffness(cell, COMPOSITE, bonding=bonding).effective_stiffness
     assert energy_error(found, exact) < accuracy
-
-
-def test_a_size_of_elements_is_what_the_result_tells():
-    cell = {"geometry": "square", "fibre_fraction": 0.4, "element_size": 0.03}
-    result = stiffness(cell, COMPOSITE)
-    assert (result.cell.mesh_size, result.cell.refine) == (0.06, 1)
-    twin = stiffness({"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.06, "refine": 1}, COMPOSITE)
-    assert np.array_equal(twin.effective_stiffness, result.effective_stiffness)

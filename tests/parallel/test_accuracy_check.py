@@ -10,11 +10,8 @@ from support.cases import FIBRE, MATRIX
 from support.pixel_images import pixel_mesh
 
 from feti_homog import Case, run
-from feti_homog.analysis import runner
 from feti_homog.analysis.mesh_errors import note_accuracy
-from feti_homog.errors import CaseError, CheckpointError, CoarseMeshError, ConvergenceError
-from feti_homog.system.parallel.mpi_errors import agree, on_root
-from feti_homog.system.runtime.progress import Progress
+from feti_homog.system.parallel.mpi_errors import on_root
 
 pytestmark = pytest.mark.parallel
 
@@ -28,7 +25,7 @@ ASKED = {
 
 
 def test_more_error_than_asked_for_is_remarked_with_a_mesh_that_would_do(comm):
-    context = SimpleNamespace(case=Case.parse(ASKED), notes=[], earlier=None, cell=SimpleNamespace(comm=comm))
+    context = SimpleNamespace(case=Case.parse(ASKED), notes=[], cell=SimpleNamespace(comm=comm))
     note_accuracy(context, 0.9e-3)
     assert not context.notes
     note_accuracy(context, 5e-3)
@@ -38,84 +35,13 @@ def test_more_error_than_asked_for_is_remarked_with_a_mesh_that_would_do(comm):
     assert f"refine = {chosen.refine + 2} and order = 1" in note and "5.0e-03" in note
 
 
-def test_no_repetition_with_many_more_unknowns(comm):
-    case = Case.parse(ASKED | {"cell": ASKED["cell"] | {"accuracy_check": "repeat"}})
-    context = SimpleNamespace(case=case, notes=[], earlier=None, cell=SimpleNamespace(comm=comm))
-    with pytest.raises(CoarseMeshError):
-        note_accuracy(context, 15e-3)  # two halvings
-    note_accuracy(context, 60e-3)
-    assert "not solved once more with 64 times the unknowns" in context.notes[0]
-
-
-@pytest.mark.parametrize("raises", [ConvergenceError, MemoryError, None])
-def test_the_first_mesh_stays_if_the_finer_one_fails(comm, raises):
-    case = Case.parse(ASKED | {"cell": ASKED["cell"] | {"accuracy_check": "repeat"}})
-    first, notes = case.cell.refine, []
-
-    def solved(own, earlier, resume):
-        context = SimpleNamespace(case=own, notes=notes, earlier=earlier, cell=SimpleNamespace(comm=comm))
-        if own.cell.refine > first:
-            if raises:
-                raise raises("broke down")
-            return SimpleNamespace(faults=["broke down"])
-        note_accuracy(context, 5e-3)
-        return SimpleNamespace(faults=[], case=own)
-
-    if raises is MemoryError and comm.size > 1:  # which one rank may meet alone
-        with pytest.raises(MemoryError):
-            runner._accurate(case, solved, Progress(comm, quiet=True))
-        return
-    found = runner._accurate(case, solved, Progress(comm, quiet=True))
-    why = "no memory left: broke down" if raises is MemoryError else "broke down"
-    assert found.case is case
-    assert f"for with refine = {first + 2} it could not be solved: {why}" in notes[0]
-
-
-@pytest.mark.parametrize("resume", [False, True])
-def test_a_rank_without_memory_or_a_checkpoint_of_the_first_mesh_leaves_the_first_mesh(comm, resume):
-    case = Case.parse(ASKED | {"cell": ASKED["cell"] | {"accuracy_check": "repeat"}})
-    notes, resumed = [], []
-
-    def fail():
-        if not resume and comm.rank == comm.size - 1:
-            raise MemoryError("none left")
-
-    def solved(own, earlier, resumes):
-        context = SimpleNamespace(case=own, notes=notes, earlier=earlier, cell=SimpleNamespace(comm=comm))
-        if own.cell.refine > case.cell.refine:
-            agree(comm, fail)
-            raise CheckpointError("--resume: of another run")
-        resumed.append(resumes)
-        note_accuracy(context, 5e-3)
-        return SimpleNamespace(faults=[], case=own)
-
-    assert runner._accurate(case, solved, Progress(comm, quiet=True), resume).case is case
-    assert resumed == [resume, resume]  # the checkpoint of a finer mesh that fails is of no use to the first
-    last = comm.size - 1
-    assert ("of another run" if resume else f"rank {last} of {last + 1} has no memory left") in notes[0]
-
-
-@pytest.mark.parametrize("resume", [False, True])
-def test_a_case_that_the_finer_mesh_refuses_is_no_earlier_run(comm, resume):
-    case = Case.parse(ASKED | {"cell": ASKED["cell"] | {"accuracy_check": "repeat"}})
-
-    def solved(own, earlier, resumes):
-        if own.cell.refine > case.cell.refine:
-            raise CaseError("no node lies on the arc")
-        context = SimpleNamespace(case=own, notes=[], earlier=earlier, cell=SimpleNamespace(comm=comm))
-        note_accuracy(context, 5e-3)
-
-    with pytest.raises(CaseError, match=r"^no node lies on the arc$"):
-        runner._accurate(case, solved, Progress(comm, quiet=True), resume)
-
-
 @pytest.mark.parametrize("kind", ["stiffness", "load", "angle", "path"])
-def test_a_mesh_that_errs_too_much_is_refined_once(comm, kind):
+def test_a_mesh_that_errs_too_much_is_remarked_with_a_finer_one(comm, kind):
     # Sharp corners, of which the choice of the mesh does not know.
     square = {"x": 0.5, "y": 0.5, "radius": 0.35, "sides": 4, "angle": 45.0}
     cell = {"geometry": "table", "width": 1.0, "height": 1.0, "fibre_list": [square], "order": 2}
     stiff = {"young": 1000.0, "poisson": 0.3}
-    document = {"cell": cell | {"accuracy": 2e-4, "accuracy_check": "repeat"}, "analysis": {"plane": "strain"}}
+    document = {"cell": cell | {"accuracy": 2e-4}, "analysis": {"plane": "strain"}}
     document |= {"material": {"matrix": {"young": 1.0, "poisson": 0.3}, "fibre": stiff}}
     own = {"load": {"to": {"E11": 1.0}}, "angle": {"values": [0.0], "strain": [1.0, 0.0, 0.0]}}
     own["path"] = {"strain": [1.0, 0.0, 0.0]}
@@ -128,11 +54,8 @@ def test_a_mesh_that_errs_too_much_is_refined_once(comm, kind):
         document["interface"] = {"contact": False, "debonded": [{"fibre": "all", "centre": 0.0}]}
     case = Case.parse(document)
     found = run(case, comm)
-    first, *others = (note for note in found.remarks if "accuracy" in note)
-    assert f"with refine = {case.cell.refine}: solved once more with refine = {found.cell.refine}" in first
-    if kind == "stiffness":  # of the rate that both meshes have, not of that of smooth fields
-        assert int(others[0].split("refine = ")[1].split(" ")[0]) > found.cell.refine + 1
-    assert found.cell.refine > case.cell.refine
+    (remark,) = (note for note in found.remarks if "accuracy" in note)
+    assert int(remark.split("refine = ")[1].split(" ")[0]) > found.cell.refine == case.cell.refine
     assert found.case == case.resolved() and found.digest == case.digest()
 
 

@@ -13,7 +13,7 @@ from unit.mesh.faulty_meshes import grid
 
 from feti_homog.analysis import path as load_path
 from feti_homog.analysis.context import AnalysisContext, CellLoads
-from feti_homog.case.load_section import LoadPath
+from feti_homog.case.loads import LoadPath
 from feti_homog.errors import CaseError, ConvergenceError
 from feti_homog.interface.contact.states import OPEN
 from feti_homog.interface.laws.strength import MaxStrength

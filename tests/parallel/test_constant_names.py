@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from feti_homog import Case, run
-from feti_homog.materials.constant_names import ABOUT_FIBRES, OF_THE_CELL
-from feti_homog.materials.derivatives import composite_constants
+from feti_homog.materials.constants import ABOUT_FIBRES, OF_THE_CELL, constants
 from feti_homog.report.cards import csv_table
 from feti_homog.report.cards.effective_material import in_axes_of_the_cell
 from feti_homog.report.text import constant_tables, stiffness_tables
@@ -49,7 +48,7 @@ def test_every_constant_has_one_name(result):
     case, found = result
     document = plain(found.document)
     own = dict(zip(found.sensitivities.constants, map(float, found.sensitivities.constant_values), strict=True))
-    assert {*available(case)} == {*composite_constants(np.eye(6), np.zeros(6))} == {*own}
+    assert {*available(case)} == {*constants(np.eye(6), np.zeros(6))} == {*own}
     sources = {"sensitivities": own, "sweep": outputs(document)}
     sources["axes of the cell"] = dict(row[:2] for row in stiffness_tables.constants(document, "")[0].rows)
     about = stiffness_tables.estimates(document, "")[0]

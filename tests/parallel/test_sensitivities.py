@@ -55,7 +55,7 @@ CASES = {
         PLAIN | {"order": 2}, "strain", {"matrix": MATRIX, "fibre": FIBRE}, {"contact": False, "debonded": ARC}
     ),
     "mixed elements": document(
-        PLAIN | {"order": 2, "element": "mixed"}, "generalized",
+        PLAIN | {"order": 2}, "generalized",
         {"matrix": EPOXY | {"poisson": 0.4}, "fibre": CARBON}, SPRINGS,
     ),
     "voids": document(VOIDS | {"order": 1}, "stress", {"matrix": GENERAL, "fibre": TURNED}),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import tomllib
 from pathlib import Path
 
@@ -15,7 +14,6 @@ from support.sweep_files import BY_BODIES, CASE, RANDOM
 
 from feti_homog import run
 from feti_homog.errors import ConvergenceError
-from feti_homog.results.result_json import read
 from feti_homog.studies.sweep import collect, execute, plan, store
 from feti_homog.system.parallel.mpi_errors import on_root
 
@@ -91,29 +89,3 @@ def test_failed_cases_end_the_sweep_as_one_error(comm, shared_path):
     assert table.status == ["not converged"] * 2 and "no convergence" in table.reason[0]
     entries = on_root(comm, store.read_index, shared_path / "out").entries
     assert [entry.folder for entry in entries] == table.folder
-
-
-SQUARE = """
-[cell]
-geometry = "table"
-width = 1.0
-height = 1.0
-fibre_list = [{x = 0.5, y = 0.5, radius = 0.35, sides = 4, angle = 45.0}]
-order = 2
-accuracy = 2e-3
-accuracy_check = "repeat"
-"""
-
-
-def test_a_case_that_is_solved_once_more_is_collected_with_its_finer_mesh(comm, shared_path):
-    case = CASE[CASE.index("[material.matrix]") :] + SQUARE
-    table = swept(comm, shared_path, "'material.fibre.young' = [100.0, 5000.0]\n", case, ranks_per_case=1)
-    alike, apart = (read(shared_path / f"out/case-{k:04d}") for k in (1, 2))
-    assert table.status == ["done"] * 2 and table.outputs["energy_mesh_error"][0] < 2e-3
-    assert not any("once more" in remark for remark in alike["remarks"])
-    once_more = next(remark for remark in apart["remarks"] if "solved once more" in remark)
-    first, finer = map(int, re.findall(r"refine = (\d)", once_more))
-    assert apart["cell"]["refine"] == finer > first and apart["case"]["cell"]["accuracy"] == 2e-3
-    assert table.outputs["refine"].tolist() == [alike["cell"]["refine"], finer]
-    elements, ratio = table.outputs["elements"], 4 ** (finer - alike["cell"]["refine"])
-    assert elements[1] == ratio * elements[0] > elements[0]

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from feti_homog.materials.spatial_constants import TransverselyIsotropic, transversely_isotropic_part
+from feti_homog.materials.constants import TransverseIsotropy, transversely_isotropic_part
 
 
 def compliance(E_L, E_T, nu_L, nu_T, G_L):
@@ -21,19 +21,19 @@ def compliance(E_L, E_T, nu_L, nu_T, G_L):
     return S
 
 
-def fibre_like(E_L, E_T, nu_L, nu_T, G_L, alpha_L=None, alpha_T=None) -> TransverselyIsotropic:
+def fibre_like(E_L, E_T, nu_L, nu_T, G_L, alpha_L=None, alpha_T=None) -> TransverseIsotropy:
     strains = None if alpha_L is None else [alpha_T, alpha_T, alpha_L, 0, 0, 0]
     return transversely_isotropic_part(np.linalg.inv(compliance(E_L, E_T, nu_L, nu_T, G_L)), strains)
 
 
-def isotropic(E, nu, alpha=None) -> TransverselyIsotropic:
+def isotropic(E, nu, alpha=None) -> TransverseIsotropy:
     return fibre_like(E, E, nu, nu, E / 2 / (1 + nu), alpha, alpha)
 
 
 @dataclass(frozen=True)
 class Composite:
-    matrix: TransverselyIsotropic
-    fibre: TransverselyIsotropic
+    matrix: TransverseIsotropy
+    fibre: TransverseIsotropy
     fraction: float
     constants: tuple[float, ...]
 

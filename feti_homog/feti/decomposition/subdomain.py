@@ -8,10 +8,9 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from feti_homog.errors import MeshError
-from feti_homog.fem.assembly import Mixed, assemble
+from feti_homog.fem.assembly import Mixed, assemble, void_integrals
 from feti_homog.fem.bubble import lame
 from feti_homog.fem.problem import PLANE, Problem
-from feti_homog.fem.void_boundary import void_integrals
 from feti_homog.feti.thresholds import KERNEL_TOLERANCE, LEAST_ORDERED_DOFS, SCALED_LAME
 from feti_homog.mesh.elimination_order import elimination_order
 from feti_homog.mesh.mesh_fibres import unwrap

@@ -10,7 +10,7 @@ from types import MappingProxyType
 import numpy as np
 
 from feti_homog.case.cell_section import Cell
-from feti_homog.case.mixed_cell import fractions_in_words, mixed_width
+from feti_homog.case.cell_sizes import fractions_in_words, mixed_width
 from feti_homog.errors import MeshError
 from feti_homog.mesh.arrange import arrange, listed_arrangement
 from feti_homog.mesh.coarse_mesh import CoarseMesh, representatives

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from feti_homog.case.cell_section import FIBRES_OF, Cell
-from feti_homog.case.mixed_cell import fibre_counts
+from feti_homog.case.cell_sizes import fibre_counts
 from feti_homog.errors import MeshError
 from feti_homog.mesh.sizes.from_sources import MAX_GROWTH
 from feti_homog.mesh.sizes.graded_size import MIN_EDGES_AROUND

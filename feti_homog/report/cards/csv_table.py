@@ -7,7 +7,7 @@ import io
 from collections.abc import Iterator
 from itertools import combinations_with_replacement
 
-from feti_homog.materials.constant_names import MATERIAL_EXPANSIONS
+from feti_homog.materials.constants import MATERIAL_EXPANSIONS
 from feti_homog.report.cards.effective_material import PAIRS, EffectiveMaterial, number
 
 COLUMNS = ("name", "value", "unit", "meaning")

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from feti_homog.materials.plane_state import plane_state_of
+from feti_homog.materials.voigt import plane_state_of
 from feti_homog.report.text import constant_tables, point_tables, stiffness_tables
 from feti_homog.report.text.path_table import path_table, peak_table
 from feti_homog.report.text.table import Table

@@ -10,12 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.materials.constant_names import (
-    ABOUT_FIBRES,
-    MATERIAL_AXES,
-    MATERIAL_EXPANSIONS,
-    OF_THE_CELL,
-)
+from feti_homog.materials.constants import ABOUT_FIBRES, MATERIAL_AXES, MATERIAL_EXPANSIONS, OF_THE_CELL
 from feti_homog.materials.voigt import EXPANSIONS
 from feti_homog.report.text.stiffness_tables import UNKNOWN, abreast, with_errors
 from feti_homog.report.text.table import Column, Table, in_brackets, without_noise

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.case.mixed_load import TEMPERATURE
+from feti_homog.case.loads import TEMPERATURE
 from feti_homog.materials.voigt import voigt_names
 from feti_homog.report.text.point_tables import COUNTS, WIDTH, columns_without_noise, counts, debonded, energies
 from feti_homog.report.text.table import Column, Table, without_noise

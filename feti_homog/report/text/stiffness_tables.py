@@ -8,7 +8,7 @@ from itertools import zip_longest
 from math import floor, log10
 from typing import Any
 
-from feti_homog.materials.constant_names import ABOUT_FIBRES, CELL_AXES
+from feti_homog.materials.constants import ABOUT_FIBRES, CELL_AXES
 from feti_homog.materials.voigt import SPATIAL_STRESSES, STRAINS, voigt_names
 from feti_homog.microstructure.phase_names import COATING
 from feti_homog.report.text.table import Column, Table, number, with_unit

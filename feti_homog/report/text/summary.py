@@ -9,7 +9,6 @@ from pathlib import Path
 from textwrap import wrap
 from typing import Any
 
-from feti_homog.case.element_sizes import ASKED
 from feti_homog.report.text.analyses import reported
 from feti_homog.report.text.point_tables import WIDTH
 from feti_homog.report.text.table import Column, Table, in_brackets
@@ -121,8 +120,8 @@ def _sizes(shape: Document, cell: Document) -> list[str]:
     """Return how often elements were split, and the coarse mesh where the program chose it."""
     if "refine" in shape:
         return [f"refine {shape['refine']}"]
-    asked = [f"{name} = {shape[name]:g}" for name in ASKED if name in shape]
-    return [f"refine {cell['refine']} of mesh_size {cell['mesh_size']:g} for {asked[0]}"] if asked else []
+    size = f"refine {cell['refine']} of mesh_size {cell['mesh_size']:g}"
+    return [f"{size} for accuracy = {shape['accuracy']:g}"] if "accuracy" in shape else []
 
 
 def _match(shape: Document, cell: Document) -> list[str]:

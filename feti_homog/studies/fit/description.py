@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 from feti_homog.case.case import Case
 from feti_homog.case.document import TomlPath, read_document, to_document
-from feti_homog.case.mixed_load import TEMPERATURE
+from feti_homog.case.loads import TEMPERATURE
 from feti_homog.case.sections import CURVE, MEASURED, SWEEP, TEST, UNKNOWN, Unknown
 from feti_homog.errors import CaseError
-from feti_homog.materials.constant_names import FORMER, axes_line
-from feti_homog.materials.plane_state import PLANE_STATES
-from feti_homog.materials.voigt import voigt_names
+from feti_homog.materials.constants import FORMER, axes_line
+from feti_homog.materials.voigt import PLANE_STATES, voigt_names
 from feti_homog.results.path_curves import SAME_LOAD
 from feti_homog.schema.wording import suggestion, toml_key
 from feti_homog.studies.fit.predictions import Datum, available

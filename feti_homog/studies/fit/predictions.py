@@ -12,10 +12,9 @@ import numpy as np
 from feti_homog.case.bond_laws import DEFAULT, LAWS
 from feti_homog.case.case import Case
 from feti_homog.errors import CaseError
-from feti_homog.materials.derivatives import composite_constants
+from feti_homog.materials.constants import constants
 from feti_homog.materials.laws import expansion
-from feti_homog.materials.plane_state import PLANE_STATES
-from feti_homog.materials.voigt import voigt_names
+from feti_homog.materials.voigt import PLANE_STATES, voigt_names
 from feti_homog.report.text.point_tables import STATES
 from feti_homog.results import path_curves
 from feti_homog.results.path_curves import Document
@@ -51,7 +50,7 @@ def available(case: Case) -> list[str]:
     size = 6 if spatial else 3
     if case.analysis.type == "stiffness":
         is_heated = spatial and all(expansion(material) is not None for material in case.materials.values())
-        return [*composite_constants(np.eye(size), np.zeros(6) if is_heated else None)]
+        return [*constants(np.eye(size), np.zeros(6) if is_heated else None)]
     if case.analysis.type == "path":
         strains, stresses = voigt_names(size)
         places = [f"{place}_{name}" for place in OF_PATHS for name in (*stresses, *strains)]
@@ -126,7 +125,7 @@ def _values(document: Document) -> dict[str, float]:
     if document["case"]["analysis"]["type"] == "stiffness":
         thermal = document.get("thermal_stress")
         heat = None if thermal is None else np.array(thermal)
-        return {k: float(v) for k, v in composite_constants(np.array(document["effective_stiffness"]), heat).items()}
+        return {k: float(v) for k, v in constants(np.array(document["effective_stiffness"]), heat).items()}
     return outputs(document)
 
 

@@ -11,7 +11,6 @@ import numpy as np
 from mpi4py import MPI
 
 from feti_homog.case import case as cases
-from feti_homog.case import element_sizes
 from feti_homog.case.case import Case
 from feti_homog.case.sections import SWEEP
 from feti_homog.errors import CaseError
@@ -74,11 +73,7 @@ def _described(
         *([f"voids      {summary.voids}"] if summary.voids else []),
         f"mesh       {summary.coarse_triangles} coarse triangles, {elements} "
         f"elements of order {case.cell.order}, about {2 * sum(nodes)} degrees of freedom",
-        *(
-            [f"sizes      mesh_size = {case.cell.mesh_size:g}, refine = {case.cell.refine}, as asked for by {asked}"]
-            if (asked := element_sizes.asked(case.cell))
-            else []
-        ),
+        *_size_lines(case),
         *_fibres_lines(case, summary),
         *_mix_lines(case, summary),
         *_match_lines(case, summary),
@@ -150,6 +145,13 @@ def _plan(
     if case.has_friction and found.preconditioner != "influence":
         raise CaseError(solver_plan.WITHOUT_INVERSE)
     return found
+
+
+def _size_lines(case: Case) -> list[str]:
+    """Return the mesh that an accuracy chooses, in a line."""
+    cell = case.cell
+    sizes = f"sizes      mesh_size = {cell.mesh_size:g}, refine = {cell.refine}"
+    return [f"{sizes}, as asked for by accuracy = {cell.accuracy:g}"] if cell.accuracy is not None else []
 
 
 def _fibres_lines(case: Case, summary: CellSummary) -> list[str]:

@@ -1,19 +1,16 @@
-"""The coarse mesh and its refinement that an accuracy or a size of elements chooses."""
+"""The coarse mesh and its refinement that an accuracy chooses."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from feti_homog.case import case as cases
-from feti_homog.case.element_sizes import COARSE_ERROR, EDGES_AROUND, SOFT_FACTOR, coarse_error
+from feti_homog.case.cell_sizes import COARSE_ERROR, SOFT_FACTOR, coarse_error
 from feti_homog.materials.forms import Isotropic, TransverselyIsotropic
-from feti_homog.mesh.fill.gmsh_mesher import generate
-from feti_homog.mesh.sizes.graded_size import MIN_EDGES_AROUND
 
 MATRIX = {"young": 3.5, "poisson": 0.35}
 GEOMETRIES = {
@@ -87,10 +84,10 @@ def test_the_estimate_of_isotropic_phases_in_closed_form():
         assert found == pytest.approx(constant * kappa * SOFT_FACTOR * beta[shear] ** 2)
 
 
-@pytest.mark.parametrize(("order", "element", "kappa"), [(1, "mixed", 1e4), (2, "displacement", 1e4), (2, "mixed", 33)])
-def test_mixed_elements_err_no_more_with_a_phase_that_keeps_its_volume(order, element, kappa):
+@pytest.mark.parametrize(("order", "kappa"), [(1, 1e4), (2, 33)])
+def test_mixed_elements_err_no_more_with_a_phase_that_keeps_its_volume(order, kappa):
     matrix, fibre = Isotropic(young=1.0, poisson=0.49995), Isotropic(young=1e9, poisson=0.49995)
-    found = coarse_error({"matrix": matrix, "fibre": fibre}, "strain", order, False, element)
+    found = coarse_error({"matrix": matrix, "fibre": fibre}, "strain", order, False)
     assert found == pytest.approx(COARSE_ERROR[order] * kappa)
 
 
@@ -126,36 +123,10 @@ def test_shear_along_the_fibres_counts_in_space_alone():
     )
 
 
-@pytest.mark.parametrize("geometry", GEOMETRIES)
-@pytest.mark.parametrize("size", [0.5, 0.09, 0.004, 1e-3])
-def test_a_size_of_elements_is_that_after_refinement(geometry, size):
-    cell = case_of(geometry=geometry, element_size=size).cell
-    coarse = case_of(geometry=geometry, accuracy=1e-3).cell.mesh_size
-    assert cell.mesh_size <= coarse
-    assert cell.mesh_size / 2**cell.refine <= size * (1 + 1e-12)
-    if size <= coarse:  # not finer than asked for
-        assert cell.mesh_size / 2**cell.refine == pytest.approx(size)
-    radius = {"square": 0.357, "hexagonal": 0.332, "random": 0.0714, "mix": 0.0714, "table": 0.05}[geometry]
-    assert EDGES_AROUND == MIN_EDGES_AROUND
-    edge = 2 * np.pi * radius / EDGES_AROUND
-    assert cell.refine == 0 or 0.34 * edge < cell.mesh_size < 0.71 * edge
-
-
-@pytest.mark.parametrize("geometry", ["square", "random"])
-def test_a_size_of_elements_is_met_within_a_fifth(geometry):
-    """Compare the side of equilateral triangles of the mean area, which separates the sizes of a mesh study."""
-    for size in (0.02, 0.012):
-        cell = case_of(geometry=geometry, element_size=size).cell
-        mesh = generate(cell)
-        found = np.sqrt(4 / np.sqrt(3) / (len(mesh.triangles) * 4**cell.refine))
-        assert 0.8 * size < found < size
-
-
-@pytest.mark.parametrize("asked", [{"accuracy": 1e-4}, {"element_size": 0.01}])
-def test_a_resolved_case_asks_for_the_same(asked):
-    case = case_of(**asked)
+def test_a_resolved_case_asks_for_the_same():
+    case = case_of(accuracy=1e-4)
     resolved = case.resolved()["cell"]
-    assert asked.items() <= resolved.items() and not {"mesh_size", "refine"} & set(resolved)
-    assert resolved["order"] == case.cell.order == (2 if "accuracy" in asked else 1)
+    assert resolved["accuracy"] == 1e-4 and not {"mesh_size", "refine"} & set(resolved)
+    assert resolved["order"] == case.cell.order == 2
     again = cases.parse(case.resolved(), Path())
     assert (again, again.digest()) == (case, case.digest())

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from feti_homog import Case
-from feti_homog.case.interface_faults import COMMON
 from feti_homog.case.interface_section import InterfaceSection
+from feti_homog.case.relations import COMMON
 from feti_homog.errors import CaseError
 from feti_homog.schema.keys import keys_of
 from feti_homog.studies.sweep.plan import case_documents

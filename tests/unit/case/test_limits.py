@@ -7,7 +7,7 @@ import re
 
 import pytest
 
-from feti_homog.case.mixed_load import WAYPOINTS
+from feti_homog.case.loads import WAYPOINTS
 from feti_homog.case.section_values import OPENINGS, STRAIN, STRENGTH
 from feti_homog.case.sections import RANGE_KEYS, TABLES, SweepSection
 from feti_homog.schema.keys import keys_of

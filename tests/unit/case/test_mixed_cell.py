@@ -11,7 +11,7 @@ import pytest
 
 from feti_homog.case.case import Case, parse
 from feti_homog.case.cell_section import Cell
-from feti_homog.case.mixed_cell import fibre_counts, mixed_width
+from feti_homog.case.cell_sizes import fibre_counts, mixed_width
 from feti_homog.errors import CaseError
 
 MIX = {"glass": 0.3, "carbon": 0.25}

@@ -13,7 +13,7 @@ from unit.case.faulty_bonding import of_type
 from unit.case.valid_cases import VALID_CASES, in_space
 
 from feti_homog.case.case import Case, load
-from feti_homog.case.mixed_load import MixedLoad, completed
+from feti_homog.case.loads import MixedLoad, completed
 from feti_homog.materials.voigt import STRAINS
 
 PLANE = (("E11", "S11"), ("E22", "S22"), ("gamma12", "S12"))

@@ -10,7 +10,7 @@ from support.cases import FIBRE, MATRIX, make_case
 
 from feti_homog.case.case import Case
 from feti_homog.case.interface_section import Arc, InterfaceSection
-from feti_homog.case.load_section import Angle, LoadPath
+from feti_homog.case.loads import Angle, LoadPath
 from feti_homog.homogenization import cost_model
 from feti_homog.homogenization.bonds import teeth_of
 from feti_homog.homogenization.phase_laws import problems

@@ -26,7 +26,7 @@ from feti_homog.system.petsc.options import case_options
         ({"petsc": {"feti_pc_type": "lumped"}}, False),
         ({"fibre": {"young": 2e3, "poisson": 0.3}, "matrix": {"young": 1.0, "poisson": 0.3}}, False),
         ({"fibre": {"young": 9e2, "poisson": 0.3}, "matrix": {"young": 1.0, "poisson": 0.3}}, True),
-        ({"order": 2, "matrix": {"young": 1.0, "poisson": 0.49}, "element": "mixed"}, False),
+        ({"order": 2, "matrix": {"young": 1.0, "poisson": 0.49}}, False),
     ],
 )
 def test_only_cells_in_which_nothing_is_asked_of_bodies_are_cut_across_materials(change, may):

@@ -7,8 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from feti_homog.materials import bounds, spatial_constants
-from feti_homog.materials.derivatives import composite_constants, constant_changes, law_changes
+from feti_homog.materials.constants import (
+    constants,
+    engineering_constants,
+    engineering_moduli,
+    transversely_isotropic_part,
+)
+from feti_homog.materials.derivatives import constant_changes, law_changes
 from feti_homog.materials.forms import General, Isotropic, Orthotropic, TransverselyIsotropic
 from feti_homog.materials.laws import expansion, spatial_stiffness, stiffness_of
 
@@ -81,11 +86,11 @@ def test_every_given_constant_has_a_derivative():
 def test_constants_of_composites_are_those_of_results():
     C = spatial_stiffness(TURNED)
     strains = expansion(TURNED)
-    found = composite_constants(C, -C @ strains)
+    found = constants(C, -C @ strains)
     records = (
-        spatial_constants.engineering_constants(C),
-        spatial_constants.transversely_isotropic_part(C, strains),
-        bounds.engineering_moduli(stiffness_of(TURNED, "strain")),
+        engineering_constants(C),
+        transversely_isotropic_part(C, strains),
+        engineering_moduli(stiffness_of(TURNED, "strain")),
     )
     expected = vars(records[0]) | vars(records[1])
     shared = found.keys() & expected.keys()
@@ -93,7 +98,7 @@ def test_constants_of_composites_are_those_of_results():
     for name in shared:
         assert found[name] == pytest.approx(expected[name], rel=1e-12)
     assert [found[f"expansion_{axis}"] for axis in ("x1", "x2", "axial")] == pytest.approx(strains[:3], rel=1e-12)
-    in_plane = composite_constants(stiffness_of(TURNED, "strain"), None)
+    in_plane = constants(stiffness_of(TURNED, "strain"), None)
     for name in ("E1", "E2", "nu12", "nu21", "G12"):
         assert in_plane[name] == pytest.approx(getattr(records[2], name), rel=1e-12)
 
@@ -103,5 +108,5 @@ def test_changes_of_constants_are_their_slopes():
     other = spatial_stiffness(PHASES["carbon"])
     found = constant_changes(C, thermal, other, 0.1 * thermal)
     names = found.keys()
-    expected = slope(lambda h: np.array([*composite_constants(C + h * other, thermal * (1 + 0.1 * h)).values()]), 1e-4)
+    expected = slope(lambda h: np.array([*constants(C + h * other, thermal * (1 + 0.1 * h)).values()]), 1e-4)
     np.testing.assert_allclose([found[name] for name in names], expected, rtol=1e-7, atol=1e-12)

@@ -26,9 +26,9 @@ from reference.fibre_composites import (
 )
 from reference.references import ELASTIC
 
-from feti_homog.materials.estimates.constituents import Fibres, Springs, equivalent_fibre
-from feti_homog.materials.estimates.methods import METHODS
-from feti_homog.materials.spatial_constants import transversely_isotropic_stiffness
+from feti_homog.materials.bounds import Fibres, Springs, equivalent_fibre
+from feti_homog.materials.constants import transversely_isotropic_stiffness
+from feti_homog.materials.estimates import METHODS
 
 PAIRS = [(ALUMINIUM, BORON), (EPOXY, CARBON), (SOFT_EPOXY, GLASS), (GLASS, EPOXY)]
 BONDS = {

@@ -9,7 +9,7 @@ from support.cases import make_case
 from feti_homog.homogenization import phase_laws
 from feti_homog.materials.forms import Isotropic
 from feti_homog.materials.laws import out_of_plane, stiffness_of
-from feti_homog.materials.plane_state import PLANE_STATES, plane_state_of
+from feti_homog.materials.voigt import PLANE_STATES, plane_state_of
 
 
 @pytest.mark.parametrize("state", PLANE_STATES.values(), ids=PLANE_STATES)

@@ -7,7 +7,7 @@ import pytest
 from unit.microstructure.test_arrangement import smallest_gap
 
 from feti_homog.case.cell_section import Cell
-from feti_homog.case.mixed_cell import fibre_counts
+from feti_homog.case.cell_sizes import fibre_counts
 from feti_homog.commands.listed_fibres import table
 from feti_homog.errors import MeshError
 from feti_homog.mesh.arrange import arrange

@@ -13,8 +13,7 @@ from unit.case.valid_cases import VALID_CASES
 
 from feti_homog.case.case import parse
 from feti_homog.errors import CaseError
-from feti_homog.schema.keys import Selector
-from feti_homog.schema.rules import ITEMS, Rule, exclusive, needed, refused
+from feti_homog.schema.keys import ITEMS, Rule, Selector, exclusive, needed, refused
 
 NO_TOML = {"syntax", "syntax_unclosed", "key_twice", "section_twice", "number_too_long"}
 SOURCES = [tomllib.loads(text) for text in VALID_CASES.values()]

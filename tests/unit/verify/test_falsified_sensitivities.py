@@ -29,7 +29,7 @@ CASES = {
         {"matrix": WARM, "fibre": CARBON, "coating": SIZING},
         [SPRINGS | {"between": ["coating", "matrix"]}, SPRINGS | {"between": ["fibre", "coating"]}],
     ),
-    "strain": ("strain", SQUARE | {"order": 2, "element": "mixed"}, {"matrix": INCOMPRESSIBLE, "fibre": TURNED}, None),
+    "strain": ("strain", SQUARE | {"order": 2}, {"matrix": INCOMPRESSIBLE, "fibre": TURNED}, None),
     "contact": ("generalized", SQUARE, {"matrix": WARM, "fibre": CARBON}, SPRINGS | TOUCHING),
     "load": ("strain", SQUARE, {"matrix": MATRIX, "fibre": FIBRE}, TOUCHING),
     "stresses": ("generalized", SQUARE, {"matrix": MATRIX, "fibre": CARBON}, SPRINGS | TOUCHING),

@@ -11,10 +11,10 @@ from matplotlib.figure import Figure
 from feti_homog.case.cell_section import GEOMETRY
 from feti_homog.case.material_sections import read_materials
 from feti_homog.materials import bounds as mechanics
-from feti_homog.materials.estimates.methods import fibre_bounds
+from feti_homog.materials.bounds import fibre_bounds
+from feti_homog.materials.constants import is_transversely_isotropic, isotropic_part, transversely_isotropic_part
 from feti_homog.materials.laws import stiffness_of
-from feti_homog.materials.plane_state import PLANE_STATES, plane_state_of
-from feti_homog.materials.spatial_constants import is_transversely_isotropic, transversely_isotropic_part
+from feti_homog.materials.voigt import PLANE_STATES, plane_state_of
 from feti_homog.report.plots.plot_helpers import plain
 from feti_homog.schema.keys import TableReader
 from feti_homog.studies.sweep.report.style import COLOURS, label_axes, legend, plot_series
@@ -121,7 +121,7 @@ def _bounds_at(shares: list[float], phases: list[Float]) -> dict[str, list[float
     """Bounds of each panel: Reuss, Voigt, and the two of Hashin and Shtrikman for isotropic phases."""
     found: dict[str, list[float]] = {name: [] for name in PANELS}
     for stiffness in (mechanics.reuss(shares, phases), mechanics.voigt(shares, phases)):
-        bulk, shear = mechanics.isotropic_part(stiffness)
+        bulk, shear = isotropic_part(stiffness)
         for name, value in zip(PANELS, (stiffness[0, 0], stiffness[2, 2], bulk, shear), strict=True):
             found[name].append(float(value))
     if all(map(mechanics.is_isotropic, phases)):

@@ -7,8 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.materials.plane_state import GENERALIZED, PLANE_STRAIN
-from feti_homog.materials.voigt import EXPANSIONS, SPATIAL_STRESSES, STRESSES, THERMAL_STRESSES, voigt_names
+from feti_homog.materials.voigt import (
+    EXPANSIONS,
+    GENERALIZED,
+    PLANE_STRAIN,
+    SPATIAL_STRESSES,
+    STRESSES,
+    THERMAL_STRESSES,
+    voigt_names,
+)
 from feti_homog.report.text import point_tables
 from feti_homog.results.landmarks import peak_of
 from feti_homog.typing import Document

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from feti_homog.materials.constant_names import ABOUT_FIBRES
+from feti_homog.materials.constants import ABOUT_FIBRES
 from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES
 from feti_homog.report.plots.plot_helpers import SYMBOLS, faint_grid, stress_label
 from feti_homog.studies.sweep.report.sweep_table import Series, SweepTable

@@ -12,8 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.materials.bounds import Moduli
-from feti_homog.materials.spatial_constants import EngineeringConstants, TransverselyIsotropic
+from feti_homog.materials.constants import EngineeringConstants, Moduli, TransverseIsotropy
 from feti_homog.report.text.point_tables import STATES
 from feti_homog.report.text.table import unit
 from feti_homog.results import atomic
@@ -36,7 +35,7 @@ OUTPUT_COLUMNS = (
     Column("fraction_PHASE", "", "share of a phase in the meshed area, if there are more than matrix and fibre"),
     Column("porosity", "", "share of voids in the area of the cell, where there are some"),
     Column("match_distance", "", "of cells with `match`: how far they are from the table, in mean diameters"),
-    Column("refine", "", "halvings of the mesh, of one that is solved once more those of its finer mesh"),
+    Column("refine", "", "halvings of the mesh"),
     Column("elements", "", "triangles of the refined mesh"),
     Column("nodes", "", "nodes of the refined mesh, once for each body in each subdomain: depends on ranks"),
     Column("ranks", "", "MPI ranks"),
@@ -53,7 +52,7 @@ OUTPUT_COLUMNS = (
     Column("anisotropy_shear", STRESS, "C33 - (C11 + C22 - 2 C12) / 4; with generalized plane strain C66 - ..."),
     *columns(Moduli),
     *(column for column in columns(EngineeringConstants) if column.name not in MODULI),
-    *columns(TransverselyIsotropic),
+    *columns(TransverseIsotropy),
     Column("NAME_mesh_error", "that of NAME", "estimated error of an entry or constant by its mesh"),
     Column("energy_mesh_error", "", "estimated relative error of the strain energy, the largest under any strain"),
     Column("Cii_reuss", STRESS, "lower bound of Cii"),

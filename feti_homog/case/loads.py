@@ -1,22 +1,111 @@
-"""Sections of the analyses: what all of them answer, and [angle], [path], [load] and [envelope]."""
+"""Loads by name, and the sections of the analyses: [angle], [path], [load] and [envelope].
+
+A load has of each component its strain or its stress; along a path it is completed by the load before.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import dataclasses
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
-from typing import ClassVar
+from itertools import accumulate
+from typing import Any, ClassVar
 
-from feti_homog.case.material_sections import missing_expansions
-from feti_homog.case.mixed_load import LOAD, TEMPERATURE, WAYPOINTS, MixedLoad, Strain, completed, first_named, named
-from feti_homog.case.section_values import OPENINGS, STRAIN
-from feti_homog.case.selectors import BY_EVENTS, BY_INCREMENTS, GENERALIZED, IN_THE_PLANE
-from feti_homog.materials.forms import Material, Orthotropic
-from feti_homog.materials.plane_state import PLANE_STATES
-from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES
-from feti_homog.schema.keys import key
-from feti_homog.schema.values import choice, either, integer, list_of, real
-from feti_homog.schema.wording import toml_value
+from feti_homog.case.section_values import (
+    BY_EVENTS,
+    BY_INCREMENTS,
+    GENERALIZED,
+    IN_THE_PLANE,
+    OPENINGS,
+    STRAIN,
+    STRAIN_COMPONENTS,
+)
+from feti_homog.materials.voigt import PLANE_STATES, SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS
+from feti_homog.schema.keys import Condition, key
+from feti_homog.schema.values import choice, either, integer, list_of, real, table_of
+
+TEMPERATURE = "temperature"
+Strain = tuple[float, ...]
+
+
+def _strain(name: str, *only: Condition) -> Any:
+    return key(real(), f"Macroscopic strain {name}.", default=None, only=only)
+
+
+def _stress(name: str, *only: Condition) -> Any:
+    return key(real(), f"Macroscopic stress {name}.", unit="stress", default=None, only=only)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MixedLoad:
+    """Prescribed components of a macroscopic load: the strain or the stress of each, never both.
+
+    What a load of a path does not name stays as it was prescribed last; what none has named so far is free of stress.
+    """
+
+    E11: float | None = _strain("E11")
+    E22: float | None = _strain("E22")
+    E33: float | None = _strain("E33", GENERALIZED)
+    gamma23: float | None = _strain("gamma23", GENERALIZED)
+    gamma13: float | None = _strain("gamma13", GENERALIZED)
+    gamma12: float | None = _strain("gamma12")
+    S11: float | None = _stress("S11")
+    S22: float | None = _stress("S22")
+    S33: float | None = _stress("S33", GENERALIZED)
+    S23: float | None = _stress("S23", GENERALIZED)
+    S13: float | None = _stress("S13", GENERALIZED)
+    S12: float | None = _stress("S12")
+    temperature: float | None = key(
+        real(),
+        "A change of temperature, 0 until it is named. Every phase must give its expansion.",
+        unit="temperature",
+        default=None,
+        only=GENERALIZED,
+    )
+
+    @property
+    def named(self) -> dict[str, float]:
+        """The values that are given, by name."""
+        values = ((each.name, getattr(self, each.name)) for each in dataclasses.fields(self))
+        return {name: value for name, value in values if value is not None}
+
+
+LOAD = table_of(MixedLoad, "a table of strains and stresses such as {S11 = 60.0, S22 = 0.0}", least=1)
+WAYPOINTS = list_of(
+    either("", STRAIN, LOAD), f"a list of strains {STRAIN_COMPONENTS} or of tables such as {{S11 = 60.0}}", least=1
+)
+
+
+def completed(loads: Sequence[Strain | MixedLoad], plane: str) -> tuple[dict[str, float], ...]:
+    """Return the loads of a path in full.
+
+    Of each component one name and value, and the temperature in generalized plane strain. What a load does not name is
+    that of the load before, at first a stress of zero.
+    """
+    state = PLANE_STATES[plane]
+    unloaded = dict.fromkeys((*state.stresses, *[TEMPERATURE] * state.is_spatial), 0.0)
+
+    def after(before: Mapping[str, float], load: Strain | MixedLoad) -> dict[str, float]:
+        given, full = named(load), dict[str, float]()
+        for names in state.components:
+            source = given if not given.keys().isdisjoint(names) else before
+            full |= {name: source[name] for name in names if name in source}
+        return full | {name: given.get(name, value) for name, value in before.items() if name == TEMPERATURE}
+
+    return tuple(accumulate(loads, after, initial=unloaded))[1:]
+
+
+def first_named(loads: Sequence[Strain | MixedLoad], plane: str) -> dict[str, int]:
+    """By the name of its stress, which load is the first to name each component; len(loads) if none does."""
+    return {
+        names[1]: next((k for k, load in enumerate(loads) if not named(load).keys().isdisjoint(names)), len(loads))
+        for names in PLANE_STATES[plane].components
+    }
+
+
+def named(load: Strain | MixedLoad) -> dict[str, float]:
+    """Return the named components of a load, [E11, E22, gamma12] if it is a strain."""
+    return load.named if isinstance(load, MixedLoad) else dict(zip(STRAINS, load, strict=True))
 
 
 class AnalysisSection:
@@ -50,8 +139,6 @@ class Stiffness(AnalysisSection):
 
 
 FAMILIES = (SPATIAL_STRESSES, SPATIAL_STRAINS)
-
-
 PLANE_OF_LOADS = either(
     f"two different names, both of stresses ({', '.join(SPATIAL_STRESSES)}) or both of strains "
     f"({', '.join(SPATIAL_STRAINS)})",
@@ -67,8 +154,7 @@ class Angle(AnalysisSection):
     strain: Strain | None = key(
         STRAIN,
         "Macroscopic strain, other than zero; by default the three unit strains, which give the effective stiffness.",
-        default=None,
-        default_words="unit strains",
+        absent="unit strains",
         only=IN_THE_PLANE,
     )
 
@@ -161,11 +247,6 @@ class LoadPath(AnalysisSection):
     )
 
     @property
-    def targets(self) -> tuple[Strain | MixedLoad, ...]:
-        """The waypoints after the unloaded start, as they are given."""
-        return tuple(self.placed.values())
-
-    @property
     def placed(self) -> Mapping[str, Strain | MixedLoad]:
         """The waypoints by their places in the section."""
         if self.waypoints is not None:
@@ -186,65 +267,3 @@ class SingleLoad(AnalysisSection):
     def placed(self) -> Mapping[str, Strain | MixedLoad]:
         """The load."""
         return {"to": self.to}
-
-
-def load_faults(path: LoadPath | None, load: SingleLoad | None, plane: str | None) -> list[str]:
-    """Faults of loads that are zero or repeat the last one, and of too few increments; None is a faulty plane state."""
-    if load is not None and not any(load.to.named.values()):
-        return [f"[load] to = {_in_words(load.to)}: expected a load other than zero"]
-    if path is None:
-        return []
-    faults = []
-    if plane is not None and [path.strain, path.to, path.waypoints].count(None) == 2:
-        faults = _repeated_loads(path, plane)
-    if path.increments is not None and path.increments < len(path.targets):
-        faults.append(f"[path] increments = {path.increments}: expected at least one for each waypoint")
-    return faults
-
-
-def _repeated_loads(path: LoadPath, plane: str) -> list[str]:
-    """Faults of waypoints at which the path already is."""
-    placed = path.placed
-    loads = completed(path.targets, plane)
-    is_last = [not any(loads[0].values()), *(before == after for before, after in pairwise(loads))]
-    last = ["zero, where the path begins", *placed]
-    nouns = ["load" if isinstance(load, MixedLoad) else "strain" for load in placed.values()]
-    return [
-        f"[path] {place} = {_in_words(load)}: expected a {nouns[k]} other than {last[k]}"
-        for k, (place, load) in enumerate(placed.items())
-        if is_last[k]
-    ]
-
-
-def _in_words(load: Strain | MixedLoad) -> str:
-    return toml_value(load.named if isinstance(load, MixedLoad) else list(load))
-
-
-def expansion_faults(path: LoadPath | None, load: SingleLoad | None, materials: Mapping[str, Material]) -> list[str]:
-    """Faults of phases without thermal expansion, where a load names a temperature."""
-    placed: dict[str, Strain | MixedLoad] = {} if load is None else {"[load] to": load.to}
-    placed |= {} if path is None else {f"[path] {place}": each for place, each in path.placed.items()}
-    place = next((place for place, load in placed.items() if TEMPERATURE in named(load)), None)
-    return [] if place is None else missing_expansions(materials, f"{place}.{TEMPERATURE}")
-
-
-def axes_lines(kind: str, section: AnalysisSection, materials: Mapping[str, Material], plane: str) -> tuple[str, ...]:
-    """Return the axes of loads and of constants of phases that could be of a ply, in a line; none in a plane."""
-    if not PLANE_STATES[plane].is_spatial:
-        return ()
-    from feti_homog.materials.constant_names import axes_line  # which nothing in a plane needs
-
-    loaded = [name for load in section.placed.values() for name, value in named(load).items() if value]
-    of_loads = axes_line(section.plane if isinstance(section, Envelope) else loaded)
-    phases = [f"[material.{name}]" for name, own in materials.items() if isinstance(own, Orthotropic)]
-    lines = [f"[{kind}] {of_loads}"] if of_loads else []
-    lines += [f"{', '.join(phases)} E1 and E2 are across the fibres; along them E3"] if phases else []
-    return (". ".join(lines),) if lines else ()
-
-
-def stress_free(section: str, placed: Mapping[str, Strain | MixedLoad], plane: str) -> tuple[str, ...]:
-    """List the components free of stress because no load of a section names them, or none so far; a line each."""
-    first = first_named(tuple(placed.values()), plane)
-    words = ["", *(f"stress-free until {place}" for place in [*placed][1:]), "never named: stress-free"]
-    unnamed = {k: [name for name, number in first.items() if number == k] for k in range(1, len(words))}
-    return tuple(f"[{section}] {', '.join(names)}: {words[k]}" for k, names in unnamed.items() if names)

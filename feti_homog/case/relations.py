@@ -1,4 +1,4 @@
-"""Reading of the sections [interface], and relations between their keys."""
+"""Reading the sections [interface], and relations between values of sections: faults, and remarks on loads."""
 
 from __future__ import annotations
 
@@ -10,7 +10,22 @@ from typing import Any
 
 from feti_homog.case.bond_laws import BRANCH, COHESIVE, LAWS, STIFFNESSES
 from feti_homog.case.interface_section import InterfaceSection, Scatter, interface_label, interface_tables
+from feti_homog.case.loads import (
+    TEMPERATURE,
+    AnalysisSection,
+    Envelope,
+    LoadPath,
+    MixedLoad,
+    SingleLoad,
+    Strain,
+    completed,
+    first_named,
+    named,
+)
+from feti_homog.case.material_sections import coating_faults, missing_expansions
 from feti_homog.case.section_values import PAIR
+from feti_homog.materials.forms import Material, Orthotropic
+from feti_homog.materials.voigt import PLANE_STATES
 from feti_homog.schema.keys import TableReader, keys_of, to_table
 from feti_homog.schema.wording import toml_value
 
@@ -18,6 +33,68 @@ from feti_homog.schema.wording import toml_value
 SAME = 1e-6
 COMMON = tuple(name for name, entry in keys_of(InterfaceSection).items() if not entry.by_pair)
 """The keys in which all sections [[interface]] agree."""
+
+
+def relation_faults(sections: Mapping[str, Any], document: Mapping[str, Any], plane: str | None) -> list[str]:
+    """List the faults between values of sections that are not faulty themselves; a `plane` of None is faulty."""
+    path, load, angle, envelope = (sections[name] for name in ("path", "single_load", "angle", "envelope"))
+    faults, materials = [*_load_faults(path, load, plane)], sections["materials"]
+    if place := next(_heated_loads(path, load), ""):
+        faults += missing_expansions(materials, place)
+    if isinstance(document.get("material"), dict) and sections["cell"]:
+        faults += coating_faults(sections["cell"], document["material"])
+    if angle is not None and angle.strain is not None and not any(angle.strain):
+        faults.append("[angle] strain: expected a strain other than zero")
+    if envelope is not None and envelope.temperature is not None:
+        faults += missing_expansions(materials, "[envelope] temperature")
+    return faults
+
+
+def _heated_loads(path: LoadPath | None, load: SingleLoad | None) -> Iterator[str]:
+    """Yield the places of loads that name a temperature."""
+    for kind, section in (("load", load), ("path", path)):
+        for place, given in ({} if section is None else section.placed).items():
+            if TEMPERATURE in named(given):
+                yield f"[{kind}] {place}.{TEMPERATURE}"
+
+
+def _load_faults(path: LoadPath | None, load: SingleLoad | None, plane: str | None) -> Iterator[str]:
+    """Yield loads that are zero or repeat the load before, and too few increments."""
+    if load is not None and not any(load.to.named.values()):
+        yield f"[load] to = {toml_value(load.to.named)}: expected a load other than zero"
+    elif path is not None:
+        placed = path.placed
+        if plane is not None and [path.strain, path.to, path.waypoints].count(None) == 2:
+            loads, last = completed(tuple(placed.values()), plane), ["zero, where the path begins", *placed]
+            repeats = [not any(loads[0].values()), *(before == after for before, after in pairwise(loads))]
+            for k, (place, given) in enumerate(placed.items()):
+                noun, value = ("load", given.named) if isinstance(given, MixedLoad) else ("strain", list(given))
+                if repeats[k]:
+                    yield f"[path] {place} = {toml_value(value)}: expected a {noun} other than {last[k]}"
+        if path.increments is not None and path.increments < len(placed):
+            yield f"[path] increments = {path.increments}: expected at least one for each waypoint"
+
+
+def axes_lines(kind: str, section: AnalysisSection, materials: Mapping[str, Material], plane: str) -> tuple[str, ...]:
+    """Return the axes of loads and of constants of phases that could be of a ply, in a line; none in a plane."""
+    if not PLANE_STATES[plane].is_spatial:
+        return ()
+    from feti_homog.materials.constants import axes_line  # which nothing in a plane needs
+
+    loaded = [name for load in section.placed.values() for name, value in named(load).items() if value]
+    of_loads = axes_line(section.plane if isinstance(section, Envelope) else loaded)
+    phases = [f"[material.{name}]" for name, own in materials.items() if isinstance(own, Orthotropic)]
+    lines = [f"[{kind}] {of_loads}"] if of_loads else []
+    lines += [f"{', '.join(phases)} E1 and E2 are across the fibres; along them E3"] if phases else []
+    return (". ".join(lines),) if lines else ()
+
+
+def stress_free(section: str, placed: Mapping[str, Strain | MixedLoad], plane: str) -> tuple[str, ...]:
+    """List the components free of stress because no load of a section names them, or none so far; a line each."""
+    first = first_named(tuple(placed.values()), plane)
+    words = ["", *(f"stress-free until {place}" for place in [*placed][1:]), "never named: stress-free"]
+    unnamed = {k: [name for name, number in first.items() if number == k] for k in range(1, len(words))}
+    return tuple(f"[{section}] {', '.join(names)}: {words[k]}" for k, names in unnamed.items() if names)
 
 
 def read_interfaces(document: Mapping[str, Any], reader: TableReader) -> tuple[InterfaceSection, ...] | None:

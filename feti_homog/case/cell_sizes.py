@@ -1,0 +1,225 @@
+"""Sizes that follow from a cell: the numbers of its fibres, its width, and the order and size of its elements.
+
+Fibres of several phases have a fraction and a radius each: `mix` and `radii`.  Order and size of elements follow where
+a cell gives its accuracy.  Mixed elements have a bubble and a pressure of their own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from itertools import permutations
+from math import ceil, fsum, inf, log, pi, sqrt
+from typing import Any
+
+import numpy as np
+
+from feti_homog.case.cell_section import FIBRES_OF, MOST_FIBRES, Cell
+from feti_homog.materials.forms import Isotropic, Material
+from feti_homog.materials.laws import isotropic_ratio, plane_stiffness, stiffness_of
+from feti_homog.materials.voigt import PLANE_STATES
+from feti_homog.microstructure.phase_names import COATING
+from feti_homog.schema.wording import toml_key, toml_value
+
+FEWEST = 0.5  # fibres of a phase, below which one would be another phase's worth
+LOCKING_POISSON = 0.49
+"""Linear triangles lock above it."""
+# Rounding takes checks to their tolerance beside fibres of a thousandth of the matrix: from 2e-4 to 1e-9 of energies
+# at 0.4999999, with products that are refined.
+ROUNDING_POISSON = 0.49999999
+
+
+def is_mixed(order: int, material: Material, plane: str) -> bool:
+    """Return whether the elements of a phase have a bubble and a pressure of their own in the plane problem."""
+    return order == 2 and isotropic_ratio(material) is not None and not PLANE_STATES[plane].is_sheet
+
+
+def warnings(materials: Mapping[str, Material], plane: str) -> list[str]:
+    """List the phases whose elements err by rounding, a line each."""
+    words = "so near to 0.5 that rounding may exceed the tolerance of the checks"
+    lines = _above(ROUNDING_POISSON, materials, plane)
+    return [f"{line}: {words}; use at most {ROUNDING_POISSON:.10g}" for line in lines]
+
+
+def remarks(materials: Mapping[str, Material], plane: str) -> tuple[str, ...]:
+    """List the phases for which elements are quadratic, a line each."""
+    lines = _above(LOCKING_POISSON, materials, plane)
+    return tuple(f"{line}: elements are quadratic, for linear ones lock above {LOCKING_POISSON}" for line in lines)
+
+
+def _above(limit: float, materials: Mapping[str, Material], plane: str) -> list[str]:
+    """List the phases of a larger ratio that keep their volume: not in plane stress."""
+    if PLANE_STATES[plane].is_sheet:
+        return []
+    ratios = {phase: isotropic_ratio(material) for phase, material in materials.items()}
+    names = {phase: "poisson" if isinstance(m, Isotropic) else "Poisson's ratio" for phase, m in materials.items()}
+    return [f"[material.{toml_key(phase)}] {names[phase]} = {nu}" for phase, nu in ratios.items() if nu and nu > limit]
+
+
+CHOSEN = ("mesh_size", "interface_size", "tip_size", "refine")
+"""Keys that an accuracy excludes."""
+
+# Error of the coarsest mesh of elements of each order with stiff inclusions / (kappa beta^2), and how much larger it is
+# with soft ones: 1.5 times the largest that `scripts/measure_accuracy.py` finds.
+COARSE_ERROR = {1: 0.12, 2: 0.0075}
+SOFT_FACTOR = 6.0
+# Largest kappa s of cells of mixed elements.
+MIXED_CONDITION = 33.0
+# Of the coarsest mesh: largest elements / distance of fibres on a square lattice, and / width of the cell. Circles and
+# gaps have smaller ones; still coarser meshes have hardly less elements.
+PITCH_SHARE, LARGEST = 0.5, 0.5
+MOST_REFINED = 8
+
+
+def sized(
+    cell: Cell,
+    table: Mapping[str, Any],
+    materials: Mapping[str, Material],
+    plane: str,
+    free_faces: bool,
+    faults: list[str],
+) -> Cell:
+    """Return the cell with the mesh_size, the refine and the order that its accuracy asks for.
+
+    Of an accuracy eps, the coarsest mesh is refined r times, with r the least for which `coarse_error` / 4^(p r) <= eps
+    for elements of order p; of orders the one with the fewest nodes, about p^2 4^r. It is a fault if more than
+    MOST_REFINED were needed, and so is a linear order of the table if its elements lock.
+
+    Args:
+        table: [cell] as it is given, with the order or without.
+        free_faces: whether there are faces that no other phase holds firmly: of voids, of bonds that are soft or part.
+    """
+    locking, is_given = _above(LOCKING_POISSON, materials, plane), "order" in table
+    if is_given and cell.order == 1:
+        faults += [f"[cell] order = 1: linear triangles lock: {line}; expected order = 2" for line in locking]
+    orders = (cell.order,) if is_given else (2,) if locking else (1, 2)
+    if cell.accuracy is None:
+        return replace(cell, order=orders[0])
+    refinements = {}
+    for p in orders:
+        error = coarse_error(materials, plane, p, free_faces)
+        refinements[p] = max(0, ceil(log(error / cell.accuracy, 4**p))) if error > 0 else 0
+    order = min(refinements, key=lambda p: (p**2 * 4 ** refinements[p], p))
+    if refinements[order] > MOST_REFINED:
+        better = "a larger one, or order = 2" if order == 1 else "a larger one"
+        faults.append(
+            f"[cell] accuracy = {cell.accuracy:g}: would need elements split {refinements[order]} times, more than "
+            f"{MOST_REFINED}; expected {better}"
+        )
+    return replace(cell, mesh_size=_coarsest(cell), refine=refinements[order], order=order)
+
+
+def _coarsest(cell: Cell) -> float:
+    """mesh_size of the coarsest mesh: half the distance of as many fibres on a square lattice, in two digits."""
+    if cell.table is not None:
+        assert cell.table.width is not None and cell.table.height is not None
+        fibres, height = len(cell.table.row), cell.table.height / cell.table.width
+    else:
+        fibres = FIBRES_OF.get(cell.geometry) or sum(fibre_counts(cell).values())
+        height = sqrt(3.0) if cell.geometry == "hexagonal" else 1.0
+    return min(LARGEST, float(f"{PITCH_SHARE * sqrt(height / fibres):.2g}"))
+
+
+def without_chosen(cell: Cell, table: dict[str, Any]) -> dict[str, Any]:
+    """Return the table [cell] of a cell without the sizes that its accuracy chooses."""
+    return table if cell.accuracy is None else {name: table[name] for name in table if name not in CHOSEN}
+
+
+def coarse_error(materials: Mapping[str, Material], plane: str, order: int, free_faces: bool) -> float:
+    """Return an upper estimate of the relative error of the strain energy on the coarsest mesh,
+
+        C_p kappa max s beta^2,  beta = |lambda - 1| / (lambda + 1),
+
+    lambda the eigenvalues of the stiffness of a phase relative to that around it, 0 of free faces, s SOFT_FACTOR where
+    lambda < 1 and else 1, and kappa the condition of the stiffness in the plane of the phase nearest to incompressible,
+    of mixed elements at most MIXED_CONDITION, as is kappa s where all are mixed.
+    """
+    stiffness = {phase: stiffness_of(material, plane) for phase, material in materials.items()}
+    ratios = [
+        np.linalg.eigvals(np.linalg.solve(stiffness[outer], stiffness[inner])).real
+        for inner, outer in permutations(stiffness, 2)
+        if inner != "matrix" and outer in ("matrix", COATING)
+    ]
+    if free_faces:
+        ratios.append(np.zeros(1))
+    mixed = [is_mixed(order, material, plane) for material in materials.values()]
+    scale, conditions = np.sqrt([1.0, 1.0, 2.0]), []  # to orthonormal components, [E11, E22, gamma12 / sqrt(2)]
+    for material, has_pressure in zip(materials.values(), mixed, strict=True):
+        condition = float(np.linalg.cond(plane_stiffness(material, plane) * np.outer(scale, scale)))
+        conditions.append(min(condition, MIXED_CONDITION if has_pressure else inf))
+    eigenvalues = np.concatenate([np.ones(1), *ratios])
+    beta = (eigenvalues - 1) / (eigenvalues + 1)
+    factors = max(conditions) * np.where(beta < 0, SOFT_FACTOR, 1.0)
+    return COARSE_ERROR[order] * float(np.max(np.minimum(factors, MIXED_CONDITION if all(mixed) else inf) * beta**2))
+
+
+def fibre_counts(cell: Cell) -> dict[str, int]:
+    """Return how many fibres of each phase a random cell has.
+
+    Fibres of the fraction c_p and the radius r_p are as many as e_p ~ c_p / r_p^2. Each phase has one, and each further
+    fibre is of the phase with the largest e_p / (2 n_p + 1), the rule of Sainte-Lague: whole numbers next to e_p.
+    """
+    expected = _expected_counts(cell)
+    count = max(len(expected), round(fsum(expected.values())))
+    quotients = np.array(list(expected.values()))[:, None] / (2 * np.arange(1, count) + 1)
+    phase = np.repeat(np.arange(len(expected)), count - 1)
+    further = phase[np.argsort(-quotients.ravel(), kind="stable")[: count - len(expected)]]
+    return dict(zip(expected, (1 + np.bincount(further, minlength=len(expected))).tolist(), strict=True))
+
+
+def _expected_counts(cell: Cell) -> dict[str, float]:
+    """Numbers of fibres of each phase that are not whole; their sum is `fibres`, or what the width holds."""
+    radii = cell.radii or dict.fromkeys(cell.fractions, 1.0)
+    per_area = {phase: share / (pi * radii[phase] ** 2) for phase, share in cell.fractions.items()}
+    area = cell.fibres / fsum(per_area.values()) if cell.fibres is not None else (cell.width or 1.0) ** 2
+    return {phase: area * density for phase, density in per_area.items()}
+
+
+def void_count(cell: Cell, fibre_radius: float) -> int:
+    """Return the number of voids of a random cell of width 1 whose fibres have this mean radius.
+
+    It is the whole number next to that of their radius, at least one.
+    """
+    if not cell.voids:
+        return 0
+    radius = fibre_radius * (1.0 if cell.void_radius is None else cell.void_radius)
+    return max(1, round(cell.voids / (pi * radius**2)))
+
+
+def fractions_in_words(cell: Cell) -> str:
+    """Return the keys with the fractions of a cell without a file, and their values."""
+    fibres = f"fibre_fraction = {cell.fibre_fraction:g}" if cell.mix is None else f"mix = {toml_value(dict(cell.mix))}"
+    return f"{fibres}, voids = {cell.voids:g}" if cell.voids else fibres
+
+
+def mixed_width(cell: Cell) -> float | None:
+    """Width of the cell, or None where `fibre_radius` or the default make it.
+
+    In it `fibres` fibres have these radii and fractions, W^2 = sum n_p pi r_p^2 / sum c_p.
+    """
+    if cell.radii is None or cell.fibres is None:
+        return cell.width
+    filled = fsum(count * pi * cell.radii[phase] ** 2 for phase, count in fibre_counts(cell).items())
+    return sqrt(filled / fsum(cell.fractions.values()))
+
+
+def mix_faults(cell: Cell) -> list[str]:
+    """List the faults of the numbers of a mix together."""
+    if cell.mix is None:
+        return []
+    faults, given = [], f"[cell] mix = {toml_value(dict(cell.mix))}"
+    if fsum(cell.mix.values()) >= 1:
+        faults.append(f"{given}: expected a sum below 1")
+    if cell.radii is not None and set(cell.radii) != set(cell.mix):
+        expected = ", ".join(cell.mix)
+        faults.append(f"[cell] radii = {toml_value(dict(cell.radii))}: expected a radius of each of mix: {expected}")
+    if faults:
+        return faults
+    expected_counts = _expected_counts(cell)
+    if (count := fsum(expected_counts.values())) > MOST_FIBRES:
+        return [f"{given}: makes {count:.2g} fibres; expected at most {MOST_FIBRES}, of larger radii or a smaller cell"]
+    return [
+        f"{given}: makes {expected:.2g} fibres of {phase}; expected at least {FEWEST}, of more fibres or a wider cell"
+        for phase, expected in expected_counts.items()
+        if expected < FEWEST
+    ]

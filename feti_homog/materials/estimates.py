@@ -1,0 +1,230 @@
+"""Closed estimates of the constants of a unidirectional composite, from its phases and their fractions alone.
+
+E_A, E_T, nu_A, nu_T: Young's moduli and contractions along and across the fibres; G_A, G_T, k: shear moduli along and
+across them and the bulk modulus across them; alpha: expansions; c: fractions; f, m: fibre and matrix.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from feti_homog.materials.bounds import (
+    NOTHING,
+    Estimate,
+    Estimates,
+    Fibres,
+    aligned_cylinders,
+    equivalent_fibre,
+    expansions,
+)
+from feti_homog.materials.constants import TransverseIsotropy, is_transversely_isotropic, transverse_constants
+
+
+def estimates(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimates:
+    """Return the estimates of each method for fibres in a matrix.
+
+    The rule of mixtures and Mori and Tanaka's estimate are defined for any kinds of fibres, the others for one; on
+    springs the last three.  No method gives a constant if a phase is not transversely isotropic about x3, nor an
+    expansion if a phase has none.
+    """
+    if not all(map(is_transversely_isotropic, [matrix, *(family.constants for family in fibres)])):
+        return Estimates(**dict.fromkeys(METHODS, NOTHING))
+    return Estimates(**{name: method(matrix, fibres) for name, method in METHODS.items()})
+
+
+def rule_of_mixtures(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
+    """Phases in parallel along the fibres, in series across them; any number of phases.
+
+        E_A = sum c E_A,  nu_A = sum c nu_A,  1/E_T = sum c/E_T,  1/G_A = sum c/G_A,  1/G_T = sum c/G_T,
+        alpha_A = sum c E_A alpha_A / E_A*,  alpha_T = sum c (alpha_T + nu_A alpha_A) - nu_A* alpha_A*,
+
+    with a star for the composite; nu_T and k follow: nu_T = E_T/(2 G_T) - 1, 1/k = 4/E_T - 1/G_T - 4 nu_A^2/E_A.
+    Voigt 1889, Reuss 1929; the expansions Schapery 1968, of anisotropic fibres Hashin 1979.
+    """
+    if any(family.springs is not None for family in fibres):
+        return NOTHING
+    phases, along = _phases(matrix, fibres), _in_parallel(matrix, fibres)
+    E, nu, *_ = along.values()
+    E_transverse = 1 / sum(c / x.E_transverse for c, x in phases)
+    G = 1 / sum(c / x.G_transverse for c, x in phases)
+    return Estimate(
+        **along,
+        E_transverse=E_transverse,
+        nu_transverse=E_transverse / (2 * G) - 1,
+        G_axial=1 / sum(c / x.G_axial for c, x in phases),
+        G_transverse=G,
+        K_transverse=1 / (4 / E_transverse - 1 / G - 4 * nu**2 / E),
+    )
+
+
+def chamis(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
+    """Return the simplified equations of Chamis; one kind of fibres.
+
+        E_A, nu_A: rule of mixtures,  M = M_m / (1 - sqrt(c) (1 - M_m/M_f)) for M = E_T, G_A, G_T,
+        nu_T = E_T/(2 G_T) - 1,  alpha_A = (c E_f alpha_f + (1 - c) E_m alpha_m)/E_A,
+        alpha_T = sqrt(c) alpha_Tf + (1 - sqrt(c)) (alpha_Tm + c nu_m E_f/E_A alpha_m),
+
+    E, nu and alpha of the phases being the axial ones where T does not occur.  Chamis 1984, for an isotropic
+    matrix.
+    """
+    if len(fibres) != 1 or fibres[0].springs is not None:
+        return NOTHING
+    fibre, c = fibres[0].constants, fibres[0].fraction
+    root = math.sqrt(c)
+
+    def mean(of_matrix: float, of_fibre: float) -> float:
+        return of_matrix / (1 - root * (1 - of_matrix / of_fibre))
+
+    along = _in_parallel(matrix, fibres)
+    E_transverse = mean(matrix.E_transverse, fibre.E_transverse)
+    G = mean(matrix.G_transverse, fibre.G_transverse)
+    if (of_fibre := expansions(fibre)) and (of_matrix := expansions(matrix)):
+        restrained = c * matrix.nu_axial * fibre.E_axial / along["E_axial"] * of_matrix[0]
+        along["expansion_transverse"] = root * of_fibre[1] + (1 - root) * (of_matrix[1] + restrained)
+    return Estimate(
+        **along,
+        E_transverse=E_transverse,
+        nu_transverse=E_transverse / (2 * G) - 1,
+        G_axial=mean(matrix.G_axial, fibre.G_axial),
+        G_transverse=G,
+        K_transverse=None,
+    )
+
+
+def halpin_tsai(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
+    """Return the equations of Halpin and Tsai; one kind of fibres.
+
+        E_A, nu_A: rule of mixtures,  M = M_m (1 + xi eta c)/(1 - eta c),  eta = (M_f - M_m)/(M_f + xi M_m),
+
+    with xi = 2 for E_T, 1 for G_A, k_m/(k_m + 2 G_m) for G_T and G_m/k_m for k, G_m being across the fibres.
+    E_T is fitted and the others are not, so that E_T/(2 G_T) - 1 may exceed 1: no nu_T is given.
+    Halpin and Kardos 1976.
+    """
+    if len(fibres) != 1 or fibres[0].springs is not None:
+        return NOTHING
+    fibre, c = fibres[0].constants, fibres[0].fraction
+
+    def mean(of_matrix: float, of_fibre: float, xi: float) -> float:
+        eta = (of_fibre - of_matrix) / (of_fibre + xi * of_matrix)
+        return of_matrix * (1 + xi * eta * c) / (1 - eta * c)
+
+    k, G = matrix.K_transverse, matrix.G_transverse
+    along = _in_parallel(matrix, fibres)
+    return dataclasses.replace(
+        NOTHING,
+        E_axial=along["E_axial"],
+        E_transverse=mean(matrix.E_transverse, fibre.E_transverse, 2),
+        nu_axial=along["nu_axial"],
+        G_axial=mean(matrix.G_axial, fibre.G_axial, 1),
+        G_transverse=mean(G, fibre.G_transverse, k / (k + 2 * G)),
+        K_transverse=mean(k, fibre.K_transverse, G / k),
+    )
+
+
+def _phases(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> list[tuple[float, TransverseIsotropy]]:
+    rest = 1 - sum(family.fraction for family in fibres)
+    return [(rest, matrix), *((family.fraction, family.constants) for family in fibres)]
+
+
+def _in_parallel(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> dict[str, Any]:
+    """Tabulate E_A, nu_A, alpha_A and alpha_T of the rule of mixtures; no alpha if a phase has none."""
+    phases = _phases(matrix, fibres)
+    E, nu = sum(c * x.E_axial for c, x in phases), sum(c * x.nu_axial for c, x in phases)
+    axial = transverse = 0.0
+    for c, phase in phases:
+        if (strains := expansions(phase)) is None:
+            return {"E_axial": E, "nu_axial": nu, "expansion_axial": None, "expansion_transverse": None}
+        axial += c * phase.E_axial * strains[0] / E
+        transverse += c * (strains[1] + phase.nu_axial * strains[0])
+    return {"E_axial": E, "nu_axial": nu, "expansion_axial": axial, "expansion_transverse": transverse - nu * axial}
+
+
+def cylinders_in_matrix(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> TransverseIsotropy:
+    """`aligned_cylinders` with the matrix around, and for a fibre on springs the bonded one that does the same."""
+    fractions = [c for c, _ in _phases(matrix, fibres)]
+    phases = [matrix, *(equivalent_fibre(family, matrix) for family in fibres)]
+    return aligned_cylinders(fractions, phases, (matrix.K_transverse, matrix.G_transverse, matrix.G_axial))
+
+
+def mori_tanaka(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
+    """Every fibre is alone in the matrix, under the matrix's mean field; any kinds of round fibres, on springs too.
+
+    `cylinders_in_matrix`.  Mori and Tanaka 1973, Benveniste 1987; transversely isotropic phases Chen, Dvorak and
+    Benveniste 1992; springs Benveniste 1985.
+    """
+    return Estimate.of(cylinders_in_matrix(matrix, fibres))
+
+
+def composite_cylinders(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
+    """Cylinders of fibre and matrix, alike but for their size, that fill space; one kind of fibres, on springs too.
+
+    Exact for this arrangement: k, E_A, nu_A, G_A and the expansions, which are those of `cylinders_in_matrix`.  Of
+    shear across the fibres there are bounds only.  Hashin and Rosen 1964; anisotropic fibres Hashin 1979; expansions
+    Rosen and Hashin 1970; springs, of fibres of equal radius, Hashin 1990.
+    """
+    if len(fibres) != 1:
+        return NOTHING
+    exact = Estimate.of(cylinders_in_matrix(matrix, fibres))
+    return dataclasses.replace(exact, E_transverse=None, nu_transverse=None, G_transverse=None)
+
+
+def self_consistent(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
+    """Christensen and Lo's estimate; one kind of fibres, on springs too.
+
+    k, E_A, nu_A, G_A and the expansions are those of `composite_cylinders`, G_T is that of `transverse_shear`;
+    E_T and nu_T follow.  Christensen and Lo 1979; springs, of fibres of equal radius, Hashin 1990.
+    """
+    if len(fibres) != 1:
+        return NOTHING
+    x = cylinders_in_matrix(matrix, fibres)
+    G = transverse_shear(matrix, fibres[0])
+    E_transverse, nu_transverse = transverse_constants(x.E_axial, x.nu_axial, x.K_transverse, G)
+    return dataclasses.replace(Estimate.of(x), E_transverse=E_transverse, nu_transverse=nu_transverse, G_transverse=G)
+
+
+def transverse_shear(matrix: TransverseIsotropy, family: Fibres) -> float:
+    """Return the shear modulus m* of the medium that a coated fibre does not change.
+
+    Under shear across it the coated fibre has the energy of the medium.
+
+    On a circle, u_1 + i u_2 and the resultant F = phi + z conj(phi') + conj(psi) of Muskhelishvili's potentials have
+    two harmonics, exp(-i t) and exp(3 i t).  In the medium phi has no term 1/z, as the energies are equal, and so
+    2 m* u = -F there (Eshelby).  Through the matrix, with P = F + 2 m u, kappa_m = 1 + 2 m/k and m, k its moduli,
+
+        P_1 ~ 1/r,  P_3 ~ r^3,  F_1 - (3 P_3 + P_1)/(kappa_m + 1) ~ r,  F_3 - (P_3 - P_1)/(kappa_m + 1) ~ 1/r^3,
+
+    and at the fibre 2 m u = V F.  A homogeneous fibre has V = diag(-m/m_f, m/m_f + 2 m/k_f); springs with
+    q_i = 1/(k_i a) add m [[-(q_n + q_t), 3 (q_n - q_t)], [-(q_n - q_t), 3 (q_n + q_t)]], and m_e of
+    `equivalent_fibre` has m/m_e = V13 V31/(1 + V33) - V11.  With two unknowns y at the fibre, P = A y and F = B y at
+    the outer radius, where P = (1 - m/m*) F: det(A - (1 - m/m*) B) = 0, Christensen and Lo's quadratic, has one
+    positive root m*, for V is indefinite as a homogeneous cylinder's is.
+    """
+    fibre, c, m = family.constants, family.fraction, matrix.G_transverse
+    normal, tangential, _ = (0.0, 0.0, 0.0) if family.springs is None else family.springs.compliances
+    total, difference = m * (normal + tangential), m * (normal - tangential)
+    ratio = equivalent_fibre(family, matrix).G_transverse / m  # m_e/m
+    d = 1 / (1 + m / fibre.G_transverse + 2 * m / fibre.K_transverse + 3 * total)  # 1/(1 + V33)
+    w, v = -difference * d * ratio, 3 * difference * d  # (m_e/m) V31/(1 + V33) and V13/(1 + V33)
+    beta = 1 / (2 + 2 * m / matrix.K_transverse)  # 1/(kappa_m + 1)
+    # Columns: the amplitudes of F_1 at the fibre over r and of P_3 at the outer radius; no power of c is negative.
+    P = np.array([[c * (ratio - 1), c**2 * v], [0, 1]])
+    inner = np.array([
+        [ratio - (ratio - 1) * beta, -(3 + v) * c * beta],
+        [c**2 * ((ratio - 1) * beta - w), c**3 * (d - (1 - v) * beta)],
+    ])  # fmt: skip
+    F = inner + beta * np.array([[1, 3], [-1, 1]]) @ P
+    rest = P - F
+    mixed = rest[0, 0] * F[1, 1] + F[0, 0] * rest[1, 1] - rest[0, 1] * F[1, 0] - F[0, 1] * rest[1, 0]
+    roots = np.roots([np.linalg.det(rest), mixed, np.linalg.det(F)])  # of m*/m
+    return float(m * roots.real.max())
+
+
+METHODS: Mapping[str, Callable[[TransverseIsotropy, Sequence[Fibres]], Estimate]] = {
+    method.__name__: method
+    for method in (rule_of_mixtures, chamis, halpin_tsai, mori_tanaka, composite_cylinders, self_consistent)
+}
