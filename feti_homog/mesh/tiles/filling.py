@@ -25,8 +25,7 @@ FRONTAL_DELAUNAY, DELAUNAY = 6, 5
 DECIMALS = 12
 # Of the area of triangles against that of the part of the cell that they fill, relative.
 AREA_TOLERANCE = 1e-9
-# gmsh's element types.
-LINE, TRIANGLE = 1, 2
+TRIANGLE = 2  # gmsh's type of elements
 
 # Curves are numbered from 1; a negative number is a curve run backwards.
 Signed = tuple[int, Curve]
