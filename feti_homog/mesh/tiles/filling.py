@@ -13,7 +13,7 @@ import numpy as np
 
 from feti_homog.errors import MeshError
 from feti_homog.mesh.coarse_mesh import areas, flip_double_arcs
-from feti_homog.mesh.outline.curves import MATRIX, OUTSIDE, Curve, Curves
+from feti_homog.mesh.outline.lines import MATRIX, OUTSIDE, Curve, Curves
 from feti_homog.mesh.sizes.from_sources import MAX_GROWTH
 from feti_homog.typing import Float, Int, Int32
 

@@ -16,7 +16,7 @@ from scipy.spatial import QhullError
 
 from feti_homog.mesh.coarse_mesh import CoarseMesh, edge_keys, edges
 from feti_homog.mesh.outline.bridges import CLEAR, Bridges, bridges, centre_lines
-from feti_homog.mesh.outline.curves import MATRIX, OUTSIDE
+from feti_homog.mesh.outline.lines import MATRIX, OUTSIDE
 from feti_homog.mesh.outline.outline import Outline, crossings, disc_at, images, on_side
 from feti_homog.mesh.periodic_topology import Torus, plane_edges_of
 from feti_homog.mesh.tiles.filling import Filling, Tile, arc_edges
