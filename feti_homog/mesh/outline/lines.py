@@ -48,6 +48,13 @@ class Curves:
     def __len__(self) -> int:
         return len(self.circle)
 
+    @property
+    def edges(self) -> tuple[Int, Int]:
+        """Nodes (e, 2) of all edges, and the curve (e,) of each."""
+        counts = np.diff(self.first)
+        begin = np.delete(np.arange(len(self.node)), self.first[1:] - 1)
+        return self.node[begin[:, None] + [0, 1]], np.repeat(np.arange(len(self)), counts - 1)
+
     def pieces(self) -> list[Curve]:
         """One after the other."""
         nodes = np.split(self.node, self.first[1:-1])

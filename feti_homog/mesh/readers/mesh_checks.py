@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from feti_homog.mesh.coarse_mesh import CoarseMesh, areas, edge_keys, edges, void_edges
+from feti_homog.mesh.coarse_mesh import CoarseMesh, areas, edge_keys, edges, twins, void_edges
 from feti_homog.mesh.periodic_topology import Torus, components, edge_pairs
 from feti_homog.mesh.readers.raw_mesh import DEBONDED, RawMesh, at, first_of
 from feti_homog.typing import Bool, Float, Int, Int32
@@ -117,9 +117,7 @@ def middle_nodes(mesh: RawMesh) -> list[str]:
         first = first[np.unique(middles.tags[first], return_index=True)[1]]
         faults += _listed("", first, lambda k: f"middle node {middles.tags[k]} {at(middles.points[k])}", f": {fault}")
     # The two triangles of an edge have one middle node.
-    keys = edge_keys(middles.edges, len(mesh.points))
-    order = np.argsort(keys, kind="stable")
-    pairs = np.column_stack([order[:-1], order[1:]])[keys[order][1:] == keys[order][:-1]]
+    pairs = np.stack(twins(edge_keys(middles.edges, len(mesh.points))), axis=1)
     pairs = pairs[middles.tags[pairs[:, 0]] != middles.tags[pairs[:, 1]]]
 
     def on_edge(pair: Int) -> str:

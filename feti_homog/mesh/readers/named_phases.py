@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from feti_homog.errors import MeshError
-from feti_homog.mesh.coarse_mesh import areas, edges
+from feti_homog.mesh.coarse_mesh import areas, edges, twins
 from feti_homog.mesh.periodic_topology import components
 from feti_homog.mesh.readers.raw_mesh import DEBONDED, RawMesh, first_of
 from feti_homog.microstructure.phase_names import PHASE, VOID
@@ -114,9 +114,7 @@ def _surrounding(mesh: RawMesh) -> str:
     if not np.isfinite(middles).all():
         return ""
     key = (np.rint(middles * SIDE).astype(np.int64) % SIDE) @ [SIDE, 1]
-    order = np.argsort(key, kind="stable")
-    same = np.flatnonzero(np.diff(key[order]) == 0)
-    one, other = order[same], order[same + 1]
+    one, other = twins(key)
     alike = number[one // 3] == number[other // 3]
     one, other, count = one[alike], other[alike], len(mesh.triangles)
     step = np.rint(middles[one] - middles[other]).astype(np.int64)
