@@ -49,7 +49,7 @@ def place_nodes(case: Case, comm: MPI.Intracomm, policy: TilePolicy) -> NodedCel
 
 def _with_nodes(unmeshed: UnmeshedCell, stations: list[LineStations]) -> NodedCell:
     """Return the cell with the nodes that ranks have placed."""
-    return unmeshed.with_nodes(LineStations.joined(stations, unmeshed.bare.lines.sampling))
+    return unmeshed.with_nodes(unmeshed.bare.lines.joined(stations))
 
 
 def begin_mesh(case: Case, policy: TilePolicy) -> UnmeshedCell | NodedCell | CoarseMesh:

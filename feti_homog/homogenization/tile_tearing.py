@@ -22,7 +22,7 @@ from feti_homog.homogenization.domain_partition import CellSummary, RankShare, i
 from feti_homog.homogenization.partition_policy import PartitionPolicy, can_be_cut_across, wanted_pieces
 from feti_homog.mesh.coarse_mesh import CoarseMesh, representatives
 from feti_homog.mesh.fill.gmsh_mesher import NodedCell
-from feti_homog.mesh.outline.curves import MATRIX
+from feti_homog.mesh.outline.lines import MATRIX
 from feti_homog.mesh.periodic_topology import Torus, components, places_by_depth
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.mesh.sizes.element_estimate import ElementEstimate

@@ -98,6 +98,13 @@ def edge_keys(pairs: Int32, nodes: int) -> Int:
     return ordered[:, 0] * nodes + ordered[:, 1]
 
 
+def twins(keys: Int) -> tuple[Int, Int]:
+    """Return the places of equal keys (n,), each with the next: two arrays, by ascending key."""
+    order = np.argsort(keys, kind="stable")
+    same = np.flatnonzero(keys[order][1:] == keys[order][:-1])
+    return order[same], order[same + 1]
+
+
 def representatives(points: Float, width: float, height: float) -> Int32:
     """Class representative (n,) of each node, for a mesh whose opposite sides match exactly.
 
@@ -191,10 +198,7 @@ def can_debond(mesh: CoarseMesh, pairs: Int32) -> Bool:
 def _neighbours(mesh: CoarseMesh) -> tuple[Int32, Index]:
     """Return the triangles' edges (3m, 2), low copies on sides, and the two places (e, 2) of those that have two."""
     pairs = _low_copies(mesh, edges(mesh.triangles))
-    keys = edge_keys(pairs, len(mesh.points))
-    order = np.argsort(keys, kind="stable")
-    twice = np.flatnonzero(keys[order][1:] == keys[order][:-1])
-    return pairs, np.stack([order[twice], order[twice + 1]], axis=1)
+    return pairs, np.stack(twins(edge_keys(pairs, len(mesh.points))), axis=1)
 
 
 def _alone(pairs: Int32, order: Index) -> Bool:

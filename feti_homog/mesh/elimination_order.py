@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from feti_homog.mesh.refinement import FineMesh, ReferenceLattice
+from feti_homog.mesh.coarse_mesh import edge_keys, edges
+from feti_homog.mesh.periodic_topology import edge_pairs
+from feti_homog.mesh.refinement import FineMesh
 from feti_homog.typing import Float, Int, Int32
 
 # Share of the triangles of a part by which a cut may be off the middle.
@@ -20,16 +22,12 @@ MANY_INTERVALS = 8
 
 def elimination_order(mesh: FineMesh) -> Int:
     """(c,) the classes of a mesh in their order of elimination."""
-    return _dissected(mesh.points[mesh.nodes[:, :3]].mean(axis=1), mesh.node_class[mesh.nodes], _inside(mesh.lattice))
-
-
-def _inside(lattice: ReferenceLattice) -> Int:
-    """(q,) place of each lattice node in an order of elimination, where that matters."""
-    place = np.arange(len(lattice.nodes))
+    lattice = mesh.lattice
+    inside = np.arange(len(lattice.nodes))
     if lattice.intervals >= MANY_INTERVALS:
         centres = lattice.nodes[lattice.triangles[:, :3]].mean(axis=1)[:, 1:]
-        place[_dissected(centres, lattice.triangles, np.arange(lattice.triangles.shape[1]))] = np.arange(len(place))
-    return place
+        inside[_dissected(centres, lattice.triangles, np.arange(lattice.triangles.shape[1]))] = np.arange(len(inside))
+    return _dissected(mesh.points[mesh.nodes[:, :3]].mean(axis=1), mesh.node_class[mesh.nodes], inside)
 
 
 def _dissected(centres: Float, nodes: Int | Int32, inside: Int) -> Int:
@@ -37,7 +35,10 @@ def _dissected(centres: Float, nodes: Int | Int32, inside: Int) -> Int:
 
     Nodes of one triangle alone are ordered by their places `inside` (q,).
     """
-    size, leaf = int(nodes.max()) + 1, _halved(centres, _neighbours(nodes[:, :3]))
+    size, leaf = (
+        int(nodes.max()) + 1,
+        _halved(centres, edge_pairs(edge_keys(edges(np.asarray(nodes[:, :3], np.int32)), int(nodes.max()) + 1))),
+    )
     by_leaf = np.argsort(leaf)
     of_leaf, node = np.repeat(leaf[by_leaf], nodes.shape[1]), nodes[by_leaf].ravel()
     first, last, place = np.empty((3, size), np.int64)
@@ -45,16 +46,6 @@ def _dissected(centres: Float, nodes: Int | Int32, inside: Int) -> Int:
     height = np.frexp((first ^ last).astype(float))[1]  # above the leaves, of the smallest part with all its triangles
     end = (last >> height) + 1 << height
     return np.asarray(np.lexsort((place, height, end)))
-
-
-def _neighbours(corners: Int | Int32) -> tuple[Int, Int]:
-    """Triangles (s,) on both sides of each side, of their `corners` (t, 3)."""
-    size = int(corners.max()) + 1
-    low, high = np.sort([corners, np.roll(corners, -1, axis=1)], axis=0).reshape(2, -1)
-    key = low.astype(np.int64) * size + high
-    order = np.argsort(key)
-    same = np.flatnonzero(np.diff(key[order]) == 0)
-    return order[same] // 3, order[same + 1] // 3
 
 
 def _halved(centres: Float, neighbours: tuple[Int, Int]) -> Int:

@@ -9,15 +9,13 @@ from collections import deque
 
 import numpy as np
 
-from feti_homog.mesh.coarse_mesh import areas
+from feti_homog.mesh.coarse_mesh import areas, twins
 from feti_homog.mesh.periodic_topology import Torus, components, edge_pairs
 from feti_homog.mesh.submesh import Submesh, cut_bodies
 from feti_homog.microstructure.phase_names import COATING
 from feti_homog.typing import Bool, Float, Int
 
-# Relative to the radius: circles nearer than this are images of one.
-SAME_CIRCLE = 1e-9
-# Relative to the longer semi-axis: ellipses with centres nearer than this are images of one, or one within another.
+# Relative to the longer semi-axis: curves with centres nearer than this are images of one, or one within another.
 SAME_CENTRE = 1e-9
 # Relative to the longer semi-axis: coatings whose thicknesses along both differ by less are of one.
 SAME_LENGTH = 1e-6
@@ -49,9 +47,7 @@ def _part_shifts(submesh: Submesh, part: Int) -> Float:
     """Shift of each plane-connected part, along a spanning tree of their contacts across the cell's boundary."""
     part_of_edge = np.empty(len(submesh.edges), np.int64)
     part_of_edge[submesh.triangle_edges] = part[:, None]
-    order = np.argsort(submesh.edge_class, kind="stable")
-    twice = np.flatnonzero(np.diff(submesh.edge_class[order]) == 0)
-    a, b = order[twice], order[twice + 1]
+    a, b = twins(submesh.edge_class)
     step = submesh.points[submesh.edges[a, 0]] - submesh.points[submesh.edges[b, 0]]
     links, first = np.unique(np.stack([part_of_edge[a], part_of_edge[b]], axis=1), axis=0, return_index=True)
     neighbours: dict[int, list[tuple[int, Float]]] = {k: [] for k in range(part.max() + 1)}
@@ -76,51 +72,22 @@ def fibre_circles(torus: Torus) -> Float:
     The centre of a fibre that is not round is that of its area, or the one that the mesh has, and its radius NaN.
     NaN for the matrix, and for a fibre that winds around the torus, which has no centre.
     """
-    circles = _discs(torus)
+    bodies, edge, is_round = _outer_edges(torus)
+    circles = np.full((len(torus.constituent_phase), 3), np.nan)
+    circles[bodies[is_round]] = torus.edge_circles[edge[is_round]]
     others = np.isnan(circles[torus.constituent, 2]) & (torus.constituent_phase[torus.constituent] > 0)
     for submesh in cut_bodies(torus, np.flatnonzero(others)):
-        circles[submesh.body] = _centre_of_area(submesh)
+        shift, closes = unwrap(submesh)
+        if closes:
+            middles = submesh.points[submesh.triangles].mean(axis=1) + shift
+            weights = areas(submesh.points, submesh.triangles.astype(np.int32))
+            circles[submesh.body, :2] = np.average(middles, axis=0, weights=weights)
     if torus.mesh.centres is not None:
         body, first = np.unique(torus.constituent, return_index=True)
         number = torus.mesh.precedence[first]
-        known = np.isnan(circles[body, 2]) & (number > 0)
-        circles[body[known], :2] = torus.mesh.centres[(number[known] - 1) % len(torus.mesh.centres)]
+        listed = np.isnan(circles[body, 2]) & (number > 0)
+        circles[body[listed], :2] = torus.mesh.centres[(number[listed] - 1) % len(torus.mesh.centres)]
     return circles
-
-
-def _discs(torus: Torus) -> Float:
-    """(constituents, 3) the largest circle of those whose boundary is on one circle, or on several around one centre.
-
-    NaN of others.
-    """
-    edge, body = torus.triangle_torus_edges, torus.constituent
-    left, right, between = torus.sides
-    outer = torus.at_void.copy()
-    outer[between] = body[left] != body[right]
-    triangle, k = np.nonzero(outer[edge])
-    own, around = body[triangle], torus.edge_circles[torus.triangle_edges[triangle, k]]
-    n = len(torus.constituent_phase)
-    order = np.lexsort((torus.triangle_edges[triangle, k], -np.nan_to_num(around[:, 2]), own))
-    bodies, first = np.unique(own[order], return_index=True)
-    circles = np.full((n, 3), np.nan)
-    circles[bodies] = around[order[first]]
-    offset = around[:, :2] - circles[own, :2]
-    offset -= np.round(offset / torus.mesh.period) * torus.mesh.period
-    on_one = (around[:, 2] > 0) & np.all(np.abs(offset) < SAME_CIRCLE * circles[own, 2:], axis=1)
-    is_disc = torus.constituent_phase > 0
-    is_disc[own[~on_one]] = False
-    circles[~is_disc] = np.nan
-    return circles
-
-
-def _centre_of_area(submesh: Submesh) -> Float:
-    """(3,) that of a fibre, and NaN for the radius."""
-    shift, closes = unwrap(submesh)
-    if not closes:
-        return np.full(3, np.nan)
-    middles = submesh.points[submesh.triangles].mean(axis=1) + shift
-    weights = areas(submesh.points, submesh.triangles.astype(np.int32))
-    return np.asarray(np.r_[np.average(middles, axis=0, weights=weights), np.nan])
 
 
 def fibre_frames(torus: Torus) -> Float:
@@ -128,26 +95,29 @@ def fibre_frames(torus: Torus) -> Float:
 
     NaN for the matrix, and for fibres whose boundary is not on ellipses about one centre.
     """
-    edge, body = torus.triangle_edges.ravel(), np.repeat(torus.constituent, 3)
-    low, high = np.full(torus.torus_edge.max() + 1, body.max()), np.zeros(torus.torus_edge.max() + 1, np.int64)
-    np.minimum.at(low, torus.torus_edge[edge], body)
-    np.maximum.at(high, torus.torus_edge[edge], body)
-    is_border = ((low != high) | torus.at_void)[torus.torus_edge[edge]]
-    edge, body = edge[is_border], body[is_border]
-    ellipses = torus.edge_ellipses
+    bodies, edge, _ = _outer_edges(torus)
+    frames = np.full((len(torus.constituent_phase), 2, 2), np.nan)
+    frames[bodies] = torus.edge_ellipses.frames[edge]
+    return frames
+
+
+def _outer_edges(torus: Torus) -> tuple[Int, Int, Bool]:
+    """Find fibres (k,) whose boundary is on ellipses about one centre, an edge (k,) on the largest; all round (k,)?"""
+    left, right, between = torus.sides
+    border = torus.at_void.copy()
+    border[between] = torus.constituent[left] != torus.constituent[right]
+    triangle, k = np.nonzero(border[torus.triangle_torus_edges])
+    edge, body, ellipses = torus.triangle_edges[triangle, k], torus.constituent[triangle], torus.edge_ellipses
     area = np.abs(np.linalg.det(ellipses.frames))
-    order = np.lexsort((-area[edge], body))
-    bodies, first, place = np.unique(body[order], return_index=True, return_inverse=True)
+    order = np.lexsort((edge, -area[edge], body))
     edge = edge[order]
-    outer = ellipses[edge[first]]
-    period = torus.mesh.period
+    bodies, first, place = np.unique(body[order], return_index=True, return_inverse=True)
+    outer, period = ellipses[edge[first]], torus.mesh.period
     offset = (ellipses.centres[edge] - outer.centres[place] + period / 2) % period - period / 2
     away = (area[edge] == 0) | (np.linalg.norm(offset, axis=1) > SAME_CENTRE * outer.longest[place])
-    is_other = np.bincount(place, away, len(bodies)) > 0
-    frames = np.full((len(torus.constituent_phase), 2, 2), np.nan)
-    known = ~is_other & (torus.constituent_phase[bodies] > 0)
-    frames[bodies[known]] = outer.frames[known]
-    return frames
+    is_round = np.bincount(place, np.isnan(torus.edge_circles[edge, 2]), len(bodies)) == 0
+    some = (np.bincount(place, away, len(bodies)) == 0) & (torus.constituent_phase[bodies] > 0)
+    return bodies[some], edge[first][some], is_round[some]
 
 
 def fibre_numbers(torus: Torus) -> tuple[Int, Bool]:

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra
 
-from feti_homog.mesh.coarse_mesh import CoarseMesh, paired_sides
+from feti_homog.mesh.coarse_mesh import CoarseMesh, paired_sides, twins
 from feti_homog.microstructure.phase_names import COATING
 from feti_homog.microstructure.shapes.ellipses import Ellipses
 from feti_homog.typing import Bool, Float, Int, Int32
@@ -55,7 +55,10 @@ class Torus:
         """Identify the periodic images of `mesh` and find its constituents."""
         node_class = np.unique(mesh.representative, return_inverse=True)[1]
         edges, triangle_edges = plane_edges_of(mesh)
-        torus_edge = _identify_edges(mesh, edges)
+        same = np.arange(len(edges))
+        for _, low, high in paired_sides(mesh.points[edges].mean(axis=1), mesh.period):
+            same[high] = low
+        torus_edge = np.unique(same, return_inverse=True)[1]
         left, right = edge_pairs(torus_edge[triangle_edges])
         same = mesh.phase[left] == mesh.phase[right]
         label = components(len(mesh.triangles), left[same], right[same])
@@ -78,10 +81,8 @@ class Torus:
     @cached_property
     def sides(self) -> tuple[Int, Int, Int]:
         """The triangles (e,) and (e,) on either side of each torus edge that two share, and that edge (e,)."""
-        flat = self.triangle_torus_edges.ravel()
-        order = np.argsort(flat, kind="stable")
-        twice = np.flatnonzero(flat[order][1:] == flat[order][:-1])
-        return order[twice] // 3, order[twice + 1] // 3, flat[order[twice]]
+        one, other = twins(self.triangle_torus_edges.ravel())
+        return one // 3, other // 3, self.triangle_torus_edges.ravel()[one]
 
     @cached_property
     def debonded(self) -> Bool:
@@ -211,10 +212,8 @@ def places_by_depth(depth: Float | Int, phase: Int, phases: tuple[str, ...]) -> 
 
 def edge_pairs(triangle_edges: Int) -> tuple[Int, Int]:
     """Return the triangles on either side of each edge that two of them share: two arrays, in the edges' order."""
-    flat = triangle_edges.ravel()
-    order = np.argsort(flat, kind="stable")
-    twice = flat[order][1:] == flat[order][:-1]
-    return order[:-1][twice] // 3, order[1:][twice] // 3
+    one, other = twins(triangle_edges.ravel())
+    return one // 3, other // 3
 
 
 def components(n: int, left: Int, right: Int) -> Int:
@@ -255,11 +254,3 @@ def plane_edges_of(mesh: CoarseMesh) -> tuple[Int, Int]:
     backwards = (xa > xb) | ((xa == xb) & (ya > yb))
     edges[backwards] = edges[backwards, ::-1]
     return edges, which.reshape(-1, 3)
-
-
-def _identify_edges(mesh: CoarseMesh, edges: Int) -> Int:
-    """(e,) torus edge of each plane edge (e, 2)."""
-    same = np.arange(len(edges))
-    for _, low, high in paired_sides(mesh.points[edges].mean(axis=1), mesh.period):
-        same[high] = low
-    return np.asarray(np.unique(same, return_inverse=True)[1])

@@ -37,8 +37,11 @@ class ReferenceLattice:
         """Return the lattice of `refine` halvings for elements of the given order (1 or 2)."""
         m = order * 2**refine
         corners = np.array([[[m, 0, 0], [0, m, 0], [0, 0, m]]])
-        for _ in range(refine):
-            corners = _split(corners)
+        for _ in range(refine):  # child i keeps corner i, the last is in the middle
+            a, b, c = corners.transpose(1, 0, 2)
+            ab, bc, ca = (a + b) // 2, (b + c) // 2, (c + a) // 2
+            children = np.array([[a, ab, ca], [ab, b, bc], [ca, bc, c], [bc, ca, ab]])
+            corners = children.transpose(2, 0, 1, 3).reshape(-1, 3, 3)
         if order == 2:
             corners = np.concatenate([corners, (corners + np.roll(corners, -1, axis=1)) // 2], axis=1)
         j, i = np.mgrid[0 : m + 1, 0 : m + 1]
@@ -146,14 +149,6 @@ def edge_node(n_classes: int, edge: Int, position: Int, lattice: ReferenceLattic
     return n_classes + edge * (lattice.intervals - 1) + position - 1
 
 
-def _split(triangle: Int) -> Int:
-    """Four halved triangles for each (.., 3 corners, 3); child i keeps corner i, the last is in the middle."""
-    a, b, c = triangle[:, 0], triangle[:, 1], triangle[:, 2]
-    ab, bc, ca = (a + b) // 2, (b + c) // 2, (c + a) // 2
-    children = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [bc, ca, ab]]
-    return np.asarray(np.stack([np.stack(child, axis=1) for child in children], axis=1).reshape(-1, 3, 3))
-
-
 def _positions(submesh: Submesh, lattice: ReferenceLattice) -> Float:
     """(t, q, 2) lattice nodes of each coarse triangle, bent towards its curved edges.
 
@@ -166,33 +161,20 @@ def _positions(submesh: Submesh, lattice: ReferenceLattice) -> Float:
     for k in range(3):
         edge = submesh.triangle_edges[:, k]
         curved = np.flatnonzero(submesh.turns[edge] > 0)
-        a, c = submesh.points[submesh.triangles[curved, k]], submesh.points[submesh.triangles[curved, (k + 1) % 3]]
+        a, c = (submesh.points[submesh.triangles[curved, end % 3], None] for end in (k, k + 1))
         span = 1 - b[:, (k + 2) % 3]
         s = np.divide(b[:, (k + 1) % 3], span, out=np.zeros_like(span), where=span > 0)
-        centre, turn = submesh.circles[edge[curved], :2], submesh.turns[edge[curved]]
-        chord = a[:, None] + s[None, :, None] * (c - a)[:, None]
-        x[curved] += span[:, None] ** 2 * (_arc(a, c, centre, turn, s) - chord)
+        centre, turn = submesh.circles[edge[curved], None, :2], submesh.turns[edge[curved], None]
+        # Points that cut the arc in the ratio s of its parameters: an affine map takes the arc of a circle, where
+        # spokes have these weights, to the arc of an ellipse.
+        weight_a, weight_c = np.sin((1 - s) * turn)[..., None], np.sin(s * turn)[..., None]
+        arc = centre + (weight_a * (a - centre) + weight_c * (c - centre)) / np.sin(turn)[..., None]
+        x[curved] += span[:, None] ** 2 * (arc - (a + s[None, :, None] * (c - a)))
     if lattice.order == 2:
-        _straighten(x, submesh, lattice)
+        # Mid-edge nodes are midway between their vertices, save on arcs.
+        corners, middles = lattice.triangles[:, :3], lattice.triangles[:, 3:]
+        midway = (x[:, corners] + x[:, np.roll(corners, -1, axis=1)]) / 2
+        on_edge = lattice.nodes[middles][..., [2, 0, 1]] == 0
+        on_arc = ((submesh.turns[submesh.triangle_edges] > 0)[:, None, None, :] & on_edge).any(axis=3)
+        x[:, middles] = np.where(on_arc[..., None], x[:, middles], midway)
     return x
-
-
-def _straighten(x: Float, submesh: Submesh, lattice: ReferenceLattice) -> None:
-    """Put mid-edge nodes midway between their vertices, save those on arcs."""
-    corners = lattice.triangles[:, :3]
-    middle = (x[:, corners] + x[:, np.roll(corners, -1, axis=1)]) / 2
-    curved = submesh.turns[submesh.triangle_edges] > 0
-    on_edge = lattice.nodes[lattice.triangles[:, 3:]][..., [2, 0, 1]] == 0
-    on_arc = (curved[:, None, None, :] & on_edge).any(axis=3)
-    x[:, lattice.triangles[:, 3:]] = np.where(on_arc[..., None], x[:, lattice.triangles[:, 3:]], middle)
-
-
-def _arc(a: Float, b: Float, centre: Float, turn: Float, s: Float) -> Float:
-    """(t, q, 2) points that cut the arcs from a to b in the ratio s of their parameters, which turn by `turn` (t,).
-
-    An affine map takes the arc of a circle, where the weights of the spokes are these, to that of an ellipse.
-    """
-    from_a, from_b, angle = a[:, None] - centre[:, None], b[:, None] - centre[:, None], turn[:, None]
-    weight_a, weight_b = np.sin((1 - s) * angle), np.sin(s * angle)
-    spokes = (weight_a[..., None] * from_a + weight_b[..., None] * from_b) / np.sin(angle)[..., None]
-    return np.asarray(centre[:, None] + spokes)

@@ -287,6 +287,6 @@ def _all(parts: Sequence[object], name: str) -> Array:
 
 
 def _numbers(parts: Sequence[object], name: str, of: str) -> Int:
-    """Return the same for numbers of what is called `of`, which become numbers in the list of all of these."""
+    """Concatenate index arrays, shifted by the number of `of` entries before."""
     ends = np.cumsum([0, *(len(getattr(part, of)) for part in parts)])
     return np.concatenate([getattr(part, name) + end for part, end in zip(parts, ends, strict=False)])

@@ -30,7 +30,7 @@ from feti_homog.mesh.tiles.tiles import DEFAULT_TILES, Regions, TilePolicy, Tili
 from feti_homog.microstructure.arrangement import Arrangement
 from feti_homog.microstructure.phase_names import VOID
 from feti_homog.microstructure.shapes.ellipses import Discs, Ellipses
-from feti_homog.typing import Float, Int, Int32
+from feti_homog.typing import Int, Int32
 
 # Radius / width of the cell above which positions on a circle differ by more than rounding.
 SMALLEST_RADIUS = 1e-6
@@ -73,7 +73,7 @@ def begin(
     estimate = ElementEstimate.of(cell, listed)
     tiled = estimate.fibres >= policy.least_discs if listed is None else is_tiled(listed, policy)
     most = MAX_TRIANGLES_OF_TILES if tiled else MAX_TRIANGLES
-    _refuse_extremes(estimate, sizes, sum(len(own) for own in marks.values()), most)
+    _refuse_extremes(estimate, sizes, sum(map(len, marks.values())), most)
     arrangement = arrange(cell) if listed is None else listed
     smallest = int(arrangement.radii.argmin())
     if arrangement.radii[smallest] < SMALLEST_RADIUS * arrangement.width:
@@ -207,7 +207,14 @@ class NodedCell:
     def mesh(self, fillings: Sequence[Filling]) -> CoarseMesh:
         """Return the mesh of which these are the filled tiles, in their order."""
         arrangement, lines, scale = self.arrangement, self.lines, self.scale
-        points, triangles, circle = self._joined(fillings)
+        # Nodes of the outline come first, and then of one tile after the other.
+        count, parts = len(lines.points), []
+        for (nodes, _), filling in zip(self.parts, fillings, strict=True):
+            inner = np.arange(count, count + len(filling.inner))
+            parts.append(np.concatenate([nodes, inner]).astype(np.int32)[filling.triangles])
+            count += len(filling.inner)
+        points = np.concatenate([lines.points, *(filling.inner for filling in fillings)])
+        triangles, circle = np.concatenate(parts), np.concatenate([filling.circle for filling in fillings])
         phase, precedence = self._within
         void = len(self.phases)
         arcs, arc_circle = arc_edges(lines.curves)
@@ -261,16 +268,6 @@ class NodedCell:
             phase=phase[solid][first].astype(np.int64),
             nodes=len(self.lines.points),
         )
-
-    def _joined(self, fillings: Sequence[Filling]) -> tuple[Float, Int32, Int]:
-        """Nodes, those of the outline first, triangles and the circle around each."""
-        count, triangles = len(self.lines.points), []
-        for (nodes, _), filling in zip(self.parts, fillings, strict=True):
-            inner = np.arange(count, count + len(filling.inner))
-            triangles.append(np.concatenate([nodes, inner]).astype(np.int32)[filling.triangles])
-            count += len(filling.inner)
-        points = np.concatenate([self.lines.points, *(filling.inner for filling in fillings)])
-        return points, np.concatenate(triangles), np.concatenate([filling.circle for filling in fillings])
 
 
 def _without_voids(mesh: CoarseMesh, void: int) -> CoarseMesh:

@@ -11,18 +11,18 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from feti_homog.mesh.outline.bridges import Bridges, OnCircles
-from feti_homog.mesh.outline.curves import MATRIX, Curves, Numbering
-from feti_homog.mesh.outline.lines import WHOLE, Arcs, EdgeSamples, Sampling, Segments, Stations
+from feti_homog.mesh.outline.lines import MATRIX, WHOLE, Arcs, Curves, EdgeSamples, Sampling, Segments, Stations
 from feti_homog.mesh.outline.outline import (
     SAME_PLACE,
+    Numbering,
     Outline,
     arcs_within,
     crossings,
     disc_at,
     images,
-    marked,
     on_side,
     side_curves,
+    tip_vertices,
     vertex_angles,
 )
 from feti_homog.mesh.sizes.graded_size import MeshSizes, SizeField, circle_size, size_field
@@ -35,6 +35,10 @@ from feti_homog.typing import Bool, Float, Int
 NO_BRIDGES = Bridges(np.zeros((0, 2), np.int64), np.zeros(0))
 
 
+# Nodes of the arcs, and of the bridges.
+LineStations = tuple[Stations, Stations]
+
+
 @dataclass(frozen=True)
 class SizedLines:
     """Lines that get nodes one by one, so that ranks may share them."""
@@ -44,7 +48,7 @@ class SizedLines:
     sampling: Sampling
 
     def parts(self, count: int) -> list[SizedLines]:
-        """So many parts, in order and of equal numbers of lines."""
+        """Divide the lines, in order, into `count` parts of equal numbers."""
         arcs, bridges = (pairwise(even(len(lines), count)) for lines in (self.arcs, self.bridges))
         return [
             SizedLines(self.arcs.chosen(slice(*own)), self.bridges.chosen(slice(*other)), self.sampling)
@@ -52,37 +56,24 @@ class SizedLines:
         ]
 
     def stations(self, field: SizeField) -> LineStations:
-        """Return where their nodes are.
+        """Place the nodes.
 
         Raises:
             MeshError: there would be more than the sampling allows.
         """
-        sampled = ((self.arcs, self.sampling.arc), (self.bridges, self.sampling.bridge))
-        found = [
-            EdgeSamples.of(field, lines, least).stations(np.ones(len(lines), np.int64), self.sampling.most_nodes)
-            for lines, least in sampled
-        ]
-        return LineStations(*found)
+        most, ones = self.sampling.most_nodes, np.ones(len(self.arcs) + len(self.bridges), np.int64)
+        arcs = EdgeSamples.of(field, self.arcs, self.sampling.arc).stations(ones[: len(self.arcs)], most)
+        bridges = EdgeSamples.of(field, self.bridges, self.sampling.bridge).stations(ones[len(self.arcs) :], most)
+        return arcs, bridges
 
-
-@dataclass(frozen=True)
-class LineStations:
-    """Nodes of `SizedLines`."""
-
-    arcs: Stations
-    bridges: Stations
-
-    @classmethod
-    def joined(cls, parts: Sequence[LineStations], sampling: Sampling) -> LineStations:
-        """Return the stations of all parts.
+    def joined(self, parts: Sequence[LineStations]) -> LineStations:
+        """Join the nodes of all parts.
 
         Raises:
             MeshError: they are more than the sampling allows.
         """
-        return cls(
-            Stations.joined([part.arcs for part in parts], sampling.most_nodes),
-            Stations.joined([part.bridges for part in parts], sampling.most_nodes),
-        )
+        arcs, bridges = (Stations.joined(own, self.sampling.most_nodes) for own in zip(*parts, strict=True))
+        return arcs, bridges
 
 
 @dataclass(frozen=True)
@@ -139,8 +130,14 @@ class BareOutline:
         angles = tuple(np.concatenate(parts) for parts in zip(angles, bridges.on_circles, strict=True))
         (circle, start, stop), ends = _arcs(circles, border, angles, size, np.ones(len(circles), bool))
         vertices = np.concatenate([border_once, ends])
-        field = size_field(arrangement, sizes, outer, _tips(arrangement, marks, vertices))
-        caps = _caps(arrangement, sizes.interface, disc, around)
+
+        def at(fibre: Int, within: Bool, angle: Float) -> Float:
+            radii = np.where(within, arrangement.radii[fibre], arrangement.outer_radii[fibre])
+            return on_circle(np.column_stack([arrangement.centres[fibre], radii]), angle)
+
+        field = size_field(arrangement, sizes, outer, tip_vertices(arrangement, marks, vertices, at))
+        first = np.unique(arrangement.shells[1], return_index=True)[1]
+        caps = circle_size(arrangement, sizes.interface)[first[disc] + (around != MATRIX)]
         arcs = Arcs(circles[circle], start, stop - start, caps[circle])
         lines = SizedLines(arcs, _segments(circles, bridges, caps, field), sampling)
         return cls(size, circles, disc, around, places, vertices, circle, lines, field)
@@ -164,7 +161,7 @@ class BareOutline:
             side_curves(axis, self.places[axis], find, self.around, self.size, self.field, numbering, sampling)
             for axis in (0, 1)
         ]
-        arcs, bridges = stations.arcs, stations.bridges
+        arcs, bridges = stations
         node = numbering.along(self.lines.arcs.points(arcs.line, arcs.share), arcs.first)
         curves.append(Curves(node, arcs.first, self.circle, self.circle, self.around[self.circle]))
         if len(self.lines.bridges):
@@ -190,12 +187,6 @@ def _arcs(
     return arcs, ends[away & chosen[arcs[0]]]
 
 
-def _caps(arrangement: Arrangement, largest: float, disc: Int, around: Int) -> Float:
-    """Largest edge length (k,) on the circles of these discs (k,) with these circles around (k,)."""
-    first = np.unique(arrangement.shells[1], return_index=True)[1]
-    return np.asarray(circle_size(arrangement, largest)[first[disc] + (around != MATRIX)])
-
-
 def _segments(circles: Float, bridges: Bridges, caps: Float, field: SizeField) -> Segments:
     """Return the bridges between circles, on which edges are at most `caps` (k,).
 
@@ -209,12 +200,3 @@ def _segments(circles: Float, bridges: Bridges, caps: Float, field: SizeField) -
             [np.minimum(field.at(at), caps[bridges.ends[:, k]]) for k, at in enumerate((begin, end))], axis=1
         )
     return Segments(begin, end - begin, longest)
-
-
-def _tips(arrangement: Arrangement, marks: Mapping[int, Sequence[float]], vertices: Float) -> Float:
-    """Return the vertices (t, 2) that the marks have become; those of curves that are not there are none."""
-    curve, angle = marked(arrangement, marks)
-    size, fibre = arrangement.size, np.where(curve < 0, ~curve, curve)
-    radii = np.where(curve < 0, arrangement.radii[fibre], arrangement.outer_radii[fibre])
-    places = on_circle(np.column_stack([arrangement.centres[fibre], radii]), angle)
-    return np.asarray(vertices[cKDTree(vertices % size, boxsize=size).query(places % size)[1]])

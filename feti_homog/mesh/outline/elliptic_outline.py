@@ -11,17 +11,17 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from feti_homog.mesh.outline.bridges import TURN
-from feti_homog.mesh.outline.curves import MATRIX, Curves, Numbering
-from feti_homog.mesh.outline.lines import WHOLE, EdgeSamples
+from feti_homog.mesh.outline.lines import MATRIX, WHOLE, Curves, EdgeSamples, Lines
 from feti_homog.mesh.outline.outline import (
     MERGED,
     SAME_PLACE,
+    Numbering,
     Outline,
     arcs_within,
-    marked,
     nested,
     on_side,
     side_curves,
+    tip_vertices,
 )
 from feti_homog.mesh.sizes.element_estimate import refuse_many
 from feti_homog.mesh.sizes.from_sources import MAX_GROWTH, Source, SourcedSize, wrap
@@ -37,7 +37,7 @@ from feti_homog.mesh.sizes.graded_size import (
 from feti_homog.microstructure.arrangement import Arrangement, neighbours
 from feti_homog.microstructure.shapes.ellipses import Ellipses, gaps
 from feti_homog.microstructure.shapes.outlines import directions
-from feti_homog.typing import Float, Int
+from feti_homog.typing import Bool, Float, Int
 
 # Steps of a quarter of an ellipse between which its length is taken to be linear.
 LENGTH_STEPS = 256
@@ -66,11 +66,17 @@ def outline(
     # Vertices within coatings are as far from each other as those on the ellipse around, which they face, or marked.
     sparse = (around != MATRIX) & ~np.isin(curve, list(marks))
     outer = np.concatenate([border, ends[away & ~sparse[which]]])
-    field = _size_field(arrangement, inner, sizes, outer, sharp, _tips(arrangement, inner, marks, numbering.vertices))
+
+    def at(fibre: Int, within: Bool, angle: Float) -> Float:
+        own = inner[fibre].grown(np.where(within, 0.0, arrangement.coating[fibre]))
+        return own.points(own.parameter(directions(angle)))
+
+    tips = tip_vertices(arrangement, marks, numbering.vertices, at)
+    field = _size_field(arrangement, inner, sizes, outer, sharp, tips)
     refuse_many(field.at, field.least, size)
     find = partial(_ellipse_at, ellipses)
     curves = [side_curves(axis, places[axis], find, around, size, field, numbering, WHOLE) for axis in (0, 1)]
-    arcs = _EllipticArcs.of(ellipses[which], start, stop, sizes.interface)
+    arcs = EllipticArcs.of(ellipses[which], start, stop, sizes.interface)
     stations = EdgeSamples.of(field, arcs, WHOLE.arc).stations(np.ones(len(which), np.int64), WHOLE.most_nodes)
     node = numbering.along(arcs.points(stations.line, stations.share), stations.first)
     curves.append(Curves(node, stations.first, which, which, around[which]))
@@ -137,15 +143,6 @@ def _vertex_angles(
     return (whose, np.concatenate(angles)), (np.concatenate(where), np.concatenate(lengths))
 
 
-def _tips(arrangement: Arrangement, inner: Ellipses, marks: Mapping[int, Sequence[float]], vertices: Float) -> Float:
-    """Return the vertices (t, 2) that the marks have become; those of curves that are not there are none."""
-    curve, angle = marked(arrangement, marks)
-    fibre, size = np.where(curve < 0, ~curve, curve), arrangement.size
-    own = inner[fibre].grown(np.where(curve < 0, 0.0, arrangement.coating[fibre]))
-    places = own.points(own.parameter(directions(angle)))
-    return np.asarray(vertices[cKDTree(vertices % size, boxsize=size).query(places % size)[1]])
-
-
 def _ellipse_at(ellipses: Ellipses, points: Float) -> Int:
     """Return the smallest ellipse (k,) around each point, or MATRIX."""
     holds, area = ellipses.level(points) < 1, np.abs(np.linalg.det(ellipses.frames))
@@ -153,36 +150,39 @@ def _ellipse_at(ellipses: Ellipses, points: Float) -> Int:
 
 
 @dataclass(frozen=True)
-class _EllipticArcs:
-    """Lines of ellipses, as `Lines`.
+class EllipticArcs(Lines):
+    """Arcs of ellipses, all with one longest edge, unless the curvature asks for shorter ones.
 
     Attributes:
-        ellipses: that of each of a arcs.
-        angle, way: (a, k) parameters of equidistant places on each, and the shares of the arc's length there.
-        lengths: (a,) of arcs.
-        cap: longest edge, unless the curvature asks for shorter ones.
+        ellipses: of each arc.
+        angle, way: (a, k) parameters of places on each arc, and the lengths up to there.
+        cap: longest edge.
     """
 
     ellipses: Ellipses
     angle: Float
     way: Float
-    lengths: Float
     cap: float
 
     @classmethod
-    def of(cls, ellipses: Ellipses, start: Float, stop: Float, cap: float) -> _EllipticArcs:
-        """Between parameters (a,) of ellipses (a,)."""
+    def of(cls, ellipses: Ellipses, start: Float, stop: Float, cap: float) -> EllipticArcs:
+        """Return arcs between parameters (a,) of ellipses (a,)."""
         share = np.linspace(0, 1, LENGTH_STEPS + 1)
         angle = start[:, None] + (stop - start)[:, None] * share
         places = np.stack([ellipses.points(angle[:, k]) for k in range(len(share))], axis=1)
         length = np.cumsum(np.linalg.norm(np.diff(places, axis=1), axis=2), axis=1)
-        way = np.column_stack([np.zeros(len(length)), length / length[:, -1:]])
-        return cls(ellipses, angle, way, length[:, -1], cap)
+        return cls(ellipses, angle, np.column_stack([np.zeros(len(length)), length]), cap)
+
+    @property
+    def lengths(self) -> Float:
+        """See `Lines`."""
+        return self.way[:, -1]
 
     def points(self, line: Int, share: Float) -> Float:
         """See `Lines`."""
-        after = np.clip((self.way[line] <= share[:, None]).sum(axis=1), 1, LENGTH_STEPS)
-        low, high = self.way[line, after - 1], self.way[line, after]
+        way = self.way / self.way[:, -1:]
+        after = np.clip((way[line] <= share[:, None]).sum(axis=1), 1, LENGTH_STEPS)
+        low, high = way[line, after - 1], way[line, after]
         part = (share - low) / (high - low)
         parameter = self.angle[line, after - 1] * (1 - part) + self.angle[line, after] * part
         return self.ellipses[line].points(parameter)
@@ -207,7 +207,10 @@ def _size_field(
     """
     size, largest = arrangement.size, sizes.largest
     shells, disc = arrangement.shells
-    ellipses, disc = _in_mesh_order(arrangement, Ellipses(shells.centres, shells.frames), disc)
+    # In mesh order: that of rows does not matter.
+    rank = np.arange(len(inner)) if arrangement.mesh_order is None else np.argsort(arrangement.mesh_order)
+    order = np.argsort(rank[disc], kind="stable")
+    ellipses, disc = Ellipses(shells.centres, shells.frames)[order], disc[order]
     angle, which = np.tile(np.linspace(0, 2 * np.pi, POINTS, endpoint=False), len(ellipses)), np.arange(len(ellipses))
     around = np.repeat(which, POINTS)
     points, normal = ellipses[around].points(angle), ellipses[around].normal(angle)
@@ -215,12 +218,15 @@ def _size_field(
     # As on circles of the same curvature.
     caps = np.minimum(2 * np.pi * ellipses[around].bend(normal) / MIN_EDGES_AROUND, np.minimum(sizes.interface, thin))
     outer = ellipses[np.sort(np.unique(disc, return_index=True)[1])]
+    offset = (points + size / 2) % size - size / 2
+    nearest = offset[np.argmin(np.linalg.norm(offset, axis=1))]
+    to_corner = min(PASSAGE_EDGE * float(np.linalg.norm(nearest)), largest)
     sources = [
         (points, caps, np.full(len(points), MAX_GROWTH)),
         _between(outer, size, largest),
         _beside_sides(ellipses, size, largest),
         (crossings[0], np.minimum(crossings[1] / WEDGE, largest), np.full(len(crossings[0]), MAX_GROWTH)),
-        _at_corner(points, size, largest),
+        (np.stack([nearest, np.zeros(2)]), np.full(2, to_corner), np.full(2, MAX_GROWTH)),
         at_vertices(vertices, size, largest),
     ]
     base = SourcedSize(sources, size, largest)
@@ -236,14 +242,6 @@ def _size_field(
         return np.asarray(np.minimum(beside[nearest] + MAX_GROWTH * distance, at_tips))
 
     return SizeField(base, graded, min(sizes.tip, float(beside.min())))
-
-
-def _in_mesh_order(arrangement: Arrangement, ellipses: Ellipses, disc: Int) -> tuple[Ellipses, Int]:
-    """Ellipses and their discs (k,) in the order in which these are meshed: the order of rows does not matter."""
-    if arrangement.mesh_order is None:
-        return ellipses, disc
-    order = np.argsort(np.argsort(arrangement.mesh_order)[disc], kind="stable")
-    return ellipses[order], disc[order]
 
 
 def _coating_size(arrangement: Arrangement, inner: Ellipses, disc: Int, normal: Float) -> Float:
@@ -289,11 +287,3 @@ def _beside_sides(ellipses: Ellipses, size: Float, largest: float) -> Source:
         sources += [(place[near], length[near], growth[near]) for place in (extreme, foot)]
     places, lengths, growths = (np.concatenate(parts) for parts in zip(*sources, strict=True))
     return places, lengths, growths
-
-
-def _at_corner(points: Float, size: Float, largest: float) -> Source:
-    """Return the corner and the nearest of the points (n, 2) of ellipses."""
-    offset = (points + size / 2) % size - size / 2
-    nearest = offset[np.argmin(np.linalg.norm(offset, axis=1))]
-    length = min(PASSAGE_EDGE * float(np.linalg.norm(nearest)), largest)
-    return np.stack([nearest, np.zeros(2)]), np.full(2, length), np.full(2, MAX_GROWTH)

@@ -1,35 +1,109 @@
-"""The lines of a cell, and their nodes at distances that follow the size of edges along them."""
+"""The lines of a cell: pieces of sides, arcs and bridges, and their nodes, whose distances follow the size of edges."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Self
 
 import numpy as np
 
 from feti_homog.errors import MeshError
 from feti_homog.mesh.sizes.graded_size import SizeField
 from feti_homog.microstructure.shapes.outlines import on_circle
+from feti_homog.system.parallel.dividing import ranges
 from feti_homog.typing import Float, Int
 
+# Regions beside a curve that are no disc or coating.
+MATRIX, OUTSIDE = -1, -2
 
-class Lines(Protocol):
-    """c lines."""
+
+@dataclass(frozen=True)
+class Curve:
+    """A bridge, or a piece of a side or a circle from vertex to vertex, counter-clockwise around the cell or the disc.
+
+    Attributes:
+        nodes: (k,) numbers of its nodes, from end to end.
+        circle: the circle it lies on; MATRIX for a straight line.
+        inside: the region on its left: the disc, or the coating, within that circle, or MATRIX, or OUTSIDE.
+        outside: the region on its right: the coating within the circle around it, or MATRIX, or OUTSIDE.
+    """
+
+    nodes: Int
+    circle: int
+    inside: int
+    outside: int
+
+
+@dataclass(frozen=True)
+class Curves:
+    """c curves; curve k has the nodes node[first[k] : first[k + 1]], and the other arrays (c,) are as in `Curve`."""
+
+    node: Int
+    first: Int
+    circle: Int
+    inside: Int
+    outside: Int
+
+    def __len__(self) -> int:
+        return len(self.circle)
+
+    @property
+    def edges(self) -> tuple[Int, Int]:
+        """Nodes (e, 2) of all edges, and the curve (e,) of each."""
+        counts = np.diff(self.first)
+        begin = np.delete(np.arange(len(self.node)), self.first[1:] - 1)
+        return self.node[begin[:, None] + [0, 1]], np.repeat(np.arange(len(self)), counts - 1)
+
+    def pieces(self) -> list[Curve]:
+        """One after the other."""
+        nodes = np.split(self.node, self.first[1:-1])
+        beside = (self.circle.tolist(), self.inside.tolist(), self.outside.tolist())
+        return [Curve(*parts) for parts in zip(nodes, *beside, strict=True)]
+
+    def chosen(self, those: Int) -> Curves:
+        """Return the curves `those` (k,)."""
+        counts = np.diff(self.first)[those]
+        node, first = self.node[ranges(self.first[those], counts)], np.concatenate([[0], np.cumsum(counts)])
+        return Curves(node, first, self.circle[those], self.inside[those], self.outside[those])
+
+    @classmethod
+    def joined(cls, parts: Sequence[Curves]) -> Curves:
+        """All of these, one after the other."""
+        counts = np.concatenate([np.diff(part.first) for part in parts])
+        return cls(
+            np.concatenate([part.node for part in parts]),
+            np.concatenate([[0], np.cumsum(counts)]),
+            *(np.concatenate([getattr(part, name) for part in parts]) for name in ("circle", "inside", "outside")),
+        )
+
+
+class Lines:
+    """c lines, whose attributes are arrays (c, ...)."""
 
     @property
     def lengths(self) -> Float:
         """(c,) of each."""
+        raise NotImplementedError
 
     def points(self, line: Int, share: Float) -> Float:
         """(n, 2) on lines (n,) at these shares (n,) of their lengths."""
+        raise NotImplementedError
 
     def caps(self, line: Int, share: Float) -> Float:
         """(n,) the longest edge there."""
+        raise NotImplementedError
+
+    def __len__(self) -> int:
+        return len(self.lengths)
+
+    def chosen(self, some: slice) -> Self:
+        """Return some of them."""
+        return type(self)(**{name: values[some] for name, values in vars(self).items()})
 
 
 @dataclass(frozen=True)
-class Arcs:
+class Arcs(Lines):
     """Arcs of circles.
 
     Attributes:
@@ -42,9 +116,6 @@ class Arcs:
     start: Float
     span: Float
     cap: Float
-
-    def __len__(self) -> int:
-        return len(self.start)
 
     @property
     def lengths(self) -> Float:
@@ -59,13 +130,9 @@ class Arcs:
         """See `Lines`."""
         return self.cap[line]
 
-    def chosen(self, those: slice) -> Arcs:
-        """Return some of them."""
-        return Arcs(self.circles[those], self.start[those], self.span[those], self.cap[those])
-
 
 @dataclass(frozen=True)
-class Segments:
+class Segments(Lines):
     """Straight lines.
 
     Attributes:
@@ -76,9 +143,6 @@ class Segments:
     begin: Float
     way: Float
     cap: Float
-
-    def __len__(self) -> int:
-        return len(self.begin)
 
     @property
     def lengths(self) -> Float:
@@ -94,17 +158,14 @@ class Segments:
         low, high = self.cap[line].T
         return np.asarray(low + share * (high - low))
 
-    def chosen(self, those: slice) -> Segments:
-        """Return some of them."""
-        return Segments(self.begin[those], self.way[those], self.cap[those])
-
 
 @dataclass(frozen=True)
 class Sampling:
     """Numbers of samples of sizes.
 
-    There are so many positions along an arc, a piece of a side and a bridge, and for at most so many nodes on all arcs,
-    on the sides along one axis, and on all bridges.
+    Attributes:
+        arc, side, bridge: positions along an arc, a piece of a side and a bridge.
+        most_nodes: on all arcs, on the sides along one axis, or on all bridges.
     """
 
     arc: int
@@ -138,7 +199,7 @@ class Stations:
 
     @classmethod
     def joined(cls, parts: Sequence[Stations], most: int) -> Stations:
-        """Return the samples of all these lines, one after the other.
+        """Return the nodes of all lines, part after part.
 
         Raises:
             MeshError: they have more than `most` edges together.
@@ -161,8 +222,12 @@ def _refuse_many(edges: float, most: int) -> None:
 class EdgeSamples:
     """The size of edges h sampled along c lines.
 
-    At the shares `share` (n,) of their lengths there is ds / h `density` (n,); those of line k are from first[k] up to
-    first[k + 1]. Those of a line depend on it and on the sizes alone.
+    Samples of a line depend on it and on the sizes alone.
+
+    Attributes:
+        share: (n,) of the lengths of the lines; samples of line k are from first[k] up to first[k + 1].
+        density: (n,) ds / h.
+        first: (c + 1,)
     """
 
     share: Float
@@ -194,35 +259,27 @@ class EdgeSamples:
         Raises:
             MeshError: there would be more than `most`.
         """
-        measure = self._measures()
-        whole = measure[self.first[1:] - 1]
-        _refuse_many(total := float(whole.sum()), most)
-        edges = np.maximum(np.ceil(whole - 1e-6).astype(int), least)
-        first = np.concatenate([[0], np.cumsum(edges + 1)])
-        line = np.repeat(np.arange(len(edges)), edges + 1)
-        target = (np.arange(first[-1]) - first[line]) * (whole / edges)[line]
-        target[first[1:] - 1] = whole
-        return Stations(self._at(measure, line, target), first, total)
-
-    def _measures(self) -> Float:
-        """(n,) int ds / h from the beginning of the line, by the trapezoidal rule."""
-        measure, counts = np.zeros(len(self.share)), np.diff(self.first)
+        # int ds / h from the beginning of each line, by the trapezoidal rule.
+        measure, counts, last = np.zeros(len(self.share)), np.diff(self.first), self.first[1:] - 1
         for count in np.unique(counts):
             rows = self.first[:-1][counts == count, None] + np.arange(count)
             d, s = self.density[rows], self.share[rows]
             measure[rows[:, 1:]] = np.cumsum((d[:, 1:] + d[:, :-1]) / 2 * np.diff(s, axis=1), axis=1)
-        return measure
-
-    def _at(self, measure: Float, line: Int, target: Float) -> Float:
-        """Return the positions (m,) where the measure of lines (m,) is `target` (m,), linear between samples."""
-        last = self.first[1:] - 1
-        # All in one ascending row, the lines 1 apart; the rounding of large sums may miss an interval by one.
-        shift = np.concatenate([[0.0], np.cumsum(measure[last] + 1)])[: len(last)]
-        row = measure + np.repeat(shift, np.diff(self.first))
+        total = measure[last]
+        _refuse_many(float(total.sum()), most)
+        edges = np.maximum(np.ceil(total - 1e-6).astype(int), least)
+        first = np.concatenate([[0], np.cumsum(edges + 1)])
+        line = np.repeat(np.arange(len(edges)), edges + 1)
+        target = (np.arange(first[-1]) - first[line]) * (total / edges)[line]
+        target[first[1:] - 1] = total
+        # Linear between samples, of all lines in one ascending row, 1 apart; the rounding of large sums may miss an
+        # interval by one.
+        shift = np.concatenate([[0.0], np.cumsum(total + 1)])[: len(last)]
+        row = measure + np.repeat(shift, counts)
         j = np.searchsorted(row, target + shift[line], side="right") - 1
         j = np.clip(j, self.first[line], last[line] - 1)
         j = np.maximum(j - (measure[j] > target), self.first[line])
         j = np.minimum(j + (measure[j + 1] <= target), last[line] - 1)
         slope = (self.share[j + 1] - self.share[j]) / (measure[j + 1] - measure[j])
-        at = slope * (target - measure[j]) + self.share[j]
-        return np.where(target == measure[last[line]], 1.0, at)
+        share = np.where(target == total[line], 1.0, slope * (target - measure[j]) + self.share[j])
+        return Stations(share, first, float(total.sum()))

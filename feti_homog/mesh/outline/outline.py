@@ -10,8 +10,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from feti_homog.mesh.outline.bridges import TURN, OnCircles
-from feti_homog.mesh.outline.curves import MATRIX, OUTSIDE, Curves, Numbering, backwards
-from feti_homog.mesh.outline.lines import EdgeSamples, Sampling, Segments
+from feti_homog.mesh.outline.lines import MATRIX, OUTSIDE, Curves, EdgeSamples, Sampling, Segments
 from feti_homog.mesh.sizes.graded_size import SizeField
 from feti_homog.microstructure.arrangement import Arrangement
 from feti_homog.microstructure.shapes.ellipses import Ellipses
@@ -49,13 +48,51 @@ class Outline:
         return np.isin(np.arange(len(self.around)), self.around)
 
 
+class Numbering:
+    """Number nodes: first the vertices (v, 2), found by position, then the nodes between."""
+
+    def __init__(self, vertices: Float) -> None:
+        self.vertices = vertices
+        self._tree = cKDTree(vertices)
+        self._between: list[Float] = []
+        self._count = len(vertices)
+
+    def along(self, points: Float, first: Int) -> Int:
+        """Assign numbers (n,) to the nodes `points` (n, 2) of curves from first[:-1] on, whose ends are vertices."""
+        is_end = np.zeros(len(points), bool)
+        is_end[first[:-1]] = is_end[first[1:] - 1] = True
+        number = np.empty(len(points), np.int64)
+        number[is_end] = self._tree.query(points[is_end])[1]
+        between = np.count_nonzero(~is_end)
+        number[~is_end] = np.arange(self._count, self._count + between)
+        self._count += between
+        self._between.append(points[~is_end])
+        return number
+
+    def points(self) -> Float:
+        """Positions (n, 2) of all nodes by number."""
+        return np.concatenate([self.vertices, *self._between])
+
+
 def images(arrangement: Arrangement) -> tuple[Float, Int, Int]:
     """Circles (k, 3) of the periodic images that reach into the cell, their fibres (k,), the circles around them (k,).
 
     Fibre by fibre, the circles of each image one after the other, from without.
     """
-    size = arrangement.size
-    outer, fibre = _outer_images(arrangement, size)
+    size, radii = arrangement.size, arrangement.outer_radii
+    rank = np.arange(len(radii))
+    if arrangement.mesh_order is not None:
+        rank[arrangement.mesh_order] = np.arange(len(rank))
+    circles, fibres = [], []
+    for step in product((-1, 0, 1), repeat=2):
+        centres = arrangement.centres + np.array(step) * size
+        outside = centres - np.clip(centres, 0, size)
+        inside = np.flatnonzero((outside**2).sum(axis=1) < radii**2)
+        circles.append(np.column_stack([centres[inside], radii[inside]]))
+        fibres.append(inside)
+    fibre = np.concatenate(fibres)
+    order = np.argsort(rank[fibre], kind="stable")
+    outer, fibre = np.concatenate(circles)[order], fibre[order]
     coated = arrangement.coated[fibre]
     inner = np.column_stack([outer[:, :2], arrangement.radii[fibre]])[coated]
     order, owner, around = nested(fibre, coated)
@@ -71,24 +108,6 @@ def nested(fibre: Int, coated: Bool) -> tuple[Int, Int, Int]:
     order = np.argsort(np.concatenate([place, place[coated] + 1]))
     around = np.concatenate([np.full(len(fibre), MATRIX), place[coated]])
     return order, np.concatenate([fibre, fibre[coated]])[order], around[order]
-
-
-def _outer_images(arrangement: Arrangement, size: Float) -> tuple[Float, Int]:
-    """Return those of the discs with their coatings."""
-    radii = arrangement.outer_radii
-    circles, fibre = [], []
-    for step in product((-1, 0, 1), repeat=2):
-        centres = arrangement.centres + np.array(step) * size
-        outside = centres - np.clip(centres, 0, size)
-        near = np.flatnonzero((outside**2).sum(axis=1) < radii**2)
-        circles.append(np.column_stack([centres[near], radii[near]]))
-        fibre.append(near)
-    owner = np.concatenate(fibre)
-    rank = np.arange(len(radii))
-    if arrangement.mesh_order is not None:
-        rank[arrangement.mesh_order] = np.arange(len(rank))
-    order = np.argsort(rank[owner], kind="stable")
-    return np.concatenate(circles)[order], owner[order]
 
 
 def crossings(circles: Float, axis: int, size: Float) -> Float:
@@ -139,10 +158,11 @@ def side_curves(
         along = begin[piece] + span[piece] * stations.share
         along[first[:-1]], along[first[1:] - 1] = begin, places[1:]
         node = numbering.along(on_side(along, axis, level), first)
-        # Counter-clockwise around the cell: along the coordinate at the bottom and at the right.
-        turned = np.full(len(span), low != (axis == 0))
+        if low != (axis == 0):
+            # Counter-clockwise around the cell: along the coordinate at the bottom and at the right.
+            node = node[(first[:-1] + first[1:] - 1)[piece] - np.arange(len(node))]
         straight, beyond = np.full(len(span), MATRIX), np.full(len(span), OUTSIDE)
-        parts.append(Curves(backwards(node, first, turned), first, straight, inside, beyond))
+        parts.append(Curves(node, first, straight, inside, beyond))
     return Curves.joined(parts)
 
 
@@ -197,12 +217,20 @@ def arcs_within(
     return whose[within], first[within], last[within]
 
 
-def marked(arrangement: Arrangement, marks: Mapping[int, Sequence[float]]) -> tuple[Int, Float]:
-    """Curve and angle in radians (t,) of the marks on curves that are there.
+def tip_vertices(
+    arrangement: Arrangement,
+    marks: Mapping[int, Sequence[float]],
+    vertices: Float,
+    at: Callable[[Int, Bool, Float], Float],
+) -> Float:
+    """Return the vertices (t, 2) that marks in degrees have become; missing curves have none.
 
-    k is the outer curve of fibre k, ~k that within its coating.
+    Mark k is on the outer curve of fibre k, ~k on the curve within its coating. at(fibres, within, angles) are the
+    places (t, 2) of marks on fibres (t,), within coatings (t,) or not.
     """
-    there = {*range(len(arrangement.radii)), *(~np.flatnonzero(arrangement.coated)).tolist()}
-    known = {curve: own for curve, own in marks.items() if curve in there}
-    curve = np.repeat(list(known), [len(own) for own in known.values()]).astype(int)
-    return curve, np.radians([mark for own in known.values() for mark in own])
+    curves = {*range(len(arrangement.radii)), *(~np.flatnonzero(arrangement.coated)).tolist()}
+    pairs = [(curve, mark) for curve, own in marks.items() if curve in curves for mark in own]
+    curve, mark = np.array([k for k, _ in pairs], np.int64), np.array([mark for _, mark in pairs])
+    places = at(np.where(curve < 0, ~curve, curve), curve < 0, np.radians(mark))
+    size = arrangement.size
+    return np.asarray(vertices[cKDTree(vertices % size, boxsize=size).query(places % size)[1]])

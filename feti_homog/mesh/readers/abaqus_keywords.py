@@ -68,6 +68,16 @@ class KeywordBlock:
     parameters: dict[str, str]
     rows: list[list[str]] = field(default_factory=list)
 
+    @classmethod
+    def begun(cls, number: int, line: str) -> KeywordBlock:
+        """Return the block of a keyword line: *ELEMENT, TYPE=CPE3 has the parameter TYPE."""
+        word, *rest = (part.strip() for part in line[1:].split(","))
+        try:
+            keyword = resolved(word)
+            return cls(number, word, keyword, _parameters(keyword, filter(None, rest)))
+        except ValueError as error:
+            raise MeshError(f"line {number}, *{word}: {error}") from None
+
     def parameter(self, name: str) -> str:
         """Return a parameter; a fault if it is missing."""
         if name not in self.parameters:
@@ -79,7 +89,7 @@ def blocks(text: str) -> Iterator[KeywordBlock]:
     """Yield the blocks of a file.
 
     Raises:
-        MeshError: a keyword is not known, or data stand before the first one.
+        MeshError: a keyword is unknown, or data stand before the first one.
     """
     block, open_line = None, ""
     for number, line in enumerate(map(str.strip, text.splitlines()), start=1):
@@ -88,28 +98,17 @@ def blocks(text: str) -> Iterator[KeywordBlock]:
         if line.startswith("*"):
             if block is not None:
                 yield block
-            block, open_line = _begun(number, line), line
+            block, open_line = KeywordBlock.begun(number, line), line
         elif block is None:
             raise MeshError(f"line {number}: data without a keyword: expected *NODE, *ELEMENT, ... before")
         elif open_line.endswith(","):
             open_line += line
-            block = _begun(block.number, open_line)
+            block = KeywordBlock.begun(block.number, open_line)
         else:
             open_line = ""
             block.rows.append([word.strip() for word in line.rstrip(", \t").split(",")])
     if block is not None:
         yield block
-
-
-def _begun(number: int, line: str) -> KeywordBlock:
-    """Return the block of a keyword line: *ELEMENT, TYPE=CPE3 has the parameter TYPE."""
-    word, *rest = (part.strip() for part in line[1:].split(","))
-    try:
-        keyword = resolved(word)
-        parameters = _parameters(keyword, filter(None, rest))
-    except ValueError as error:
-        raise MeshError(f"line {number}, *{word}: {error}") from None
-    return KeywordBlock(number, word, keyword, parameters)
 
 
 def resolved(word: str) -> str:
@@ -124,34 +123,29 @@ def resolved(word: str) -> str:
     if key in WHOLE or key.startswith(OTHERS):
         return WHOLE.get(key, "")
     # *ELEM is *ELEMENT, although *ELEMENT OUTPUT begins with it too.
-    longer = [name for name in (*WHOLE, *OTHERS) if key and name.startswith(key)]
-    found = {WHOLE.get(name, "") for name in longer if not any(name.startswith(own) for own in {*longer} - {name})}
-    if len(found) != 1:
-        what = "may be several keywords" if found else "unknown keyword"
-        raise ValueError(f"{what}: write it out, or delete it if it makes no nodes or elements")
-    return found.pop()
+    longer = {name for name in (*WHOLE, *OTHERS) if key and name.startswith(key)}
+    keywords = {WHOLE.get(name, "") for name in longer if not any(map(name.startswith, longer - {name}))}
+    if len(keywords) != 1:
+        fault = "may be several keywords" if keywords else "unknown keyword"
+        raise ValueError(f"{fault}: write it out, or delete it if it makes no nodes or elements")
+    return keywords.pop()
 
 
 def _parameters(keyword: str, words: Iterable[str]) -> dict[str, str]:
     """Return the parameters of a keyword by their full names; ValueError if one that is not read may matter."""
-    known = OF_SECTIONS if keyword.endswith("SECTION") else READ.get(keyword) or ()
-    found = {}
+    names = OF_SECTIONS if keyword.endswith("SECTION") else READ.get(keyword) or ()
+    values = {}
     for word in words:
         name, _, value = word.partition("=")
-        found[_parameter(name, known)] = name_of(value)
-    if READ.get(keyword) and (unread := [name for name in found if name not in known]):
+        name = name.strip().upper()
+        longer = [full for full in names if full.startswith(name)]
+        values[longer[0] if len(longer) == 1 and name not in names else name] = name_of(value)
+    if READ.get(keyword) and (unread := [name for name in values if name not in names]):
         raise ValueError(f"its parameter {toml_value(unread[0])} is not read: write nodes and elements out without it")
-    return found
-
-
-def _parameter(name: str, known: tuple[str, ...]) -> str:
-    """Return the full name of a parameter, in upper case, if it abbreviates a single known one."""
-    name = name.strip().upper()
-    whole = [own for own in known if own.startswith(name)]
-    return whole[0] if len(whole) == 1 and name not in known else name
+    return values
 
 
 def name_of(word: str) -> str:
-    """Return the name that a word is, in lower case unless it is quoted."""
+    """Return a name in lower case unless it is quoted."""
     word = word.strip()
     return word[1:-1] if word[:1] == '"' else word.lower()

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from feti_homog.errors import MeshError
-from feti_homog.mesh.readers.msh_sections import INT, SIZE, BinarySection, Section, chain, end_of
+from feti_homog.mesh.readers.scanner import INT, SIZE, Section, chain, end_of
 from feti_homog.schema.wording import toml_value
 from feti_homog.typing import Float, Int
 
@@ -34,7 +34,8 @@ NODES = np.array([KINDS[kind][3] if kind in KINDS else 0 for kind in range(max(K
 PARAMETERS = np.array([0, 1, 2, 0])
 
 HEADER = re.compile(rb"\$(\w+)[ \t\r]*$", re.MULTILINE)
-BEHIND = re.compile(rb"(\s*\$End\w+)?\s*")
+# Blanks, and the end of a section, before the next one.
+BETWEEN = re.compile(rb"(\s*\$End\w+)?+\s*+(?=\S)")
 NAME = re.compile(rb'^[ \t]*(\d{1,15})[ \t]+(-?\d{1,15})[ \t]+"([^"\n]*)"', re.MULTILINE)
 VERSIONS = {2.0: "2", 2.1: "2", 2.2: "2", 4.0: "4.0", 4.1: "4.1"}
 # Sections without nodes or elements.
@@ -60,6 +61,10 @@ class MshContent:
     groups: dict[tuple[int, int], tuple[int, ...]] = field(default_factory=dict)
     names: dict[tuple[int, int], str] = field(default_factory=dict)
 
+    def name(self, dimension: int, group: int) -> str:
+        """Return the name of a physical group, or its number."""
+        return self.names.get((dimension, group)) or f"number {group}"
+
 
 def read(content: bytes) -> MshContent:
     """Read the sections that make the mesh; OTHERS are passed over.
@@ -73,24 +78,24 @@ def read(content: bytes) -> MshContent:
         raise MeshError("format 1 of gmsh: save it in format 2.2 or 4.1")
     if not start.startswith((b"$MeshFormat", b"$Comments", b"$PhysicalNames")):
         raise MeshError("not a gmsh mesh file: it does not begin with $MeshFormat")
-    result, seen, place = MshContent(), set[str](), _behind(content, 0)
+    result, seen, place = MshContent(), set[str](), 0
     version, order = "", ""
-    while place < len(content):
-        name, place = _section(content, place)
+    while between := BETWEEN.match(content, place):
+        name, place = _section(content, between.end())
         if name in READERS:
             if not version or name in seen:
-                raise MeshError(
-                    f"${name}: it is there twice" if version else f"${name}: there is no $MeshFormat before"
-                )
-            place = _read_section(name, content, place, version, order, result)
+                fault = "it is there twice" if version else "there is no $MeshFormat before"
+                raise MeshError(f"${name}: {fault}")
+            section = Section(name, content, place, order, "i8" if name == "Elements" else "f8")
+            READERS[name](section, version, result)
+            place = section.end()
             seen.add(name)
-        else:
-            if name == "MeshFormat":
-                version, order = _format(content, place)
-            elif name == "PhysicalNames":
-                result.names |= _names(content, place)
-            place = end_of(name, content, place)
-        place = _behind(content, place)
+            continue
+        if name == "MeshFormat":
+            version, order = _format(content, place)
+        elif name == "PhysicalNames":
+            result.names |= _names(content, place)
+        place = end_of(name, content, place)
     return result
 
 
@@ -100,23 +105,9 @@ def _section(content: bytes, place: int) -> tuple[str, int]:
     name = "" if header is None else header[1].decode(errors="replace")
     if header is None or (name not in READERS and name not in OTHERS):
         line, words = content.count(b"\n", 0, place) + 1, content[place : place + 80].partition(b"\n")[0]
-        found = toml_value(words.decode(errors="replace").strip())
-        raise MeshError(f"line {line}: {found}: expected a section of a mesh, such as $Nodes, or $Comments")
+        text = toml_value(words.decode(errors="replace").strip())
+        raise MeshError(f"line {line}: {text}: expected a section of a mesh, such as $Nodes, or $Comments")
     return name, header.end() + 1
-
-
-def _behind(content: bytes, place: int) -> int:
-    """Return the first place that is neither blank nor the end of a section."""
-    found = BEHIND.match(content, place)
-    return place if found is None else found.end()
-
-
-def _read_section(name: str, content: bytes, start: int, version: str, order: str, result: MshContent) -> int:
-    """Read a section of numbers; the place in the file behind it."""
-    kind = "i8" if name == "Elements" else "f8"
-    section = BinarySection(name, content, start, order) if order else Section(name, content, start, kind)
-    READERS[name](section, version, result)
-    return section.end()
 
 
 def _format(content: bytes, start: int) -> tuple[str, str]:

@@ -15,11 +15,10 @@ from feti_homog.case.cell_section import Cell
 from feti_homog.errors import MeshError, escaped
 from feti_homog.mesh.coarse_mesh import CoarseMesh, areas, can_debond, edge_keys, edges, paired_sides, representatives
 from feti_homog.mesh.periodic_topology import Torus
-from feti_homog.mesh.readers import abaqus_file, bent_edges, gmsh_file, medit_file, mesh_checks, vtk_file, vtu_file
-from feti_homog.mesh.readers.bent_edges import with_bent_edges
+from feti_homog.mesh.readers import abaqus_file, gmsh_file, mesh_checks, vtk_file, vtu_file
 from feti_homog.mesh.readers.named_phases import Selectors, unknown_phases, with_phases
 from feti_homog.mesh.readers.raw_mesh import RawMesh, at
-from feti_homog.mesh.readers.round_interfaces import with_circles, with_ellipses
+from feti_homog.mesh.readers.round_interfaces import with_bent_edges, with_circles, with_ellipses
 from feti_homog.microstructure.shapes.ellipses import Ellipses
 from feti_homog.typing import Float, Int, Int32
 
@@ -28,7 +27,7 @@ LOADERS = {
     ".inp": abaqus_file.load,
     ".vtu": vtu_file.load,
     ".vtk": vtk_file.load,
-    ".mesh": medit_file.load,
+    ".mesh": vtk_file.load_medit,
 }
 # Sine of the angle at a node of the hull, and cosine between vectors of a lattice, that are zero but for rounding.
 STRAIGHT, RIGHT = 1e-5, 1e-6
@@ -61,7 +60,13 @@ def read(
         MeshError: with all faults of the first stage that has any: file, labels, shapes, middle nodes, connections,
             sides, debonded lines.
     """
-    raw, moved = _loaded(path, phases), 0.0
+    moved = 0.0
+    try:
+        raw = with_phases(LOADERS[path.suffix](path), phases)
+    except OSError as error:
+        raise MeshError(f"{path}: cannot be read: {error.strerror}") from None
+    except MeshError as error:
+        raise MeshError(*(f"{path.name}: {fault}" for fault in error.faults)) from None
     _refuse(path.name, mesh_checks.unlabelled(raw), unknown_phases(raw), mesh_checks.stray_lines(raw))
     _refuse(path.name, mesh_checks.not_finite(raw))
     if snap is not None:
@@ -73,17 +78,25 @@ def read(
 def made(raw: RawMesh, path: str, has_voids: bool = True) -> CoarseMesh:
     """Return the coarse mesh of triangles in phases; `path` names them in faults. Raises as `read`."""
     _refuse(path, mesh_checks.not_planar(raw), mesh_checks.flat(raw), mesh_checks.duplicate_nodes(raw))
-    raw = _turned(raw)
-    _refuse(path, bent_edges.faults(raw))
+    # All counter-clockwise; middle nodes are those of edges, whichever way these run.
+    clockwise = areas(raw.points[:, :2], raw.triangles) < 0
+    raw = replace(raw, triangles=np.where(clockwise[:, None], raw.triangles[:, ::-1], raw.triangles))
+    _refuse(path, mesh_checks.middle_nodes(raw))
     _refuse(path, _lattice(raw.points[:, :2], raw.triangles))
-    origin, size, plane = _on_rectangle(raw.points[:, :2])
+    origin = raw.points[:, :2].min(axis=0)
+    size = raw.points[:, :2].max(axis=0) - origin
+    plane = raw.points[:, :2] - origin
+    for level in (np.zeros(2), size):
+        plane = np.where(np.abs(plane - level) < mesh_checks.SAME_PLACE * size.max(), level, plane)
     corners = mesh_checks.missing_corners(plane, origin, size)
     if corners and (advice := _shift(plane, raw.triangles, size)):
         corners = [f"{corners[0]}; {advice}"]
     _refuse(path, mesh_checks.overlapping(raw), mesh_checks.hanging_nodes(raw, plane, size), corners)
     _refuse(path, mesh_checks.too_large(plane, raw.triangles, size))
     _refuse(path, mesh_checks.not_periodic(raw, plane, size), mesh_checks.unrefined_sides(plane, size))
-    mesh = _coarse_mesh(raw, _matched(plane, size), size)
+    for axis, low, high in paired_sides(plane, size):
+        plane[high, 1 - axis] = plane[low, 1 - axis]
+    mesh = _coarse_mesh(raw, plane, size)
     _refuse(path, mesh_checks.unmatched_sides(raw, mesh))
     _refuse(path, mesh_checks.islands(raw, mesh), mesh_checks.void_faults(raw, mesh, has_voids))
     _refuse(path, mesh_checks.cannot_debond(raw, mesh.debonded_edges, can_debond(mesh, mesh.debonded_edges)))
@@ -95,56 +108,17 @@ def made(raw: RawMesh, path: str, has_voids: bool = True) -> CoarseMesh:
     return replace(mesh, precedence=numbers)
 
 
-def _loaded(path: Path, phases: Selectors) -> RawMesh:
-    """Return the triangles of a file, as it has them, in the phases of the case."""
-    try:
-        return with_phases(LOADERS[path.suffix](path), phases)
-    except OSError as error:
-        raise MeshError(f"{path}: cannot be read: {error.strerror}") from None
-    except MeshError as error:
-        raise MeshError(*(f"{path.name}: {fault}" for fault in error.faults)) from None
-
-
 def _refuse(path: str, *faults: Sequence[str]) -> None:
     """Raise MeshError if there are faults."""
-    found = [fault for kind in faults for fault in kind]
-    if found:
-        raise MeshError(*(f"{path}: {fault}" for fault in found))
-
-
-def _turned(raw: RawMesh) -> RawMesh:
-    """Return the mesh with all triangles counter-clockwise.
-
-    Middle nodes are those of edges, whichever way these run.
-    """
-    clockwise = areas(raw.points[:, :2], raw.triangles) < 0
-    return replace(raw, triangles=np.where(clockwise[:, None], raw.triangles[:, ::-1], raw.triangles))
-
-
-def _on_rectangle(plane: Float) -> tuple[Float, Float, Float]:
-    """Origin and size (2,) of the bounding rectangle, and positions (n, 2) in it, exactly on its sides."""
-    origin = plane.min(axis=0)
-    size = plane.max(axis=0) - origin
-    moved = plane - origin
-    near = mesh_checks.SAME_PLACE * size.max()
-    moved[np.abs(moved) < near] = 0.0
-    return origin, size, np.where(np.abs(moved - size) < near, size, moved)
-
-
-def _matched(plane: Float, size: Float) -> Float:
-    """Positions whose partners on opposite sides have the same coordinate along them."""
-    plane = plane.copy()
-    for axis, low, high in paired_sides(plane, size):
-        plane[high, 1 - axis] = plane[low, 1 - axis]
-    return plane
+    if lines := [f"{path}: {fault}" for kind in faults for fault in kind]:
+        raise MeshError(*lines)
 
 
 def _coarse_mesh(raw: RawMesh, plane: Float, size: Float) -> CoarseMesh:
     """Return a checked mesh without circles."""
     names = [group[0] for group in raw.groups]
     phases = ("matrix", *sorted(set(names) - {"matrix"}))
-    place = {name: k for k, name in enumerate(phases)}
-    number = np.array([place[name] for name in names], dtype=np.int32)
+    number = np.array([phases.index(name) for name in names], np.int32)
     width, height = size.tolist()
     return CoarseMesh(
         width=width,
@@ -163,39 +137,34 @@ def _coarse_mesh(raw: RawMesh, plane: Float, size: Float) -> CoarseMesh:
 
 
 def snapped(raw: RawMesh, tolerance: float) -> tuple[RawMesh, float]:
-    """Return the mesh with its outer edges on the sides of a rectangle, and how far the farthest node has moved.
-
-    Nodes of the outer edges are opposite each other.
+    """Move the outer nodes onto the sides of a rectangle, opposite each other; also how far, at most.
 
     A side lies at the median of the nodes within `tolerance`, relative to the width, of the outermost. Partners, each
     other's nearest within the tolerance along the side, both move to the middle between them. Middle nodes of
-    second-order triangles are then midway between the ends of their edges on sides. What is farther stays where it is,
-    for the checks to report.
+    second-order triangles are then midway between the ends of their edges on sides. Nodes that are farther stay where
+    they are, for the checks to report.
     """
     plane = raw.points[:, :2].copy()
-    if not np.isfinite(plane).all():
+    pairs = edges(raw.triangles)
+    _, first, count = np.unique(edge_keys(pairs, len(plane)), return_index=True, return_counts=True)
+    outer = np.asarray(np.unique(pairs[first[count == 1]]), np.int64)
+    if not np.isfinite(plane).all() or not len(outer):
         return raw, 0.0
-    outer = _outer_nodes(raw)
     reach = tolerance * float(np.ptp(plane[:, 0]))
     sides = {}
     for axis in (0, 1):
         for extreme in (np.min, np.max):
             along = plane[outer, axis]
-            near = outer[np.abs(along - extreme(along)) <= reach]
-            plane[near, axis] = np.median(plane[near, axis])
-            sides[axis, extreme is np.max] = near
+            side = outer[np.abs(along - extreme(along)) <= reach]
+            plane[side, axis] = np.median(plane[side, axis])
+            sides[axis, extreme is np.max] = side
     for axis in (0, 1):
         _match(plane, sides[axis, False], sides[axis, True], 1 - axis, reach)
     moved = float(np.linalg.norm(plane - raw.points[:, :2], axis=1).max())
-    points = np.column_stack([plane, raw.points[:, 2]])
-    return _with_straight_sides(replace(raw, points=points), list(sides.values())), moved
-
-
-def _outer_nodes(raw: RawMesh) -> Int:
-    """Nodes of the edges that one triangle has."""
-    pairs = edges(raw.triangles)
-    _, first, count = np.unique(edge_keys(pairs, len(raw.points)), return_index=True, return_counts=True)
-    return np.asarray(np.unique(pairs[first[count == 1]]), np.int64)
+    points, middles = np.column_stack([plane, raw.points[:, 2]]), raw.middles
+    on_side = np.any([np.isin(middles.edges, side).all(axis=1) for side in sides.values()], axis=0)
+    straight = np.where(on_side[:, None], points[middles.edges].mean(axis=1), middles.points)
+    return replace(raw, points=points, middles=replace(middles, points=straight)), moved
 
 
 def _match(plane: Float, low: Int, high: Int, along: int, reach: float) -> None:
@@ -209,43 +178,26 @@ def _match(plane: Float, low: Int, high: Int, along: int, reach: float) -> None:
     plane[a, along] = plane[b, along] = (plane[a, along] + plane[b, along]) / 2
 
 
-def _with_straight_sides(raw: RawMesh, sides: list[Int]) -> RawMesh:
-    """Return the mesh with middle nodes on its sides midway between their ends."""
-    middles = raw.middles
-    on_side = np.zeros(len(middles.tags), bool)
-    for side in sides:
-        on_side |= np.isin(middles.edges, side).all(axis=1)
-    midway = raw.points[middles.edges].mean(axis=1)
-    return replace(raw, middles=replace(middles, points=np.where(on_side[:, None], midway, middles.points)))
-
-
 def _lattice(plane: Float, triangles: Int32) -> list[str]:
     """Return the fault of triangles that fill a parallelogram or a hexagon, with the rectangle of the same lattice."""
     hull = ConvexHull(plane)
-    corners = _corners(plane[hull.vertices])
+    corners = plane[hull.vertices]
+    before, after = corners - np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0) - corners
+    turn = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+    # Nodes on straight sides are no corners.
+    corners = corners[turn > STRAIGHT * np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)]
     if len(corners) not in (4, 6) or np.abs(areas(plane, triangles)).sum() < FILLED * hull.volume:
         return []
     sides = np.roll(corners, -1, axis=0) - corners
     half = len(sides) // 2
-    size = np.abs(sides).max()
-    if np.abs(sides[:half] + sides[half:]).max() > STRAIGHT * size or _is_upright(sides[:half]):
+    lengths = np.abs(sides[:half])
+    is_upright = half == 2 and bool((lengths.min(axis=1) <= UPRIGHT * lengths.max(axis=1)).all())
+    if np.abs(sides[:half] + sides[half:]).max() > STRAIGHT * np.abs(sides).max() or is_upright:
         return []
     # Opposite sides of the hexagon are these vectors apart.
     first, second = (sides[0], sides[1]) if half == 2 else (sides[0] + sides[1], sides[1] + sides[2])
     name = "parallelogram" if half == 2 else "hexagon"
     return [f"the cell is a {name}, expected a rectangle: {_rectangle(first, second)}"]
-
-
-def _corners(hull: Float) -> Float:
-    """Corners (k, 2) of a convex hull, counter-clockwise, without the nodes on its straight sides."""
-    before, after = hull - np.roll(hull, 1, axis=0), np.roll(hull, -1, axis=0) - hull
-    turn = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
-    return np.asarray(hull[turn > STRAIGHT * np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)])
-
-
-def _is_upright(sides: Float) -> bool:
-    """Return whether two sides (2, 2) are along the axes."""
-    return len(sides) == 2 and bool((np.abs(sides).min(axis=1) <= UPRIGHT * np.abs(sides).max(axis=1)).all())
 
 
 def _rectangle(first: Float, second: Float) -> str:

@@ -5,12 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
 from feti_homog.errors import MeshError
-from feti_homog.mesh.coarse_mesh import areas, edges
+from feti_homog.mesh.coarse_mesh import areas, edges, twins
 from feti_homog.mesh.periodic_topology import components
 from feti_homog.mesh.readers.raw_mesh import DEBONDED, RawMesh, first_of
 from feti_homog.microstructure.phase_names import PHASE, VOID
@@ -31,33 +30,32 @@ def with_phases(mesh: RawMesh, phases: Selectors) -> RawMesh:
     Raises:
         MeshError: a name or number that no element has; one line for each.
     """
-    pairs = [(phase, own) for phase, selected in phases.items() for own in selected]
-    faults = list(filter(None, (_fault(mesh, *pair) for pair in pairs)))
-    if faults:
+    pairs = [(phase, name) for phase, selected in phases.items() for name in selected]
+    if faults := _unknown_names(mesh, pairs):
         raise MeshError(*faults)
-    wanted = {_key(own): phase for phase, own in pairs if phase != DEBONDED}
+    phase_of = {_key(name): phase for phase, name in pairs if phase != DEBONDED}
     lines = set(map(_key, phases.get(DEBONDED, ())))
     curves = {DEBONDED if _key(name) in lines else name: ends for name, ends in mesh.curves.items()}
-    groups = map(partial(_named, wanted), mesh.groups, mesh.aliases or ((),) * len(mesh.groups))
-    return replace(mesh, groups=tuple(groups), curves=curves)
+    both = zip(mesh.groups, mesh.aliases or ((),) * len(mesh.groups), strict=True)
+    groups = tuple(_selecting(names, phase_of) or _selecting(aliases, phase_of) or names for names, aliases in both)
+    return replace(mesh, groups=groups, curves=curves)
 
 
-def _named(wanted: Mapping[str, str], names: tuple[str, ...], aliases: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the phases that select one of the names of a group, else of its aliases; else its names."""
-    return _phases(names, wanted) or _phases(aliases, wanted) or names
+def _unknown_names(mesh: RawMesh, pairs: Iterable[tuple[str, str | int]]) -> list[str]:
+    """List names and numbers that no element has, or no line."""
+    faults = []
+    for phase, name in pairs:
+        of_curves = phase == DEBONDED
+        if _key(name) not in map(_key, _names(mesh, of_curves)):
+            selected = f"[cell.phases] {toml_key(phase)} = {toml_value(name)}"
+            kind = "lines" if of_curves else "elements"
+            faults.append(f"{selected}: no {kind} of that name; {known_names(mesh, of_curves)}")
+    return faults
 
 
-def _fault(mesh: RawMesh, phase: str, own: str | int) -> str:
-    """Return that nothing has the name or number `own`, if it is so."""
-    if _key(own) in map(_key, _names(mesh, phase == DEBONDED)):
-        return ""
-    what = "lines" if phase == DEBONDED else "elements"
-    given = f"[cell.phases] {toml_key(phase)} = {toml_value(own)}"
-    return f"{given}: no {what} of that name; {known_names(mesh, phase == DEBONDED)}"
-
-
-def _phases(names: Iterable[str], wanted: Mapping[str, str]) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(wanted[_key(name)] for name in names if _key(name) in wanted))
+def _selecting(names: tuple[str, ...], phase_of: Mapping[str, str]) -> tuple[str, ...]:
+    """Return the phases that select one of the names, each once."""
+    return tuple(dict.fromkeys(phase_of[_key(name)] for name in names if _key(name) in phase_of))
 
 
 def _key(name: str | int) -> str:
@@ -66,16 +64,15 @@ def _key(name: str | int) -> str:
 
 
 def unknown_phases(mesh: RawMesh) -> list[str]:
-    """Physical surfaces whose name is not a phase, and a missing matrix."""
+    """List physical surfaces whose name is not a phase, and a missing matrix."""
     names = list(dict.fromkeys(name for group in mesh.groups for name in group))
     has_matrix = "matrix" in names
-    known = 'expected "matrix", "fibre", "glass", ... of letters, digits, _ and -, "fibre:2"'
-    strange = [name for name in names if not PHASE.fullmatch(name)]
+    expected = 'expected "matrix", "fibre", "glass", ... of letters, digits, _ and -, "fibre:2"'
     # Without a matrix all groups are named anew, and numbers need no further word.
     faults = [
-        f'{mesh.container} "{name}" is not a phase: {HOLE if name == VOID else known}'
-        for name in strange
-        if has_matrix or not NUMBER.fullmatch(name)
+        f'{mesh.container} "{name}" is not a phase: {HOLE if name == VOID else expected}'
+        for name in names
+        if not PHASE.fullmatch(name) and (has_matrix or not NUMBER.fullmatch(name))
     ]
     if not has_matrix:
         faults.append(f'no {mesh.container} is named "matrix"')
@@ -117,9 +114,7 @@ def _surrounding(mesh: RawMesh) -> str:
     if not np.isfinite(middles).all():
         return ""
     key = (np.rint(middles * SIDE).astype(np.int64) % SIDE) @ [SIDE, 1]
-    order = np.argsort(key, kind="stable")
-    same = np.flatnonzero(np.diff(key[order]) == 0)
-    one, other = order[same], order[same + 1]
+    one, other = twins(key)
     alike = number[one // 3] == number[other // 3]
     one, other, count = one[alike], other[alike], len(mesh.triangles)
     step = np.rint(middles[one] - middles[other]).astype(np.int64)

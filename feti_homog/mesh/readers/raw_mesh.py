@@ -1,18 +1,23 @@
-"""Triangles of three and of six nodes, as a file has them: read block by block, put together as one mesh."""
+"""Triangles of three and six nodes, as a file has them, put together as one mesh; quadrilaterals are cut in two."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components, dijkstra
 
 from feti_homog.mesh.coarse_mesh import edge_keys
-from feti_homog.mesh.readers.quadrilaterals import in_triangles
 from feti_homog.typing import Float, Int, Int32
 
 # The physical curve of the edges that are debonded from the start.
 DEBONDED = "debonded"
+# The triangles on either side of the diagonal 02, and on either side of the diagonal 13.
+HALVES = np.array([[[0, 1, 2], [0, 2, 3]], [[0, 1, 3], [1, 2, 3]]])
+# Ratio of the smaller triangles by which the diagonal that leaves the larger one is preferred to alternate ones.
+MUCH_LARGER = 2.0
 
 
 @dataclass(frozen=True)
@@ -31,20 +36,20 @@ class MiddleNodes:
 
     @classmethod
     def none(cls) -> MiddleNodes:
-        """Return those of triangles of three nodes."""
+        """Return the empty list, for triangles of three nodes."""
         return cls(np.zeros((0, 2), np.int32), np.zeros(0, np.int64), np.zeros((0, 3)))
 
     def between(self, pairs: Int32) -> Float:
         """(p, 2) the middle node between each pair (p, 2) of corner nodes; NaN where there is none."""
         nodes = int(max(self.edges.max(initial=0), pairs.max(initial=0))) + 1
         keys, first = np.unique(edge_keys(self.edges, nodes), return_index=True)
-        wanted = edge_keys(pairs, nodes)
-        found = np.full((len(pairs), 2), np.nan)
+        sought = edge_keys(pairs, nodes)
+        middle = np.full((len(pairs), 2), np.nan)
         if len(keys):
-            place = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
-            known = keys[place] == wanted
-            found[known] = self.points[first[place[known]], :2]
-        return found
+            place = np.minimum(np.searchsorted(keys, sought), len(keys) - 1)
+            exists = keys[place] == sought
+            middle[exists] = self.points[first[place[exists]], :2]
+        return middle
 
 
 @dataclass(frozen=True)
@@ -109,8 +114,11 @@ def first_of(names: Iterable[str], total: int, shown: int = 3) -> str:
 class Block:
     """m triangles or quadrilaterals of a file.
 
-    Their numbers (m,), the group (m,) of each, and the numbers of their nodes: the corners, then the middles of the
-    edges 01, 12, ... of second-order ones, then what is inside; (m, 3) or (m, 6), (m, 4), (m, 8) or (m, 9).
+    Attributes:
+        tags: (m,) their numbers.
+        nodes: (m, 3), (m, 6), (m, 4), (m, 8) or (m, 9) the numbers of their nodes: corners, then middles of the edges
+            01, 12, ... of second-order ones, then inner ones.
+        group: (m,) of each.
     """
 
     tags: Int
@@ -122,12 +130,6 @@ class Block:
         """(m, 3) or (m, 4)."""
         return self.nodes[:, : 3 if self.nodes.shape[1] in (3, 6) else 4]
 
-    @property
-    def middles(self) -> Int:
-        """(m, 3) or (m, 4) of second-order ones, (m, 0) of others."""
-        count = self.corners.shape[1]
-        return self.nodes[:, count : 2 * count]
-
 
 def assembled(
     node_tags: Int,
@@ -138,33 +140,43 @@ def assembled(
     containers: tuple[str, str] = ("physical surface", "physical curve"),
     aliases: Sequence[tuple[str, ...]] = (),
 ) -> RawMesh:
-    """Return the mesh of the blocks, one at least, with the corner nodes that they use.
+    """Return the mesh of blocks, one at least, with the corner nodes that they use.
 
     Args:
-        node_tags, points: (n,) and (n, 3) numbers and positions of the file's nodes, all that the blocks have among
-            them.
+        node_tags, points: (n,) and (n, 3) numbers and positions of all nodes in the file.
         groups: the names of each group.
         curves, containers, aliases: as in `RawMesh`, surfaces first.
     """
     order = np.argsort(node_tags)
-    points, known = points[order], node_tags[order]
-    sides = [(block.corners, block.middles) for block in blocks if block.middles.size]
-    blocks = _in_triangles(blocks, known, points)
-    used, triangles = np.unique(np.concatenate([block.nodes for block in blocks]), return_inverse=True)
-    bent = [np.stack([nodes, np.roll(nodes, -1, axis=1)], axis=2).reshape(-1, 2) for nodes, _ in sides]
-    middles = np.concatenate([np.zeros(0, np.int64), *(own.ravel() for _, own in sides)])
+    points, tags = points[order], node_tags[order]
+    edges, middles = [np.zeros((0, 2), np.int64)], [np.zeros(0, np.int64)]
+    triangles, quads = list[tuple[Int, Int, Int]](), list[tuple[Int, Int, Int]]()
+    for block in blocks:
+        count = block.corners.shape[1]
+        bent = block.nodes[:, count : 2 * count]
+        if bent.size:
+            edges.append(np.stack([block.corners, np.roll(block.corners, -1, axis=1)], axis=2).reshape(-1, 2))
+            middles.append(bent.ravel())
+        (triangles if count == 3 else quads).append((block.tags, block.corners, block.group))
+    if quads:
+        numbers, corners, group = (np.concatenate(parts) for parts in zip(*quads, strict=True))
+        halves = tags[in_triangles(np.searchsorted(tags, corners), points)].reshape(-1, 3)
+        triangles.append((numbers.repeat(2), halves, group.repeat(2)))
+    numbers, corners, group = (np.concatenate(parts) for parts in zip(*triangles, strict=True))
+    used, inner = np.unique(corners, return_inverse=True)
+    middle = np.concatenate(middles)
     return RawMesh(
         node_tags=used,
-        points=points[np.searchsorted(known, used)],
-        element_tags=np.concatenate([block.tags for block in blocks]),
-        triangles=triangles.reshape(-1, 3).astype(np.int32),
-        group=np.concatenate([block.group for block in blocks]),
+        points=points[np.searchsorted(tags, used)],
+        element_tags=numbers,
+        triangles=inner.reshape(-1, 3).astype(np.int32),
+        group=group,
         groups=tuple(groups),
         curves=curves,
         middles=MiddleNodes(
-            edges=np.searchsorted(used, np.concatenate([np.zeros((0, 2), np.int64), *bent])).astype(np.int32),
-            tags=middles,
-            points=points[np.searchsorted(known, middles)],
+            edges=np.searchsorted(used, np.concatenate(edges)).astype(np.int32),
+            tags=middle,
+            points=points[np.searchsorted(tags, middle)],
         ),
         container=containers[0],
         curve_container=containers[1],
@@ -172,12 +184,29 @@ def assembled(
     )
 
 
-def _in_triangles(blocks: Sequence[Block], known: Int, points: Float) -> list[Block]:
-    """Return triangles of three nodes; two triangles for each quadrilateral come last."""
-    found = [replace(block, nodes=block.corners) for block in blocks]
-    quads = [block for block in found if block.nodes.shape[1] == 4]
-    if not quads:
-        return found
-    tags, nodes, group = (np.concatenate([getattr(q, name) for q in quads]) for name in ("tags", "nodes", "group"))
-    halves = known[in_triangles(np.searchsorted(known, nodes), points)].reshape(-1, 3)
-    return [b for b in found if b.nodes.shape[1] == 3] + [Block(tags.repeat(2), halves, group.repeat(2))]
+def in_triangles(corners: Int, points: Float) -> Int:
+    """Cut quadrilaterals (m, 4), with corners among points (n, 2 or 3), into two triangles (m, 2, 3) each.
+
+    Diagonals join nodes that an even number of sides parts from the first node of connected quadrilaterals, so that
+    they alternate in a grid: parallel ones couple stretch and shear.  The cut depends on places, not on numbers.  Where
+    such a diagonal leaves a much smaller triangle than the other one, or sides do not tell, the better one is taken.
+    """
+    x, y = points[corners].T[:2]  # (4, m)
+
+    def area(i: int, j: int, k: int) -> Float:
+        return np.asarray((x[j] - x[i]) * (y[k] - y[i]) - (x[k] - x[i]) * (y[j] - y[i]))
+
+    sense = np.sign(area(0, 1, 2) + area(0, 2, 3))
+    first, second = (np.minimum(*(sense * area(*half) for half in pair)) for pair in HALVES.tolist())
+    used, inner = np.unique(corners, return_inverse=True)
+    n, inner = len(used), inner.reshape(-1, 4)
+    ends = inner.ravel(), np.roll(inner, -1, axis=1).ravel()
+    sides = coo_matrix((np.ones(len(ends[0])), ends), shape=(n, n)).tocsr()
+    order = np.lexsort(points[used, :2].T)
+    part = connected_components(sides, directed=False)[1]
+    start = order[np.unique(part[order], return_index=True)[1]]
+    away = dijkstra(sides, directed=False, indices=start, unweighted=True, min_only=True)
+    even = np.asarray(away % 2 == 0)[inner]
+    preferred = np.where((even != np.roll(even, 1, axis=1)).all(axis=1), np.where(even[:, 0], 1, -1), 0)
+    limit = np.where(preferred == 0, 1.0, MUCH_LARGER**preferred)
+    return np.take_along_axis(corners[:, None], HALVES[(second > limit * first).astype(int)], axis=2)

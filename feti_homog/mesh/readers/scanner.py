@@ -1,4 +1,7 @@
-"""Words and numbers of a file, taken one after the other; nothing is allocated that its length does not bound."""
+"""Numbers and words of mesh files, taken one after the other, from text or binary content.
+
+Content is data: nothing is executed, and nothing allocated that the length of the file does not bound.
+"""
 
 from __future__ import annotations
 
@@ -10,18 +13,25 @@ from itertools import islice
 from typing import Any, NoReturn
 
 import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import breadth_first_order
 
 from feti_homog.errors import MeshError
 from feti_homog.schema.wording import toml_value
+from feti_homog.typing import Float, Int
 
 Numbers = np.ndarray[Any, Any]
 
 WORD = re.compile(rb"\S+")
-# The first word that is no number, of those that are read as whole or as real ones.
+# The first word that is no number, where whole or real numbers are read.
 WRONG_WORD = {
     "i8": re.compile(rb"(?<!\S)(?![-+]?\d+(?!\S))\S+"),
     "f8": re.compile(rb"(?i)(?<!\S)(?![-+]?((\d+(\.\d*)?|\.\d+)(e[-+]?\d+)?|nan|inf)(?!\S))\S+"),
 }
+# Whole numbers in binary .msh files: C's int and size_t.
+INT, SIZE = "i4", "u8"
+# Whole numbers from here on are not exact as floating-point numbers.
+LARGEST = 2**53
 
 
 class NotANumber(ValueError):
@@ -35,10 +45,10 @@ class NotANumber(ValueError):
 
 
 def numbers(text: bytes, kind: str) -> Numbers:
-    """Return the numbers that a text consists of, as whole (`i8`) or as real ones (`f8`).
+    """Convert text into numbers, whole (`i8`) or real (`f8`).
 
     Raises:
-        NotANumber: something else is in it.
+        NotANumber: another word is in it.
     """
     if not text.strip():
         return np.zeros(0, kind)
@@ -51,7 +61,7 @@ def numbers(text: bytes, kind: str) -> Numbers:
 
 
 class Scanner:
-    """Take lines, words and arrays of a file, of text or with arrays in binary form, most significant byte first."""
+    """Take lines, words and arrays of a file; binary arrays have the most significant byte first."""
 
     def __init__(self, content: bytes) -> None:
         self.content, self.place, self.is_binary = content.removeprefix(codecs.BOM_UTF8), 0, False
@@ -68,14 +78,14 @@ class Scanner:
 
     def word(self) -> str:
         """Take the next word; empty at the end of the file."""
-        found = WORD.search(self.content, self.place)
-        self.place = len(self.content) if found is None else found.end()
-        return "" if found is None else found[0].decode(errors="replace")
+        match = WORD.search(self.content, self.place)
+        self.place = len(self.content) if match is None else match.end()
+        return "" if match is None else match[0].decode(errors="replace")
 
     def follows(self, word: str) -> bool:
-        """Return whether the next word is this one."""
-        found = WORD.search(self.content, self.place)
-        return found is not None and found[0].upper() == word.encode()
+        """Return whether the next word is `word`."""
+        match = WORD.search(self.content, self.place)
+        return match is not None and match[0].upper() == word.encode()
 
     def count(self, word: str) -> int:
         """Return the number of values that a word announces."""
@@ -105,6 +115,120 @@ class Scanner:
         return values
 
     def refuse(self, fault: str) -> NoReturn:
-        """Raise MeshError with the line of the file that has been reached."""
+        """Raise MeshError with the line that has been reached."""
         line = self.content[: self.place].rstrip().count(b"\n") + 1
         raise MeshError(fault if self.is_binary else f"line {line}: {fault}")
+
+
+class Section:
+    """Take the numbers of a section `$name` of a .msh file, which begin at `start` in its content.
+
+    Text is read at once, as whole (`i8`) or real numbers (`f8`). A binary file has the byte order `<` or `>`; its
+    numbers are read as they are taken.
+    """
+
+    def __init__(self, name: str, content: bytes, start: int, order: str, kind: str) -> None:
+        self.name, self.content, self.order, self.place = name, content, order, start
+        if order:
+            return
+        self.stop, self.place = end_of(name, content, start), 0
+        try:
+            self.values = numbers(content[start : self.stop], kind)
+        except NotANumber as error:
+            line = content.count(b"\n", 0, start + error.place) + 1
+            self.refuse(f"line {line}, {error}")
+
+    def refuse(self, fault: str) -> NoReturn:
+        """Raise MeshError with the name of the section."""
+        raise MeshError(f"${self.name}: {fault}")
+
+    def take(self, count: int, kind: np.dtype[Any]) -> Numbers:
+        """Take (count,) numbers, of a NumPy type in a binary file."""
+        size = kind.itemsize if self.order else 1
+        remaining = (len(self.content if self.order else self.values) - self.place) // size
+        if not 0 <= count <= remaining:
+            self.refuse(f"{count} numbers should follow, and {remaining} do: the file is damaged or broken off")
+        start, self.place = self.place, self.place + count * size
+        return np.frombuffer(self.content[start : self.place], kind) if self.order else self.values[start : self.place]
+
+    def reals(self, count: int) -> Float:
+        """Take (count,) real numbers."""
+        return np.asarray(self.take(count, np.dtype(f"{self.order}f8")), float)
+
+    def records(self, count: int, reals: int, kind: str = INT) -> tuple[Int, Float]:
+        """Take (count,) whole numbers and, after each, real ones (count, reals)."""
+        pair = np.dtype([("whole", f"{self.order}{kind}"), ("reals", f"{self.order}f8", (reals,))])
+        if self.order:
+            taken = self.take(count, pair)
+            return self.checked(taken["whole"]), taken["reals"].astype(float)
+        rows = self.take(count * (1 + reals), pair).reshape(count, 1 + reals)
+        return self.checked(rows[:, 0]), rows[:, 1:]
+
+    def whole(self, count: int, kind: str = INT) -> Int:
+        """Take (count,) whole numbers, of type `kind` in a binary file."""
+        return self.records(count, 0, kind)[0]
+
+    def count(self) -> int:
+        """Take one whole number, a count of entries."""
+        return int(self.whole(1, SIZE)[0])
+
+    def line(self) -> int:
+        """Take one whole number, a line of text in binary files too."""
+        if not self.order:
+            return self.count()
+        stop = self.content.find(b"\n", self.place, self.place + 30)
+        text = self.content[self.place : stop].strip()
+        if not re.fullmatch(rb"\d{1,15}", text):
+            self.refuse("there is no line with a count at its beginning")
+        self.place = stop + 1
+        return int(text)
+
+    def rest(self) -> Numbers:
+        """Return all numbers that follow, as C's int in a binary file, where they go on to the end of the file."""
+        if not self.order:
+            return self.values[self.place :]
+        count = (len(self.content) - self.place) // 4
+        return np.frombuffer(self.content, f"{self.order}i4", count, self.place).astype(np.int64)
+
+    def skip(self, count: int) -> None:
+        """Leave out the first numbers of `rest`."""
+        self.place += count * (4 if self.order else 1)
+
+    def end(self) -> int:
+        """Return the place in the file after the numbers, all of which must have been taken."""
+        if self.order:
+            if re.compile(rb"\s*\$End" + self.name.encode()).match(self.content, self.place) is None:
+                self.refuse(f"there is no $End{self.name} after the numbers that its counts announce")
+            return self.place
+        if self.place < len(self.values):
+            self.refuse(f"{len(self.values) - self.place} numbers are left after those that its counts announce")
+        return self.stop
+
+    def checked(self, values: Numbers) -> Int:
+        """Convert numbers into whole ones."""
+        if len(values) == 0 or (np.abs(values.max()) < LARGEST and np.abs(values.min()) < LARGEST):
+            whole = values.astype(np.int64)
+            if np.array_equal(whole, values):
+                return whole
+        bad = next(value for value in values.tolist() if not (abs(value) < LARGEST and value == int(value)))
+        self.refuse(f"{bad:g}: expected a whole number of at most 15 digits")
+
+
+def end_of(name: str, content: bytes, start: int) -> int:
+    """Return the place of the line `$Endname` from `start` on."""
+    stop = content.find(f"\n$End{name}".encode(), start - 1)
+    if stop < 0:
+        raise MeshError(f"${name}: there is no $End{name}: the file is damaged or broken off")
+    return stop
+
+
+def chain(following: Int) -> Int:
+    """Return the indices met from 0 on, in order.
+
+    following[i] comes after i; that of the last is out of range.
+    """
+    size = len(following)
+    onward = np.clip(following, 0, size)
+    graph = csr_array((np.ones(size), onward, np.append(np.arange(size + 1), size)), shape=(size + 1, size + 1))
+    met = breadth_first_order(graph, 0, return_predecessors=False)
+    return np.asarray(met[met < size], np.int64)

@@ -23,15 +23,8 @@ NAMES |= {34: "triangles of seven nodes", 42: "polyhedra", 69: "triangles of any
 PHASE = "phase"
 # Cell data by which other programs number materials, in the order of precedence.
 NUMBERS = (
-    "medit:ref",
-    "gmsh:physical",
-    "CellEntityIds",
-    "mat_id",
-    "MaterialIds",
-    "material",
-    "cell_tags",
-    "region",
-    "gmsh:geometrical",
+    *("medit:ref", "gmsh:physical", "CellEntityIds", "mat_id", "MaterialIds"),
+    *("material", "cell_tags", "region", "gmsh:geometrical"),
 )
 MOST_PHASES = 10**9
 
@@ -65,20 +58,19 @@ class Grid:
 def mesh_of(grid: Grid) -> RawMesh:
     """Return the triangles and the lines of a grid.
 
-    Its cell data `phase` are 0 in the matrix, 1 in phase fibre, k in fibre:k; in their place the groups are those of
-    one of NUMBERS, or of the only cell data of whole numbers. Its cell data `debonded`, if it has them, are 1 on lines
+    Its cell data `phase` are 0 in the matrix, 1 in phase fibre, k in fibre:k; in their place groups come from one of
+    NUMBERS, or from the only cell data of whole numbers. Cell data `debonded`, if there are any, are 1 on lines
     that are debonded from the start.
 
     Raises:
         MeshError: it has other cells or no phases, or is damaged.
     """
-    faults = _misfits(grid)
-    if not faults:
-        grid = _in_common_types(grid)
-        faults = _other_cells(grid) + _unnumbered(grid)
-    if faults:
+    if faults := _misfits(grid):
         raise MeshError(*faults)
-    name = _numbers_name(grid)
+    grid = _in_common_types(grid)
+    name = _numbers_name(grid.data)
+    if faults := _other_cells(grid) + _unnumbered(grid, name):
+        raise MeshError(*faults)
     groups = np.ravel(grid.data[name]).astype(np.int64)
     is_triangle = np.isin(grid.types, [*TRIANGLES])
     values, group = np.unique(groups[is_triangle], return_inverse=True)
@@ -86,14 +78,22 @@ def mesh_of(grid: Grid) -> RawMesh:
     place[is_triangle] = group
     blocks = []
     for kind, count in TRIANGLES.items():
-        own = np.flatnonzero(grid.types == kind)
-        if len(own):
-            blocks.append(Block(grid.first + own, grid.nodes_of(own, count), place[own]))
+        cells = np.flatnonzero(grid.types == kind)
+        if len(cells):
+            blocks.append(Block(grid.first + cells, grid.nodes_of(cells, count), place[cells]))
     aliases = [(f"number {k}",) for k in values.tolist()]
     phases = [(("matrix", "fibre")[k] if k < 2 else f"fibre:{k}",) for k in values.tolist()]
     named, containers = (phases if name == PHASE else aliases), (f"value of {name}", "cells")
     tags = grid.first + np.arange(len(grid.points))
     return assembled(tags, grid.points, blocks, named, _curves(grid, groups, name == PHASE), containers, aliases)
+
+
+def _numbers_name(data: Mapping[str, Numbers]) -> str:
+    """Return the name of the cell data with the phase of an element; empty if there are none."""
+    if named := [name for name in (PHASE, *NUMBERS) if name in data]:
+        return named[0]
+    whole = [name for name, own in data.items() if name != DEBONDED and own.ndim == 1 and own.dtype.kind in "iu"]
+    return whole[0] if len(whole) == 1 else ""
 
 
 def _misfits(grid: Grid) -> list[str]:
@@ -105,11 +105,8 @@ def _misfits(grid: Grid) -> list[str]:
     if len(bad):
         cell, node = np.searchsorted(np.cumsum(grid.counts), bad[0], side="right"), grid.nodes[bad[0]] + grid.first
         return [f"cell {cell + grid.first} has the node {node}: expected {grid.first} to {last}"]
-    return [
-        f"cell data {name}: {len(values)} values for {count} cells"
-        for name, values in grid.data.items()
-        if len(values) != count
-    ]
+    sizes = {name: len(values) for name, values in grid.data.items()}
+    return [f"cell data {name}: {size} values for {count} cells" for name, size in sizes.items() if size != count]
 
 
 def _in_common_types(grid: Grid) -> Grid:
@@ -127,25 +124,24 @@ def _in_common_types(grid: Grid) -> Grid:
 
 def _other_cells(grid: Grid) -> list[str]:
     """List cells of types that cannot be used, cells with a wrong number of nodes, and the lack of triangles."""
-    known, counts, faults = TRIANGLES | LINES, grid.counts, []
+    usable, counts, faults = TRIANGLES | LINES, grid.counts, []
     for kind in np.unique(grid.types).tolist():
-        own = np.flatnonzero(grid.types == kind)
-        wrong = own[counts[own] != known.get(kind, 0)]
-        if kind not in known and kind not in POINTS:
-            words = f"{len(own)} cells are {NAMES.get(kind, f'of type {kind}')}, the first is number"
+        cells = np.flatnonzero(grid.types == kind)
+        wrong = cells[counts[cells] != usable.get(kind, 0)]
+        if kind not in usable and kind not in POINTS:
+            cells_of_type = f"{len(cells)} cells are {NAMES.get(kind, f'of type {kind}')}, the first is number"
             expected = "only triangles of three or six nodes and quadrilaterals of four, eight or nine can be used"
-            faults.append(f"{words} {own[0] + grid.first}: {expected}")
-        elif kind in known and len(wrong):
+            faults.append(f"{cells_of_type} {cells[0] + grid.first}: {expected}")
+        elif kind in usable and len(wrong):
             cell = f"cell {wrong[0] + grid.first}, of type {kind}, has {counts[wrong[0]]} nodes"
-            faults.append(f"{cell}: expected {known[kind]}")
+            faults.append(f"{cell}: expected {usable[kind]}")
     if not faults and not np.isin(grid.types, [*TRIANGLES]).any():
         faults.append("no triangles in it")
     return faults
 
 
-def _unnumbered(grid: Grid) -> list[str]:
-    """List the lack of phases, and values that are no numbers of phases."""
-    name = _numbers_name(grid)
+def _unnumbered(grid: Grid, name: str) -> list[str]:
+    """List the lack of phases, and values of the cell data `name` that are no numbers of phases."""
     if not name:
         expected = "expected 0 in the matrix, 1 in phase fibre, 2 in fibre:2, ..."
         return [f"no cell data named {PHASE}, but {', '.join(grid.data) or 'none'}: {expected}"]
@@ -156,32 +152,20 @@ def _unnumbered(grid: Grid) -> list[str]:
     return [f"cell data {name} = {bad[0]:g}: expected 0, 1, 2, ... below {MOST_PHASES}"] if len(bad) else []
 
 
-def _numbers_name(grid: Grid) -> str:
-    """Return the name of the cell data with the phase of an element; empty if there are none."""
-    if known := [name for name in (PHASE, *NUMBERS) if name in grid.data]:
-        return known[0]
-    whole = [
-        name
-        for name, values in grid.data.items()
-        if name != DEBONDED and np.size(values) == len(values) and values.dtype.kind in "iu"
-    ]
-    return whole[0] if len(whole) == 1 else ""
-
-
 def _curves(grid: Grid, groups: Int, has_phases: bool) -> dict[str, Int]:
     """Return the end nodes (d, 2) of the lines of each curve.
 
     Cell data `debonded` mark the curve DEBONDED; other lines are curves by their numbers, or `line` beside phases.
     """
     marks = np.ravel(grid.data[DEBONDED]) if DEBONDED in grid.data else np.zeros(len(grid.types))
-    curves: dict[str, list[Int]] = {}
+    curves: dict[str, Int] = {}
     for kind, count in LINES.items():
-        own = np.flatnonzero(grid.types == kind)
-        ends = grid.nodes_of(own, count)[:, :2]
-        for number in np.unique(groups[own]).tolist():
+        cells = np.flatnonzero(grid.types == kind)
+        ends = grid.nodes_of(cells, count)[:, :2]
+        for number in np.unique(groups[cells]).tolist():
             for is_debonded in (True, False):
-                some = (groups[own] == number) & ((marks[own] != 0) == is_debonded)
+                lines = ends[(groups[cells] == number) & ((marks[cells] != 0) == is_debonded)]
                 name = DEBONDED if is_debonded else "line" if has_phases else f"number {number}"
-                if some.any():
-                    curves.setdefault(name, []).append(ends[some])
-    return {name: np.concatenate(parts) for name, parts in curves.items()}
+                if len(lines):
+                    curves[name] = np.concatenate([curves.get(name, lines[:0]), lines])
+    return curves

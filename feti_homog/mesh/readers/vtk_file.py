@@ -1,15 +1,18 @@
-"""Read the triangles and the lines of a legacy file of VTK (.vtk), of text or binary, up to version 5.1."""
+"""Legacy files of VTK (.vtk), of text or binary, up to version 5.1, and mesh files of Medit (.mesh).
+
+FreeFEM, Netgen, Gmsh and MMG write the latter.
+"""
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from urllib.parse import unquote
 
 import numpy as np
 
-from feti_homog.mesh.readers.msh_sections import chain
 from feti_homog.mesh.readers.raw_mesh import RawMesh
-from feti_homog.mesh.readers.scanner import Numbers, Scanner
+from feti_homog.mesh.readers.scanner import Numbers, Scanner, chain
 from feti_homog.mesh.readers.unstructured_grid import Grid, mesh_of
 from feti_homog.mesh.readers.vtu_file import TYPES as XML_TYPES
 from feti_homog.schema.wording import toml_value
@@ -23,9 +26,20 @@ TYPES |= {"signed_char": "i1", "vtkidtype": "i4", "float": "f4", "double": "f8"}
 # Numbers of a cell or a point in the sections that name their type; that of SCALARS stands behind it.
 WIDTHS = {"SCALARS": 1, "VECTORS": 3, "NORMALS": 3, "TENSORS": 9, "TENSORS6": 6, "GLOBAL_IDS": 1, "PEDIGREE_IDS": 1}
 
+# Medit's sections of cells: VTK's type, number of nodes.
+CELLS = {"EDGES": (3, 2), "TRIANGLES": (5, 3), "QUADRILATERALS": (9, 4)}
+# Numbers per entry of sections, nodes and reference of cells; vectors have as many as coordinates.
+ENTRIES = {
+    **dict.fromkeys(("CORNERS", "RIDGES", "REQUIREDVERTICES", "REQUIREDEDGES", "REQUIREDTRIANGLES"), 1),
+    **dict.fromkeys(("NORMALATVERTICES", "TANGENTATVERTICES", "VERTEXONGEOMETRICVERTEX", "EDGEONGEOMETRICEDGE"), 2),
+    **{"NORMALATTRIANGLEVERTICES": 3, "VERTEXONGEOMETRICEDGE": 3, "SUBDOMAINFROMMESH": 4, "SUBDOMAIN": 4},
+    **{name: nodes + 1 for name, (_, nodes) in CELLS.items()},
+}
+VECTORS, VERTICES = ("NORMALS", "TANGENTS"), "VERTICES"
+
 
 def load(path: Path) -> RawMesh:
-    """Read the triangles and the lines; nodes and cells have the numbers of the file, from 0.
+    """Read the triangles and the lines of a VTK file; nodes and cells have its numbers, from 0.
 
     Raises:
         OSError: the file cannot be read.
@@ -42,11 +56,15 @@ def load(path: Path) -> RawMesh:
     legacy = _Legacy(file)
     while words := file.line():
         legacy.take(words[0].upper(), [*words[1:], *[""] * 4])
-    return mesh_of(Grid(legacy.points, legacy.types, *legacy.cells(), legacy.data))
+    nodes, counts = legacy.nodes, np.diff(legacy.offsets)
+    if legacy.rows is not None:
+        starts = chain(np.arange(len(legacy.rows)) + 1 + legacy.rows)
+        nodes, counts = np.delete(legacy.rows, starts), legacy.rows[starts]
+    return mesh_of(Grid(legacy.points, legacy.types, nodes, counts, legacy.data))
 
 
 class _Legacy:
-    """Take the sections of a file and keep those that make the mesh, and numbers of cells."""
+    """Take the sections of a file; keep points, cells, and numbers of cells."""
 
     def __init__(self, file: Scanner) -> None:
         self.file, self.points, self.types = file, np.zeros((0, 3)), np.zeros(0, np.int64)
@@ -74,8 +92,7 @@ class _Legacy:
             case "CELL_DATA" | "POINT_DATA":
                 self.are_of_cells, self.length = section == "CELL_DATA", file.count(words[0])
             case "FIELD":
-                for _ in range(min(file.count(words[1]), len(file.content))):
-                    self._take_array(file.line())
+                self._take_arrays(min(file.count(words[1]), len(file.content)))
             case "METADATA":
                 self._skip_metadata()
             case _:
@@ -86,19 +103,20 @@ class _Legacy:
         if not self.file.follows("OFFSETS"):
             self.rows = self.file.take(size, "i4").astype(np.int64)
             return
-        self.offsets = self.file.take(count, self._type(self.file.line()[1:2])).astype(np.int64)
+        self.offsets = self.file.take(count, self._type("".join(self.file.line()[1:2]))).astype(np.int64)
         if not self.file.follows("CONNECTIVITY"):
             self.file.refuse("CELLS: expected CONNECTIVITY behind OFFSETS")
-        self.nodes = self.file.take(size, self._type(self.file.line()[1:2])).astype(np.int64)
+        self.nodes = self.file.take(size, self._type("".join(self.file.line()[1:2]))).astype(np.int64)
 
-    def _take_array(self, words: list[str]) -> None:
-        """Take an array of a field."""
-        if words[:1] == ["METADATA"]:
-            self._skip_metadata()
-            words = self.file.line()
-        name, width, length, kind = (*words, "", "", "", "")[:4]
-        values = self.file.take(self.file.count(width) * self.file.count(length), self._type(kind))
-        self._keep(name, values, int(width))
+    def _take_arrays(self, count: int) -> None:
+        """Take the arrays of a field."""
+        for _ in range(count):
+            if (words := self.file.line())[:1] == ["METADATA"]:
+                self._skip_metadata()
+                words = self.file.line()
+            name, width, length, kind = (*words, "", "", "", "")[:4]
+            values = self.file.take(self.file.count(width) * self.file.count(length), self._type(kind))
+            self._keep(name, values, int(width))
 
     def _take_attribute(self, section: str, words: list[str]) -> None:
         """Take numbers of points or cells, and colours of tables."""
@@ -129,17 +147,49 @@ class _Legacy:
         stop = self.file.content.find(b"\n\n", self.file.place - 1)
         self.file.place = len(self.file.content) if stop < 0 else stop + 2
 
-    def _type(self, words: str | list[str]) -> str:
-        name = words if isinstance(words, str) else "".join(words)
+    def _type(self, name: str) -> str:
         if name.lower() not in TYPES:
             self.file.refuse(f"{toml_value(name)}: expected a type of numbers, such as int or double")
         return TYPES[name.lower()]
 
-    def cells(self) -> tuple[Int, Int]:
-        """Return the nodes of the cells, one after the other, and how many each has."""
-        if self.rows is None:
-            return self.nodes, np.diff(self.offsets)
-        starts = chain(np.arange(len(self.rows)) + 1 + self.rows)
-        is_count = np.zeros(len(self.rows), bool)
-        is_count[starts] = True
-        return self.rows[~is_count], self.rows[starts]
+
+def load_medit(path: Path) -> RawMesh:
+    """Read the triangles and the lines of a Medit file; nodes have numbers from 1, and cells section by section.
+
+    Raises:
+        OSError: the file cannot be read.
+        MeshError: it is damaged, or has other cells.
+    """
+    file = Scanner(re.sub(rb"#[^\n]*", b"", input_files.read(path)))
+    dimension = _dimension(file)
+    widths = ENTRIES | {VERTICES: dimension + 1} | dict.fromkeys(VECTORS, dimension)
+    none = np.zeros(0, np.int64)
+    points, cells = np.zeros((0, 3)), [(none, none, none, none)]
+    while (word := file.word()) and word.upper() != "END":
+        section = word.upper()
+        if not section.isalnum() or section[0].isdigit():
+            file.refuse(f"{toml_value(word)}: expected the name of a section")
+        count, width = file.count(file.word()), widths.get(section, 1)
+        if section not in widths and count:
+            expected = "only triangles of three nodes, quadrilaterals of four and edges of two can be used"
+            file.refuse(f"{count} {word}: {expected}")
+        rows = file.take(count * width, "i8" if section in CELLS else "f8").reshape(-1, width)
+        if section in CELLS:
+            types, counts = np.full(count, CELLS[section][0]), np.full(count, width - 1)
+            cells.append((types, rows[:, :-1].ravel() - 1, counts, rows[:, -1]))
+        elif section == VERTICES:
+            if len(points):
+                file.refuse(f"{word}: they are there twice")
+            points = np.pad(rows[:, :-1], ((0, 0), (0, 3 - dimension)))
+    types, nodes, counts, references = (np.concatenate(parts) for parts in zip(*cells, strict=True))
+    return mesh_of(Grid(points, types, nodes, counts, {"medit:ref": references}, first=1))
+
+
+def _dimension(file: Scanner) -> int:
+    """Take the head of a Medit file and return the number of coordinates."""
+    if file.word() != "MeshVersionFormatted":
+        file.refuse("expected MeshVersionFormatted, with which a mesh file of Medit begins")
+    file.word()
+    if file.word().upper() != "DIMENSION" or (dimension := file.count(file.word())) not in (2, 3):
+        file.refuse("expected Dimension 2 or 3")
+    return dimension

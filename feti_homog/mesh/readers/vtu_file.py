@@ -40,43 +40,37 @@ def load(path: Path) -> RawMesh:
         MeshError: it is damaged, or has other cells or no phases.
     """
     content = input_files.read(path)
-    root, appended = _parsed(content)
+    size, start, stop, appended = len(content), content.find(b"<AppendedData"), content.rfind(b"</AppendedData>"), b""
+    if 0 <= start < stop and (head := content.find(b">", start, stop)) > 0:
+        appended = content[head + 1 : stop]
+        appended = appended[appended.find(b"_") + 1 :]
+        content = content[: head + 1] + content[stop:]
+    try:
+        root = ElementTree.fromstring(content)
+    except (ElementTree.ParseError, ValueError, LookupError) as error:
+        raise MeshError(f"not XML: {error}") from None
     (grid,) = _children(root, "VTKFile", {"UnstructuredGrid": 1, "AppendedData": 0})["UnstructuredGrid"]
-    arrays = _Arrays(root, appended, max(MOST_BYTES, MOST_RATIO * len(content)))
-    pieces = _children(grid, grid.tag, {"Piece": 1, "FieldData": 0})["Piece"]
-    return mesh_of(_joined([_piece(piece, arrays) for piece in pieces]))
+    arrays = _Arrays(root, appended, max(MOST_BYTES, MOST_RATIO * size))
+    pieces = [_piece(piece, arrays) for piece in _children(grid, grid.tag, {"Piece": 1, "FieldData": 0})["Piece"]]
+    return mesh_of(_joined(pieces))
 
 
 def _joined(pieces: Sequence[Grid]) -> Grid:
-    """Return the grid of all pieces."""
+    """Join the pieces of a grid."""
     first = np.cumsum([0, *(len(piece.points) for piece in pieces)])
-    nodes = np.concatenate([piece.nodes + own for piece, own in zip(pieces, first, strict=False)])
+    nodes = np.concatenate([piece.nodes + before for piece, before in zip(pieces, first, strict=False)])
     points, types, counts = (
         np.concatenate([getattr(piece, name) for piece in pieces]) for name in ("points", "types", "counts")
     )
-    return Grid(points, types, nodes, counts, _joined_data([piece for piece in pieces if len(piece.types)]))
+    return Grid(points, types, nodes, counts, _joined_data([piece.data for piece in pieces if len(piece.types)]))
 
 
-def _joined_data(pieces: Sequence[Grid]) -> dict[str, Numbers]:
-    """Return the cell data of all pieces; MeshError if one of them lacks data of another."""
-    for name in {name for piece in pieces for name in piece.data}:
-        if not all(name in piece.data for piece in pieces):
-            raise MeshError(f"cell data {name}: missing in one of {len(pieces)} pieces")
-    return {name: np.concatenate([piece.data[name] for piece in pieces]) for name in pieces[0].data} if pieces else {}
-
-
-def _parsed(content: bytes) -> tuple[ElementTree.Element, bytes]:
-    """Return the root of the file and its appended data, whose first character is behind the underscore."""
-    start = content.find(b"<AppendedData")
-    stop, appended = content.rfind(b"</AppendedData>"), b""
-    if 0 <= start < stop and (head := content.find(b">", start, stop)) > 0:
-        appended = content[head + 1 : stop]
-        content = content[: head + 1] + content[stop:]
-        appended = appended[appended.find(b"_") + 1 :]
-    try:
-        return ElementTree.fromstring(content), appended
-    except (ElementTree.ParseError, ValueError, LookupError) as error:
-        raise MeshError(f"not XML: {error}") from None
+def _joined_data(data: Sequence[Mapping[str, Numbers]]) -> dict[str, Numbers]:
+    """Join cell data; MeshError if a piece lacks data of another."""
+    for name in {name for piece in data for name in piece}:
+        if not all(name in piece for piece in data):
+            raise MeshError(f"cell data {name}: missing in one of {len(data)} pieces")
+    return {name: np.concatenate([piece[name] for piece in data]) for name in data[0]} if data else {}
 
 
 def _children(element: ElementTree.Element, name: str, known: Mapping[str, int]) -> dict[str, list[Any]]:
@@ -116,15 +110,10 @@ def _piece(piece: ElementTree.Element, arrays: _Arrays) -> Grid:
     return Grid(points.reshape(-1, 3).astype(float), types, nodes, np.diff(ends, prepend=0), data)
 
 
-def _decoded(text: bytes) -> bytes:
-    """Return the bytes of text in base64: header and data may be encoded separately, each with its own padding."""
-    return b"".join(base64.b64decode(part, validate=True) for part in SEGMENT.findall(b"".join(text.split())))
-
-
 class _Arrays:
-    """Arrays of a file, read as its root says; `left` bytes may be decompressed."""
+    """Arrays of a file, read as its root says; `budget` bytes may be decompressed."""
 
-    def __init__(self, root: ElementTree.Element, appended: bytes, left: int) -> None:
+    def __init__(self, root: ElementTree.Element, appended: bytes, budget: int) -> None:
         kind, compressor = root.get("type"), root.get("compressor", "")
         header, order = root.get("header_type", "UInt32"), root.get("byte_order", "LittleEndian")
         expected = {
@@ -137,7 +126,7 @@ class _Arrays:
             if value not in known:
                 words = " or ".join(filter(None, known))
                 raise MeshError(f"{name} is {toml_value(value or '')}: expected {words}")
-        self.order, self.left = ORDERS[order], left
+        self.order, self.budget = ORDERS[order], budget
         self.header = np.dtype(f"{self.order}{TYPES[header]}")
         self.decompressor: Any = COMPRESSORS.get(compressor)
         section = root.find("AppendedData")
@@ -170,8 +159,11 @@ class _Arrays:
             text = self.appended[start : next((other for other in self.starts if other > start), start)]
         elif form != "binary":
             raise MeshError(f"format is {toml_value(form)}: expected ascii, binary or appended")
-        data = text if self.is_raw and form == "appended" else _decoded(text)
-        return np.frombuffer(self._unpacked(data) if self.decompressor else self._plain(data), f"{self.order}{kind}")
+        if not (self.is_raw and form == "appended"):
+            # Header and data may be encoded separately, each with its own padding.
+            parts = SEGMENT.findall(b"".join(text.split()))
+            text = b"".join(base64.b64decode(part, validate=True) for part in parts)
+        return np.frombuffer(self._unpacked(text), f"{self.order}{kind}")
 
     def _offset(self, array: ElementTree.Element) -> int:
         word = array.get("offset", "").strip()
@@ -185,23 +177,20 @@ class _Arrays:
             raise ValueError
         return np.frombuffer(data, self.header, count)
 
-    def _plain(self, data: bytes) -> bytes:
-        """Return data behind their length; ValueError if they are broken off."""
-        (length,), start = self._words(data, 1).tolist(), self.header.itemsize
-        if start + length > len(data):
-            raise ValueError
-        return data[start : start + length]
-
     def _unpacked(self, data: bytes) -> bytes:
-        """Return the data of compressed blocks, whose lengths stand in front; ValueError if they are broken off."""
-        (blocks,) = self._words(data, 1).tolist()
-        place, unpacked = (3 + blocks) * self.header.itemsize, []
-        for length in self._words(data, 3 + blocks).tolist()[3:] if blocks else []:
+        """Return data behind their length, or behind the lengths of compressed blocks; ValueError if broken off."""
+        (count,), start = self._words(data, 1).tolist(), self.header.itemsize
+        if not self.decompressor:
+            if start + count > len(data):
+                raise ValueError
+            return data[start : start + count]
+        place, unpacked = (3 + count) * start, []
+        for length in self._words(data, 3 + count).tolist()[3:] if count else []:
             decompressor = self.decompressor()
-            unpacked.append(decompressor.decompress(data[place : place + length], self.left + 1))
-            self.left -= len(unpacked[-1])
+            unpacked.append(decompressor.decompress(data[place : place + length], self.budget + 1))
+            self.budget -= len(unpacked[-1])
             place += length
-            if self.left < 0:
+            if self.budget < 0:
                 raise MeshError("its compressed data are too large for a file of its length")
             if not decompressor.eof:
                 raise ValueError

@@ -78,7 +78,10 @@ class ElementEstimate:
         cell = self.cell
         irregular = 0 if cell.geometry in FIBRES_OF else self.fibres
         count = self.height / (TRIANGLE_AREA * cell.mesh_size**2) + TRIANGLES_OF_A_FIBRE * irregular
-        count += _triangles_of_ends(self.ovals, cell.interface_size or cell.mesh_size)
+        # Ends of long axes have the radius of curvature b^2 / a.
+        short, long = np.sort(self.ovals.semi_axes, axis=1).T
+        ratios = (cell.interface_size or cell.mesh_size) / (2 * np.pi * short**2 / long / MIN_EDGES_AROUND)
+        count += 2 * math.fsum(map(triangles_of_a_tip, np.maximum(1.0, ratios).tolist()))
         if cell.interface_size is None:
             return count
         return count + 2 * self.interfaces / (TRIANGLE_AREA * MAX_GROWTH * cell.interface_size)
@@ -118,10 +121,3 @@ def ratio_at_a_tip(count: float) -> float:
     """Return how much smaller elements at a tip may be than around, if it is to add no more triangles than `count`."""
     counts = [triangles_of_a_tip(ratio) for ratio in RATIOS]
     return float(np.interp(count, counts, RATIOS))
-
-
-def _triangles_of_ends(ovals: Ellipses, around: float) -> float:
-    """Triangles that the ends of long axes, of radius of curvature b^2 / a, add among elements of this size."""
-    short, long = np.sort(ovals.semi_axes, axis=1).T
-    at_ends = 2 * np.pi * short**2 / long / MIN_EDGES_AROUND
-    return 2 * math.fsum(map(triangles_of_a_tip, np.maximum(1.0, around / at_ends).tolist()))

@@ -43,14 +43,13 @@ class SourcedSize:
 
     def __call__(self, points: Float) -> Float:
         """(n,) at points (n, 2)."""
-        wrapped, chunk = wrap(points, self._size), self._chunk
-        return np.concatenate([self._near(wrapped[k : k + chunk]) for k in range(0, max(1, len(points)), chunk)])
-
-    def _near(self, points: Float) -> Float:
-        count = min(NEAREST, len(self._places))
-        distance, nearest = self._tree.query(points, k=count, distance_upper_bound=self._bound)
-        sizes = (self._lengths[nearest] + self._growths[nearest] * distance).reshape(len(points), count)
-        return np.asarray(np.minimum(self.largest, sizes.min(axis=1)))
+        wrapped, count, parts = wrap(points, self._size), min(NEAREST, len(self._places)), []
+        for k in range(0, max(1, len(points)), self._chunk):
+            some = wrapped[k : k + self._chunk]
+            distance, nearest = self._tree.query(some, k=count, distance_upper_bound=self._bound)
+            sizes = (self._lengths[nearest] + self._growths[nearest] * distance).reshape(len(some), count)
+            parts.append(np.minimum(self.largest, sizes.min(axis=1)))
+        return np.concatenate(parts)
 
     def on_lines(self, points: Float) -> Float:
         """(c, m) at points (c, m, 2) of lines, as for each point.

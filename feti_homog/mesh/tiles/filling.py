@@ -13,7 +13,7 @@ import numpy as np
 
 from feti_homog.errors import MeshError
 from feti_homog.mesh.coarse_mesh import areas, flip_double_arcs
-from feti_homog.mesh.outline.curves import MATRIX, OUTSIDE, Curve, Curves
+from feti_homog.mesh.outline.lines import MATRIX, OUTSIDE, Curve, Curves
 from feti_homog.mesh.sizes.from_sources import MAX_GROWTH
 from feti_homog.typing import Float, Int, Int32
 
@@ -25,8 +25,7 @@ FRONTAL_DELAUNAY, DELAUNAY = 6, 5
 DECIMALS = 12
 # Of the area of triangles against that of the part of the cell that they fill, relative.
 AREA_TOLERANCE = 1e-9
-# gmsh's element types.
-LINE, TRIANGLE = 1, 2
+TRIANGLE = 2  # gmsh's type of elements
 
 # Curves are numbered from 1; a negative number is a curve run backwards.
 Signed = tuple[int, Curve]
@@ -107,7 +106,13 @@ def fill(tile: Tile) -> Filling:
     points[: len(tile.points)] = tile.points
     triangles = np.searchsorted(tags[order], np.concatenate(elements)).astype(np.int32).reshape(-1, 3)
     area = areas(points, triangles)
-    if abs(np.abs(area).sum() / _bounded_area(tile) - 1) > AREA_TOLERANCE:
+    # 1/2 of the integral of x dy - y dx along curves with the tile on their left, less along those with it on their
+    # right, is the area within.
+    pairs, curve = tile.curves.edges
+    sign = (tile.curves.inside != OUTSIDE).astype(float) - (tile.curves.outside != OUTSIDE)
+    a, b = tile.points[pairs[:, 0]], tile.points[pairs[:, 1]]
+    within = float(sign[curve] @ (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2)
+    if abs(np.abs(area).sum() / within - 1) > AREA_TOLERANCE:
         raise _unfilled(tile, "triangles are missing")
     triangles[area < 0] = triangles[area < 0][:, ::-1]
     circle_of = np.repeat(circle, [len(nodes) // 3 for nodes in elements])
@@ -128,29 +133,11 @@ def _unfilled(tile: Tile, why: str) -> MeshError:
     )
 
 
-def _bounded_area(tile: Tile) -> float:
-    """Area within the curves that bound a tile.
-
-    It is 1/2 of the integral of x dy - y dx along those with the tile on their left, less along those with it on their
-    right.
-    """
-    curves = tile.curves
-    sign = (curves.inside != OUTSIDE).astype(float) - (curves.outside != OUTSIDE)
-    within = np.ones(len(curves.node), bool)
-    within[curves.first[1:] - 1] = False
-    begin = np.flatnonzero(within)
-    a, b = tile.points[curves.node[begin]], tile.points[curves.node[begin + 1]]
-    weight = np.repeat(sign, np.diff(curves.first) - 1)
-    return float(weight @ (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2)
-
-
 def arc_edges(curves: Curves) -> tuple[Int32, Int32]:
     """Edges (a, 2) on circles, and their circles (a,)."""
-    on_circle = np.repeat(curves.circle, np.diff(curves.first))
-    within = np.ones(len(curves.node), bool)
-    within[curves.first[1:] - 1] = False
-    begin = np.flatnonzero(within & (on_circle != MATRIX))
-    return curves.node[begin[:, None] + [0, 1]].astype(np.int32), on_circle[begin].astype(np.int32)
+    pairs, curve = curves.edges
+    circle = curves.circle[curve]
+    return pairs[circle != MATRIX].astype(np.int32), circle[circle != MATRIX].astype(np.int32)
 
 
 def _grow_from_lines(gmsh: ModuleType, surfaces: list[int], largest: float) -> None:
@@ -169,24 +156,17 @@ def _grow_from_lines(gmsh: ModuleType, surfaces: list[int], largest: float) -> N
     gmsh.option.setNumber("Mesh.Algorithm", DELAUNAY)
 
 
-def _add_lines(gmsh: ModuleType, points: Float, curves: list[Curve]) -> list[list[int]]:
-    """Make each edge of the outline a line of one element, node n a point n + 1; the lines of each curve."""
-    geo = gmsh.model.geo
-    for tag, (x, y) in enumerate(points.round(DECIMALS).tolist(), 1):
+def _add_surfaces(gmsh: ModuleType, tile: Tile) -> tuple[list[int], list[int]]:
+    """Add the plane surfaces of fibres, coatings and matrix; their tags, and the circle next around each or MATRIX.
+
+    Each edge of the outline is a line of one element, and its node n is point n + 1.
+    """
+    curves, geo = tile.curves.pieces(), gmsh.model.geo
+    for tag, (x, y) in enumerate(tile.points.round(DECIMALS).tolist(), 1):
         geo.addPoint(x, y, 0.0, tag=tag)
-    made = []
-    for curve in curves:
-        nodes = (curve.nodes + 1).tolist()
-        made.append([geo.addLine(start, stop) for start, stop in pairwise(nodes)])
+    made = [[geo.addLine(start, stop) for start, stop in pairwise((curve.nodes + 1).tolist())] for curve in curves]
     for tag in chain.from_iterable(made):
         geo.mesh.setTransfiniteCurve(tag, 2)
-    return made
-
-
-def _add_surfaces(gmsh: ModuleType, tile: Tile) -> tuple[list[int], list[int]]:
-    """Add the plane surfaces of fibres, coatings and matrix; their tags, and the circle next around each or MATRIX."""
-    curves = tile.curves.pieces()
-    geo, made = gmsh.model.geo, _add_lines(gmsh, tile.points, curves)
 
     def add_loop(loop: list[Signed]) -> int:
         tags = [made[tag - 1] if tag > 0 else [-line for line in reversed(made[-tag - 1])] for tag, _ in loop]
@@ -194,7 +174,7 @@ def _add_surfaces(gmsh: ModuleType, tile: Tile) -> tuple[list[int], list[int]]:
 
     surfaces, circle = [], []
     regions = defaultdict(list)
-    for loop in _loops(_bounding_lines(curves)):
+    for loop in _loops(curves):
         regions[loop[0][1].inside].append(loop)
     # The matrix is last.
     for region in sorted(regions, key=lambda inside: inside == MATRIX):
@@ -205,16 +185,14 @@ def _add_surfaces(gmsh: ModuleType, tile: Tile) -> tuple[list[int], list[int]]:
     return surfaces, circle
 
 
-def _bounding_lines(curves: list[Curve]) -> list[Signed]:
-    """All curves with what they bound on their left, forwards, then backwards with a negative tag."""
-    forwards = list(enumerate(curves, 1))
-    backwards = [(-tag, Curve(own.nodes[::-1], own.circle, own.outside, own.inside)) for tag, own in forwards]
-    return [(tag, curve) for tag, curve in forwards + backwards if curve.inside != OUTSIDE]
+def _loops(curves: list[Curve]) -> list[list[Signed]]:
+    """Return closed chains of curves that have one region on their left; each vertex of a region starts one curve.
 
-
-def _loops(lines: list[Signed]) -> list[list[Signed]]:
-    """Return closed chains of lines that have one region on their left; each vertex of a region starts one line."""
-    after = {(curve.inside, int(curve.nodes[0])): (tag, curve) for tag, curve in lines}
+    Curves run forwards, then backwards with a negative tag.
+    """
+    lines = list(enumerate(curves, 1))
+    lines += [(-tag, Curve(own.nodes[::-1], own.circle, own.outside, own.inside)) for tag, own in lines]
+    after = {(own.inside, int(own.nodes[0])): (tag, own) for tag, own in lines if own.inside != OUTSIDE}
     loops = []
     while after:
         loop = [after.pop(next(iter(after)))]

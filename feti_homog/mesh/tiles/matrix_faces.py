@@ -82,10 +82,6 @@ class MatrixTiles:
     tile: Int
     alone: Int
 
-    def beside(self, disc: Int, angle: Float) -> Int:
-        """(k,) tiles of the matrix beside the circles of discs (k,) at these angles."""
-        return beside(self.lines, self.tile, self.alone, disc, angle)
-
 
 def beside(lines: HalfLines, label: Int, alone: Int, disc: Int, angle: Float) -> Int:
     """Return the label (k,) of the matrix beside discs (k,) at these angles.

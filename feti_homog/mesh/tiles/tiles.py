@@ -16,11 +16,11 @@ from scipy.spatial import QhullError
 
 from feti_homog.mesh.coarse_mesh import CoarseMesh, edge_keys, edges
 from feti_homog.mesh.outline.bridges import CLEAR, Bridges, bridges, centre_lines
-from feti_homog.mesh.outline.curves import MATRIX, OUTSIDE
+from feti_homog.mesh.outline.lines import MATRIX, OUTSIDE
 from feti_homog.mesh.outline.outline import Outline, crossings, disc_at, images, on_side
 from feti_homog.mesh.periodic_topology import Torus, plane_edges_of
 from feti_homog.mesh.tiles.filling import Filling, Tile, arc_edges
-from feti_homog.mesh.tiles.matrix_faces import MatrixTiles, grid_cell, matrix_tiles
+from feti_homog.mesh.tiles.matrix_faces import MatrixTiles, beside, grid_cell, matrix_tiles
 from feti_homog.microstructure.arrangement import Arrangement
 from feti_homog.microstructure.shapes.ellipses import Discs, Ellipses
 from feti_homog.typing import Array, Float, Int, Int32
@@ -160,7 +160,8 @@ def _tiles_beside(lines: Outline, tiles: Tiling) -> tuple[Int, Int]:
     begin = curves.first[arc]
     middle = (lines.points[curves.node[begin]] + lines.points[curves.node[begin + 1]]) / 2
     offset = middle - lines.ellipses.centres[curves.circle[arc]]
-    right[arc] = tiles.matrix.beside(curves.circle[arc], np.arctan2(offset[:, 1], offset[:, 0]))
+    matrix, angle = tiles.matrix, np.arctan2(offset[:, 1], offset[:, 0])
+    right[arc] = beside(matrix.lines, matrix.tile, matrix.alone, curves.circle[arc], angle)
     n = len(tiles.bridges.angle)
     left[len(curves) - n :], right[len(curves) - n :] = tiles.beside.T
     return left, right

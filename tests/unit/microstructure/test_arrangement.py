@@ -9,8 +9,7 @@ import pytest
 from support.circular_cells import cell
 
 from feti_homog.errors import MeshError
-from feti_homog.mesh.arrange import arrange
-from feti_homog.mesh.random_cell import random_arrangement
+from feti_homog.mesh.arrange import arrange, random_arrangement
 from feti_homog.microstructure.arrangement import Arrangement, clear_shift, neighbours
 
 

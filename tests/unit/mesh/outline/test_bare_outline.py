@@ -11,7 +11,6 @@ from support.tiled_cells import CELLS, SMALL
 
 from feti_homog.errors import MeshError
 from feti_homog.mesh.fill.gmsh_mesher import begin
-from feti_homog.mesh.outline.bare_outline import LineStations
 from feti_homog.mesh.outline.lines import Stations
 
 
@@ -28,15 +27,15 @@ def test_nodes_are_the_same_in_parts(name, count):
     assert [len(lines) for lines in (bare.lines.arcs, bare.lines.bridges)] == [
         sum(len(getattr(part, kind)) for part in parts) for kind in ("arcs", "bridges")
     ]
-    found = LineStations.joined([part.stations(field) for part in parts], bare.lines.sampling)
-    for mine, whole in ((found.arcs, bare.stations().arcs), (found.bridges, bare.stations().bridges)):
+    found = bare.lines.joined([part.stations(field) for part in parts])
+    for mine, whole in zip(found, bare.stations(), strict=True):
         assert len(whole.share) > 0
         assert np.array_equal(mine.share, whole.share) and np.array_equal(mine.first, whole.first)
         assert mine.edges == pytest.approx(whole.edges, rel=1e-12)
 
 
 def test_stations_go_from_end_to_end():
-    stations = bare_of("dense").stations().arcs
+    stations = bare_of("dense").stations()[0]
     begin, end = stations.first[:-1], stations.first[1:] - 1
     assert not stations.share[begin].any() and (stations.share[end] == 1).all()
     inner = np.diff(stations.line) == 0
@@ -48,11 +47,11 @@ def test_too_many_nodes_of_all_parts_are_refused():
     """Though no part has too many."""
     lines = bare_of("dense").lines
     parts = [part.stations(bare_of("dense").field) for part in lines.parts(3)]
-    most = int(max(part.arcs.edges for part in parts)) + 1
+    most = int(max(arcs.edges for arcs, _ in parts)) + 1
     few = replace(lines.sampling, most_nodes=most)
     for part in lines.parts(3):
         replace(part, sampling=few).stations(bare_of("dense").field)
     with pytest.raises(MeshError, match=f"nodes; expected at most {most}"):
-        LineStations.joined(parts, few)
+        replace(lines, sampling=few).joined(parts)
     with pytest.raises(MeshError, match=f"nodes; expected at most {most}"):
-        Stations.joined([part.arcs for part in parts], most)
+        Stations.joined([arcs for arcs, _ in parts], most)

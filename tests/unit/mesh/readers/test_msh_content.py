@@ -14,13 +14,13 @@ from unit.mesh.second_order import second_order
 
 from feti_homog.errors import MeshError
 from feti_homog.mesh.readers import gmsh_file, msh_content
-from feti_homog.mesh.readers.gmsh_file import triangles_of_model
 from feti_homog.mesh.readers.msh_reader import made, read
-from feti_homog.mesh.readers.raw_mesh import RawMesh
+from feti_homog.mesh.readers.raw_mesh import Block, RawMesh, assembled
 from feti_homog.mesh.tiles.filling import gmsh_session
 
 MESHES = Path(__file__).parents[4] / "meshes"
 TOLERANCE = 1e-12
+NODES = {2: 3, 9: 6, 3: 4, 10: 9, 16: 8}  # of gmsh's triangles and quadrilaterals
 FORMATS = [(2.2, 0), (2.2, 1), (4.0, 0), (4.1, 0), (4.1, 1)]
 
 
@@ -28,7 +28,28 @@ def by_gmsh(path: Path) -> RawMesh:
     """Return what gmsh reads from a file."""
     with gmsh_session() as session:
         session.open(str(path))
-        return triangles_of_model(session)
+        mesh, name = session.model.mesh, lambda tag, dimension: session.model.getPhysicalName(dimension, tag)
+        blocks, groups = [], []
+        for _, entity in session.model.getEntities(2):
+            for kind, count in NODES.items():
+                tags, nodes = mesh.getElementsByType(kind, entity)
+                if len(tags):
+                    nodes = nodes.reshape(-1, count).astype(np.int64)
+                    blocks.append(Block(tags.astype(np.int64), nodes, np.full(len(tags), len(groups))))
+                    physical = session.model.getPhysicalGroupsForEntity(2, entity)
+                    groups.append(tuple(name(tag, 2) or f"number {tag}" for tag in physical))
+        curves = {}
+        for _, group in session.model.getPhysicalGroups(1):
+            entities = session.model.getEntitiesForPhysicalGroup(1, group)
+            ends = [
+                mesh.getElementsByType(kind, entity)[1].astype(np.int64).reshape(-1, count)[:, :2]
+                for entity in entities
+                for kind, count in ((1, 2), (8, 3))
+            ]
+            curves.setdefault(name(group, 1) or f"number {group}", []).extend(ends)
+        tags, places, _ = mesh.getNodes()
+        curves = {name: np.concatenate(ends) for name, ends in curves.items()}
+        return assembled(tags.astype(np.int64), places.reshape(-1, 3), blocks, groups, curves)
 
 
 def written(source: Path, target: Path, version: float, binary: int, **options: float) -> Path:

@@ -9,7 +9,7 @@ from support.other_formats import written
 from support.pixel_images import quadrilaterals
 
 from feti_homog import Case, run
-from feti_homog.mesh.readers.quadrilaterals import in_triangles
+from feti_homog.mesh.readers.raw_mesh import in_triangles
 
 # Rows of 24 pixels from below, and C13, C23 of these squares: by another program with 8 x 8 squares a pixel, within
 # 0.004 of quadratic elements of this one refined three times.

@@ -23,9 +23,9 @@ def test_fit_gives_back_the_ellipse(a, b, turn):
     turned = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
     centre = np.array([0.7, -0.2])
     ellipse = fit_ellipse(centre + (turned @ np.diag([a, b]) @ [np.cos(t), np.sin(t)]).T)
-    assert ellipse is not None and ellipse.centre == pytest.approx(centre, abs=1e-10)
+    assert ellipse is not None and ellipse.centres[0] == pytest.approx(centre, abs=1e-10)
     square = turned @ np.diag([a**2, b**2]) @ turned.T
-    assert ellipse.frame @ ellipse.frame.T == pytest.approx(square, rel=1e-8, abs=1e-8 * a * b)
+    assert ellipse.squares[0] == pytest.approx(square, rel=1e-8, abs=1e-8 * a * b)
 
 
 @pytest.mark.parametrize(

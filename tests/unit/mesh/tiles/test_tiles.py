@@ -15,7 +15,7 @@ from feti_homog.mesh.arrange import arrange
 from feti_homog.mesh.coarse_mesh import areas
 from feti_homog.mesh.fill.gmsh_mesher import begin, generate
 from feti_homog.mesh.outline.bridges import CLEAR, LEAST_ANGLE
-from feti_homog.mesh.outline.curves import MATRIX, OUTSIDE
+from feti_homog.mesh.outline.lines import MATRIX, OUTSIDE
 from feti_homog.mesh.outline.outline import images
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.tiles import filling
@@ -71,7 +71,9 @@ def test_bridges_cross_the_matrix_and_nothing_else(name):
     lines = noded(name).lines
     curves, circles = lines.curves, lines.ellipses.circles
     bridge = np.flatnonzero((curves.circle == MATRIX) & (curves.inside == MATRIX) & (curves.outside == MATRIX))
-    ends = lines.points[curves.ends[bridge]]
+    ends = lines.points[
+        np.stack([curves.node[curves.first[bridge]], curves.node[curves.first[bridge + 1] - 1]], axis=1)
+    ]
     share = np.linspace(0.0, 1.0, 51)[1:-1, None, None]
     inside = ends[:, 0] * (1 - share) + ends[:, 1] * share
     distance = np.linalg.norm(inside[:, :, None] - circles[:, :2], axis=3) - circles[:, 2]
