@@ -14,7 +14,7 @@ from petsc4py import PETSc
 
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace
 from feti_homog.feti.operators.interface_operators import DualOperator
-from feti_homog.feti.preconditioners.scaled import Preconditioner
+from feti_homog.feti.operators.preconditioners import Preconditioner
 from feti_homog.feti.thresholds import FORCE_STALL_ITERATIONS, MAX_ITERATIONS, RTOL, STALL_ITERATIONS
 from feti_homog.system.parallel.distributed_arrays import allreduce_sum, scale_rows
 from feti_homog.system.petsc.c_functions import CallbackErrors

@@ -31,7 +31,7 @@ from feti_homog.feti.decomposition.neighbours import Neighbours
 from feti_homog.feti.linalg.distributed_solver import DistributedSolver
 from feti_homog.feti.linalg.sparse_matrices import DenseBlockSum, scaled
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
-from feti_homog.feti.preconditioners.scaled import Dirichlet, Preconditioner, StiffnessScaled, never_softens
+from feti_homog.feti.operators.preconditioners import Dirichlet, Preconditioner, StiffnessScaled, never_softens
 from feti_homog.feti.thresholds import (
     COARSE_REGULARISATIONS,
     DEFAULTS,

@@ -28,7 +28,7 @@ from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.neighbours import Neighbours
 from feti_homog.feti.linalg.sparse_matrices import add_shared_rows
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
-from feti_homog.feti.preconditioners.scaled import StiffnessScaled
+from feti_homog.feti.operators.preconditioners import StiffnessScaled
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.system.parallel.distributed_arrays import allreduce_sum
 from feti_homog.system.parallel.mpi_errors import agree

@@ -141,7 +141,7 @@ def compliance_root(B: csr_matrix, compliance: Float, copies: Int, of_inner: Boo
     """(n, r) T of the springs on one body, for its constraints B (rows, n) and the compliance C (rows,) of the rows.
 
     A node's spring belongs to the inner of two bodies, but where that is cut, to the outer one: so it softens one body
-    alone.  Where both are cut it belongs to neither; see `preconditioners.spring_update`.
+    alone.  Where both are cut it belongs to neither; see `exact.spring_update`.
 
     Args:
         copies: (rows, 2) how many copies the outer and the inner body have there.
