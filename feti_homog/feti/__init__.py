@@ -3,7 +3,7 @@
 Imports `fem`, `feti.coarse`, `feti.decomposition`, `feti.exact`, `feti.operators`, `mesh` and `system`.  Main entry:
 `solver.FetiSolver`.  Its own floors, each on those below:
 
-    solver, factory, solver_plan, krylov, active_jumps, confirmation
+    solver, factory, solver_plan, krylov, dual_solution, confirmation
     coarse           natural and adaptive coarse space, the preconditioner with the latter
     exact            exact inverses of F from influence columns
     operators        S and S+ of subdomains, the dual operator F, preconditioners without coarse space

@@ -158,10 +158,6 @@ class PrimalTest:
             return self._go_on(self._force_stall.is_reached(iteration, residual))
         if ksp.getType() not in PRECONDITION_TRUE_RESIDUAL:
             return PETSc.KSP.ConvergedReason.CONVERGED_RTOL
-        return self._judge_jump(rtol, iteration)
-
-    def _judge_jump(self, rtol: float, iteration: int) -> PETSc.KSP.ConvergedReason:
-        """Converged, stalled, or neither, where the forces are small enough.  Collective."""
         jump = self.preconditioner.jump_norm()
         if jump <= rtol * self._jump_scale:
             return PETSc.KSP.ConvergedReason.CONVERGED_RTOL

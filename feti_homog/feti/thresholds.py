@@ -137,7 +137,7 @@ MAX_RESTARTS = 2
 # motions is then that of a vector of its own size.
 CANCELLED = 1e-2
 # A jump that the active rows see, relative to that of the torn cell, is rounding if it is as small as the first of
-# these; below the second, what is rounding is measured (`active_jumps.jump_rounding`) and multiplied by a margin, for
+# these; below the second, what is rounding is measured (`dual_solution.jump_rounding`) and multiplied by a margin, for
 # it was up to 20 times as large with phases 1000 times apart.
 ZERO_JUMP, SMALL_JUMP, ROUNDING_MARGIN = 1e-13, 1e-8, 100.0
 

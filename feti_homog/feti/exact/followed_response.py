@@ -177,7 +177,9 @@ class FollowedResponse:
         Collective.
         """
         columns, values = self._present(rows)
-        if len(moved := self._moved_pins(values[len(rows) :, : len(rows)][:, sign < 0.0])):
+        # Pins that unit forces on rows that come press.
+        forces = values[len(rows) :, : len(rows)][:, sign < 0.0]
+        if len(moved := self.pins[(np.abs(forces[self._slot[self.pins]]) > RIGID_SHARE).any(axis=1)]):
             rows, none = np.concatenate([rows, moved]), np.zeros(len(moved))
             sign, gained = np.concatenate([sign, none + 1.0]), np.concatenate([gained, none])
             columns, values = self._present(rows)
@@ -195,21 +197,13 @@ class FollowedResponse:
             self._turn(rows[which], sign[which], gained[which], B, columns[:, which], values)
         if len(moved) or len(which) < k or len(self.pins):
             loose = np.setdiff1d(np.arange(k), which)
-            self._pin(np.union1d(np.setdiff1d(self.pins, moved), rows[loose]))
+            self.pins, self.answer = np.union1d(np.setdiff1d(self.pins, moved), rows[loose]), self.answer.copy()
+            own = self.pins - self._first
+            self.answer[own[(own >= 0) & (own < len(self.answer))]] = 0.0
             # Springs of pins have C_0, as of all rows that are not active.
             if len(loose := loose[gained[loose] != 0.0]):
                 return self.soften(rows[loose], gained[loose], least)
         return True
-
-    def _pin(self, pins: Int) -> None:
-        """Let these global rows be the pins, whose answer is 0."""
-        self.pins, self.answer = pins, self.answer.copy()
-        self.answer[pins[(pins >= self._first) & (pins < self._first + len(self.answer))] - self._first] = 0.0
-
-    def _moved_pins(self, forces: Float) -> Int:
-        """Return the pins that unit forces on rows that come press; `forces` (columns, k) of them on all columns."""
-        pins: Int = self.pins[(np.abs(forces[self._slot[self.pins]]) > RIGID_SHARE).any(axis=1)]
-        return pins
 
     def _turn(self, rows: Int, sign: Float, gained: Float, B: Float, columns: Float, values: Float) -> None:
         """Let rows leave (sign 1) or come (-1) whose block has the inverse B.  Collective."""
