@@ -1,13 +1,12 @@
 """The dual problem of the torn cell: subdomains, multipliers, dual operator, coarse spaces, preconditioners, solver.
 
-Imports `fem`, `feti.coarse`, `feti.decomposition`, `feti.exact`, `feti.operators`, `feti.preconditioners`, `mesh` and
-`system`.  Main entry: `solver.FetiSolver`. Its own floors, each on those below:
+Imports `fem`, `feti.coarse`, `feti.decomposition`, `feti.exact`, `feti.operators`, `mesh` and `system`.  Main entry:
+`solver.FetiSolver`.  Its own floors, each on those below:
 
-    solver, factory, solver_plan, krylov, active_jumps, confirmation
+    solver, factory, solver_plan, krylov, dual_solution, confirmation
     coarse           natural and adaptive coarse space, the preconditioner with the latter
     exact            exact inverses of F from influence columns
-    preconditioners  lumped, Dirichlet
-    operators        S and S+ of subdomains, the dual operator F
+    operators        S and S+ of subdomains, the dual operator F, preconditioners without coarse space
     decomposition    subdomains, kernels, the jump operator B
     linalg           factorizations and matrices on one rank and on all
     thresholds       every tuning constant, with the command that measured it

@@ -7,9 +7,8 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from feti_homog.errors import ConvergenceError
-from feti_homog.feti.active_jumps import ActiveJumps
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace
-from feti_homog.feti.dual_solution import DualSolution
+from feti_homog.feti.dual_solution import ActiveJumps, DualSolution
 from feti_homog.feti.exact.exact_inverse import ExactInverse
 from feti_homog.feti.operators.interface_operators import DualOperator
 from feti_homog.feti.thresholds import (
@@ -107,11 +106,9 @@ class InfluenceSolutions:
         off = float(np.max([off, *(each.residual for each in solutions)]))
         if not off <= MOST_UNCONFIRMED_ERROR:
             raise ConvergenceError(f"influence columns: multipliers of the last {self._granted} solves: {off:.1e} off")
-        if not (error := float(np.max([off, drift]))) <= max(MOST_FOLLOWED_ERROR, 2.0 * self._rounding):
-            self._renew(d, solutions, error)
-
-    def _renew(self, d: Float, solutions: list[DualSolution], error: float) -> None:
-        """Renew followed multipliers; if they stay the same, the `error` is rounding of F lambda.  Collective."""
+        if (error := float(np.max([off, drift]))) <= max(MOST_FOLLOWED_ERROR, 2.0 * self._rounding):
+            return
+        # If renewed multipliers stay the same, the error is rounding of F lambda.
         self._inverse.renew_answer(d)
         strains = np.stack([each.strain for each in solutions], axis=1)
         again = self._inverse.answer(d, strains, self._natural.unconstrained_modes.shape[1])

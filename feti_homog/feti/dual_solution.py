@@ -1,9 +1,17 @@
-"""Solution of the dual problem."""
+"""Solutions of the dual problem, and the jumps that they leave on the active rows, without rigid-body motions."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+from mpi4py import MPI
+
+from feti_homog.feti.coarse.natural import NaturalCoarseSpace
+from feti_homog.feti.krylov import ActiveRows
+from feti_homog.feti.operators.interface_operators import DualOperator
+from feti_homog.feti.thresholds import CANCELLED, ROUNDING_MARGIN, SMALL_JUMP, ZERO_JUMP
+from feti_homog.system.parallel.distributed_arrays import allreduce_sum
 from feti_homog.typing import Float
 
 
@@ -35,3 +43,85 @@ class DualSolution:
     def opening(self) -> Float:
         """(owned rows,) B u*: what the springs give way, and the jump of rows without multipliers."""
         return self.jump + self.compliance * self.lam
+
+
+class ActiveJumps:
+    """P of jumps on the active rows, and norms over all ranks.  All calls are collective."""
+
+    def __init__(
+        self, comm: MPI.Intracomm, operator: DualOperator, natural: NaturalCoarseSpace, active: ActiveRows
+    ) -> None:
+        self._comm, self._operator, self._natural, self._active = comm, operator, natural, active
+        self._rounding: Float | None = None
+
+    def norms(self, x: Float) -> Float:
+        """(k,) of the columns of x (owned rows, k)."""
+        norms: Float = np.sqrt(allreduce_sum(self._comm, np.einsum("ik,ik->k", x, x)))
+        return norms
+
+    def projected(self, x: Float, size: Float) -> Float:
+        """P x for jumps x (owned rows, k) of the norms `size` (k,).
+
+        It is projected again where it is far smaller than x. Rounding of the motions that P takes away is out of the
+        range of P, so no multipliers remove it, and a Krylov method that meets it stalls.
+        """
+        projected = self._natural.project(self._active.restrict(x))
+        if (self.norms(projected) < CANCELLED * size).any():
+            projected = self._natural.project(projected)
+        return projected
+
+    def rounding(self, displacement: Float, loads: Float, seen: Float, torn: Float) -> Float:
+        """(k,) up to which jumps of the torn cell under k loads (v, k) are rounding, on the active rows.
+
+        It is measured only if there are jumps which might be.
+
+        Args:
+            displacement: (boundary dofs, v) of the torn cell under the unit loads, the same at every call.
+            seen: (k,) norms of the jumps on the active rows, projected.
+            torn: (k,) norms of the jumps on all rows.
+        """
+        rounding = ZERO_JUMP * torn
+        if ((seen > rounding) & (seen < SMALL_JUMP * torn)).any():
+            if self._rounding is None:
+                self._rounding = jump_rounding(self._operator, displacement)
+            left = self._natural.project(self._active.restrict(self._rounding @ loads))
+            rounding = np.maximum(rounding, ROUNDING_MARGIN * self.norms(left))
+        return rounding
+
+    def solutions(
+        self, strains: Float, lam: Float, jump: Float, iterations: int, reason: int, scale: Float
+    ) -> list[DualSolution]:
+        """Return the solutions that multipliers `lam` (owned rows, k) make, with amplitudes, jumps and residuals.
+
+        `jump` (owned rows, k) is d E - F lam, to which rigid-body motions are added; `scale` (k,) that of residuals.
+        """
+        alpha = np.zeros((self._natural.kernel_dimension, len(strains)))
+        if self._natural.kernel_dimension:
+            alpha -= self._natural.amplitudes(self._active.restrict(jump))
+            jump = jump + self._natural.G @ alpha
+        residual = self.norms(self._active.restrict(jump)) / np.where(scale > 0, scale, 1.0)
+        C, parts = self._operator.compliance, (strains, lam.T.copy(), jump.T.copy(), alpha.T.copy(), residual)
+        rows = zip(*parts, strict=True)
+        return [DualSolution(E, x, g, a, iterations, reason, float(left), C) for E, x, g, a, left in rows]
+
+    def completed(self, solution: DualSolution, d: Float) -> DualSolution:
+        """Return a solution of the present state with amplitudes, jumps and residual by F lambda.
+
+        d (owned rows, v) are the jumps of the torn cell.
+        """
+        torn = (d @ solution.strain)[:, None]
+        left = torn - self._operator.apply(solution.lam[:, None])
+        scale = self.norms(self.projected(torn, self.norms(torn)))
+        parts = solution.iterations, solution.reason, scale
+        return self.solutions(solution.strain[None], solution.lam[:, None], left, *parts)[0]
+
+
+def jump_rounding(operator: DualOperator, displacement: Float) -> Float:
+    """(owned rows, v) about how far rounding takes jumps B u of displacements u = K+ f (boundary dofs, v).  Collective.
+
+    They are the jumps that forces of random signs as large as the rounding of K u make, B K+ (eps diag(K) |u|): each
+    subdomain has its own scale, and a soft one beside stiff ones moves far.
+    """
+    signs = np.random.default_rng(0).choice([-1.0, 1.0], displacement.shape)
+    forces = operator.boundary.body_diagonal[:, None] * np.abs(displacement) * signs
+    return operator.jump(operator.boundary.apply_flexibility(np.finfo(float).eps * forces))

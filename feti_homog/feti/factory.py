@@ -14,8 +14,7 @@ from feti_homog.feti.coarse.natural import NaturalCoarseSpace
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
-from feti_homog.feti.preconditioners.assembled_schur import shared_dofs
-from feti_homog.feti.preconditioners.scaled import Dirichlet, Identity, Lumped, Preconditioner
+from feti_homog.feti.operators.preconditioners import Dirichlet, Identity, Lumped, Preconditioner
 from feti_homog.feti.solver_plan import BONDED, ProblemSizes, SolverOptions, choose
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.system.parallel.mpi_errors import agree
@@ -33,7 +32,7 @@ def _influence(comm: MPI.Intracomm, jump_operator: JumpOperator, operators: Inte
 
 
 def _bonded(comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> Preconditioner:
-    from feti_homog.feti.exact.bonded_inverse import BondedInverse  # with two of these modules
+    from feti_homog.feti.exact.reference_cell import BondedInverse  # with two of these modules
 
     return BondedInverse(comm, jump_operator, operators)
 
@@ -180,7 +179,7 @@ def _sizes(
         bodies_are_cut=_are_cut(comm, operators.subdomains),
         all_dense=comm.allreduce(all(dense), MPI.LAND),
         all_searchable=comm.allreduce(all(np.logical_or(dense, operators.facewise)), MPI.LAND),
-        shared_dofs=shared_dofs(comm, jump_operator),
+        shared_dofs=jump_operator.shared_dofs,
         has_thin=comm.allreduce(any(s.is_thin for s in operators.subdomains), MPI.LOR),
         one_each=one_each,
     )

@@ -14,7 +14,7 @@ from petsc4py import PETSc
 
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace
 from feti_homog.feti.operators.interface_operators import DualOperator
-from feti_homog.feti.preconditioners.scaled import Preconditioner
+from feti_homog.feti.operators.preconditioners import Preconditioner
 from feti_homog.feti.thresholds import FORCE_STALL_ITERATIONS, MAX_ITERATIONS, RTOL, STALL_ITERATIONS
 from feti_homog.system.parallel.distributed_arrays import allreduce_sum, scale_rows
 from feti_homog.system.petsc.c_functions import CallbackErrors
@@ -158,10 +158,6 @@ class PrimalTest:
             return self._go_on(self._force_stall.is_reached(iteration, residual))
         if ksp.getType() not in PRECONDITION_TRUE_RESIDUAL:
             return PETSc.KSP.ConvergedReason.CONVERGED_RTOL
-        return self._judge_jump(rtol, iteration)
-
-    def _judge_jump(self, rtol: float, iteration: int) -> PETSc.KSP.ConvergedReason:
-        """Converged, stalled, or neither, where the forces are small enough.  Collective."""
         jump = self.preconditioner.jump_norm()
         if jump <= rtol * self._jump_scale:
             return PETSc.KSP.ConvergedReason.CONVERGED_RTOL

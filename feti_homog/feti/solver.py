@@ -20,11 +20,10 @@ from petsc4py import PETSc
 
 from feti_homog.fem.problem import PLANE, Problem
 from feti_homog.feti import factory
-from feti_homog.feti.active_jumps import ActiveJumps
 from feti_homog.feti.decomposition.jump_operator import GLUE, InterfaceSprings, JumpOperator
 from feti_homog.feti.decomposition.shared_entities import SharedEntities
 from feti_homog.feti.decomposition.subdomain import Subdomain
-from feti_homog.feti.dual_solution import DualSolution
+from feti_homog.feti.dual_solution import ActiveJumps, DualSolution
 from feti_homog.feti.krylov import ActiveRows, Krylov
 from feti_homog.feti.operators.interface_operators import DualOperator
 from feti_homog.feti.operators.one_subdomain import CondensedLoads
@@ -263,7 +262,14 @@ class FetiSolver:
         iterations = 0
         for restart in range(MAX_RESTARTS + 2):
             krylov.test.ends_on_stall = self.adaptive is not None and restart <= MAX_RESTARTS
-            first = self._first_iterate(lam, right)
+            # Loads of which `lam` leaves a larger residual than 0 begin with 0.
+            applied, residual = np.zeros_like(lam), right
+            if self._jumps.norms(lam).any():
+                applied = self.operator.apply(lam)
+                residual = self._jumps.projected(right - applied, self._jumps.norms(right))
+            is_better = self._jumps.norms(residual) <= self._jumps.norms(right)
+            lam, applied = np.where(is_better, lam, 0.0), np.where(is_better, applied, 0.0)
+            first = Iterate(lam, applied, np.where(is_better, residual, right))
             left = float(np.linalg.norm(self._jumps.norms(first.residual)))
             if krylov.test.is_met(self.rtol, left, self.preconditioner.norm * left):
                 return first, iterations, int(PETSc.KSP.ConvergedReason.CONVERGED_RTOL)
@@ -273,16 +279,6 @@ class FetiSolver:
             if reason not in BREAKDOWNS:
                 break
         return Iterate(lam, self.operator.apply(lam), first.residual), iterations, reason
-
-    def _first_iterate(self, lam: Float, right: Float) -> Iterate:
-        """Return the iterate to begin with: `lam`, or 0 for loads of which `lam` leaves a larger residual than 0."""
-        applied, residual = np.zeros_like(lam), right
-        if self._jumps.norms(lam).any():
-            applied = self.operator.apply(lam)
-            residual = self._jumps.projected(right - applied, self._jumps.norms(right))
-        is_better = self._jumps.norms(residual) <= self._jumps.norms(right)
-        lam, applied = np.where(is_better, lam, 0.0), np.where(is_better, applied, 0.0)
-        return Iterate(lam, applied, np.where(is_better, residual, right))
 
     def _krylov_for(self, columns: int) -> Krylov:
         """Return the Krylov method for so many load cases, set up when first asked for."""

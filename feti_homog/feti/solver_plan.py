@@ -128,25 +128,16 @@ def choose(sizes: ProblemSizes, options: SolverOptions, thresholds: Thresholds =
     if preconditioner == "auto":
         preconditioner = _fastest(sizes, options.coarse_space, thresholds)
     can_balance = sizes.all_searchable and preconditioner == "dirichlet"
-    _check_adaptive(sizes, options, can_balance)
-    return SolverPlan(preconditioner, can_balance and options.want_soft_modes(sizes.bodies_are_cut))
-
-
-def _check_adaptive(sizes: ProblemSizes, options: SolverOptions, can_balance: bool) -> None:
-    """Raise CaseError if a cell with multipliers cannot have the adaptive coarse space that is asked for."""
     if options.coarse_space == "adaptive" and sizes.shared_dofs and not can_balance:
         raise CaseError("-feti_coarse_space adaptive: needs -feti_pc_type dirichlet, -feti_dual_operator not implicit")
+    return SolverPlan(preconditioner, can_balance and options.want_soft_modes(sizes.bodies_are_cut))
 
 
 def _fastest(sizes: ProblemSizes, coarse_space: str, thresholds: Thresholds) -> str:
     """Return the preconditioner where no option names one."""
-    if coarse_space != "adaptive" and _influence_pays(sizes, thresholds):
+    pays = sizes.applications >= thresholds.influence_applications
+    is_wanted = sizes.has_thin or (pays and sizes.shared_dofs <= thresholds.assembled_schur_dofs)
+    if coarse_space != "adaptive" and sizes.all_dense and is_wanted:
         return "influence"
     is_small = 0 < sizes.shared_dofs <= thresholds.dense_boundary_dofs
     return BONDED if coarse_space == "auto" and sizes.one_each and sizes.all_dense and is_small else "dirichlet"
-
-
-def _influence_pays(sizes: ProblemSizes, thresholds: Thresholds) -> bool:
-    """Return whether the columns of influence are worth their set-up, and fit."""
-    pays = sizes.applications >= thresholds.influence_applications
-    return sizes.all_dense and (sizes.has_thin or (pays and sizes.shared_dofs <= thresholds.assembled_schur_dofs))

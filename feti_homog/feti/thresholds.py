@@ -137,7 +137,7 @@ MAX_RESTARTS = 2
 # motions is then that of a vector of its own size.
 CANCELLED = 1e-2
 # A jump that the active rows see, relative to that of the torn cell, is rounding if it is as small as the first of
-# these; below the second, what is rounding is measured (`active_jumps.jump_rounding`) and multiplied by a margin, for
+# these; below the second, what is rounding is measured (`dual_solution.jump_rounding`) and multiplied by a margin, for
 # it was up to 20 times as large with phases 1000 times apart.
 ZERO_JUMP, SMALL_JUMP, ROUNDING_MARGIN = 1e-13, 1e-8, 100.0
 
@@ -151,36 +151,24 @@ MOST_FOLLOWED_ERROR, MOST_CONFIRMED_ROUNDING = 1e-11, 1e-9
 # Jump that active rows see, relative to that of the torn cell, below which F lambda confirms every solve.
 LEAST_UNCONFIRMED_JUMP = 1e-6
 
-# preconditioners
+# exact
 
 # Influence columns that a rank finds at once, and ranks up to which all are found together: bounds the memory of their
 # right-hand sides, (boundary dofs, both).  A column takes CHOLMOD the less, the more are found at once.
 INFLUENCE_CHUNK, CHUNK_RANKS = 64, 4
-# Freed bytes that stay after a reference cell is factored, for what comes.
-SPARE_BYTES = 64 << 20
-# Columns of a reference cell that have room at first, which takes no memory until they come; for more all are copied,
-# at the worst of times.
-BUFFERED_COLUMNS = 8192
 # Changed rows after which the cell as it stands is factored in place of them: the default of `-feti_influence_columns`;
 # and rows of cells in which that never pays (`scripts/benchmark_path --to-the-end`).
 INFLUENCE_COLUMNS, NEVER_REFACTORED_ROWS = 1000, 2500
-# The next reference cell is made in parts, at events without new columns; at once where by this part more rows changed.
-LATEST_RENEWAL = 4
-# Parts of its assembly, and changes of the bonds from one part to the next: an event has one to three.
-ASSEMBLED_PARTS, RENEWAL_PAUSE = 2, 3
 # Influence columns that each rank finds together at least, with those of bonds near the one that breaks: fewer and
-# larger batches, but columns that may not be needed (`scripts/benchmark_path --to-the-end`).  Share of them to which
-# batches shrink where most columns go unused, for many cracks grow a little each.
-INFLUENCE_BATCH, LEAST_BATCH_SHARE = 64, 0.125
-# Rows that change at once up to which their columns are followed; columns that are followed at most, or twice as many
-# as `-feti_influence_columns`, 8 bytes an owned row each; changes that wait before all of these follow
-# (`scripts/benchmark_path --to-the-end`).
-MOST_FOLLOWED, FOLLOWED_COLUMNS, WAITING_COLUMNS = 16, 2400, 32
-# Share of these columns that stay where there is no room for more, and changes of the bonds for which columns that no
-# longer need to be followed are, lest they come again: faces close.
-FOLLOWED_SHARE, LATE_CHANGES = 0.75, 300
+# larger batches, but columns that may not be needed (`scripts/benchmark_path --to-the-end`).
+INFLUENCE_BATCH = 64
+# Columns from which on unused ones are no longer followed, or twice as many as `-feti_influence_columns`, 8 bytes an
+# owned row each; changes that wait before all of these follow (`scripts/benchmark_path --to-the-end`).
+FOLLOWED_COLUMNS, WAITING_COLUMNS = 2400, 32
+# Share of these columns that stay where there is no room for more.
+FOLLOWED_SHARE = 0.75
 # Columns of each batch of which the entries are compared with those that are followed, and the error, relative to the
-# largest, above which nothing is followed any more.
+# largest, above which the response is followed from a new reference cell.
 CHECKED_COLUMNS, MOST_ASYMMETRY = 4, 1e-9
 # Columns that are copied at once, 8 bytes an owned row each; and of how many columns a product takes as long as a copy
 # of its matrix.
@@ -193,8 +181,6 @@ RIGID_SHARE = 1e-6
 # Stiffness of a fibre over that of what is around it, as the diagonals of K have them, above which influence columns
 # take the forces of the latter: those of the fibre lose as many digits as this has.
 STIFF_FIBRES = 1e3
-# Relative error of the bordered inverse above which it is made anew: borders that pass by a singular block lose digits.
-INVERSE_ERROR = 1e-7
 # Steps of the power method for the norm of the inverse of the dual operator, which find it from below, and by how much
 # what they find is multiplied.
 NORM_ITERATIONS, NORM_MARGIN = 30, 1.2

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from feti_homog.errors import FetiHomogError
-from feti_homog.system.runtime import owners
+from feti_homog.system.runtime import file_locks
 
 
 def replace(path: Path, write: Callable[[Path], object]) -> Path:
@@ -24,7 +24,7 @@ def replace(path: Path, write: Callable[[Path], object]) -> Path:
     part = part_of(path)
     with write_errors(path):
         try:
-            owners.files.add(part)
+            file_locks.files.add(part)
             write(part)
             commit(part, path)
         except BaseException:
@@ -32,7 +32,7 @@ def replace(path: Path, write: Callable[[Path], object]) -> Path:
                 part.unlink(missing_ok=True)
             raise
         finally:
-            owners.files.discard(part)
+            file_locks.files.discard(part)
     return path
 
 
@@ -43,7 +43,7 @@ def replace_text(path: Path, text: str) -> Path:
 
 def part_of(path: Path) -> Path:
     """Return the name, beside `path`, of a file that is being written: no other process writes one of that name."""
-    return path.with_name(f"{path.name}.{owners.tag()}.part")
+    return path.with_name(f"{path.name}.{file_locks.tag()}.part")
 
 
 def commit(part: Path, path: Path) -> None:
@@ -72,7 +72,7 @@ def remove_abandoned(folder: Path, names: re.Pattern[str]) -> None:
     """Remove what writers on this machine that were killed have left; for whoever writes there beside others."""
     part = re.compile(rf"({names.pattern})\.(?P<tag>.+)\.part")
     for path in folder.glob("*.part"):
-        if (match := part.fullmatch(path.name)) and owners.has_ended(match["tag"]):
+        if (match := part.fullmatch(path.name)) and file_locks.has_ended(match["tag"]):
             with contextlib.suppress(OSError):
                 path.unlink()
 

@@ -29,7 +29,7 @@ from feti_homog.results.field_layout import (
 )
 from feti_homog.results.field_views import add_views, bytes_of_views
 from feti_homog.system.parallel.mpi_errors import agree, agree_after, all_raise, on_root, on_root_only
-from feti_homog.system.runtime import owners
+from feti_homog.system.runtime import file_locks
 from feti_homog.system.runtime.records import LENGTH, STRESS, Description
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ class FieldFile:
         self._comm = comm
         self.path = Path(directory) / NAME
         self.part: Path = on_root(comm, atomic.part_of, self.path)
-        owners.files.add(self.part)
+        file_locks.files.add(self.part)
         self._units = {LENGTH: header.length_unit, STRESS: header.stress_unit}
         counts = {
             "n": len(mesh.points),
@@ -114,7 +114,7 @@ class FieldFile:
         self._agreed(agree_after, self._opened.close)
         self._agreed(on_root_only, _complete, self.part, self.path)
         self._is_open = False
-        owners.files.discard(self.part)
+        file_locks.files.discard(self.part)
         return self.path
 
     def __enter__(self) -> FieldFile:
@@ -177,7 +177,7 @@ class FieldFile:
     def _remove(self) -> None:
         """Close and remove the file, once. On a full disk HDF5 can close it only after it was cut to nothing."""
         self._is_open = False
-        owners.files.discard(self.part)
+        file_locks.files.discard(self.part)
         if self._comm.rank == 0:
             with contextlib.suppress(OSError):
                 os.truncate(self.part, 0)

@@ -163,7 +163,7 @@ WITHOUT_MEMORY = {
     "coarse space": (1, "feti.coarse.natural:assemble_owned_rows"),
     "field file": (1, "results.field_file:_write_rows"),
     "contact": (2, "interface.contact.contact_problem:kkt_errors"),
-    "influence columns": (1, "feti.exact.reference_cell:ResponseColumns._of_units"),
+    "influence columns": (1, "feti.exact.reference_cell:ReferenceCell.columns"),
     "checkpoint": (0, "results.checkpoint:Checkpoint._write"),
     "table": (0, "results.csv_tables:write"),
     "picture": (0, "report.plots.figures:plot"),

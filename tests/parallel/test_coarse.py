@@ -17,7 +17,7 @@ from feti_homog.case import case as cases
 from feti_homog.feti.coarse.geneo import kernels_and_soft_modes, subdomain_blocks
 from feti_homog.feti.decomposition.neighbours import Neighbours
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
-from feti_homog.feti.preconditioners.scaled import Dirichlet
+from feti_homog.feti.operators.preconditioners import Dirichlet
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.interface.contact.states import BONDED, OPEN
 

@@ -1,4 +1,4 @@
-"""Influence columns are found in batches, which shrink where their columns go unused."""
+"""Influence columns are found in batches."""
 
 from __future__ import annotations
 
@@ -11,24 +11,22 @@ from feti_homog.interface.contact.states import BONDED, OPEN
 pytestmark = pytest.mark.parallel
 
 
-def test_batches_shrink_where_columns_go_unused(comm):
-    """Bonds far from each other are wanted in turn, and none beside them."""
+def test_columns_come_in_batches_with_those_of_active_rows_near_them(comm):
     cell = torn_cells.tear(comm, geometry="square", petsc={"feti_pc_type": "influence"})
-    solver, influence = cell.solver, cell.solver.exact_inverse
-    influence.most_followed, influence.batch = 24, 16
-    rows, first = influence.neighbours.rows, influence.neighbours.first
-    status = np.full(len(solver.jump_operator.nodes.row), BONDED, np.int8)
+    influence, first = cell.solver.exact_inverse, cell.solver.exact_inverse.neighbours.first
+    influence.batch, rows = 6, influence.neighbours.rows
+    status = np.full(len(cell.solver.jump_operator.nodes.row), BONDED, np.int8)
     status[: 1 if first == 0 else 0] = OPEN
-    solver.set_state(torn_cells.interface(cell, True).active(status), solver.intact_compliance)
-    influence.multipliers(solver.d, np.eye(3))
-    before = len(influence._with_near(rows[1:2], lambda near: near))
-    for number in (7 * np.arange(1, len(rows))) % len(rows):
-        influence.inverse_blocks(rows[[max(number, 1)], None] + np.arange(2))
-    assert influence._share == 0.125 and 1 < len(influence._with_near(rows[1:2], lambda near: near)) < before >= 16
+    active = torn_cells.interface(cell, True).active(status)
+    cell.solver.set_state(active, cell.solver.intact_compliance)
+    asked, columns = [], influence.reference.columns
+    influence.reference.columns = lambda rows: asked.append(rows) or columns(rows)
+    far = len(rows) // 2
+    near = set(rows[influence.neighbours.adjacency[[far]].indices])
+    influence.inverse_blocks(rows[[far], None] + np.arange(2))
+    assert len(asked) == 1 and 6 <= len(asked[0]) < 14 and near < set(asked[0])
     # Rows that have left are found alone.
-    assert len(influence._with_near(rows[:1], lambda near: near)) == 1
-    influence._adapt_batch(np.array([True, True, False]))
-    assert influence._share == 0.25
+    assert influence._with_near(rows[:1], influence._unchanged).tolist() == [rows[0]]
 
 
 def test_columns_have_room_for_those_of_all_rows_at_most(comm):

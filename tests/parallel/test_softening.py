@@ -145,8 +145,9 @@ def test_a_wrong_answer_does_not_outlive_the_next_confirmation(comm):
     soften = FollowedResponse.soften
 
     def distorted(self, *arguments):
-        soften(self, *arguments)
+        done = soften(self, *arguments)
         self.answer = self.answer * (1.0 + 1e-3)
+        return done
 
     with mock.patch.object(FollowedResponse, "soften", distorted), pytest.raises(ConvergenceError, match="columns"):
         solved(comm, **case)

@@ -11,7 +11,7 @@ from support.dimensions import Units
 
 from feti_homog import run
 from feti_homog.case import case as cases
-from feti_homog.feti.active_jumps import ActiveJumps
+from feti_homog.feti.dual_solution import ActiveJumps
 from feti_homog.feti.solver import FetiSolver
 
 pytestmark = pytest.mark.parallel

@@ -46,7 +46,6 @@ FLOORS = (
     ("feti.linalg",),
     ("feti.decomposition",),
     ("feti.operators",),
-    ("feti.preconditioners",),
     ("feti.exact",),
     ("feti.coarse",),
     ("feti",),

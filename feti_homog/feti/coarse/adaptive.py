@@ -31,7 +31,7 @@ from feti_homog.feti.decomposition.neighbours import Neighbours
 from feti_homog.feti.linalg.distributed_solver import DistributedSolver
 from feti_homog.feti.linalg.sparse_matrices import DenseBlockSum, scaled
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
-from feti_homog.feti.preconditioners.scaled import Dirichlet, Preconditioner, StiffnessScaled, never_softens
+from feti_homog.feti.operators.preconditioners import Dirichlet, Preconditioner, StiffnessScaled, never_softens
 from feti_homog.feti.thresholds import (
     COARSE_REGULARISATIONS,
     DEFAULTS,
@@ -145,7 +145,9 @@ class AdaptiveCoarseSpace:
         self.factorizations += 1
         if not self.coarse_dimension:
             return
-        energy = self._sum(part.diagonal())
+        whole = np.zeros(self.coarse_dimension)
+        whole[self._modes.reaching] = part.diagonal()
+        energy = allreduce_sum(self.comm, whole)[self._modes.reaching]
         if self._free_energy is None:
             largest = self.comm.allreduce(energy.max(initial=0.0), MPI.MAX)
             self._free_energy = FREE_MODE_ENERGY * np.where(energy > ROUNDED_MODE_ENERGY * largest, energy, largest)
@@ -162,13 +164,6 @@ class AdaptiveCoarseSpace:
             except np.linalg.LinAlgError:
                 if regularisation == COARSE_REGULARISATIONS[-1]:
                     raise
-
-    def _sum(self, values: Float) -> Float:
-        """(u,) the sum over ranks of values (u,) of coarse displacements.  Collective."""
-        whole = np.zeros(self.coarse_dimension)
-        whole[self._modes.reaching] = values
-        summed: Float = allreduce_sum(self.comm, whole)[self._modes.reaching]
-        return summed
 
     def balanced(self, x: Float) -> Float:
         """Return the forces S_0 x (boundary dofs,) or (boundary dofs, k) of displacements x of that shape.

@@ -18,17 +18,12 @@ import numpy as np
 from mpi4py import MPI
 from scipy.sparse import csc_matrix, csr_matrix
 
-from feti_homog.feti.coarse.local_eigenproblems import (
-    FaceEigenproblems,
-    SubdomainBlocks,
-    SubdomainEigenproblem,
-    eigenproblem,
-)
+from feti_homog.feti.coarse.local_eigenproblems import SubdomainBlocks, eigenproblem
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.neighbours import Neighbours
 from feti_homog.feti.linalg.sparse_matrices import add_shared_rows
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
-from feti_homog.feti.preconditioners.scaled import StiffnessScaled
+from feti_homog.feti.operators.preconditioners import StiffnessScaled
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
 from feti_homog.system.parallel.distributed_arrays import allreduce_sum
 from feti_homog.system.parallel.mpi_errors import agree
@@ -167,7 +162,8 @@ def kernels_and_soft_modes(
     Raises:
         MeshError: the neighbourhood of a face, on any rank, is no subdomain.
     """
-    problems = agree(neighbours.comm, _eigenproblems, blocks, neighbours, thresholds)
+    parts = list(zip(blocks, neighbours.common, strict=True))
+    problems = agree(neighbours.comm, lambda: [eigenproblem(*part, thresholds) for part in parts])
     # Of the neighbours' shares in M^-1 the rows that both have.
     received: list[list[tuple[int, Float32]]] = [[] for _ in blocks]
 
@@ -182,13 +178,6 @@ def kernels_and_soft_modes(
         V.append(np.hstack([block.R, problem.modes(shares, threshold)]))
         shares.clear()
     return V
-
-
-def _eigenproblems(
-    blocks: Sequence[SubdomainBlocks], neighbours: Neighbours, thresholds: Thresholds
-) -> list[SubdomainEigenproblem | FaceEigenproblems]:
-    """Return those of this rank's subdomains, without communication."""
-    return [eigenproblem(block, common, thresholds) for block, common in zip(blocks, neighbours.common, strict=True)]
 
 
 def local_columns(matrix: csc_matrix, span: slice, rows: Int) -> csr_matrix:

@@ -88,7 +88,9 @@ class NaturalCoarseSpace:
         self._is_factored = True
         if not self.kernel_dimension:
             return
-        Z = self._own_unconstrained_modes()
+        # Of the unconstrained modes the ones whose first subdomain is this rank's, as rows.
+        modes, first = self.unconstrained_modes, self.unconstrained_modes.indices[self.unconstrained_modes.indptr[:-1]]
+        Z = modes[:, (first >= self.owned_modes.start) & (first < self.owned_modes.stop)].T.tocsr()
         self.unknowns = np.union1d(self._reaching, Z.indices).astype(np.int64)
         self._G = self.G_active[:, self.unknowns].tocsr()
         self._GT = self._G.T.tocsr()
@@ -100,12 +102,6 @@ class NaturalCoarseSpace:
     def _factor_if_wanted(self) -> None:
         if not self._is_factored:
             self.factor()
-
-    def _own_unconstrained_modes(self) -> csr_matrix:
-        """(z, m) those of the unconstrained modes whose first subdomain is this rank's, as rows."""
-        Z = self.unconstrained_modes
-        first = Z.indices[Z.indptr[:-1]]
-        return Z[:, (first >= self.owned_modes.start) & (first < self.owned_modes.stop)].T.tocsr()
 
     @cached_property
     def _gram(self) -> GramMatrix:

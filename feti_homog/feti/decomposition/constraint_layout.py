@@ -78,7 +78,15 @@ class ConstraintLayout:
         shift: Int = np.repeat(components * shared.first - self.first, self.count)
         self.rows: Int = shift + np.arange(self.count.sum(), dtype=np.int64)
         self.dofs = np.cumsum([0, *(components * s.mesh.n_classes for s in subdomains)])
-        self.base = self._first_nodes()
+        self.base = np.full(len(shared.sharer), -1)
+        entity = np.repeat(np.arange(len(shared.key)), copies)
+        for subdomain, offset in zip(subdomains, self.dofs // components, strict=False):
+            submesh = subdomain.submesh
+            mine = np.flatnonzero(shared.sharer == submesh.index)
+            key, is_edge = shared.key[entity[mine]], shared.is_edge[entity[mine]]
+            place = np.searchsorted(submesh.edge_keys, key)
+            edge = edge_node(len(submesh.class_keys), place, np.ones_like(key), lattice)
+            self.base[mine] = offset + np.where(is_edge, edge, np.searchsorted(submesh.class_keys, key))
 
     @property
     def owned(self) -> tuple[int, int]:
@@ -95,21 +103,6 @@ class ConstraintLayout:
     def _owned_row(self) -> Int:
         """(n,) first row of each entity, counted from this rank's first."""
         return self.components * (self.shared.first - self.shared.owned[0])
-
-    def _first_nodes(self) -> Int:
-        """For each sharer: rank-wide number of its first fine node on the entity, or -1 if it is elsewhere."""
-        shared = self.shared
-        base = np.full(len(shared.sharer), -1)
-        entity = np.repeat(np.arange(len(shared.key)), shared.copies)
-        for subdomain, offset in zip(self.subdomains, self.dofs // self.components, strict=False):
-            submesh = subdomain.submesh
-            mine = np.flatnonzero(shared.sharer == submesh.index)
-            key, is_edge = shared.key[entity[mine]], shared.is_edge[entity[mine]]
-            edge = edge_node(
-                len(submesh.class_keys), np.searchsorted(submesh.edge_keys, key), np.ones_like(key), self.lattice
-            )
-            base[mine] = offset + np.where(is_edge, edge, np.searchsorted(submesh.class_keys, key))
-        return base
 
     def matrix(self) -> csr_matrix:
         """B (local rows, local dofs)."""
@@ -140,7 +133,10 @@ class ConstraintLayout:
         entity, p = expand(entities, shared.nodes[entities])
         first = self.first[entity] + p * c * (k - 1)
         identity = np.broadcast_to(np.eye(c), (len(entity), c, c))
-        frame = _frames(self._normals(entity, p)) if breakable and c == 2 else identity
+        frame = identity
+        if breakable and c == 2:
+            n = self._normals(entity, p)
+            frame = np.stack([n, np.stack([-n[:, 1], n[:, 0]], axis=1)], axis=1)
         rows, columns, values = [], [], []
         for j in range(k):
             base = self.base[shared.pointer[entity] + j]
@@ -190,7 +186,9 @@ class ConstraintLayout:
         breakable = np.flatnonzero(self._owned & (shared.fibre >= 0))
         entity, p = expand(breakable, shared.nodes[breakable])
         k = shared.copies[entity]
-        positions = np.concatenate([_class_points(s) for s in self.subdomains] or [np.zeros((0, 2))])
+        positions = np.zeros((self.dofs[-1] // self.components, 2))
+        for offset, mesh in zip(self.dofs // self.components, (s.mesh for s in self.subdomains), strict=False):
+            positions[offset + mesh.node_class] = mesh.points
         # Sharers are sorted inwards, so the last one is the fibre's, and it is this rank's, which owns the rows.
         copy = self.base[shared.pointer[entity + 1] - 1] + p
         return InterfaceNodes(
@@ -238,13 +236,6 @@ class ConstraintLayout:
         return self.first[entity] + self.components * ((p + 1) * (shared.copies[entity] - 1) - 1), first[entity] + p
 
 
-def _class_points(subdomain: Meshed) -> Float:
-    """(c, 2) a plane position of each class."""
-    points = np.empty((subdomain.mesh.n_classes, 2))
-    points[subdomain.mesh.node_class] = subdomain.mesh.points
-    return points
-
-
 def expand(entities: Int, nodes: Int) -> tuple[Int, Int]:
     """Entity and position of every fine node."""
     ends = np.cumsum(nodes)
@@ -260,8 +251,3 @@ def _contrasts(sizes: Int) -> Float:
     if len(sizes) != 2:
         return np.asarray(helmert(int(sizes.sum())))
     return np.vstack([block_diag(*map(helmert, sizes)), np.repeat([1.0, -1.0] / sizes, sizes)])
-
-
-def _frames(normal: Float) -> Float:
-    """(i, 2, 2) rows n and t."""
-    return np.stack([normal, np.stack([-normal[:, 1], normal[:, 0]], axis=1)], axis=1)

@@ -58,6 +58,7 @@ class JumpOperator:
         B: (local rows, local dofs) signed, rotated entries; a local row is one that a local dof takes part in.
         rows: global number of each local row.
         node_rows: first owned row and number of rows of each fine node that this rank owns.
+        shared_dofs: displacements of all nodes that subdomains of any rank share.
         nodes: the interface nodes that this rank owns.
         outer_copies: local rows of the interface nodes of which this rank has a copy of the outer body, and these
             copies, as `ConstraintLayout.outer_copies` has them.
@@ -87,6 +88,7 @@ class JumpOperator:
         self.global_rows = layout.components * shared.constraints
         self.rows, self.B = layout.rows, layout.matrix()
         self.node_rows = layout.node_rows()
+        self.shared_dofs = int(comm.allreduce(layout.components * len(self.node_rows[0])))
         self.nodes = layout.interface_nodes()
         self.outer_copies = layout.outer_copies()
         self.copies, self.inside = layout.facing()

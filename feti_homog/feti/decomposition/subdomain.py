@@ -99,7 +99,13 @@ class Subdomain:
         positions[mesh.node_class[mesh.nodes]] = mesh.points[mesh.nodes] + shift[:, None]
         R = kernel(problem, positions, closes, submesh.pinned)
         K = _pinned(body.K, problem, submesh.pinned)
-        _check_kernel(submesh, K, R)
+        # The rigid-body modes are in the kernel of K; NaN is above any tolerance.
+        residual = abs(K @ R).max(initial=0.0) / abs(K.data).max()
+        if not residual <= KERNEL_TOLERANCE:
+            faults = (
+                f"|K R| / |K| = {residual:.1e}, expected at most {KERNEL_TOLERANCE:.0e}; its elements are degenerate"
+            )
+            raise MeshError(f"{label(submesh)}: {faults}")
         Q, slopes = body.Q, body.slopes
         if submesh.pinned >= 0:
             Q[problem.dofs(np.array([submesh.pinned]))], slopes[submesh.pinned] = 0.0, 0.0
@@ -193,8 +199,16 @@ class Subdomain:
         """
         if self.R.shape[1] == 0:
             return np.zeros(0, np.int64), np.zeros((0, 0))
+        # Three far-apart nodes for three modes, else the one farthest from the pinned class.
+        x = self.positions[candidates]
+        origin = self.positions[self.submesh.pinned] if self.submesh.pinned >= 0 else x.mean(axis=0)
+        apart = [np.argmax(((x - origin) ** 2).sum(axis=1))]
+        if self.R.shape[1] >= 3:
+            apart.append(np.argmax(((x - x[apart[0]]) ** 2).sum(axis=1)))
+            (dx, dy), (ex, ey) = x[apart[1]] - x[apart[0]], (x - x[apart[0]]).T
+            apart.append(np.argmax(np.abs(dx * ey - dy * ex)))
         # On a straight line two are enough, and the third is one of them.
-        nodes = np.unique(self._far_apart(candidates))
+        nodes = np.unique(candidates[apart])
         dofs = self.problem.dofs(nodes)
         Rf = np.linalg.qr(self.R[dofs])[0]
         return dofs, K.diagonal()[dofs].mean() * Rf @ Rf.T
@@ -204,17 +218,6 @@ class Subdomain:
         dofs, block = self.fixing(K, candidates)
         rows, columns = np.meshgrid(dofs, dofs, indexing="ij")
         return (K + csr_matrix((block.ravel(), (rows.ravel(), columns.ravel())), shape=K.shape)).tocsr()
-
-    def _far_apart(self, candidates: Int) -> Int:
-        """Three far-apart nodes for three modes, else the one farthest from the pinned class."""
-        x = self.positions[candidates]
-        origin = self.positions[self.submesh.pinned] if self.submesh.pinned >= 0 else x.mean(axis=0)
-        a = np.argmax(((x - origin) ** 2).sum(axis=1))
-        if self.R.shape[1] < 3:
-            return candidates[[a]]
-        b = np.argmax(((x - x[a]) ** 2).sum(axis=1))
-        (dx, dy), (ex, ey) = x[b] - x[a], (x - x[a]).T
-        return candidates[[a, b, np.argmax(np.abs(dx * ey - dy * ex))]]
 
 
 def kernel(problem: Problem, positions: Float, rotates: bool, pinned: int) -> Float:
@@ -247,17 +250,6 @@ def _pinned(K: csr_matrix, problem: Problem, pinned: int) -> csr_matrix:
         K.data[own] = np.where(K.indices[own] == dof, largest, 0.0)
     K.eliminate_zeros()
     return K
-
-
-def _check_kernel(submesh: Submesh, K: csr_matrix, R: Float) -> None:
-    """Refuse a subdomain whose rigid-body modes R (cn, k) are not in the kernel of K (cn, cn)."""
-    residual = abs(K @ R).max(initial=0.0) / abs(K.data).max()
-    # NaN is above any tolerance.
-    if not residual <= KERNEL_TOLERANCE:
-        raise MeshError(
-            f"{label(submesh)}: |K R| / |K| = {residual:.1e}, expected at most {KERNEL_TOLERANCE:.0e}; "
-            "its elements are degenerate"
-        )
 
 
 def _check_corners(submesh: Submesh, mesh: FineMesh) -> None:

@@ -1,5 +1,5 @@
 """Exact inverses of the dual operator from influence columns.
 
-Imports `feti`, `feti.decomposition`, `feti.linalg`, `feti.operators`, `feti.preconditioners` and `system`.  Main
-entries: `exact_inverse` and `bonded_inverse`.
+Imports `feti`, `feti.decomposition`, `feti.linalg`, `feti.operators` and `system`.  Main entries:
+`exact_inverse.ExactInverse` and `reference_cell.BondedInverse`.
 """

@@ -1,18 +1,13 @@
-"""The inverse H of the projected dual operator, exact for any active rows, by columns of a reference cell.
+"""The inverse H of the projected dual operator, exact for any active rows, by a reference cell and followed columns.
 
-Let Gamma be the response of a cell whose active rows are A, `reference_cell`, and C the rows that are active either
-here or there: D of A have left, R beside A have come.  The multipliers that close the jumps g are
+Let Gamma be the response of a cell whose active rows are A, `reference_cell`, and C the rows that have changed since:
+some of A have left, others have come or their springs gained compliance.  The columns of C in the present response,
+which `followed_response` keeps up, give the present response to anything else from that of the reference cell
+(`reference_changes`), new followed columns among it.
 
-    y = Gamma_:A g_A,  c = N (y_C + g_R),  lam_A = y_A - Gamma_AC c,  lam_R = -c_R,  N = Gamma_CC^-1.
-
-A spring whose compliance grew by dC is one of C, whose jump dC lam is prescribed by its own multiplier:
-
-    N = (Gamma_CC + D)^-1,  lam_C = D c on such rows,  D = dC^-1 there, -dC where bonds came, 0 where they left.
-
-Changes cost their columns of what `followed_response` keeps up, which gives new ones, too (`followed_changes`).  N
-follows the changes, by borders, where these columns are not at hand.  The reference cell stays, until there are more
-changes than an option allows: then the cell as it stands, but for what softened, takes its place, see
-`renewed_reference`.
+The reference cell stays until there are more changes than an option allows: then the cell as it stands, but for gains
+of compliance, is factored in its place.  Where changes cannot be followed, for they lose too many digits, it is
+factored too, and its response is followed from there.
 """
 
 from __future__ import annotations
@@ -23,33 +18,42 @@ from petsc4py import PETSc
 
 from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
-from feti_homog.feti.exact.followed_changes import FollowedChanges
+from feti_homog.feti.decomposition.neighbours import InterfaceNeighbours
 from feti_homog.feti.exact.followed_response import FollowedResponse
-from feti_homog.feti.exact.renewed_reference import RenewedReference
+from feti_homog.feti.exact.reference_cell import BodyTies, ReferenceCell, one_sided_jumps, stiffness_of_rows
+from feti_homog.feti.exact.reference_changes import ReferenceChanges
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
-from feti_homog.feti.preconditioners.scaled import Preconditioner
+from feti_homog.feti.operators.preconditioners import Preconditioner
 from feti_homog.feti.thresholds import (
     FOLLOWED_COLUMNS,
+    INFLUENCE_BATCH,
     INFLUENCE_COLUMNS,
+    LEAST_FOLLOWED_PIVOT,
     MOST_ASYMMETRY,
-    MOST_FOLLOWED,
     NEVER_REFACTORED_ROWS,
     NORM_MARGIN,
 )
-from feti_homog.system.parallel.distributed_arrays import gather_rows, scale_rows
-from feti_homog.typing import Float, Int
+from feti_homog.system.parallel.distributed_arrays import scale_rows
+from feti_homog.system.runtime import process_memory
+from feti_homog.typing import Bool, Float, Int
 
 
-class ExactInverse(RenewedReference, Preconditioner):
+class ExactInverse(Preconditioner):
     """z = H r on the active rows, H the inverse of the dual operator there: nothing is left to iterate.
 
     Attributes:
+        neighbours: which bonds lie beside each other.
+        stiffness: (all rows,) bounds of the diagonal of H: the stiffness of a node of either side and of the spring
+            between them, in a row, while all others are held.
         norm: |H| with all bonds intact, which is the largest, as the power method finds it, with a margin.
-        most_followed: columns at most that are followed, from the next time that none are.
+        factorizations: reference cells so far.
+        batch: columns found at once at least.
+        most_followed: columns from which on unused ones go, from the next time that none are followed.
     """
 
     norm: float = np.inf
     is_exact = True
+    reference: ReferenceCell
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> None:
         """Factor the cell with all bonds intact; all boundary operators must be dense.  Collective.
@@ -63,21 +67,22 @@ class ExactInverse(RenewedReference, Preconditioner):
         most = PETSc.Options("feti_").getInt("influence_columns", most)
         if most < 1:
             raise CaseError(f"-feti_influence_columns {most}: expected a whole number above 0")
-        super().__init__(comm, jump_operator, operators, most)
+        self.comm, self._jump_operator, self._operators, self._most_changes = comm, jump_operator, operators, most
+        self._first, end = jump_operator.owned
+        self._rows = end - self._first
+        self.stiffness = np.concatenate(comm.allgather(stiffness_of_rows(jump_operator, operators)))
+        self._one_sided = one_sided_jumps(comm, jump_operator, operators)
+        self._ties = BodyTies(comm, jump_operator)
+        self.neighbours = InterfaceNeighbours(comm, jump_operator, operators.subdomains)
+        self.batch = INFLUENCE_BATCH * comm.size
         self.most_followed = min(max(FOLLOWED_COLUMNS, 2 * most), jump_operator.global_rows)
-        self._has_added = False
-        self._next, self._loose = self._more, np.zeros(0, np.int64)
+        self.factorizations = 0
+        # Of the present state active rows and what springs gained; the latter from the next `activate` on.
+        self._active, self._more = np.ones(self._rows), np.zeros(self._rows)
+        self._next = self._more
+        self._restart()
         # Rows that leave make H smaller.
-        self.norm = NORM_MARGIN * self.reference.largest_eigenvalue(self._first)
-
-    @property
-    def rounding(self) -> float:
-        """Return the largest force, relative to `stiffness`, that jumps of rigid-body motions of size 1 make.
-
-        Bodies follow them without force: all of it is rounding, a relative error of H.  Collective."""
-        if self._followed is None:
-            self._catch_up()
-        return self._rounding
+        self.norm = NORM_MARGIN * self.reference.largest_eigenvalue()
 
     def soften(self, more: Float) -> None:
         """Let springs have `more` compliance (owned rows,) than at first, from the next `activate` on."""
@@ -85,156 +90,176 @@ class ExactInverse(RenewedReference, Preconditioner):
 
     def activate(self, active: Float) -> None:
         """Restrict to the rows where `active` is 1.  Collective."""
-        self._has_added = False
-        if self._followed is not None and not self._follow(self._followed, active):
-            self._followed = None
-        self._active, self._more, self._is_behind = active, self._next, True
-        self._held = active if self._followed is None else self._with_pins(self._followed.pins, active)
-        # Columns cost as much as a part of the next reference cell.
-        if self._followed is not None and not self._has_added:
-            self._renew_a_part()
+        if not self._follow(active, self._next, LEAST_FOLLOWED_PIVOT):
+            self._active, self._more = active, self._next
+            self._restart()
 
-    def _follow(self, followed: FollowedResponse, active: Float) -> bool:
-        """Keep what is followed up with the rows that soften, leave or come, if it can be.  Collective."""
-        gained = self._next * active - self._more * self._active
-        own = np.flatnonzero(((turned := self._active - active) != 0.0) | (gained != 0.0))
+    def _follow(self, active: Float, more: Float, least: float) -> bool:
+        """Follow rows that leave, come or soften to another state, if pivots are above `least`.  Collective."""
+        gained, turned = more * active - self._more * self._active, self._active - active
+        own = np.flatnonzero((turned != 0.0) | (gained != 0.0))
         parts = zip(*self.comm.allgather((self._first + own, turned[own], gained[own])), strict=True)
-        rows, *numbers = (np.concatenate(part) for part in parts)
-        is_few = len(rows) <= MOST_FOLLOWED
-        return is_few and self._add_followed(followed, rows) and followed.follow(rows, *numbers)
-
-    def _with_pins(self, pins: Int, active: Float) -> Float:
-        """(owned rows,) 1 on active rows and on the global rows `pins`."""
-        held = active.copy()
-        held[pins[(pins >= self._first) & (pins < self._first + self._rows)] - self._first] = 1.0
-        return held
-
-    def _add_followed(self, followed: FollowedResponse, wanted: Int) -> bool:
-        """Let all rows (k,) `wanted` and the pins have columns of the present response; False if that cannot be.
-
-        Collective.
-        """
-        wanted = np.union1d(wanted, followed.pins) if len(followed.pins) else wanted
-        if not len(followed.lacking(wanted)):
+        rows, turns, gains = (np.concatenate(part) for part in parts)
+        if not len(rows):
             return True
-        self._has_added = True
-        changes = self._up_to_date()
-        if (changes is None and self._has_others(followed)) or len(wanted) > followed.most:
-            return False  # other bodies are free than those with pins, or there is no room
-        near = self._with_near(lacking := followed.lacking(wanted), followed.lacking)
-        rows = near if len(np.union1d(wanted, near)) <= followed.most else lacking
-        if changes is None:
-            self._changes.columns.add(rows)
-            columns = self._changes.present(rows, self._held)
-        else:
-            columns = changes.present(self._changes.columns.found(rows))
-            if not changes.error(rows, columns, self.stiffness) <= MOST_ASYMMETRY:
-                self._forget()
-                return False
-        # Without columns of what has changed, N is wanted.
-        spared = np.union1d(wanted, self._changed(self._held) if changes is None else changes.rows)
-        spared = spared if len(np.union1d(spared, rows)) <= followed.most else wanted
-        self._adapt_batch(followed.make_room(len(rows), spared, self._is_active()))
-        followed.add(rows, columns)
+        self._is_fresh = False
+        self._add_columns(rows)
+        if not self._followed.follow(rows, turns, gains, least):
+            return False
+        self._active, self._more = active, more
         return True
 
-    def _up_to_date(self) -> FollowedChanges | None:
-        """Return the changes of the reference cell if all are followed, else None with N up to date.  Collective."""
-        self._renew_if_due()
-        if (changes := self._followed_changes()) is None:
-            self._catch_up()
-        return changes
+    def _restart(self) -> None:
+        """Factor the cell as it stands, and follow its response from there.  Collective."""
+        active, more = self._active, self._more
+        self._active, self._more = self._ties.tied(active), np.zeros(self._rows)
+        nothing = np.zeros((self._rows, 0))
+        self._followed = FollowedResponse(self.comm, self._first, self.stiffness, nothing, self.most_followed)
+        self._factor(self._active)
+        self._follow(active, more, 0.0)
+        self._is_fresh = True
 
-    def _catch_up(self) -> None:
-        """Let the reference cell and N be those of the present state.  Collective."""
-        if not self._is_behind:
+    def _factor(self, active: Float) -> None:
+        """Let the reference cell be the one with these bonds, which must hold all bodies.  Collective."""
+        if self.factorizations:
+            self.reference.destroy()  # before the new cell takes memory
+            process_memory.trim()
+        self.reference = ReferenceCell(self.comm, self._jump_operator, self._operators, self._one_sided, active)
+        self.factorizations += 1
+        self._unchanged = FollowedResponse(
+            self.comm, self._first, self.stiffness, np.zeros((self._rows, 0)), self.most_followed
+        )
+        self._answer: Float | None = None
+        self._rounding: float | None = None
+        # Changes without which the reference cell is not the one at hand.
+        self._tied = len(self._changes().rows)
+
+    @property
+    def _held(self) -> Float:
+        """(owned rows,) 1 on active rows and on pins."""
+        held, pins = self._active.copy(), self._followed.pins - self._first
+        held[pins[(pins >= 0) & (pins < self._rows)]] = 1.0
+        return held
+
+    def _changes(self) -> ReferenceChanges:
+        """Return the changes since the reference cell.  Collective."""
+        kinds = np.stack([self.reference.active - self._held, self._more * self._active], axis=1)
+        own = np.flatnonzero(kinds.any(axis=1))
+        parts = zip(*self.comm.allgather((self._first + own, kinds[own])), strict=True)
+        return ReferenceChanges(self.comm, self._first, self.reference, self._followed, *map(np.concatenate, parts))
+
+    def _up_to_date(self) -> ReferenceChanges:
+        """Return the changes since the reference cell, which is factored anew if they are too many.  Collective."""
+        changes = self._changes()
+        if len(changes.rows) - self._tied <= self._most_changes:
+            return changes
+        tied = self._ties.tied(self._held)
+        # Ties that have left are changes of the new cell, too.
+        rows = np.concatenate(self.comm.allgather(self._first + np.flatnonzero(tied != self._held)))
+        self._add(self._followed.lacking(rows), changes, rows)
+        self._factor(tied)
+        return self._changes()
+
+    def _add_columns(self, rows: Int) -> None:
+        """Let all global rows (k,) and the pins have columns of the present response.  Collective."""
+        rows = np.union1d(rows, self._followed.pins)
+        if not len(self._followed.lacking(rows)):
             return
-        self._renew_if_due()
-        self._is_behind = False
-        changed = self._changed(self._held)
-        self._find(changed)
-        self._changes.update(changed, self._softened)
-        self._loose = self._changes.columns.rows[self._changes.inverse.dependent]
-        self._held = self._with_pins(self._loose, self._held)
+        changes = self._up_to_date()
+        if not self._add(self._with_near(rows, self._followed), changes, rows):
+            self._restart()
+            rows = np.union1d(rows, self._followed.pins)
+            self._add(self._followed.lacking(rows), self._changes(), rows, np.inf)
 
-    def _has_others(self, followed: FollowedResponse) -> bool:
-        """Return whether N finds other bodies free than those with pins."""
-        return not np.isin(self._loose, followed.pins).all()
+    def _add(self, rows: Int, changes: ReferenceChanges, needed: Int, most: float = MOST_ASYMMETRY) -> bool:
+        """Follow columns of global rows (k,) too, unless followed ones are asymmetric with them.  Collective."""
+        if not len(rows):
+            return True
+        columns = changes.present(self.reference.columns(rows))
+        if not changes.error(rows, columns, self.stiffness) <= most:
+            return False
+        self._followed.make_room(len(rows), np.union1d(needed, changes.rows), self._are_active)
+        self._followed.add(rows, columns)
+        return True
+
+    def _with_near(self, rows: Int, followed: FollowedResponse) -> Int:
+        """Return rows that lack columns and active ones near them, which break next: columns are cheaper together.
+
+        Where only rows lack that have left, none: faces touch here and there.  Collective.
+        """
+        rows, active = followed.lacking(rows), self._are_active
+        most = self.batch if active[rows].any() else 0
+        return self.neighbours.rows_near(rows, lambda near: followed.lacking(near[active[near]]), most)
+
+    @property
+    def _are_active(self) -> Bool:
+        """(all rows,) which are active.  Collective."""
+        return np.asarray(np.concatenate(self.comm.allgather(self._active)) > 0.0)
+
+    @property
+    def rounding(self) -> float:
+        """Return the largest force, relative to `stiffness`, that jumps of rigid-body motions of size 1 make.
+
+        Bodies follow them without force: all of it is rounding, a relative error of H.  Collective."""
+        if self._rounding is None:
+            stiffness = self.stiffness[self._first : self._first + self._rows]
+            self._rounding = self.reference.force_of_rigid_motions(stiffness)
+        return self._rounding
 
     def apply(self, r: Float) -> Float:
         """H r for r (owned rows,) or (owned rows, k); 0 on inactive rows.  Collective."""
-        changes = self._up_to_date()
-        z = self._of_reference(r if r.ndim == 2 else r[:, None])
-        found = self._changes.response(z) if changes is None else changes.refined(z)
-        return scale_rows(self._active, found.reshape(r.shape))
+        z = self._up_to_date().refined(self._of_reference(r if r.ndim == 2 else r[:, None]))
+        return scale_rows(self._active, z.reshape(r.shape))
 
     def _of_reference(self, g: Float) -> Float:
-        """(owned rows, k) Gamma g_A + g_R.  Collective."""
+        """(owned rows, k) Gamma g_A + g_R: jumps of rows that are not active stay.  Collective."""
         at_rest = scale_rows(1.0 - self.reference.active, g)
         return self.reference.respond(scale_rows(self.reference.active, g)) + at_rest
 
     def multipliers(self, d: Float, E: Float) -> Float:
         """H d E, but for rounding, for d (owned rows, v), the same at every call, and E (v, k).  Collective."""
-        return scale_rows(self._active, self._whole_answer(d) @ E)
+        return scale_rows(self._active, self.renew_answer(d) @ E)
 
     def answer(self, d: Float, E: Float, free: int = 0) -> tuple[Float, Float] | None:
         """Multipliers H d E and jumps on inactive rows, (owned rows, k), with arguments as of `multipliers`.
 
-        They are those of before with updates, where these can be followed.  Jumps are those of one place of the bodies
-        that nothing holds; None where these have another number of motions than `free`.  Collective.
+        They are those of before with updates.  Jumps are those of one place of the bodies that nothing holds; None
+        where these have another number of motions than `free`.  Collective.
         """
-        whole = (self._whole_answer(d) if self._followed is None else self._followed.answer) @ E
-        if self._followed is None or len(self._followed.pins) != free:
-            self._forget()
+        if len(self._followed.pins) != free:
+            if not self._is_fresh:
+                self._restart()
             return None
-        lam = scale_rows(self._active, whole)
-        return lam, whole - lam
+        U = (self._followed.answer if self._followed.answer.shape[1] else self.renew_answer(d)) @ E
+        lam = scale_rows(self._active, U)
+        return lam, U - lam
 
-    def renew_answer(self, d: Float) -> None:
-        """Let what is followed of the multipliers H d, of d (owned rows, v), be without rounding of the updates.
+    def renew_answer(self, d: Float) -> Float:
+        """Return U (owned rows, v) of d (owned rows, v) without rounding of the updates, which go on from there.
 
         Collective."""
-        self._whole_answer(d)
-
-    def _forget(self) -> None:
-        """Follow nothing, so that pins are found anew."""
-        self._followed, self._held, self._is_behind = None, self._active, True
-
-    def _whole_answer(self, d: Float) -> Float:
-        """(owned rows, v) U, from which updates go on.  Collective."""
         changes = self._up_to_date()
-        if changes is None and self._followed is not None and self._has_others(self._followed):
-            self._forget()
-            self._catch_up()
         if self._answer is None:
             self._answer = self._of_reference(d)
-        answer = self._changes.response(self._answer) if changes is None else changes.refined(self._answer)
         # Pins bear nothing, and stay.
-        answer = scale_rows(1.0 - self._held + self._active, answer)
-        if self._followed is None:
-            arguments = self.stiffness, answer, self._loose, self.most_followed
-            self._followed = FollowedResponse(self.comm, self._first, *arguments)
-        self._followed.answer = answer
-        return answer
+        self._followed.answer = scale_rows(1.0 - self._held + self._active, changes.refined(self._answer))
+        return self._followed.answer
 
     def inverse_blocks(self, pairs: Int) -> Float:
         """(m, 2, 2) diagonal blocks of H, for the same pairs (m, 2) of active global rows on every rank.  Collective.
 
         Rows that leave together change the multipliers of their own by all of them, and open by H_ii^-1 lam_i.
         """
-        if (followed := self._followed) is not None and self._add_followed(followed, np.unique(pairs)):
-            return followed.blocks(pairs)
-        self._catch_up()
-        self._find(pairs.ravel())
-        returned = gather_rows(self.comm, self.reference.active, self._first, pairs.ravel()) == 0
-        found = self._changes.columns
-        return self._changes.inverse.blocks(found.block, found.positions(pairs.ravel()), returned)
+        self._add_columns(np.unique(pairs))
+        return self._followed.blocks(pairs)
 
     def columns(self, rows: Int) -> tuple[Float, Float]:
         """(owned rows, k) columns of H of the reference cell, and their (k, k) block, for the same global rows (k,).
 
         They are those of the bonded cell until rows are first restricted.  Collective.
         """
-        self._find(rows)
-        at = self._changes.columns.positions(rows)
-        return self._changes.columns.owned[:, at], self._changes.columns.block[at[:, None], at]
+        if len(self._unchanged.lacking(rows)):
+            new = self._with_near(rows, self._unchanged)
+            self._unchanged.make_room(len(new), rows, np.ones(len(self.stiffness), bool))
+            self._unchanged.add(new, self.reference.columns(new))
+        return self._unchanged.columns(rows), self._unchanged.entries(rows, rows)

@@ -28,9 +28,7 @@ from scipy.linalg.lapack import dpstrf
 
 from feti_homog.feti.linalg.dense_matrices import product_with_some
 from feti_homog.feti.thresholds import (
-    FOLLOWED_COLUMNS,
     FOLLOWED_SHARE,
-    LATE_CHANGES,
     LEAST_FOLLOWED_PIVOT,
     RIGID_SHARE,
     SINGULAR_PIVOT,
@@ -46,29 +44,19 @@ class FollowedResponse:
     Attributes:
         answer: (owned rows, v) U.
         pins: (p,) global rows that left and hold bodies that nothing else does.
-        most: columns at most.
     """
 
-    def __init__(
-        self,
-        comm: MPI.Intracomm,
-        first: int,
-        stiffness: Float,
-        answer: Float,
-        pins: Int,
-        most: int = FOLLOWED_COLUMNS,
-    ) -> None:
-        """`answer` is U with these `pins`; this rank's rows begin at `first`.  No columns yet.
+    def __init__(self, comm: MPI.Intracomm, first: int, stiffness: Float, answer: Float, most: int) -> None:
+        """Begin with the `answer` U and no columns; this rank's rows begin at `first`.
 
-        `stiffness` (all rows,) is the most that the diagonal of Gamma can be on active rows.
+        `stiffness` (all rows,) bounds the diagonal of Gamma on active rows; from `most` columns on, unused ones go.
         """
         self._comm, self._first, self._stiffness = comm, first, stiffness
-        self.answer, self.pins, self.most = answer, pins, most
+        self.answer, self.pins = answer, np.zeros(0, np.int64)
         self._slot = np.full(len(stiffness), -1)
         self._rows: Int = np.zeros(0, np.int64)
-        # When each column was last used, and when it came, counted in changes.
+        # When each column was last used, counted in changes.
         self._used, self._now = np.zeros(most, np.int64), 0
-        self._came = np.zeros(most, np.int64)
         # Memory is taken when columns come.
         self._buffer = np.zeros((len(answer), most), order="F")
         # What is taken off at changes that wait, and its factors in the columns of the rows K that are kept.
@@ -80,36 +68,32 @@ class FollowedResponse:
         """Return which of the global rows have no column."""
         return rows[self._slot[rows] < 0]
 
-    def make_room(self, more: int, wanted: Int, useful: Bool) -> Bool:
-        """Let columns go where there is no room for so many more, and return which of them were ever used.
+    def make_room(self, more: int, needed: Int, useful: Bool) -> None:
+        """Have room for so many more columns: those longest unused go.
 
-        Those longest unused go first, those of rows that are `useful` (all rows,) last, those of `wanted` stay.
+        Columns of the rows `needed` stay; those of rows that are `useful` (all rows,) go last.
         """
-        if len(self._rows) + more <= self.most:
-            return np.zeros(0, bool)
+        most = len(self._used)
+        if len(self._rows) + more <= most:
+            return
         # Some more at once, for the others move.
-        count = min(int(FOLLOWED_SHARE * self.most), self.most - more)
-        spared, is_useful = np.isin(self._rows, wanted), useful[self._rows]
+        count = max(min(int(FOLLOWED_SHARE * most), most - more), 0)
+        spared, is_useful = np.isin(self._rows, needed), useful[self._rows]
         order = np.lexsort([-self._used[: len(self._rows)], ~is_useful, ~spared])
-        stay, go = np.split(order, [max(count, int(spared.sum()))])
-        was_used = np.asarray(self._used[go] > self._came[go])
-        self._retain(np.sort(stay))
-        return was_used
-
-    def keep(self, useful: Bool) -> None:
-        """Let columns go but those of rows that are `useful` (all rows,) or were used lately."""
-        self._retain(np.flatnonzero(useful[self._rows] | (self._used[: len(self._rows)] >= self._now - LATE_CHANGES)))
-
-    def _retain(self, stay: Int) -> None:
-        """Let columns go but those at the places `stay` (n,), ascending."""
+        stay = np.sort(order[: max(count, int(spared.sum()))])
         kept, n = self._rows[stay], len(stay)
         self._slot[self._rows] = -1
         self._slot[kept] = np.arange(n)
-        self._rows, self._used[:n], self._came[:n] = kept, self._used[stay], self._came[stay]
+        self._rows, self._used[:n] = kept, self._used[stay]
         for part in np.array_split(np.arange(n), n // WAITING_COLUMNS + 1):
             # Columns move to the left, so that none is lost.
             self._buffer[:, part] = self._buffer[:, stay[part]]
         self._factors[:n] = self._factors[stay]
+        if n + more > most:
+            wider = np.zeros((len(self._buffer), 2 * (n + more)), order="F")
+            wider[:, :n], self._buffer = self._buffer[:, :n], wider
+            new = wider.shape[1] - most
+            self._used, self._factors = np.pad(self._used, (0, new)), np.pad(self._factors, [(0, new), (0, 0)])
 
     def columns(self, rows: Int) -> Float:
         """(owned rows, k) columns of the global rows (k,), which have them."""
@@ -152,48 +136,57 @@ class FollowedResponse:
         old, new = len(self._rows), len(self._rows) + len(rows)
         self._slot[rows] = np.arange(old, new)
         self._rows = np.concatenate([self._rows, rows])
-        self._buffer[:, old:new], self._used[old:new], self._came[old:new] = columns, self._now, self._now
+        self._buffer[:, old:new], self._used[old:new] = columns, self._now
 
-    def follow(self, rows: Int, turned: Float, gained: Float) -> bool:
+    def follow(self, rows: Int, turned: Float, gained: Float, least: float = LEAST_FOLLOWED_PIVOT) -> bool:
         """Let the global rows (k,) leave (`turned` is 1), come (-1) or soften (0), their springs gain compliance (k,).
 
-        False where columns, those of pins too, are lacking or lose too many digits; then this is of no state.
-        Collective.
+        All of them and the pins have columns.  False where pivots below `least` lose too many digits; then this is the
+        response of no state.  Collective.
         """
-        soft, is_pin = turned == 0.0, (rows[:, None] == self.pins).any(axis=1)
-        if len(self.lacking(np.concatenate([rows, self.pins]))) or (gained[soft] < 0.0).any():
-            return False
+        is_pin = (rows[:, None] == self.pins).any(axis=1)
         if is_pin.any():
             self.pins = np.setdiff1d(self.pins, rows)
-        softer = (soft | is_pin) & (gained != 0.0)
-        if softer.any():
-            self.soften(rows[softer], gained[softer])
-        moves = ~soft & ~is_pin
-        return not moves.any() or self._exchange(*(x[moves] for x in (rows, turned, gained)))
+        held = (turned == 0.0) | is_pin
+        softer = np.flatnonzero(held & (gained != 0.0))
+        parts = np.array_split(softer, len(softer) // WAITING_COLUMNS + 1)
+        if not all(self.soften(rows[some], gained[some], least) for some in parts if len(some)):
+            return False
+        # Rows come before others leave, so that fewer bodies are free meanwhile; half of the room is for pins.
+        moves = np.flatnonzero(~held)
+        moves = moves[np.argsort(turned[moves], kind="stable")]
+        parts = np.array_split(moves, 2 * len(moves) // WAITING_COLUMNS + 1)
+        return all(self._exchange(rows[some], turned[some], gained[some], least) for some in parts if len(some))
 
-    def soften(self, rows: Int, more: Float) -> None:
-        """Let springs of the global rows (k,), which have columns, gain compliance (k,).  Collective."""
+    def soften(self, rows: Int, more: Float, least: float = 0.0) -> bool:
+        """Let springs of global rows (k,) gain compliance (k,), some less than 0; False as `follow`.  Collective."""
         self._make_room(len(rows))
         columns, values = self._present(rows)
-        k = len(rows)
+        k, root = len(rows), np.sqrt(np.abs(more))
+        outer = np.outer(root, root)
+        block = np.diag(np.sign(more)) + outer * (values[:k, :k] + values[:k, :k].T) / 2
         # One rank's rounding is that of all.
-        B = self._comm.bcast(np.linalg.inv(np.diag(1.0 / more) + (values[:k, :k] + values[:k, :k].T) / 2))
-        self._change(columns, B, values)
+        B = self._comm.bcast(np.linalg.inv(block) * outer if _has_digits(block, least) else None)
+        if B is not None:
+            self._change(columns, B, values)
+        return B is not None
 
-    def _exchange(self, rows: Int, sign: Float, gained: Float) -> bool:
+    def _exchange(self, rows: Int, sign: Float, gained: Float, least: float) -> bool:
         """Let rows leave (sign 1) or come (-1), and pins leave with those that come; False where digits are lost.
 
         Collective.
         """
         columns, values = self._present(rows)
-        if len(moved := self._moved_pins(values[len(rows) :, : len(rows)][:, sign < 0.0])):
+        # Pins that unit forces on rows that come press.
+        forces = values[len(rows) :, : len(rows)][:, sign < 0.0]
+        if len(moved := self.pins[(np.abs(forces[self._slot[self.pins]]) > RIGID_SHARE).any(axis=1)]):
             rows, none = np.concatenate([rows, moved]), np.zeros(len(moved))
             sign, gained = np.concatenate([sign, none + 1.0]), np.concatenate([gained, none])
             columns, values = self._present(rows)
         if (k := len(rows)) > WAITING_COLUMNS:
             return False
         block = (values[:k, :k] + values[:k, :k].T) / 2 - np.diag(np.where(sign < 0.0, gained, 0.0))
-        found = self._comm.bcast(_regular(block, sign, self._stiffness[rows]))
+        found = self._comm.bcast(_regular(block, sign, self._stiffness[rows], least))
         if found is None:
             return False
         which, B = found
@@ -204,21 +197,13 @@ class FollowedResponse:
             self._turn(rows[which], sign[which], gained[which], B, columns[:, which], values)
         if len(moved) or len(which) < k or len(self.pins):
             loose = np.setdiff1d(np.arange(k), which)
-            self._pin(np.union1d(np.setdiff1d(self.pins, moved), rows[loose]))
+            self.pins, self.answer = np.union1d(np.setdiff1d(self.pins, moved), rows[loose]), self.answer.copy()
+            own = self.pins - self._first
+            self.answer[own[(own >= 0) & (own < len(self.answer))]] = 0.0
             # Springs of pins have C_0, as of all rows that are not active.
             if len(loose := loose[gained[loose] != 0.0]):
-                self.soften(rows[loose], gained[loose])
+                return self.soften(rows[loose], gained[loose], least)
         return True
-
-    def _pin(self, pins: Int) -> None:
-        """Let these global rows be the pins, whose answer is 0."""
-        self.pins, self.answer = pins, self.answer.copy()
-        self.answer[pins[(pins >= self._first) & (pins < self._first + len(self.answer))] - self._first] = 0.0
-
-    def _moved_pins(self, forces: Float) -> Int:
-        """Return the pins that unit forces on rows that come press; `forces` (columns, k) of them on all columns."""
-        pins: Int = self.pins[(np.abs(forces[self._slot[self.pins]]) > RIGID_SHARE).any(axis=1)]
-        return pins
 
     def _turn(self, rows: Int, sign: Float, gained: Float, B: Float, columns: Float, values: Float) -> None:
         """Let rows leave (sign 1) or come (-1) whose block has the inverse B.  Collective."""
@@ -264,8 +249,8 @@ class FollowedResponse:
         self._count = 0
 
 
-def _regular(block: Float, sign: Float, stiffness: Float) -> tuple[Int, Float] | None:
-    """Return the rows that can turn, and the inverse of their part of `block` (k, k); None if that loses digits.
+def _regular(block: Float, sign: Float, stiffness: Float, least: float) -> tuple[Int, Float] | None:
+    """Return the rows that can turn, and the inverse of their part of `block` (k, k); None if pivots are below `least`.
 
     They are all that come (sign -1), and of those that leave (1) as many as leave no body free.
     """
@@ -273,9 +258,9 @@ def _regular(block: Float, sign: Float, stiffness: Float) -> tuple[Int, Float] |
     root = np.sqrt(np.maximum(np.where(sign > 0.0, stiffness, 1.0 / stiffness), np.abs(block.diagonal())))
     outer = np.outer(root, root)
     scaled, which = block / outer, np.arange(len(block))
-    if not _has_digits(scaled):
+    if not _has_digits(scaled, LEAST_FOLLOWED_PIVOT):
         come, leave = np.flatnonzero(sign < 0.0), np.flatnonzero(sign > 0.0)
-        if not len(leave) or not _has_digits(scaled[come[:, None], come]):
+        if not len(leave) or not _has_digits(scaled[come[:, None], come], least):
             return None
         across = scaled[come[:, None], leave]
         rest = scaled[leave[:, None], leave] - across.T @ np.linalg.solve(scaled[come[:, None], come], across)
@@ -283,10 +268,10 @@ def _regular(block: Float, sign: Float, stiffness: Float) -> tuple[Int, Float] |
         # The first pivot is taken whatever it is.
         rank = min(rank, int((factor.diagonal() ** 2 > SINGULAR_PIVOT).sum()))
         which = np.concatenate([come, leave[order[:rank] - 1]])
-        if not _has_digits(scaled[which[:, None], which]):
+        if not _has_digits(scaled[which[:, None], which], least):
             return None
     return which, np.linalg.inv(scaled[which[:, None], which]) / outer[which[:, None], which]
 
 
-def _has_digits(block: Float) -> bool:
-    return bool(np.linalg.svd(block, compute_uv=False).min(initial=1.0) > LEAST_FOLLOWED_PIVOT)
+def _has_digits(block: Float, least: float) -> bool:
+    return bool(np.linalg.svd(block, compute_uv=False).min(initial=1.0) > least)

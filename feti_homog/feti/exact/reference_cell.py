@@ -16,11 +16,12 @@ from mpi4py import MPI
 from scipy.sparse import csr_matrix
 
 from feti_homog.feti.decomposition.jump_operator import JumpOperator
+from feti_homog.feti.exact.assembled_schur import AssembledSchur, assembled_stiffness
 from feti_homog.feti.exact.spring_update import SpringUpdate
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
-from feti_homog.feti.preconditioners.assembled_schur import AssembledSchur
-from feti_homog.feti.thresholds import BUFFERED_COLUMNS, CHUNK_RANKS, INFLUENCE_CHUNK, NORM_ITERATIONS, STIFF_FIBRES
-from feti_homog.system.parallel.distributed_arrays import allreduce_sum, gather_rows, scale_rows
+from feti_homog.feti.operators.preconditioners import Preconditioner, never_softens
+from feti_homog.feti.thresholds import CHUNK_RANKS, INFLUENCE_CHUNK, NORM_ITERATIONS, STIFF_FIBRES
+from feti_homog.system.parallel.distributed_arrays import allreduce_sum, scale_rows
 from feti_homog.typing import Float, Int
 
 # Bonds, each in all directions, that let no rigid-body motion pass between two bodies.
@@ -71,18 +72,17 @@ class ReferenceCell:
         operators: InterfaceOperators,
         one_sided: csr_matrix,
         active: Float,
-        assembled: AssembledSchur,
     ) -> None:
-        """`one_sided` is B_D, and `assembled` has the same active rows.  Collective."""
+        """Factor the cell with the bonds where `active` (owned rows,) is 1; `one_sided` is B_D.  Collective."""
         self._comm, self.active = comm, active
         self._jump_operator, self._operators = jump_operator, operators
         self._BD, self._BDT = one_sided, one_sided.T.tocsr()
         reached = self._BDT.getnnz(axis=1) > 0
         self._reached = [bool(reached[own].any()) for own in operators.slices]
-        self.assembled = assembled
+        self.assembled = AssembledSchur(comm, *assembled_stiffness(comm, jump_operator, operators, active))
         self._is_bonded = not comm.allreduce(bool((active == 0).any()), MPI.LOR)
-        first = jump_operator.owned[0]
-        self._springs = SpringUpdate(comm, first, active * operators.compliance, self._without_springs)
+        self._first = jump_operator.owned[0]
+        self._springs = SpringUpdate(comm, self._first, active * operators.compliance, self._without_springs)
 
     def destroy(self) -> None:
         """Free the factor."""
@@ -91,6 +91,18 @@ class ReferenceCell:
     def respond(self, x: Float) -> Float:
         """Gamma x for x (owned rows,) or (owned rows, k).  Collective."""
         return self._springs.apply(self._without_springs(x))
+
+    def columns(self, rows: Int) -> Float:
+        """(owned rows, k) Gamma[:, rows] of global rows (k,), the same on every rank.  Collective."""
+        # A few columns too many are cheaper with others than by themselves.
+        chunk = INFLUENCE_CHUNK * min(self._comm.size, CHUNK_RANKS)
+        columns = [np.zeros((len(self.active), 0))]
+        for some in np.array_split(rows, max(round(len(rows) / chunk), 1)) if len(rows) else []:
+            unit, place = np.zeros((len(self.active), len(some))), some - self._first
+            mine = np.flatnonzero((place >= 0) & (place < len(unit)))
+            unit[place[mine], mine] = 1.0
+            columns.append(self.respond(unit))
+        return np.hstack(columns)
 
     def force_of_rigid_motions(self, stiffness: Float) -> float:
         """Return the largest force, relative to `stiffness` (owned rows,), by jumps of rigid-body motions of size 1.
@@ -104,9 +116,9 @@ class ReferenceCell:
         force = scale_rows(self.active, self.respond(jump)) / stiffness
         return float(self._comm.allreduce(np.abs(force).max(initial=0.0), MPI.MAX))
 
-    def largest_eigenvalue(self, first: int) -> float:
-        """|Gamma| as some steps of the power method find it; this rank's rows begin at `first`.  Collective."""
-        x = np.cos(np.arange(first, first + len(self.active)) ** 2.0)
+    def largest_eigenvalue(self) -> float:
+        """|Gamma| as some steps of the power method find it.  Collective."""
+        x = np.cos((self._first + np.arange(len(self.active))) ** 2.0)
         norm = 0.0
         for _ in range(NORM_ITERATIONS):
             length = np.sqrt(allreduce_sum(self._comm, np.array([x @ x]))[0])
@@ -171,73 +183,28 @@ def stiffness_of_rows(jump_operator: JumpOperator, operators: InterfaceOperators
     return np.asarray(1.0 / (flexibility + operators.springs))
 
 
-class ResponseColumns:
-    """Gamma[:, K] and Gamma[K, K] for a growing set K of rows.
+class BondedInverse(Preconditioner):
+    """z = H r by the factor of the assembled Schur complement: nothing is left to iterate.
 
-    Attributes:
-        rows: (k,) K, global numbers in the order in which they came.
+    `ExactInverse` without what follows rows that leave and come: another set of active rows is factored anew.
     """
 
-    def __init__(self, comm: MPI.Intracomm, cell: ReferenceCell, owned: tuple[int, int], global_rows: int) -> None:
-        """No columns yet; this rank owns the rows from owned[0] up to owned[1]."""
-        self._comm, self._cell, self._first = comm, cell, owned[0]
-        self.rows: Int = np.zeros(0, np.int64)
-        self._position = np.full(global_rows, -1)
-        # Both grow in place; a full buffer doubles.  Memory is taken when columns come.
-        room = min(global_rows, BUFFERED_COLUMNS)
-        self._columns, self._block = np.empty((owned[1] - owned[0], room), order="F"), np.empty((room, room))
+    norm, soften, is_exact = np.inf, never_softens, True
 
-    @property
-    def owned(self) -> Float:
-        """(owned rows, k) Gamma[:, K]."""
-        return self._columns[:, : len(self.rows)]
+    def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> None:
+        """Factor the cell with all bonds; all boundary operators must be dense.  Collective."""
+        self._comm, self._jump_operator, self._operators = comm, jump_operator, operators
+        self._one_sided = one_sided_jumps(comm, jump_operator, operators)
+        first, end = jump_operator.owned
+        self._cell = ReferenceCell(comm, jump_operator, operators, self._one_sided, np.ones(end - first))
 
-    @property
-    def block(self) -> Float:
-        """(k, k) Gamma[K, K] on every rank."""
-        return self._block[: len(self.rows), : len(self.rows)]
+    def activate(self, active: Float) -> None:
+        """Factor the cell with these bonds, which must hold all bodies, unless it is."""
+        if self._comm.allreduce(bool((active != self._cell.active).any()), MPI.LOR):
+            self._cell.destroy()
+            parts = self._comm, self._jump_operator, self._operators, self._one_sided
+            self._cell = ReferenceCell(*parts, active)
 
-    def positions(self, rows: Int) -> Int:
-        """Return where rows are in K; -1 if they are not."""
-        return self._position[rows]
-
-    def clear(self) -> None:
-        """Give the memory back; no columns are left."""
-        self.rows, self._columns, self._block = self.rows[:0], self._columns[:, :0].copy(), self._block[:0, :0].copy()
-
-    def add(self, rows: Int) -> None:
-        """Find the columns of those rows that have none.  Collective."""
-        new = np.unique(rows[self._position[rows] < 0])
-        for some in self._chunks(new):
-            self._append(some, self._of_units(some))
-
-    def found(self, rows: Int) -> Float:
-        """(owned rows, k) columns of global rows (k,), which are not kept.  Collective."""
-        return np.hstack([self._of_units(some) for some in self._chunks(rows)])
-
-    def _chunks(self, rows: Int) -> list[Int]:
-        """Divide rows into those whose columns are found at once."""
-        # A few columns too many are cheaper with others than by themselves.
-        chunk = INFLUENCE_CHUNK * min(self._comm.size, CHUNK_RANKS)
-        return np.array_split(rows, max(round(len(rows) / chunk), 1)) if len(rows) else []
-
-    def _of_units(self, rows: Int) -> Float:
-        unit = np.zeros((len(self._columns), len(rows)))
-        mine = np.flatnonzero((rows >= self._first) & (rows < self._first + len(unit)))
-        unit[rows[mine] - self._first, mine] = 1.0
-        return self._cell.respond(unit)
-
-    def _append(self, rows: Int, columns: Float) -> None:
-        """Take the columns (owned rows, k) of rows (k,) that have none.  Collective."""
-        old = len(self.rows)
-        self._position[rows] = old + np.arange(len(rows))
-        self.rows = np.concatenate([self.rows, rows])
-        n = len(self.rows)
-        if n > len(self._block):
-            size = max(n, 2 * len(self._block))
-            columns_of, block = np.empty((len(self._columns), size), order="F"), np.empty((size, size))
-            columns_of[:, :old], block[:old, :old] = self._columns[:, :old], self._block[:old, :old]
-            self._columns, self._block = columns_of, block
-        self._columns[:, old:n] = columns
-        self._block[:n, old:n] = gather_rows(self._comm, columns, self._first, self.rows)
-        self._block[old:n, :old] = self._block[:old, old:n].T
+    def apply(self, r: Float) -> Float:
+        """Return the multipliers that close the jump r on the active rows."""
+        return self._cell.respond(scale_rows(self._cell.active, r))

@@ -20,7 +20,7 @@ from mpi4py import MPI
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from feti_homog.errors import ConvergenceError
-from feti_homog.feti.preconditioners.scaled import Preconditioner
+from feti_homog.feti.operators.preconditioners import Preconditioner
 from feti_homog.system.parallel.distributed_arrays import gather_rows, scale_rows
 from feti_homog.system.parallel.mpi_errors import agree
 from feti_homog.typing import Float

@@ -142,7 +142,11 @@ def _by_mumps(matrix: csr_matrix, rows: Int) -> Float:
     A.setOption(PETSc.Mat.Option.SPD, True)
     some = PETSc.IS().createGeneral(rows.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
     try:
-        pc = _with_room(A, some)
+        for workspace in MORE_WORKSPACE:
+            pc = _factored(A, some, workspace)
+            if mumps_error(pc.getFactorMatrix())[0] not in TOO_SMALL or workspace == MORE_WORKSPACE[-1]:
+                break
+            pc.destroy()
         try:
             check_factor(pc)
             return c_functions.schur_complement(pc.getFactorMatrix(), len(rows))
@@ -150,17 +154,6 @@ def _by_mumps(matrix: csr_matrix, rows: Int) -> Float:
             pc.destroy()
     finally:
         A.destroy()
-
-
-def _with_room(A: PETSc.Mat, rows: PETSc.IS) -> PETSc.PC:
-    """Return the partial factorization, with the first of MORE_WORKSPACE that is enough, or the last."""
-    *fewer, last = MORE_WORKSPACE
-    for workspace in fewer:
-        pc = _factored(A, rows, workspace)
-        if mumps_error(pc.getFactorMatrix())[0] not in TOO_SMALL:
-            return pc
-        pc.destroy()
-    return _factored(A, rows, last)
 
 
 def _factored(A: PETSc.Mat, rows: PETSc.IS, workspace: int | None) -> PETSc.PC:

@@ -67,16 +67,13 @@ class DistributedSolver:
         self._scale = power_of_two(matrix.getDiagonal().getArray(readonly=True), self.comm)
         matrix.scale(self._scale)
         library = PETSc.Mat.SolverType.MUMPS if self.is_distributed else PETSc.Mat.SolverType.CHOLMOD
-        near_kernel = None if near_kernel is None else self._orthonormal(near_kernel)
+        if near_kernel is not None:
+            # A basis (n, m), without zeros, that ranks with the same unknown agree on.
+            whole = self._sum(near_kernel) / np.maximum(self._sum(np.ones((len(near_kernel), 1))), 1.0)
+            near_kernel = np.linalg.qr(whole[:, whole.any(axis=0)])[0]
         # Before a factor that may fail on one rank alone.
         self._x, self._b = matrix.createVecs()
         self._ksp = factored(matrix, self._prefix, library, near_kernel)
-
-    def _orthonormal(self, vectors: Float) -> Float:
-        """(n, m) a basis of the space of vectors (u, c) that ranks with the same unknown agree on; without zeros."""
-        copies = self._sum(np.ones((len(vectors), 1)))
-        whole = self._sum(vectors) / np.maximum(copies, 1.0)
-        return np.linalg.qr(whole[:, whole.any(axis=0)])[0]
 
     def solve(self, B: Float) -> Float:
         """A^-1 times the sum over ranks of right-hand sides, on the unknowns of this rank.  Collective.

@@ -64,7 +64,17 @@ def check_factor(pc: PETSc.PC) -> None:
     library, is_cholesky = pc.getFactorSolverType(), pc.getType() == PETSc.PC.Type.CHOLESKY
     negative = 0
     if library == PETSc.Mat.SolverType.MUMPS:
-        negative = _read_mumps(pc.getFactorMatrix(), is_cholesky)
+        factor = pc.getFactorMatrix()
+        first, second = mumps_error(factor)
+        if first == SINGULAR:
+            raise np.linalg.LinAlgError(f"singular (MUMPS: INFOG(1) = {first}, INFOG(2) = {second})")
+        if first:
+            raise MemoryError(f"MUMPS cannot factor: INFOG(1) = {first}, INFOG(2) = {second}")
+        replaced = int(factor.getMumpsInfog(25))
+        if replaced:
+            raise np.linalg.LinAlgError(f"nearly singular (MUMPS: INFOG(25) = {replaced} tiny pivots were replaced)")
+        # Without symmetry INFOG(12) counts exchanged pivots.
+        negative = int(factor.getMumpsInfog(12)) if is_cholesky else 0
     elif library == PETSc.Mat.SolverType.PETSC and is_cholesky:
         negative, zero, _ = pc.getFactorMatrix().getInertia()
         negative += zero
@@ -76,20 +86,6 @@ def mumps_error(factor: PETSc.Mat) -> tuple[int, int]:
     """MUMPS' INFOG(1) and INFOG(2) if the first is an error, which PETSc may keep to itself; else zeros."""
     first, second = (int(factor.getMumpsInfog(k)) for k in (1, 2))
     return (first, second) if first < 0 else (0, 0)
-
-
-def _read_mumps(factor: PETSc.Mat, is_cholesky: bool) -> int:
-    """Return the number of negative pivots. Raises as `check_factor`."""
-    first, second = mumps_error(factor)
-    if first == SINGULAR:
-        raise np.linalg.LinAlgError(f"singular (MUMPS: INFOG(1) = {first}, INFOG(2) = {second})")
-    if first:
-        raise MemoryError(f"MUMPS cannot factor: INFOG(1) = {first}, INFOG(2) = {second}")
-    replaced = int(factor.getMumpsInfog(25))
-    if replaced:
-        raise np.linalg.LinAlgError(f"nearly singular (MUMPS: INFOG(25) = {replaced} tiny pivots were replaced)")
-    # Without symmetry INFOG(12) counts exchanged pivots.
-    return int(factor.getMumpsInfog(12)) if is_cholesky else 0
 
 
 class DirectSolver:
@@ -107,8 +103,15 @@ class DirectSolver:
         scaled = csr_matrix((self._scale * matrix.data, matrix.indices, matrix.indptr), shape=matrix.shape)
         self._ksp = factored(sequential(scaled), prefix, PETSc.Mat.SolverType.CHOLMOD, is_ordered=is_ordered)
         self._x, self._b = self._ksp.getOperators()[0].createVecs()
-        if _is_by_cholmod(self._ksp):
-            _free_matrix(self._ksp)
+        pc, A = self._ksp.getPC(), self._ksp.getOperators()[0]
+        is_cholesky = pc.getType() == PETSc.PC.Type.CHOLESKY
+        # A factor of CHOLMOD's needs its matrix no more: an empty one of its size takes its place.
+        if is_cholesky and pc.getFactorSolverType() == PETSc.Mat.SolverType.CHOLMOD and is_direct(self._ksp):
+            empty = PETSc.Mat().createAIJ(A.getSizes(), nnz=0, comm=A.comm)
+            empty.assemble()
+            pc.setReusePreconditioner(True)
+            self._ksp.setOperators(empty)
+            A.destroy()
         self._destroy = weakref.finalize(self, _destroy, self._ksp, self._x, self._b)
 
     def solve(self, B: Float) -> Float:
@@ -175,16 +178,12 @@ def factored(
         try:
             ksp.setUp()
         except PETSc.Error as error:
-            raise _failure(error_words(error)) from error
+            words = error_words(error)
+            if words.endswith(CHOLMOD_OUT_OF_MEMORY):
+                raise MemoryError(words) from error
+            raise np.linalg.LinAlgError(f"not positive definite ({words})") from error
     check_factor(ksp.getPC())
     return ksp
-
-
-def _failure(words: str) -> Exception:
-    """Return the error of a factorization for which PETSc has these words."""
-    if words.endswith(CHOLMOD_OUT_OF_MEMORY):
-        return MemoryError(words)
-    return np.linalg.LinAlgError(f"not positive definite ({words})")
 
 
 @contextmanager
@@ -238,23 +237,6 @@ def _direct_ksp(A: PETSc.Mat, prefix: str, library: str) -> PETSc.KSP:
             f"of a matrix {where}; mumps has"
         ) from error
     return ksp
-
-
-def _is_by_cholmod(ksp: PETSc.KSP) -> bool:
-    """Return whether a solver applies a factor of CHOLMOD's, which needs its matrix no more."""
-    pc = ksp.getPC()
-    is_cholesky = pc.getType() == PETSc.PC.Type.CHOLESKY
-    return is_cholesky and pc.getFactorSolverType() == PETSc.Mat.SolverType.CHOLMOD and is_direct(ksp)
-
-
-def _free_matrix(ksp: PETSc.KSP) -> None:
-    """Free the matrix of a solver that applies its factor alone: an empty one of its size takes its place."""
-    A = ksp.getOperators()[0]
-    empty = PETSc.Mat().createAIJ(A.getSizes(), nnz=0, comm=A.comm)
-    empty.assemble()
-    ksp.getPC().setReusePreconditioner(True)
-    ksp.setOperators(empty)
-    A.destroy()
 
 
 def _destroy(ksp: PETSc.KSP, *vectors: PETSc.Vec) -> None:

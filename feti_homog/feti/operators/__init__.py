@@ -1,5 +1,5 @@
-"""Operators on the boundaries of subdomains, S and S+, explicit or implicit, and the dual operator F made of them.
+"""Boundary operators of subdomains, S and S+, explicit or implicit; the dual operator F and its preconditioners.
 
 Imports `feti`, `feti.decomposition`, `feti.linalg` and `system`.  Main entries: `choice.choose`,
-`interface_operators.InterfaceOperators` and `interface_operators.DualOperator`.
+`interface_operators.InterfaceOperators`, `interface_operators.DualOperator` and `preconditioners.Preconditioner`.
 """

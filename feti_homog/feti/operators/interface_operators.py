@@ -98,8 +98,10 @@ class InterfaceOperators:
         self.BT = self.B.T.tocsr()
         sizes = _sizes(jump_operator.shared, subdomains, self.dofs)
         can_condense = bool(PETSc.Sys.hasExternalPackage("mumps"))
-        own = _own_rows(jump_operator)
-        self.springs = np.zeros(own.stop - own.start) if compliance is None else compliance[own]
+        first_row, last_row = jump_operator.owned
+        at = int(np.searchsorted(jump_operator.rows, first_row))
+        own = slice(at, at + last_row - first_row)
+        self.springs = np.zeros(last_row - first_row) if compliance is None else compliance[own]
         self.compliance = np.where((jump_operator.copies[own] > 1).all(axis=1), self.springs, 0.0)
         self.of_inner = self._inner_dofs(jump_operator)
         roots = self._compliance_roots(jump_operator.copies, compliance)
@@ -188,19 +190,6 @@ class InterfaceOperators:
         of_stresses = sum((own.stiffness for own in each), np.zeros((v, v)))
         return CondensedLoads(boundary, of_stresses, sum((own.energy for own in each), np.zeros((v, v))))
 
-    def _interior(self, place: int, keep: bool) -> Interior:
-        """Return the factored interior of the subdomain at a place; `keep` it for later calls."""
-        operator = self.operators[place]
-        if isinstance(operator, ImplicitInterfaceOperator):
-            return operator.interior
-        if place in self.interiors:
-            return self.interiors[place]
-        s = self.subdomains[place]
-        interior = Interior(s.take_stiffness(), self.dofs[place], s.elimination_order())
-        if keep:
-            self.interiors[place] = interior
-        return interior
-
     def extend(self, place: int, x: Float, loads: Float | None = None, keep: bool = True) -> Float:
         """(dofs, k) displacements of the subdomain at a place, of x (n_s, k) on its boundary and loads (v, k), if any.
 
@@ -210,7 +199,14 @@ class InterfaceOperators:
         operator, s = self.operators[place], self.subdomains[place]
         if isinstance(operator, ExplicitInterfaceOperator) and operator.factor is not None:
             return operator.extend(x, loads)
-        interior = self._interior(place, keep)
+        if isinstance(operator, ImplicitInterfaceOperator):
+            interior = operator.interior
+        elif (kept := self.interiors.get(place)) is not None:
+            interior = kept
+        else:
+            interior = Interior(s.take_stiffness(), self.dofs[place], s.elimination_order())
+            if keep:
+                self.interiors[place] = interior
         u = np.empty((s.n_dofs, *x.shape[1:]))
         inside = None
         if loads is not None and s.loads_inside:
@@ -241,13 +237,6 @@ def _factor(subdomain: Subdomain, dofs: Int, explicit: bool, keep_factor: bool) 
         faults = f"its stiffness cannot be factored, {error}; its elements are degenerate"
         raise MeshError(f"{label(subdomain.submesh)}: {faults}") from error
     return operator, K.diagonal()[dofs]
-
-
-def _own_rows(jump_operator: JumpOperator) -> slice:
-    """Return the owned rows among the local rows."""
-    first, last = jump_operator.owned
-    at = int(np.searchsorted(jump_operator.rows, first))
-    return slice(at, at + last - first)
 
 
 def _constrained_dofs(B: csr_matrix, subdomains: Sequence[Subdomain]) -> list[Int]:

@@ -17,7 +17,6 @@ from scipy.sparse import csr_matrix
 
 from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.linalg.dense_matrices import (
-    ShiftedFactor,
     condensed_with_loads,
     full_from_lower,
     invert_upper,
@@ -56,7 +55,13 @@ class ExplicitInterfaceOperator:
         fixed, self._term = subdomain.fixing(K, np.unique(subdomain.problem.nodes(dofs)))
         self._fixed = np.searchsorted(dofs, fixed)
         self.n, self._subdomain = len(dofs), subdomain
-        both, self.condensed, self.factor = _condensed(subdomain, K, dofs, keep_factor)
+        self.factor, q, C, order = None, subdomain.Q[dofs], subdomain.area * subdomain.L, subdomain.elimination_order()
+        if subdomain.loads_inside:
+            condensed = condensed_with_loads(K, dofs, subdomain.Q, order, keep_factor)
+            both, q, C, self.factor = condensed.S, condensed.q, C + condensed.C, condensed.factor
+        else:
+            both = schur_complement(K, dofs, order)
+        self.condensed = CondensedLoads(q, C, C)
         self._schur_diagonal = both.diagonal().copy()
         # S stays below the diagonal; the inverse of the regularised S comes above it.
         both[np.ix_(self._fixed, self._fixed)] += np.triu(self._term)
@@ -156,18 +161,6 @@ class CondensedLoads:
     energy: Float
 
 
-def _condensed(
-    subdomain: Subdomain, K: csr_matrix, dofs: Int, keep_factor: bool
-) -> tuple[Float, CondensedLoads, ShiftedFactor | None]:
-    """Return S (n, n) of a subdomain on its boundary `dofs` (n,), its unit loads there, and its factor if kept."""
-    s, C = subdomain, subdomain.area * subdomain.L
-    if not s.loads_inside:
-        return schur_complement(K, dofs, s.elimination_order()), CondensedLoads(s.Q[dofs], C, C), None
-    found = condensed_with_loads(K, dofs, s.Q, s.elimination_order(), keep_factor)
-    C = C + found.C
-    return found.S, CondensedLoads(found.q, C, C), found.factor
-
-
 class ImplicitInterfaceOperator:
     """S and the boundary part of K+ of one subdomain, on its n boundary dofs."""
 
@@ -177,21 +170,18 @@ class ImplicitInterfaceOperator:
         """Factor K + rho Rf Rf^T; `dofs` (n,) are sorted local numbers.  Options under `feti_sub_`."""
         self.n, self.dofs, self._subdomain = len(dofs), dofs, subdomain
         if not len(dofs) and not subdomain.R.shape[1]:
-            self._solve_whole(K)
+            # Pinned and without a boundary: it is solved for the unit loads, for no other forces will act on it.
+            s, u = subdomain, np.empty(subdomain.Q.shape)
+            self.interior = Interior(K, dofs, s.elimination_order())
+            self.interior.answers = self.interior.solve(-s.Q[self.interior.dofs])
+            u[self.interior.dofs] = self.interior.answers
+            C = s.area * s.L + s.Q.T @ u
+            self.condensed = CondensedLoads(s.Q[dofs], C, C + s.Q.T @ u + u.T @ (K @ u))
             return
         # A single subdomain has no boundary: any of its nodes can be fixed.
         own = subdomain.problem.nodes(dofs)
         nodes = np.unique(own) if len(dofs) else np.arange(subdomain.mesh.n_classes)
         self._solver = DirectSolver(subdomain.regularised(K, nodes), "feti_sub_")
-
-    def _solve_whole(self, K: csr_matrix) -> None:
-        """Solve for the unit loads of a pinned subdomain without a boundary: no other forces will act on it."""
-        s, u = self._subdomain, np.empty(self._subdomain.Q.shape)
-        self.interior = Interior(K, self.dofs, s.elimination_order())
-        self.interior.answers = self.interior.solve(-s.Q[self.interior.dofs])
-        u[self.interior.dofs] = self.interior.answers
-        C = s.area * s.L + s.Q.T @ u
-        self.condensed = CondensedLoads(s.Q[self.dofs], C, C + s.Q.T @ u + u.T @ (K @ u))
 
     @cached_property
     def interior(self) -> Interior:
@@ -214,13 +204,13 @@ class ImplicitInterfaceOperator:
 
     def apply_flexibility(self, x: Float, out: Float | None = None) -> Float:
         """Return the boundary part of K+ x for x (n,) or (n, k), into `out` if it is given."""
-        return _by_columns(self._solve, x, out)
 
-    def _solve(self, x: Float) -> Float:
-        """Return the boundary part of K+ x for few columns."""
-        load = np.zeros((self._subdomain.n_dofs, *x.shape[1:]), order="F")
-        load[self.dofs] = x
-        return self._solver.solve(load)[self.dofs]
+        def solve(x: Float) -> Float:
+            load = np.zeros((self._subdomain.n_dofs, *x.shape[1:]), order="F")
+            load[self.dofs] = x
+            return self._solver.solve(load)[self.dofs]
+
+        return _by_columns(solve, x, out)
 
 
 class Interior:

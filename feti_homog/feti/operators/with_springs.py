@@ -76,13 +76,9 @@ class _Softening:
         root = np.linalg.cholesky((self.kernel.T @ GR + GR.T @ self.kernel) / 2)
         self._root_of_kernel = np.asarray(solve_triangular(root, GR.T, lower=True))
 
-    def _along_springs(self, y: Float) -> Float:
-        """T^T G x for y = A x."""
-        return np.asarray(cho_solve(self._factor, self._T.T @ y))
-
     def _relaxed(self, y: Float) -> Float:
         """G x for y = A x."""
-        along = self._along_springs(y)
+        along = cho_solve(self._factor, self._T.T @ y)  # T^T G x
         z = y - self._AT @ along
         return np.asarray(z + self._directions @ (along - self._T.T @ z))
 
@@ -141,7 +137,7 @@ def compliance_root(B: csr_matrix, compliance: Float, copies: Int, of_inner: Boo
     """(n, r) T of the springs on one body, for its constraints B (rows, n) and the compliance C (rows,) of the rows.
 
     A node's spring belongs to the inner of two bodies, but where that is cut, to the outer one: so it softens one body
-    alone.  Where both are cut it belongs to neither; see `preconditioners.spring_update`.
+    alone.  Where both are cut it belongs to neither; see `exact.spring_update`.
 
     Args:
         copies: (rows, 2) how many copies the outer and the inner body have there.

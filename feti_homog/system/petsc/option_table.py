@@ -82,6 +82,7 @@ OPTIONS = (
     *_direct_solver("feti_bonded_", "the cell with all bonds intact, for influence columns"),
 )
 """Every option that a run accepts whether or not it makes the solver which reads it."""
+TABLE = {option.name: option for option in OPTIONS}
 
 DIRECT_PREFIXES = (
     "feti_sub_", "feti_interior_", "feti_schur_", "feti_natural_", "feti_coarse_", "feti_bonded_",
@@ -120,20 +121,19 @@ CLOSE = 0.9
 
 def unknown_options(names: Iterable[str]) -> list[str]:
     """One fault for each name (without dash) that begins with feti_ but is no option of the solver."""
-    unknown = [n for n in names if n.startswith("feti_") and not is_in_table(n) and not solver_prefix(n)]
+    unknown = [n for n in names if n.startswith("feti_") and n not in TABLE and not solver_prefix(n)]
     return [f"-{name}: unknown option; {suggestion(name)}" for name in unknown]
 
 
 def unknown_to_petsc(names: Iterable[str]) -> list[str]:
-    """One fault for each name (without dash) that no option has.
-
-    Options are those of PETSC_NAMES and those that begin with feti_, as those of this program's solvers do.
+    """One fault for each name (without dash) that neither PETSC_NAMES has nor begins with feti_.
 
     A name that lacks the prefix of one of OPTIONS is left to `without_prefix`.
     """
-    others = [n for n in names if n not in PETSC_NAMES and not n.startswith("feti_") and not is_in_table(f"feti_{n}")]
     faults = []
-    for name in others:
+    for name in names:
+        if name in PETSC_NAMES or name.startswith("feti_") or f"feti_{name}" in TABLE:
+            continue
         nearest = difflib.get_close_matches(name, PETSC_NAMES, 1, CLOSE)
         if nearest:
             faults.append(f"-{name}: unknown option; did you mean -{nearest[0]}?")
@@ -144,8 +144,8 @@ def unknown_to_petsc(names: Iterable[str]) -> list[str]:
 
 def without_prefix(names: Iterable[str]) -> list[str]:
     """One fault for each name (without dash) that lacks the prefix feti_ of an option of the solver."""
-    known = [name for name in names if is_in_table(f"feti_{name}")]
-    return [f"-{name}: not an option of this program; did you mean -feti_{name}?" for name in known]
+    lacking = [name for name in names if f"feti_{name}" in TABLE]
+    return [f"-{name}: not an option of this program; did you mean -feti_{name}?" for name in lacking]
 
 
 def only_prints(name: str) -> bool:
@@ -156,18 +156,13 @@ def only_prints(name: str) -> bool:
 def almost_in_table(name: str) -> bool:
     """Return whether the name is probably one of OPTIONS misspelt, behind the prefix of a PETSc solver."""
     prefix = solver_prefix(name)
-    table = [option.name for option in OPTIONS if solver_prefix(option.name) == prefix]
-    return bool(prefix and not is_in_table(name) and difflib.get_close_matches(name, table, 1, CLOSE))
-
-
-def is_in_table(name: str) -> bool:
-    """Return whether OPTIONS has the name (without dash)."""
-    return any(name == option.name for option in OPTIONS)
+    table = [other for other in TABLE if solver_prefix(other) == prefix]
+    return bool(prefix and name not in TABLE and difflib.get_close_matches(name, table, 1, CLOSE))
 
 
 def suggestion(name: str) -> str:
     """Return the option of the table that a misspelt name is nearest to, or the prefixes, in words."""
-    nearest = difflib.get_close_matches(name, [option.name for option in OPTIONS], n=1)
+    nearest = difflib.get_close_matches(name, TABLE, n=1)
     return f"did you mean -{nearest[0]}?" if nearest else f"prefixes: -{', -'.join(PREFIXES)}"
 
 

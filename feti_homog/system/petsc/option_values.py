@@ -17,6 +17,7 @@ Value = str | int | float | bool
 TRUE, FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
 LARGEST_INTEGER = 2**31 - 1  # of a PETSc with 32-bit integers
 VIEWER = re.compile(r"(ascii)?(:(?P<file>[^:]*)(:(default|ascii_\w+)?(:(write|append))?)?)?")
+NEW_FILE = "a file of an existing folder, or no value"
 FLAGS = (
     *("feti_view", "malloc_debug", "malloc_test", "log_view_memory", "log_view_gpu_time"),
     *("options_left", "skip_petscrc", "on_error_abort", "on_error_mpiabort", "no_signal_handler"),
@@ -40,16 +41,11 @@ def can_be_written(file: str) -> bool:
     except OSError:  # too long a name, a file for a folder, links in a circle
         return False
     if stat.S_ISFIFO(kind):
-        return _has_reader(file)
+        try:
+            os.close(os.open(file, os.O_WRONLY | os.O_NONBLOCK))
+        except OSError:
+            return False
     return not stat.S_ISDIR(kind) and os.access(file, os.W_OK)
-
-
-def _has_reader(pipe: str) -> bool:
-    try:
-        os.close(os.open(pipe, os.O_WRONLY | os.O_NONBLOCK))
-    except OSError:
-        return False
-    return True
 
 
 @dataclass(frozen=True)
@@ -96,11 +92,6 @@ def is_own_flag(name: str) -> bool:
     return is_flag(name) and not name.startswith("feti_")
 
 
-def is_flag_value(text: str) -> bool:
-    """Return whether a word after a flag is its value."""
-    return SWITCH.holds(text) or VIEWER.fullmatch(text) is not None
-
-
 def _text(value: Value) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
@@ -132,10 +123,6 @@ def _is_new_file(text: str) -> bool:
     """Return whether the text is empty, or what may stand before its first colon is a file that can be written."""
     file = text.partition(":")[0]
     return not file or SWITCH.holds(file) or can_be_written(file)
-
-
-def _never(text: str) -> bool:
-    return text.lower() in FALSE
 
 
 def _has_options(file: str) -> bool:
@@ -173,13 +160,15 @@ RULES: dict[str, Rule] = {
     "feti_schur_mat_mumps_icntl_14": _integer(0, 10_000),
     "feti_schur_pc_type": Rule("cholesky, for what is condensed is symmetric", "cholesky".__eq__),
     "feti_schur_pc_factor_mat_solver_type": Rule("mumps, which alone makes Schur complements", "mumps".__eq__),
-    "feti_ksp_error_if_not_converged": Rule("nothing: the run reports it and keeps its results", _never),
-    "fp_trap": Rule("nothing: numbers that are not finite are checked where they may occur", _never),
-    "info": Rule("a file of an existing folder, or no value", _is_new_file),
-    "malloc_dump": Rule("a file of an existing folder, or no value", _is_new_file),
-    "malloc_view": Rule("a file of an existing folder, or no value", _is_new_file),
+    "feti_ksp_error_if_not_converged": Rule(
+        "nothing: the run reports it and keeps its results", lambda text: text.lower() in FALSE
+    ),
+    "fp_trap": Rule(
+        "nothing: numbers that are not finite are checked where they may occur", lambda text: text.lower() in FALSE
+    ),
+    **{name: Rule(NEW_FILE, _is_new_file) for name in ("info", "malloc_dump", "malloc_view")},
     "options_file": Rule("a file with an option of PETSc in each line", _has_options),
-    "log_trace": Rule("a file of an existing folder, or no value", lambda text: not text or can_be_written(text)),
+    "log_trace": Rule(NEW_FILE, lambda text: not text or can_be_written(text)),
 }
 """For each of these options, what is expected in words, and whether a text is that."""
 
@@ -242,4 +231,5 @@ def _may_be_value(name: str, word: str) -> bool:
     """
     if word.endswith(CASE_FILE) and name != "options_file":
         return False
-    return not is_flag(name) or is_flag_value(word) or not (os.sep in word or os.path.exists(word))
+    is_flag_value = SWITCH.holds(word) or VIEWER.fullmatch(word) is not None
+    return not is_flag(name) or is_flag_value or not (os.sep in word or os.path.exists(word))

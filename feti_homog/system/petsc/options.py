@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from functools import partial
 
 from petsc4py import PETSc
 
@@ -13,8 +12,8 @@ from feti_homog.system.petsc.c_functions import error_words, option_was_used
 from feti_homog.system.petsc.option_table import (
     DIRECT_PREFIXES,
     MUMPS_PREFIXES,
+    TABLE,
     almost_in_table,
-    is_in_table,
     only_prints,
     solver_prefix,
     suggestion,
@@ -59,7 +58,10 @@ def case_options(options: Mapping[str, Value]) -> Iterator[None]:
     try:
         for name in changed:
             _set(database, name, kept[name])
-        _refuse_early()
+        if faults := faults_of_solvers(given_options()):
+            raise CaseError(*faults)
+        # Larger solvers alone read some options: names that are not almost ours are left to `refuse_unused`.
+        _refuse_unread([name for name in given_options() if almost_in_table(name) and not is_flag(name)])
         yield
     finally:
         for name in changed:
@@ -90,19 +92,6 @@ def without_iterations() -> str:
     return f"{', '.join(given)}: the run has no iterations to print" if given else ""
 
 
-def _refuse_early() -> None:
-    """Refuse what solvers of a 1 x 1 matrix cannot be made with, and misspelt names that they do not read.
-
-    Some options are read by larger solvers alone: other names are left to `refuse_unused`.
-    """
-    given = given_options()
-    faults = faults_of_solvers(given)
-    if faults:
-        raise CaseError(*faults)
-    misspelt = [name for name in sorted(given) if almost_in_table(name) and not is_flag(name)]
-    _refuse([name for name in misspelt if not option_was_used(name)])
-
-
 def refuse_unused() -> None:
     """Call when all solvers are set up.
 
@@ -111,19 +100,14 @@ def refuse_unused() -> None:
     Raises:
         CaseError: an option with our prefix is no option of any solver.
     """
-    _refuse(_unused_names())
+    given = PETSc.Options().getAll().keys() - READ_WHEN_SOLVING
+    _refuse_unread([name for name in given if name.startswith("feti_") and name not in TABLE])
 
 
-def _refuse(names: list[str]) -> None:
-    """Raise a CaseError with one fault for each name, if there is any."""
-    if names:
-        raise CaseError(*(f"-{name}: no solver has such an option; {suggestion(name)}" for name in names))
-
-
-def _unused_names() -> list[str]:
-    """Return the options with our prefix, but for those of the table, that no solver has read or will read."""
-    given = [name for name in sorted(PETSc.Options().getAll().keys() - READ_WHEN_SOLVING) if name.startswith("feti_")]
-    return [name for name in given if not is_in_table(name) and not option_was_used(name)]
+def _refuse_unread(names: list[str]) -> None:
+    """Raise a CaseError with one fault for each name that no solver has read, if there is any."""
+    if unread := [name for name in sorted(names) if not option_was_used(name)]:
+        raise CaseError(*(f"-{name}: no solver has such an option; {suggestion(name)}" for name in unread))
 
 
 # Options with the prefixes of PETSc's solvers that the program reads itself.
@@ -137,50 +121,25 @@ def faults_of_solvers(given: Mapping[str, str]) -> list[str]:
     Each solver is made and applied once: a method may lack what it needs only then.  PETSc marks what they read, and
     prints all that they could with -help.  Options that print are hidden meanwhile.
     """
-    trials = {"feti_": _solve_by_krylov_method} | {
-        prefix: partial(_solve_directly, prefix) for prefix in DIRECT_PREFIXES
-    }
-    faults, viewers = [], {name: value for name, value in given.items() if is_viewer(name)}
-    with _hidden(viewers):
-        for prefix, solve in trials.items():
-            own = [name for name in given if _prefix(name) == prefix and name not in (*OWN, *viewers)]
-            words = _complaint(solve) if own or "help" in given else ""
-            if words:
-                own.sort(key=lambda name: not name.endswith("_type"))  # types first: they decide what others mean
-                faults.append(f"{' '.join(in_words(name, given[name]) for name in own)}: {words}")
-    return faults
-
-
-def _prefix(name: str) -> str:
-    """Return the prefix of the solver that an option is for, that of the Krylov method being feti_.
-
-    Empty for others.
-    """
-    prefix = solver_prefix(name)
-    return "feti_" if prefix in ("feti_ksp_", "feti_pc_") else prefix
-
-
-def _complaint(solve: Callable[[], None]) -> str:
-    """PETSc's complaint about the options of a solver, empty if there is none."""
-    try:
-        solve()
-    except PETSc.Error as error:
-        words = error_words(error)
-        return "PETSc has no such Krylov method" if NO_SUCH_METHOD in words else words
-    return ""
-
-
-@contextmanager
-def _hidden(options: Mapping[str, str]) -> Iterator[None]:
-    """Take options out of the database during the block."""
-    database = PETSc.Options()
-    for name in options:
+    database, faults, viewers = PETSc.Options(), [], [name for name in given if is_viewer(name)]
+    for name in viewers:
         database.delValue(name)
     try:
-        yield
+        for prefix in ("feti_", *DIRECT_PREFIXES):
+            prefixes = ("feti_ksp_", "feti_pc_") if prefix == "feti_" else (prefix,)
+            own = [name for name in given if solver_prefix(name) in prefixes and name not in (*OWN, *viewers)]
+            try:
+                if own or "help" in given:
+                    _solve_once(prefix)
+            except PETSc.Error as error:
+                words = error_words(error)
+                words = "PETSc has no such Krylov method" if NO_SUCH_METHOD in words else words
+                own.sort(key=lambda name: not name.endswith("_type"))  # types first: they decide what others mean
+                faults.append(f"{' '.join(in_words(name, given[name]) for name in own)}: {words}")
     finally:
-        for name, value in options.items():
-            database.setValue(name, value or None)
+        for name in viewers:
+            database.setValue(name, given[name] or None)
+    return faults
 
 
 class _Identity:
@@ -193,39 +152,30 @@ class _Identity:
         x.copy(y)
 
 
-def _solve_by_krylov_method() -> None:
-    A = PETSc.Mat().createPython((1, 1), _Identity(), comm=PETSc.COMM_SELF)
-    A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+def _solve_once(prefix: str) -> None:
+    """Solve with a 1 x 1 matrix by the options under `prefix`: the Krylov method's are `feti_`."""
+    is_krylov, comm = prefix == "feti_", PETSc.COMM_SELF
+    if is_krylov:
+        A = PETSc.Mat().createPython((1, 1), _Identity(), comm=comm)
+    else:
+        A = PETSc.Mat().createAIJ((1, 1), csr=([0, 1], [0], [1.0]), comm=comm)
+    A.setOption(PETSc.Mat.Option.SYMMETRIC if is_krylov else PETSc.Mat.Option.SPD, True)
     A.setUp()
-    with _solver(A, "feti_") as ksp:
-        ksp.setType(PETSc.KSP.Type.CG)
-        ksp.setNormType(PETSc.KSP.NormType.PRECONDITIONED)
-        ksp.getPC().setType(PETSc.PC.Type.PYTHON)
-        ksp.getPC().setOptionsPrefix("feti_projected_")
-        ksp.getPC().setPythonContext(_Identity())
-
-
-def _solve_directly(prefix: str) -> None:
-    A = PETSc.Mat().createAIJ((1, 1), csr=([0, 1], [0], [1.0]), comm=PETSc.COMM_SELF)
-    A.setOption(PETSc.Mat.Option.SPD, True)
-    with _solver(A, prefix) as ksp:
-        ksp.setType(PETSc.KSP.Type.PREONLY)
-        ksp.getPC().setType(PETSc.PC.Type.CHOLESKY)
-        if prefix in MUMPS_PREFIXES:
-            ksp.getPC().setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
-
-
-@contextmanager
-def _solver(A: PETSc.Mat, prefix: str) -> Iterator[PETSc.KSP]:
-    """Provide a solver of the 1 x 1 matrix.
-
-    At the end of the block it solves, by the options under `prefix`, and is freed with its matrix.
-    """
-    ksp, (x, b) = PETSc.KSP().create(PETSc.COMM_SELF), A.createVecs()
+    ksp, (x, b) = PETSc.KSP().create(comm), A.createVecs()
     ksp.setOptionsPrefix(prefix)
     ksp.setOperators(A)
     try:
-        yield ksp
+        ksp.setType(PETSc.KSP.Type.CG if is_krylov else PETSc.KSP.Type.PREONLY)
+        pc = ksp.getPC()
+        if is_krylov:
+            ksp.setNormType(PETSc.KSP.NormType.PRECONDITIONED)
+            pc.setType(PETSc.PC.Type.PYTHON)
+            pc.setOptionsPrefix("feti_projected_")
+            pc.setPythonContext(_Identity())
+        else:
+            pc.setType(PETSc.PC.Type.CHOLESKY)
+        if prefix in MUMPS_PREFIXES:
+            pc.setFactorSolverType(PETSc.Mat.SolverType.MUMPS)
         ksp.setFromOptions()
         ksp.setUp()
         b.set(1.0)

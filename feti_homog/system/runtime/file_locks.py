@@ -1,4 +1,4 @@
-"""Locks between processes, on one machine or on several that share a file system.
+"""Locks between processes, on one machine or on several that share a file system, and files that end with a process.
 
 The system takes a lock back when its process ends, however that ends: none is left behind by a kill.
 """
@@ -9,19 +9,22 @@ import contextlib
 import errno
 import fcntl
 import os
+import re
 import socket
 import time
 from pathlib import Path
 from types import TracebackType
 
 from feti_homog.errors import FetiHomogError
-from feti_homog.system.runtime import owners
 
 # Seconds that a lock is tried for: one who only looks whether it is held, holds it for a moment.
 LOCK_TIMEOUT_S = 0.2
 # Errors of the system for a lock that somebody else has, and for a file system without locks.
 HELD = (errno.EAGAIN, errno.EACCES)
 UNSUPPORTED = (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP)
+TAG = re.compile(r"(?P<host>.+)\.(?P<process>\d+)\.(?P<began>\d+)")
+# Files that are of no use when this process has ended: locks that it holds, and what it writes.
+files: set[Path] = set()
 
 
 class LockHeld(Exception):
@@ -55,14 +58,14 @@ class Lock:
             self._close()
             self._take()
         if not self.shared:
-            owners.files.add(self.path)
+            files.add(self.path)
 
     def release(self) -> None:
         """Give the lock back, if it is held, and remove its file unless others share it."""
         if self._file >= 0 and self._is_alone():
             with contextlib.suppress(OSError):
                 self.path.unlink()
-        owners.files.discard(self.path)
+        files.discard(self.path)
         self._close()
 
     def __enter__(self) -> Lock:
@@ -151,3 +154,29 @@ def this_process() -> str:
 
 def _written(file: int) -> str:
     return os.pread(file, 200, 0).decode(errors="replace") or "another process"
+
+
+def tag() -> str:
+    """Return the name of this process, for names of files: no other process has it, neither now nor later."""
+    return f"{socket.gethostname()}.{os.getpid()}.{_began(os.getpid())}"
+
+
+def has_ended(name: str) -> bool:
+    """Return whether a `tag` names a process of this machine that has ended; False for other machines."""
+    match = TAG.fullmatch(name)
+    return match is not None and match["host"] == socket.gethostname() and match["began"] != _began(match["process"])
+
+
+def remove_files() -> None:
+    """Remove the files of this process, which is about to end."""
+    for path in tuple(files):
+        with contextlib.suppress(OSError):
+            path.unlink()
+
+
+def _began(process: int | str) -> str:
+    """Return when a process began, in clock ticks since boot; empty if there is none.  See proc(5)."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text(errors="replace").rpartition(")")[2].split()[19]
+    except OSError:
+        return ""

@@ -17,7 +17,7 @@ import threading
 import time
 
 from feti_homog.errors import FetiHomogError, escaped
-from feti_homog.system.runtime import owners
+from feti_homog.system.runtime import file_locks
 
 ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGXCPU)  # the last: the limit of CPU time
 # Variables in which launchers give the rank of a process before MPI has started.
@@ -55,7 +55,7 @@ def _wait_and_end(awaited: set[signal.Signals]) -> None:
         complain(f"interrupted by {signal.Signals(number).name}")
     else:
         time.sleep(SILENT_SECONDS)
-    owners.remove_files()
+    file_locks.remove_files()
     os._exit(128 + number)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from mpi4py import MPI
 
 from feti_homog.results import atomic, output_folder
-from feti_homog.system.runtime import owners
+from feti_homog.system.runtime import file_locks
 
 
 def test_unfinished_files_are_removed(tmp_path):
@@ -19,10 +19,10 @@ def test_unfinished_files_are_removed(tmp_path):
 
 
 def test_only_what_dead_writers_left_is_removed_beside_others(tmp_path):
-    host, process, began = owners.tag().rsplit(".", 2)
+    host, process, began = file_locks.tag().rsplit(".", 2)
     dead = f"{host}.{process}.{int(began) + 1}"
     names = ("cell.png.%s.part", "mine.png.%s.part", "cell.png.%s.txt")
-    for name in (*(words % dead for words in names), names[0] % owners.tag(), names[0] % f"else.{dead}"):
+    for name in (*(words % dead for words in names), names[0] % file_locks.tag(), names[0] % f"else.{dead}"):
         (tmp_path / name).write_text("")
     before = set(tmp_path.iterdir())
     atomic.remove_abandoned(tmp_path, output_folder.RESULT_FILE)

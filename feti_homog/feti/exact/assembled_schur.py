@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
-
 import numpy as np
 from mpi4py import MPI
 from scipy.sparse import csr_matrix, diags, hstack
@@ -14,10 +12,10 @@ from feti_homog.feti.linalg.sparse_direct import DirectSolver
 from feti_homog.feti.linalg.sparse_matrices import DenseBlockSum, allreduce_sparse
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.feti.operators.with_springs import is_dense
-from feti_homog.feti.thresholds import ASSEMBLED_PARTS, DENSE_SHARE, MOST_DENSE_ROWS
+from feti_homog.feti.thresholds import DENSE_SHARE, MOST_DENSE_ROWS
 from feti_homog.system.parallel.distributed_arrays import share_columns
 from feti_homog.system.petsc.options import choices
-from feti_homog.typing import Float, Int
+from feti_homog.typing import Float
 
 # Entries of Z, which are cosines of angles or their products, that rounding leaves of zero.
 DIRECTION_ROUNDING = 1e-14
@@ -61,63 +59,33 @@ class AssembledSchur:
 
 def assembled_stiffness(
     comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators, active: Float
-) -> Generator[None, None, tuple[csr_matrix, csr_matrix | Float]]:
-    """Z (n, columns) and Z^T S Z of all ranks, as `block_sum` has it, in ASSEMBLED_PARTS parts.  Collective.
+) -> tuple[csr_matrix, csr_matrix | Float]:
+    """Return Z (n, columns) and Z^T S Z of all ranks for the owned rows where `active` is 1.  Collective.
 
-    They are of the owned rows of which `active` is 1, which must leave no rigid-body motion free, for that to be
-    factored.
+    The rows must leave no rigid-body motion free.  The sum is dense, in Fortran order, where all ranks' blocks fill
+    most of it and there are no options `feti_bonded_`; sparse otherwise.
 
     Raises:
         TypeError: a boundary operator is not dense.
     """
-    together = _copies_together(comm, jump_operator, operators)
-    Z = _released(comm, jump_operator, operators, together, active)
-    stiffness = block_sum(comm, Z.shape[1], [len(np.unique(Z[span].indices)) for span in operators.slices])
-    for part in np.array_split(np.arange(len(operators.slices)), ASSEMBLED_PARTS):
-        for place in part:
-            operator, span = operators.with_springs[place], operators.slices[place]
-            if not is_dense(operator):
-                raise TypeError("the assembled Schur complement needs dense boundary operators")
-            columns = np.unique(Z[span].indices)
-            T = Z[span][:, columns].T.tocsr()
-            stiffness.add(columns, columns, T @ (T @ operator.S).T)
-        yield
-    if isinstance(stiffness, DenseSum):
-        return Z, stiffness.of_all_ranks(comm)
-    return Z, allreduce_sparse(comm, stiffness.matrix())
-
-
-class DenseSum:
-    """The dense sum of dense symmetric blocks."""
-
-    def __init__(self, size: int) -> None:
-        self._sum = np.zeros((size, size))
-
-    def add(self, rows: Int, columns: Int, values: Float) -> None:
-        """Add the block `values` (rows, columns)."""
-        self._sum[rows[:, None], columns] += values
-
-    def of_all_ranks(self, comm: MPI.Intracomm) -> Float:
-        """(size, size) the sum over ranks, in Fortran order.  Collective."""
-        comm.Allreduce(MPI.IN_PLACE, self._sum)
-        return self._sum.T
-
-
-def block_sum(comm: MPI.Intracomm, size: int, sizes: list[int]) -> DenseSum | DenseBlockSum:
-    """Return an empty sum (size, size) for square blocks of these `sizes` on this rank.  Collective.
-
-    It is dense where all ranks' blocks fill most of it and there are no options `feti_bonded_`, sparse otherwise.
-    """
-    entries = comm.allreduce(sum(n**2 for n in sizes))
-    is_full = entries >= DENSE_SHARE * size**2 and size <= MOST_DENSE_ROWS
-    if is_full and not choices("feti_bonded_"):
-        return DenseSum(size)
-    return DenseBlockSum((size, size))
-
-
-def shared_dofs(comm: MPI.Intracomm, jump_operator: JumpOperator) -> int:
-    """Dofs on the shared nodes of all ranks; collective."""
-    return int(comm.allreduce(jump_operator.components * len(jump_operator.node_rows[0])))
+    Z = _released(comm, jump_operator, operators, _copies_together(comm, jump_operator, operators), active)
+    size, columns = Z.shape[1], [np.unique(Z[span].indices) for span in operators.slices]
+    entries = comm.allreduce(sum(len(of) ** 2 for of in columns))
+    is_full = entries >= DENSE_SHARE * size**2 and size <= MOST_DENSE_ROWS and not choices("feti_bonded_")
+    dense, blocks = np.zeros((size, size) if is_full else (0, 0)), DenseBlockSum((size, size))
+    for operator, span, of in zip(operators.with_springs, operators.slices, columns, strict=True):
+        if not is_dense(operator):
+            raise TypeError("the assembled Schur complement needs dense boundary operators")
+        T = Z[span][:, of].T.tocsr()
+        block = T @ (T @ operator.S).T
+        if is_full:
+            dense[of[:, None], of] += block
+        else:
+            blocks.add(of, of, block)
+    if not is_full:
+        return Z, allreduce_sparse(comm, blocks.matrix())
+    comm.Allreduce(MPI.IN_PLACE, dense)
+    return Z, dense.T
 
 
 def _copies_together(comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> csr_matrix:
@@ -130,7 +98,7 @@ def _copies_together(comm: MPI.Intracomm, jump_operator: JumpOperator, operators
     row = operators.BT.indices[operators.BT.indptr[:-1]]
     n, c = len(row), jump_operator.components
     shared = c * node[row].astype(np.int64) + np.arange(n) % c
-    return csr_matrix((np.ones(n), (np.arange(n), shared)), shape=(n, shared_dofs(comm, jump_operator)))
+    return csr_matrix((np.ones(n), (np.arange(n), shared)), shape=(n, jump_operator.shared_dofs))
 
 
 def _released(

@@ -19,7 +19,7 @@ from feti_homog.system.parallel.distributed_arrays import gather_rows
 from feti_homog.typing import Float, Int
 
 
-class FollowedChanges:
+class ReferenceChanges:
     """The rows C of a reference cell that have changed, all of which have followed columns.
 
     Attributes:
