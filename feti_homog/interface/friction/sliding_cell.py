@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property
 
 import numpy as np
 from mpi4py import MPI
@@ -21,7 +20,7 @@ from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState,
 from feti_homog.interface.friction.condensed_problem import AxialFaces, CondensedProblem
 from feti_homog.interface.friction.coulomb_faces import CoulombFaces
 from feti_homog.interface.friction.status_system import OPEN_FACE, STICK
-from feti_homog.interface.loads.load import CoupledSolution, Load, Macroscopic, Multipliers
+from feti_homog.interface.loads.load import CoupledSolution, Load, Macroscopic
 from feti_homog.typing import Bool, Float, Int
 
 
@@ -103,11 +102,6 @@ class SlidingCell:
         more = interface.compliance(pulled) - problem.solver.intact_compliance
         return np.asarray(more[interface.nodes.row[:, None] + np.arange(problem.solver.jump_operator.components)])
 
-    @cached_property
-    def area(self) -> float:
-        """Area of the cell."""
-        return float(self.interface.size.prod())
-
     def begin(self, bonds: BondState, strain: Float) -> tuple[Status, Float]:
         """Return the statuses (n,) of the faces of the bonds, and scaled x (m,), with a strain (v,).  Collective.
 
@@ -136,19 +130,15 @@ class SlidingCell:
 
     def stored(self, x: Float) -> float:
         """Return the energy per area of the cell in scaled x."""
-        return float(x @ self.faces.solver.product(x)) / (2.0 * self.area)
+        return float(x @ self.faces.solver.product(x)) / (2.0 * self.cell.area)
 
     def stretched(self, x: Float) -> float:
         """Return the energy per area of the springs in scaled x by which damaged bonds have become softer."""
-        return float(self.springs @ self._jumps_of(x) ** 2) / (2.0 * self.area)
+        return float(self.springs @ self._jumps_of(x) ** 2) / (2.0 * self.cell.area)
 
     def _jumps_of(self, x: Float) -> Float:
         """(2n,) jumps in the plane of scaled x."""
         return np.asarray((x / self.faces.size)[: self.faces.loads.start])
-
-    def multipliers(self, x: Float) -> Multipliers:
-        """(owned rows,) lam of scaled x in each problem."""
-        return Multipliers(each.multipliers(*own) for each, own in self._parts(x))
 
     def traction(self, x: Float) -> Float:
         """(k, 2) or (k, 3) traction of scaled x at the bonds of this rank, also along the fibre; 0 where they broke.
@@ -173,18 +163,15 @@ class SlidingCell:
         parts = (Macroscopic(each.strain[self._loads :], each.stress[self._loads :]) for each in (before, after))
         return next(parts).released_to(next(parts))
 
-    def strain(self, x: Float) -> Float:
-        """(v,) E of scaled x."""
-        return np.asarray((x / self.faces.size)[self.faces.loads])
-
-    def stress(self, x: Float) -> Float:
-        """(v,) Sigma of scaled x."""
-        return np.asarray((self.faces.solver.product(x) * self.faces.size)[self.faces.loads] / self.area)
+    def macroscopic(self, x: Float) -> Macroscopic:
+        """Return the strains and stresses (v,) of scaled x."""
+        loads, size = self.faces.loads, self.faces.size
+        return Macroscopic((x / size)[loads], (self.faces.solver.product(x) * size)[loads] / self.cell.area)
 
     def given(self, load: Load) -> Float:
         """(v,) scaled values of a load."""
         size = self.faces.size[self.faces.loads]
-        return np.where(load.by_stress, self.area * load.values / size, load.values * size)
+        return np.where(load.by_stress, self.cell.area * load.values / size, load.values * size)
 
     def equilibrium(self, loads: Sequence[Load], bonds: BondState, x: Float) -> Equilibrium:
         """Return the state of scaled x, with its certificate, under the last of the loads up to it.  Collective."""

@@ -2,7 +2,7 @@
 
 `events` finds every break exactly.  The first leg of the path starts at zero, where for zero initial gaps the
 response is homogeneous of degree one: one solve gives the load at which the next bond breaks, be it lower than
-the last (snap-back).  On later legs it is the load that is controlled, see `later_leg`.  `increments` is the paper's
+the last (snap-back).  On later legs it is the load that is controlled, see `leg`.  `increments` is the paper's
 loop.
 
 Energy.  A break happens at constant load, at which stresses or strains jump, and loses work less stored energy; between
@@ -15,34 +15,43 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.contact.states import BONDED
+from feti_homog.interface.friction.sliding_cell import SlidingCell
 from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.loads.load import Load
-from feti_homog.interface.path.later_leg import LaterLeg
-from feti_homog.interface.path.path_points import (
-    NO_ENERGIES,
-    UTILISATION_TIE,
-    Energies,
-    PathState,
-    Point,
-    break_bonds,
-    count_on_all_ranks,
-    most_utilised,
-)
+from feti_homog.interface.path.coulomb_leg import CoulombLeg
+from feti_homog.interface.path.frictionless_leg import FrictionlessLeg
+from feti_homog.interface.path.leg import Leg
+from feti_homog.interface.path.path_points import Energies, PathState, Point, break_bonds, most_utilised
 
 
-def events(cell: CoupledInterfaces, law: BondLaw, waypoints: Sequence[Load], begin: PathState) -> Iterator[Point]:
+def events(
+    cell: CoupledInterfaces,
+    law: BondLaw,
+    waypoints: Sequence[Load],
+    begin: PathState,
+    sliding: SlidingCell | None = None,
+) -> Iterator[Point]:
     """Every break along zero -> waypoints[0] -> ..., and the end of each leg.  Collective.
 
     A leg begins with what the state has of the components that its waypoint gives, strain or stress.  A point's state
-    is the one before its bonds break.  On later legs the changes of contact are points too, with `broke` = 0: between
-    points the response is straight.  The last point is one that did not converge, if there is one.
+    is the one before its bonds break.  On later legs, and with friction by `sliding` on all, the changes of contact
+    are points too, with `broke` = 0: between points the response is straight.  The last point is one that did not
+    converge, if there is one.
+
+    Raises:
+        NotCarriedError: nothing goes on from the last point, the limit of the load.
     """
-    for point in _legs(cell, law, waypoints, begin):
-        yield point
-        if not point.state.converged:
-            # What breaks next cannot be decided on a state that does not hold.
-            return
+    for leg in range(begin.leg, len(waypoints)):
+        if leg == 0 and sliding is None:
+            points = _first_leg(cell, law, waypoints[0], len(waypoints), begin)
+        else:
+            points = _leg(cell, law, waypoints, leg, begin, sliding).points()
+        for point in points:
+            yield point
+            if not point.state.converged:
+                # What breaks next cannot be decided on a state that does not hold.
+                return
+            begin = point.after
 
 
 def increments(
@@ -52,58 +61,44 @@ def increments(
     steps: int,
     worst_only: bool,
     begin: PathState,
+    sliding: SlidingCell | None = None,
 ) -> Iterator[Point]:
     """Yield the paper's loop: at each of `steps` equal load steps, release overloaded bonds until none is left.
 
     A point's state is the one after its bonds broke.  `begin.leg` is the number of steps done.  With `worst_only`
     just the most overloaded bonds are released at a time.  The last point is one that did not converge, if there is
-    one.
+    one; where nothing carries the load of a step with friction, it is at the largest load that is carried.  Collective.
+
+    Raises:
+        NotCarriedError: nothing carries more, or a step has no admissible statuses.
     """
+    legs, way = len(waypoints), None
     for step in range(begin.leg + 1, steps + 1):
-        leg = (step * len(waypoints) - 1) // steps
-        begins_here = ((step - 1) * len(waypoints) - 1) // steps < leg
-        origin, end = begin.last if begins_here else begin.origin, waypoints[leg]
-        start = cell.leg_start(origin, waypoints[leg - 1] if leg else None, end)
-        load = start.after(step * len(waypoints) / steps - leg, end)
-        point = _increment(cell, law, load, worst_only, begin)
-        after = PathState(step, 0.0, point.state.bonds, point.state.multipliers, origin, point.after.last)
-        begin = after
-        yield replace(point, load_factor=step / steps, after=after)
+        leg = (step * legs - 1) // steps
+        if way is None or leg > way.leg:
+            position = begin.position or max((step - 1) * legs / steps - leg, 0.0)
+            way = _leg(cell, law, waypoints, leg, replace(begin, leg=leg, position=position), sliding)
+        point = way.step(step, steps, worst_only)
+        begin = point.after
+        yield point
+        if way.limit is not None:
+            raise way.limit
         if not point.state.converged:
             return
 
 
-def _increment(cell: CoupledInterfaces, law: BondLaw, load: Load, worst_only: bool, begin: PathState) -> Point:
-    """Return the state under a load after all overloaded bonds have broken."""
-    bonds, lam, here, broke = begin.bonds, begin.lam, begin, 0
-    energies = NO_ENERGIES
-    while True:
-        state = cell.equilibrium(load, bonds, lam)
-        lam, reached = state.multipliers, cell.macroscopic(state.solutions)
-        energies = energies.plus(here.energies_to(reached))
-        used, largest, which = most_utilised(cell, law, state)
-        here = PathState(begin.leg, 0.0, state.bonds, lam, begin.origin, reached)
-        if largest <= 1.0 + UTILISATION_TIE or not state.converged:
-            weaker = (bonds.history != begin.bonds.history).any(axis=1) & (state.status == BONDED)
-            softened = count_on_all_ranks(cell, weaker)
-            return Point(0.0, 1.0, state, broke, softened, energies, used, here)
-        if not worst_only:
-            which = used > 1.0
-        bonds, parted, _, fracture = break_bonds(cell, law, which, state)
-        broke += parted
-        here = PathState(begin.leg, 0.0, bonds, lam, begin.origin, reached, fracture)
-
-
-def _legs(cell: CoupledInterfaces, law: BondLaw, waypoints: Sequence[Load], begin: PathState) -> Iterator[Point]:
-    legs = len(waypoints)
-    if begin.leg == 0:
-        for point in _first_leg(cell, law, waypoints[0], legs, begin):
-            yield point
-            begin = point.after
-    for leg in range(max(begin.leg, 1), legs):
-        for point in LaterLeg(cell, law, waypoints, leg, begin).points():
-            yield point
-            begin = point.after
+def _leg(
+    cell: CoupledInterfaces,
+    law: BondLaw,
+    waypoints: Sequence[Load],
+    leg: int,
+    begin: PathState,
+    sliding: SlidingCell | None,
+) -> Leg:
+    """Return the leg that ends at waypoint `leg`, with the engine of the case.  Collective."""
+    if sliding is None:
+        return FrictionlessLeg(cell, law, waypoints, leg, begin)
+    return CoulombLeg(cell, law, waypoints, leg, begin, sliding)
 
 
 def _first_leg(cell: CoupledInterfaces, law: BondLaw, load: Load, legs: int, begin: PathState) -> Iterator[Point]:
@@ -125,6 +120,6 @@ def _first_leg(cell: CoupledInterfaces, law: BondLaw, load: Load, legs: int, beg
             after = PathState(1, 0.0, state.bonds, lam, reached, reached)
             yield Point(1.0 / legs, 1.0, state, 0, 0, energies, used, after)
             return
-        bonds, broke, softened, fracture = break_bonds(cell, law, worst, state)
-        begin = PathState(0, factor, bonds, lam, begin.origin, reached, fracture)
+        place = PathState(0, factor, state.bonds, lam, begin.origin, reached)
+        broke, softened, begin = break_bonds(cell, law, worst, state, place)
         yield Point(factor / legs, factor, state, broke, softened, energies, used / largest, begin)

@@ -32,7 +32,7 @@ class PathState:
         last: the last point's state.
         broken: fracture energy of the bonds that broke there, in the mode in which each broke, per area of the cell, 0
             of bonds without toughness; None if none broke.
-        stretched: with friction, energy per area of the springs of damaged bonds before they broke.
+        stretched: with friction, energy per area of the springs of damaged bonds, before those of `broken` broke.
     """
 
     leg: int
@@ -97,43 +97,31 @@ class Point:
     after: PathState
 
 
-class Break(NamedTuple):
-    """Break of some bonds.
-
-    The state of the interface after it, how many part on all ranks and how many soften, and the fracture energy per
-    area of the cell.
-    """
-
-    bonds: BondState
-    parted: int
-    softened: int
-    fracture: float
-
-
 def unloaded(cell: CoupledInterfaces, bonds: BondState) -> PathState:
     """Return the beginning of a path with the debonded nodes of `bonds`."""
     nothing = Macroscopic(np.zeros(len(cell.loads)), np.zeros(len(cell.loads)))
     return PathState(0, 0.0, bonds, cell.no_multipliers(), nothing, nothing)
 
 
-def break_bonds(cell: CoupledInterfaces, law: BondLaw, which: Bool, state: Equilibrium) -> Break:
-    """Break the bonds `which` (k,) in the modes of an equilibrium, whatever its size.  Collective."""
-    traction = held_traction(cell, state)
-    history, parts = law.after(state.bonds, which, traction)
+def break_bonds(
+    cell: CoupledInterfaces, law: BondLaw, which: Bool, state: Equilibrium, place: PathState
+) -> tuple[int, int, PathState]:
+    """Break the bonds `which` (k,) in the modes of an equilibrium, whatever its size.  Collective.
+
+    Return how many of all ranks part and how many soften, and the path state `place` with the broken bonds.
+    """
+    traction, bonds = held_traction(cell, state), state.bonds
+    history, parts = law.after(bonds, which, traction)
     status = cell.plane.debond(state.status, parts, state.multipliers.plane)
-    energy = _fracture_energy(cell, law, which, state.bonds, traction)
     # A first guess, which the search for contact checks.
-    pressed = np.where(which, traction[:, 0] < 0.0, state.bonds.pressed)
+    pressed = np.where(which, traction[:, 0] < 0.0, bonds.pressed)
+    energy = 0.0
+    if law.has_toughness:
+        energy = float(law.fracture(bonds, which, traction) @ cell.nodes.length[which])
+        energy = float(cell.comm.allreduce(energy) / cell.area)
     parted, softened = (count_on_all_ranks(cell, nodes) for nodes in (parts, which & ~parts))
-    return Break(replace(state.bonds, status=status, history=history, pressed=pressed), parted, softened, energy)
-
-
-def _fracture_energy(cell: CoupledInterfaces, law: BondLaw, which: Bool, bonds: BondState, traction: Float) -> float:
-    """Fracture energy of the bonds `which` (k,) under tractions (k, c), times their lengths, per area; collective."""
-    if not law.has_toughness:
-        return 0.0
-    energy = float(law.fracture(bonds, which, traction) @ cell.nodes.length[which])
-    return float(cell.comm.allreduce(energy) / cell.area)
+    broken = replace(bonds, status=status, history=history, pressed=pressed)
+    return parted, softened, replace(place, bonds=broken, broken=energy)
 
 
 def most_utilised(cell: CoupledInterfaces, law: BondLaw, state: Equilibrium) -> tuple[Float, float, Bool]:

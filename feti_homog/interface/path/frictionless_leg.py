@@ -1,4 +1,4 @@
-"""A leg of a path that does not begin at zero: the load is controlled and the response piecewise linear."""
+"""Legs of paths without friction: the load is controlled and the response piecewise linear."""
 
 from __future__ import annotations
 
@@ -10,18 +10,12 @@ from mpi4py import MPI
 
 from feti_homog.errors import NotCarriedError
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.contact.states import Equilibrium
+from feti_homog.interface.contact.states import BondState, Equilibrium
 from feti_homog.interface.laws.bond_law import BondLaw
-from feti_homog.interface.loads.load import CoupledSolution, Load, Macroscopic
-from feti_homog.interface.path.next_change import first_break, first_change
-from feti_homog.interface.path.path_points import (
-    NO_ENERGIES,
-    UTILISATION_TIE,
-    PathState,
-    Point,
-    break_bonds,
-    most_utilised,
-)
+from feti_homog.interface.loads.load import CoupledSolution, Load, Macroscopic, Multipliers
+from feti_homog.interface.path.leg import Leg
+from feti_homog.interface.path.onset import first_break, first_change
+from feti_homog.interface.path.path_points import UTILISATION_TIE, PathState, Point, most_utilised
 from feti_homog.typing import Float
 
 # Shares of a leg that are not distinguished.
@@ -32,8 +26,8 @@ LEAST_SHARE = 1e-9
 OFF_LINE_PER_RTOL, OFF_LINE_ROUNDING = 10.0, 1e-10
 
 
-class LaterLeg:
-    """Events on leg `leg` of `legs`, the way between two loads of the same kinds, at rising share s of it.
+class FrictionlessLeg(Leg):
+    """Leg whose equilibria do not depend on the way to them.
 
     From the equilibrium at s the transitions are
 
@@ -53,39 +47,60 @@ class LaterLeg:
     only halving finds it.
     """
 
+    _state: Equilibrium
+
     def __init__(
         self, cell: CoupledInterfaces, law: BondLaw, waypoints: Sequence[Load], leg: int, begin: PathState
     ) -> None:
-        """Stand at `begin` on the way from its origin to waypoint `leg`.  Collective."""
-        self.cell, self.law, self.end = cell, law, waypoints[leg]
-        self.leg, self.legs = leg, len(waypoints)
-        self.origin = begin.last if begin.position == 0.0 else begin.origin
-        self.start = cell.leg_start(self.origin, waypoints[leg - 1], self.end)
-        # Where the last point is, up to where the line is known to bend, and whether a predicted change did not come.
-        self._reported, self._bends_before, self._false_alarm = begin.position, np.inf, False
-        self._from, self._energies = begin, NO_ENERGIES
-        self._stand(begin.position, cell.equilibrium(self._load_at(begin.position), begin.bonds, begin.lam))
+        super().__init__(cell, law, waypoints, leg, begin)
+        # Up to where the line is known to bend, and whether a predicted change did not come.
+        self._bends_before, self._false_alarm, self._from = np.inf, False, begin
 
-    def _load_at(self, share: float) -> Load:
-        return self.start.after(share, self.end)
+    @property
+    def state(self) -> Equilibrium:
+        """Equilibrium at s."""
+        return self._state
 
     def points(self) -> Iterator[Point]:
-        """Yield the points of the leg; if a solve does not converge, up to there. Collective."""
-        yield from self._break_overloaded()
-        while self._share < 1.0 and self._state.converged:
-            ahead = self._ahead()
-            yield from self._touch() if ahead is None else self._advance(ahead)
-        yield self._point(0, 0, self._path_state(self.leg + 1, 0.0))
+        """Yield the points of the leg, up to a solve that does not converge.  Collective."""
+        self._settle(self._from)
+        yield from super().points()
 
-    def _ahead(self) -> CoupledSolution | None:
-        """Return the end of the leg with the contact states as they are; None if they do not carry its stresses."""
+    def _is_over(self) -> bool:
+        return self._share >= 1.0 or not self._state.converged
+
+    def _settle(self, begin: PathState) -> None:
+        self._bends_before, self._false_alarm, self._from = np.inf, False, begin
+        self._go_to(self._share)
+
+    def _go_to(self, share: float) -> None:
+        self._stand(share, self._solve(share, self._from.bonds, self._from.lam))
+
+    def _solve(self, share: float, bonds: BondState, lam: Multipliers) -> Equilibrium:
+        return self.cell.equilibrium(self._load_at(share), bonds, lam)
+
+    def _stand(self, share: float, state: Equilibrium) -> None:
+        """Stand at a share of the leg with its equilibrium, and add the energies of the way."""
+        if share >= self._bends_before:
+            self._bends_before = np.inf
+        self._share, self._state, self._bonds = share, state, state.bonds
+        self._mean = self.cell.macroscopic(state.solutions)
+        self._energies = self._energies.plus(self._from.energies_to(self._mean))
+        self._from = self._path_state()
+
+    def _advance(self) -> Iterator[Point]:
+        """Go on to the next event, or part of the way, and yield its points.  Collective."""
         try:
-            return self.cell.linear(self.end, self._state.bonds, self._state.multipliers)
+            ahead = self.cell.linear(self.end, self._state.bonds, self._state.multipliers)
         except NotCarriedError:
-            return None
+            return self._touch()
+        return self._advance_towards(ahead)
 
-    def _advance(self, ahead: CoupledSolution) -> Iterator[Point]:
-        """Go to the next event, or as far towards it as the response is straight, and past it."""
+    def _advance_towards(self, ahead: CoupledSolution) -> Iterator[Point]:
+        """Go to the next event, or as far towards it as the response to `ahead` is straight, and past it.
+
+        `ahead` is the end of the leg with the contact states as they are.
+        """
         before, share = self._state, self._share
         breaks, begins, certain = self._predict(ahead)
         target = min(breaks, begins, 1.0)
@@ -101,21 +116,21 @@ class LaterLeg:
                 yield from self._turned()
         yield from self._break_overloaded()
 
-    def _is_due(self) -> bool:
-        """Return whether the worst bonds are at their strength."""
-        return self._used_at_worst > 1.0 - UTILISATION_TIE
-
     def _predict(self, ahead: CoupledSolution) -> tuple[float, float, float]:
         """Shares of the leg where a bond breaks, where the contact begins to change, and where that is beyond doubt.
 
         What does not happen on the leg is at infinity.
         """
-        rest = 1.0 - self._share
-        breaks = first_break(self.cell, self.law, self._state, ahead)
-        begins, certain = (1.0, 1.0) if self._false_alarm else first_change(self.cell.plane, self._state, ahead.plane)
+        cell, state, rest = self.cell, self._state, 1.0 - self._share
+        breaks = first_break(cell, self.law, state.bonds, cell.traction(state.solutions), cell.traction(ahead))
+        begins, certain = (1.0, 1.0) if self._false_alarm else first_change(cell.plane, state, ahead.plane)
         if begins == 1.0:
             begins = certain = np.inf
         return self._share + rest * breaks, self._share + rest * begins, self._share + rest * certain
+
+    def _is_due(self) -> bool:
+        """Return whether the worst bonds are at their strength."""
+        return self._used()[1] > 1.0 - UTILISATION_TIE
 
     def _approach(self, target: float, ahead: CoupledSolution) -> bool:
         """Stand at the target, or at the first half, quarter, ... of the way up to which the response is straight.
@@ -129,7 +144,7 @@ class LaterLeg:
             target, reached = max((start + self._bends_before) / 2, nearest), False
         while True:
             way = (target - start) / (1.0 - start)
-            state = self.cell.equilibrium(self._load_at(target), here.bonds, here.multipliers.towards(ahead.lam, way))
+            state = self._solve(target, here.bonds, here.multipliers.towards(ahead.lam, way))
             if target <= nearest or not state.converged or self._continues(ahead, way, state):
                 break
             self._bends_before, reached = target, False
@@ -141,7 +156,7 @@ class LaterLeg:
         """Return whether no bond is overloaded in a state, and its response on the line to `ahead`.  Collective."""
         cell = self.cell
         _, used, _ = most_utilised(cell, self.law, state)
-        here, there = self._from.last, cell.macroscopic(ahead)
+        here, there = self._mean, cell.macroscopic(ahead)
         ends = np.stack([self._response(here), self._response(there)])
         off = np.abs((1.0 - way) * ends[0] + way * ends[1] - self._response(cell.macroscopic(state.solutions))).max()
         strains = np.stack([here.strain, there.strain])
@@ -163,7 +178,7 @@ class LaterLeg:
         there_is_one = self._share <= self._reported + LEAST_SHARE
         if not there_is_one:
             yield self._turn(beyond)
-        self._stand(beyond, self.cell.equilibrium(self._load_at(beyond), before.bonds, before.multipliers))
+        self._stand(beyond, self._solve(beyond, before.bonds, before.multipliers))
         self._false_alarm = not self._differs(from_state)
         if there_is_one and not self._false_alarm:
             yield from self._turned()
@@ -175,8 +190,8 @@ class LaterLeg:
             NotCarriedError: touching faces do not carry it either.
         """
         state, beyond = self._state, min(self._share + LEAST_SHARE, 1.0)
-        there = self.cell.equilibrium(self._load_at(beyond), state.bonds, state.multipliers)
-        here = self.cell.equilibrium(self._load_at(self._share), there.bonds, there.multipliers)
+        there = self._solve(beyond, state.bonds, state.multipliers)
+        here = self._solve(self._share, there.bonds, there.multipliers)
         self._stand(self._share, here)
         yield self._turn(beyond)
         self._stand(beyond, there)
@@ -189,44 +204,7 @@ class LaterLeg:
 
     def _turn(self, position: float) -> Point:
         """Return the state here as a point at which nothing breaks and from which the path goes on at `position`."""
-        return self._point(0, 0, self._path_state(self.leg, position))
-
-    def _break_overloaded(self) -> Iterator[Point]:
-        while self._is_overloaded():
-            yield from self._break()
-
-    def _is_overloaded(self) -> bool:
-        """Return True if bonds break here at once: a break or a change of contact has overloaded them."""
-        return self._used_at_worst > 1.0 + UTILISATION_TIE and self._state.converged
-
-    def _break(self) -> Iterator[Point]:
-        """Break the worst bonds here, and find the state after it."""
-        cell, state, worst = self.cell, self._state, self._worst
-        bonds, broke, softened, fracture = break_bonds(cell, self.law, worst, state)
-        broken = replace(self._path_state(self.leg, self._share), bonds=bonds, broken=fracture)
-        yield self._point(broke, softened, broken)
-        self._bends_before, self._false_alarm, self._from = np.inf, False, broken
-        self._stand(self._share, cell.equilibrium(self._load_at(self._share), bonds, state.multipliers))
-
-    def _point(self, broke: int, softened: int, after: PathState) -> Point:
-        """Return the point here, at which so many bonds part and so many soften."""
-        energies, self._energies, self._reported = self._energies, NO_ENERGIES, self._share
-        load_factor = (self.leg + self._share) / self.legs
-        return Point(load_factor, 1.0, self._state, broke, softened, energies, self._used, after)
-
-    def _path_state(self, leg: int, position: float) -> PathState:
-        """From the state here on, at a position of a leg."""
-        return replace(self._from, leg=leg, position=position)
-
-    def _stand(self, share: float, state: Equilibrium) -> None:
-        """Stand at a share of the leg, where this state was found."""
-        self._share, self._state = share, state
-        if share >= self._bends_before:
-            self._bends_before = np.inf
-        self._used, self._used_at_worst, self._worst = most_utilised(self.cell, self.law, state)
-        here = self.cell.macroscopic(state.solutions)
-        self._energies = self._energies.plus(self._from.energies_to(here))
-        self._from = PathState(self.leg, share, state.bonds, state.multipliers, self.origin, here)
+        return self._point(0, 0, replace(self._path_state(), position=position))
 
     def _differs(self, before: Equilibrium) -> bool:
         """Return whether contact states are other than before; collective."""

@@ -1,0 +1,133 @@
+"""A leg of a path: the stretch of load between two waypoints, by events or in equal steps.
+
+Two engines follow the load: `FrictionlessLeg` solves equilibria, `CoulombLeg` the rates of faces that rub.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from feti_homog.errors import NotCarriedError
+from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
+from feti_homog.interface.contact.states import BONDED, Equilibrium
+from feti_homog.interface.laws.bond_law import BondLaw
+from feti_homog.interface.loads.load import Load, Macroscopic
+from feti_homog.interface.path.path_points import (
+    NO_ENERGIES,
+    UTILISATION_TIE,
+    PathState,
+    Point,
+    break_bonds,
+    count_on_all_ranks,
+    most_utilised,
+)
+from feti_homog.typing import Bool, Float
+
+
+class Leg(ABC):
+    """Leg `leg` between two loads of the same kinds, at rising share s of it.
+
+    Bonds break at constant load: a point, then the state after the break at the same s.
+
+    Attributes:
+        limit: why the last step ended before its load, None if it did not.
+    """
+
+    limit: NotCarriedError | None = None
+    _mean: Macroscopic
+
+    def __init__(
+        self, cell: CoupledInterfaces, law: BondLaw, waypoints: Sequence[Load], leg: int, begin: PathState
+    ) -> None:
+        """Begin at the position of `begin`, on the way from its origin to waypoint `leg`.  Collective."""
+        self.cell, self.law, self.leg, self.waypoints = cell, law, leg, waypoints
+        self.end = waypoints[leg]
+        self.origin = begin.last if begin.position == 0.0 else begin.origin
+        self.start = cell.leg_start(self.origin, waypoints[leg - 1] if leg else None, self.end)
+        self._share = self._reported = begin.position
+        self._bonds, self._energies = begin.bonds, NO_ENERGIES
+        self._utilisation: tuple[Equilibrium, tuple[Float, float, Bool]] | None = None
+
+    @property
+    @abstractmethod
+    def state(self) -> Equilibrium:
+        """Equilibrium at s.  Collective."""
+
+    @abstractmethod
+    def _settle(self, begin: PathState) -> None:
+        """Find the state at s with the bonds of `begin`, after its break if it has one.  Collective."""
+
+    @abstractmethod
+    def _advance(self) -> Iterator[Point]:
+        """Go on to the next event, or part of the way, and yield its points.  Collective."""
+
+    @abstractmethod
+    def _go_to(self, share: float) -> None:
+        """Go to a share of the leg in one step, with the bonds as they are.  Collective."""
+
+    def points(self) -> Iterator[Point]:
+        """Yield the points of the leg, up to a solve that does not converge.  Collective."""
+        yield from self._break_overloaded()
+        while not self._is_over():
+            yield from self._advance()
+        yield self._point(0, 0, replace(self._path_state(), leg=self.leg + 1, position=0.0))
+
+    def step(self, number: int, steps: int, worst_only: bool) -> Point:
+        """Return the point after step `number`, from 1, of all steps of the path.  Collective."""
+        before, parted = self._bonds.history, 0
+        self._go_to(number * len(self.waypoints) / steps - self.leg)
+        while self._is_overloaded():
+            used, _, worst = self._used()
+            count, _, broken = self._release(worst if worst_only else used > 1.0)
+            parted += count
+            self._settle(broken)
+        bonds, after = self.state.bonds, self._path_state()
+        weaker = count_on_all_ranks(self.cell, (bonds.history != before).any(axis=1) & (bonds.status == BONDED))
+        if self.limit is not None:
+            return self._point(parted, weaker, replace(after, leg=number - 1))
+        point = self._point(parted, weaker, replace(after, leg=number, position=0.0))
+        return replace(point, load_factor=number / steps)
+
+    def _load_at(self, share: float) -> Load:
+        return self.start.after(share, self.end)
+
+    def _is_over(self) -> bool:
+        """Return whether the leg is at its end."""
+        return self._share >= 1.0
+
+    def _used(self) -> tuple[Float, float, Bool]:
+        """Return `most_utilised` of the state, found once.  Collective."""
+        if self._utilisation is None or self._utilisation[0] is not self.state:
+            self._utilisation = self.state, most_utilised(self.cell, self.law, self.state)
+        return self._utilisation[1]
+
+    def _is_overloaded(self) -> bool:
+        """Return whether bonds break at s: a break or a change of contact has overloaded them.  Collective."""
+        return self._used()[1] > 1.0 + UTILISATION_TIE and self.state.converged
+
+    def _break_overloaded(self) -> Iterator[Point]:
+        while self._is_overloaded():
+            yield from self._break()
+
+    def _break(self) -> Iterator[Point]:
+        """Break the worst bonds at s, and find the state after the break.  Collective."""
+        broke, softened, broken = self._release(self._used()[2])
+        yield self._point(broke, softened, broken)
+        self._settle(broken)
+
+    def _release(self, which: Bool) -> tuple[int, int, PathState]:
+        """Return how many bonds of `which` (k,) part, how many soften, and the path state then.  Collective."""
+        return break_bonds(self.cell, self.law, which, self.state, self._path_state())
+
+    def _point(self, broke: int, softened: int, after: PathState) -> Point:
+        """Return the point at s, at which so many bonds part and so many soften.  Collective."""
+        energies, self._energies, self._reported = self._energies, NO_ENERGIES, self._share
+        load_factor = (self.leg + self._share) / len(self.waypoints)
+        return Point(load_factor, 1.0, self.state, broke, softened, energies, self._used()[0], after)
+
+    def _path_state(self) -> PathState:
+        """Return the path state at s.  Collective."""
+        state = self.state
+        return PathState(self.leg, self._share, state.bonds, state.multipliers, self.origin, self._mean)
