@@ -26,7 +26,7 @@ from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BONDED
 from feti_homog.interface.laws.energy import SpringEnergy
 from feti_homog.interface.laws.released import ReleasedEnergy
-from feti_homog.interface.loads.load import Load
+from feti_homog.interface.loads import Load
 from feti_homog.interface.path.path_following import events
 from feti_homog.interface.path.path_points import unloaded
 

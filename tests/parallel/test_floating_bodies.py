@@ -10,7 +10,7 @@ from support import torn_cells
 from feti_homog.errors import ConvergenceError
 from feti_homog.interface.contact import floating_bodies
 from feti_homog.interface.contact.states import OPEN
-from feti_homog.interface.loads.load import Load
+from feti_homog.interface.loads import Load
 
 pytestmark = pytest.mark.parallel
 

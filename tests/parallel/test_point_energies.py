@@ -22,7 +22,7 @@ from feti_homog.interface.contact.states import BONDED
 from feti_homog.interface.laws.energy import SpringEnergy
 from feti_homog.interface.laws.released import ReleasedEnergy
 from feti_homog.interface.laws.strength import MaxStrength
-from feti_homog.interface.loads.load import Load
+from feti_homog.interface.loads import Load
 from feti_homog.interface.path.path_following import events
 from feti_homog.interface.path.path_points import unloaded
 from feti_homog.system.parallel.mpi_errors import on_root

@@ -17,12 +17,12 @@ from feti_homog import Case, run
 from feti_homog.errors import ConvergenceError
 from feti_homog.feti.exact.bordered_inverse import BorderedInverse
 from feti_homog.feti.exact.exact_inverse import ExactInverse
+from feti_homog.interface.contact import mixed_load
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BONDED, OPEN
 from feti_homog.interface.laws.energy import SpringEnergy
 from feti_homog.interface.laws.released import ReleasedEnergy
-from feti_homog.interface.loads import mixed_load
-from feti_homog.interface.loads.load import Load
+from feti_homog.interface.loads import Load
 from feti_homog.interface.path.path_following import events
 from feti_homog.interface.path.path_points import unloaded
 

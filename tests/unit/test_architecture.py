@@ -53,7 +53,7 @@ FLOORS = (
     ("interface.loads",),
     ("interface.contact",),
     ("interface.friction",),
-    ("interface.tips",),
+    ("interface.debonded_arcs",),
     ("interface.laws",),
     ("interface.path",),
     ("interface",),

@@ -1,7 +1,10 @@
 """Unilateral, frictionless contact of debonded faces: the states that satisfy the KKT conditions.
 
 A debonded node is open (gap >= 0, no force) or closed (gap = 0, force <= 0, compression).  Which, is found by
-block principal pivoting on the dual problem, which is strictly convex.
+block principal pivoting (Judice & Pires, Computers & Operations Research 21, 1994) on the dual problem, which is
+strictly convex: all wrong nodes change at once while their number falls, else only the first one (Murty's rule).  While
+no fibre is free the gaps are q + A p with contact pressures p and a positive definite A, so no set of states comes
+again and the search ends.  With free fibres A is semi-definite only, and that is not proven.
 
 A damaged bond that holds is pulled (compliance C, force >= 0) or pressed (compliance C_0 as without damage,
 force <= 0).  With s = jump - C_0 force >= 0 and w = s / (C - C_0) - force >= 0, s w = 0: the conditions of a debonded
@@ -21,8 +24,7 @@ from feti_homog.errors import NotCarriedError
 from feti_homog.feti.decomposition.constraint_layout import InterfaceNodes
 from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.feti.solver import FetiSolver
-from feti_homog.interface.contact.block_pivoting import BlockPivoting
-from feti_homog.interface.contact.contact_certificate import kkt_errors
+from feti_homog.interface.contact import mixed_load
 from feti_homog.interface.contact.floating_bodies import place
 from feti_homog.interface.contact.load_scales import LoadScales
 from feti_homog.interface.contact.states import (
@@ -33,10 +35,10 @@ from feti_homog.interface.contact.states import (
     Equilibrium,
     Softening,
     Status,
+    kkt_errors,
     never_softens,
 )
-from feti_homog.interface.loads import mixed_load
-from feti_homog.interface.loads.load import Load
+from feti_homog.interface.loads import Load
 from feti_homog.typing import Bool, Float, Int
 
 # An amplitude takes part in new motions if its square is larger than this, of motions of size one.
@@ -56,7 +58,8 @@ class ContactProblem:
         contact: false lets debonded faces overlap; damaged bonds are stiff under pressure all the same.
         size: (2,) of the cell, for the scale of displacements.
         softening: of the law of the bonds.
-        block_pivots: see `BlockPivoting`.
+        block_pivots: block pivots in a row, counted from the last that left fewer wrong nodes than ever before,
+            after which only one node changes at a time; 0 means one at a time from the beginning.
     """
 
     solver: FetiSolver
@@ -152,10 +155,7 @@ class ContactProblem:
             NotCarriedError: nothing carries the stresses of the load.
         """
         self.prepare(bonds)
-        given = self.scales.imposed_strain(np.where(load.by_stress, 0.0, load.values))
-        roots = self.scales.roots
-        noise = mixed_load.Noise(roots, self.scales.sign_noise, float((roots[: len(given)] * given).max()))
-        return mixed_load.solve(self.solver, load, start, float(self.size.prod()), noise)
+        return mixed_load.solve(self.scales, load, start)
 
     def completed(self, state: Equilibrium) -> Equilibrium:
         """Return a state with the amplitudes and jumps that F lambda gives, if it has none.  Collective."""
@@ -190,30 +190,35 @@ class ContactProblem:
 
     def _searched(self, load: Load, bonds: BondState, start: Float) -> Equilibrium:
         """Return the equilibrium, from these states on. Collective; raises as `linear`."""
-        pivoting = BlockPivoting(self.solver.comm, self.block_pivots)
+        comm, fewest, left = self.solver.comm, np.inf, 0
         iterations = solves = 0
         while True:
             solution = self.linear(load, bonds, start)
             iterations, solves = iterations + solution.iterations, solves + 1
             solution, wrong = self._placed(bonds, solution)
-            count = self.solver.comm.allreduce(int(wrong.sum()))
+            count = comm.allreduce(int(wrong.sum()))
             if count == 0 or solves == MAX_CONTACT_SOLVES or solution.reason < 0:
                 return self._equilibrium(load, bonds, solution, iterations, solves)
-            bonds = bonds.flipped(pivoting.choose(wrong, count))
-            start = solution.lam
+            left -= 1
+            if count < fewest:
+                fewest, left = count, self.block_pivots
+            if left <= 0:
+                # The first wrong node of the lowest rank that has one.
+                rank = comm.allreduce(comm.rank if wrong.any() else comm.size, MPI.MIN)
+                wrong = np.arange(len(wrong)) == (np.argmax(wrong) if rank == comm.rank else -1)
+            bonds, start = bonds.flipped(wrong), solution.lam
 
     def undetermined(self, state: Equilibrium) -> Bool:
         """(v,) strains that nothing determines: their stresses are given, and what is open lets them be any.
 
         Collective.
         """
-        if state.bonds.gap_and_slip is not None:
-            return np.zeros(len(state.load.values), bool)
-        if not state.load.by_stress.any() or not self._any(state.status != BONDED):
-            return np.zeros(len(state.load.values), bool)
+        has_history, by_stress = state.bonds.gap_and_slip is not None, state.load.by_stress
+        if has_history or not by_stress.any() or not self._any(state.status != BONDED):
+            return np.zeros(len(by_stress), bool)
         self.prepare(state.bonds)
         held = self.scales.mean_stiffness * float(self.size.prod())
-        return mixed_load.unresisted(self.solver, state.load.by_stress, held)
+        return mixed_load.unresisted(self.solver, by_stress, held)
 
     def _any(self, which: Bool) -> bool:
         """Return True if a node of any rank is one of `which`; collective."""

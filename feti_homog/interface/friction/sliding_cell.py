@@ -14,13 +14,12 @@ from mpi4py import MPI
 from scipy.linalg import block_diag
 
 from feti_homog.feti.dual_solution import DualSolution
-from feti_homog.interface.contact.contact_certificate import coulomb_errors
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, Equilibrium, Status
+from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, Equilibrium, Status, coulomb_errors
 from feti_homog.interface.friction.condensed_problem import AxialFaces, CondensedProblem
 from feti_homog.interface.friction.coulomb_faces import CoulombFaces
 from feti_homog.interface.friction.status_system import OPEN_FACE, STICK
-from feti_homog.interface.loads.load import CoupledSolution, Load, Macroscopic
+from feti_homog.interface.loads import Load, Macroscopic
 from feti_homog.typing import Bool, Float, Int
 
 
@@ -74,8 +73,7 @@ class SlidingCell:
         self.faces = CoulombFaces(np.block([[K, -b], [-b.T, S]]), whole[:, 1])
         old = self._places_of(before)
         if len(old):
-            units = faces.size / self.faces.size[old]
-            self.faces.solver.follow(faces.solver, old, old[self._changed(old, before, held)], units)
+            self.faces.follow(faces, old, old[self._changed(old, before, held)])
 
     def _places_of(self, rows: Int) -> Int:
         """(m',) where entries of x of faces of other rows (n',) stand now, none if some are not there."""
@@ -130,7 +128,7 @@ class SlidingCell:
 
     def stored(self, x: Float) -> float:
         """Return the energy per area of the cell in scaled x."""
-        return float(x @ self.faces.solver.product(x)) / (2.0 * self.cell.area)
+        return float(x @ self.faces.product(x)) / (2.0 * self.cell.area)
 
     def stretched(self, x: Float) -> float:
         """Return the energy per area of the springs in scaled x by which damaged bonds have become softer."""
@@ -166,7 +164,7 @@ class SlidingCell:
     def macroscopic(self, x: Float) -> Macroscopic:
         """Return the strains and stresses (v,) of scaled x."""
         loads, size = self.faces.loads, self.faces.size
-        return Macroscopic((x / size)[loads], (self.faces.solver.product(x) * size)[loads] / self.cell.area)
+        return Macroscopic((x / size)[loads], (self.faces.product(x) * size)[loads] / self.cell.area)
 
     def given(self, load: Load) -> Float:
         """(v,) scaled values of a load."""
@@ -200,7 +198,7 @@ class SlidingCell:
 
     def _excess(self, bonds: BondState, states: Sequence[Equilibrium], x: Float) -> float:
         """Return the largest of `coulomb_errors` of scaled x, relative to the largest traction.  Collective."""
-        traction = self.cell.traction(CoupledSolution(tuple(each.solution for each in states)))
+        traction = self.cell.traction([each.solution for each in states])
         components = [each.solver.jump_operator.components for each in self.cell.problems]
         # By the jumps of x: what F lambda leaves of them would be divided by a vanishing compliance.
         parts = zip(self._parts(x), components, strict=True)

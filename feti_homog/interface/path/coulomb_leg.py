@@ -20,7 +20,7 @@ from feti_homog.interface.friction.coulomb_faces import StuckError
 from feti_homog.interface.friction.face_system import Prescribed
 from feti_homog.interface.friction.sliding_cell import SlidingCell
 from feti_homog.interface.laws.bond_law import BondLaw
-from feti_homog.interface.loads.load import Load, Macroscopic
+from feti_homog.interface.loads import Load, Macroscopic
 from feti_homog.interface.path.leg import Leg
 from feti_homog.interface.path.onset import first_break
 from feti_homog.interface.path.path_points import Energies, PathState, Point
@@ -78,14 +78,14 @@ class CoulombLeg(Leg):
 
     def _on_root(self, find: Callable[..., tuple[Status, Float]], *arguments: Any) -> tuple[Status, Float]:
         """Return the statuses and the array that rank 0 finds, whose product every rank keeps.  Collective."""
-        solver = self.sliding.faces.solver
+        faces = self.sliding.faces
 
         def found() -> tuple[Status, Float, Float]:
             status, x = find(*arguments)
-            return status, x, solver.product(x)
+            return status, x, faces.product(x)
 
         status, x, product = on_root(self.cell.comm, found)
-        solver.keep(x, product)
+        faces.keep(x, product)
         return status, x
 
     def _given(self, share: float, x: Float) -> Prescribed:
@@ -164,7 +164,7 @@ class CoulombLeg(Leg):
         rounded = (there != 0.0) & (np.abs(there) <= ROUNDING * np.abs(x))
         there[rounded] = 0.0
         if not rounded.any():
-            faces.solver.keep(there, faces.solver.product(x) + way * faces.solver.product(rate))
+            faces.keep(there, faces.product(x) + way * faces.product(rate))
         self._go_straight(status, there, 0.0, faces.heat(status, x, there) / self.cell.area)
         self._share = 1.0 if breaks > 1.0 and change >= rest else share + way
         return breaks <= 1.0

@@ -9,10 +9,11 @@ import numpy as np
 from mpi4py import MPI
 
 from feti_homog.errors import NotCarriedError
+from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BondState, Equilibrium
 from feti_homog.interface.laws.bond_law import BondLaw
-from feti_homog.interface.loads.load import CoupledSolution, Load, Macroscopic, Multipliers
+from feti_homog.interface.loads import Load, Macroscopic, Multipliers
 from feti_homog.interface.path.leg import Leg
 from feti_homog.interface.path.onset import first_break, first_change
 from feti_homog.interface.path.path_points import UTILISATION_TIE, PathState, Point, most_utilised
@@ -96,7 +97,7 @@ class FrictionlessLeg(Leg):
             return self._touch()
         return self._advance_towards(ahead)
 
-    def _advance_towards(self, ahead: CoupledSolution) -> Iterator[Point]:
+    def _advance_towards(self, ahead: Sequence[DualSolution]) -> Iterator[Point]:
         """Go to the next event, or as far towards it as the response to `ahead` is straight, and past it.
 
         `ahead` is the end of the leg with the contact states as they are.
@@ -116,14 +117,14 @@ class FrictionlessLeg(Leg):
                 yield from self._turned()
         yield from self._break_overloaded()
 
-    def _predict(self, ahead: CoupledSolution) -> tuple[float, float, float]:
+    def _predict(self, ahead: Sequence[DualSolution]) -> tuple[float, float, float]:
         """Shares of the leg where a bond breaks, where the contact begins to change, and where that is beyond doubt.
 
         What does not happen on the leg is at infinity.
         """
         cell, state, rest = self.cell, self._state, 1.0 - self._share
         breaks = first_break(cell, self.law, state.bonds, cell.traction(state.solutions), cell.traction(ahead))
-        begins, certain = (1.0, 1.0) if self._false_alarm else first_change(cell.plane, state, ahead.plane)
+        begins, certain = (1.0, 1.0) if self._false_alarm else first_change(cell.plane, state, ahead[0])
         if begins == 1.0:
             begins = certain = np.inf
         return self._share + rest * breaks, self._share + rest * begins, self._share + rest * certain
@@ -132,7 +133,7 @@ class FrictionlessLeg(Leg):
         """Return whether the worst bonds are at their strength."""
         return self._used()[1] > 1.0 - UTILISATION_TIE
 
-    def _approach(self, target: float, ahead: CoupledSolution) -> bool:
+    def _approach(self, target: float, ahead: Sequence[DualSolution]) -> bool:
         """Stand at the target, or at the first half, quarter, ... of the way up to which the response is straight.
 
         Whether it is the target.
@@ -144,7 +145,8 @@ class FrictionlessLeg(Leg):
             target, reached = max((start + self._bends_before) / 2, nearest), False
         while True:
             way = (target - start) / (1.0 - start)
-            state = self._solve(target, here.bonds, here.multipliers.towards(ahead.lam, way))
+            lam = tuple((1.0 - way) * a + way * b.lam for a, b in zip(here.multipliers, ahead, strict=True))
+            state = self._solve(target, here.bonds, lam)
             if target <= nearest or not state.converged or self._continues(ahead, way, state):
                 break
             self._bends_before, reached = target, False
@@ -152,7 +154,7 @@ class FrictionlessLeg(Leg):
         self._stand(target, state)
         return reached
 
-    def _continues(self, ahead: CoupledSolution, way: float, state: Equilibrium) -> bool:
+    def _continues(self, ahead: Sequence[DualSolution], way: float, state: Equilibrium) -> bool:
         """Return whether no bond is overloaded in a state, and its response on the line to `ahead`.  Collective."""
         cell = self.cell
         _, used, _ = most_utilised(cell, self.law, state)

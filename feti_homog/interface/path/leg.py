@@ -13,7 +13,7 @@ from feti_homog.errors import NotCarriedError
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BONDED, Equilibrium
 from feti_homog.interface.laws.bond_law import BondLaw
-from feti_homog.interface.loads.load import Load, Macroscopic
+from feti_homog.interface.loads import Load, Macroscopic
 from feti_homog.interface.path.path_points import (
     NO_ENERGIES,
     UTILISATION_TIE,

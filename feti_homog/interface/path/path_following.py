@@ -17,7 +17,7 @@ from dataclasses import replace
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.friction.sliding_cell import SlidingCell
 from feti_homog.interface.laws.bond_law import BondLaw
-from feti_homog.interface.loads.load import Load
+from feti_homog.interface.loads import Load
 from feti_homog.interface.path.coulomb_leg import CoulombLeg
 from feti_homog.interface.path.frictionless_leg import FrictionlessLeg
 from feti_homog.interface.path.leg import Leg

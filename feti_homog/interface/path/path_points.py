@@ -8,11 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.contact.rubbing_bonds import held_traction
+from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces, held_traction
 from feti_homog.interface.contact.states import BONDED, BondState, Equilibrium
 from feti_homog.interface.laws.bond_law import BondLaw
-from feti_homog.interface.loads.load import Macroscopic, Multipliers
+from feti_homog.interface.loads import Macroscopic, Multipliers
 from feti_homog.typing import Bool, Float
 
 # Bonds whose utilisation differs by no more than this, relatively, break together: those of a symmetric cell do, but
@@ -112,7 +111,7 @@ def break_bonds(
     """
     traction, bonds = held_traction(cell, state), state.bonds
     history, parts = law.after(bonds, which, traction)
-    status = cell.plane.debond(state.status, parts, state.multipliers.plane)
+    status = cell.plane.debond(state.status, parts, state.multipliers[0])
     # A first guess, which the search for contact checks.
     pressed = np.where(which, traction[:, 0] < 0.0, bonds.pressed)
     energy = 0.0

@@ -7,14 +7,15 @@ others are superposed such that the stresses are met.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from feti_homog.errors import NotCarriedError
 from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.feti.solver import FetiSolver
-from feti_homog.interface.loads.load import Load
+from feti_homog.interface.contact.load_scales import LoadScales
+from feti_homog.interface.loads import Load
 from feti_homog.system.parallel.distributed_arrays import allreduce_sum
 from feti_homog.typing import Bool, Float
 
@@ -24,31 +25,15 @@ UNCARRIED_SHARE = 1e-6
 UNRESISTED = 1e-12
 
 
-@dataclass(frozen=True)
-class Noise:
-    """Sizes of the solver's error.
+def solve(scales: LoadScales, load: Load, start: Float) -> DualSolution:
+    """Return the solution under a load, from the multipliers `start` (owned rows,) on.  Collective.
 
-    Attributes:
-        roots: (v,) of a stiffness of each load, with all bonds.
-        share: the error of stresses over these and of strains times these, relative to the largest.
-        given: the largest of the given strains times these.
-    """
-
-    roots: Float
-    share: float
-    given: float
-
-
-def solve(solver: FetiSolver, load: Load, start: Float, area: float, noise: Noise) -> DualSolution:
-    """Return the solution under a load on the cell of this area.
-
-    It begins with the multipliers `start` (owned rows,).
-
-    Strains that meet no more than noise stay zero.  Collective.
+    Strains that meet no more than noise stay zero.
 
     Raises:
         NotCarriedError: nothing carries the stresses.
     """
+    solver = scales.solver
     if not (load.by_stress.any() and load.values.any()):
         return solver.solve(load.values, start)
     unknown = np.flatnonzero(load.by_stress)
@@ -56,27 +41,29 @@ def solve(solver: FetiSolver, load: Load, start: Float, area: float, noise: Nois
     starts = np.column_stack([start, np.zeros((len(start), len(unknown)))])
     needed = slice(0 if strains[0].any() else 1, None)
     found = solver.solve_many(strains[needed], starts[:, needed])
-    stresses = np.stack([solver.stress_integral(each)[unknown] / area for each in found])
+    stresses = np.stack([solver.stress_integral(each)[unknown] / scales.size.prod() for each in found])
     missing = load.values[unknown]
     if strains[0].any():
         missing = missing - stresses[0]
+    imposed = scales.imposed_strain(strains[0])
+    largest = scales.sign_noise * float((scales.roots[: len(imposed)] * imposed).max())
     # Rank 0 decides: rounding on other processors may part the ranks where a stiffness is nearly none.
-    own = replace(noise, roots=noise.roots[unknown])
-    factors = solver.comm.bcast(_strains(stresses[-len(unknown) :], missing, own))
+    answer = _strains(stresses[-len(unknown) :], missing, scales.roots[unknown], scales.sign_noise, largest)
+    factors = solver.comm.bcast(answer)
     if factors is None:
         raise NotCarriedError("nothing in the cell carries the stresses of the load")
     return superposed(solver, found, np.concatenate([np.ones(len(found) - len(unknown)), factors]))
 
 
-def _strains(stiffness: Float, stress: Float, noise: Noise) -> Float | None:
-    """(u,) the strains that make the stresses (u,) by a stiffness (u, u) that may be singular.
+def _strains(stiffness: Float, stress: Float, roots: Float, share: float, noise: float) -> Float | None:
+    """(u,) strains that make the stresses (u,) by a stiffness (u, u) that may be singular; None if it carries them not.
 
-    None if it carries them not. Each is scaled by the root of its own stiffness, so that none is small beside another.
+    Each is scaled by the root (u,) of its own stiffness, so that none is small beside another.  Scaled stiffnesses of
+    less than `share` and scaled stresses of less than `noise` are the solver's error.
     """
-    roots = noise.roots
     eigenvalues, vectors = np.linalg.eigh((stiffness + stiffness.T) / (2 * np.outer(roots, roots)))
-    along, resists = vectors.T @ (stress / roots), eigenvalues > noise.share
-    largest = max(UNCARRIED_SHARE * np.abs(stress / roots).max(), noise.share * noise.given)
+    along, resists = vectors.T @ (stress / roots), eigenvalues > share
+    largest = max(UNCARRIED_SHARE * np.abs(stress / roots).max(), noise)
     if np.abs(along[~resists]).max(initial=0.0) > largest:
         return None
     return np.asarray(vectors[:, resists] @ (along[resists] / eigenvalues[resists]) / roots)

@@ -1,4 +1,4 @@
-"""Loads on a cell, strains or the stresses that work on them; macroscopic states, and solutions of all problems."""
+"""Loads on a cell, strains or the stresses that work on them, and macroscopic states."""
 
 from __future__ import annotations
 
@@ -7,48 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.typing import Bool, Float
 
 # What is smaller than this, relative to its values at the ends of its leg, is what rounding leaves of zero.
 LOAD_ROUNDING = 1e-13
 
 
-class Multipliers(tuple[Float, ...]):
-    """(owned rows,) multipliers of each problem, that of the plane first."""
-
-    __slots__ = ()
-
-    @property
-    def plane(self) -> Float:
-        """Multipliers in the plane."""
-        return self[0]
-
-    def towards(self, others: Multipliers, share: float) -> Multipliers:
-        """Multipliers after a share of the way to others."""
-        return Multipliers((1.0 - share) * a + share * b for a, b in zip(self, others, strict=True))
-
-
-@dataclass(frozen=True)
-class CoupledSolution:
-    """Solutions with the same bonds, `parts` of each problem, that of the plane first."""
-
-    parts: tuple[DualSolution, ...]
-
-    @property
-    def plane(self) -> DualSolution:
-        """The solution in the plane."""
-        return self.parts[0]
-
-    @property
-    def lam(self) -> Multipliers:
-        """Their multipliers."""
-        return Multipliers(each.lam for each in self.parts)
-
-    @property
-    def converged(self) -> bool:
-        """Return True if the Krylov method found all."""
-        return all(each.reason > 0 for each in self.parts)
+Multipliers = tuple[Float, ...]
+"""(owned rows,) multipliers of each problem, the plane first."""
 
 
 @dataclass(frozen=True)
