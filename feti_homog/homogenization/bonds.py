@@ -13,8 +13,7 @@ from feti_homog.case import bond_laws
 from feti_homog.case.case import Case
 from feti_homog.case.interface_section import InterfaceSection
 from feti_homog.feti.decomposition.jump_operator import InterfaceSprings
-from feti_homog.interface.laws.bond_law import BondLaw
-from feti_homog.interface.laws.registry import law_class
+from feti_homog.interface.laws.bond_law import BondLaw, law_class
 from feti_homog.typing import Float, Int
 
 

@@ -8,10 +8,12 @@ from __future__ import annotations
 import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from importlib import import_module
 from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
 
+from feti_homog.case.bond_laws import LAWS
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BondState
 from feti_homog.typing import Bool, Float, Int
@@ -33,6 +35,7 @@ class KeyValues(Protocol):
         """Return the value in which all sections agree, as the case has it."""
 
 
+@dataclasses.dataclass(frozen=True)
 class BondLaw(ABC):
     """Law of all bonds of a cell.  The defaults are those of a law without memory.
 
@@ -60,18 +63,27 @@ class BondLaw(ABC):
     def breaks(self, traction: Float) -> Float:
         """(p, d) how bonds break under tractions (p, c), with the first d of `break_names`."""
 
+    @classmethod
+    @abstractmethod
+    def of_keys(cls, value: KeyValues) -> Self:
+        """Make the law of the keys of [interface]."""
+
     def at(self, node: Int) -> Self:
         """Return the law of the nodes (p,), one after the other."""
-        fields = [field.name for field in dataclasses.fields(self)]  # type: ignore[arg-type]  # laws are dataclasses
-        return type(self)(*(at_nodes(getattr(self, name), node) for name in fields))
+        values: dict[str, Any] = {k: value[node] for k, value in vars(self).items() if isinstance(value, np.ndarray)}
+        return dataclasses.replace(self, **values)
 
     def begin(self, k: int) -> Float:
         """(k, h) internal variables of k intact bonds."""
         return np.zeros((k, 0))
 
-    def utilisation(self, cell: CoupledInterfaces, bonds: BondState) -> Utilisation:
-        """Utilisation of the nodes of this rank in a state of all bonds.  Collective; what it returns is not."""
-        return Utilisation(self)
+    def in_state(self, cell: CoupledInterfaces, bonds: BondState) -> BondLaw:
+        """Return the law of the nodes of this rank in a state of all bonds.  Collective; its methods are not."""
+        return self
+
+    def convex(self, p: int) -> Bool:
+        """(p,) True where `share` is sure to be a convex function of the traction, for p nodes."""
+        return np.full(p, self.is_convex)
 
     def after(self, bonds: BondState, which: Bool, traction: Float) -> tuple[Float, Bool]:
         """(k, h) internal variables after some bonds used all of their strength, and which bonds (k,) part.
@@ -116,48 +128,23 @@ class BondLaw(ABC):
         """
         return None
 
-
-class Utilisation:
-    """Share of their strength that tractions use at some nodes, with the bonds of one state.
-
-    Attributes:
-        law: of the nodes, with the strengths that they have in the state.
-    """
-
-    def __init__(self, law: BondLaw) -> None:
-        self.law = law
-
-    def __call__(self, traction: Float) -> Float:
-        """(p,) shares that tractions (p, c) at the nodes use; of no meaning where a bond is broken."""
-        return self.law.share(traction)
-
-    def at(self, node: Int) -> Utilisation:
-        """Return the same of the nodes (p,), one after the other."""
-        return Utilisation(self.law.at(node))
-
-    def is_convex(self, p: int) -> Bool:
-        """(p,) True where the utilisation is sure to be a convex function of the traction, for p nodes."""
-        return np.full(p, self.law.is_convex)
-
-    def first_factor(self, before: Float, ahead: Float) -> Float | None:
-        """(p,) factors of `BondLaw.first_factor`; None where `crossing` has to find them."""
-        return self.law.first_factor(before, ahead)
-
     def crossing(self, before: Float, ahead: Float, high: Float) -> Float:
         """(p,) f at which `before` + f `ahead` (p, c) reach 1, by halving [0, `high`] (p,), which grows if it must."""
         low, high = np.zeros(len(high)), high.copy()
         for _ in range(BISECTIONS):
-            below = self(before + high[:, None] * ahead) < 1.0
+            below = self.share(before + high[:, None] * ahead) < 1.0
             if not below.any():
                 break
             high[below] *= 2.0
         for _ in range(BISECTIONS):
             middle = (low + high) / 2
-            broken = self(before + middle[:, None] * ahead) > 1.0
+            broken = self.share(before + middle[:, None] * ahead) > 1.0
             low, high = np.where(broken, low, middle), np.where(broken, middle, high)
         return high
 
 
-def at_nodes(value: float | Float, node: Int) -> float | Float:
-    """Return a value of all nodes, or those (k,) of each, at the nodes (p,)."""
-    return value[node] if isinstance(value, np.ndarray) else value
+def law_class(name: str) -> type[BondLaw]:
+    """Class of the law with this name in `case.bond_laws`."""
+    module, cls = LAWS[name].implementation.split(".")
+    found: type[BondLaw] = getattr(import_module(f"{__package__}.{module}"), cls)
+    return found

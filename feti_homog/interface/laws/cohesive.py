@@ -28,7 +28,7 @@ import numpy as np
 from feti_homog.errors import CaseError
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BondState
-from feti_homog.interface.laws.bond_law import BondLaw, KeyValues, Utilisation
+from feti_homog.interface.laws.bond_law import BondLaw, KeyValues
 from feti_homog.interface.laws.strength import QuadraticStrength
 from feti_homog.typing import Bool, Float, Int
 
@@ -145,18 +145,13 @@ class CohesiveLaw(BondLaw):
     def opening(self, d: Float, s: Float | float) -> Float:
         """(p,) the u with tau(u) = (1 - d) (1 + s u), for d < 1."""
 
-    def at(self, node: Int) -> Self:
-        """Return the law of the nodes (p,), one after the other."""
-        values: dict[str, Any] = {k: value[node] for k, value in vars(self).items() if isinstance(value, np.ndarray)}
-        return replace(self, **values)
-
     def begin(self, k: int) -> Float:
         """(k, 1) no tooth broke."""
         return np.zeros((k, 1))
 
-    def utilisation(self, cell: CoupledInterfaces, bonds: BondState) -> Utilisation:
-        """Utilisation of the bonds by the teeth that come next."""
-        return Utilisation(replace(self, level=bonds.history[:, 0]))
+    def in_state(self, cell: CoupledInterfaces, bonds: BondState) -> Self:
+        """Return the law of the teeth that come next."""
+        return replace(self, level=bonds.history[:, 0])
 
     def share(self, traction: Float) -> Float:
         """(p,) sqrt(W / W_j) of tractions (p, c) at bonds with j broken teeth.
@@ -164,7 +159,7 @@ class CohesiveLaw(BondLaw):
         Of degree one, for B does not depend on the size of the traction.
         """
         first, second = self._energies(traction)
-        tooth = self._teeth[np.minimum(np.asarray(self.level, np.int64), len(self.levels) - 2)]
+        tooth = np.minimum(np.asarray(self.level, np.int64), len(self.levels) - 2)
         return np.asarray(np.sqrt((first + second) / self._breaking(traction, tooth)) / (1.0 - self._damages[tooth]))
 
     def after(self, bonds: BondState, which: Bool, traction: Float) -> tuple[Float, Bool]:
@@ -207,11 +202,6 @@ class CohesiveLaw(BondLaw):
     def _damages(self) -> Float:
         """(n + 1,) the levels."""
         return np.array(self.levels)
-
-    @property
-    def _teeth(self) -> Int:
-        """(n,) their numbers."""
-        return np.arange(len(self.levels) - 1)
 
     @property
     def _onsets(self) -> tuple[float | Float, float | Float]:

@@ -12,7 +12,6 @@ for u is subadditive: only bonds whose lower bound is below the least upper boun
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from mpi4py import MPI
@@ -22,7 +21,7 @@ from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.floating_bodies import admissible_share, shares_to_zero
 from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, Equilibrium
-from feti_homog.interface.laws.bond_law import BISECTIONS, BondLaw, Utilisation
+from feti_homog.interface.laws.bond_law import BISECTIONS, BondLaw
 from feti_homog.interface.path.path_points import UTILISATION_TIE
 from feti_homog.typing import Bool, Float, Int
 
@@ -35,21 +34,21 @@ class Onset:
     """First break of the bonds of a cell whose debonded faces do not touch.
 
     Attributes:
-        bonds: utilisation of the nodes of this rank.
+        bonds: law of the nodes of this rank in the state of the bonds.
         bonded: (k,) which nodes have a bond.
     """
 
-    bonds: Utilisation
+    bonds: BondLaw
     bonded: Bool
 
     @classmethod
     def of(cls, law: BondLaw, cell: CoupledInterfaces, bonds: BondState) -> Onset:
         """Make the onset of a law with these bonds.  Collective."""
-        return cls(law.utilisation(cell, bonds), np.asarray(bonds.status == BONDED))
+        return cls(law.in_state(cell, bonds), np.asarray(bonds.status == BONDED))
 
     def utilisation(self, traction: Float, node: Int) -> Float:
         """(p,) share of what breaks them that tractions (p, c) at the nodes (p,) use; 0 of debonded ones."""
-        return np.where(self.bonded[node], self.bonds.at(node)(traction), 0.0)
+        return np.where(self.bonded[node], self.bonds.at(node).share(traction), 0.0)
 
     def factors(self, ahead: Float, least: Float, before: Float | None = None) -> Float:
         """(n, k) the f >= 0 at which each bond breaks under each of n rays of tractions.
@@ -67,29 +66,24 @@ class Onset:
         else:
             at, along = node[loaded], ahead.reshape(-1, c)[loaded]
             known = self.bonds.at(at).first_factor(before[at], along)
-            rays = _Rays(before[at], along, at, ray[loaded])
-            found[loaded] = self._searched(rays, used[loaded], n) if known is None else known
+            if known is None:
+                known = self._searched(before[at], along, at, ray[loaded], used[loaded], n)
+            found[loaded] = known
         return found.reshape(n, k)
 
-    def _searched(self, rays: _Rays, used: Float, n: int) -> Float:
-        """(p,) factors of bonds by halving an interval, inf of those that break later than another of their ray."""
-        bonds = self.bonds.at(rays.node)
-        lower, upper = (1.0 - bonds(rays.before)) / used, (1.0 + bonds(-rays.before)) / used
-        first, is_convex = np.full(n, np.inf), bonds.is_convex(len(used))
-        np.minimum.at(first, rays.number[is_convex], upper[is_convex])
-        near = np.flatnonzero((lower <= first[rays.number] * (1.0 + UTILISATION_TIE)) | ~is_convex)
+    def _searched(self, before: Float, ahead: Float, node: Int, ray: Int, used: Float, n: int) -> Float:
+        """(p,) factors of bonds by halving an interval, inf of those that break later than another of their ray.
+
+        Tractions are `before` + f `ahead` (p, c) at the nodes (p,) on the rays (p,) of n.
+        """
+        bonds = self.bonds.at(node)
+        lower, upper = (1.0 - bonds.share(before)) / used, (1.0 + bonds.share(-before)) / used
+        first, is_convex = np.full(n, np.inf), bonds.convex(len(used))
+        np.minimum.at(first, ray[is_convex], upper[is_convex])
+        near = np.flatnonzero((lower <= first[ray] * (1.0 + UTILISATION_TIE)) | ~is_convex)
         found = np.full(len(used), np.inf)
-        found[near] = bonds.at(near).crossing(rays.before[near], rays.ahead[near], upper[near])
+        found[near] = bonds.at(near).crossing(before[near], ahead[near], upper[near])
         return found
-
-
-class _Rays(NamedTuple):
-    """Tractions `before` + f `ahead` (p, c) at the nodes (p,), and the number (p,) of the ray of each."""
-
-    before: Float
-    ahead: Float
-    node: Int
-    number: Int
 
 
 def first_break(cell: CoupledInterfaces, law: BondLaw, bonds: BondState, here: Float, there: Float) -> float:
@@ -98,17 +92,17 @@ def first_break(cell: CoupledInterfaces, law: BondLaw, bonds: BondState, here: F
     Utilisation that is convex along a straight way, below 1 here and above 1 there, passes 1 once: bisection.  Others
     are bisected up to the first of some equal parts at whose end they are above 1.
     """
-    utilisation, bonded = law.utilisation(cell, bonds), bonds.status == BONDED
+    law, bonded = law.in_state(cell, bonds), bonds.status == BONDED
     step, low, high = there - here, np.zeros(len(here)), np.full(len(here), np.inf)
-    parts = 1 if utilisation.is_convex(len(here)).all() else PARTS
+    parts = 1 if law.convex(len(here)).all() else PARTS
     for k in range(1, parts + 1):
-        passes = bonded & (utilisation(here + k / parts * step) > 1.0) & np.isinf(high)
+        passes = bonded & (law.share(here + k / parts * step) > 1.0) & np.isinf(high)
         low, high = np.where(passes, (k - 1) / parts, low), np.where(passes, k / parts, high)
     over = np.isfinite(high)
     high = np.where(over, high, 1.0)
     for _ in range(BISECTIONS if over.any() else 0):
         middle = (low + high) / 2
-        broken = utilisation(here + middle[:, None] * step) > 1.0
+        broken = law.share(here + middle[:, None] * step) > 1.0
         low, high = np.where(broken, low, middle), np.where(broken, middle, high)
     return float(cell.comm.allreduce(high[over].min(initial=np.inf), MPI.MIN))
 

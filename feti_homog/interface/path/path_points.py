@@ -129,7 +129,7 @@ def most_utilised(cell: CoupledInterfaces, law: BondLaw, state: Equilibrium) -> 
     The largest of all, and which (k,) have it. Collective, rank 0 decides.
     """
     comm = cell.comm
-    used = law.utilisation(cell, state.bonds)(held_traction(cell, state))
+    used = law.in_state(cell, state.bonds).share(held_traction(cell, state))
     used = np.where(state.status == BONDED, used, 0.0)
     largest = comm.bcast(comm.reduce(used.max(initial=0.0), MPI.MAX))
     return used, float(largest), (used >= largest * (1.0 - UTILISATION_TIE)) & (used > 0.0)
