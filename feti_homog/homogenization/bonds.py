@@ -31,7 +31,7 @@ def teeth_of(case: Case) -> int:
     """Return the events of a bond until it parts: the teeth of a law that softens, else one."""
     if not has_softening(case):
         return 1
-    from feti_homog.interface.laws.cohesive import CohesiveLaw  # which bonds that break at once do not use
+    from feti_homog.interface.laws.softening import CohesiveLaw  # which bonds that break at once do not use
 
     law = bond_law(case.interfaces, np.zeros(0, np.int64))
     return len(law.levels) - 1 if isinstance(law, CohesiveLaw) else 1

@@ -25,7 +25,7 @@ from feti_homog.feti.decomposition.constraint_layout import InterfaceNodes
 from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.feti.solver import FetiSolver
 from feti_homog.interface.contact import mixed_load
-from feti_homog.interface.contact.floating_bodies import place
+from feti_homog.interface.contact.floating_bodies import FloatingBodies
 from feti_homog.interface.contact.load_scales import LoadScales
 from feti_homog.interface.contact.states import (
     BONDED,
@@ -232,10 +232,10 @@ class ContactProblem:
             return solution, pressed
         coarse, noise = self.solver.natural, self.scales.gap_noise(solution.strain)
         if self.contact and coarse.unconstrained_modes.shape[1]:
-            placement = place(self.solver.comm, coarse, self.nodes, status == OPEN, solution, noise)
-            alpha = None if solution.alpha is None else placement.alpha + solution.alpha
-            solution = replace(solution, alpha=alpha, jump=solution.jump + placement.jump(coarse))
-            pressed = placement.pressed
+            bodies = FloatingBodies(self.solver.comm, coarse, self.nodes, status == OPEN, noise)
+            moved, pressed = bodies.place(solution)
+            alpha = None if solution.alpha is None else moved + solution.alpha
+            solution = replace(solution, alpha=alpha, jump=solution.jump + coarse.G @ moved)
         force, gap = solution.lam[self.nodes.row], solution.jump[self.nodes.row]
         force_noise, meets = self.scales.force_noise(solution), (status == OPEN) & self.contact
         pulled = ((status == CLOSED) | (damaged & bonds.pressed)) & (force > force_noise)
@@ -245,11 +245,26 @@ class ContactProblem:
     def _equilibrium(
         self, load: Load, bonds: BondState, solution: DualSolution, iterations: int, solves: int
     ) -> Equilibrium:
-        """Return the state that a search ended with, its free motions and its certificate."""
-        asked = self.scales.asked(load)
+        """Return the state that a search ended with, its certificate, and the rigid motions that nothing resists.
+
+        Neither a bond nor a face under compression does.  A fibre may touch its hole without a force: such nodes count
+        as open if it moves without them, lest they seem to hold it; those of other fibres stay closed.  Collective.
+        """
+        asked, status, coarse = self.scales.asked(load), bonds.status, self.solver.natural
         certificate = self.certificate(bonds, solution, asked)
-        status, motions = self._without_idle(bonds.status, solution)
-        return Equilibrium(load, bonds.with_status(status), solution, iterations, solves, motions, certificate, asked)
+        motions, idle = coarse.unconstrained_modes, np.zeros(len(status), bool)
+        if self.contact and self._any(status == CLOSED):
+            idle = (status == CLOSED) & (solution.lam[self.nodes.row] >= -self.scales.force_noise(solution))
+        if self._any(idle):
+            before = motions
+            motions = coarse.free_motions(self.active(np.where(idle, OPEN, status).astype(np.int8)))
+            # The squares are the diagonal of the projector on the motions, which rises where a body comes free.
+            shares, without = (np.asarray(Z.power(2).sum(axis=1)).ravel() for Z in (motions, before))
+            freed = np.isin(coarse.body, coarse.body[shares - without > LEAST_SHARE_OF_MOTION])
+            idle &= (abs(coarse.G[self.nodes.row]) + abs(coarse.G[self.nodes.row + 1])) @ freed > 0
+            bonds = bonds.with_status(np.where(idle, OPEN, status).astype(np.int8))
+        free = motions.shape[1]
+        return Equilibrium(load, bonds, solution, iterations, solves, free, certificate, asked)
 
     def certificate(self, bonds: BondState, solution: DualSolution, asked: Float) -> dict[str, float]:
         """Return the errors of the KKT conditions; `asked` as of `Equilibrium`.  Collective."""
@@ -276,25 +291,3 @@ class ContactProblem:
             is_strain = np.arange(len(strain)) < self.solver.problem.strains
             strain = np.maximum(np.abs(strain), np.where(is_strain, jump / self.size.max(), 0.0))
         return self.scales.acting(strain, asked)
-
-    def _without_idle(self, status: Status, solution: DualSolution) -> tuple[Status, int]:
-        """Return the status and the number of rigid motions that nothing resists.
-
-        Neither a bond nor a face under compression does.
-
-        A fibre may touch its hole without a force: such nodes count as open if it moves without them, lest they seem
-        to hold it; those of other fibres stay closed.  Collective.
-        """
-        coarse, idle = self.solver.natural, np.zeros(len(status), bool)
-        motions = coarse.unconstrained_modes
-        if self.contact and self._any(status == CLOSED):
-            idle = (status == CLOSED) & (solution.lam[self.nodes.row] >= -self.scales.force_noise(solution))
-        if not self._any(idle):
-            return status, motions.shape[1]
-        more = coarse.free_motions(self.active(np.where(idle, OPEN, status).astype(np.int8)))
-        # The squares are the diagonal of the projector on the motions, which rises where a body comes free.
-        shares, before = (np.asarray(Z.power(2).sum(axis=1)).ravel() for Z in (more, motions))
-        risen = shares - before > LEAST_SHARE_OF_MOTION
-        freed = np.isin(coarse.body, coarse.body[risen])
-        idle &= (abs(coarse.G[self.nodes.row]) + abs(coarse.G[self.nodes.row + 1])) @ freed > 0
-        return np.where(idle, OPEN, status).astype(np.int8), more.shape[1]

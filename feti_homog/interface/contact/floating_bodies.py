@@ -39,18 +39,6 @@ LP_TOLERANCES = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolera
 
 
 @dataclass(frozen=True)
-class Placement:
-    """Amplitudes (dimension,) to add to alpha, and the open nodes (k,) that must close for lack of room."""
-
-    alpha: Float
-    pressed: Bool
-
-    def jump(self, coarse: NaturalCoarseSpace) -> Float:
-        """(owned rows,) G alpha."""
-        return np.asarray(coarse.G @ self.alpha)
-
-
-@dataclass(frozen=True)
 class _Fibres:
     """On rank 0, of all open nodes: the change of gap with each free motion, (k, motions), and the fibre.
 
@@ -74,54 +62,104 @@ class _Fibres:
         opening = self.opening[nodes]
         ends = [0, *(np.flatnonzero(np.diff(self.fibre[nodes])) + 1), len(nodes)]
         for first, last in pairwise(ends) if len(nodes) else ():
-            columns, motions = _block(first, last, opening)
-            modes = _opening_modes(motions, self.reach[columns])
+            columns = np.unique(opening.indices[slice(*opening.indptr[[first, last]])])
+            motions, modes = opening[first:last, columns].toarray(), np.zeros((len(columns), 0))
+            if motions.size:
+                _, size, basis = np.linalg.svd(motions, full_matrices=False)
+                # Combinations that open gaps: not those that slide, or move both faces alike.
+                modes = basis[size > LARGEST_GAP_OF_SLIDING * max(size[0], self.reach[columns].max())].T
             yield nodes[first:last], motions @ modes, columns, modes
 
+    def place(self, gap: Float, noise: float) -> tuple[Float, Bool]:
+        """Return the amplitudes (motions,) that move the fibres with overlaps, and the nodes (k,) that close."""
+        pressed, amplitudes = np.zeros(len(gap), bool), np.zeros(self.opening.shape[1])
+        for own, motion, columns, modes in self.nodes_and_motions(gap < -noise):
+            if not modes.shape[1]:
+                continue
+            # The largest s with gap + motion a >= s, and the multipliers of the inequalities.
+            scale, size = np.abs(gap[own]).max(), np.abs(motion).max(axis=0)
+            result = _maximised(-motion / size, np.ones(len(own)), gap[own] / scale, (None, 1.0))
+            amplitudes[columns] += modes @ (result.x[:-1] * scale / size)
+            if float(result.x[-1] * scale) < -noise:
+                forces = -result.ineqlin.marginals
+                pressed[own[forces > LEAST_FORCE_SHARE * forces.max()]] = True
+        return amplitudes, pressed
 
-def place(
-    comm: MPI.Intracomm,
-    coarse: NaturalCoarseSpace,
-    nodes: InterfaceNodes,
-    is_open: Bool,
-    solution: DualSolution,
-    noise: float,
-) -> Placement:
-    """Move the free fibres so that no open node overlaps by more than `noise`; collective, decided on rank 0.
+    def shares(self, here: Float, ahead: Float, noise: float) -> tuple[float, float]:
+        """Return the shares of `FloatingBodies.admissible_share` for gaps (k,)."""
+        shares = [(1.0, 1.0)]
+        for own, motion, *_ in self.nodes_and_motions(ahead < -2 * noise):
+            a, b = here[own], ahead[own]
+            if not motion.shape[1]:
+                shares.append(shares_to_zero(a, b, noise))
+            elif (certain := _last_share(a, b, motion, 2 * noise)) < 1.0:
+                shares.append((_last_share(np.maximum(a, 0.0), b, motion, 0.0), certain))
+        begins, certain = np.min(shares, axis=0)
+        return float(begins), float(certain)
 
-    A fibre that overlaps is put where its smallest gap is largest.  If even that overlaps, the programme's dual
-    solution is a system of contact forces in balance, and its nodes close.
 
-    Raises:
-        ConvergenceError: on every rank; a linear programme was not solved.
+@dataclass(frozen=True)
+class FloatingBodies:
+    """Fibres that nothing holds, with the open nodes (k,) of this rank.
+
+    Gaps that are no larger than `noise` may be the solver's error.
     """
-    gap = solution.jump[nodes.row]
-    if not comm.allreduce(bool((is_open & (gap < -noise)).any()), MPI.LOR):
-        return Placement(np.zeros(coarse.kernel_dimension), np.zeros(len(gap), bool))
-    amplitudes, pressed = _decided_on_root(comm, coarse, nodes, is_open, _place_all, [gap], noise)
-    first = comm.exscan(len(nodes.row)) or 0
-    return Placement(coarse.unconstrained_modes @ amplitudes, pressed[first : first + len(nodes.row)])
 
+    comm: MPI.Intracomm
+    coarse: NaturalCoarseSpace
+    nodes: InterfaceNodes
+    is_open: Bool
+    noise: float
 
-def admissible_share(
-    comm: MPI.Intracomm,
-    coarse: NaturalCoarseSpace,
-    nodes: InterfaceNodes,
-    is_open: Bool,
-    here: Float,
-    ahead: Float,
-    noise: float,
-) -> tuple[float, float]:
-    """Return the room of every fibre on the way from the gaps `here` (k,) to `ahead` (k,), of which it has some here.
+    def place(self, solution: DualSolution) -> tuple[Float, Bool]:
+        """Move the free fibres so that no open node overlaps by more than noise; collective, decided on rank 0.
 
-    The largest shares w <= 1 of the way for which all fibres have amplitudes a with
+        A fibre that overlaps is put where its smallest gap is largest.  If even that overlaps, the programme's dual
+        solution is a system of contact forces in balance, and its nodes close.
 
-        (1 - w) here + w ahead + M a >= 0,   and   >= -2 noise,
+        Return amplitudes (dimension,) to add to alpha, and the open nodes (k,) that must close for lack of room.
 
-    where the first fibre begins to be pressed, and where it is beyond doubt.
-    Collective, decided on rank 0; raises as `place`.
-    """
-    return _decided_on_root(comm, coarse, nodes, is_open, _shares_of_all, [here, ahead], noise)
+        Raises:
+            ConvergenceError: on every rank; a linear programme was not solved.
+        """
+        gap = solution.jump[self.nodes.row]
+        if not self.comm.allreduce(bool((self.is_open & (gap < -self.noise)).any()), MPI.LOR):
+            return np.zeros(self.coarse.kernel_dimension), np.zeros(len(gap), bool)
+        amplitudes, pressed = self._on_root(_Fibres.place, gap)
+        first = self.comm.exscan(len(gap)) or 0
+        return np.asarray(self.coarse.unconstrained_modes @ amplitudes), pressed[first : first + len(gap)]
+
+    def admissible_share(self, here: Float, ahead: Float) -> tuple[float, float]:
+        """Return the room of every fibre on the way from the gaps `here` (k,), where it has some, to `ahead` (k,).
+
+        The largest shares w <= 1 of the way for which all fibres have amplitudes a with
+
+            (1 - w) here + w ahead + M a >= 0,   and   >= -2 noise,
+
+        where the first fibre begins to be pressed, and where it is beyond doubt.
+        Collective, decided on rank 0; raises as `place`.
+        """
+        return self._on_root(_Fibres.shares, here, ahead)
+
+    def _on_root(self, decide: Callable[..., T], *gaps: Float) -> T:
+        """decide(fibres, *gaps, noise) of rank 0, with the gaps of all nodes, on every rank; collective."""
+        free = self.coarse.unconstrained_modes.tocsr()
+        opening, slip = ((self.coarse.G[self.nodes.row + i] @ free).tocsr() for i in range(2))
+        reach = np.zeros(free.shape[1])
+        np.maximum.at(reach, np.r_[opening.indices, slip.indices], np.abs(np.r_[opening.data, slip.data]))
+        parts = self.comm.gather((self.is_open, opening, self.nodes.bodies, reach, *gaps))
+
+        def decided() -> T:
+            is_open, opening, bodies, reach, *gaps = zip(*(parts or []), strict=True)
+            # Gaps depend on each other's motions where one body links them, the pinned one excepted.
+            pairs, fixed = np.concatenate(bodies), self.coarse.pinned_body
+            (outer, inner), between = pairs.T, (pairs != fixed).all(axis=1)
+            labels = components(int(pairs.max(initial=0)) + 1, outer[between], inner[between])
+            groups = np.asarray(labels[np.where(inner == fixed, outer, inner)])
+            fibres = _Fibres(np.concatenate(is_open), vstack(opening).tocsr(), np.max(reach, axis=0), groups)
+            return decide(fibres, *map(np.concatenate, gaps), self.noise)
+
+        return on_root(self.comm, decided)
 
 
 def shares_to_zero(here: Float, ahead: Float, noise: float | Float) -> tuple[float, float]:
@@ -135,86 +173,6 @@ def shares_to_zero(here: Float, ahead: Float, noise: float | Float) -> tuple[flo
     a, b, doubt = here[falls], ahead[falls], np.broadcast_to(2 * noise, falls.shape)[falls]
     begins, certain = (np.maximum(a + slack, 0.0) / (a - b) for slack in (0.0, doubt))
     return float(begins.min(initial=1.0)), float(certain.min(initial=1.0))
-
-
-def _decided_on_root(
-    comm: MPI.Intracomm,
-    coarse: NaturalCoarseSpace,
-    nodes: InterfaceNodes,
-    is_open: Bool,
-    decide: Callable[..., T],
-    gaps: list[Float],
-    noise: float,
-) -> T:
-    """decide(fibres, *gaps, noise) of rank 0, with the gaps of all nodes, on every rank; collective."""
-    free = coarse.unconstrained_modes.tocsr()
-    opening, slip = ((coarse.G[nodes.row + i] @ free).tocsr() for i in range(2))
-    reach = np.zeros(free.shape[1])
-    np.maximum.at(reach, np.r_[opening.indices, slip.indices], np.abs(np.r_[opening.data, slip.data]))
-    parts = comm.gather((is_open, opening, nodes.bodies, reach, *gaps))
-
-    def decided() -> T:
-        is_open, opening, bodies, reach, *gaps = zip(*(parts or []), strict=True)
-        groups = _moving_together(np.concatenate(bodies), coarse.pinned_body)
-        fibres = _Fibres(np.concatenate(is_open), vstack(opening).tocsr(), np.max(reach, axis=0), groups)
-        return decide(fibres, *map(np.concatenate, gaps), noise)
-
-    return on_root(comm, decided)
-
-
-def _moving_together(bodies: Array, fixed: int) -> Array:
-    """(k,) labels of nodes, the same where gaps depend on each other's motions.
-
-    They are those of the two bodies (k, 2) of each node, of which one may be the body that is `fixed`.
-    """
-    outer, inner = bodies.T
-    between = (bodies != fixed).all(axis=1)
-    labels = components(int(bodies.max(initial=0)) + 1, outer[between], inner[between])
-    return np.asarray(labels[np.where(inner == fixed, outer, inner)])
-
-
-def _place_all(fibres: _Fibres, gap: Float, noise: float) -> tuple[Float, Bool]:
-    pressed, amplitudes = np.zeros(len(gap), bool), np.zeros(fibres.opening.shape[1])
-    for own, motion, columns, modes in fibres.nodes_and_motions(gap < -noise):
-        if modes.shape[1]:
-            a, room, forces = _largest_gap(gap[own], motion)
-            amplitudes[columns] += modes @ a
-            if room < -noise:
-                pressed[own[forces > LEAST_FORCE_SHARE * forces.max()]] = True
-    return amplitudes, pressed
-
-
-def _shares_of_all(fibres: _Fibres, here: Float, ahead: Float, noise: float) -> tuple[float, float]:
-    shares = [(1.0, 1.0)]
-    for own, motion, *_ in fibres.nodes_and_motions(ahead < -2 * noise):
-        a, b = here[own], ahead[own]
-        if not motion.shape[1]:
-            shares.append(shares_to_zero(a, b, noise))
-        elif (certain := _last_share(a, b, motion, 2 * noise)) < 1.0:
-            shares.append((_last_share(np.maximum(a, 0.0), b, motion, 0.0), certain))
-    begins, certain = np.min(shares, axis=0)
-    return float(begins), float(certain)
-
-
-def _block(first: int, last: int, matrix: csr_matrix) -> tuple[Array, Float]:
-    """Return the columns (c,) in which these rows of a matrix have entries, and the dense rows (rows, c) there."""
-    columns = np.unique(matrix.indices[slice(*matrix.indptr[[first, last]])])
-    return columns, matrix[first:last, columns].toarray()
-
-
-def _opening_modes(opening: Float, reach: Float) -> Float:
-    """(modes, m) the combinations of modes that open gaps: not those that slide, or move both faces alike."""
-    if not opening.size:
-        return np.zeros((opening.shape[1], 0))
-    _, size, basis = np.linalg.svd(opening, full_matrices=False)
-    return np.asarray(basis[size > LARGEST_GAP_OF_SLIDING * max(size[0], reach.max())].T)
-
-
-def _largest_gap(gap: Float, motion: Float) -> tuple[Float, float, Float]:
-    """max s with gap + motion a >= s: a, s, and the multipliers of the inequalities."""
-    scale, size = np.abs(gap).max(), np.abs(motion).max(axis=0)
-    result = _maximised(-motion / size, np.ones(len(gap)), gap / scale, (None, 1.0))
-    return result.x[:-1] * scale / size, float(result.x[-1] * scale), -result.ineqlin.marginals
 
 
 def _last_share(here: Float, ahead: Float, motion: Float, slack: float) -> float:

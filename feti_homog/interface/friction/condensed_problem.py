@@ -105,18 +105,14 @@ class AxialFaces:
         self._jumps = np.zeros_like(b)
         for _ in range(1 + REFINEMENTS):
             self._jumps += lu_solve(held, b - K @ self._jumps)
-        self.stiffness = _without_rounding(L - b.T @ self._jumps, L)
+        # Stiffness that is rounding beside that with all bonds would carry a load.
+        diagonal, stiffness = L.diagonal(), L - b.T @ self._jumps
+        roots = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
+        values, vectors = np.linalg.eigh((stiffness + stiffness.T) / (2.0 * np.outer(roots, roots)))
+        left = (vectors * np.where(values > NO_STIFFNESS, values, 0.0)) @ vectors.T
+        resists = left.diagonal() > NO_STIFFNESS
+        self.stiffness = np.asarray(left * np.outer(resists * roots, resists * roots))
 
     def parts(self, strain: Float) -> tuple[Float, Float]:
         """Return jumps (n,) of strains (v,), and these."""
         return self._jumps @ strain, strain
-
-
-def _without_rounding(stiffness: Float, bonded: Float) -> Float:
-    """(v, v) a stiffness that has none where it is rounding beside that with all bonds, which would carry a load."""
-    diagonal = bonded.diagonal()
-    roots = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
-    values, vectors = np.linalg.eigh((stiffness + stiffness.T) / (2.0 * np.outer(roots, roots)))
-    left = (vectors * np.where(values > NO_STIFFNESS, values, 0.0)) @ vectors.T
-    resists = left.diagonal() > NO_STIFFNESS
-    return np.asarray(left * np.outer(resists * roots, resists * roots))

@@ -13,14 +13,13 @@ import numpy as np
 from mpi4py import MPI
 from scipy.linalg import block_diag
 
-from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, Equilibrium, Status, coulomb_errors
 from feti_homog.interface.friction.condensed_problem import AxialFaces, CondensedProblem
 from feti_homog.interface.friction.coulomb_faces import CoulombFaces
 from feti_homog.interface.friction.status_system import OPEN_FACE, STICK
 from feti_homog.interface.loads import Load, Macroscopic
-from feti_homog.typing import Bool, Float, Int
+from feti_homog.typing import Float, Int
 
 
 class SlidingCell:
@@ -71,26 +70,17 @@ class SlidingCell:
         S = block_diag(L, *(each.stiffness for each in self._along))
         b = np.pad(b, [(0, 0), (0, len(S) - self._loads)])
         self.faces = CoulombFaces(np.block([[K, -b], [-b.T, S]]), whole[:, 1])
-        old = self._places_of(before)
-        if len(old):
-            self.faces.follow(faces, old, old[self._changed(old, before, held)])
+        if len(before) and np.isin(before, self.rows).all():
+            self._follow(faces, before, held)
 
-    def _places_of(self, rows: Int) -> Int:
-        """(m',) where entries of x of faces of other rows (n',) stand now, none if some are not there."""
-        if not len(rows) or not np.isin(rows, self.rows).all():
-            return np.zeros(0, np.int64)
-        nodes, loads = np.searchsorted(self.rows, rows), self.faces.loads
-        pairs = (2 * nodes[:, None] + np.arange(2)).ravel()
-        return np.asarray(np.concatenate([pairs, np.arange(loads.start, loads.stop)]))
-
-    def _changed(self, old: Int, rows: Int, springs: Float) -> Bool:
-        """(m',) which entries of `_places_of` are on other springs, or loads whose stiffness all jumps change."""
-        nodes, changed = np.searchsorted(self.rows, rows), np.zeros(len(old), bool)
-        pairs = (2 * nodes[:, None] + np.arange(2)).ravel()
-        last = len(pairs)
-        changed[:last] = np.repeat((self.springs[pairs] != springs).reshape(-1, 2).any(axis=1), 2)
-        changed[last + self._loads :] = True
-        return changed
+    def _follow(self, faces: CoulombFaces, rows: Int, springs: Float) -> None:
+        """Go on from faces of rows (n',), which are here too, on springs (2n',)."""
+        pairs = (2 * np.searchsorted(self.rows, rows)[:, None] + np.arange(2)).ravel()
+        loads = np.arange(self.faces.loads.start, self.faces.loads.stop)
+        # Entries on other springs, and loads whose stiffness all jumps change.
+        differs = np.repeat((self.springs[pairs] != springs).reshape(-1, 2).any(axis=1), 2)
+        other = np.concatenate([pairs[differs], loads[self._loads :]])
+        self.faces.follow(faces, np.concatenate([pairs, loads]), other)
 
     @staticmethod
     def _gained(problem: CondensedProblem, bonds: BondState) -> Float:
@@ -184,17 +174,14 @@ class SlidingCell:
             certificate = problem.interface.certificate(bonds, solution, strains)
             states.append(Equilibrium(of[-1], bonds, solution, 0, 1, 0, certificate, strains))
         plane, *axial = states
-        plane = replace(plane, free_motions=self._free_motions(bonds, plane.solution))
-        excess = {"kkt_friction": self._excess(bonds, states, x)}
-        return replace(plane, certificate=plane.certificate | excess, axial=next(iter(axial), None))
-
-    def _free_motions(self, bonds: BondState, solution: DualSolution) -> int:
-        """Count rigid motions that neither a bond nor a compressed face resists, nor its friction.  Collective."""
+        # Rigid motions that neither a bond nor a compressed face resists, nor its friction.
         row, is_closed = self.interface.nodes.row, bonds.status == CLOSED
-        is_pressed = is_closed & (solution.lam[row] < -self.interface.scales.force_noise(solution))
+        is_pressed = is_closed & (plane.solution.lam[row] < -self.interface.scales.force_noise(plane.solution))
         active = self.interface.active(np.where(is_closed & ~is_pressed, OPEN, bonds.status).astype(np.int8))
         active[row[is_pressed & (self.friction > 0.0)] + 1] = 1.0
-        return int(self.solver.natural.free_motions(active).shape[1])
+        plane = replace(plane, free_motions=int(self.solver.natural.free_motions(active).shape[1]))
+        excess = {"kkt_friction": self._excess(bonds, states, x)}
+        return replace(plane, certificate=plane.certificate | excess, axial=next(iter(axial), None))
 
     def _excess(self, bonds: BondState, states: Sequence[Equilibrium], x: Float) -> float:
         """Return the largest of `coulomb_errors` of scaled x, relative to the largest traction.  Collective."""

@@ -181,7 +181,10 @@ class FollowedStatuses:
             return False
         column = self._R[:, : self._size, at] - self._U[:, : self._size, : self._count] @ self._V[: self._count, at]
         w[at] -= 1.0
-        self._add(column, w / pivot)
+        self._U[:, : self._size, self._count], self._V[self._count, : self._size] = column, w / pivot
+        self._count += 1
+        if self._count == MOST_CHANGES:
+            self._flush()
         self.free[j], self.slope[j] = free, slope
         self.sign *= 1 if pivot > 0.0 else -1
         return True
@@ -190,13 +193,6 @@ class FollowedStatuses:
         """(m,) row of M^-1 or S M^-1."""
         count, size = self._count, self._size
         return np.asarray(self._R[kind, at, :size] - self._U[kind, at, :count] @ self._V[:count, :size])
-
-    def _add(self, column: Float, row: Float) -> None:
-        """Subtract an outer product from R."""
-        self._U[:, : self._size, self._count], self._V[self._count, : self._size] = column, row
-        self._count += 1
-        if self._count == MOST_CHANGES:
-            self._flush()
 
     def _flush(self) -> None:
         size, count = self._size, self._count
@@ -245,7 +241,12 @@ class FollowedStatuses:
         free, slope, place = np.zeros(m, bool), np.zeros(m), np.empty(m, np.int64)
         free[old], slope[old], place[old], place[new] = self.free, self.slope, self._place, np.arange(size, m)
         self.S, self.free, self.slope, self._place = S, free, slope, place
-        self._reserve(m)
+        if m > self._R.shape[1]:
+            # Room for more to come.
+            R = np.empty((2, m + m // 4, m + m // 4))
+            R[:, :size, :size] = self._R[:, :size, :size]
+            self._R = R
+            self._forget()
         order = np.argsort(place)
         first, last = order[:size], order[size:]
         sliding = np.flatnonzero(slope[first])
@@ -280,11 +281,3 @@ class FollowedStatuses:
         before = self.S[entries[:, None], entries] * np.outer(units[entries], units[entries])
         self._R[1, at[:, None], at] += block - before
         return True
-
-    def _reserve(self, m: int) -> None:
-        """Have room for m entries, and for more to come."""
-        if m > self._R.shape[1]:
-            R = np.empty((2, m + m // 4, m + m // 4))
-            R[:, : self._size, : self._size] = self._R[:, : self._size, : self._size]
-            self._R = R
-            self._forget()

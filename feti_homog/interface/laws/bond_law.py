@@ -143,6 +143,40 @@ class BondLaw(ABC):
         return high
 
 
+class SpringLaw(BondLaw):
+    """Law of bonds that break by the energies of their undamaged springs.
+
+    A traction along the fibre adds to the energy of slip: all shear counts alike.
+
+    Attributes:
+        normal_stiffness, tangential_stiffness, axial_stiffness: k_n, k_t, k_a, stress per length.
+    """
+
+    normal_stiffness: float | Float
+    tangential_stiffness: float | Float
+    axial_stiffness: float | Float
+
+    has_toughness: ClassVar[bool] = True
+    break_names: ClassVar[Sequence[str]] = ("psi",)
+
+    def energies(self, traction: Float) -> tuple[Float, Float]:
+        """(p,) energies of springs that open and that slip, under tractions (p, c)."""
+        opening = np.maximum(traction[:, 0], 0.0) ** 2 / (2.0 * self.normal_stiffness)
+        slip = traction[:, 1] ** 2 / (2.0 * self.tangential_stiffness)
+        if traction.shape[1] == 3:
+            slip = slip + traction[:, 2] ** 2 / (2.0 * self.axial_stiffness)
+        return np.asarray(opening), np.asarray(slip)
+
+    def mode_angle(self, traction: Float) -> Float:
+        """(p,) psi of tractions (p, c), in radians: sin^2 psi is the share of slip in the energy."""
+        opening, slip = self.energies(traction)
+        return np.asarray(np.arctan2(np.sqrt(slip), np.sqrt(opening)))
+
+    def breaks(self, traction: Float) -> Float:
+        """(p, 1) psi of tractions (p, c), in degrees."""
+        return np.degrees(self.mode_angle(traction))[:, None]
+
+
 def law_class(name: str) -> type[BondLaw]:
     """Class of the law with this name in `case.bond_laws`."""
     module, cls = LAWS[name].implementation.split(".")

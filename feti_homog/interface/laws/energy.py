@@ -22,7 +22,7 @@ from feti_homog.errors import ConvergenceError
 from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BONDED, BondState
-from feti_homog.interface.laws.bond_law import BondLaw, KeyValues
+from feti_homog.interface.laws.bond_law import KeyValues, SpringLaw
 from feti_homog.typing import Bool, Float, Int
 
 if TYPE_CHECKING:
@@ -36,13 +36,13 @@ MOST_ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
-class SpringEnergy(BondLaw):
+class SpringEnergy(SpringLaw):
     """A bond breaks when the energy of its spring reaches the toughness.
 
     G_I = <t_n>^2 / (2 k_n), G_II = t_t^2 / (2 k_t), tan^2 psi = G_II / G_I;
     G_I + G_II = G_c = G_Ic [1 + tan^2((1 - lambda) psi)].
 
-    A traction along the fibre adds G_III = t_a^2 / (2 k_a) to G_II: all shear counts alike.
+    A traction along the fibre adds G_III = t_a^2 / (2 k_a) to G_II.
 
     The attributes are those of all nodes, or (k,) of each.
 
@@ -59,9 +59,7 @@ class SpringEnergy(BondLaw):
     mode_sensitivity: float | Float
     axial_stiffness: float | Float = math.inf
 
-    has_toughness: ClassVar[bool] = True
     has_tips: ClassVar[bool] = True
-    break_names: ClassVar[tuple[str, ...]] = ("psi",)
 
     @classmethod
     def of_keys(cls, value: KeyValues) -> Self:
@@ -86,7 +84,7 @@ class SpringEnergy(BondLaw):
 
         Homogeneous of degree one in the traction, for psi does not depend on its size, and convex.
         """
-        return np.asarray(np.hypot(*self._roots(traction)) * self.mode_factor(traction) / np.sqrt(self.toughness))
+        return np.asarray(np.sqrt(sum(self.energies(traction)) / self.toughness) * self.mode_factor(traction))
 
     def fracture_toughness(self, traction: Float) -> Float:
         """(k,) G_c of the modes of tractions (k, 2), energy per area."""
@@ -95,23 +93,6 @@ class SpringEnergy(BondLaw):
     def fracture(self, bonds: BondState, which: Bool, traction: Float) -> Float:
         """(p,) G_c of the bonds `which` (k,) in the modes of tractions (k, c)."""
         return self.at(np.flatnonzero(which)).fracture_toughness(traction[which])
-
-    def breaks(self, traction: Float) -> Float:
-        """(p, 1) psi of tractions (p, c), in degrees."""
-        return np.degrees(self.mode_angle(traction))[:, None]
-
-    def mode_angle(self, traction: Float) -> Float:
-        """(k,) psi of tractions (k, 2), in radians: 0 opens, pi/2 shears, under pressure too."""
-        opening, shear = self._roots(traction)
-        return np.asarray(np.arctan2(shear, opening))
-
-    def _roots(self, traction: Float) -> tuple[Float, Float]:
-        """(k,) sqrt(G_I) and sqrt(G_II), with G_III in the latter."""
-        opening = np.maximum(traction[:, 0], 0.0) / np.sqrt(2.0 * self.normal_stiffness)
-        shear = np.abs(traction[:, 1]) / np.sqrt(2.0 * self.tangential_stiffness)
-        if traction.shape[1] == 3:
-            shear = np.hypot(shear, traction[:, 2] / np.sqrt(2.0 * self.axial_stiffness))
-        return opening, shear
 
 
 @dataclass(frozen=True)

@@ -1,20 +1,221 @@
-"""Softening branches of cohesive laws: how the traction falls from its peak."""
+"""Cohesive laws: bonds soften under damage, tooth by tooth, with exactly the energy of the law; softening branches.
+
+Camanho, Davila, NASA/TM-2002-211737 (mixed mode); Benzeggagh, Kenane, Compos. Sci. Technol. 56 (1996) 439 (toughness);
+Rots, Belletti, Invernizzi, Eng. Fract. Mech. 75 (2008) 590 (saw teeth).
+
+All is in terms of the energy W that the undamaged springs would store at the same opening and slip, and of its shear
+share B:
+
+    W_0 = 1 / ((1 - B) / W_n + B / W_t),  W_n = N^2 / (2 k_n),  W_t = S^2 / (2 k_t)     onset of damage,
+    G_c = G_n + (G_t - G_n) B^eta                                                       energy of the law,
+    traction / peak = tau(u),  sqrt(W / W_0) = x = 1 + s u,  s = (G_c / W_0 - 1) / (2 int tau)   softening,
+    1 - d = tau / x                                                                     damage.
+
+So the law has taken W_0 phi at the damage d, phi = 2 int_0^x tau dx - tau x.  The tooth from the damage d_j to d_j+1
+breaks at W_j = W_0 (phi_j+1 - phi_j) / (d_j+1 - d_j) and takes W_j (d_j+1 - d_j): the energy of the law in between.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from abc import abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from feti_homog.interface.laws.bond_law import KeyValues
-from feti_homog.interface.laws.cohesive import CohesiveLaw
-from feti_homog.typing import Float
+from feti_homog.errors import CaseError
+from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
+from feti_homog.interface.contact.states import BondState
+from feti_homog.interface.laws.bond_law import KeyValues, SpringLaw
+from feti_homog.interface.laws.strength import QuadraticStrength
+from feti_homog.typing import Bool, Float, Int
 
+# Teeth of the default at most; steps of Newton's method.
+MOST_TEETH, NEWTON_STEPS = 10_000, 60
 # The last tooth begins where an exponential traction has fallen to this share of its peak.
 EXPONENTIAL_TAIL = 0.01
-NEWTON_STEPS = 60
+NUMBERS = ("normal_stiffness", "tangential_stiffness", "normal_strength", "tangential_strength",
+           "normal_toughness", "tangential_toughness", "mixing_exponent")  # fmt: skip
+
+
+def numbers(value: Callable[..., float | Float]) -> dict[str, Any]:
+    """Return the numbers of a law; the stiffness along the fibre is the tangential one by default."""
+    axial = value("axial_stiffness", "tangential_stiffness")
+    return {name: value(name) for name in NUMBERS} | {"axial_stiffness": axial}
+
+
+@dataclass(frozen=True)
+class CohesiveLaw(SpringLaw):
+    """A law that softens.  The history of a bond is the number of teeth that broke.
+
+    The attributes are those of all nodes, or (k,) of each.  All shear counts alike.
+
+    Attributes:
+        normal_stiffness, tangential_stiffness, axial_stiffness: k_n, k_t, k_a of undamaged springs.
+        normal_strength, tangential_strength: N and S.
+        normal_toughness, tangential_toughness: G_n and G_t.
+        mixing_exponent: eta.
+        levels: the damage d_0 = 0 < ... < d_n = 1 between the teeth.
+        level: teeth that broke.
+    """
+
+    normal_stiffness: float | Float
+    tangential_stiffness: float | Float
+    axial_stiffness: float | Float
+    normal_strength: float | Float
+    tangential_strength: float | Float
+    normal_toughness: float | Float
+    tangential_toughness: float | Float
+    mixing_exponent: float | Float
+    levels: tuple[float, ...]
+    level: float | Float = 0.0
+
+    is_convex: ClassVar[bool] = False
+
+    @classmethod
+    def of_keys(cls, value: KeyValues) -> Self:
+        """Make the law of [interface], with the number of teeth that the case asks for."""
+        law, branch = cls(**numbers(value), levels=(0.0, 1.0)), cls.branch(value)
+        # Of all sections, so that the ranks agree.
+        everywhere = cls(**numbers(value.everywhere), levels=(0.0, 1.0), **branch)
+        levels = everywhere.levels_for(value.common("teeth"), value.common("softening_tolerance"))
+        return replace(law, levels=levels, **branch)
+
+    @classmethod
+    def branch(cls, value: KeyValues) -> dict[str, Any]:
+        """Return the fields that describe the softening branch."""
+        return {}
+
+    def levels_for(self, teeth: int | None, tolerance: float) -> tuple[float, ...]:
+        """Levels of damage with constant quotients of the openings, in the pure mode with the largest G_c / W_0.
+
+        Without a number of `teeth` it is the least with which the first tooth exceeds the peak by no more than
+        `tolerance` of it.
+
+        Raises:
+            CaseError: that takes more than MOST_TEETH.
+        """
+        s = self._longest_branch
+        for n in [teeth] if teeth else range(1, MOST_TEETH + 1):
+            # Without a branch all levels are reached at once.
+            x = (1.0 + s * self.last) ** (np.arange(n) / n)
+            d = 1.0 - self.shape((x - 1.0) / s) / x if s > 0.0 else np.arange(n) / n
+            levels = np.append(d, 1.0)
+            excess = math.sqrt(float(self._taken(levels[1:2], s)[0] / levels[1])) - 1.0
+            if teeth or excess <= tolerance:
+                return tuple(levels.tolist())
+        raise CaseError(
+            f"[interface] softening_tolerance = {tolerance:g}: with {MOST_TEETH} teeth, the most, the first exceeds "
+            f"the peak traction by {excess:.1e} of it; expected at least that"
+        )
+
+    @property
+    def _longest_branch(self) -> float:
+        """The largest s of the pure modes of any node."""
+        onsets = self._onsets
+        ratios = self.normal_toughness / onsets[0], self.tangential_toughness / onsets[1]
+        largest = max(float(np.max(each, initial=0.0)) for each in map(np.asarray, ratios))
+        return max(0.0, largest - 1.0) / (2.0 * float(self.area(np.inf)))
+
+    @property
+    def overshoot(self) -> float:
+        """Excess of the first tooth over the peak traction, relative to that, in the pure mode where it is largest."""
+        return float(np.sqrt(self._taken(self._damages[1:2], self._longest_branch)[0] / self.levels[1])) - 1.0
+
+    @property
+    @abstractmethod
+    def last(self) -> float:
+        """The u at which the last tooth ends, or from which on it takes what is left."""
+
+    @abstractmethod
+    def shape(self, u: Float) -> Float:
+        """tau(u) of u >= 0: 1 at 0, falling."""
+
+    @abstractmethod
+    def area(self, u: Float | float) -> Float | float:
+        """int_0^u tau."""
+
+    @abstractmethod
+    def opening(self, d: Float, s: Float | float) -> Float:
+        """(p,) the u with tau(u) = (1 - d) (1 + s u), for d < 1."""
+
+    def begin(self, k: int) -> Float:
+        """(k, 1) no tooth broke."""
+        return np.zeros((k, 1))
+
+    def in_state(self, cell: CoupledInterfaces, bonds: BondState) -> Self:
+        """Return the law of the teeth that come next."""
+        return replace(self, level=bonds.history[:, 0])
+
+    def share(self, traction: Float) -> Float:
+        """(p,) sqrt(W / W_j) of tractions (p, c) at bonds with j broken teeth.
+
+        Of degree one, for B does not depend on the size of the traction.
+        """
+        first, second = self.energies(traction)
+        tooth = np.minimum(np.asarray(self.level, np.int64), len(self.levels) - 2)
+        return np.asarray(np.sqrt((first + second) / self._breaking(traction, tooth)) / (1.0 - self._damages[tooth]))
+
+    def after(self, bonds: BondState, which: Bool, traction: Float) -> tuple[Float, Bool]:
+        """(k, 1) teeth that broke after one more of the bonds `which`, and which bonds lost the last."""
+        history = bonds.history + which[:, None]
+        return history, which & (history[:, 0] >= len(self.levels) - 1)
+
+    def damage(self, bonds: BondState) -> Float:
+        """(k,) d, 1 of bonds that broke from the start too."""
+        d = self._damages[bonds.history[:, 0].astype(np.int64)]
+        return np.asarray(np.where(bonds.status == 0, d, 1.0))
+
+    def softening(self, bonds: BondState, pulled: Bool) -> Float:
+        """(k, 3) 1 / (1 - d); 1 of pressed normal springs, and of parted bonds, whose faces press with those."""
+        d = self._damages[bonds.history[:, 0].astype(np.int64)]
+        factor = 1.0 / (1.0 - np.where(d < 1.0, d, 0.0))
+        return np.column_stack([np.where(pulled, factor, 1.0), factor, factor])
+
+    def fracture(self, bonds: BondState, which: Bool, traction: Float) -> Float:
+        """(p,) W_j (d_j+1 - d_j) of the teeth that break."""
+        law, own = self.at(np.flatnonzero(which)), traction[which]
+        tooth = bonds.history[which, 0].astype(np.int64)
+        return np.asarray(law._breaking(own, tooth) * np.diff(self._damages)[tooth])
+
+    def onset(self) -> QuadraticStrength:
+        """Return the criterion of the onset of damage."""
+        axial = self.tangential_strength * np.sqrt(self.axial_stiffness / np.asarray(self.tangential_stiffness))
+        return QuadraticStrength(self.normal_strength, self.tangential_strength, axial)
+
+    @property
+    def _damages(self) -> Float:
+        """(n + 1,) the levels."""
+        return np.array(self.levels)
+
+    @property
+    def _onsets(self) -> tuple[float | Float, float | Float]:
+        """W_n and W_t."""
+        normal, tangential = self.normal_strength, self.tangential_strength
+        return normal**2 / (2.0 * self.normal_stiffness), tangential**2 / (2.0 * self.tangential_stiffness)
+
+    def _breaking(self, traction: Float, tooth: Int) -> Float:
+        """(p,) W_j of the teeth (p,) or one, in the modes of tractions (p, c)."""
+        first, second = self.energies(traction)
+        stored = first + second
+        B = np.divide(second, stored, out=np.zeros(len(stored)), where=stored > 0.0)
+        onsets = self._onsets
+        onset = 1.0 / ((1.0 - B) / onsets[0] + B / onsets[1])
+        extra = (self.tangential_toughness - self.normal_toughness) * B**self.mixing_exponent
+        s = np.maximum((self.normal_toughness + extra) / onset - 1.0, 0.0) / (2.0 * self.area(np.inf))
+        low, high = self._damages[tooth], self._damages[tooth + 1]
+        return np.asarray(onset * (self._taken(high, s) - self._taken(low, s)) / (high - low))
+
+    def _taken(self, d: Float, s: Float | float) -> Float:
+        """(p,) phi at the damage d: what the law has taken, over W_0."""
+        d, s = np.asarray(d, float), np.asarray(s)
+        inside = d < 1.0
+        below = np.where(inside, d, 0.0)
+        u = self.opening(below, s)
+        partly = 1.0 + 2.0 * s * self.area(u) - (1.0 - below) * (1.0 + s * u) ** 2
+        return np.asarray(np.where(inside, partly, 1.0 + 2.0 * s * self.area(np.inf)))
 
 
 @dataclass(frozen=True)
@@ -36,8 +237,6 @@ class PiecewiseLinear(CohesiveLaw):
     def area(self, u: Float | float) -> Float | float:
         """int_0^u tau."""
         u = np.minimum(u, self.last)
-        if len(self.knots) == 2:
-            return np.asarray(u - u**2 / (2.0 * self.knots[1]))
         knots, heights = np.array(self.knots), np.array(self.heights)
         areas = np.concatenate([[0.0], np.cumsum(np.diff(knots) * (heights[1:] + heights[:-1]) / 2.0)])
         k = np.clip(np.searchsorted(knots, u, side="right") - 1, 0, len(knots) - 2)

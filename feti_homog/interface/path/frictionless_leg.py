@@ -90,12 +90,23 @@ class FrictionlessLeg(Leg):
         self._from = self._path_state()
 
     def _advance(self) -> Iterator[Point]:
-        """Go on to the next event, or part of the way, and yield its points.  Collective."""
+        """Go on to the next event, or part of the way, and yield its points.  Collective.
+
+        Raises:
+            NotCarriedError: neither open faces carry the stresses of the load nor touching ones.
+        """
+        state, share = self._state, self._share
         try:
-            ahead = self.cell.linear(self.end, self._state.bonds, self._state.multipliers)
+            ahead = self.cell.linear(self.end, state.bonds, state.multipliers)
         except NotCarriedError:
-            return self._touch()
-        return self._advance_towards(ahead)
+            beyond = min(share + LEAST_SHARE, 1.0)
+            there = self._solve(beyond, state.bonds, state.multipliers)
+            self._stand(share, self._solve(share, there.bonds, there.multipliers))
+            yield self._turn(beyond)
+            self._stand(beyond, there)
+            self._false_alarm = False
+        else:
+            yield from self._advance_towards(ahead)
 
     def _advance_towards(self, ahead: Sequence[DualSolution]) -> Iterator[Point]:
         """Go to the next event, or as far towards it as the response to `ahead` is straight, and past it.
@@ -184,20 +195,6 @@ class FrictionlessLeg(Leg):
         self._false_alarm = not self._differs(from_state)
         if there_is_one and not self._false_alarm:
             yield from self._turned()
-
-    def _touch(self) -> Iterator[Point]:
-        """Report the state in which open faces touch, which carry no more than there is here, and go on from there.
-
-        Raises:
-            NotCarriedError: touching faces do not carry it either.
-        """
-        state, beyond = self._state, min(self._share + LEAST_SHARE, 1.0)
-        there = self._solve(beyond, state.bonds, state.multipliers)
-        here = self._solve(self._share, there.bonds, there.multipliers)
-        self._stand(self._share, here)
-        yield self._turn(beyond)
-        self._stand(beyond, there)
-        self._false_alarm = False
 
     def _turned(self) -> Iterator[Point]:
         """Report the state after a change of contact; a break here is the point otherwise."""

@@ -19,7 +19,7 @@ from mpi4py import MPI
 from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.contact.floating_bodies import admissible_share, shares_to_zero
+from feti_homog.interface.contact.floating_bodies import FloatingBodies, shares_to_zero
 from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, Equilibrium
 from feti_homog.interface.laws.bond_law import BISECTIONS, BondLaw
 from feti_homog.interface.path.path_points import UTILISATION_TIE
@@ -127,7 +127,7 @@ def first_change(interface: ContactProblem, state: Equilibrium, ahead: DualSolut
     here, there = state.solution.jump[nodes.row], ahead.jump[nodes.row]
     noise = max(interface.scales.gap_noise(state.solution.strain), interface.scales.gap_noise(ahead.strain))
     if interface.contact and solver.natural.unconstrained_modes.shape[1]:
-        shares.append(admissible_share(solver.comm, solver.natural, nodes, is_open, here, there, noise))
+        shares.append(FloatingBodies(solver.comm, solver.natural, nodes, is_open, noise).admissible_share(here, there))
     else:
         shares.append(shares_to_zero(here[is_open], there[is_open], noise))
     least = np.min(shares, axis=0)

@@ -11,41 +11,38 @@ breaks nothing is lost.  A point's `energies` are those of the way from the last
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.friction.sliding_cell import SlidingCell
 from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.loads import Load
-from feti_homog.interface.path.coulomb_leg import CoulombLeg
 from feti_homog.interface.path.frictionless_leg import FrictionlessLeg
 from feti_homog.interface.path.leg import Leg
 from feti_homog.interface.path.path_points import Energies, PathState, Point, break_bonds, most_utilised
 
+Engine = Callable[[CoupledInterfaces, BondLaw, Sequence[Load], int, PathState], Leg]
+"""From cell, law, waypoints, number and begin of a leg to the leg."""
+
 
 def events(
-    cell: CoupledInterfaces,
-    law: BondLaw,
-    waypoints: Sequence[Load],
-    begin: PathState,
-    sliding: SlidingCell | None = None,
+    cell: CoupledInterfaces, law: BondLaw, waypoints: Sequence[Load], begin: PathState, engine: Engine = FrictionlessLeg
 ) -> Iterator[Point]:
     """Every break along zero -> waypoints[0] -> ..., and the end of each leg.  Collective.
 
     A leg begins with what the state has of the components that its waypoint gives, strain or stress.  A point's state
-    is the one before its bonds break.  On later legs, and with friction by `sliding` on all, the changes of contact
-    are points too, with `broke` = 0: between points the response is straight.  The last point is one that did not
-    converge, if there is one.
+    is the one before its bonds break.  On later legs, and with friction on all, the changes of contact are points too,
+    with `broke` = 0: between points the response is straight.  The last point is one that did not converge, if there is
+    one.
 
     Raises:
         NotCarriedError: nothing goes on from the last point, the limit of the load.
     """
     for leg in range(begin.leg, len(waypoints)):
-        if leg == 0 and sliding is None:
+        if leg == 0 and engine is FrictionlessLeg:
             points = _first_leg(cell, law, waypoints[0], len(waypoints), begin)
         else:
-            points = _leg(cell, law, waypoints, leg, begin, sliding).points()
+            points = engine(cell, law, waypoints, leg, begin).points()
         for point in points:
             yield point
             if not point.state.converged:
@@ -61,7 +58,7 @@ def increments(
     steps: int,
     worst_only: bool,
     begin: PathState,
-    sliding: SlidingCell | None = None,
+    engine: Engine = FrictionlessLeg,
 ) -> Iterator[Point]:
     """Yield the paper's loop: at each of `steps` equal load steps, release overloaded bonds until none is left.
 
@@ -77,7 +74,7 @@ def increments(
         leg = (step * legs - 1) // steps
         if way is None or leg > way.leg:
             position = begin.position or max((step - 1) * legs / steps - leg, 0.0)
-            way = _leg(cell, law, waypoints, leg, replace(begin, leg=leg, position=position), sliding)
+            way = engine(cell, law, waypoints, leg, replace(begin, leg=leg, position=position))
         point = way.step(step, steps, worst_only)
         begin = point.after
         yield point
@@ -85,20 +82,6 @@ def increments(
             raise way.limit
         if not point.state.converged:
             return
-
-
-def _leg(
-    cell: CoupledInterfaces,
-    law: BondLaw,
-    waypoints: Sequence[Load],
-    leg: int,
-    begin: PathState,
-    sliding: SlidingCell | None,
-) -> Leg:
-    """Return the leg that ends at waypoint `leg`, with the engine of the case.  Collective."""
-    if sliding is None:
-        return FrictionlessLeg(cell, law, waypoints, leg, begin)
-    return CoulombLeg(cell, law, waypoints, leg, begin, sliding)
 
 
 def _first_leg(cell: CoupledInterfaces, law: BondLaw, load: Load, legs: int, begin: PathState) -> Iterator[Point]:
