@@ -24,6 +24,7 @@ from itertools import product
 import numpy as np
 
 from feti_homog.errors import NotCarriedError
+from feti_homog.interface.contact.contact_problem import BLOCK_PIVOTS
 from feti_homog.interface.contact.states import Status
 from feti_homog.interface.friction.face_system import FaceSystem, Prescribed
 from feti_homog.interface.friction.status_system import BACKWARD, FORWARD, OPEN_FACE, STICK, largest_share, residual
@@ -31,9 +32,8 @@ from feti_homog.typing import Bool, Float
 
 # Share of the forces of the loads that may be left on a free motion.
 UNBALANCED = 1e-7
-# Pivots of blocks without progress, after which one node at random changes at a time: with friction a fixed order may
-# come back to where it was.  And solves after which other searches take over; those of a step of the continuation.
-BLOCK_PIVOTS, LEAST_SOLVES, SOLVES_PER_NODE, SOLVES_OF_A_STEP = 11, 50, 4, 50
+# Solves, and solves a node, after which other searches take over; solves of a step of the continuation.
+SOLVES, SOLVES_PER_NODE = 50, 4
 # Sets of statuses that are tried one after the other, and the least step of mu.
 MOST_TRIED, LEAST_STEP = 256.0, 1.0 / 256.0
 STATUSES = np.array([STICK, FORWARD, OPEN_FACE, BACKWARD], np.int8)
@@ -71,7 +71,7 @@ class StatusSearch:
     @property
     def _solves(self) -> int:
         """Number of solves after which other searches take over."""
-        return LEAST_SOLVES + SOLVES_PER_NODE * self.faces.nodes
+        return SOLVES + SOLVES_PER_NODE * self.faces.nodes
 
     def by_pivots(self, status: Status, solves: int) -> Found:
         """Return the statuses to which pivots lead, if the forces balance."""
@@ -84,9 +84,10 @@ class StatusSearch:
         return found is not None and not balanced
 
     def _pivoted(self, status: Status, solves: int) -> tuple[Found, bool]:
-        """Return what changes of all wrong statuses at once lead to, or of one at random where they lead nowhere.
+        """Return what changes of all wrong statuses at once lead to, and whether its forces balance.
 
-        And whether its forces balance.
+        After some block pivots without progress one node at random changes at a time: with friction a fixed order may
+        come back to where it was.
         """
         fewest, left, random = self.faces.nodes + 1, 0, np.random.default_rng(0)
         for _ in range(solves):
@@ -109,7 +110,7 @@ class StatusSearch:
         for stuck in (sliding, *sliding):
             guess = status.copy()
             guess[stuck] = STICK
-            if (found := self.by_pivots(guess, SOLVES_OF_A_STEP)) is not None:
+            if (found := self.by_pivots(guess, SOLVES)) is not None:
                 yield found
         yield from self._tried(status)
 
@@ -135,7 +136,7 @@ class StatusSearch:
         search = replace(self, faces=faces)
         while step >= LEAST_STEP:
             faces.friction = min(share + step, 1.0) * self.faces.friction
-            found = search.by_pivots(status, SOLVES_OF_A_STEP)
+            found = search.by_pivots(status, SOLVES)
             if found is None:
                 step /= 2.0
             elif share + step >= 1.0:
@@ -232,7 +233,7 @@ class CoulombFaces(FaceSystem):
     def carries(self, status: Status, given: Prescribed, start: Float) -> bool:
         """Return whether there is such a step; sure of it where few pivots find that it is so, or that it is not."""
         search = StatusSearch(self, self.all_allowed(), given, start)
-        found = search.by_pivots(self._known(status), SOLVES_OF_A_STEP)
+        found = search.by_pivots(self._known(status), SOLVES)
         if found is not None or search.slides_freely(self._known(status)):
             return found is not None
         return search.run(self._known(status)) is not None

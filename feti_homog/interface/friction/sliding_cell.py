@@ -1,7 +1,12 @@
 """The debonded faces of a cell, condensed to dense arrays: what rank 0 decides, and multipliers of all ranks.
 
-The matrix S of `coulomb_faces` is that of `CondensedProblem` in the plane, and behind it in generalized plane strain
-that of `AxialFaces`.
+A problem of the cell, in the plane or along the fibres, is condensed to jumps of some interface rows.  With H the
+inverse of the dual operator of the bonded cell, prescribed jumps g on rows D leave
+
+    lam = H (d E - g),      |UC| Sigma = L E - b^T g,      b = (H d)_D,
+
+L the bonded stiffness times the area: the cell stores x.S x / 2 of x = (g, E), S = [[H_DD, -b], [-b^T, L]].  The matrix
+of `coulomb_faces` is that of the plane, and behind it in generalized plane strain that of `AxialFaces`.
 """
 
 from __future__ import annotations
@@ -11,15 +16,115 @@ from dataclasses import replace
 
 import numpy as np
 from mpi4py import MPI
-from scipy.linalg import block_diag
+from scipy.linalg import block_diag, lu_factor, lu_solve
 
+from feti_homog.errors import CaseError
+from feti_homog.feti.dual_solution import DualSolution
+from feti_homog.feti.solver_plan import WITHOUT_INVERSE
+from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, Equilibrium, Status, coulomb_errors
-from feti_homog.interface.friction.condensed_problem import AxialFaces, CondensedProblem
 from feti_homog.interface.friction.coulomb_faces import CoulombFaces
-from feti_homog.interface.friction.status_system import OPEN_FACE, STICK
+from feti_homog.interface.friction.status_system import HELD, OPEN_FACE, REFINEMENTS, STICK
 from feti_homog.interface.loads import Load, Macroscopic
+from feti_homog.system.parallel.distributed_arrays import allreduce_sum, gather_rows
 from feti_homog.typing import Float, Int
+
+# Stiffness, relative to that with all bonds, that is what rounding leaves of none.
+NO_STIFFNESS = 1e-10
+
+
+class CondensedProblem:
+    """One problem with the rows that `take` was last given.
+
+    Attributes:
+        interface: its contact problem.
+        rows: (n,) global rows D.
+        first: global number of the first row of this rank.
+    """
+
+    def __init__(self, interface: ContactProblem) -> None:
+        """Find the response of the bonded cell to its loads.  Collective.
+
+        Raises:
+            CaseError: the solver has no inverse of the dual operator.
+        """
+        self.interface, self.solver = interface, interface.solver
+        if self.solver.exact_inverse is None:
+            raise CaseError(WITHOUT_INVERSE)
+        self._inverse, self.first = self.solver.exact_inverse, self.solver.jump_operator.owned[0]
+        self._response = self._inverse.multipliers(self.solver.d, np.eye(len(self.solver.problem.loads)))
+        bonded = self.solver.torn_stiffness + allreduce_sum(self.solver.comm, self.solver.d.T @ self._response)
+        self._bonded = (bonded + bonded.T) / 2
+        self._some: tuple[Int, Float] | None = None
+
+    def take(self, rows: Int, springs: Float) -> tuple[Float, Float, Float]:
+        """Return H_DD (n, n) with springs (n,) beside it, b (n, v) and L (v, v) of the same rows.  Collective."""
+        self.rows, self._some = rows, None
+        self._columns, K = self._inverse.columns(rows)
+        K[np.diag_indices(len(K))] += springs
+        return K, gather_rows(self.solver.comm, self._response, self.first, rows), self._bonded
+
+    def gained(self, bonds: BondState) -> Float:
+        """(k, c) compliance that damage adds to the springs, if all bonds are pulled."""
+        interface, pulled = self.interface, replace(bonds, pressed=np.zeros(len(bonds.status), bool))
+        more = interface.compliance(pulled) - self.solver.intact_compliance
+        return np.asarray(more[interface.nodes.row[:, None] + np.arange(self.solver.jump_operator.components)])
+
+    def multipliers(self, jump: Float, strain: Float) -> Float:
+        """(owned rows,) lam of jumps (n,) and strains (v,)."""
+        return np.asarray(self._response @ strain - self._columns @ jump)
+
+    def some_multipliers(self, own: Int, jump: Float, strain: Float) -> Float:
+        """(k, c) lam at the places `own` (k, c) among the owned rows; their columns are kept for this array."""
+        if self._some is None or self._some[0] is not own:
+            self._some = own, self._columns[own.ravel()]
+        return self._response[own] @ strain - (self._some[1] @ jump).reshape(own.shape)
+
+    def solution(self, bonds: BondState, jump: Float, strain: Float) -> DualSolution:
+        """Return the multipliers, and the jumps that they leave by the dual operator itself.  Collective."""
+        solver, lam = self.solver, self.multipliers(jump, strain)
+        torn = solver.d @ strain
+        left, opened = torn - solver.operator.apply(lam), np.zeros(len(lam))
+        mine = (self.rows >= self.first) & (self.rows < self.first + len(lam))
+        opened[self.rows[mine] - self.first] = jump[mine]
+        alpha = np.zeros(solver.natural.kernel_dimension)
+        if len(alpha):
+            alpha -= solver.natural.amplitudes(left - opened)
+            left = left + solver.natural.G @ alpha
+        sums = np.array([(left - opened) @ (left - opened), left @ left, torn @ torn])
+        off, *sizes = np.sqrt(allreduce_sum(solver.comm, sums))
+        C = self.interface.compliance(bonds)
+        left = left - (C - solver.intact_compliance) * lam
+        return DualSolution(strain, lam, left, alpha, 0, 2, float(off / (max(sizes) or 1.0)), C)
+
+
+class AxialFaces:
+    """The axial problem, a few rows and columns of the matrix S of `coulomb_faces` behind those of the plane.
+
+    The jumps g = K^-1 b E are eliminated, K g = b E.  What nothing holds is held by a share of its own row: a share of
+    the largest would measure by the stiffest spring.
+
+    Attributes:
+        problem: the axial one.
+        jumps, stiffness: K^-1 b (n, v), and (v, v) of its strains, L - b^T K^-1 b.
+    """
+
+    def __init__(self, problem: CondensedProblem, rows: Int, springs: Float) -> None:
+        """Take rows (n,) with springs (n,), 0 of faces that nothing ties.  Collective."""
+        self.problem = problem
+        K, b, L = problem.take(rows, springs)
+        held = lu_factor(K + HELD * np.diag(K.diagonal()))
+        self.jumps = np.zeros_like(b)
+        for _ in range(1 + REFINEMENTS):
+            self.jumps += lu_solve(held, b - K @ self.jumps)
+        # Stiffness that is rounding beside that with all bonds would carry a load.
+        diagonal, stiffness = L.diagonal(), L - b.T @ self.jumps
+        roots = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
+        values, vectors = np.linalg.eigh((stiffness + stiffness.T) / (2.0 * np.outer(roots, roots)))
+        left = (vectors * np.where(values > NO_STIFFNESS, values, 0.0)) @ vectors.T
+        resists = left.diagonal() > NO_STIFFNESS
+        self.stiffness = np.asarray(left * np.outer(resists * roots, resists * roots))
 
 
 class SlidingCell:
@@ -45,7 +150,7 @@ class SlidingCell:
     def take(self, bonds: BondState) -> None:
         """Have the faces of the debonded nodes, and of damaged bonds, which are on springs.  Collective."""
         comm, row, first = self.solver.comm, self.interface.nodes.row, self._plane.first
-        more = np.hstack([self._gained(each, bonds) for each in (self._plane, *self._axial)])
+        more = np.hstack([each.gained(bonds) for each in (self._plane, *self._axial)])
         self._more = more[:, 1]
         self._damaged = (bonds.status == BONDED) & (more[:, :2] > 0.0).any(axis=1)
         self._own = np.flatnonzero((bonds.status != BONDED) | self._damaged)
@@ -53,8 +158,8 @@ class SlidingCell:
         problems = (self._plane, *self._axial)
         rows = [(each.interface.nodes.row[self._held], each.solver.jump_operator.components) for each in problems]
         self._held_rows = [own[:, None] + np.arange(components) for own, components in rows]
-        springs = np.divide(1.0, more, out=np.zeros_like(more), where=(more > 0.0) & self._damaged[:, None])
-        self._springs = springs
+        pulled = (more > 0.0) & self._damaged[:, None]
+        self._springs = springs = np.divide(1.0, more, out=np.zeros_like(more), where=pulled)
         friction = np.where(self._damaged, self.friction_of_damage, self.friction)
         along = [each.first + each.interface.nodes.row for each in self._axial]
         own = np.column_stack([first + row, friction, *along, springs])[self._own]
@@ -81,14 +186,6 @@ class SlidingCell:
         differs = np.repeat((self.springs[pairs] != springs).reshape(-1, 2).any(axis=1), 2)
         other = np.concatenate([pairs[differs], loads[self._loads :]])
         self.faces.follow(faces, np.concatenate([pairs, loads]), other)
-
-    @staticmethod
-    def _gained(problem: CondensedProblem, bonds: BondState) -> Float:
-        """(k, c) compliance that damage adds to the springs of a problem, if all bonds are pulled."""
-        interface = problem.interface
-        pulled = replace(bonds, pressed=np.zeros(len(bonds.status), bool))
-        more = interface.compliance(pulled) - problem.solver.intact_compliance
-        return np.asarray(more[interface.nodes.row[:, None] + np.arange(problem.solver.jump_operator.components)])
 
     def begin(self, bonds: BondState, strain: Float) -> tuple[Status, Float]:
         """Return the statuses (n,) of the faces of the bonds, and scaled x (m,), with a strain (v,).  Collective.
@@ -144,7 +241,7 @@ class SlidingCell:
     def _parts(self, x: Float) -> list[tuple[CondensedProblem, tuple[Float, Float]]]:
         """Return each problem with its jumps and strains of scaled x."""
         jump, plane, along = np.split(x / self.faces.size, 2 * len(self.rows) + np.array([0, self._loads]))
-        return [(self._plane, (jump, plane)), *((each.problem, each.parts(along)) for each in self._along)]
+        return [(self._plane, (jump, plane)), *((each.problem, (each.jumps @ along, along)) for each in self._along)]
 
     def released_along(self, before: Macroscopic, after: Macroscopic) -> float:
         """Return the energy per area that a break at constant load loses along fibres."""

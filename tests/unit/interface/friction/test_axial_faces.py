@@ -9,8 +9,7 @@ import pytest
 
 from feti_homog.interface.contact.coupled_interfaces import slipped
 from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, coulomb_errors
-from feti_homog.interface.friction.condensed_problem import AxialFaces
-from feti_homog.interface.friction.sliding_cell import SlidingCell
+from feti_homog.interface.friction.sliding_cell import AxialFaces, SlidingCell
 from feti_homog.interface.friction.status_system import FORWARD, STICK
 
 
