@@ -9,7 +9,7 @@ import numpy as np
 
 from feti_homog.typing import Bool, Float
 
-# What is smaller than this, relative to its values at the ends of its leg, is what rounding leaves of zero.
+# Values below this, relative to the ends of their leg, are zero with rounding.
 LOAD_ROUNDING = 1e-13
 
 
@@ -19,11 +19,9 @@ Multipliers = tuple[Float, ...]
 
 @dataclass(frozen=True)
 class Macroscopic:
-    """Strains E and the stresses Sigma that work on them, energy per area of the cell.
+    """Strains E, temperature changes among them, and their work conjugates Sigma, energy per area of the cell.
 
-    A change of temperature is a strain.
-
-    With the bonds as they are the cell stores E.Sigma / 2, and E'.Sigma = E.Sigma' of two states (Betti).
+    With fixed bonds the cell stores E.Sigma / 2, and E'.Sigma = E.Sigma' for two states (Betti).
 
     Attributes:
         strain, stress: (n,).
@@ -42,24 +40,24 @@ class Macroscopic:
         return Macroscopic(factor * self.strain, factor * self.stress)
 
     def load(self, by_stress: Bool) -> Load:
-        """Return the load that holds the state, with these (n,) components given by their stress."""
+        """Return the load of the state, with (n,) components `by_stress`."""
         return Load(np.where(by_stress, self.stress, self.strain), by_stress)
 
     def released_to(self, after: Macroscopic) -> float:
-        """Return the energy lost by a break at constant load: 1/2 (E'.Sigma - E.Sigma'), with ' after the break.
+        """Return the energy released by a break at constant load: 1/2 (E'.Sigma - E.Sigma'), with ' after the break.
 
-        It is the work less the change of stored energy; at constant strain 1/2 E.(Sigma - Sigma').
+        It is the work minus the change of stored energy; at constant strain 1/2 E.(Sigma - Sigma').
         """
         return 0.5 * float(after.strain @ self.stress - self.strain @ after.stress)
 
 
 @dataclass(frozen=True)
 class Load:
-    """Values of n macroscopic strains, a change of temperature among them, or of their stresses.
+    """Values of n macroscopic strains, a temperature change among them, or of their stresses.
 
     Attributes:
         values: (n,) strains and stresses.
-        by_stress: (n,) which are stresses.
+        by_stress: (n,) True for stresses.
     """
 
     values: Float
@@ -67,19 +65,16 @@ class Load:
 
     @classmethod
     def strain(cls, values: Float) -> Load:
-        """Return the strains (n,)."""
+        """Return the load of strains (n,)."""
         return cls(values, np.zeros(len(values), bool))
 
     def parts(self, sizes: Sequence[int]) -> list[Load]:
-        """Return the load in parts of so many components."""
+        """Split the load into parts of these sizes."""
         ends = np.cumsum(sizes)[:-1]
         return [Load(*part) for part in zip(np.split(self.values, ends), np.split(self.by_stress, ends), strict=True)]
 
     def after(self, share: float, end: Load) -> Load:
-        """Return the load after a share of the way to another one of the same kinds.
-
-        What is left of zero by rounding is zero.
-        """
+        """Return the load after a share of the way to another one of the same kinds, without rounding of zeros."""
         values = (1.0 - share) * self.values + share * end.values
         largest = np.abs([self.values, end.values]).max(axis=0)
         return Load(np.where(np.abs(values) <= LOAD_ROUNDING * largest, 0.0, values), self.by_stress)

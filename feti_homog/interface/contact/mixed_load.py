@@ -1,7 +1,7 @@
-"""The dual problem under strains of which some follow from given stresses.
+"""The dual problem under mixed loads: some strains follow from prescribed stresses.
 
-With the active rows as they are the response is linear: the answer to the given strains and one to each unit of the
-others are superposed such that the stresses are met.
+With fixed active rows the response is linear: the answers to the prescribed strains and to unit strains superpose, with
+factors that meet the stresses.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from feti_homog.interface.loads import Load
 from feti_homog.system.parallel.distributed_arrays import allreduce_sum
 from feti_homog.typing import Bool, Float
 
-# Share of the stresses that may act on what resists nothing: rounding of directions.
+# Share of the stresses that may act on directions without stiffness: rounding of these.
 UNCARRIED_SHARE = 1e-6
-# Squares of jumps, and stresses, relative to those of the torn cell and of its bodies held, that are rounding.
+# Rounding of squared jumps, relative to the torn cell, and of stresses, relative to clamped bodies.
 UNRESISTED = 1e-12
 
 
@@ -31,7 +31,7 @@ def solve(scales: LoadScales, load: Load, start: Float) -> DualSolution:
     Strains that meet no more than noise stay zero.
 
     Raises:
-        NotCarriedError: nothing carries the stresses.
+        NotCarriedError: the stresses meet no stiffness.
     """
     solver = scales.solver
     if not (load.by_stress.any() and load.values.any()):
@@ -40,8 +40,8 @@ def solve(scales: LoadScales, load: Load, start: Float) -> DualSolution:
     strains = np.vstack([np.where(load.by_stress, 0.0, load.values), np.eye(len(load.values))[unknown]])
     starts = np.column_stack([start, np.zeros((len(start), len(unknown)))])
     needed = slice(0 if strains[0].any() else 1, None)
-    found = solver.solve_many(strains[needed], starts[:, needed])
-    stresses = np.stack([solver.stress_integral(each)[unknown] / scales.size.prod() for each in found])
+    solutions = solver.solve_many(strains[needed], starts[:, needed])
+    stresses = np.stack([solver.stress_integral(solution)[unknown] / scales.size.prod() for solution in solutions])
     missing = load.values[unknown]
     if strains[0].any():
         missing = missing - stresses[0]
@@ -52,14 +52,14 @@ def solve(scales: LoadScales, load: Load, start: Float) -> DualSolution:
     factors = solver.comm.bcast(answer)
     if factors is None:
         raise NotCarriedError("nothing in the cell carries the stresses of the load")
-    return superposed(solver, found, np.concatenate([np.ones(len(found) - len(unknown)), factors]))
+    return superposed(solver, solutions, np.concatenate([np.ones(len(solutions) - len(unknown)), factors]))
 
 
 def _strains(stiffness: Float, stress: Float, roots: Float, share: float, noise: float) -> Float | None:
-    """(u,) strains that make the stresses (u,) by a stiffness (u, u) that may be singular; None if it carries them not.
+    """(u,) strains that make the stresses (u,) by a stiffness (u, u), perhaps singular; None if it cannot carry them.
 
-    Each is scaled by the root (u,) of its own stiffness, so that none is small beside another.  Scaled stiffnesses of
-    less than `share` and scaled stresses of less than `noise` are the solver's error.
+    Roots (u,) of their own stiffnesses scale the strains, so that none is small beside another.  Scaled stiffnesses
+    below `share` and scaled stresses below `noise` are the solver's error.
     """
     eigenvalues, vectors = np.linalg.eigh((stiffness + stiffness.T) / (2 * np.outer(roots, roots)))
     along, resists = vectors.T @ (stress / roots), eigenvalues > share
@@ -70,45 +70,42 @@ def _strains(stiffness: Float, stress: Float, roots: Float, share: float, noise:
 
 
 def unresisted(solver: FetiSolver, by_stress: Bool, voigt: Float) -> Bool:
-    """(v,) which of the strains with given stresses (v,) have a share in one that strains no body.  Collective.
+    """(v,) strains, of prescribed stresses (v,), with a share in a strain that strains no body.  Collective.
 
-    Such a strain opens faces without multipliers alone; `voigt` (v, v) is the stress integral of bodies that do not
-    move.
-
-    Of such a strain rigid motions close all jumps of the torn cell, and the torn bodies bear no stress.
+    Such a strain opens faces without multipliers alone: rigid motions close the jumps of the torn cell, and the torn
+    bodies bear no stress.  `voigt` (v, v) is the stress integral of clamped bodies.
     """
-    unknown, found = np.flatnonzero(by_stress), np.zeros(len(by_stress), bool)
+    unknown, undetermined = np.flatnonzero(by_stress), np.zeros(len(by_stress), bool)
     torn = solver.d[:, unknown]
-    left = solver.natural.project(solver.active.restrict(torn))
-    sizes, open_jumps = (allreduce_sum(solver.comm, each.T @ each) for each in (torn, left))
+    opened = solver.natural.project(solver.active.restrict(torn))
+    sizes, open_jumps = (allreduce_sum(solver.comm, jumps.T @ jumps) for jumps in (torn, opened))
     largest = np.array([np.diag(sizes), np.abs(voigt[unknown, unknown])])
     scales = np.sqrt(np.where(largest > 0.0, largest, 1.0))
     pairs = zip((open_jumps, solver.torn_stiffness[np.ix_(unknown, unknown)]), scales, strict=True)
     values, vectors = np.linalg.eigh(sum(matrix / np.outer(scale, scale) for matrix, scale in pairs))
     shares = np.abs(vectors[:, values < UNRESISTED]) > UNCARRIED_SHARE
-    found[unknown] = shares.any(axis=1)
-    return np.asarray(solver.comm.bcast(found))
+    undetermined[unknown] = shares.any(axis=1)
+    return np.asarray(solver.comm.bcast(undetermined))
 
 
 def superposed(solver: FetiSolver, solutions: Sequence[DualSolution], factors: Float) -> DualSolution:
-    """Return the sum of solutions with the same active rows, each times its factor. Collective."""
-    strain, lam, jump = (
-        np.stack([getattr(each, name) for each in solutions], axis=1) @ factors for name in ("strain", "lam", "jump")
-    )
-    amplitudes = [each.alpha for each in solutions if each.alpha is not None]
+    """Return the sum of solutions with equal active rows, times factors.  Collective."""
+    triples = zip(*((solution.strain, solution.lam, solution.jump) for solution in solutions), strict=True)
+    strain, lam, jump = (np.stack(arrays, axis=1) @ factors for arrays in triples)
+    amplitudes = [solution.alpha for solution in solutions if solution.alpha is not None]
     if len(amplitudes) < len(solutions):
         return replace(solutions[0], strain=strain, lam=lam, jump=jump, alpha=None)
     alpha = np.stack(amplitudes, axis=1) @ factors
     torn = solver.natural.project(solver.active.restrict(solver.d @ strain))
     pairs = np.stack([torn, solver.active.restrict(jump)])
-    scale, left = np.sqrt(allreduce_sum(solver.comm, np.einsum("ij,ij->i", pairs, pairs)))
+    scale, residual = np.sqrt(allreduce_sum(solver.comm, np.einsum("ij,ij->i", pairs, pairs)))
     return DualSolution(
         strain,
         lam,
         jump,
         alpha,
-        max(each.iterations for each in solutions),
-        min(each.reason for each in solutions),
-        float(left / (scale or 1.0)),
+        max(solution.iterations for solution in solutions),
+        min(solution.reason for solution in solutions),
+        float(residual / (scale or 1.0)),
         solutions[0].compliance,
     )

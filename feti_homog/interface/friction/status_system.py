@@ -1,7 +1,7 @@
-"""The linear system of debonded faces with given statuses, factored, or kept up from statuses to neighbouring ones.
+"""The linear system of debonded faces with prescribed statuses, factored or updated from neighbouring statuses.
 
-The rows of M x = c are x_j where it is prescribed, (S x)_j where it is free, and (S x)_j + s mu (S x)_n of a slip that
-grows with the sign s.  Of R = [M^-1; S M^-1] a row r in place of row j changes rank one,
+The rows of M x = c are x_j for prescribed entries, (S x)_j for free ones, and (S x)_j + s mu (S x)_n for a slip that
+grows with the sign s.  Row r in place of row j changes R = [M^-1; S M^-1] by rank one,
 
     R <- R - R_:j (w - e_j)^T / w_j,      w = r M^-1,      det M <- w_j det M,
 
@@ -22,46 +22,46 @@ from feti_homog.typing import Bool, Float, Int
 STICK, FORWARD, OPEN_FACE, BACKWARD = 0, 1, 2, -1
 """Statuses of a debonded node: tied, sliding with a rising or a falling slip, apart."""
 
-# Stiffness, relative to that of a node, that holds what nothing else does where it is; steps of refinement remove it.
+# Stiffness, relative to a node's own, that holds free motions; steps of refinement remove it.
 HELD = 1e-9
-# A smaller pivot is that of a free motion: its sign is rounding.
+# A smaller pivot belongs to a free motion: its sign is rounding.
 LEAST_PIVOT = 1e-6
-# Free motions are looked for where a pivot is smaller, among a few more than such pivots, by inverse iteration, whose
-# steps leave HELD of what resists; their relative stiffness at most.
+# Smaller pivots ask for a search of free motions by inverse iteration, among some more vectors than such pivots; steps
+# of it, each of which leaves HELD of stiff motions; largest relative stiffness of a free motion.
 SOFT_PIVOT, MORE_MOTIONS, INVERSE_ITERATIONS, UNRESISTED = 1e-3, 3, 3, 0.1 * HELD
-# Steps of refinement at most, until each row is left with this share of its terms.
+# Largest number of refinements, until the residual of each row is this share of its terms.
 MOST_REFINEMENTS, ROUNDED = 20, 1e-14
-# What is left of rows, as a share of their terms, up to which no force drives a free motion.
+# Residuals of rows, relative to their terms, up to which no force drives a free motion.
 BALANCED = 1e-9
-# Changes that are kept beside R.
+# Changes that wait to be added to R.
 MOST_CHANGES = 32
-# Right-hand sides with no more entries are found from the columns of these alone.
+# Right-hand sides with no more entries use the columns of these alone.
 FEW = 8
-# Residual of a row of R, relative to its terms, that is too much after refinement; steps of refinement.
+# Residual of a row, relative to its terms, that refinement may not leave; steps of refinement.
 TOO_MUCH, REFINEMENTS = 1e-11, 3
 
 
 def free_rows(status: Status, friction: Float, by_stress: Bool) -> tuple[Bool, Float]:
-    """(m,) which entries of x are unknown, and (m,) s mu of sliding nodes at their slips, 0 elsewhere."""
+    """(m,) unknown entries of x, and (m,) s mu at the slips of sliding nodes, 0 elsewhere."""
     free = np.concatenate([np.stack([status == OPEN_FACE, status != STICK], axis=1).ravel(), by_stress])
     slope = np.zeros(len(free))
     slope[1 : 2 * len(status) : 2] = np.where(np.abs(status) == 1, status * friction, 0.0)
     return free, slope
 
 
-def residual(y: Float, given: Float, free: Bool, slope: Float) -> Float:
-    """(m,) what y = S x (m,) leaves of the rows `given` (m,) that are free, 0 of others."""
+def residual(y: Float, rhs: Float, free: Bool, slope: Float) -> Float:
+    """(m,) residual of y = S x (m,) in the free rows with the right-hand side (m,); 0 in prescribed rows."""
     sliding = np.flatnonzero(slope)
-    left = given - y
-    left[sliding] -= slope[sliding] * y[sliding - 1]
-    return np.where(free, left, 0.0)
+    missing = rhs - y
+    missing[sliding] -= slope[sliding] * y[sliding - 1]
+    return np.where(free, missing, 0.0)
 
 
-def largest_share(left: Float, terms: Float, slope: Float) -> float:
-    """Return the largest of residuals (m,), each relative to the terms (m,) of its row."""
+def largest_share(residuals: Float, terms: Float, slope: Float) -> float:
+    """Return the largest residual (m,), relative to the terms (m,) of its row."""
     size, sliding = terms.copy(), np.flatnonzero(slope)
     size[sliding] += np.abs(slope[sliding]) * terms[sliding - 1]
-    return float((np.abs(left) / np.where(size > 0.0, size, 1.0)).max(initial=0.0))
+    return float((np.abs(residuals) / np.where(size > 0.0, size, 1.0)).max(initial=0.0))
 
 
 class StatusSystem:
@@ -70,12 +70,12 @@ class StatusSystem:
     Sliding nodes have the row S_t + s mu S_n: their traction is s mu times the pressure.
 
     Attributes:
-        free: (m,) which entries of x are unknown.
-        sign: of the determinant; 0 where a motion is free.
+        free: (m,) unknown entries of x.
+        sign: sign of the determinant, 0 with a free motion.
     """
 
     def __init__(self, S: Float, free: Bool, slope: Float) -> None:
-        """`S` (m, m) of `CoulombFaces`; what is free, and the slopes, as of `free_rows`."""
+        """Factor the rows that `free_rows` describes, of S (m, m) of `CoulombFaces`."""
         self.free = free
         sliding = np.flatnonzero(slope)
         place = np.cumsum(self.free) - 1
@@ -87,7 +87,7 @@ class StatusSystem:
 
     @property
     def sign(self) -> int:
-        """Sign of the determinant, 0 where a motion is free."""
+        """Sign of the determinant, 0 with a free motion."""
         if self._factor is None:
             return 1
         lu, pivots = self._factor
@@ -96,35 +96,35 @@ class StatusSystem:
         swaps = int((pivots != np.arange(len(pivots))).sum())
         return int(np.prod(np.sign(lu.diagonal()))) * (-1 if swaps % 2 else 1)
 
-    def solve(self, x: Float, given: Float) -> tuple[Float, bool]:
-        """(m,) x with the rows `given` (m,), from a start with the entries that are not free, and whether it is one.
+    def solve(self, x: Float, rhs: Float) -> tuple[Float, bool]:
+        """(m,) x with the right-hand side (m,) from a start with the prescribed entries, and whether it is a solution.
 
-        What nothing determines stays as it was at the start.  If forces drive it there is no solution: x is then that
-        of a cell that is held.
+        Free motions stay as they were at the start.  If forces drive them there is no solution: then springs of the
+        stiffness HELD bear the forces.
         """
         start, x = x, x.copy()
         if self._factor is None:
             return x, True
-        terms, rows = np.abs(self._rows), given[self.free]
+        terms, rows = np.abs(self._rows), rhs[self.free]
         for _ in range(MOST_REFINEMENTS):
-            left = rows - self._rows @ x
-            # Soft motions, whose stiffness is near that by which they are held, take more steps.
-            if (np.abs(left) <= ROUNDED * (terms @ np.abs(x) + np.abs(rows))).all():
+            missing = rows - self._rows @ x
+            # Motions about as soft as HELD take more steps.
+            if (np.abs(missing) <= ROUNDED * (terms @ np.abs(x) + np.abs(rows))).all():
                 break
-            x[self.free] += lu_solve(self._factor, left, check_finite=False)
+            x[self.free] += lu_solve(self._factor, missing, check_finite=False)
         if not self._free_motions.shape[1]:
             return x, True
-        # Where forces balance, rounding over what holds has driven free motions, otherwise on other numbers of ranks.
+        # Where forces balance, rounding divided by HELD has driven free motions, otherwise on other numbers of ranks.
         stays = x.copy()
         stays[self.free] -= self._free_motions @ (self._free_motions.T @ (x - start)[self.free])
-        # A row without any stiffness, of shear along fibres that slide there, is rounding of others.
-        left = np.abs(rows - self._rows @ stays) - np.finfo(float).eps * np.abs(stays).max(initial=0.0)
-        balanced = bool((left <= BALANCED * (terms @ np.abs(stays) + np.abs(rows))).all())
+        # A row without any stiffness, as of shear along sliding fibres, has the rounding of other rows.
+        missing = np.abs(rows - self._rows @ stays) - np.finfo(float).eps * np.abs(stays).max(initial=0.0)
+        balanced = bool((missing <= BALANCED * (terms @ np.abs(stays) + np.abs(rows))).all())
         return stays if balanced else x, balanced
 
     @cached_property
     def _free_motions(self) -> Float:
-        """(free rows, k) orthonormal motions that nothing resists."""
+        """(free rows, k) orthonormal free motions."""
         rows = np.count_nonzero(self.free)
         soft = 0 if self._factor is None else np.count_nonzero(np.abs(self._factor[0].diagonal()) < SOFT_PIVOT)
         if not soft:
@@ -137,11 +137,11 @@ class StatusSystem:
 
 
 class FollowedStatuses:
-    """R of m entries of x, which come in any order and stay.
+    """R of m entries of x, which may arrive in any order.
 
     Attributes:
         S: (m, m) as of `CoulombFaces`.
-        free: (m,) which rows are those of S.
+        free: (m,) rows of S.
         slope: (m,) s mu of sliding nodes at their rows of slips, 0 elsewhere.
         sign: of det M.
     """
@@ -155,23 +155,23 @@ class FollowedStatuses:
         self._forget()
 
     def _forget(self) -> None:
-        """Keep no changes beside R."""
+        """Drop all waiting changes."""
         capacity = self._R.shape[1]
         self._U, self._V = np.zeros((2, capacity, MOST_CHANGES)), np.zeros((MOST_CHANGES, capacity))
         self._count = 0
 
     def turn(self, free: Bool, slope: Float) -> bool:
-        """Have these rows, and return whether that went without a pivot that is too small."""
-        left = np.flatnonzero((free != self.free) | (slope != self.slope))
-        while len(left):
-            failed = [j for j in left if not self._exchange(j, bool(free[j]), float(slope[j]))]
-            if len(failed) == len(left):
+        """Exchange rows for new ones; False if a pivot is too small."""
+        pending = np.flatnonzero((free != self.free) | (slope != self.slope))
+        while len(pending):
+            failed = [j for j in pending if not self._exchange(j, bool(free[j]), float(slope[j]))]
+            if len(failed) == len(pending):
                 return False
-            left = np.array(failed, np.int64)
+            pending = np.array(failed, np.int64)
         return True
 
     def _exchange(self, j: int, free: bool, slope: float) -> bool:
-        """Take another row j, unless its pivot is too small."""
+        """Exchange row j, unless its pivot is too small."""
         at = int(self._place[j])
         w = self._row(int(free), at)
         if slope:
@@ -202,36 +202,36 @@ class FollowedStatuses:
 
     def _inverse(self, c: Float) -> Float:
         """(m,) M^-1 c."""
-        size, own = self._size, np.empty(self._size)
-        own[self._place] = c
-        few = np.flatnonzero(own)
+        size, permuted = self._size, np.empty(self._size)
+        permuted[self._place] = c
+        few = np.flatnonzero(permuted)
         some = few if len(few) <= FEW else slice(size)
-        change = self._U[0, :size, : self._count] @ (self._V[: self._count, :size][:, some] @ own[some])
-        return np.asarray((self._R[0, :size, :size][:, some] @ own[some] - change)[self._place])
+        change = self._U[0, :size, : self._count] @ (self._V[: self._count, :size][:, some] @ permuted[some])
+        return np.asarray((self._R[0, :size, :size][:, some] @ permuted[some] - change)[self._place])
 
-    def solve(self, x: Float, given: Float, terms: Callable[[Float], Float]) -> tuple[Float, Float] | None:
-        """(m,) x and S x, with the rows `given` (m,), from a start that has the prescribed entries.
+    def solve(self, x: Float, rhs: Float, terms: Callable[[Float], Float]) -> tuple[Float, Float] | None:
+        """(m,) x and S x with the right-hand side (m,), from a start with the prescribed entries.
 
-        None if R has lost too many digits: each row is checked by its `terms`, sum_j |S_ij x_j|.
+        None if R has lost too many digits, measured by the terms sum_j |S_ij x_j| of each row.
         """
-        prescribed = np.where(self.free, given, x)
+        prescribed = np.where(self.free, rhs, x)
         if np.count_nonzero(prescribed) <= FEW:
             x = np.where(self.free, self._inverse(prescribed), x)
-        off = np.inf
+        error = np.inf
         for step in range(1 + REFINEMENTS):
             y = self.S @ x
-            left, before = residual(y, given, self.free, self.slope), off
-            off = largest_share(left, np.abs(given) + terms(x), self.slope)
-            if off <= ROUNDED or off > before / 2 or step == REFINEMENTS:
+            missing, before = residual(y, rhs, self.free, self.slope), error
+            error = largest_share(missing, np.abs(rhs) + terms(x), self.slope)
+            if error <= ROUNDED or error > before / 2 or step == REFINEMENTS:
                 break
-            x = np.where(self.free, x + self._inverse(left), x)
-        return (x, y) if off <= TOO_MUCH else None
+            x = np.where(self.free, x + self._inverse(missing), x)
+        return (x, y) if error <= TOO_MUCH else None
 
     def grow(self, S: Float, old: Int, other: Int, units: Float) -> bool:
-        """Prescribe more entries: of S (m', m') those that are here stand at the places `old` (m,), with their S.
+        """Add prescribed entries, so that the present ones stand at the places `old` (m,) of S (m', m').
 
-        Theirs has `units` (m,) of what S was scaled by.  Between the places `other` S may be another one.  False if a
-        pivot on the way is too small; then R is of no S.
+        Present entries get other `units` (m,), and those at the places `other` another S between them.  False if a
+        pivot on the way is too small; then R is worthless.
         """
         if not self._replace(np.flatnonzero(np.isin(old, other)), S[other[:, None], other], units):
             return False
@@ -242,7 +242,7 @@ class FollowedStatuses:
         free[old], slope[old], place[old], place[new] = self.free, self.slope, self._place, np.arange(size, m)
         self.S, self.free, self.slope, self._place = S, free, slope, place
         if m > self._R.shape[1]:
-            # Room for more to come.
+            # With room for more entries.
             R = np.empty((2, m + m // 4, m + m // 4))
             R[:, :size, :size] = self._R[:, :size, :size]
             self._R = R
@@ -265,9 +265,9 @@ class FollowedStatuses:
         return True
 
     def _replace(self, entries: Int, block: Float, units: Float) -> bool:
-        """Have another block of S between rising entries, and other units (m,) of all; False as `grow`.
+        """Replace the block of S between rising entries, and the units (m,) of all entries; False as `grow`.
 
-        While the entries are prescribed, their rows of M^-1 are those of the identity: no more of S M^-1 changes.
+        Prescribed entries have rows of the identity in M^-1, so that only their block of S M^-1 changes.
         """
         free, slope, at = self.free.copy(), self.slope.copy(), self._place[entries]
         free[entries], slope[entries] = False, 0.0

@@ -2,10 +2,10 @@
 
 Tavara, Mantic, Graciani, Paris, Eng. Anal. Bound. Elem. 35 (2011) 207; the mode-mixity law is Hutchinson and Suo's.
 
-Where debonding has begun, at a tip, it is what the break really releases that counts.  The energy of a tip's own spring
-falls with the length that it stands for, so that growth by it depends on the mesh.  What the break of bond i releases
-does not: with H the inverse of the dual operator on the active rows, its faces then part by j = H_ii^-1 lam_i, and the
-energy of the cell falls, at constant strain, by
+At a tip of debonding the released energy counts.  The energy in the spring of a tip falls with the length of its node,
+so that growth by it depends on the mesh.  The energy that the break of bond i releases does not: with H the inverse of
+the dual operator on the active rows, its faces then part by j = H_ii^-1 lam_i, and the energy of the cell falls, at
+constant strain, by
 
     1/2 lam_i . H_ii^-1 lam_i;  1/2 lam_t^2 / H_tt if they would overlap and the normal force stays.
 """
@@ -28,10 +28,9 @@ from feti_homog.typing import Bool, Float, Int
 if TYPE_CHECKING:
     from feti_homog.feti.exact.exact_inverse import ExactInverse
 
-# Share of the stiffness beside a bond that the inverse of the dual operator is where only rounding is left of it.
+# Blocks of H are rounding if smaller than this share of the stiffness beside the bond.
 RIGID = 1e-9
-# Largest rounding of the inverse of the dual operator with which energies are compared: bonds whose utilisation differs
-# by less break together.
+# Largest rounding of H with which energies are compared: bonds whose utilisation differs by less break together.
 MOST_ROUNDING = 1e-6
 
 
@@ -44,13 +43,9 @@ class SpringEnergy(SpringLaw):
 
     A traction along the fibre adds G_III = t_a^2 / (2 k_a) to G_II.
 
-    The attributes are those of all nodes, or (k,) of each.
-
     Attributes:
-        normal_stiffness, tangential_stiffness: k_n and k_t, stress per length.
         toughness: G_Ic, energy per area.
-        mode_sensitivity: lambda; 1 lets G_c not depend on the mode, 0 lets shear alone break nothing.
-        axial_stiffness: k_a, along the fibre.
+        mode_sensitivity: lambda; with 1 G_c is independent of the mode, with 0 shear alone breaks nothing.
     """
 
     normal_stiffness: float | Float
@@ -63,7 +58,7 @@ class SpringEnergy(SpringLaw):
 
     @classmethod
     def of_keys(cls, value: KeyValues) -> Self:
-        """Make the law from stiffnesses and toughness; that along the fibre is the tangential one by default."""
+        """Make the law from stiffnesses and toughness; the axial stiffness defaults to the tangential one."""
         return cls(
             value("normal_stiffness"),
             value("tangential_stiffness"),
@@ -73,25 +68,23 @@ class SpringEnergy(SpringLaw):
         )
 
     def mode_factor(self, traction: Float) -> Float:
-        """(k,) sqrt(G_Ic / G_c) of the modes of tractions (k, 2)."""
+        """(p,) sqrt(G_Ic / G_c) under tractions (p, c)."""
         # 1 / (1 + tan^2 x) = cos^2 x
         return np.asarray(np.cos((1.0 - self.mode_sensitivity) * self.mode_angle(traction)))
 
     def share(self, traction: Float) -> Float:
-        """(k,) sqrt((G_I + G_II) / G_c) of tractions (k, 2).
+        """(p,) sqrt((G_I + G_II) / G_c) of tractions (p, c).
 
-        Normal and tangential, or (k, 3), also along the fibre: 1 breaks.
-
-        Homogeneous of degree one in the traction, for psi does not depend on its size, and convex.
+        Homogeneous of degree one in the traction, for psi is independent of its size, and convex.
         """
         return np.asarray(np.sqrt(sum(self.energies(traction)) / self.toughness) * self.mode_factor(traction))
 
     def fracture_toughness(self, traction: Float) -> Float:
-        """(k,) G_c of the modes of tractions (k, 2), energy per area."""
+        """(p,) G_c under tractions (p, c), energy per area."""
         return np.asarray(self.toughness / self.mode_factor(traction) ** 2)
 
     def fracture(self, bonds: BondState, which: Bool, traction: Float) -> Float:
-        """(p,) G_c of the bonds `which` (k,) in the modes of tractions (k, c)."""
+        """(p,) G_c of bonds `which` (k,) under tractions (k, c)."""
         return self.at(np.flatnonzero(which)).fracture_toughness(traction[which])
 
 
@@ -100,11 +93,11 @@ class Tips:
     """The bonds of this rank beside broken ones.
 
     Attributes:
-        node: (t,) their numbers.
-        H: (t, 2, 2) their blocks of the inverse of the dual operator.
-        length: (t,) that they stand for.
-        stiffness: (t, c) the most that H can be, as `ExactInverse.stiffness`.
-        axial: (t,) the same blocks for slip along the fibres; empty where there is none.
+        node: (t,) node numbers.
+        H: (t, 2, 2) diagonal blocks of the inverse of the dual operator.
+        length: (t,) tributary lengths.
+        stiffness: (t, c) upper bound of H, as `ExactInverse.stiffness`.
+        axial: (t,) H for slip along the fibres; empty without this problem.
     """
 
     node: Int
@@ -114,12 +107,12 @@ class Tips:
     axial: Float
 
     def chosen(self, which: Int) -> Tips:
-        """Return some of them."""
+        """Return some tips."""
         axial = self.axial[which] if len(self.axial) else self.axial
         return Tips(self.node[which], self.H[which], self.length[which], self.stiffness[which], axial)
 
     def released(self, traction: Float, contact: bool) -> Float:
-        """(t,) energies that breaks release under tractions (t, c); with `contact` faces do not overlap."""
+        """(t,) energies that breaks under tractions (t, c) release; with `contact` faces do not overlap."""
         lam = traction * self.length[:, None]
         released = released_energy(self.H, lam[:, :2], self.stiffness[:, :2], contact)
         if len(self.axial) == 0:
@@ -131,13 +124,13 @@ class Tips:
 
 @dataclass(frozen=True, kw_only=True)
 class ReleasedEnergy(SpringEnergy):
-    """Bonds beside a broken one break when that releases G_c l, l being the length that they stand for.
+    """Bonds beside a broken one break when the break releases G_c l, with l their tributary length.
 
-    Others when the energy of their spring reaches G_c.
+    Other bonds break when the energy of their spring reaches G_c.
 
     Attributes:
-        influence: the inverse of the dual operator, which couples the bonds beside each other.
-        axial: that of slip along the fibres, where it counts.
+        influence: inverse of the dual operator, which couples neighbouring bonds.
+        axial: inverse for slip along the fibres, if that is a problem.
     """
 
     influence: ExactInverse
@@ -149,7 +142,7 @@ class ReleasedEnergy(SpringEnergy):
         return cls(**vars(springs), influence=influence, axial=axial)
 
     def in_state(self, cell: CoupledInterfaces, bonds: BondState) -> SpringsAndTips:
-        """Return the law of the nodes of this rank with these bonds.  Collective; its methods are not."""
+        """Return the law of this rank's nodes with these bonds.  Collective; its methods are not."""
         tips = self.tips(cell, bonds)
         number = np.full(len(bonds.status), -1)
         number[tips.node] = np.arange(len(tips.node))
@@ -157,10 +150,10 @@ class ReleasedEnergy(SpringEnergy):
         return SpringsAndTips(**springs, tips=tips, number=number, contact=cell.plane.contact)
 
     def tips(self, cell: CoupledInterfaces, bonds: BondState) -> Tips:
-        """Return the tips that this rank owns. Collective.
+        """Return the tips of this rank.  Collective.
 
         Raises:
-            ConvergenceError: rounding hides what breaks release.
+            ConvergenceError: rounding hides the released energy.
         """
         self._activate(self.influence, cell.plane, bonds)
         neighbours, first = self.influence.neighbours, self.influence.neighbours.first
@@ -170,17 +163,17 @@ class ReleasedEnergy(SpringEnergy):
         rows = neighbours.rows[numbers][:, None] + np.arange(2)
         H, axial = self.influence.inverse_blocks(rows)[mine], np.zeros(0)
         stiffness = self.influence.stiffness[rows[mine]]
-        own = numbers[mine] - first
+        node = numbers[mine] - first
         if self.axial is not None:
             self._activate(self.axial, cell.problems[1], bonds)
             rows = self.axial.neighbours.rows[numbers]
             axial = self.axial.inverse_blocks(np.stack([rows, rows], axis=1))[mine, 0, 0]
             stiffness = np.column_stack([stiffness, self.axial.stiffness[rows[mine]]])
-        return Tips(own, H, cell.nodes.length[own], stiffness, axial)
+        return Tips(node, H, cell.nodes.length[node], stiffness, axial)
 
     @staticmethod
     def _activate(influence: ExactInverse, interface: ContactProblem, bonds: BondState) -> None:
-        """Let the inverse be that with these bonds.  Collective; raises as `tips`."""
+        """Update the inverse to these bonds.  Collective; raises as `tips`."""
         interface.prepare(bonds)
         if not influence.rounding <= MOST_ROUNDING:
             raise ConvergenceError(
@@ -195,8 +188,8 @@ class SpringsAndTips(SpringEnergy):
     """Released energy in a state of the bonds: at tips sqrt(released / (G_c l)), at other nodes the springs.
 
     Attributes:
-        number: (p,) number of the tip at a node, or -1.
-        contact: faces do not overlap.
+        number: (p,) tip number of a node, or -1.
+        contact: whether faces do not overlap.
     """
 
     tips: Tips
@@ -204,7 +197,7 @@ class SpringsAndTips(SpringEnergy):
     contact: bool
 
     def share(self, traction: Float) -> Float:
-        """(p,) shares that tractions (p, c) at the nodes use."""
+        """(p,) shares of the strength that tractions (p, c) use."""
         used, at = super().share(traction), np.flatnonzero(self.number >= 0)
         springs, tips = self.at(at), self.tips.chosen(self.number[at])
         released = tips.released(traction[at], self.contact)
@@ -212,15 +205,15 @@ class SpringsAndTips(SpringEnergy):
         return used
 
     def convex(self, p: int) -> Bool:
-        """(p,) False at tips: what their breaks release need not be subadditive."""
+        """(p,) False at tips, whose released energy need not be subadditive."""
         return np.asarray(self.number < 0)
 
 
 def released_energy(H: Float, lam: Float, stiffness: Float, contact: bool) -> Float:
-    """(m,) energies that the breaks of single bonds release, for their blocks H (m, 2, 2) and forces lam (m, 2).
+    """(m,) energies that breaks of single bonds release, with blocks H (m, 2, 2) and forces lam (m, 2).
 
-    `stiffness` (m, 2) is the most that H can be: where H is rounding beside it, as at the last
-    bond of a fibre, no force can act.  With `contact` faces that would overlap keep their normal force.
+    `stiffness` (m, 2) bounds H: where H is rounding beside it, as at the last bond of a fibre, no force can act.  With
+    `contact` faces that would overlap keep their normal force.
     """
     root = np.sqrt(stiffness)
     share, vectors = np.linalg.eigh(H / (root[:, :, None] * root[:, None, :]))

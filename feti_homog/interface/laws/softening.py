@@ -1,17 +1,16 @@
-"""Cohesive laws: bonds soften under damage, tooth by tooth, with exactly the energy of the law; softening branches.
+"""Cohesive laws: bonds soften by damage, tooth by tooth, with exactly the energy of the law.
 
 Camanho, Davila, NASA/TM-2002-211737 (mixed mode); Benzeggagh, Kenane, Compos. Sci. Technol. 56 (1996) 439 (toughness);
 Rots, Belletti, Invernizzi, Eng. Fract. Mech. 75 (2008) 590 (saw teeth).
 
-All is in terms of the energy W that the undamaged springs would store at the same opening and slip, and of its shear
-share B:
+W is the energy that undamaged springs would store at the same opening and slip, B its share of shear:
 
     W_0 = 1 / ((1 - B) / W_n + B / W_t),  W_n = N^2 / (2 k_n),  W_t = S^2 / (2 k_t)     onset of damage,
     G_c = G_n + (G_t - G_n) B^eta                                                       energy of the law,
     traction / peak = tau(u),  sqrt(W / W_0) = x = 1 + s u,  s = (G_c / W_0 - 1) / (2 int tau)   softening,
     1 - d = tau / x                                                                     damage.
 
-So the law has taken W_0 phi at the damage d, phi = 2 int_0^x tau dx - tau x.  The tooth from the damage d_j to d_j+1
+So damage d takes the energy W_0 phi, phi = 2 int_0^x tau dx - tau x.  The tooth from the damage d_j to d_j+1
 breaks at W_j = W_0 (phi_j+1 - phi_j) / (d_j+1 - d_j) and takes W_j (d_j+1 - d_j): the energy of the law in between.
 """
 
@@ -34,31 +33,28 @@ from feti_homog.typing import Bool, Float, Int
 
 # Teeth of the default at most; steps of Newton's method.
 MOST_TEETH, NEWTON_STEPS = 10_000, 60
-# The last tooth begins where an exponential traction has fallen to this share of its peak.
+# The last tooth begins where an exponential traction is this share of its peak.
 EXPONENTIAL_TAIL = 0.01
 NUMBERS = ("normal_stiffness", "tangential_stiffness", "normal_strength", "tangential_strength",
            "normal_toughness", "tangential_toughness", "mixing_exponent")  # fmt: skip
 
 
 def numbers(value: Callable[..., float | Float]) -> dict[str, Any]:
-    """Return the numbers of a law; the stiffness along the fibre is the tangential one by default."""
+    """Return the numbers of a law; the axial stiffness defaults to the tangential one."""
     axial = value("axial_stiffness", "tangential_stiffness")
     return {name: value(name) for name in NUMBERS} | {"axial_stiffness": axial}
 
 
 @dataclass(frozen=True)
 class CohesiveLaw(SpringLaw):
-    """A law that softens.  The history of a bond is the number of teeth that broke.
-
-    The attributes are those of all nodes, or (k,) of each.  All shear counts alike.
+    """A law that softens; the history of a bond is its number of broken teeth.
 
     Attributes:
-        normal_stiffness, tangential_stiffness, axial_stiffness: k_n, k_t, k_a of undamaged springs.
         normal_strength, tangential_strength: N and S.
         normal_toughness, tangential_toughness: G_n and G_t.
         mixing_exponent: eta.
-        levels: the damage d_0 = 0 < ... < d_n = 1 between the teeth.
-        level: teeth that broke.
+        levels: damage d_0 = 0 < ... < d_n = 1 between teeth.
+        level: number of broken teeth.
     """
 
     normal_stiffness: float | Float
@@ -76,26 +72,25 @@ class CohesiveLaw(SpringLaw):
 
     @classmethod
     def of_keys(cls, value: KeyValues) -> Self:
-        """Make the law of [interface], with the number of teeth that the case asks for."""
+        """Make the law of [interface], with the teeth that the case asks for."""
         law, branch = cls(**numbers(value), levels=(0.0, 1.0)), cls.branch(value)
-        # Of all sections, so that the ranks agree.
+        # All sections together, so that ranks agree.
         everywhere = cls(**numbers(value.everywhere), levels=(0.0, 1.0), **branch)
         levels = everywhere.levels_for(value.common("teeth"), value.common("softening_tolerance"))
         return replace(law, levels=levels, **branch)
 
     @classmethod
     def branch(cls, value: KeyValues) -> dict[str, Any]:
-        """Return the fields that describe the softening branch."""
+        """Return the fields of the softening branch."""
         return {}
 
     def levels_for(self, teeth: int | None, tolerance: float) -> tuple[float, ...]:
-        """Levels of damage with constant quotients of the openings, in the pure mode with the largest G_c / W_0.
+        """Return damage levels with a constant ratio of openings, in the pure mode with the largest G_c / W_0.
 
-        Without a number of `teeth` it is the least with which the first tooth exceeds the peak by no more than
-        `tolerance` of it.
+        Without `teeth` the smallest number is taken whose first tooth exceeds the peak by at most `tolerance` of it.
 
         Raises:
-            CaseError: that takes more than MOST_TEETH.
+            CaseError: the number is above MOST_TEETH.
         """
         s = self._longest_branch
         for n in [teeth] if teeth else range(1, MOST_TEETH + 1):
@@ -113,25 +108,25 @@ class CohesiveLaw(SpringLaw):
 
     @property
     def _longest_branch(self) -> float:
-        """The largest s of the pure modes of any node."""
+        """Largest s of the pure modes at any node."""
         onsets = self._onsets
         ratios = self.normal_toughness / onsets[0], self.tangential_toughness / onsets[1]
-        largest = max(float(np.max(each, initial=0.0)) for each in map(np.asarray, ratios))
+        largest = max(float(np.max(ratio, initial=0.0)) for ratio in map(np.asarray, ratios))
         return max(0.0, largest - 1.0) / (2.0 * float(self.area(np.inf)))
 
     @property
     def overshoot(self) -> float:
-        """Excess of the first tooth over the peak traction, relative to that, in the pure mode where it is largest."""
+        """Largest excess of the first tooth over the peak traction in pure modes, relative to the peak."""
         return float(np.sqrt(self._taken(self._damages[1:2], self._longest_branch)[0] / self.levels[1])) - 1.0
 
     @property
     @abstractmethod
     def last(self) -> float:
-        """The u at which the last tooth ends, or from which on it takes what is left."""
+        """The u at which the last tooth ends, or begins to take the rest."""
 
     @abstractmethod
     def shape(self, u: Float) -> Float:
-        """tau(u) of u >= 0: 1 at 0, falling."""
+        """tau(u) for u >= 0: 1 at 0, falling."""
 
     @abstractmethod
     def area(self, u: Float | float) -> Float | float:
@@ -139,46 +134,46 @@ class CohesiveLaw(SpringLaw):
 
     @abstractmethod
     def opening(self, d: Float, s: Float | float) -> Float:
-        """(p,) the u with tau(u) = (1 - d) (1 + s u), for d < 1."""
+        """(p,) u with tau(u) = (1 - d) (1 + s u), for d < 1."""
 
     def begin(self, k: int) -> Float:
-        """(k, 1) no tooth broke."""
+        """(k, 1) no broken teeth."""
         return np.zeros((k, 1))
 
     def in_state(self, cell: CoupledInterfaces, bonds: BondState) -> Self:
-        """Return the law of the teeth that come next."""
+        """Return the law of the next teeth."""
         return replace(self, level=bonds.history[:, 0])
 
     def share(self, traction: Float) -> Float:
         """(p,) sqrt(W / W_j) of tractions (p, c) at bonds with j broken teeth.
 
-        Of degree one, for B does not depend on the size of the traction.
+        Homogeneous of degree one, for B is independent of the traction's size.
         """
         first, second = self.energies(traction)
         tooth = np.minimum(np.asarray(self.level, np.int64), len(self.levels) - 2)
         return np.asarray(np.sqrt((first + second) / self._breaking(traction, tooth)) / (1.0 - self._damages[tooth]))
 
     def after(self, bonds: BondState, which: Bool, traction: Float) -> tuple[Float, Bool]:
-        """(k, 1) teeth that broke after one more of the bonds `which`, and which bonds lost the last."""
+        """(k, 1) broken teeth with one more at the bonds `which`, and (k,) bonds that lost the last."""
         history = bonds.history + which[:, None]
         return history, which & (history[:, 0] >= len(self.levels) - 1)
 
     def damage(self, bonds: BondState) -> Float:
-        """(k,) d, 1 of bonds that broke from the start too."""
+        """(k,) d, 1 for all parted bonds."""
         d = self._damages[bonds.history[:, 0].astype(np.int64)]
         return np.asarray(np.where(bonds.status == 0, d, 1.0))
 
     def softening(self, bonds: BondState, pulled: Bool) -> Float:
-        """(k, 3) 1 / (1 - d); 1 of pressed normal springs, and of parted bonds, whose faces press with those."""
+        """(k, 3) 1 / (1 - d); 1 for pressed normal springs and for parted bonds, whose faces press by them."""
         d = self._damages[bonds.history[:, 0].astype(np.int64)]
         factor = 1.0 / (1.0 - np.where(d < 1.0, d, 0.0))
         return np.column_stack([np.where(pulled, factor, 1.0), factor, factor])
 
     def fracture(self, bonds: BondState, which: Bool, traction: Float) -> Float:
-        """(p,) W_j (d_j+1 - d_j) of the teeth that break."""
-        law, own = self.at(np.flatnonzero(which)), traction[which]
+        """(p,) W_j (d_j+1 - d_j) of the breaking teeth."""
+        law, selected = self.at(np.flatnonzero(which)), traction[which]
         tooth = bonds.history[which, 0].astype(np.int64)
-        return np.asarray(law._breaking(own, tooth) * np.diff(self._damages)[tooth])
+        return np.asarray(law._breaking(selected, tooth) * np.diff(self._damages)[tooth])
 
     def onset(self) -> QuadraticStrength:
         """Return the criterion of the onset of damage."""
@@ -187,7 +182,7 @@ class CohesiveLaw(SpringLaw):
 
     @property
     def _damages(self) -> Float:
-        """(n + 1,) the levels."""
+        """(n + 1,) levels."""
         return np.array(self.levels)
 
     @property
@@ -197,7 +192,7 @@ class CohesiveLaw(SpringLaw):
         return normal**2 / (2.0 * self.normal_stiffness), tangential**2 / (2.0 * self.tangential_stiffness)
 
     def _breaking(self, traction: Float, tooth: Int) -> Float:
-        """(p,) W_j of the teeth (p,) or one, in the modes of tractions (p, c)."""
+        """(p,) W_j of teeth, (p,) or one number, in the modes of tractions (p, c)."""
         first, second = self.energies(traction)
         stored = first + second
         B = np.divide(second, stored, out=np.zeros(len(stored)), where=stored > 0.0)
@@ -209,7 +204,7 @@ class CohesiveLaw(SpringLaw):
         return np.asarray(onset * (self._taken(high, s) - self._taken(low, s)) / (high - low))
 
     def _taken(self, d: Float, s: Float | float) -> Float:
-        """(p,) phi at the damage d: what the law has taken, over W_0."""
+        """(p,) phi at the damage d: energy that the law has taken, over W_0."""
         d, s = np.asarray(d, float), np.asarray(s)
         inside = d < 1.0
         below = np.where(inside, d, 0.0)
@@ -220,14 +215,14 @@ class CohesiveLaw(SpringLaw):
 
 @dataclass(frozen=True)
 class PiecewiseLinear(CohesiveLaw):
-    """tau falls in straight lines between `knots` (m,) with the values `heights` (m,), from 1 to 0."""
+    """tau is piecewise linear, with `heights` (m,) from 1 to 0 at `knots` (m,)."""
 
     knots: tuple[float, ...] = (0.0, 1.0)
     heights: tuple[float, ...] = (1.0, 0.0)
 
     @property
     def last(self) -> float:
-        """Return where tau is none at first."""
+        """First zero of tau."""
         return self.knots[self.heights.index(0.0)]
 
     def shape(self, u: Float) -> Float:
@@ -243,16 +238,16 @@ class PiecewiseLinear(CohesiveLaw):
         return np.asarray(areas[k] + (u - knots[k]) * (heights[k] + self.shape(np.asarray(u))) / 2.0)
 
     def opening(self, d: Float, s: Float | float) -> Float:
-        """(p,) the u with tau(u) = (1 - d) (1 + s u), in the piece where that changes sign."""
+        """(p,) u with tau(u) = (1 - d) (1 + s u), in the piece with a change of sign."""
         if len(self.knots) == 2:
             return np.asarray(d / ((1.0 - d) * s + 1.0 / self.knots[1]))
         knots, heights = np.array(self.knots), np.array(self.heights)
-        kept = 1.0 - np.asarray(d)
-        above = heights - kept[..., None] * (1.0 + np.asarray(s)[..., None] * knots) >= 0.0
+        intact = 1.0 - np.asarray(d)
+        above = heights - intact[..., None] * (1.0 + np.asarray(s)[..., None] * knots) >= 0.0
         k = np.clip(above.sum(axis=-1) - 1, 0, len(knots) - 2)
         slope = (heights[k + 1] - heights[k]) / (knots[k + 1] - knots[k])
         # tau_k + slope (u - u_k) = kept + kept s u
-        return np.asarray((heights[k] - slope * knots[k] - kept) / (kept * s - slope))
+        return np.asarray((heights[k] - slope * knots[k] - intact) / (intact * s - slope))
 
 
 @dataclass(frozen=True)
@@ -262,11 +257,11 @@ class Bilinear(PiecewiseLinear):
 
 @dataclass(frozen=True)
 class Table(PiecewiseLinear):
-    """Traction over opening in mode I from a table; in other modes the branch is stretched to their toughness."""
+    """Traction over opening in mode I from a table; other modes stretch the branch to their toughness."""
 
     @classmethod
     def branch(cls, value: KeyValues) -> dict[str, Any]:
-        """Return knots and heights from the openings and tractions, the first of which are those of the peak."""
+        """Return knots and heights from openings and tractions, which begin at the peak."""
         openings, tractions = np.array(value.common("openings")), np.array(value.common("tractions"))
         return {"knots": tuple(openings / openings[0] - 1.0), "heights": tuple(tractions / tractions[0])}
 
@@ -277,7 +272,7 @@ class Exponential(CohesiveLaw):
 
     @property
     def last(self) -> float:
-        """Return where little is left."""
+        """The u of the exponential tail."""
         return -math.log(EXPONENTIAL_TAIL)
 
     def shape(self, u: Float) -> Float:
@@ -289,7 +284,7 @@ class Exponential(CohesiveLaw):
         return np.asarray(-np.expm1(-np.asarray(u)))
 
     def opening(self, d: Float, s: Float | float) -> Float:
-        """(p,) the root of u + ln(1 + s u) = -ln(1 - d), which Newton's method reaches from below."""
+        """(p,) root of u + ln(1 + s u) = -ln(1 - d), by Newton's method from below."""
         right = -np.log1p(-np.asarray(d))
         u = right / (1.0 + s)
         for _ in range(NEWTON_STEPS):

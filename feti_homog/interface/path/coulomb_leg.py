@@ -1,8 +1,7 @@
-"""Legs of paths with friction on debonded faces: linear pieces, between which statuses change or bonds break.
+"""Legs with friction on debonded faces: linear pieces, between which statuses change or bonds break.
 
-An equal load step is an implicit one: slips grow from where they were with the sign of the traction behind it.  The way
-within the step is not known: its heat is that of the slips under the forces behind it, and the work of the loads what
-is stored, lost or heat.
+An equal load step is implicit: slips grow with the sign of the traction at its end.  The way within a step is unknown:
+its heat is the work of final forces on slips, and the work of the loads is stored, released or heat.
 """
 
 from __future__ import annotations
@@ -27,26 +26,24 @@ from feti_homog.interface.path.path_points import Energies, PathState, Point
 from feti_homog.system.parallel.mpi_errors import on_root
 from feti_homog.typing import Float
 
-# Share of a leg without a point, after which a change of statuses is one.
+# Share of a leg between points, after which a change of statuses is a point.
 LEAST_SHARE = 0.01
-# Share of a load within which the largest one that is carried is found.
+# Relative accuracy of the largest load that the cell carries.
 LEAST_STEP = 1e-9
-# Changes in a row at the same load, after which they count as a cycle.
+# Changes at one load that count as a cycle.
 MOST_CHANGES_AT_A_LOAD = 200
-# Shares of a leg, and what is left of a jump or a strain relative to what it was, that are rounding: an unloaded cell
-# bears nothing.
+# Rounding of leg shares, and of vanishing jumps and strains relative to their last values.
 ROUNDING = 1e-12
 CYCLE = "friction: the statuses of the faces change without end at one load (a cycle)"
 
 
 class CoulombLeg(Leg):
-    """Leg at whose rising share s statuses (n,) of faces change, and with them scaled x (m,) of `CoulombFaces`.
+    """Leg with statuses (n,) of faces and scaled x (m,), as in `CoulombFaces`.
 
-    From a state the rates of the faces are those of a problem of complementarity, and hold up to the first of: a face
-    reaches a limit of its status, a bond its strength, s = 1.
+    The rates of a state solve a problem of complementarity, and are constant until a face reaches a limit of its
+    status, a bond its strength, or s = 1.
 
-    A break is a step at constant load, with the statuses that are admissible behind it: slips grow from where they
-    were with the sign of the traction.
+    A break is an implicit step at constant load to admissible statuses.
     """
 
     _state: Equilibrium | None
@@ -60,14 +57,14 @@ class CoulombLeg(Leg):
         begin: PathState,
         sliding: SlidingCell,
     ) -> None:
-        """Settle at `begin`, where the next change of statuses is the `_first` if it is a waypoint.  Collective."""
+        """Settle at `begin`; the first change of statuses after a waypoint is a point.  Collective."""
         super().__init__(cell, law, waypoints, leg, begin)
         self.sliding, self._first, self._changes = sliding, begin.position == 0.0, 0
         self._settle(begin)
 
     @property
     def state(self) -> Equilibrium:
-        """Equilibrium at s, found once.  Collective."""
+        """Equilibrium at s, computed once.  Collective."""
         if self._state is None:
             loads = [*self.waypoints[: self.leg], self._load_at(self._share)]
             self._state = self.sliding.equilibrium(loads, self._bonds, self._x)
@@ -77,7 +74,7 @@ class CoulombLeg(Leg):
         return replace(super()._path_state(), stretched=self.sliding.stretched(self._x))
 
     def _on_root(self, find: Callable[..., tuple[Status, Float]], *arguments: Any) -> tuple[Status, Float]:
-        """Return the statuses and the array that rank 0 finds, whose product every rank keeps.  Collective."""
+        """Return statuses and x that rank 0 finds; every rank stores their product.  Collective."""
         faces = self.sliding.faces
 
         def found() -> tuple[Status, Float, Float]:
@@ -89,21 +86,21 @@ class CoulombLeg(Leg):
         return status, x
 
     def _given(self, share: float, x: Float) -> Prescribed:
-        """Return what is prescribed at a share of the leg, with the slips of scaled x."""
+        """Return the load at a share of the leg, with the slips of scaled x."""
         load = self._load_at(share)
         return Prescribed(load.by_stress, self.sliding.given(load), x[1 : 2 * len(self.sliding.rows) : 2])
 
     def _stand(self, status: Status, x: Float, mean: Macroscopic, way: Energies) -> None:
-        """Stand at s with statuses and scaled x, after a way with these energies."""
+        """Take statuses and scaled x, after a way with these energies."""
         self._energies = self._energies.plus(way)
         self._bonds = self.sliding.bonds(self._bonds, status, x)
         self._status, self._x, self._mean, self._state = status, x, mean, None
 
     def _settle(self, begin: PathState) -> None:
-        """Find the state at s with the bonds of `begin`, after its break if it has one.  Collective.
+        """Find the state at s with the bonds of `begin`, after its break if any.  Collective.
 
-        The faces lose half the product of their forces, before and after a break, and their jumps; of that the slips
-        make heat by the forces after it, and the break has lost the rest.
+        In a break faces lose the product of jumps and mean forces; slips turn a part into heat by the final forces, and
+        the break has released the rest.
         """
         sliding, self._bonds = self.sliding, begin.bonds
         self._status, self._x = status, x = sliding.begin(begin.bonds, begin.last.strain)
@@ -111,25 +108,25 @@ class CoulombLeg(Leg):
         if begin.broken is None:
             return
         self._mean, faces = begin.last, sliding.faces
-        status, there = self._on_root(faces.search, status, faces.all_allowed(), self._given(self._share, x), x)
-        lost, heat = (own / self.cell.area for own in faces.losses(status, x, there))
-        # Springs of the bonds that soften do not keep what they were stretched by before.
+        status, after = self._on_root(faces.search, status, faces.all_allowed(), self._given(self._share, x), x)
+        lost, heat = (loss / self.cell.area for loss in faces.losses(status, x, after))
+        # Softening bonds lose the energy of their springs.
         lost += begin.stretched - sliding.stretched(x)
-        lost += sliding.released_along(begin.last, sliding.macroscopic(there))
-        self._go_straight(status, there, lost - heat, heat, begin.broken)
+        lost += sliding.released_along(begin.last, sliding.macroscopic(after))
+        self._go_straight(status, after, lost - heat, heat, begin.broken)
         self._first = True
 
     def _go_straight(self, status: Status, x: Float, released: float, heat: float, fracture: float = 0.0) -> None:
-        """Go straight to scaled x with these statuses, on a way that loses these energies."""
+        """Advance straight to scaled x with these statuses, and losses of energy."""
         before, mean = self._mean, self.sliding.macroscopic(x)
         work = 0.5 * float((before.stress + mean.stress) @ (mean.strain - before.strain))
         self._stand(status, x, mean, Energies(work, released, fracture, heat))
 
     def _advance(self) -> Iterator[Point]:
-        """Go on along the rates up to the next change, and past it.
+        """Advance along the rates up to the next change, and past it.
 
         Raises:
-            NotCarriedError: nothing carries more, which a point at the largest load comes before.
+            NotCarriedError: nothing carries more, after a point at the largest load.
             StuckError: no statuses go on, or they change without end.
         """
         faces, share = self.sliding.faces, self._share
@@ -151,39 +148,39 @@ class CoulombLeg(Leg):
             raise StuckError(CYCLE)
 
     def _follow(self, status: Status, rate: Float) -> bool:
-        """Go straight along a rate of x up to the next change, and return whether bonds break there.  Collective."""
+        """Advance along a rate of x up to the next change, and return whether bonds break then.  Collective."""
         faces, share, sliding = self.sliding.faces, self._share, self.sliding
         status, x = self._on_root(faces.settled, status, self._given(share, self._x), self._x)
         change, rest = self.cell.comm.bcast(faces.next_change(status, x, rate)), 1.0 - share
         if change >= rest - ROUNDING:
             change = np.inf
-        tractions = (sliding.traction(each) for each in (x, x + min(rest, change) * rate))
+        tractions = (sliding.traction(state) for state in (x, x + min(rest, change) * rate))
         breaks = first_break(self.cell, self.law, sliding.bonds(self._bonds, status, x), *tractions)
         way = min(breaks, 1.0) * min(rest, change)
-        there = x + way * rate
-        rounded = (there != 0.0) & (np.abs(there) <= ROUNDING * np.abs(x))
-        there[rounded] = 0.0
+        after = x + way * rate
+        rounded = (after != 0.0) & (np.abs(after) <= ROUNDING * np.abs(x))
+        after[rounded] = 0.0
         if not rounded.any():
-            faces.keep(there, faces.product(x) + way * faces.product(rate))
-        self._go_straight(status, there, 0.0, faces.heat(status, x, there) / self.cell.area)
+            faces.keep(after, faces.product(x) + way * faces.product(rate))
+        self._go_straight(status, after, 0.0, faces.heat(status, x, after) / self.cell.area)
         self._share = 1.0 if breaks > 1.0 and change >= rest else share + way
         return breaks <= 1.0
 
     def _go_to(self, share: float) -> None:
-        """Go to a share of the leg in one step, or to the largest one before it that is carried.  Collective.
+        """Advance to a share of the leg in one step, or to the largest share that the cell carries.  Collective.
 
         Raises:
-            NotCarriedError: nothing is carried beyond the last step.
+            NotCarriedError: the cell carries nothing beyond the last step.
         """
         sliding, x = self.sliding, self._x
         self._share, self.limit = on_root(self.cell.comm, self._carried, share)
-        status, there = self._on_root(sliding.faces.step, self._status, self._given(self._share, x), x)
-        heat = sliding.faces.heat_behind(status, x, there) / self.cell.area
-        way = Energies(sliding.stored(there) - sliding.stored(x) + heat, 0.0, 0.0, heat)
-        self._stand(status, there, sliding.macroscopic(there), way)
+        status, after = self._on_root(sliding.faces.step, self._status, self._given(self._share, x), x)
+        heat = sliding.faces.heat_behind(status, x, after) / self.cell.area
+        way = Energies(sliding.stored(after) - sliding.stored(x) + heat, 0.0, 0.0, heat)
+        self._stand(status, after, sliding.macroscopic(after), way)
 
     def _carried(self, share: float) -> tuple[float, NotCarriedError | None]:
-        """Return this share of the leg, or the largest one that is carried and why no more is."""
+        """Return this share of the leg, or the largest one that the cell carries with the error beyond it."""
         low, high, faces = self._share, share, self.sliding.faces
         try:
             faces.step(self._status, self._given(share, self._x), self._x)

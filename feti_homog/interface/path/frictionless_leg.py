@@ -1,4 +1,4 @@
-"""Legs of paths without friction: the load is controlled and the response piecewise linear."""
+"""Legs without friction: the load is controlled and the response piecewise linear."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from feti_homog.interface.path.onset import first_break, first_change
 from feti_homog.interface.path.path_points import UTILISATION_TIE, PathState, Point, most_utilised
 from feti_homog.typing import Float
 
-# Shares of a leg that are not distinguished.
+# Shares of a leg that count as equal.
 LEAST_SHARE = 1e-9
-# A response is on a straight line if it is off by no more than this many relative tolerances of the Krylov method, and
-# by no more than rounding leaves of the best solves, both relative to the largest stress of the line.  The solver,
-# which begins with the multipliers of the line, was off by a few hundredths of a tolerance.
+# A response is on a straight line up to this many relative tolerances of the Krylov method, or up to the rounding in
+# the best solves, both relative to the largest stress of the line.  The solver, which begins with the multipliers of
+# the line, had errors of a few hundredths of a tolerance.
 OFF_LINE_PER_RTOL, OFF_LINE_ROUNDING = 10.0, 1e-10
 
 
@@ -32,20 +32,18 @@ class FrictionlessLeg(Leg):
 
     From the equilibrium at s the transitions are
 
-        overloaded   By a break, or at tips by a change of contact, with which the energy jumps that they release.  The
-                     worst bonds break: a point; equilibrium at the same s without them.
-        advance      With the response linear from here on, predict where the first bond breaks, where the contact
-                     begins to change, and where the leg ends.  Equilibrium at the first of these; if the stress is
-                     not on the line, or a bond is overloaded, something comes before: halve the way until that is
-                     not so.  What was reached is
+        overloaded   by a break, or at tips by a change of contact, with which their released energy jumps.  The worst
+                     bonds break: a point; equilibrium at the same s without them.
+        advance      With a linear response, predict the first break, the beginning of a change of contact, and the
+                     end of the leg.  Equilibrium at the first of these; if the stress is not on the line, or a bond
+                     is overloaded, an event was missed: halve the way until none is.  The result is
           a break    the worst bonds break: a point; equilibrium at the same s without them;
           a change   a point; equilibrium a little further, where the change is beyond doubt;
-          less       a point if contact states are others than before.
-        touch        Open faces carry nothing of what the stresses of the load become: a point where they touch.
+          less       a point if contact states have changed.
+        touch        Open faces do not carry the stresses of the load: a point where they touch.
         end          s = 1: a point.
 
-    A change that was predicted and does not come is a false alarm: up to the next change predictions are not used, and
-    only halving finds it.
+    A predicted change that does not come is a false alarm: up to the next change only halving finds changes.
     """
 
     _state: Equilibrium
@@ -54,7 +52,7 @@ class FrictionlessLeg(Leg):
         self, cell: CoupledInterfaces, law: BondLaw, waypoints: Sequence[Load], leg: int, begin: PathState
     ) -> None:
         super().__init__(cell, law, waypoints, leg, begin)
-        # Up to where the line is known to bend, and whether a predicted change did not come.
+        # Share before which the line bends, and whether the last prediction was a false alarm.
         self._bends_before, self._false_alarm, self._from = np.inf, False, begin
 
     @property
@@ -63,7 +61,7 @@ class FrictionlessLeg(Leg):
         return self._state
 
     def points(self) -> Iterator[Point]:
-        """Yield the points of the leg, up to a solve that does not converge.  Collective."""
+        """Yield the points of the leg, up to a solve without convergence.  Collective."""
         self._settle(self._from)
         yield from super().points()
 
@@ -81,7 +79,7 @@ class FrictionlessLeg(Leg):
         return self.cell.equilibrium(self._load_at(share), bonds, lam)
 
     def _stand(self, share: float, state: Equilibrium) -> None:
-        """Stand at a share of the leg with its equilibrium, and add the energies of the way."""
+        """Take the equilibrium at a share of the leg, and add the energies of the way."""
         if share >= self._bends_before:
             self._bends_before = np.inf
         self._share, self._state, self._bonds = share, state, state.bonds
@@ -90,34 +88,34 @@ class FrictionlessLeg(Leg):
         self._from = self._path_state()
 
     def _advance(self) -> Iterator[Point]:
-        """Go on to the next event, or part of the way, and yield its points.  Collective.
+        """Advance to the next event, or part of the way, and yield its points.  Collective.
 
         Raises:
-            NotCarriedError: neither open faces carry the stresses of the load nor touching ones.
+            NotCarriedError: neither open nor touching faces carry the stresses of the load.
         """
         state, share = self._state, self._share
         try:
-            ahead = self.cell.linear(self.end, state.bonds, state.multipliers)
+            end = self.cell.linear(self.end, state.bonds, state.multipliers)
         except NotCarriedError:
             beyond = min(share + LEAST_SHARE, 1.0)
-            there = self._solve(beyond, state.bonds, state.multipliers)
-            self._stand(share, self._solve(share, there.bonds, there.multipliers))
+            touching = self._solve(beyond, state.bonds, state.multipliers)
+            self._stand(share, self._solve(share, touching.bonds, touching.multipliers))
             yield self._turn(beyond)
-            self._stand(beyond, there)
+            self._stand(beyond, touching)
             self._false_alarm = False
         else:
-            yield from self._advance_towards(ahead)
+            yield from self._advance_towards(end)
 
-    def _advance_towards(self, ahead: Sequence[DualSolution]) -> Iterator[Point]:
-        """Go to the next event, or as far towards it as the response to `ahead` is straight, and past it.
+    def _advance_towards(self, end: Sequence[DualSolution]) -> Iterator[Point]:
+        """Advance to the next event, or as far as the response is straight, and past it.
 
-        `ahead` is the end of the leg with the contact states as they are.
+        `end` has the solutions at the end of the leg with fixed contact states.
         """
         before, share = self._state, self._share
-        breaks, begins, certain = self._predict(ahead)
+        breaks, begins, certain = self._predict(end)
         target = min(breaks, begins, 1.0)
         is_here = target - share <= LEAST_SHARE and (target == begins or (target == breaks and self._is_due()))
-        reached = is_here or self._approach(target, ahead)
+        reached = is_here or self._approach(target, end)
         if reached and target == breaks and self._is_due():
             yield from self._break()
         elif reached and target == begins:
@@ -128,14 +126,14 @@ class FrictionlessLeg(Leg):
                 yield from self._turned()
         yield from self._break_overloaded()
 
-    def _predict(self, ahead: Sequence[DualSolution]) -> tuple[float, float, float]:
-        """Shares of the leg where a bond breaks, where the contact begins to change, and where that is beyond doubt.
+    def _predict(self, end: Sequence[DualSolution]) -> tuple[float, float, float]:
+        """Return the shares of the leg at which a bond breaks, contact begins to change, and is beyond doubt.
 
-        What does not happen on the leg is at infinity.
+        Shares are infinite without such an event on the leg.
         """
         cell, state, rest = self.cell, self._state, 1.0 - self._share
-        breaks = first_break(cell, self.law, state.bonds, cell.traction(state.solutions), cell.traction(ahead))
-        begins, certain = (1.0, 1.0) if self._false_alarm else first_change(cell.plane, state, ahead[0])
+        breaks = first_break(cell, self.law, state.bonds, cell.traction(state.solutions), cell.traction(end))
+        begins, certain = (1.0, 1.0) if self._false_alarm else first_change(cell.plane, state, end[0])
         if begins == 1.0:
             begins = certain = np.inf
         return self._share + rest * breaks, self._share + rest * begins, self._share + rest * certain
@@ -144,48 +142,48 @@ class FrictionlessLeg(Leg):
         """Return whether the worst bonds are at their strength."""
         return self._used()[1] > 1.0 - UTILISATION_TIE
 
-    def _approach(self, target: float, ahead: Sequence[DualSolution]) -> bool:
-        """Stand at the target, or at the first half, quarter, ... of the way up to which the response is straight.
+    def _approach(self, target: float, end: Sequence[DualSolution]) -> bool:
+        """Advance to the target, or to the first half, quarter, ... of the way with a straight response.
 
-        Whether it is the target.
+        Return whether it is the target.
         """
-        start, here, reached = self._share, self._state, True
+        start, begin, reached = self._share, self._state, True
         nearest = min(start + LEAST_SHARE, 1.0)
         target = max(target, nearest)
         if target >= self._bends_before:
             target, reached = max((start + self._bends_before) / 2, nearest), False
         while True:
             way = (target - start) / (1.0 - start)
-            lam = tuple((1.0 - way) * a + way * b.lam for a, b in zip(here.multipliers, ahead, strict=True))
-            state = self._solve(target, here.bonds, lam)
-            if target <= nearest or not state.converged or self._continues(ahead, way, state):
+            lam = tuple((1.0 - way) * a + way * b.lam for a, b in zip(begin.multipliers, end, strict=True))
+            state = self._solve(target, begin.bonds, lam)
+            if target <= nearest or not state.converged or self._continues(end, way, state):
                 break
             self._bends_before, reached = target, False
             target = max((start + target) / 2, nearest)
         self._stand(target, state)
         return reached
 
-    def _continues(self, ahead: Sequence[DualSolution], way: float, state: Equilibrium) -> bool:
-        """Return whether no bond is overloaded in a state, and its response on the line to `ahead`.  Collective."""
+    def _continues(self, end: Sequence[DualSolution], way: float, state: Equilibrium) -> bool:
+        """Return whether a state overloads no bond and has its response on the line to `end`.  Collective."""
         cell = self.cell
         _, used, _ = most_utilised(cell, self.law, state)
-        here, there = self._mean, cell.macroscopic(ahead)
-        ends = np.stack([self._response(here), self._response(there)])
-        off = np.abs((1.0 - way) * ends[0] + way * ends[1] - self._response(cell.macroscopic(state.solutions))).max()
-        strains = np.stack([here.strain, there.strain])
+        before, after = self._mean, cell.macroscopic(end)
+        ends = np.stack([self._response(before), self._response(after)])
+        error = np.abs((1.0 - way) * ends[0] + way * ends[1] - self._response(cell.macroscopic(state.solutions))).max()
+        strains = np.stack([before.strain, after.strain])
         largest = max(np.abs(ends).max(), np.abs(cell.least_bonded_stress(strains)).max())
         tolerance = max(OFF_LINE_PER_RTOL * cell.plane.solver.rtol, OFF_LINE_ROUNDING)
-        return bool(used <= 1.0 + UTILISATION_TIE and off <= tolerance * largest)
+        return bool(used <= 1.0 + UTILISATION_TIE and error <= tolerance * largest)
 
     def _response(self, state: Macroscopic) -> Float:
-        """(n,) what the load leaves open: stresses, and strains times a stiffness."""
+        """(n,) components that the load does not prescribe: stresses, and strains times a stiffness."""
         return np.where(self.end.by_stress, self.cell.plane.scales.largest_stiffness * state.strain, state.stress)
 
     def _change(self, beyond: float, from_state: Equilibrium) -> Iterator[Point]:
-        """Report the state in which the contact begins to change, and go on to where the change is beyond doubt.
+        """Yield the state in which contact begins to change, and advance until the change is beyond doubt.
 
-        If there is a point here, of a break or a waypoint, report the state after the change instead.  Faces that touch
-        without a force may open on the way here from `from_state`.
+        If a break or a waypoint is a point at this s, yield the state after the change instead.  Faces that touch
+        without a force may have opened since `from_state`.
         """
         before, beyond = self._state, min(max(beyond, self._share + LEAST_SHARE), 1.0)
         there_is_one = self._share <= self._reported + LEAST_SHARE
@@ -197,14 +195,14 @@ class FrictionlessLeg(Leg):
             yield from self._turned()
 
     def _turned(self) -> Iterator[Point]:
-        """Report the state after a change of contact; a break here is the point otherwise."""
+        """Yield the state after a change of contact, unless a break at this s is a point."""
         if not self._is_overloaded():
             yield self._turn(self._share)
 
     def _turn(self, position: float) -> Point:
-        """Return the state here as a point at which nothing breaks and from which the path goes on at `position`."""
+        """Return the state as a point without a break, from which the path goes on at `position`."""
         return self._point(0, 0, replace(self._path_state(), position=position))
 
     def _differs(self, before: Equilibrium) -> bool:
-        """Return whether contact states are other than before; collective."""
+        """Return whether contact states have changed.  Collective."""
         return bool(self.cell.comm.allreduce(bool(self._state.bonds.differs(before.bonds).any()), MPI.LOR))

@@ -1,6 +1,6 @@
-"""A leg of a path: the stretch of load between two waypoints, by events or in equal steps.
+"""A leg of a path: the load between two waypoints, by events or in equal steps.
 
-Two engines follow the load: `FrictionlessLeg` solves equilibria, `CoulombLeg` the rates of faces that rub.
+Two engines follow the load: `FrictionlessLeg` solves equilibria, `CoulombLeg` rates of faces with friction.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ from feti_homog.typing import Bool, Float
 
 
 class Leg(ABC):
-    """Leg `leg` between two loads of the same kinds, at rising share s of it.
+    """Leg `leg` between two loads of equal kinds, at its rising share s.
 
     Bonds break at constant load: a point, then the state after the break at the same s.
 
     Attributes:
-        limit: why the last step ended before its load, None if it did not.
+        limit: error that ended the last step before its load, or None.
     """
 
     limit: NotCarriedError | None = None
@@ -41,7 +41,7 @@ class Leg(ABC):
     def __init__(
         self, cell: CoupledInterfaces, law: BondLaw, waypoints: Sequence[Load], leg: int, begin: PathState
     ) -> None:
-        """Begin at the position of `begin`, on the way from its origin to waypoint `leg`.  Collective."""
+        """Begin at the position of `begin` on the way to waypoint `leg`.  Collective."""
         self.cell, self.law, self.leg, self.waypoints = cell, law, leg, waypoints
         self.end = waypoints[leg]
         self.origin = begin.last if begin.position == 0.0 else begin.origin
@@ -57,25 +57,25 @@ class Leg(ABC):
 
     @abstractmethod
     def _settle(self, begin: PathState) -> None:
-        """Find the state at s with the bonds of `begin`, after its break if it has one.  Collective."""
+        """Find the state at s with the bonds of `begin`, after its break if any.  Collective."""
 
     @abstractmethod
     def _advance(self) -> Iterator[Point]:
-        """Go on to the next event, or part of the way, and yield its points.  Collective."""
+        """Advance to the next event, or part of the way, and yield its points.  Collective."""
 
     @abstractmethod
     def _go_to(self, share: float) -> None:
-        """Go to a share of the leg in one step, with the bonds as they are.  Collective."""
+        """Advance to a share of the leg in one step, with fixed bonds.  Collective."""
 
     def points(self) -> Iterator[Point]:
-        """Yield the points of the leg, up to a solve that does not converge.  Collective."""
+        """Yield the points of the leg, up to a solve without convergence.  Collective."""
         yield from self._break_overloaded()
         while not self._is_over():
             yield from self._advance()
         yield self._point(0, 0, replace(self._path_state(), leg=self.leg + 1, position=0.0))
 
     def step(self, number: int, steps: int, worst_only: bool) -> Point:
-        """Return the point after step `number`, from 1, of all steps of the path.  Collective."""
+        """Return the point after step `number`, from 1, of the steps of the path.  Collective."""
         before, parted = self._bonds.history, 0
         self._go_to(number * len(self.waypoints) / steps - self.leg)
         while self._is_overloaded():
@@ -98,13 +98,13 @@ class Leg(ABC):
         return self._share >= 1.0
 
     def _used(self) -> tuple[Float, float, Bool]:
-        """Return `most_utilised` of the state, found once.  Collective."""
+        """Return `most_utilised` for the state, computed once.  Collective."""
         if self._utilisation is None or self._utilisation[0] is not self.state:
             self._utilisation = self.state, most_utilised(self.cell, self.law, self.state)
         return self._utilisation[1]
 
     def _is_overloaded(self) -> bool:
-        """Return whether bonds break at s: a break or a change of contact has overloaded them.  Collective."""
+        """Return whether a break or a change of contact has overloaded bonds.  Collective."""
         return self._used()[1] > 1.0 + UTILISATION_TIE and self.state.converged
 
     def _break_overloaded(self) -> Iterator[Point]:
@@ -118,11 +118,11 @@ class Leg(ABC):
         self._settle(broken)
 
     def _release(self, which: Bool) -> tuple[int, int, PathState]:
-        """Return how many bonds of `which` (k,) part, how many soften, and the path state then.  Collective."""
+        """Break the bonds `which` (k,): numbers that part and that soften, and the path state.  Collective."""
         return break_bonds(self.cell, self.law, which, self.state, self._path_state())
 
     def _point(self, broke: int, softened: int, after: PathState) -> Point:
-        """Return the point at s, at which so many bonds part and so many soften.  Collective."""
+        """Return the point at s, with the numbers of bonds that part and that soften.  Collective."""
         energies, self._energies, self._reported = self._energies, NO_ENERGIES, self._share
         load_factor = (self.leg + self._share) / len(self.waypoints)
         return Point(load_factor, 1.0, self.state, broke, softened, energies, self._used()[0], after)

@@ -1,12 +1,12 @@
-"""Ends of a straight response: the first bond breaks, or the contact begins to change.
+"""Ends of a straight response: the first bond breaks, or contact begins to change.
 
-The first bond of a linear cell breaks under tractions t0 + f t1, f being the factor of the load.  The utilisation u is
-homogeneous of degree one in the tractions, so without t0 the factor is 1 / u(t1).  With t0, laws with a formula for it
-use that.  Others are convex along a ray, pass 1 once, and
+The first bond of a linear cell breaks under tractions t0 + f t1, with load factor f.  The utilisation u is homogeneous
+of degree one in the tractions, so without t0 the factor is 1 / u(t1).  With t0, some laws have a formula; for others u
+is convex along a ray, passes 1 once, and
 
     (1 - u(t0)) / u(t1)  <=  f  <=  (1 + u(-t0)) / u(t1),
 
-for u is subadditive: only bonds whose lower bound is below the least upper bound are searched.
+for u is subadditive: only bonds with a lower bound below the smallest upper bound are searched.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ from feti_homog.interface.laws.bond_law import BISECTIONS, BondLaw
 from feti_homog.interface.path.path_points import UTILISATION_TIE
 from feti_homog.typing import Bool, Float, Int
 
-# Parts of a straight way in which a utilisation that is not convex is looked at.
+# Parts of a straight way at whose ends a utilisation without convexity is evaluated.
 PARTS = 32
 
 
 @dataclass(frozen=True)
 class Onset:
-    """First break of the bonds of a cell whose debonded faces do not touch.
+    """First break in a cell whose debonded faces do not touch.
 
     Attributes:
-        bonds: law of the nodes of this rank in the state of the bonds.
-        bonded: (k,) which nodes have a bond.
+        bonds: law of this rank's nodes in their state.
+        bonded: (k,) nodes with a bond.
     """
 
     bonds: BondLaw
@@ -43,93 +43,93 @@ class Onset:
 
     @classmethod
     def of(cls, law: BondLaw, cell: CoupledInterfaces, bonds: BondState) -> Onset:
-        """Make the onset of a law with these bonds.  Collective."""
+        """Make the onset for a law and a state of the bonds.  Collective."""
         return cls(law.in_state(cell, bonds), np.asarray(bonds.status == BONDED))
 
     def utilisation(self, traction: Float, node: Int) -> Float:
-        """(p,) share of what breaks them that tractions (p, c) at the nodes (p,) use; 0 of debonded ones."""
+        """(p,) utilisation by tractions (p, c) at the nodes (p,), 0 if debonded."""
         return np.where(self.bonded[node], self.bonds.at(node).share(traction), 0.0)
 
-    def factors(self, ahead: Float, least: Float, before: Float | None = None) -> Float:
-        """(n, k) the f >= 0 at which each bond breaks under each of n rays of tractions.
+    def factors(self, direction: Float, noise: Float, before: Float | None = None) -> Float:
+        """(n, k) factors f >= 0 at which bonds break under n rays of tractions, inf for bonds that are not the first.
 
-        Tractions are `before` (k, c) + f `ahead` (n, k, c); inf where none breaks, or where it is not the first by far.
-
-        Utilisations by `ahead` of at most `least`, (n,) or (n, k), are none.  `before` alone breaks nothing.
+        Tractions are `before` (k, c) + f `direction` (n, k, c); `before` alone breaks nothing.  Utilisations by
+        `direction` up to `noise`, (n,) or (n, k), count as zero.
         """
-        n, k, c = ahead.shape
+        n, k, c = direction.shape
         ray, node = np.divmod(np.arange(n * k), max(k, 1))
-        used, found = self.utilisation(ahead.reshape(-1, c), node), np.full(n * k, np.inf)
-        loaded = np.flatnonzero(used > np.broadcast_to(least.reshape(n, -1), (n, k)).ravel())
+        used, factors = self.utilisation(direction.reshape(-1, c), node), np.full(n * k, np.inf)
+        loaded = np.flatnonzero(used > np.broadcast_to(noise.reshape(n, -1), (n, k)).ravel())
         if before is None:
-            found[loaded] = 1.0 / used[loaded]
+            factors[loaded] = 1.0 / used[loaded]
         else:
-            at, along = node[loaded], ahead.reshape(-1, c)[loaded]
-            known = self.bonds.at(at).first_factor(before[at], along)
-            if known is None:
-                known = self._searched(before[at], along, at, ray[loaded], used[loaded], n)
-            found[loaded] = known
-        return found.reshape(n, k)
+            at, along = node[loaded], direction.reshape(-1, c)[loaded]
+            exact = self.bonds.at(at).first_factor(before[at], along)
+            if exact is None:
+                exact = self._searched(before[at], along, at, ray[loaded], used[loaded], n)
+            factors[loaded] = exact
+        return factors.reshape(n, k)
 
-    def _searched(self, before: Float, ahead: Float, node: Int, ray: Int, used: Float, n: int) -> Float:
-        """(p,) factors of bonds by halving an interval, inf of those that break later than another of their ray.
+    def _searched(self, before: Float, direction: Float, node: Int, ray: Int, used: Float, n: int) -> Float:
+        """(p,) factors of bonds by bisection, inf for bonds that break after another one of their ray.
 
-        Tractions are `before` + f `ahead` (p, c) at the nodes (p,) on the rays (p,) of n.
+        Tractions are `before` + f `direction` (p, c) at the nodes (p,) on the rays (p,) of n.
         """
         bonds = self.bonds.at(node)
         lower, upper = (1.0 - bonds.share(before)) / used, (1.0 + bonds.share(-before)) / used
         first, is_convex = np.full(n, np.inf), bonds.convex(len(used))
         np.minimum.at(first, ray[is_convex], upper[is_convex])
-        near = np.flatnonzero((lower <= first[ray] * (1.0 + UTILISATION_TIE)) | ~is_convex)
-        found = np.full(len(used), np.inf)
-        found[near] = bonds.at(near).crossing(before[near], ahead[near], upper[near])
-        return found
+        some = np.flatnonzero((lower <= first[ray] * (1.0 + UTILISATION_TIE)) | ~is_convex)
+        factors = np.full(len(used), np.inf)
+        factors[some] = bonds.at(some).crossing(before[some], direction[some], upper[some])
+        return factors
 
 
-def first_break(cell: CoupledInterfaces, law: BondLaw, bonds: BondState, here: Float, there: Float) -> float:
-    """Share of the way between tractions (k, c) at which the first bond reaches its strength, or inf.  Collective.
+def first_break(cell: CoupledInterfaces, law: BondLaw, bonds: BondState, before: Float, after: Float) -> float:
+    """Return the share of the way between tractions (k, c) at which the first bond breaks, or inf.  Collective.
 
-    Utilisation that is convex along a straight way, below 1 here and above 1 there, passes 1 once: bisection.  Others
-    are bisected up to the first of some equal parts at whose end they are above 1.
+    A convex utilisation, below 1 at the beginning and above 1 at the end, passes 1 once: bisection.  Without convexity
+    the first part of the way with a utilisation above 1 at its end is bisected.
     """
     law, bonded = law.in_state(cell, bonds), bonds.status == BONDED
-    step, low, high = there - here, np.zeros(len(here)), np.full(len(here), np.inf)
-    parts = 1 if law.convex(len(here)).all() else PARTS
+    step, low, high = after - before, np.zeros(len(before)), np.full(len(before), np.inf)
+    parts = 1 if law.convex(len(before)).all() else PARTS
     for k in range(1, parts + 1):
-        passes = bonded & (law.share(here + k / parts * step) > 1.0) & np.isinf(high)
+        passes = bonded & (law.share(before + k / parts * step) > 1.0) & np.isinf(high)
         low, high = np.where(passes, (k - 1) / parts, low), np.where(passes, k / parts, high)
     over = np.isfinite(high)
     high = np.where(over, high, 1.0)
     for _ in range(BISECTIONS if over.any() else 0):
         middle = (low + high) / 2
-        broken = law.share(here + middle[:, None] * step) > 1.0
+        broken = law.share(before + middle[:, None] * step) > 1.0
         low, high = np.where(broken, low, middle), np.where(broken, middle, high)
     return float(cell.comm.allreduce(high[over].min(initial=np.inf), MPI.MIN))
 
 
-def first_change(interface: ContactProblem, state: Equilibrium, ahead: DualSolution) -> tuple[float, float]:
-    """Shares of the way to `ahead` at which the contact begins to change, and at which that is beyond doubt; or 1, 1.
+def first_change(interface: ContactProblem, state: Equilibrium, end: DualSolution) -> tuple[float, float]:
+    """Return the shares of the way to `end` at which contact begins to change, and is beyond doubt; or 1, 1.
 
-    Beyond doubt means that a tension or an overlap is twice what counts as the solver's error.  A closed node opens
-    when its force is none; open nodes of a fibre that is held close when their gap is none, those of a free
-    fibre when it has no more room (its gaps are not unique).  Collective.
+    Beyond doubt a tension or an overlap is twice the solver's error.  A closed node opens when its force vanishes; open
+    nodes of a fixed fibre close when their gap vanishes, open nodes of a free fibre when the fibre has no more room
+    (its gaps are not unique).  Collective.
     """
     solver, nodes = interface.solver, interface.nodes
-    tension = np.maximum(interface.scales.force_noise(state.solution), interface.scales.force_noise(ahead))
-    # Damaged bonds turn from pulled to pressed, or back, where their force is none.
+    tension = np.maximum(interface.scales.force_noise(state.solution), interface.scales.force_noise(end))
+    # Damaged bonds change between tension and compression when their force vanishes.
     damaged = interface.damaged(state.bonds)
     at = (state.status == CLOSED) | damaged
     pressure = np.where(damaged & ~state.bonds.pressed, 1.0, -1.0)[at]
-    here, there = (pressure * lam[nodes.row][at] for lam in (state.solution.lam, ahead.lam))
-    shares = [shares_to_zero(here, there, tension[at])]
+    before, after = (pressure * lam[nodes.row][at] for lam in (state.solution.lam, end.lam))
+    shares = [shares_to_zero(before, after, tension[at])]
     # Faces without contact overlap.
     is_open = (state.status == OPEN) & interface.contact
-    here, there = state.solution.jump[nodes.row], ahead.jump[nodes.row]
-    noise = max(interface.scales.gap_noise(state.solution.strain), interface.scales.gap_noise(ahead.strain))
+    before, after = state.solution.jump[nodes.row], end.jump[nodes.row]
+    noise = max(interface.scales.gap_noise(state.solution.strain), interface.scales.gap_noise(end.strain))
     if interface.contact and solver.natural.unconstrained_modes.shape[1]:
-        shares.append(FloatingBodies(solver.comm, solver.natural, nodes, is_open, noise).admissible_share(here, there))
+        bodies = FloatingBodies(solver.comm, solver.natural, nodes, is_open, noise)
+        shares.append(bodies.admissible_share(before, after))
     else:
-        shares.append(shares_to_zero(here[is_open], there[is_open], noise))
-    least = np.min(shares, axis=0)
-    solver.comm.Allreduce(MPI.IN_PLACE, least, MPI.MIN)
-    return float(least[0]), float(least[1])
+        shares.append(shares_to_zero(before[is_open], after[is_open], noise))
+    first = np.min(shares, axis=0)
+    solver.comm.Allreduce(MPI.IN_PLACE, first, MPI.MIN)
+    return float(first[0]), float(first[1])

@@ -1,12 +1,11 @@
 """Load-induced debonding, Section III.F: the load follows a path, bonds over their strength break.
 
-`events` finds every break exactly.  The first leg of the path starts at zero, where for zero initial gaps the
-response is homogeneous of degree one: one solve gives the load at which the next bond breaks, be it lower than
-the last (snap-back).  On later legs it is the load that is controlled, see `leg`.  `increments` is the paper's
-loop.
+`events` finds every break exactly.  On the first leg from zero, without initial gaps, the response is homogeneous of
+degree one: one solve gives the load of the next break, which may be lower than the last (snap-back).  Later legs
+control the load, see `leg`.  `increments` is the paper's loop.
 
-Energy.  A break happens at constant load, at which stresses or strains jump, and loses work less stored energy; between
-breaks nothing is lost.  A point's `energies` are those of the way from the last point's state to its own.
+Energy.  A break happens at constant load, at which stresses or strains jump, and releases work minus stored energy;
+between breaks no energy is lost.  The `energies` of a point belong to the way from the last point.
 """
 
 from __future__ import annotations
@@ -22,21 +21,20 @@ from feti_homog.interface.path.leg import Leg
 from feti_homog.interface.path.path_points import Energies, PathState, Point, break_bonds, most_utilised
 
 Engine = Callable[[CoupledInterfaces, BondLaw, Sequence[Load], int, PathState], Leg]
-"""From cell, law, waypoints, number and begin of a leg to the leg."""
+"""Makes a leg from the cell, the law, the waypoints, the leg's number and its beginning."""
 
 
 def events(
     cell: CoupledInterfaces, law: BondLaw, waypoints: Sequence[Load], begin: PathState, engine: Engine = FrictionlessLeg
 ) -> Iterator[Point]:
-    """Every break along zero -> waypoints[0] -> ..., and the end of each leg.  Collective.
+    """Yield every break along zero -> waypoints[0] -> ..., and the end of each leg.  Collective.
 
-    A leg begins with what the state has of the components that its waypoint gives, strain or stress.  A point's state
-    is the one before its bonds break.  On later legs, and with friction on all, the changes of contact are points too,
-    with `broke` = 0: between points the response is straight.  The last point is one that did not converge, if there is
-    one.
+    A leg begins with the strains or stresses, as its waypoint prescribes, of the state before.  The state of a point
+    precedes its break.  On later legs, and with friction on all, changes of contact are points too, with `broke` = 0:
+    between points the response is straight.  A point without convergence is the last one.
 
     Raises:
-        NotCarriedError: nothing goes on from the last point, the limit of the load.
+        NotCarriedError: the last point is the limit of the load.
     """
     for leg in range(begin.leg, len(waypoints)):
         if leg == 0 and engine is FrictionlessLeg:
@@ -46,7 +44,7 @@ def events(
         for point in points:
             yield point
             if not point.state.converged:
-                # What breaks next cannot be decided on a state that does not hold.
+                # The next break cannot follow from a wrong state.
                 return
             begin = point.after
 
@@ -60,11 +58,11 @@ def increments(
     begin: PathState,
     engine: Engine = FrictionlessLeg,
 ) -> Iterator[Point]:
-    """Yield the paper's loop: at each of `steps` equal load steps, release overloaded bonds until none is left.
+    """Yield the paper's loop: at each of `steps` equal load steps, release all overloaded bonds.  Collective.
 
-    A point's state is the one after its bonds broke.  `begin.leg` is the number of steps done.  With `worst_only`
-    just the most overloaded bonds are released at a time.  The last point is one that did not converge, if there is
-    one; where nothing carries the load of a step with friction, it is at the largest load that is carried.  Collective.
+    The state of a point follows its breaks.  `begin.leg` is the number of finished steps.  With `worst_only` the worst
+    bonds are released first, alone.  A point without convergence is the last one; with friction the last point may be
+    at the largest load that the cell carries.
 
     Raises:
         NotCarriedError: nothing carries more, or a step has no admissible statuses.
@@ -85,20 +83,20 @@ def increments(
 
 
 def _first_leg(cell: CoupledInterfaces, law: BondLaw, load: Load, legs: int, begin: PathState) -> Iterator[Point]:
-    """From zero to the load through all equilibria.
+    """Yield the points from zero to the load, through all equilibria.
 
-    With the bonds of now, a state under t times the load is t times the state, for t >= 0.
+    With fixed bonds, the state under t times the load is t times the state, for t >= 0.
     """
     factor = begin.position
     while True:
         state = cell.equilibrium(load, begin.bonds, begin.lam)
-        whole, lam = cell.macroscopic(state.solutions), state.multipliers
-        here = whole.scaled(factor)
-        energies = begin.energies_to(here)
+        full, lam = cell.macroscopic(state.solutions), state.multipliers
+        before = full.scaled(factor)
+        energies = begin.energies_to(before)
         used, largest, worst = most_utilised(cell, law, state)
         factor = 1.0 / max(largest, 1.0)
-        reached = whole.scaled(factor)
-        energies = energies.plus(Energies(reached.stored - here.stored, 0.0, 0.0))
+        reached = full.scaled(factor)
+        energies = energies.plus(Energies(reached.stored - before.stored, 0.0, 0.0))
         if largest <= 1.0:
             after = PathState(1, 0.0, state.bonds, lam, reached, reached)
             yield Point(1.0 / legs, 1.0, state, 0, 0, energies, used, after)
