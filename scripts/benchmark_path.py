@@ -29,7 +29,7 @@ from feti_homog.homogenization.unit_cell import TornCell, tear  # noqa: E402
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces  # noqa: E402
 from feti_homog.interface.contact.states import BONDED, BondState  # noqa: E402
 from feti_homog.interface.laws.strength import MaxStrength  # noqa: E402
-from feti_homog.interface.loads.load import Load  # noqa: E402
+from feti_homog.interface.loads import Load  # noqa: E402
 from feti_homog.interface.path.path_following import events  # noqa: E402
 from feti_homog.interface.path.path_points import unloaded  # noqa: E402
 from feti_homog.system.petsc.options import case_options  # noqa: E402

@@ -12,7 +12,7 @@ from feti_homog.homogenization.averaging import Response
 CHECK_ERROR_PER_RTOL = 1e3
 # And whatever the tolerance: what is wrong by more than this is no result.
 MAX_CHECK_ERROR = 1e-4
-# Largest error of the KKT conditions that passes, relative to the scales of `contact_certificate.kkt_errors`.
+# Largest error of the KKT conditions that passes, relative to the scales of `interface.contact.states.kkt_errors`.
 CONTACT_TOLERANCE = 1e-6
 
 

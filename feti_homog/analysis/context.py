@@ -19,7 +19,7 @@ from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.load_scales import ABSURD
 from feti_homog.interface.contact.states import OPEN, BondState, Equilibrium
-from feti_homog.interface.loads.load import Load
+from feti_homog.interface.loads import Load
 from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS
 from feti_homog.results.checkpoint import Checkpoint
 from feti_homog.results.events_in_memory import NoCheckpoint

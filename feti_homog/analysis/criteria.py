@@ -5,8 +5,7 @@ from __future__ import annotations
 from feti_homog.errors import CaseError
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.laws.bond_law import BondLaw
-from feti_homog.interface.laws.energy import SpringEnergy
-from feti_homog.interface.laws.released import ReleasedEnergy
+from feti_homog.interface.laws.energy import ReleasedEnergy, SpringEnergy
 
 
 def criterion_of(cell: TornCell, grows: bool = False) -> BondLaw:
@@ -30,4 +29,4 @@ def _at_tips(cell: TornCell, springs: SpringEnergy) -> ReleasedEnergy:
     known = [inverse for inverse in inverses if inverse is not None]
     if len(known) < len(inverses):
         raise CaseError('[interface] growth = "released": needs -feti_pc_type influence; or growth = "springs"')
-    return ReleasedEnergy(springs, *known)
+    return ReleasedEnergy.of(springs, *known)

@@ -22,6 +22,7 @@ from feti_homog.analysis.tip_records import DIRECTION_DIGITS, bond_directions
 from feti_homog.case.loads import Envelope
 from feti_homog.errors import CaseError
 from feti_homog.homogenization.averaging import Response, asymmetry
+from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.path.onset import Onset
 from feti_homog.interface.path.path_points import UTILISATION_TIE
 from feti_homog.materials.voigt import voigt_names
@@ -78,7 +79,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     angles = 360.0 * np.arange(section.directions) / section.directions
     rays = rays_of(section.plane, angles, stiffness, columns.get("thermal_stress"), section.temperature or 0.0)
     law = criterion_of(context.cell)
-    finder = _Finder(context, responses, Onset.of(law, context.loads.interfaces, bonds))
+    finder = _Finder(context, responses, law, Onset.of(law, context.loads.interfaces, bonds))
     pairs = zip(angles, finder.points(rays), strict=True)
     points = tuple(EnvelopePoint(angle=float(angle), **point) for angle, point in pairs)
     secants: dict[str, Any] = {"effective_stiffness": stiffness} | columns
@@ -111,10 +112,10 @@ def rays_of(
 class _Finder:
     """Finds the first bond that breaks on each ray."""
 
-    def __init__(self, context: AnalysisContext, responses: Sequence[Response], onset: Onset) -> None:
+    def __init__(self, context: AnalysisContext, responses: Sequence[Response], law: BondLaw, onset: Onset) -> None:
         """Take the responses to the unit loads.  Collective."""
         cell = context.cell
-        self._comm, self._onset, self._loads = cell.comm, onset, context.loads.names
+        self._comm, self._law, self._onset, self._loads = cell.comm, law, onset, context.loads.names
         self._problems, self._noise = context.loads.interfaces.problems, context.plane.interface.scales.sign_noise
         self._unit = _tractions(context, responses)
         self._most = max(1, self._comm.allreduce(self._unit.shape[1], MPI.MAX))
@@ -164,7 +165,7 @@ class _Finder:
             end = first + len(problem.solver.problem.loads)
             of_one = np.zeros((len(self._fibre), components))
             of_one[:, part] = 1.0
-            total += problem.scales.bond_stress(loads[:, first:end].T).T * self._onset.bonds.law.share(of_one)
+            total += problem.scales.bond_stress(loads[:, first:end].T).T * self._law.share(of_one)
             first = end
         return self._noise * total
 
@@ -196,11 +197,11 @@ class _Finder:
 
     def _break_names(self, components: int) -> tuple[str, ...]:
         """Return the keys of a break under a traction with this number of components."""
-        return tuple(self._onset.bonds.law.break_names)[:components]
+        return tuple(self._law.break_names)[:components]
 
     def _breaks(self, node: Int, traction: Float) -> Float:
         """(p, d) the same for tractions (p, c) at the nodes (p,)."""
-        return self._onset.bonds.law.at(node).breaks(traction)
+        return self._law.at(node).breaks(traction)
 
 
 def _tractions(context: AnalysisContext, responses: Sequence[Response]) -> Float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -22,10 +23,10 @@ from feti_homog.homogenization.averaging import Response
 from feti_homog.interface.friction.coulomb_faces import StuckError
 from feti_homog.interface.friction.sliding_cell import SlidingCell
 from feti_homog.interface.laws.bond_law import BondLaw
+from feti_homog.interface.path.coulomb_leg import CoulombLeg
+from feti_homog.interface.path.frictionless_leg import FrictionlessLeg
 from feti_homog.interface.path.path_following import events, increments
 from feti_homog.interface.path.path_points import Energies, Point, unloaded
-from feti_homog.interface.path.sliding_increments import sliding_increments
-from feti_homog.interface.path.sliding_path import sliding_events
 from feti_homog.materials.voigt import voigt_names
 from feti_homog.results.checkpoint_file import is_whole
 from feti_homog.results.landmarks import kept, marks, peak_of
@@ -141,13 +142,11 @@ def _points(
             point = found_again(point, cell, law)
         begin, responses = point.after, averages(event, point, context.loads)
         yield point, energies, responses
-    by_events, steps = path.method == "events", (path.increments or 1, path.release == "worst", begin)
-    if not context.case.has_friction:
-        whole = events(cell, law, waypoints, begin) if by_events else increments(cell, law, waypoints, *steps)
-    elif by_events:
-        whole = sliding_events(cell, _sliding_cell(context), law, waypoints, begin)
+    engine = partial(CoulombLeg, sliding=_sliding_cell(context)) if context.case.has_friction else FrictionlessLeg
+    if path.method == "events":
+        whole = events(cell, law, waypoints, begin, engine)
     else:
-        whole = sliding_increments(cell, _sliding_cell(context), law, waypoints, *steps)
+        whole = increments(cell, law, waypoints, path.increments or 1, path.release == "worst", begin, engine)
     count = known
     try:
         for count, point in enumerate(whole, known + 1):  # noqa: B007

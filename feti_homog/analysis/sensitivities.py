@@ -17,7 +17,7 @@ from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.sensitivities import derivatives
 from feti_homog.homogenization.unit_cell import TornCell
-from feti_homog.interface.loads.load import Load
+from feti_homog.interface.loads import Load
 from feti_homog.materials.constants import constants
 from feti_homog.materials.derivatives import constant_changes
 from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, THERMAL_STRESSES

@@ -10,8 +10,8 @@ import numpy as np
 
 from feti_homog.case.case import Case
 from feti_homog.case.interface_section import Arc, InterfaceSection, interface_label
-from feti_homog.interface.tips import debonded_arcs
-from feti_homog.interface.tips.debonded_arcs import MovedTips
+from feti_homog.interface import debonded_arcs
+from feti_homog.interface.debonded_arcs import MovedTips
 from feti_homog.mesh.outline.outline import MERGED
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.refinement import ReferenceLattice

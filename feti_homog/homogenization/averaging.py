@@ -16,9 +16,9 @@ from feti_homog.errors import ConvergenceError
 from feti_homog.feti.decomposition.jump_operator import NodeBlocks
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.contact.contact_problem import ContactProblem
-from feti_homog.interface.contact.rubbing_bonds import energy_beside_springs, slipped
+from feti_homog.interface.contact.coupled_interfaces import energy_beside_springs, slipped
 from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, Equilibrium, Status
-from feti_homog.interface.loads.load import Load
+from feti_homog.interface.loads import Load
 from feti_homog.materials.voigt import STRAINS, STRESSES
 from feti_homog.system.parallel.distributed_arrays import allreduce_sum
 from feti_homog.typing import Float

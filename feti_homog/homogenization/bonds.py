@@ -13,8 +13,7 @@ from feti_homog.case import bond_laws
 from feti_homog.case.case import Case
 from feti_homog.case.interface_section import InterfaceSection
 from feti_homog.feti.decomposition.jump_operator import InterfaceSprings
-from feti_homog.interface.laws.bond_law import BondLaw
-from feti_homog.interface.laws.registry import law_class
+from feti_homog.interface.laws.bond_law import BondLaw, law_class
 from feti_homog.typing import Float, Int
 
 
@@ -32,7 +31,7 @@ def teeth_of(case: Case) -> int:
     """Return the events of a bond until it parts: the teeth of a law that softens, else one."""
     if not has_softening(case):
         return 1
-    from feti_homog.interface.laws.cohesive import CohesiveLaw  # which bonds that break at once do not use
+    from feti_homog.interface.laws.softening import CohesiveLaw  # which bonds that break at once do not use
 
     law = bond_law(case.interfaces, np.zeros(0, np.int64))
     return len(law.levels) - 1 if isinstance(law, CohesiveLaw) else 1

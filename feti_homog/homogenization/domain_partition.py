@@ -18,8 +18,8 @@ from feti_homog.homogenization.partition_policy import (
     can_be_cut_across,
     wanted_pieces,
 )
-from feti_homog.interface.tips import debonded_arcs
-from feti_homog.interface.tips.debonded_arcs import MovedTips
+from feti_homog.interface import debonded_arcs
+from feti_homog.interface.debonded_arcs import MovedTips
 from feti_homog.mesh.coarse_mesh import CoarseMesh, voids
 from feti_homog.mesh.mesh_fibres import coating_thickness, fibre_circles, fibre_frames, fibre_numbers
 from feti_homog.mesh.periodic_topology import Torus

@@ -27,7 +27,7 @@ from feti_homog.homogenization.crack_extension import (
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.states import BONDED, Status
-from feti_homog.interface.tips.debonded_arcs import CrackTips, InterfaceChains, closing_work
+from feti_homog.interface.debonded_arcs import CrackTips, InterfaceChains, closing_work
 from feti_homog.materials.voigt import strain_tensor
 from feti_homog.system.parallel.distributed_arrays import allreduce_sum
 from feti_homog.typing import Bool, Float, Int

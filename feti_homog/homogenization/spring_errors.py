@@ -15,7 +15,7 @@ from feti_homog.homogenization.shared_vertices import border_lines
 from feti_homog.homogenization.uniform_parts import UniformPart
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.contact.states import BONDED, Status
-from feti_homog.interface.tips.debonded_arcs import InterfaceChains
+from feti_homog.interface.debonded_arcs import InterfaceChains
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.system.parallel.distributed_arrays import allreduce_sum
 from feti_homog.typing import Bool, Float, Int

@@ -24,8 +24,8 @@ from feti_homog.homogenization.nested_interiors import NestedInterior, nested_in
 from feti_homog.homogenization.partition_policy import DEFAULT_POLICY, PartitionPolicy
 from feti_homog.homogenization.tile_tearing import can_be_torn_by_tiles, tear_by_tiles
 from feti_homog.homogenization.uniform_parts import ForcesBetweenParts, UniformPart, numbered, parts_of, share_parts
+from feti_homog.interface import debonded_arcs
 from feti_homog.interface.laws.bond_law import BondLaw
-from feti_homog.interface.tips import debonded_arcs
 from feti_homog.mesh.coarse_mesh import CoarseMesh
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.mesh.submesh import SubdomainTable, Submesh, SubmeshesOfRank

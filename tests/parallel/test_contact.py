@@ -15,7 +15,7 @@ from support.ranks import parallel_assert
 
 from feti_homog.case.interface_section import Arc
 from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN
-from feti_homog.interface.loads.load import Load
+from feti_homog.interface.loads import Load
 
 pytestmark = pytest.mark.parallel
 

@@ -15,7 +15,7 @@ from feti_homog.analysis.path_events import Work
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BONDED
 from feti_homog.interface.laws.strength import MaxStrength
-from feti_homog.interface.loads.load import Load
+from feti_homog.interface.loads import Load
 from feti_homog.interface.path.path_following import events, increments
 from feti_homog.interface.path.path_points import unloaded
 

@@ -18,8 +18,7 @@ from feti_homog import Case, run
 from feti_homog.homogenization.averaging import Homogenization
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BONDED
-from feti_homog.interface.laws.energy import SpringEnergy
-from feti_homog.interface.laws.released import ReleasedEnergy
+from feti_homog.interface.laws.energy import ReleasedEnergy, SpringEnergy
 from feti_homog.interface.path.path_following import events
 from feti_homog.interface.path.path_points import unloaded
 
@@ -84,7 +83,7 @@ def test_all_bonds_break_at_once_and_nothing_is_left(comm, strip, growth):
     for cell in strip:
         interface = torn_cells.interface(cell, True)
         springs = SpringEnergy(NORMAL, TANGENTIAL, TOUGHNESS, 0.25)
-        law = springs if growth == "springs" else ReleasedEnergy(springs, cell.solver.exact_inverse)
+        law = springs if growth == "springs" else ReleasedEnergy.of(springs, cell.solver.exact_inverse)
         strain = np.array([[2 * peak / C11, 0.0, 0.0]])
         first, last = events(
             CoupledInterfaces(interface),

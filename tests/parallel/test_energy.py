@@ -24,9 +24,8 @@ from feti_homog import Case, run
 from feti_homog.feti.decomposition.neighbours import InterfaceNeighbours
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BONDED
-from feti_homog.interface.laws.energy import SpringEnergy
-from feti_homog.interface.laws.released import ReleasedEnergy
-from feti_homog.interface.loads.load import Load
+from feti_homog.interface.laws.energy import ReleasedEnergy, SpringEnergy
+from feti_homog.interface.loads import Load
 from feti_homog.interface.path.path_following import events
 from feti_homog.interface.path.path_points import unloaded
 
@@ -45,7 +44,7 @@ ONSET_STRAIN, ONSET_STRESS = GLASS_EPOXY_ONSET.value
 def criterion(cell, growth):
     if growth == "springs":
         return SPRINGS
-    return ReleasedEnergy(SPRINGS, cell.solver.exact_inverse)
+    return ReleasedEnergy.of(SPRINGS, cell.solver.exact_inverse)
 
 
 def path(comm, growth, strain, **case):

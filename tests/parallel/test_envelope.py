@@ -214,7 +214,7 @@ def test_a_tip_in_space_releases_what_its_break_does(comm):
         energy, traction = cell_energy(plane, axial, strain, status)
         foretold = (
             onset.utilisation(traction[tips.node], tips.node) ** 2
-            * law.springs.fracture_toughness(traction[tips.node])
+            * law.fracture_toughness(traction[tips.node])
             * tips.length
         )
         owned = [(rank, k) for rank, count in enumerate(comm.allgather(len(tips.node))) for k in range(count)]

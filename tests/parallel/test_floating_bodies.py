@@ -8,9 +8,9 @@ from scipy.optimize import OptimizeResult
 from support import torn_cells
 
 from feti_homog.errors import ConvergenceError
-from feti_homog.interface.contact import floating_bodies
+from feti_homog.interface.contact.floating_bodies import FloatingBodies
 from feti_homog.interface.contact.states import OPEN
-from feti_homog.interface.loads.load import Load
+from feti_homog.interface.loads import Load
 
 pytestmark = pytest.mark.parallel
 
@@ -28,4 +28,4 @@ def test_an_unsolved_programme_is_raised_on_every_rank(comm, monkeypatch):
         interface.equilibrium(Load.strain(np.array([-1.0, -1.0, 0.0])), torn_cells.bonds(status), start)
     nodes, gap = interface.nodes, np.ones(len(status))
     with pytest.raises(ConvergenceError, match="not solved: Numerical difficulties"):
-        floating_bodies.admissible_share(comm, cell.solver.natural, nodes, status == OPEN, gap, -gap, 1e-9)
+        FloatingBodies(comm, cell.solver.natural, nodes, status == OPEN, 1e-9).admissible_share(gap, -gap)

@@ -19,10 +19,9 @@ from feti_homog.analysis.path_events import Work
 from feti_homog.homogenization.averaging import Homogenization
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BONDED
-from feti_homog.interface.laws.energy import SpringEnergy
-from feti_homog.interface.laws.released import ReleasedEnergy
+from feti_homog.interface.laws.energy import ReleasedEnergy, SpringEnergy
 from feti_homog.interface.laws.strength import MaxStrength
-from feti_homog.interface.loads.load import Load
+from feti_homog.interface.loads import Load
 from feti_homog.interface.path.path_following import events
 from feti_homog.interface.path.path_points import unloaded
 from feti_homog.system.parallel.mpi_errors import on_root
@@ -51,7 +50,7 @@ def criterion(cell, name, unit=1.0):
     springs = SpringEnergy(NORMAL * unit, TANGENTIAL * unit, TOUGHNESS / unit, 0.25)
     if name == "springs":
         return springs
-    return ReleasedEnergy(springs, cell.solver.exact_inverse)
+    return ReleasedEnergy.of(springs, cell.solver.exact_inverse)
 
 
 @pytest.mark.parametrize("waypoints", [[STRAIGHT], LEGS], ids=["straight", "legs"])

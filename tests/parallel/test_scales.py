@@ -16,12 +16,11 @@ from support.loads import strains
 from feti_homog import Case, run
 from feti_homog.errors import ConvergenceError
 from feti_homog.feti.exact.exact_inverse import ExactInverse
+from feti_homog.interface.contact import mixed_load
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BONDED, OPEN
-from feti_homog.interface.laws.energy import SpringEnergy
-from feti_homog.interface.laws.released import ReleasedEnergy
-from feti_homog.interface.loads import mixed_load
-from feti_homog.interface.loads.load import Load
+from feti_homog.interface.laws.energy import ReleasedEnergy, SpringEnergy
+from feti_homog.interface.loads import Load
 from feti_homog.interface.path.path_following import events
 from feti_homog.interface.path.path_points import unloaded
 
@@ -201,7 +200,7 @@ def softly_held(comm, stiffness, young, count, **cell):
     loaded = CoupledInterfaces(torn_cells.interface(cell, False))
     springs = SpringEnergy(stiffness, RATIO * stiffness, TOUGHNESS * stiffness, SENSITIVITY)
     begin = unloaded(loaded, torn_cells.bonds(np.full(len(loaded.nodes.row), BONDED, np.int8)))
-    points = events(loaded, ReleasedEnergy(springs, cell.solver.exact_inverse), strains(STRAIN[None]), begin)
+    points = events(loaded, ReleasedEnergy.of(springs, cell.solver.exact_inverse), strains(STRAIN[None]), begin)
     return np.array([point.load_factor for point, _ in zip(points, range(count), strict=False)]), cell
 
 

@@ -15,7 +15,7 @@ from support.random_cells import random_bonded, random_cell, random_strain
 
 from feti_homog.homogenization.averaging import Homogenization
 from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN
-from feti_homog.interface.loads.load import Load
+from feti_homog.interface.loads import Load
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 

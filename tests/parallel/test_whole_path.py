@@ -12,8 +12,7 @@ from support.ranks import PIECES
 
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BONDED
-from feti_homog.interface.laws.energy import SpringEnergy
-from feti_homog.interface.laws.released import ReleasedEnergy
+from feti_homog.interface.laws.energy import ReleasedEnergy, SpringEnergy
 from feti_homog.interface.path.path_following import events
 from feti_homog.interface.path.path_points import unloaded
 from feti_homog.system.parallel.mpi_errors import on_root
@@ -75,7 +74,7 @@ def test_a_path_goes_on_from_its_middle_as_if_it_had_not_stopped(comm):
 def follow(cell, growth, begin=None):
     """Return the points of the path, or of what is left of it."""
     interface, springs = torn_cells.interface(cell, True), SpringEnergy(*SPRINGS, TOUGHNESS, SENSITIVITY)
-    law = ReleasedEnergy(springs, cell.solver.exact_inverse) if growth == "released" else springs
+    law = ReleasedEnergy.of(springs, cell.solver.exact_inverse) if growth == "released" else springs
     bonded = np.full(len(interface.nodes.row), BONDED, np.int8)
     return list(
         events(

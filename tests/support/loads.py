@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from feti_homog.interface.loads.load import Load
+from feti_homog.interface.loads import Load
 from feti_homog.typing import Float
 
 

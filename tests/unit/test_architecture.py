@@ -52,7 +52,7 @@ FLOORS = (
     ("interface.loads",),
     ("interface.contact",),
     ("interface.friction",),
-    ("interface.tips",),
+    ("interface.debonded_arcs",),
     ("interface.laws",),
     ("interface.path",),
     ("interface",),

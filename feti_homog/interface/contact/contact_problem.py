@@ -1,11 +1,14 @@
 """Unilateral, frictionless contact of debonded faces: the states that satisfy the KKT conditions.
 
-A debonded node is open (gap >= 0, no force) or closed (gap = 0, force <= 0, compression).  Which, is found by
-block principal pivoting on the dual problem, which is strictly convex.
+A debonded node is open (gap >= 0, no force) or closed (gap = 0, force <= 0, compression).  Block principal pivoting
+(Judice & Pires, Computers & Operations Research 21, 1994) on the strictly convex dual problem finds its state: all
+wrong nodes change at once while their number falls, else only the first one (Murty's rule).  Without free fibres the
+gaps are q + A p with contact pressures p and a positive definite A, so that no set of states returns and the search
+ends.  With free fibres A is semi-definite, and an end is not proven.
 
-A damaged bond that holds is pulled (compliance C, force >= 0) or pressed (compliance C_0 as without damage,
-force <= 0).  With s = jump - C_0 force >= 0 and w = s / (C - C_0) - force >= 0, s w = 0: the conditions of a debonded
-node, for which C is infinite.  So the same search finds both.
+A damaged bond is pulled (compliance C, force >= 0) or pressed (compliance C_0 as without damage, force <= 0).  With
+s = jump - C_0 force >= 0 and w = s / (C - C_0) - force >= 0, s w = 0: the conditions of a debonded node, for which C is
+infinite.  So one search finds both.
 """
 
 from __future__ import annotations
@@ -21,9 +24,8 @@ from feti_homog.errors import NotCarriedError
 from feti_homog.feti.decomposition.constraint_layout import InterfaceNodes
 from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.feti.solver import FetiSolver
-from feti_homog.interface.contact.block_pivoting import BlockPivoting
-from feti_homog.interface.contact.contact_certificate import kkt_errors
-from feti_homog.interface.contact.floating_bodies import place
+from feti_homog.interface.contact import mixed_load
+from feti_homog.interface.contact.floating_bodies import FloatingBodies
 from feti_homog.interface.contact.load_scales import LoadScales
 from feti_homog.interface.contact.states import (
     BONDED,
@@ -33,30 +35,31 @@ from feti_homog.interface.contact.states import (
     Equilibrium,
     Softening,
     Status,
+    kkt_errors,
     never_softens,
 )
-from feti_homog.interface.loads import mixed_load
-from feti_homog.interface.loads.load import Load
+from feti_homog.interface.loads import Load
 from feti_homog.typing import Bool, Float, Int
 
-# An amplitude takes part in new motions if its square is larger than this, of motions of size one.
+# Smallest squared amplitude with which a body takes part in new motions of size one.
 LEAST_SHARE_OF_MOTION = 1e-6
-# Block pivots in a row, the last one with progress included: ten without progress are usual in the literature.
+# Block pivots in a row, from the last progress on: ten without progress are usual in the literature.
 BLOCK_PIVOTS = 11
-# Dual problems after which the search is given up; the certificate then has its errors.
+# Dual problems after which the search stops, with errors in its certificate.
 MAX_CONTACT_SOLVES = 500
 
 
 @dataclass(frozen=True)
 class ContactProblem:
-    """All fibre-matrix interfaces of the torn cell.
+    """All interfaces of the torn cell.
 
     Attributes:
-        solver: of the dual problem.
+        solver: solver of the dual problem.
         contact: false lets debonded faces overlap; damaged bonds are stiff under pressure all the same.
-        size: (2,) of the cell, for the scale of displacements.
-        softening: of the law of the bonds.
-        block_pivots: see `BlockPivoting`.
+        size: (2,) cell size, a scale of displacements.
+        softening: softening of the bond law.
+        block_pivots: number of block pivots, from the last progress on, before single nodes change; 0 begins with
+            single nodes.
     """
 
     solver: FetiSolver
@@ -72,7 +75,7 @@ class ContactProblem:
         return self.solver.jump_operator.nodes
 
     def active(self, status: Status) -> Float:
-        """(owned rows,) 1 for the multipliers that act: all of a bonded node, the normal one of a closed node."""
+        """(owned rows,) 1 for active multipliers: all at a bonded node, the normal one at a closed node."""
         mask = np.ones(self.solver.rows)
         mask[self._pairs] = (status == BONDED)[:, None]
         if self.contact:
@@ -80,22 +83,22 @@ class ContactProblem:
         return mask
 
     def prepare(self, bonds: BondState) -> None:
-        """Make the dual problem that of a state of the bonds.  Collective."""
+        """Adapt the dual problem to a state of the bonds.  Collective."""
         self.solver.set_state(self.active(bonds.status), self.compliance(bonds))
 
     def compliance(self, bonds: BondState) -> Float:
-        """(owned rows,) C of the springs in a state of the bonds."""
+        """(owned rows,) compliance C of springs in a state of the bonds."""
         C, factors = self.solver.intact_compliance, self._factors(bonds)
         if factors is None:
             return C
-        # Normal and tangential springs belong to the problem of the plane, axial ones to the other.
-        own = slice(2) if self.solver.jump_operator.components == 2 else slice(2, 3)
+        # Normal and tangential springs belong to the plane problem, axial ones to the axial problem.
+        columns = slice(2) if self.solver.jump_operator.components == 2 else slice(2, 3)
         C = C.copy()
-        C[self._pairs] *= np.where(bonds.pressed[:, None], factors[1], factors[0])[:, own]
+        C[self._pairs] *= np.where(bonds.pressed[:, None], factors[1], factors[0])[:, columns]
         return C
 
     def _factors(self, bonds: BondState) -> tuple[Float, Float] | None:
-        """(k, 3) C / C_0 of pulled and of pressed bonds; None of a law that never softens.  The last are kept."""
+        """(k, 3) C / C_0 of pulled and of pressed bonds; None without softening.  The last are stored."""
         if not (self._kept and self._kept[0][0] is bonds):
             pulled = np.ones(len(bonds.status), bool)
             soft, stiff = self.softening(bonds, pulled), self.softening(bonds, ~pulled)
@@ -103,10 +106,7 @@ class ContactProblem:
         return self._kept[0][1]
 
     def _gained(self, bonds: BondState) -> Float:
-        """(k,) normal compliance that damaged bonds have more if pulled than if pressed; 0 of others.
-
-        None has along the fibres.
-        """
+        """(k,) normal compliance of damaged bonds in tension minus compression; 0 at other nodes, and along fibres."""
         factors = self._factors(bonds)
         if factors is None or self.solver.jump_operator.components != 2:
             return np.zeros(len(bonds.status))
@@ -114,17 +114,17 @@ class ContactProblem:
         return np.where(bonds.status == BONDED, C * (factors[0] - factors[1])[:, 0], 0.0)
 
     def damaged(self, bonds: BondState) -> Bool:
-        """(k,) bonds that hold, with another normal stiffness if pulled than if pressed."""
+        """(k,) damaged bonds, softer under tension than under compression."""
         return self._gained(bonds) > 0.0
 
     def debond(self, status: Status, which: Bool, lam: Float) -> Status:
-        """Return the status after the bonds of `which` have broken; under tension they start open."""
+        """Return the status after the bonds `which` broke; under tension they start open."""
         force = lam[self.nodes.row]
         released = np.where((force < 0) & self.contact, CLOSED, OPEN).astype(np.int8)
         return np.where(which & (status == BONDED), released, status)
 
     def traction(self, solution: DualSolution) -> Float:
-        """(k, c) traction, in the plane normal and tangential, tension positive; or along the fibre."""
+        """(k, c) traction: normal and tangential, tension positive; or along the fibre."""
         return np.asarray(solution.lam[self._pairs] / self.nodes.length[:, None])
 
     def jump(self, solution: DualSolution) -> Float:
@@ -132,12 +132,12 @@ class ContactProblem:
         return np.asarray(solution.opening[self._pairs])
 
     def stress(self, solution: DualSolution) -> Float:
-        """(v,) Sigma from the multipliers alone, and what works on the other loads; collective."""
+        """(v,) Sigma, and work conjugates of other loads, from the multipliers alone.  Collective."""
         return np.asarray(self.solver.stress_integral(solution) / self.size.prod())
 
     @cached_property
     def scales(self) -> LoadScales:
-        """Scales of what loads make.  Its properties are collective when first used, and so are its methods."""
+        """Scales of the effects of loads.  Its properties, when first used, and methods are collective."""
         return LoadScales(self.solver, self.size)
 
     @cached_property
@@ -146,26 +146,23 @@ class ContactProblem:
         return self.nodes.row[:, None] + np.arange(self.solver.jump_operator.components)
 
     def linear(self, load: Load, bonds: BondState, start: Float) -> DualSolution:
-        """Solve the dual problem with the states as they are; `start` are first multipliers (owned rows,).  Collective.
+        """Solve the dual problem with fixed states, from multipliers `start` (owned rows,).  Collective.
 
         Raises:
             NotCarriedError: nothing carries the stresses of the load.
         """
         self.prepare(bonds)
-        given = self.scales.imposed_strain(np.where(load.by_stress, 0.0, load.values))
-        roots = self.scales.roots
-        noise = mixed_load.Noise(roots, self.scales.sign_noise, float((roots[: len(given)] * given).max()))
-        return mixed_load.solve(self.solver, load, start, float(self.size.prod()), noise)
+        return mixed_load.solve(self.scales, load, start)
 
     def completed(self, state: Equilibrium) -> Equilibrium:
-        """Return a state with the amplitudes and jumps that F lambda gives, if it has none.  Collective."""
+        """Return a state with amplitudes and jumps by F lambda, where they lack.  Collective."""
         if state.solution.alpha is not None:
             return state
         self.prepare(state.bonds)
         return replace(state, solution=self._placed(state.bonds, self.solver.completed(state.solution))[0])
 
     def is_linear(self, status: Status) -> bool:
-        """Return whether no face can come to touch another; collective."""
+        """Return whether no faces can begin to touch.  Collective."""
         return not (self.contact and self._any(status != BONDED))
 
     def equilibria(self, strains: Float, bonds: BondState, starts: Sequence[Float]) -> list[Equilibrium]:
@@ -178,59 +175,61 @@ class ContactProblem:
         ]
 
     def equilibrium(self, load: Load, bonds: BondState, start: Float) -> Equilibrium:
-        """Solve for the load, with `bonds` a first guess of who is in contact.  Collective; raises as `linear`."""
+        """Solve for the load, with `bonds` as a first guess of contact states.  Collective; raises as `linear`."""
         try:
             return self._searched(load, bonds, start)
         except NotCarriedError:
             closed = np.where(bonds.status == OPEN, CLOSED, bonds.status).astype(np.int8)
             if not self.contact or not self._any(closed != bonds.status):
                 raise
-        # Faces that come to touch may carry what open ones do not.
+        # Touching faces may carry loads that open ones do not.
         return self._searched(load, bonds.with_status(closed), start)
 
     def _searched(self, load: Load, bonds: BondState, start: Float) -> Equilibrium:
-        """Return the equilibrium, from these states on. Collective; raises as `linear`."""
-        pivoting = BlockPivoting(self.solver.comm, self.block_pivots)
+        """Search the equilibrium from these states on.  Collective; raises as `linear`."""
+        comm, fewest, pivots = self.solver.comm, np.inf, 0
         iterations = solves = 0
         while True:
             solution = self.linear(load, bonds, start)
             iterations, solves = iterations + solution.iterations, solves + 1
             solution, wrong = self._placed(bonds, solution)
-            count = self.solver.comm.allreduce(int(wrong.sum()))
+            count = comm.allreduce(int(wrong.sum()))
             if count == 0 or solves == MAX_CONTACT_SOLVES or solution.reason < 0:
                 return self._equilibrium(load, bonds, solution, iterations, solves)
-            bonds = bonds.flipped(pivoting.choose(wrong, count))
-            start = solution.lam
+            pivots -= 1
+            if count < fewest:
+                fewest, pivots = count, self.block_pivots
+            if pivots <= 0:
+                # The first wrong node of the lowest rank with one.
+                rank = comm.allreduce(comm.rank if wrong.any() else comm.size, MPI.MIN)
+                wrong = np.arange(len(wrong)) == (np.argmax(wrong) if rank == comm.rank else -1)
+            bonds, start = bonds.flipped(wrong), solution.lam
 
     def undetermined(self, state: Equilibrium) -> Bool:
-        """(v,) strains that nothing determines: their stresses are given, and what is open lets them be any.
-
-        Collective.
-        """
-        if state.bonds.gap_and_slip is not None:
-            return np.zeros(len(state.load.values), bool)
-        if not state.load.by_stress.any() or not self._any(state.status != BONDED):
-            return np.zeros(len(state.load.values), bool)
+        """(v,) undetermined strains: their stresses are prescribed, and open faces allow any value.  Collective."""
+        has_history, by_stress = state.bonds.gap_and_slip is not None, state.load.by_stress
+        if has_history or not by_stress.any() or not self._any(state.status != BONDED):
+            return np.zeros(len(by_stress), bool)
         self.prepare(state.bonds)
-        held = self.scales.mean_stiffness * float(self.size.prod())
-        return mixed_load.unresisted(self.solver, state.load.by_stress, held)
+        stiffness = self.scales.mean_stiffness * float(self.size.prod())
+        return mixed_load.unresisted(self.solver, by_stress, stiffness)
 
     def _any(self, which: Bool) -> bool:
-        """Return True if a node of any rank is one of `which`; collective."""
+        """Return whether any rank has a node in `which`.  Collective."""
         return bool(self.solver.comm.allreduce(bool(which.any()), MPI.LOR))
 
     def _placed(self, bonds: BondState, solution: DualSolution) -> tuple[DualSolution, Bool]:
-        """Return the solution with free fibres where they have room, and which nodes (k,) break the KKT conditions."""
+        """Return the solution with free fibres in their room, and (k,) nodes that break the KKT conditions."""
         status, damaged = bonds.status, self.damaged(bonds)
         pressed = np.zeros(len(status), bool)
         if not self.contact and not self._any(damaged):
             return solution, pressed
         coarse, noise = self.solver.natural, self.scales.gap_noise(solution.strain)
         if self.contact and coarse.unconstrained_modes.shape[1]:
-            placement = place(self.solver.comm, coarse, self.nodes, status == OPEN, solution, noise)
-            alpha = None if solution.alpha is None else placement.alpha + solution.alpha
-            solution = replace(solution, alpha=alpha, jump=solution.jump + placement.jump(coarse))
-            pressed = placement.pressed
+            bodies = FloatingBodies(self.solver.comm, coarse, self.nodes, status == OPEN, noise)
+            moved, pressed = bodies.place(solution)
+            alpha = None if solution.alpha is None else moved + solution.alpha
+            solution = replace(solution, alpha=alpha, jump=solution.jump + coarse.G @ moved)
         force, gap = solution.lam[self.nodes.row], solution.jump[self.nodes.row]
         force_noise, meets = self.scales.force_noise(solution), (status == OPEN) & self.contact
         pulled = ((status == CLOSED) | (damaged & bonds.pressed)) & (force > force_noise)
@@ -240,17 +239,32 @@ class ContactProblem:
     def _equilibrium(
         self, load: Load, bonds: BondState, solution: DualSolution, iterations: int, solves: int
     ) -> Equilibrium:
-        """Return the state that a search ended with, its free motions and its certificate."""
-        asked = self.scales.asked(load)
+        """Return the final state of a search with its certificate and its number of free rigid motions.  Collective.
+
+        Bonds and faces under compression resist motions.  Nodes of a fibre that touch its hole without a force count as
+        open if the fibre moves without them, for they do not fix it; otherwise they stay closed.
+        """
+        asked, status, coarse = self.scales.asked(load), bonds.status, self.solver.natural
         certificate = self.certificate(bonds, solution, asked)
-        status, motions = self._without_idle(bonds.status, solution)
-        return Equilibrium(load, bonds.with_status(status), solution, iterations, solves, motions, certificate, asked)
+        motions, idle = coarse.unconstrained_modes, np.zeros(len(status), bool)
+        if self.contact and self._any(status == CLOSED):
+            idle = (status == CLOSED) & (solution.lam[self.nodes.row] >= -self.scales.force_noise(solution))
+        if self._any(idle):
+            before = motions
+            motions = coarse.free_motions(self.active(np.where(idle, OPEN, status).astype(np.int8)))
+            # The squares are the diagonal of the projector on the motions, which rises if a body becomes free.
+            shares, without = (np.asarray(Z.power(2).sum(axis=1)).ravel() for Z in (motions, before))
+            freed = np.isin(coarse.body, coarse.body[shares - without > LEAST_SHARE_OF_MOTION])
+            idle &= (abs(coarse.G[self.nodes.row]) + abs(coarse.G[self.nodes.row + 1])) @ freed > 0
+            bonds = bonds.with_status(np.where(idle, OPEN, status).astype(np.int8))
+        free = motions.shape[1]
+        return Equilibrium(load, bonds, solution, iterations, solves, free, certificate, asked)
 
     def certificate(self, bonds: BondState, solution: DualSolution, asked: Float) -> dict[str, float]:
-        """Return the errors of the KKT conditions; `asked` as of `Equilibrium`.  Collective."""
+        """Return the errors of the KKT conditions; `asked` as in `Equilibrium`.  Collective."""
         status, gained, acting = bonds.status, self._gained(bonds), self.acting(bonds, solution.strain, asked)
         damaged = gained > 0.0
-        # A pulled bond opens by its damage; one that is found pulled under pressure overlaps.
+        # A pulled bond opens by its damage; under pressure it overlaps.
         overlap = np.minimum(gained * solution.lam[self.nodes.row], 0.0)
         return kkt_errors(
             self.solver.comm,
@@ -265,31 +279,9 @@ class ContactProblem:
         )
 
     def acting(self, bonds: BondState, strain: Float, asked: Float) -> Float:
-        """(v,) as `LoadScales.acting`, of the strain and with friction of the jumps that loads left.  Collective."""
+        """(v,) `LoadScales.acting` for the strain and, with friction, residual jumps.  Collective."""
         if bonds.gap_and_slip is not None:
             jump = self.solver.comm.allreduce(float(np.abs(bonds.gap_and_slip).max(initial=0.0)), MPI.MAX)
             is_strain = np.arange(len(strain)) < self.solver.problem.strains
             strain = np.maximum(np.abs(strain), np.where(is_strain, jump / self.size.max(), 0.0))
         return self.scales.acting(strain, asked)
-
-    def _without_idle(self, status: Status, solution: DualSolution) -> tuple[Status, int]:
-        """Return the status and the number of rigid motions that nothing resists.
-
-        Neither a bond nor a face under compression does.
-
-        A fibre may touch its hole without a force: such nodes count as open if it moves without them, lest they seem
-        to hold it; those of other fibres stay closed.  Collective.
-        """
-        coarse, idle = self.solver.natural, np.zeros(len(status), bool)
-        motions = coarse.unconstrained_modes
-        if self.contact and self._any(status == CLOSED):
-            idle = (status == CLOSED) & (solution.lam[self.nodes.row] >= -self.scales.force_noise(solution))
-        if not self._any(idle):
-            return status, motions.shape[1]
-        more = coarse.free_motions(self.active(np.where(idle, OPEN, status).astype(np.int8)))
-        # The squares are the diagonal of the projector on the motions, which rises where a body comes free.
-        shares, before = (np.asarray(Z.power(2).sum(axis=1)).ravel() for Z in (more, motions))
-        risen = shares - before > LEAST_SHARE_OF_MOTION
-        freed = np.isin(coarse.body, coarse.body[risen])
-        idle &= (abs(coarse.G[self.nodes.row]) + abs(coarse.G[self.nodes.row + 1])) @ freed > 0
-        return np.where(idle, OPEN, status).astype(np.int8), more.shape[1]

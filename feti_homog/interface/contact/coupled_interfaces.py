@@ -1,31 +1,38 @@
 """A cell under loads of all its problems: in the plane and, in generalized plane strain, along the fibres.
 
-Phases have x3 as a plane of symmetry, so the problems have only the bonds in common: who is in contact is decided in
-the plane, and a debonded node carries no traction along the fibre.
+Phases are symmetric about x3 = 0, so the problems share only the bonds: the plane problem decides contact, and a
+debonded node carries no traction along the fibre.
+
+The damaged share of a bond rubs, after Alfano & Sacco (2006).  At damage d, slip s and stiffness K, the share 1 - d
+bears (1 - d) K s, and the share d bears f = K (s - s_i), bounded by Coulomb's law with the full pressure.  With
+g = d s_i this is a face with the jump g on the spring 1 / (C - C_0) and the extra force f: lam = g / (C - C_0) + f,
+s = C_0 lam + g.  The solution has r = s - C lam.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from mpi4py import MPI
 
 from feti_homog.feti.decomposition.constraint_layout import InterfaceNodes
+from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.interface.contact.contact_problem import ContactProblem
-from feti_homog.interface.contact.states import BondState, Equilibrium
-from feti_homog.interface.loads.load import CoupledSolution, Load, Macroscopic, Multipliers
+from feti_homog.interface.contact.states import BONDED, BondState, Equilibrium
+from feti_homog.interface.loads import Load, Macroscopic, Multipliers
 from feti_homog.typing import Float
 
 
 class CoupledInterfaces:
     """The interfaces of a cell in its problems.
 
-    Strains and stresses (n,) are those of the plane problem, then those of the axial one.
+    Strains and stresses (n,) of the plane problem precede the axial ones.
 
     Attributes:
-        plane: with contact.
-        problems: `plane` and, where there is one, that of the displacement along the fibres, without contact.
+        plane: plane problem, with contact.
+        problems: `plane` and, in generalized plane strain, the axial problem, without contact.
     """
 
     def __init__(self, plane: ContactProblem, *axial: ContactProblem) -> None:
@@ -38,7 +45,7 @@ class CoupledInterfaces:
 
     @property
     def nodes(self) -> InterfaceNodes:
-        """Interface nodes that this rank owns."""
+        """Interface nodes of this rank."""
         return self.plane.nodes
 
     @property
@@ -49,61 +56,89 @@ class CoupledInterfaces:
     @property
     def loads(self) -> tuple[str, ...]:
         """Names of the n strains."""
-        return tuple(name for each in self.problems for name in each.solver.problem.loads)
+        return tuple(name for problem in self.problems for name in problem.solver.problem.loads)
 
     def no_multipliers(self) -> Multipliers:
-        """Return those of an unloaded cell."""
-        return Multipliers(np.zeros(each.solver.rows) for each in self.problems)
+        """Return the multipliers of an unloaded cell."""
+        return tuple(np.zeros(problem.solver.rows) for problem in self.problems)
 
-    def linear(self, load: Load, bonds: BondState, start: Multipliers) -> CoupledSolution:
-        """Return the dual problems with the states as they are. Collective."""
+    def linear(self, load: Load, bonds: BondState, start: Multipliers) -> tuple[DualSolution, ...]:
+        """Solve the dual problems with fixed states.  Collective."""
         triples = zip(self.problems, self.parts(load), start, strict=True)
-        return CoupledSolution(tuple(each.linear(own, bonds, lam) for each, own, lam in triples))
+        return tuple(problem.linear(part, bonds, lam) for problem, part, lam in triples)
 
     def equilibrium(self, load: Load, bonds: BondState, start: Multipliers) -> Equilibrium:
-        """Return the state under a load, with `bonds` a first guess of who is in contact. Collective."""
+        """Return the equilibrium under a load, with `bonds` as a first guess of contact states.  Collective."""
         loads = self.parts(load)
-        state = self.plane.equilibrium(loads[0], bonds, start.plane)
+        state = self.plane.equilibrium(loads[0], bonds, start[0])
         for axial, along, lam in zip(self.problems[1:], loads[1:], start[1:], strict=True):
             state = replace(state, axial=axial.equilibrium(along, state.bonds, lam))
         return state
 
     def completed(self, state: Equilibrium) -> Equilibrium:
-        """Return a state with the amplitudes and jumps that F lambda gives, where it has none.  Collective."""
-        plane, *others = state.problems
-        pairs = zip(self.problems[1:], others, strict=False)
-        axial = next((each.completed(own) for each, own in pairs), None)
+        """Return a state with amplitudes and jumps by F lambda, where they lack.  Collective."""
+        plane, *rest = state.problems
+        pairs = zip(self.problems[1:], rest, strict=False)
+        axial = next((problem.completed(equilibrium) for problem, equilibrium in pairs), None)
         return replace(self.plane.completed(plane), axial=axial)
 
     def parts(self, load: Load) -> list[Load]:
         """Return the load of each problem."""
-        return load.parts([len(each.solver.problem.loads) for each in self.problems])
+        return load.parts([len(problem.solver.problem.loads) for problem in self.problems])
 
     def leg_start(self, origin: Macroscopic, before: Load | None, end: Load) -> Load:
-        """Return the begin of a leg, the waypoint before, which the last point, `origin`, need not meet.  Collective.
+        """Return the load at the beginning of a leg to `end`.  Collective.
 
-        Components that are given in another way now are as that has them, stresses without the solver's error.
+        It is the waypoint `before`; components that change between strain and stress are those of the last point,
+        `origin`, stresses without the solver's error.
         """
         parts = np.split(origin.strain, [len(self.plane.solver.problem.loads)])
-        scales = [each.scales for each in self.problems]
-        noise = [np.full(len(own), each.stress_noise(own)) for own, each in zip(parts, scales, strict=False)]
+        pairs = zip(parts, self.problems, strict=False)
+        noise = [np.full(len(strain), problem.scales.stress_noise(strain)) for strain, problem in pairs]
         stress = np.where(np.abs(origin.stress) > np.concatenate(noise), origin.stress, 0.0)
         values = np.where(end.by_stress, stress, origin.strain)
         if before is not None:
             values = np.where(before.by_stress == end.by_stress, before.values, values)
         return Load(values, end.by_stress)
 
-    def traction(self, found: CoupledSolution) -> Float:
-        """(k, 2) normal and tangential traction, tension positive, or (k, 3) with that along the fibre."""
-        return np.hstack([each.traction(own) for each, own in zip(self.problems, found.parts, strict=True)])
+    def traction(self, solutions: Sequence[DualSolution]) -> Float:
+        """(k, 2) normal and tangential traction, tension positive, or (k, 3) with the axial one."""
+        pairs = zip(self.problems, solutions, strict=True)
+        return np.hstack([problem.traction(solution) for problem, solution in pairs])
 
-    def macroscopic(self, found: CoupledSolution) -> Macroscopic:
-        """Strains and stresses.  Collective."""
-        stresses = [each.stress(own) for each, own in zip(self.problems, found.parts, strict=True)]
-        return Macroscopic(np.concatenate([own.strain for own in found.parts]), np.concatenate(stresses))
+    def macroscopic(self, solutions: Sequence[DualSolution]) -> Macroscopic:
+        """Return strains and stresses.  Collective."""
+        stresses = [problem.stress(solution) for problem, solution in zip(self.problems, solutions, strict=True)]
+        return Macroscopic(np.concatenate([solution.strain for solution in solutions]), np.concatenate(stresses))
 
     def least_bonded_stress(self, strains: Float) -> Float:
-        """(m, n) stresses under strains (m, n) of the least stiffness with all bonds.  Collective."""
+        """(m, n) stresses of strains (m, n), by the smallest bonded stiffness.  Collective."""
         parts = np.split(strains, [len(self.plane.solver.problem.loads)], axis=1)
         pairs = zip(parts, self.problems, strict=False)
-        return np.hstack([own @ each.scales.least_bonded_stiffness for own, each in pairs])
+        return np.hstack([strain @ problem.scales.least_bonded_stiffness for strain, problem in pairs])
+
+
+def slipped(interface: ContactProblem, state: Equilibrium) -> Float:
+    """(owned rows,) r in the tangential rows of damaged bonds; 0 in other rows, or without friction."""
+    r = np.zeros(interface.solver.rows)
+    if state.bonds.gap_and_slip is not None and interface.solver.jump_operator.components > 1:
+        rows = interface.nodes.row[state.status == BONDED] + 1
+        rows = rows[state.solution.compliance[rows] > interface.solver.intact_compliance[rows]]
+        r[rows] = state.solution.jump[rows]
+    return r
+
+
+def energy_beside_springs(interface: ContactProblem, state: Equilibrium) -> float:
+    """Return C_0 lam^2 + g^2 / (C - C_0) minus lam C lam on this rank: r^2 / (C - C_0) + 2 r lam."""
+    r, more = slipped(interface, state), state.solution.compliance - interface.solver.intact_compliance
+    rows = np.flatnonzero(r)
+    return float(r[rows] @ (r[rows] / more[rows] + 2.0 * state.solution.lam[rows]))
+
+
+def held_traction(cell: CoupledInterfaces, state: Equilibrium) -> Float:
+    """(k, c) traction at this rank's nodes; s / C, of the intact share, at damaged bonds."""
+    traction, r = cell.traction(state.solutions), slipped(cell.plane, state)[cell.nodes.row + 1]
+    nodes = np.flatnonzero(r)
+    C = state.solution.compliance[cell.nodes.row[nodes] + 1]
+    traction[nodes, 1] += r[nodes] / C / cell.nodes.length[nodes]
+    return traction

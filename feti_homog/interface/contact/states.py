@@ -1,4 +1,7 @@
-"""States of the interface: which bonds hold, what each remembers, and the equilibrium of a cell under one load."""
+"""States of the interface: bonds with their memory, the equilibrium under one load, and its certificate.
+
+The certificate measures errors of the KKT conditions, independent of the search.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +9,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from mpi4py import MPI
 from numpy.typing import NDArray
 
 from feti_homog.feti.dual_solution import DualSolution
-from feti_homog.interface.loads.load import CoupledSolution, Load, Multipliers
+from feti_homog.interface.loads import Load, Multipliers
 from feti_homog.typing import Bool, Float
 
 Status = NDArray[np.int8]
@@ -23,12 +27,11 @@ class BondState:
 
     Attributes:
         status: (k,) BONDED, CLOSED or OPEN.
-        history: (k, h) internal variables of the law of the bonds, from its `begin`; h = 0 of laws without memory.
-        pressed: (k,) which of the bonds that hold have the normal stiffness of compression, where damage makes that
-            another one than in tension.
-        gap_and_slip: (k, 2) of debonded faces with friction and what damaged bonds give beside their intact springs, 0
-            of other bonds; None without friction.
-        sliding: (k,) the sign with which the slip of a closed node grows, 0 where it sticks; None without friction.
+        history: (k, h) internal variables of the bond law, from its `begin`; h = 0 without memory.
+        pressed: (k,) bonds with the normal stiffness of compression, which damage does not change.
+        gap_and_slip: (k, 2) jumps of debonded faces with friction, and the jumps that damage adds to bonds; 0 at intact
+            bonds; None without friction.
+        sliding: (k,) sign with which the slip of a closed node grows, 0 if it sticks; None without friction.
     """
 
     status: Status
@@ -39,7 +42,7 @@ class BondState:
 
     @classmethod
     def without_memory(cls, status: Status) -> BondState:
-        """State of bonds whose law has no internal variables."""
+        """Return the state of bonds without internal variables."""
         return cls(status, np.zeros((len(status), 0)), np.zeros(len(status), bool))
 
     @property
@@ -48,42 +51,41 @@ class BondState:
         return np.zeros(len(self.status), np.int8) if self.sliding is None else self.sliding
 
     def with_status(self, status: Status) -> BondState:
-        """Replace the status; contact changes no internal variable."""
+        """Return the state with another status."""
         return replace(self, status=status)
 
     def flipped(self, which: Bool) -> BondState:
-        """Turn the nodes `which` (k,) over: from open to closed or back, and from pulled to pressed or back."""
+        """Flip the nodes `which` (k,) between open and closed, or between pulled and pressed."""
         holds = self.status == BONDED
         turned = np.where(which & ~holds, CLOSED + OPEN - self.status, self.status).astype(np.int8)
         return replace(self, status=turned, pressed=self.pressed ^ (which & holds))
 
     def differs(self, other: BondState) -> Bool:
-        """(k,) nodes whose contact is another one."""
+        """(k,) nodes with another contact state."""
         return np.asarray((self.status != other.status) | (self.pressed != other.pressed))
 
 
 Softening = Callable[[BondState, Bool], Float | None]
-"""Map a state and which bonds (k,) are pulled, not pressed, to C / C_0 (k, 3) of the springs; None where it is 1."""
+"""Maps a state, and bonds (k,) that are pulled, not pressed, to C / C_0 (k, 3) of springs; None if all are 1."""
 
 
 def never_softens(bonds: BondState, pulled: Bool) -> None:
-    """Softening of springs whose compliance never changes."""
+    """Softening of springs with constant compliance."""
 
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """The cell under one load with the contact states that hold there.
+    """The cell under one load, with its contact states.
 
     Attributes:
-        load: what is prescribed.
-        bonds: state of the interface nodes that this rank owns.
-        solution: of the last dual problem; its multipliers and jumps are those of the state.
-        iterations, solves: Krylov iterations and dual problems that it took.
-        free_motions: number of rigid motions of bodies that no interface force resists; a face that touches without
-            a force resists none.
-        certificate: errors of the KKT conditions, `contact_certificate.kkt_errors`.
-        asked: (v,) sizes of the strains that the load would make with all bonds; with friction all loads up to it.
-        axial: the same of the displacement along the fibres with these bonds, where that is a problem.
+        load: prescribed load.
+        bonds: states at this rank's interface nodes.
+        solution: solution of the last dual problem.
+        iterations, solves: numbers of Krylov iterations and dual problems.
+        free_motions: number of rigid motions that no interface force resists; touching without a force resists none.
+        certificate: errors by `kkt_errors`.
+        asked: (v,) sizes of the strains that the load makes in the bonded cell; with friction all loads up to it.
+        axial: equilibrium along the fibres with these bonds, if that is a problem.
     """
 
     load: Load
@@ -103,20 +105,76 @@ class Equilibrium:
 
     @property
     def problems(self) -> tuple[Equilibrium, ...]:
-        """Equilibria of all problems, the one in the plane first."""
+        """Equilibria, one a problem, the plane one first."""
         return (self,) if self.axial is None else (self, self.axial)
 
     @property
-    def solutions(self) -> CoupledSolution:
-        """Solutions of all problems."""
-        return CoupledSolution(tuple(each.solution for each in self.problems))
+    def solutions(self) -> tuple[DualSolution, ...]:
+        """Solutions, one a problem."""
+        return tuple(state.solution for state in self.problems)
 
     @property
     def multipliers(self) -> Multipliers:
-        """Multipliers of all problems."""
-        return self.solutions.lam
+        """Multipliers, one array a problem."""
+        return tuple(solution.lam for solution in self.solutions)
 
     @property
     def converged(self) -> bool:
-        """Return True if the Krylov method solved all problems."""
-        return self.solutions.converged
+        """Return whether the Krylov method solved all problems."""
+        return all(solution.reason > 0 for solution in self.solutions)
+
+
+def kkt_errors(
+    comm: MPI.Intracomm,
+    traction: Float,
+    length: Float,
+    gap: Float,
+    debonded: Bool,
+    closed: Bool,
+    displacement: float,
+    stress: Float,
+    over_interface: Callable[[Float], Float],
+) -> dict[str, float]:
+    """Return the largest relative errors of gap >= 0, force <= 0, force gap = 0 on debonded faces.  Collective.
+
+    `kkt_penetration` is -gap relative to the imposed displacement, `kkt_tension` the normal traction of a closed node
+    relative to the largest traction on its interface, `kkt_complementarity` |force gap| relative to the largest force
+    on the interface times the displacement.  Scales of traction are at least the imposed stress: without forces on
+    faces the tractions are rounding.
+
+    Args:
+        traction: (k, 2) normal and tangential traction of this rank's interface nodes, tension positive.
+        length, gap: (k,) tributary interface length, force = traction length, and opening.
+        debonded, closed: (k,) nodes with these conditions, and nodes that touch.
+        displacement: largest displacement that the strain imposes on the cell.
+        stress: (k,) stress that the strain causes at each node.
+        over_interface: from values (k,) to the largest on the interface of each node.
+    """
+    force = traction[:, 0] * length
+    largest_traction = np.maximum(over_interface(np.abs(traction).max(axis=1, initial=0.0)), stress)
+    largest_force = np.maximum(over_interface(np.abs(force)), stress * over_interface(length))
+    # Without a strain errors are absolute.
+    displacement = displacement or 1.0
+    largest_traction, largest_force = (np.where(size > 0.0, size, 1.0) for size in (largest_traction, largest_force))
+    worst = np.array(
+        [
+            np.where(debonded, -gap, 0.0).max(initial=0.0) / displacement,
+            np.where(debonded & closed, traction[:, 0] / largest_traction, 0.0).max(initial=0.0),
+            np.where(debonded, np.abs(force * gap) / (largest_force * displacement), 0.0).max(initial=0.0),
+        ]
+    )
+    comm.Allreduce(MPI.IN_PLACE, worst, MPI.MAX)
+    return dict(zip(("kkt_penetration", "kkt_tension", "kkt_complementarity"), worst.tolist(), strict=True))
+
+
+def coulomb_errors(force: Float, friction: Float, sliding: Status) -> Float:
+    """(k,) excess of shear over mu p, or its distance to s mu p, and any shear along the fibres.
+
+    Args:
+        force: (k, c) normal, tangential and axial traction of faces, without the springs of damaged bonds.
+        friction, sliding: (k,) mu, and the sign s with which the slip grows, 0 for faces that stick.
+    """
+    limit, shear = friction * np.maximum(-force[:, 0], 0.0), force[:, 1]
+    excess = np.where(sliding == 0, np.maximum(np.abs(shear) - limit, 0.0), np.abs(sliding * shear - limit))
+    along = np.abs(force[:, 2:]).max(axis=1, initial=0.0)
+    return np.asarray(np.maximum(excess, along))

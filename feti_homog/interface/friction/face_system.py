@@ -1,17 +1,26 @@
-"""The linear response of debonded faces with given statuses; see `coulomb_faces`."""
+"""The linear response of debonded faces with prescribed statuses; see `coulomb_faces`.
+
+It is updated from statuses to neighbouring ones; free motions, or lost digits, ask for a factored system.
+"""
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from feti_homog.interface.contact.states import Status
-from feti_homog.interface.friction.status_solver import StatusSolver
-from feti_homog.interface.friction.status_system import OPEN_FACE, STICK, free_rows
-from feti_homog.typing import Bool, Float
+from feti_homog.interface.friction.status_system import OPEN_FACE, STICK, FollowedStatuses, StatusSystem, free_rows
+from feti_homog.typing import Bool, Float, Float32, Int
 
-# Forces and jumps of a node, scaled by its stiffness, that are rounding, relative to the terms of its rows of S x.
+# Arrays whose products are stored.
+PRODUCTS = 6
+# Factorizations that cost as much as the first followed response.
+FACTORIZATIONS = 12
+
+# Rounding of forces and jumps, scaled by the stiffness of the node, relative to the terms of its rows of S x.
 NOISE = 1e-11
 
 
@@ -20,8 +29,8 @@ class Prescribed:
     """Loads, and slips of nodes that stick.
 
     Attributes:
-        by_stress: (v,) which of the loads are given by what works on them.
-        values: (v,) strains, or (S x)_E of the others.
+        by_stress: (v,) loads of prescribed stress.
+        values: (v,) strains, or (S x)_E where the stress is prescribed.
         slip: (n,) slip of nodes that stick.
     """
 
@@ -31,24 +40,26 @@ class Prescribed:
 
 
 class FaceSystem:
-    """Debonded faces, and what their statuses make of loads.
+    """Debonded faces, and their response to loads with given statuses.
 
     Attributes:
         friction: (n,) mu.
-        S: (m, m) the scaled stiffness, of 1 on the diagonal of a node, and `size` (m,): S_ij size_i size_j is that of
-            the cell.
-        solver: of systems with it.
+        S: (m, m) scaled stiffness, whose nodes have 1 on the diagonal.
+        size: (m,) units: the stiffness is S_ij size_i size_j.
     """
 
     def __init__(self, stiffness: Float, friction: Float) -> None:
-        """`stiffness` (m, m) of normal and tangential jumps of each node, then of the v loads: m is 2n + v."""
+        """Scale the stiffness (m, m) of two jumps a node, normal and tangential, and v loads: m = 2n + v."""
         n, diagonal = len(friction), stiffness.diagonal()
         self.friction = friction
         nodes = np.repeat(diagonal[: 2 * n].reshape(n, 2).max(axis=1, initial=0.0), 2)
         size = np.sqrt(np.concatenate([nodes, np.maximum(diagonal[2 * n :], 0.0)]))
         self.size = np.where(size > 0.0, size, 1.0)
         self.S = stiffness / np.outer(self.size, self.size)
-        self.solver = StatusSolver(self.S)
+        self._followed: FollowedStatuses | None = None
+        self._last: tuple[bytes, StatusSystem] | None = None
+        self._factored = 0
+        self._products: deque[tuple[Float, Float]] = deque(maxlen=PRODUCTS)
 
     @property
     def nodes(self) -> int:
@@ -57,40 +68,98 @@ class FaceSystem:
 
     @property
     def loads(self) -> slice:
-        """Place of the loads in x."""
+        """Places of the loads in x."""
         return slice(2 * self.nodes, len(self.S))
 
     def forces(self, x: Float) -> tuple[Float, Float]:
         """(n,) scaled normal and tangential forces."""
-        f = -self.solver.product(x)[: 2 * self.nodes]
+        f = -self.product(x)[: 2 * self.nodes]
         return f[::2], f[1::2]
 
-    def linear(self, status: Status, given: Prescribed, start: Float) -> tuple[Float, bool]:
-        """(m,) scaled x with these statuses, and whether it is a solution; from a start as of `StatusSystem.solve`."""
-        return self.solver.solve(*self.free(status, given.by_stress), *self.prescribed(status, given, start))
+    def follow(self, before: FaceSystem, old: Int, other: Int) -> None:
+        """Go on from faces whose entries stand at the places `old` (m',), as `FollowedStatuses.grow`."""
+        units = before.size / self.size[old]
+        if before._followed is None:
+            self._factored = before._factored
+        elif before._followed.grow(self.S, old, other, units):
+            self._followed = before._followed
+
+    @cached_property
+    def _absolute(self) -> Float32:
+        """(m, m) |S_ij|, in single precision."""
+        return np.asarray(np.abs(self.S), np.float32)
+
+    def terms(self, x: Float) -> Float:
+        """(m,) sum_j |S_ij x_j|, to which rounding in S x is relative."""
+        largest = float(np.abs(x).max(initial=0.0)) or 1.0
+        return np.asarray(largest * (self._absolute @ np.abs(x / largest).astype(np.float32)), float)
+
+    def product(self, x: Float) -> Float:
+        """(m,) S x of an array that does not change; the last products are stored."""
+        for array, y in self._products:
+            if array is x:
+                return y
+        return self.keep(x, self.S @ x)
+
+    def keep(self, x: Float, y: Float) -> Float:
+        """Store y as the product of x, and return it."""
+        self._products.append((x, y))
+        return y
+
+    def linear(self, status: Status, load: Prescribed, start: Float) -> tuple[Float, bool]:
+        """(m,) scaled x with these statuses, and whether it is a solution; start as in `StatusSystem.solve`."""
+        rows, (x, values) = self.free(status, load.by_stress), self.prescribed(status, load, start)
+        followed = self._turned(*rows)
+        if followed is not None:
+            solution = followed.solve(x, values, self.terms)
+            if solution is not None:
+                self.keep(*solution)
+                return solution[0], True
+            self._followed, self._factored = None, 0
+        return self._system(*rows).solve(x, values)
+
+    def sign(self, status: Status, by_stress: Bool) -> int:
+        """Return the sign of the determinant with these statuses, 0 where motions are free."""
+        rows = self.free(status, by_stress)
+        return (self._turned(*rows) or self._system(*rows)).sign
+
+    def _turned(self, free: Bool, slope: Float) -> FollowedStatuses | None:
+        """Return the followed response with these rows; None with free motions, or before it pays."""
+        if self._followed is None:
+            if self._factored < FACTORIZATIONS:
+                return None
+            self._followed = FollowedStatuses(self.S)
+        return self._followed if self._followed.turn(free, slope) else None
+
+    def _system(self, free: Bool, slope: Float) -> StatusSystem:
+        """Return the factored system of these rows; the last one is stored."""
+        key = free.tobytes() + slope.tobytes()
+        if self._last is None or self._last[0] != key:
+            self._last = key, StatusSystem(self.S, free, slope)
+            self._factored += 1
+        return self._last[1]
 
     def free(self, status: Status, by_stress: Bool) -> tuple[Bool, Float]:
         """Return `free_rows` of statuses."""
         return free_rows(status, self.friction, by_stress)
 
-    def settled(self, status: Status, given: Prescribed, x: Float) -> tuple[Status, Float]:
+    def settled(self, status: Status, load: Prescribed, x: Float) -> tuple[Status, Float]:
         """Return the statuses, and x (m,) without the rounding of the way to it.
 
-        Where a motion is free, which rounding would drive, x is as it was.
+        With a free motion, which rounding would drive, x stays.
         """
-        is_free = self.solver.sign(*self.free(status, given.by_stress)) == 0
-        return status, x if is_free else self.linear(status, given, x)[0]
+        return status, self.linear(status, load, x)[0] if self.sign(status, load.by_stress) else x
 
-    def prescribed(self, status: Status, given: Prescribed, start: Float) -> tuple[Float, Float]:
-        """(m,) x with what is prescribed, and (m,) S x on the rows of loads."""
+    def prescribed(self, status: Status, load: Prescribed, start: Float) -> tuple[Float, Float]:
+        """(m,) x with its prescribed entries, and (m,) S x on the rows of loads."""
         last, loads, x, rows = 2 * self.nodes, self.loads, start.copy(), np.zeros(len(start))
         x[:last:2] = np.where(status == OPEN_FACE, x[:last:2], 0.0)
-        x[1:last:2] = np.where(status == STICK, given.slip, x[1:last:2])
-        x[loads] = np.where(given.by_stress, x[loads], given.values)
-        rows[loads] = given.values
+        x[1:last:2] = np.where(status == STICK, load.slip, x[1:last:2])
+        x[loads] = np.where(load.by_stress, x[loads], load.values)
+        rows[loads] = load.values
         return x, rows
 
     def noise(self, x: Float) -> Float:
-        """(n,) the scaled force, and jump, of each node that is rounding in x."""
-        terms = self.solver.terms(x)[: 2 * self.nodes].reshape(-1, 2)
+        """(n,) rounding of the scaled force, and jump, of each node."""
+        terms = self.terms(x)[: 2 * self.nodes].reshape(-1, 2)
         return np.asarray(NOISE * terms.max(axis=1, initial=0.0))

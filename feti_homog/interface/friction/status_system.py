@@ -1,52 +1,67 @@
-"""The linear system of debonded faces with given statuses."""
+"""The linear system of debonded faces with prescribed statuses, factored or updated from neighbouring statuses.
+
+The rows of M x = c are x_j for prescribed entries, (S x)_j for free ones, and (S x)_j + s mu (S x)_n for a slip that
+grows with the sign s.  Row r in place of row j changes R = [M^-1; S M^-1] by rank one,
+
+    R <- R - R_:j (w - e_j)^T / w_j,      w = r M^-1,      det M <- w_j det M,
+
+w a row of R itself.  Changes are collected and added to R by blocks.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
 from scipy.linalg import lu_factor, lu_solve
 
 from feti_homog.interface.contact.states import Status
-from feti_homog.typing import Bool, Float
+from feti_homog.typing import Bool, Float, Int
 
 STICK, FORWARD, OPEN_FACE, BACKWARD = 0, 1, 2, -1
 """Statuses of a debonded node: tied, sliding with a rising or a falling slip, apart."""
 
-# Stiffness, relative to that of a node, that holds what nothing else does where it is; steps of refinement remove it.
+# Stiffness, relative to a node's own, that holds free motions; steps of refinement remove it.
 HELD = 1e-9
-# A smaller pivot is that of a free motion: its sign is rounding.
+# A smaller pivot belongs to a free motion: its sign is rounding.
 LEAST_PIVOT = 1e-6
-# Free motions are looked for where a pivot is smaller, among a few more than such pivots, by inverse iteration, whose
-# steps leave HELD of what resists; their relative stiffness at most.
+# Smaller pivots ask for a search of free motions by inverse iteration, among some more vectors than such pivots; steps
+# of it, each of which leaves HELD of stiff motions; largest relative stiffness of a free motion.
 SOFT_PIVOT, MORE_MOTIONS, INVERSE_ITERATIONS, UNRESISTED = 1e-3, 3, 3, 0.1 * HELD
-# Steps of refinement at most, until each row is left with this share of its terms.
+# Largest number of refinements, until the residual of each row is this share of its terms.
 MOST_REFINEMENTS, ROUNDED = 20, 1e-14
-# What is left of rows, as a share of their terms, up to which no force drives a free motion.
+# Residuals of rows, relative to their terms, up to which no force drives a free motion.
 BALANCED = 1e-9
+# Changes that wait to be added to R.
+MOST_CHANGES = 32
+# Right-hand sides with no more entries use the columns of these alone.
+FEW = 8
+# Residual of a row, relative to its terms, that refinement may not leave; steps of refinement.
+TOO_MUCH, REFINEMENTS = 1e-11, 3
 
 
 def free_rows(status: Status, friction: Float, by_stress: Bool) -> tuple[Bool, Float]:
-    """(m,) which entries of x are unknown, and (m,) s mu of sliding nodes at their slips, 0 elsewhere."""
+    """(m,) unknown entries of x, and (m,) s mu at the slips of sliding nodes, 0 elsewhere."""
     free = np.concatenate([np.stack([status == OPEN_FACE, status != STICK], axis=1).ravel(), by_stress])
     slope = np.zeros(len(free))
     slope[1 : 2 * len(status) : 2] = np.where(np.abs(status) == 1, status * friction, 0.0)
     return free, slope
 
 
-def residual(y: Float, given: Float, free: Bool, slope: Float) -> Float:
-    """(m,) what y = S x (m,) leaves of the rows `given` (m,) that are free, 0 of others."""
+def residual(y: Float, rhs: Float, free: Bool, slope: Float) -> Float:
+    """(m,) residual of y = S x (m,) in the free rows with the right-hand side (m,); 0 in prescribed rows."""
     sliding = np.flatnonzero(slope)
-    left = given - y
-    left[sliding] -= slope[sliding] * y[sliding - 1]
-    return np.where(free, left, 0.0)
+    missing = rhs - y
+    missing[sliding] -= slope[sliding] * y[sliding - 1]
+    return np.where(free, missing, 0.0)
 
 
-def largest_share(left: Float, terms: Float, slope: Float) -> float:
-    """Return the largest of residuals (m,), each relative to the terms (m,) of its row."""
+def largest_share(residuals: Float, terms: Float, slope: Float) -> float:
+    """Return the largest residual (m,), relative to the terms (m,) of its row."""
     size, sliding = terms.copy(), np.flatnonzero(slope)
     size[sliding] += np.abs(slope[sliding]) * terms[sliding - 1]
-    return float((np.abs(left) / np.where(size > 0.0, size, 1.0)).max(initial=0.0))
+    return float((np.abs(residuals) / np.where(size > 0.0, size, 1.0)).max(initial=0.0))
 
 
 class StatusSystem:
@@ -55,12 +70,12 @@ class StatusSystem:
     Sliding nodes have the row S_t + s mu S_n: their traction is s mu times the pressure.
 
     Attributes:
-        free: (m,) which entries of x are unknown.
-        sign: of the determinant; 0 where a motion is free.
+        free: (m,) unknown entries of x.
+        sign: sign of the determinant, 0 with a free motion.
     """
 
     def __init__(self, S: Float, free: Bool, slope: Float) -> None:
-        """`S` (m, m) of `CoulombFaces`; what is free, and the slopes, as of `free_rows`."""
+        """Factor the rows that `free_rows` describes, of S (m, m) of `CoulombFaces`."""
         self.free = free
         sliding = np.flatnonzero(slope)
         place = np.cumsum(self.free) - 1
@@ -72,7 +87,7 @@ class StatusSystem:
 
     @property
     def sign(self) -> int:
-        """Sign of the determinant, 0 where a motion is free."""
+        """Sign of the determinant, 0 with a free motion."""
         if self._factor is None:
             return 1
         lu, pivots = self._factor
@@ -81,35 +96,35 @@ class StatusSystem:
         swaps = int((pivots != np.arange(len(pivots))).sum())
         return int(np.prod(np.sign(lu.diagonal()))) * (-1 if swaps % 2 else 1)
 
-    def solve(self, x: Float, given: Float) -> tuple[Float, bool]:
-        """(m,) x with the rows `given` (m,), from a start with the entries that are not free, and whether it is one.
+    def solve(self, x: Float, rhs: Float) -> tuple[Float, bool]:
+        """(m,) x with the right-hand side (m,) from a start with the prescribed entries, and whether it is a solution.
 
-        What nothing determines stays as it was at the start.  If forces drive it there is no solution: x is then that
-        of a cell that is held.
+        Free motions stay as they were at the start.  If forces drive them there is no solution: then springs of the
+        stiffness HELD bear the forces.
         """
         start, x = x, x.copy()
         if self._factor is None:
             return x, True
-        terms, rows = np.abs(self._rows), given[self.free]
+        terms, rows = np.abs(self._rows), rhs[self.free]
         for _ in range(MOST_REFINEMENTS):
-            left = rows - self._rows @ x
-            # Soft motions, whose stiffness is near that by which they are held, take more steps.
-            if (np.abs(left) <= ROUNDED * (terms @ np.abs(x) + np.abs(rows))).all():
+            missing = rows - self._rows @ x
+            # Motions about as soft as HELD take more steps.
+            if (np.abs(missing) <= ROUNDED * (terms @ np.abs(x) + np.abs(rows))).all():
                 break
-            x[self.free] += lu_solve(self._factor, left, check_finite=False)
+            x[self.free] += lu_solve(self._factor, missing, check_finite=False)
         if not self._free_motions.shape[1]:
             return x, True
-        # Where forces balance, rounding over what holds has driven free motions, otherwise on other numbers of ranks.
+        # Where forces balance, rounding divided by HELD has driven free motions, otherwise on other numbers of ranks.
         stays = x.copy()
         stays[self.free] -= self._free_motions @ (self._free_motions.T @ (x - start)[self.free])
-        # A row without any stiffness, of shear along fibres that slide there, is rounding of others.
-        left = np.abs(rows - self._rows @ stays) - np.finfo(float).eps * np.abs(stays).max(initial=0.0)
-        balanced = bool((left <= BALANCED * (terms @ np.abs(stays) + np.abs(rows))).all())
+        # A row without any stiffness, as of shear along sliding fibres, has the rounding of other rows.
+        missing = np.abs(rows - self._rows @ stays) - np.finfo(float).eps * np.abs(stays).max(initial=0.0)
+        balanced = bool((missing <= BALANCED * (terms @ np.abs(stays) + np.abs(rows))).all())
         return stays if balanced else x, balanced
 
     @cached_property
     def _free_motions(self) -> Float:
-        """(free rows, k) orthonormal motions that nothing resists."""
+        """(free rows, k) orthonormal free motions."""
         rows = np.count_nonzero(self.free)
         soft = 0 if self._factor is None else np.count_nonzero(np.abs(self._factor[0].diagonal()) < SOFT_PIVOT)
         if not soft:
@@ -119,3 +134,150 @@ class StatusSystem:
             motions = np.linalg.qr(lu_solve(self._factor, motions, check_finite=False))[0]
         _, size, combined = np.linalg.svd(self._rows[:, self.free] @ motions, full_matrices=False)
         return np.asarray(motions @ combined[size < UNRESISTED].T)
+
+
+class FollowedStatuses:
+    """R of m entries of x, which may arrive in any order.
+
+    Attributes:
+        S: (m, m) as of `CoulombFaces`.
+        free: (m,) rows of S.
+        slope: (m,) s mu of sliding nodes at their rows of slips, 0 elsewhere.
+        sign: of det M.
+    """
+
+    def __init__(self, S: Float) -> None:
+        """Prescribe all entries: M is the identity."""
+        m = len(S)
+        self.S, self.free, self.slope, self.sign = S, np.zeros(m, bool), np.zeros(m), 1
+        self._place: Int = np.arange(m)
+        self._size, self._R = m, np.stack([np.eye(m), S])
+        self._forget()
+
+    def _forget(self) -> None:
+        """Drop all waiting changes."""
+        capacity = self._R.shape[1]
+        self._U, self._V = np.zeros((2, capacity, MOST_CHANGES)), np.zeros((MOST_CHANGES, capacity))
+        self._count = 0
+
+    def turn(self, free: Bool, slope: Float) -> bool:
+        """Exchange rows for new ones; False if a pivot is too small."""
+        pending = np.flatnonzero((free != self.free) | (slope != self.slope))
+        while len(pending):
+            failed = [j for j in pending if not self._exchange(j, bool(free[j]), float(slope[j]))]
+            if len(failed) == len(pending):
+                return False
+            pending = np.array(failed, np.int64)
+        return True
+
+    def _exchange(self, j: int, free: bool, slope: float) -> bool:
+        """Exchange row j, unless its pivot is too small."""
+        at = int(self._place[j])
+        w = self._row(int(free), at)
+        if slope:
+            w += slope * self._row(1, int(self._place[j - 1]))
+        pivot = w[at]
+        if abs(pivot) < LEAST_PIVOT:
+            return False
+        column = self._R[:, : self._size, at] - self._U[:, : self._size, : self._count] @ self._V[: self._count, at]
+        w[at] -= 1.0
+        self._U[:, : self._size, self._count], self._V[self._count, : self._size] = column, w / pivot
+        self._count += 1
+        if self._count == MOST_CHANGES:
+            self._flush()
+        self.free[j], self.slope[j] = free, slope
+        self.sign *= 1 if pivot > 0.0 else -1
+        return True
+
+    def _row(self, kind: int, at: int) -> Float:
+        """(m,) row of M^-1 or S M^-1."""
+        count, size = self._count, self._size
+        return np.asarray(self._R[kind, at, :size] - self._U[kind, at, :count] @ self._V[:count, :size])
+
+    def _flush(self) -> None:
+        size, count = self._size, self._count
+        for kind in range(2 if count else 0):
+            self._R[kind, :size, :size] -= self._U[kind, :size, :count] @ self._V[:count, :size]
+        self._count = 0
+
+    def _inverse(self, c: Float) -> Float:
+        """(m,) M^-1 c."""
+        size, permuted = self._size, np.empty(self._size)
+        permuted[self._place] = c
+        few = np.flatnonzero(permuted)
+        some = few if len(few) <= FEW else slice(size)
+        change = self._U[0, :size, : self._count] @ (self._V[: self._count, :size][:, some] @ permuted[some])
+        return np.asarray((self._R[0, :size, :size][:, some] @ permuted[some] - change)[self._place])
+
+    def solve(self, x: Float, rhs: Float, terms: Callable[[Float], Float]) -> tuple[Float, Float] | None:
+        """(m,) x and S x with the right-hand side (m,), from a start with the prescribed entries.
+
+        None if R has lost too many digits, measured by the terms sum_j |S_ij x_j| of each row.
+        """
+        prescribed = np.where(self.free, rhs, x)
+        if np.count_nonzero(prescribed) <= FEW:
+            x = np.where(self.free, self._inverse(prescribed), x)
+        error = np.inf
+        for step in range(1 + REFINEMENTS):
+            y = self.S @ x
+            missing, before = residual(y, rhs, self.free, self.slope), error
+            error = largest_share(missing, np.abs(rhs) + terms(x), self.slope)
+            if error <= ROUNDED or error > before / 2 or step == REFINEMENTS:
+                break
+            x = np.where(self.free, x + self._inverse(missing), x)
+        return (x, y) if error <= TOO_MUCH else None
+
+    def grow(self, S: Float, old: Int, other: Int, units: Float) -> bool:
+        """Add prescribed entries, so that the present ones stand at the places `old` (m,) of S (m', m').
+
+        Present entries get other `units` (m,), and those at the places `other` another S between them.  False if a
+        pivot on the way is too small; then R is worthless.
+        """
+        if not self._replace(np.flatnonzero(np.isin(old, other)), S[other[:, None], other], units):
+            return False
+        self._flush()
+        size, m = self._size, len(S)
+        new = np.setdiff1d(np.arange(m), old)
+        free, slope, place = np.zeros(m, bool), np.zeros(m), np.empty(m, np.int64)
+        free[old], slope[old], place[old], place[new] = self.free, self.slope, self._place, np.arange(size, m)
+        self.S, self.free, self.slope, self._place = S, free, slope, place
+        if m > self._R.shape[1]:
+            # With room for more entries.
+            R = np.empty((2, m + m // 4, m + m // 4))
+            R[:, :size, :size] = self._R[:, :size, :size]
+            self._R = R
+            self._forget()
+        order = np.argsort(place)
+        first, last = order[:size], order[size:]
+        sliding = np.flatnonzero(slope[first])
+        coupling = S[first[:, None], last]
+        C = np.where(free[first, None], coupling, 0.0)
+        C[sliding] += slope[first[sliding], None] * S[first[sliding, None] - 1, last]
+        inverse, forces = self._R
+        rows = coupling.T @ inverse[:size, :size]
+        forces[:size, size:m] = coupling - forces[:size, :size] @ C
+        forces[size:m, :size] = rows
+        forces[size:m, size:m] = S[last[:, None], last] - rows @ C
+        inverse[:size, size:m] = -inverse[:size, :size] @ C
+        inverse[size:m, :size] = 0.0
+        inverse[size:m, size:m] = np.eye(m - size)
+        self._size = m
+        return True
+
+    def _replace(self, entries: Int, block: Float, units: Float) -> bool:
+        """Replace the block of S between rising entries, and the units (m,) of all entries; False as `grow`.
+
+        Prescribed entries have rows of the identity in M^-1, so that only their block of S M^-1 changes.
+        """
+        free, slope, at = self.free.copy(), self.slope.copy(), self._place[entries]
+        free[entries], slope[entries] = False, 0.0
+        if len(entries) and not self.turn(free, slope):
+            return False
+        self._flush()
+        some = np.flatnonzero(units != 1.0)
+        places, unit = self._place[some], units[some]
+        self._R[:, : self._size, places] *= np.where(self.free[some], 1.0 / unit, unit)
+        self._R[:, places, : self._size] *= np.stack([1.0 / unit, unit])[:, :, None]
+        before = self.S[entries[:, None], entries] * np.outer(units[entries], units[entries])
+        self._R[1, at[:, None], at] += block - before
+        return True

@@ -1,4 +1,4 @@
-"""Laws of bonds: which bond breaks at which traction or energy, and what follows.
+"""Bond laws: breaks by tractions or energies, and their consequences.
 
-Imports `case`, `feti` and `interface.contact`.  Main entries: `bond_law.BondLaw`, `registry.law_class`.
+Imports `case`, `feti` and `interface.contact`.  Main entries: `bond_law.BondLaw`, `bond_law.law_class`.
 """

@@ -1,6 +1,6 @@
-"""Laws of bonds: how much of its strength a traction uses, what a bond becomes that used all of it, what that costs.
+"""Bond laws: utilisation by tractions, the state after a break, and the energy that breaks take.
 
-A law is a dataclass of constants, one of all nodes or (k,) of each; `BondState.history` has what changes.
+A law is a dataclass of constants, numbers or (k,) arrays by node; `BondState.history` has internal variables.
 """
 
 from __future__ import annotations
@@ -8,39 +8,42 @@ from __future__ import annotations
 import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from importlib import import_module
 from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
 
+from feti_homog.case.bond_laws import LAWS
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BondState
 from feti_homog.typing import Bool, Float, Int
 
-# Halvings of an interval of length one, after which double precision ends.
+# Halvings of an interval of length one that exhaust double precision.
 BISECTIONS = 60
 
 
 class KeyValues(Protocol):
-    """Values of a key of [interface] at the nodes, those of the next key where a section has none, inf without any."""
+    """Values of a key of [interface] at nodes; a section without it has an alternative key, or inf."""
 
-    def __call__(self, key: str, *others: str) -> float | Float:
-        """Return one value of all nodes, or (k,) of each."""
+    def __call__(self, key: str, *alternatives: str) -> float | Float:
+        """Return one value for all nodes, or (k,) values."""
 
-    def everywhere(self, key: str, *others: str) -> Float:
-        """(s,) values of all sections, the same on every rank."""
+    def everywhere(self, key: str, *alternatives: str) -> Float:
+        """(s,) values of all sections, equal on every rank."""
 
     def common(self, key: str) -> Any:
-        """Return the value in which all sections agree, as the case has it."""
+        """Return the value that all sections share, as the case has it."""
 
 
+@dataclasses.dataclass(frozen=True)
 class BondLaw(ABC):
-    """Law of all bonds of a cell.  The defaults are those of a law without memory.
+    """Law for all bonds in a cell; the defaults suit laws without memory.
 
     Attributes:
         has_toughness: bonds have a fracture energy, which `fracture` gives.
-        has_tips: the energies that drive the tips of debonding on are compared with it.
-        is_convex: `share` is, and so passes 1 once on a straight way.
-        break_names: what `breaks` gives of tractions with two or three components.
+        has_tips: results compare this energy with the energies that drive tips of debonding.
+        is_convex: `share` is convex, and so passes 1 once on a straight way.
+        break_names: names of the columns of `breaks`, for tractions with two or three components.
     """
 
     has_toughness: ClassVar[bool] = False
@@ -50,58 +53,66 @@ class BondLaw(ABC):
 
     @abstractmethod
     def share(self, traction: Float) -> Float:
-        """(p,) share of the strength that tractions (p, c) use at the nodes of the law; 1 breaks.
+        """(p,) utilisation by tractions (p, c) at the law's nodes; 1 breaks.
 
-        c = 2 are normal, tension positive, and tangential, 3 also along the fibre.  Homogeneous of degree one in the
-        traction; 0 of none.
+        c = 2 are normal, tension positive, and tangential, 3 also along the fibre.  Homogeneous of degree one.
         """
 
     @abstractmethod
     def breaks(self, traction: Float) -> Float:
-        """(p, d) how bonds break under tractions (p, c), with the first d of `break_names`."""
+        """(p, d) descriptions of breaks under tractions (p, c), by the first d of `break_names`."""
+
+    @classmethod
+    @abstractmethod
+    def of_keys(cls, value: KeyValues) -> Self:
+        """Make the law from keys in [interface]."""
 
     def at(self, node: Int) -> Self:
-        """Return the law of the nodes (p,), one after the other."""
-        fields = [field.name for field in dataclasses.fields(self)]  # type: ignore[arg-type]  # laws are dataclasses
-        return type(self)(*(at_nodes(getattr(self, name), node) for name in fields))
+        """Return the law at the nodes (p,)."""
+        values: dict[str, Any] = {k: value[node] for k, value in vars(self).items() if isinstance(value, np.ndarray)}
+        return dataclasses.replace(self, **values)
 
     def begin(self, k: int) -> Float:
-        """(k, h) internal variables of k intact bonds."""
+        """(k, h) internal variables, k intact bonds."""
         return np.zeros((k, 0))
 
-    def utilisation(self, cell: CoupledInterfaces, bonds: BondState) -> Utilisation:
-        """Utilisation of the nodes of this rank in a state of all bonds.  Collective; what it returns is not."""
-        return Utilisation(self)
+    def in_state(self, cell: CoupledInterfaces, bonds: BondState) -> BondLaw:
+        """Return the law at this rank's nodes in a state of all bonds.  Collective; its methods are not."""
+        return self
+
+    def convex(self, p: int) -> Bool:
+        """(p,) True for nodes with a convex `share`."""
+        return np.full(p, self.is_convex)
 
     def after(self, bonds: BondState, which: Bool, traction: Float) -> tuple[Float, Bool]:
-        """(k, h) internal variables after some bonds used all of their strength, and which bonds (k,) part.
+        """(k, h) internal variables after the break of some bonds, and (k,) bonds that part.
 
-        These are the bonds `which` (k,) under tractions (k, c).
+        The bonds `which` (k,) break, under tractions (k, c).
         """
         return bonds.history, which
 
     def softening(self, bonds: BondState, pulled: Bool) -> Float | None:
-        """(k, 3) C / C_0 of the normal, tangential and axial springs of bonds `pulled` (k,) or pressed.
+        """(k, 3) C / C_0 of normal, tangential and axial springs, of bonds `pulled` (k,) or pressed.
 
-        None of a law that never changes C.
+        None if C never changes.
         """
         return None
 
     def fracture(self, bonds: BondState, which: Bool, traction: Float) -> Float:
-        """(p,) energies per area that the p bonds `which` (k,) take to break under tractions (k, c) of any size."""
+        """(p,) fracture energies per area, p bonds `which` (k,) in the modes of tractions (k, c)."""
         return np.zeros(int(which.sum()))
 
     def damage(self, bonds: BondState) -> Float | None:
-        """(k,) 0 of intact bonds to 1 of broken ones; None of a law that does not soften."""
+        """(k,) damage, 0 intact to 1 broken; None without softening."""
         return None
 
     @property
     def overshoot(self) -> float:
-        """Excess of the traction of the first step of damage over the peak of the law, relative to that."""
+        """Excess of the first break's traction over the peak of the law, relative to the peak."""
         return 0.0
 
     def onset(self) -> BondLaw:
-        """Return the criterion by which an intact bond is first damaged."""
+        """Return the criterion of first damage."""
         return self
 
     def mode_angle(self, traction: Float) -> Float:
@@ -109,55 +120,64 @@ class BondLaw(ABC):
         shear = np.linalg.norm(traction[:, 1:], axis=1)
         return np.asarray(np.arctan2(shear, np.maximum(traction[:, 0], 0.0)))
 
-    def first_factor(self, before: Float, ahead: Float) -> Float | None:
-        """(p,) the least f >= 0 at which `before` + f `ahead`, tractions (p, c), break, inf where none does.
+    def first_factor(self, before: Float, direction: Float) -> Float | None:
+        """(p,) smallest f >= 0 at which tractions `before` + f `direction` (p, c) break, inf if none.
 
-        None of a law that has no formula for it. `before` breaks nothing.
+        None without a formula.  `before` breaks nothing.
         """
         return None
 
-
-class Utilisation:
-    """Share of their strength that tractions use at some nodes, with the bonds of one state.
-
-    Attributes:
-        law: of the nodes, with the strengths that they have in the state.
-    """
-
-    def __init__(self, law: BondLaw) -> None:
-        self.law = law
-
-    def __call__(self, traction: Float) -> Float:
-        """(p,) shares that tractions (p, c) at the nodes use; of no meaning where a bond is broken."""
-        return self.law.share(traction)
-
-    def at(self, node: Int) -> Utilisation:
-        """Return the same of the nodes (p,), one after the other."""
-        return Utilisation(self.law.at(node))
-
-    def is_convex(self, p: int) -> Bool:
-        """(p,) True where the utilisation is sure to be a convex function of the traction, for p nodes."""
-        return np.full(p, self.law.is_convex)
-
-    def first_factor(self, before: Float, ahead: Float) -> Float | None:
-        """(p,) factors of `BondLaw.first_factor`; None where `crossing` has to find them."""
-        return self.law.first_factor(before, ahead)
-
-    def crossing(self, before: Float, ahead: Float, high: Float) -> Float:
-        """(p,) f at which `before` + f `ahead` (p, c) reach 1, by halving [0, `high`] (p,), which grows if it must."""
+    def crossing(self, before: Float, direction: Float, high: Float) -> Float:
+        """(p,) f at which `before` + f `direction` (p, c) break, by bisection of [0, `high`], doubled where needed."""
         low, high = np.zeros(len(high)), high.copy()
         for _ in range(BISECTIONS):
-            below = self(before + high[:, None] * ahead) < 1.0
+            below = self.share(before + high[:, None] * direction) < 1.0
             if not below.any():
                 break
             high[below] *= 2.0
         for _ in range(BISECTIONS):
             middle = (low + high) / 2
-            broken = self(before + middle[:, None] * ahead) > 1.0
+            broken = self.share(before + middle[:, None] * direction) > 1.0
             low, high = np.where(broken, low, middle), np.where(broken, middle, high)
         return high
 
 
-def at_nodes(value: float | Float, node: Int) -> float | Float:
-    """Return a value of all nodes, or those (k,) of each, at the nodes (p,)."""
-    return value[node] if isinstance(value, np.ndarray) else value
+class SpringLaw(BondLaw):
+    """Law for bonds that break by the energies in their undamaged springs.
+
+    A traction along the fibre adds to the energy of slip: all shear counts alike.
+
+    Attributes:
+        normal_stiffness, tangential_stiffness, axial_stiffness: k_n, k_t, k_a, stress per length.
+    """
+
+    normal_stiffness: float | Float
+    tangential_stiffness: float | Float
+    axial_stiffness: float | Float
+
+    has_toughness: ClassVar[bool] = True
+    break_names: ClassVar[Sequence[str]] = ("psi",)
+
+    def energies(self, traction: Float) -> tuple[Float, Float]:
+        """(p,) spring energies in opening and in slip, under tractions (p, c)."""
+        opening = np.maximum(traction[:, 0], 0.0) ** 2 / (2.0 * self.normal_stiffness)
+        slip = traction[:, 1] ** 2 / (2.0 * self.tangential_stiffness)
+        if traction.shape[1] == 3:
+            slip = slip + traction[:, 2] ** 2 / (2.0 * self.axial_stiffness)
+        return np.asarray(opening), np.asarray(slip)
+
+    def mode_angle(self, traction: Float) -> Float:
+        """(p,) psi of tractions (p, c), in radians: sin^2 psi is the energy share of slip."""
+        opening, slip = self.energies(traction)
+        return np.asarray(np.arctan2(np.sqrt(slip), np.sqrt(opening)))
+
+    def breaks(self, traction: Float) -> Float:
+        """(p, 1) psi of tractions (p, c), in degrees."""
+        return np.degrees(self.mode_angle(traction))[:, None]
+
+
+def law_class(name: str) -> type[BondLaw]:
+    """Return the class of a law by name, as in `case.bond_laws`."""
+    module, cls = LAWS[name].implementation.split(".")
+    law: type[BondLaw] = getattr(import_module(f"{__package__}.{module}"), cls)
+    return law

@@ -1,37 +1,51 @@
 """Break by energy of the bonds of an elastic interface (LEBIM).
 
 Tavara, Mantic, Graciani, Paris, Eng. Anal. Bound. Elem. 35 (2011) 207; the mode-mixity law is Hutchinson and Suo's.
+
+At a tip of debonding the released energy counts.  The energy in the spring of a tip falls with the length of its node,
+so that growth by it depends on the mesh.  The energy that the break of bond i releases does not: with H the inverse of
+the dual operator on the active rows, its faces then part by j = H_ii^-1 lam_i, and the energy of the cell falls, at
+constant strain, by
+
+    1/2 lam_i . H_ii^-1 lam_i;  1/2 lam_t^2 / H_tt if they would overlap and the normal force stays.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import ClassVar, Self
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
 
-from feti_homog.interface.contact.states import BondState
-from feti_homog.interface.laws.bond_law import BondLaw, KeyValues
-from feti_homog.typing import Bool, Float
+from feti_homog.errors import ConvergenceError
+from feti_homog.interface.contact.contact_problem import ContactProblem
+from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
+from feti_homog.interface.contact.states import BONDED, BondState
+from feti_homog.interface.laws.bond_law import KeyValues, SpringLaw
+from feti_homog.typing import Bool, Float, Int
+
+if TYPE_CHECKING:
+    from feti_homog.feti.exact.exact_inverse import ExactInverse
+
+# Blocks of H are rounding if smaller than this share of the stiffness beside the bond.
+RIGID = 1e-9
+# Largest rounding of H with which energies are compared: bonds whose utilisation differs by less break together.
+MOST_ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
-class SpringEnergy(BondLaw):
+class SpringEnergy(SpringLaw):
     """A bond breaks when the energy of its spring reaches the toughness.
 
     G_I = <t_n>^2 / (2 k_n), G_II = t_t^2 / (2 k_t), tan^2 psi = G_II / G_I;
     G_I + G_II = G_c = G_Ic [1 + tan^2((1 - lambda) psi)].
 
-    A traction along the fibre adds G_III = t_a^2 / (2 k_a) to G_II: all shear counts alike.
-
-    The attributes are those of all nodes, or (k,) of each.
+    A traction along the fibre adds G_III = t_a^2 / (2 k_a) to G_II.
 
     Attributes:
-        normal_stiffness, tangential_stiffness: k_n and k_t, stress per length.
         toughness: G_Ic, energy per area.
-        mode_sensitivity: lambda; 1 lets G_c not depend on the mode, 0 lets shear alone break nothing.
-        axial_stiffness: k_a, along the fibre.
+        mode_sensitivity: lambda; with 1 G_c is independent of the mode, with 0 shear alone breaks nothing.
     """
 
     normal_stiffness: float | Float
@@ -40,13 +54,11 @@ class SpringEnergy(BondLaw):
     mode_sensitivity: float | Float
     axial_stiffness: float | Float = math.inf
 
-    has_toughness: ClassVar[bool] = True
     has_tips: ClassVar[bool] = True
-    break_names: ClassVar[tuple[str, ...]] = ("psi",)
 
     @classmethod
     def of_keys(cls, value: KeyValues) -> Self:
-        """Make the law from stiffnesses and toughness; that along the fibre is the tangential one by default."""
+        """Make the law from stiffnesses and toughness; the axial stiffness defaults to the tangential one."""
         return cls(
             value("normal_stiffness"),
             value("tangential_stiffness"),
@@ -56,40 +68,159 @@ class SpringEnergy(BondLaw):
         )
 
     def mode_factor(self, traction: Float) -> Float:
-        """(k,) sqrt(G_Ic / G_c) of the modes of tractions (k, 2)."""
+        """(p,) sqrt(G_Ic / G_c) under tractions (p, c)."""
         # 1 / (1 + tan^2 x) = cos^2 x
         return np.asarray(np.cos((1.0 - self.mode_sensitivity) * self.mode_angle(traction)))
 
     def share(self, traction: Float) -> Float:
-        """(k,) sqrt((G_I + G_II) / G_c) of tractions (k, 2).
+        """(p,) sqrt((G_I + G_II) / G_c) of tractions (p, c).
 
-        Normal and tangential, or (k, 3), also along the fibre: 1 breaks.
-
-        Homogeneous of degree one in the traction, for psi does not depend on its size, and convex.
+        Homogeneous of degree one in the traction, for psi is independent of its size, and convex.
         """
-        return np.asarray(np.hypot(*self._roots(traction)) * self.mode_factor(traction) / np.sqrt(self.toughness))
+        return np.asarray(np.sqrt(sum(self.energies(traction)) / self.toughness) * self.mode_factor(traction))
 
     def fracture_toughness(self, traction: Float) -> Float:
-        """(k,) G_c of the modes of tractions (k, 2), energy per area."""
+        """(p,) G_c under tractions (p, c), energy per area."""
         return np.asarray(self.toughness / self.mode_factor(traction) ** 2)
 
     def fracture(self, bonds: BondState, which: Bool, traction: Float) -> Float:
-        """(p,) G_c of the bonds `which` (k,) in the modes of tractions (k, c)."""
+        """(p,) G_c of bonds `which` (k,) under tractions (k, c)."""
         return self.at(np.flatnonzero(which)).fracture_toughness(traction[which])
 
-    def breaks(self, traction: Float) -> Float:
-        """(p, 1) psi of tractions (p, c), in degrees."""
-        return np.degrees(self.mode_angle(traction))[:, None]
 
-    def mode_angle(self, traction: Float) -> Float:
-        """(k,) psi of tractions (k, 2), in radians: 0 opens, pi/2 shears, under pressure too."""
-        opening, shear = self._roots(traction)
-        return np.asarray(np.arctan2(shear, opening))
+@dataclass(frozen=True)
+class Tips:
+    """The bonds of this rank beside broken ones.
 
-    def _roots(self, traction: Float) -> tuple[Float, Float]:
-        """(k,) sqrt(G_I) and sqrt(G_II), with G_III in the latter."""
-        opening = np.maximum(traction[:, 0], 0.0) / np.sqrt(2.0 * self.normal_stiffness)
-        shear = np.abs(traction[:, 1]) / np.sqrt(2.0 * self.tangential_stiffness)
-        if traction.shape[1] == 3:
-            shear = np.hypot(shear, traction[:, 2] / np.sqrt(2.0 * self.axial_stiffness))
-        return opening, shear
+    Attributes:
+        node: (t,) node numbers.
+        H: (t, 2, 2) diagonal blocks of the inverse of the dual operator.
+        length: (t,) tributary lengths.
+        stiffness: (t, c) upper bound of H, as `ExactInverse.stiffness`.
+        axial: (t,) H for slip along the fibres; empty without this problem.
+    """
+
+    node: Int
+    H: Float
+    length: Float
+    stiffness: Float
+    axial: Float
+
+    def chosen(self, which: Int) -> Tips:
+        """Return some tips."""
+        axial = self.axial[which] if len(self.axial) else self.axial
+        return Tips(self.node[which], self.H[which], self.length[which], self.stiffness[which], axial)
+
+    def released(self, traction: Float, contact: bool) -> Float:
+        """(t,) energies that breaks under tractions (t, c) release; with `contact` faces do not overlap."""
+        lam = traction * self.length[:, None]
+        released = released_energy(self.H, lam[:, :2], self.stiffness[:, :2], contact)
+        if len(self.axial) == 0:
+            return released
+        gives_way = self.axial > RIGID * self.stiffness[:, 2]
+        along = np.where(gives_way, lam[:, 2] ** 2 / np.where(gives_way, 2.0 * self.axial, 1.0), 0.0)
+        return np.asarray(released + along)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReleasedEnergy(SpringEnergy):
+    """Bonds beside a broken one break when the break releases G_c l, with l their tributary length.
+
+    Other bonds break when the energy of their spring reaches G_c.
+
+    Attributes:
+        influence: inverse of the dual operator, which couples neighbouring bonds.
+        axial: inverse for slip along the fibres, if that is a problem.
+    """
+
+    influence: ExactInverse
+    axial: ExactInverse | None = None
+
+    @classmethod
+    def of(cls, springs: SpringEnergy, influence: ExactInverse, axial: ExactInverse | None = None) -> Self:
+        """Make the law of springs with the inverses of the problems."""
+        return cls(**vars(springs), influence=influence, axial=axial)
+
+    def in_state(self, cell: CoupledInterfaces, bonds: BondState) -> SpringsAndTips:
+        """Return the law of this rank's nodes with these bonds.  Collective; its methods are not."""
+        tips = self.tips(cell, bonds)
+        number = np.full(len(bonds.status), -1)
+        number[tips.node] = np.arange(len(tips.node))
+        springs = {field.name: getattr(self, field.name) for field in fields(SpringEnergy)}
+        return SpringsAndTips(**springs, tips=tips, number=number, contact=cell.plane.contact)
+
+    def tips(self, cell: CoupledInterfaces, bonds: BondState) -> Tips:
+        """Return the tips of this rank.  Collective.
+
+        Raises:
+            ConvergenceError: rounding hides the released energy.
+        """
+        self._activate(self.influence, cell.plane, bonds)
+        neighbours, first = self.influence.neighbours, self.influence.neighbours.first
+        everywhere = np.concatenate(neighbours.comm.allgather(bonds.status))
+        numbers = np.flatnonzero((everywhere == BONDED) & (neighbours.adjacency @ (everywhere != BONDED) > 0))
+        mine = (numbers >= first) & (numbers < first + len(bonds.status))
+        rows = neighbours.rows[numbers][:, None] + np.arange(2)
+        H, axial = self.influence.inverse_blocks(rows)[mine], np.zeros(0)
+        stiffness = self.influence.stiffness[rows[mine]]
+        node = numbers[mine] - first
+        if self.axial is not None:
+            self._activate(self.axial, cell.problems[1], bonds)
+            rows = self.axial.neighbours.rows[numbers]
+            axial = self.axial.inverse_blocks(np.stack([rows, rows], axis=1))[mine, 0, 0]
+            stiffness = np.column_stack([stiffness, self.axial.stiffness[rows[mine]]])
+        return Tips(node, H, cell.nodes.length[node], stiffness, axial)
+
+    @staticmethod
+    def _activate(influence: ExactInverse, interface: ContactProblem, bonds: BondState) -> None:
+        """Update the inverse to these bonds.  Collective; raises as `tips`."""
+        interface.prepare(bonds)
+        if not influence.rounding <= MOST_ROUNDING:
+            raise ConvergenceError(
+                f'[interface] growth = "released": rounding hides {influence.rounding:.1e} of what breaks release, '
+                f"expected at most {MOST_ROUNDING:g}: springs are too soft beside bodies that are cut or coated, or "
+                'phases too far apart; growth = "springs" bears more'
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpringsAndTips(SpringEnergy):
+    """Released energy in a state of the bonds: at tips sqrt(released / (G_c l)), at other nodes the springs.
+
+    Attributes:
+        number: (p,) tip number of a node, or -1.
+        contact: whether faces do not overlap.
+    """
+
+    tips: Tips
+    number: Int
+    contact: bool
+
+    def share(self, traction: Float) -> Float:
+        """(p,) shares of the strength that tractions (p, c) use."""
+        used, at = super().share(traction), np.flatnonzero(self.number >= 0)
+        springs, tips = self.at(at), self.tips.chosen(self.number[at])
+        released = tips.released(traction[at], self.contact)
+        used[at] = np.sqrt(released / (springs.toughness * tips.length)) * springs.mode_factor(traction[at])
+        return used
+
+    def convex(self, p: int) -> Bool:
+        """(p,) False at tips, whose released energy need not be subadditive."""
+        return np.asarray(self.number < 0)
+
+
+def released_energy(H: Float, lam: Float, stiffness: Float, contact: bool) -> Float:
+    """(m,) energies that breaks of single bonds release, with blocks H (m, 2, 2) and forces lam (m, 2).
+
+    `stiffness` (m, 2) bounds H: where H is rounding beside it, as at the last bond of a fibre, no force can act.  With
+    `contact` faces that would overlap keep their normal force.
+    """
+    root = np.sqrt(stiffness)
+    share, vectors = np.linalg.eigh(H / (root[:, :, None] * root[:, None, :]))
+    along = np.einsum("mij,mi->mj", vectors, lam / root)
+    inverse = np.where(share > RIGID, 1.0 / np.where(share > RIGID, share, 1.0), 0.0)
+    opens = (np.einsum("mj,mj->m", vectors[:, 0], inverse * along) >= 0.0) | (not contact)
+    both, tangential = (inverse * along**2).sum(axis=1), H[:, 1, 1] / stiffness[:, 1]
+    slides = tangential > RIGID
+    shear = np.where(slides, lam[:, 1] ** 2 / stiffness[:, 1] / np.where(slides, tangential, 1.0), 0.0)
+    return np.asarray(np.where(opens, both, shear) / 2)

@@ -1,32 +1,228 @@
-"""Softening branches of cohesive laws: how the traction falls from its peak."""
+"""Cohesive laws: bonds soften by damage, tooth by tooth, with exactly the energy of the law.
+
+Camanho, Davila, NASA/TM-2002-211737 (mixed mode); Benzeggagh, Kenane, Compos. Sci. Technol. 56 (1996) 439 (toughness);
+Rots, Belletti, Invernizzi, Eng. Fract. Mech. 75 (2008) 590 (saw teeth).
+
+W is the energy that undamaged springs would store at the same opening and slip, B its share of shear:
+
+    W_0 = 1 / ((1 - B) / W_n + B / W_t),  W_n = N^2 / (2 k_n),  W_t = S^2 / (2 k_t)     onset of damage,
+    G_c = G_n + (G_t - G_n) B^eta                                                       energy of the law,
+    traction / peak = tau(u),  sqrt(W / W_0) = x = 1 + s u,  s = (G_c / W_0 - 1) / (2 int tau)   softening,
+    1 - d = tau / x                                                                     damage.
+
+So damage d takes the energy W_0 phi, phi = 2 int_0^x tau dx - tau x.  The tooth from the damage d_j to d_j+1
+breaks at W_j = W_0 (phi_j+1 - phi_j) / (d_j+1 - d_j) and takes W_j (d_j+1 - d_j): the energy of the law in between.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from abc import abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from feti_homog.interface.laws.bond_law import KeyValues
-from feti_homog.interface.laws.cohesive import CohesiveLaw
-from feti_homog.typing import Float
+from feti_homog.errors import CaseError
+from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
+from feti_homog.interface.contact.states import BondState
+from feti_homog.interface.laws.bond_law import KeyValues, SpringLaw
+from feti_homog.interface.laws.strength import QuadraticStrength
+from feti_homog.typing import Bool, Float, Int
 
-# The last tooth begins where an exponential traction has fallen to this share of its peak.
+# Teeth of the default at most; steps of Newton's method.
+MOST_TEETH, NEWTON_STEPS = 10_000, 60
+# The last tooth begins where an exponential traction is this share of its peak.
 EXPONENTIAL_TAIL = 0.01
-NEWTON_STEPS = 60
+NUMBERS = ("normal_stiffness", "tangential_stiffness", "normal_strength", "tangential_strength",
+           "normal_toughness", "tangential_toughness", "mixing_exponent")  # fmt: skip
+
+
+def numbers(value: Callable[..., float | Float]) -> dict[str, Any]:
+    """Return the numbers of a law; the axial stiffness defaults to the tangential one."""
+    axial = value("axial_stiffness", "tangential_stiffness")
+    return {name: value(name) for name in NUMBERS} | {"axial_stiffness": axial}
+
+
+@dataclass(frozen=True)
+class CohesiveLaw(SpringLaw):
+    """A law that softens; the history of a bond is its number of broken teeth.
+
+    Attributes:
+        normal_strength, tangential_strength: N and S.
+        normal_toughness, tangential_toughness: G_n and G_t.
+        mixing_exponent: eta.
+        levels: damage d_0 = 0 < ... < d_n = 1 between teeth.
+        level: number of broken teeth.
+    """
+
+    normal_stiffness: float | Float
+    tangential_stiffness: float | Float
+    axial_stiffness: float | Float
+    normal_strength: float | Float
+    tangential_strength: float | Float
+    normal_toughness: float | Float
+    tangential_toughness: float | Float
+    mixing_exponent: float | Float
+    levels: tuple[float, ...]
+    level: float | Float = 0.0
+
+    is_convex: ClassVar[bool] = False
+
+    @classmethod
+    def of_keys(cls, value: KeyValues) -> Self:
+        """Make the law of [interface], with the teeth that the case asks for."""
+        law, branch = cls(**numbers(value), levels=(0.0, 1.0)), cls.branch(value)
+        # All sections together, so that ranks agree.
+        everywhere = cls(**numbers(value.everywhere), levels=(0.0, 1.0), **branch)
+        levels = everywhere.levels_for(value.common("teeth"), value.common("softening_tolerance"))
+        return replace(law, levels=levels, **branch)
+
+    @classmethod
+    def branch(cls, value: KeyValues) -> dict[str, Any]:
+        """Return the fields of the softening branch."""
+        return {}
+
+    def levels_for(self, teeth: int | None, tolerance: float) -> tuple[float, ...]:
+        """Return damage levels with a constant ratio of openings, in the pure mode with the largest G_c / W_0.
+
+        Without `teeth` the smallest number is taken whose first tooth exceeds the peak by at most `tolerance` of it.
+
+        Raises:
+            CaseError: the number is above MOST_TEETH.
+        """
+        s = self._longest_branch
+        for n in [teeth] if teeth else range(1, MOST_TEETH + 1):
+            # Without a branch all levels are reached at once.
+            x = (1.0 + s * self.last) ** (np.arange(n) / n)
+            d = 1.0 - self.shape((x - 1.0) / s) / x if s > 0.0 else np.arange(n) / n
+            levels = np.append(d, 1.0)
+            excess = math.sqrt(float(self._taken(levels[1:2], s)[0] / levels[1])) - 1.0
+            if teeth or excess <= tolerance:
+                return tuple(levels.tolist())
+        raise CaseError(
+            f"[interface] softening_tolerance = {tolerance:g}: with {MOST_TEETH} teeth, the most, the first exceeds "
+            f"the peak traction by {excess:.1e} of it; expected at least that"
+        )
+
+    @property
+    def _longest_branch(self) -> float:
+        """Largest s of the pure modes at any node."""
+        onsets = self._onsets
+        ratios = self.normal_toughness / onsets[0], self.tangential_toughness / onsets[1]
+        largest = max(float(np.max(ratio, initial=0.0)) for ratio in map(np.asarray, ratios))
+        return max(0.0, largest - 1.0) / (2.0 * float(self.area(np.inf)))
+
+    @property
+    def overshoot(self) -> float:
+        """Largest excess of the first tooth over the peak traction in pure modes, relative to the peak."""
+        return float(np.sqrt(self._taken(self._damages[1:2], self._longest_branch)[0] / self.levels[1])) - 1.0
+
+    @property
+    @abstractmethod
+    def last(self) -> float:
+        """The u at which the last tooth ends, or begins to take the rest."""
+
+    @abstractmethod
+    def shape(self, u: Float) -> Float:
+        """tau(u) for u >= 0: 1 at 0, falling."""
+
+    @abstractmethod
+    def area(self, u: Float | float) -> Float | float:
+        """int_0^u tau."""
+
+    @abstractmethod
+    def opening(self, d: Float, s: Float | float) -> Float:
+        """(p,) u with tau(u) = (1 - d) (1 + s u), for d < 1."""
+
+    def begin(self, k: int) -> Float:
+        """(k, 1) no broken teeth."""
+        return np.zeros((k, 1))
+
+    def in_state(self, cell: CoupledInterfaces, bonds: BondState) -> Self:
+        """Return the law of the next teeth."""
+        return replace(self, level=bonds.history[:, 0])
+
+    def share(self, traction: Float) -> Float:
+        """(p,) sqrt(W / W_j) of tractions (p, c) at bonds with j broken teeth.
+
+        Homogeneous of degree one, for B is independent of the traction's size.
+        """
+        first, second = self.energies(traction)
+        tooth = np.minimum(np.asarray(self.level, np.int64), len(self.levels) - 2)
+        return np.asarray(np.sqrt((first + second) / self._breaking(traction, tooth)) / (1.0 - self._damages[tooth]))
+
+    def after(self, bonds: BondState, which: Bool, traction: Float) -> tuple[Float, Bool]:
+        """(k, 1) broken teeth with one more at the bonds `which`, and (k,) bonds that lost the last."""
+        history = bonds.history + which[:, None]
+        return history, which & (history[:, 0] >= len(self.levels) - 1)
+
+    def damage(self, bonds: BondState) -> Float:
+        """(k,) d, 1 for all parted bonds."""
+        d = self._damages[bonds.history[:, 0].astype(np.int64)]
+        return np.asarray(np.where(bonds.status == 0, d, 1.0))
+
+    def softening(self, bonds: BondState, pulled: Bool) -> Float:
+        """(k, 3) 1 / (1 - d); 1 for pressed normal springs and for parted bonds, whose faces press by them."""
+        d = self._damages[bonds.history[:, 0].astype(np.int64)]
+        factor = 1.0 / (1.0 - np.where(d < 1.0, d, 0.0))
+        return np.column_stack([np.where(pulled, factor, 1.0), factor, factor])
+
+    def fracture(self, bonds: BondState, which: Bool, traction: Float) -> Float:
+        """(p,) W_j (d_j+1 - d_j) of the breaking teeth."""
+        law, selected = self.at(np.flatnonzero(which)), traction[which]
+        tooth = bonds.history[which, 0].astype(np.int64)
+        return np.asarray(law._breaking(selected, tooth) * np.diff(self._damages)[tooth])
+
+    def onset(self) -> QuadraticStrength:
+        """Return the criterion of the onset of damage."""
+        axial = self.tangential_strength * np.sqrt(self.axial_stiffness / np.asarray(self.tangential_stiffness))
+        return QuadraticStrength(self.normal_strength, self.tangential_strength, axial)
+
+    @property
+    def _damages(self) -> Float:
+        """(n + 1,) levels."""
+        return np.array(self.levels)
+
+    @property
+    def _onsets(self) -> tuple[float | Float, float | Float]:
+        """W_n and W_t."""
+        normal, tangential = self.normal_strength, self.tangential_strength
+        return normal**2 / (2.0 * self.normal_stiffness), tangential**2 / (2.0 * self.tangential_stiffness)
+
+    def _breaking(self, traction: Float, tooth: Int) -> Float:
+        """(p,) W_j of teeth, (p,) or one number, in the modes of tractions (p, c)."""
+        first, second = self.energies(traction)
+        stored = first + second
+        B = np.divide(second, stored, out=np.zeros(len(stored)), where=stored > 0.0)
+        onsets = self._onsets
+        onset = 1.0 / ((1.0 - B) / onsets[0] + B / onsets[1])
+        extra = (self.tangential_toughness - self.normal_toughness) * B**self.mixing_exponent
+        s = np.maximum((self.normal_toughness + extra) / onset - 1.0, 0.0) / (2.0 * self.area(np.inf))
+        low, high = self._damages[tooth], self._damages[tooth + 1]
+        return np.asarray(onset * (self._taken(high, s) - self._taken(low, s)) / (high - low))
+
+    def _taken(self, d: Float, s: Float | float) -> Float:
+        """(p,) phi at the damage d: energy that the law has taken, over W_0."""
+        d, s = np.asarray(d, float), np.asarray(s)
+        inside = d < 1.0
+        below = np.where(inside, d, 0.0)
+        u = self.opening(below, s)
+        partly = 1.0 + 2.0 * s * self.area(u) - (1.0 - below) * (1.0 + s * u) ** 2
+        return np.asarray(np.where(inside, partly, 1.0 + 2.0 * s * self.area(np.inf)))
 
 
 @dataclass(frozen=True)
 class PiecewiseLinear(CohesiveLaw):
-    """tau falls in straight lines between `knots` (m,) with the values `heights` (m,), from 1 to 0."""
+    """tau is piecewise linear, with `heights` (m,) from 1 to 0 at `knots` (m,)."""
 
     knots: tuple[float, ...] = (0.0, 1.0)
     heights: tuple[float, ...] = (1.0, 0.0)
 
     @property
     def last(self) -> float:
-        """Return where tau is none at first."""
+        """First zero of tau."""
         return self.knots[self.heights.index(0.0)]
 
     def shape(self, u: Float) -> Float:
@@ -36,24 +232,22 @@ class PiecewiseLinear(CohesiveLaw):
     def area(self, u: Float | float) -> Float | float:
         """int_0^u tau."""
         u = np.minimum(u, self.last)
-        if len(self.knots) == 2:
-            return np.asarray(u - u**2 / (2.0 * self.knots[1]))
         knots, heights = np.array(self.knots), np.array(self.heights)
         areas = np.concatenate([[0.0], np.cumsum(np.diff(knots) * (heights[1:] + heights[:-1]) / 2.0)])
         k = np.clip(np.searchsorted(knots, u, side="right") - 1, 0, len(knots) - 2)
         return np.asarray(areas[k] + (u - knots[k]) * (heights[k] + self.shape(np.asarray(u))) / 2.0)
 
     def opening(self, d: Float, s: Float | float) -> Float:
-        """(p,) the u with tau(u) = (1 - d) (1 + s u), in the piece where that changes sign."""
+        """(p,) u with tau(u) = (1 - d) (1 + s u), in the piece with a change of sign."""
         if len(self.knots) == 2:
             return np.asarray(d / ((1.0 - d) * s + 1.0 / self.knots[1]))
         knots, heights = np.array(self.knots), np.array(self.heights)
-        kept = 1.0 - np.asarray(d)
-        above = heights - kept[..., None] * (1.0 + np.asarray(s)[..., None] * knots) >= 0.0
+        intact = 1.0 - np.asarray(d)
+        above = heights - intact[..., None] * (1.0 + np.asarray(s)[..., None] * knots) >= 0.0
         k = np.clip(above.sum(axis=-1) - 1, 0, len(knots) - 2)
         slope = (heights[k + 1] - heights[k]) / (knots[k + 1] - knots[k])
         # tau_k + slope (u - u_k) = kept + kept s u
-        return np.asarray((heights[k] - slope * knots[k] - kept) / (kept * s - slope))
+        return np.asarray((heights[k] - slope * knots[k] - intact) / (intact * s - slope))
 
 
 @dataclass(frozen=True)
@@ -63,11 +257,11 @@ class Bilinear(PiecewiseLinear):
 
 @dataclass(frozen=True)
 class Table(PiecewiseLinear):
-    """Traction over opening in mode I from a table; in other modes the branch is stretched to their toughness."""
+    """Traction over opening in mode I from a table; other modes stretch the branch to their toughness."""
 
     @classmethod
     def branch(cls, value: KeyValues) -> dict[str, Any]:
-        """Return knots and heights from the openings and tractions, the first of which are those of the peak."""
+        """Return knots and heights from openings and tractions, which begin at the peak."""
         openings, tractions = np.array(value.common("openings")), np.array(value.common("tractions"))
         return {"knots": tuple(openings / openings[0] - 1.0), "heights": tuple(tractions / tractions[0])}
 
@@ -78,7 +272,7 @@ class Exponential(CohesiveLaw):
 
     @property
     def last(self) -> float:
-        """Return where little is left."""
+        """The u of the exponential tail."""
         return -math.log(EXPONENTIAL_TAIL)
 
     def shape(self, u: Float) -> Float:
@@ -90,7 +284,7 @@ class Exponential(CohesiveLaw):
         return np.asarray(-np.expm1(-np.asarray(u)))
 
     def opening(self, d: Float, s: Float | float) -> Float:
-        """(p,) the root of u + ln(1 + s u) = -ln(1 - d), which Newton's method reaches from below."""
+        """(p,) root of u + ln(1 + s u) = -ln(1 - d), by Newton's method from below."""
         right = -np.log1p(-np.asarray(d))
         u = right / (1.0 + s)
         for _ in range(NEWTON_STEPS):

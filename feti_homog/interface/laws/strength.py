@@ -1,4 +1,4 @@
-"""Bonds that break at a strength: limits of the traction on a bonded face, force per area; compression breaks none."""
+"""Bonds that break at a strength, a limit of their traction, force per area; compression breaks none."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from feti_homog.typing import Float
 
 @dataclass(frozen=True)
 class Strength(BondLaw):
-    """Limits of each component of the traction, all together.
+    """Limits of the traction's components, combined.
 
     Attributes:
-        normal, tangential: strengths R^n and R^t, inf where there is none.
-        axial: strength R^a along the fibre, whose share |t_a| / R^a counts like the others.
+        normal, tangential: strengths R^n and R^t, inf for none.
+        axial: strength R^a along the fibre.
     """
 
     normal: float | Float
@@ -28,28 +28,28 @@ class Strength(BondLaw):
 
     @classmethod
     def of_keys(cls, value: KeyValues) -> Self:
-        """Make the law from the strengths; that along the fibre is the tangential one by default."""
+        """Make the law from strengths; the axial one defaults to the tangential one."""
         return cls(
             value("normal_strength"), value("tangential_strength"), value("axial_strength", "tangential_strength")
         )
 
     def share(self, traction: Float) -> Float:
-        """(p,) share of the strength that tractions (p, c) use."""
+        """(p,) shares of the strength that tractions (p, c) use."""
         return self.together(self.breaks(traction))
 
     @abstractmethod
     def together(self, shares: Float) -> Float:
-        """(p,) utilisation by the shares (p, c) of each component."""
+        """(p,) utilisation by the shares (p, c) of components."""
 
     def breaks(self, traction: Float) -> Float:
-        """(p, c) what each component of tractions (p, c) is of its strength."""
+        """(p, c) components of tractions (p, c), relative to their strengths."""
         pulls = np.abs(traction)
         pulls[:, 0] = np.maximum(traction[:, 0], 0.0)
         return np.asarray(pulls / self.limits[..., : traction.shape[1]])
 
     @property
     def limits(self) -> Float:
-        """(3,) or (k, 3) the strengths."""
+        """(3,) or (k, 3) strengths."""
         return np.stack(np.broadcast_arrays(self.normal, self.tangential, self.axial), axis=-1)
 
 
@@ -57,30 +57,30 @@ class MaxStrength(Strength):
     """max(<t_n> / R^n, |t_t| / R^t, |t_a| / R^a) = 1 breaks: the paper's criterion."""
 
     def together(self, shares: Float) -> Float:
-        """(p,) the largest of shares (p, c)."""
+        """(p,) largest of shares (p, c)."""
         return np.asarray(shares.max(axis=1, initial=0.0))
 
-    def first_factor(self, before: Float, ahead: Float) -> Float:
-        """(p,) where the first component reaches its strength."""
+    def first_factor(self, before: Float, direction: Float) -> Float:
+        """(p,) factors at which the first component reaches its strength."""
         limits = self.limits[..., : before.shape[1]]
-        s, ds = before / limits, ahead / limits
+        s, ds = before / limits, direction / limits
         towards = np.abs(ds)
         towards[:, 0] = np.maximum(ds[:, 0], 0.0)
-        left = 1.0 - np.sign(ds) * s
-        return np.asarray(np.divide(left, towards, out=np.full_like(s, np.inf), where=towards > 0).min(axis=1))
+        room = 1.0 - np.sign(ds) * s
+        return np.asarray(np.divide(room, towards, out=np.full_like(s, np.inf), where=towards > 0).min(axis=1))
 
 
 class QuadraticStrength(Strength):
     """(<t_n> / R^n)^2 + (t_t / R^t)^2 + (t_a / R^a)^2 = 1 breaks."""
 
     def together(self, shares: Float) -> Float:
-        """(p,) root of the sum of squares of shares (p, c)."""
+        """(p,) root of the sum of squared shares (p, c)."""
         return np.asarray(np.hypot.reduce(shares, axis=1))
 
-    def first_factor(self, before: Float, ahead: Float) -> Float:
-        """(p,) where the sum of all squares reaches 1 under tension, and else that of the shears."""
+    def first_factor(self, before: Float, direction: Float) -> Float:
+        """(p,) factors at which the sum of squares reaches 1, without the normal one under compression."""
         limits = self.limits[..., : before.shape[1]]
-        s, ds = before / limits, ahead / limits
+        s, ds = before / limits, direction / limits
         opening, shear = _largest_root(s, ds), _largest_root(s[:, 1:], ds[:, 1:])
         opens = (opening >= 0.0) & np.isfinite(opening)
         opens &= s[:, 0] + np.where(opens, opening, 0.0) * ds[:, 0] >= 0.0
@@ -88,9 +88,9 @@ class QuadraticStrength(Strength):
 
 
 def _largest_root(s: Float, ds: Float) -> Float:
-    """(k,) the largest f with |s + f ds| = 1, for vectors (k, c); NaN where there is none, inf where ds = 0."""
+    """(k,) largest f with |s + f ds| = 1, for vectors (k, c); NaN without one, inf for ds = 0."""
     a, b, c = (ds * ds).sum(axis=1), (s * ds).sum(axis=1), (s * s).sum(axis=1) - 1.0
     with np.errstate(invalid="ignore", divide="ignore"):
         root = np.sqrt(b * b - a * c)
-        found = np.where(b > 0.0, -c / (b + root), (root - b) / a)
-    return np.asarray(np.where(a > 0.0, found, np.inf))
+        factor = np.where(b > 0.0, -c / (b + root), (root - b) / a)
+    return np.asarray(np.where(a > 0.0, factor, np.inf))

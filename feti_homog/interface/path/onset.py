@@ -1,84 +1,135 @@
-"""The load at which the first bond of a linear cell breaks: tractions are t0 + f t1, f being the factor of the load.
+"""Ends of a straight response: the first bond breaks, or contact begins to change.
 
-The utilisation u is homogeneous of degree one in the tractions, so without t0 the factor is 1 / u(t1).  With t0, laws
-with a formula for it use that.  Others are convex along a ray, pass 1 once, and
+The first bond of a linear cell breaks under tractions t0 + f t1, with load factor f.  The utilisation u is homogeneous
+of degree one in the tractions, so without t0 the factor is 1 / u(t1).  With t0, some laws have a formula; for others u
+is convex along a ray, passes 1 once, and
 
     (1 - u(t0)) / u(t1)  <=  f  <=  (1 + u(-t0)) / u(t1),
 
-for u is subadditive: only bonds whose lower bound is below the least upper bound are searched.
+for u is subadditive: only bonds with a lower bound below the smallest upper bound are searched.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
+from mpi4py import MPI
 
+from feti_homog.feti.dual_solution import DualSolution
+from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.contact.states import BONDED, BondState
-from feti_homog.interface.laws.bond_law import BondLaw, Utilisation
+from feti_homog.interface.contact.floating_bodies import FloatingBodies, shares_to_zero
+from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, Equilibrium
+from feti_homog.interface.laws.bond_law import BISECTIONS, BondLaw
 from feti_homog.interface.path.path_points import UTILISATION_TIE
 from feti_homog.typing import Bool, Float, Int
+
+# Parts of a straight way at whose ends a utilisation without convexity is evaluated.
+PARTS = 32
 
 
 @dataclass(frozen=True)
 class Onset:
-    """First break of the bonds of a cell whose debonded faces do not touch.
+    """First break in a cell whose debonded faces do not touch.
 
     Attributes:
-        bonds: utilisation of the nodes of this rank.
-        bonded: (k,) which nodes have a bond.
+        bonds: law of this rank's nodes in their state.
+        bonded: (k,) nodes with a bond.
     """
 
-    bonds: Utilisation
+    bonds: BondLaw
     bonded: Bool
 
     @classmethod
     def of(cls, law: BondLaw, cell: CoupledInterfaces, bonds: BondState) -> Onset:
-        """Make the onset of a law with these bonds.  Collective."""
-        return cls(law.utilisation(cell, bonds), np.asarray(bonds.status == BONDED))
+        """Make the onset for a law and a state of the bonds.  Collective."""
+        return cls(law.in_state(cell, bonds), np.asarray(bonds.status == BONDED))
 
     def utilisation(self, traction: Float, node: Int) -> Float:
-        """(p,) share of what breaks them that tractions (p, c) at the nodes (p,) use; 0 of debonded ones."""
-        return np.where(self.bonded[node], self.bonds.at(node)(traction), 0.0)
+        """(p,) utilisation by tractions (p, c) at the nodes (p,), 0 if debonded."""
+        return np.where(self.bonded[node], self.bonds.at(node).share(traction), 0.0)
 
-    def factors(self, ahead: Float, least: Float, before: Float | None = None) -> Float:
-        """(n, k) the f >= 0 at which each bond breaks under each of n rays of tractions.
+    def factors(self, direction: Float, noise: Float, before: Float | None = None) -> Float:
+        """(n, k) factors f >= 0 at which bonds break under n rays of tractions, inf for bonds that are not the first.
 
-        Tractions are `before` (k, c) + f `ahead` (n, k, c); inf where none breaks, or where it is not the first by far.
-
-        Utilisations by `ahead` of at most `least`, (n,) or (n, k), are none.  `before` alone breaks nothing.
+        Tractions are `before` (k, c) + f `direction` (n, k, c); `before` alone breaks nothing.  Utilisations by
+        `direction` up to `noise`, (n,) or (n, k), count as zero.
         """
-        n, k, c = ahead.shape
+        n, k, c = direction.shape
         ray, node = np.divmod(np.arange(n * k), max(k, 1))
-        used, found = self.utilisation(ahead.reshape(-1, c), node), np.full(n * k, np.inf)
-        loaded = np.flatnonzero(used > np.broadcast_to(least.reshape(n, -1), (n, k)).ravel())
+        used, factors = self.utilisation(direction.reshape(-1, c), node), np.full(n * k, np.inf)
+        loaded = np.flatnonzero(used > np.broadcast_to(noise.reshape(n, -1), (n, k)).ravel())
         if before is None:
-            found[loaded] = 1.0 / used[loaded]
+            factors[loaded] = 1.0 / used[loaded]
         else:
-            at, along = node[loaded], ahead.reshape(-1, c)[loaded]
-            known = self.bonds.at(at).first_factor(before[at], along)
-            rays = _Rays(before[at], along, at, ray[loaded])
-            found[loaded] = self._searched(rays, used[loaded], n) if known is None else known
-        return found.reshape(n, k)
+            at, along = node[loaded], direction.reshape(-1, c)[loaded]
+            exact = self.bonds.at(at).first_factor(before[at], along)
+            if exact is None:
+                exact = self._searched(before[at], along, at, ray[loaded], used[loaded], n)
+            factors[loaded] = exact
+        return factors.reshape(n, k)
 
-    def _searched(self, rays: _Rays, used: Float, n: int) -> Float:
-        """(p,) factors of bonds by halving an interval, inf of those that break later than another of their ray."""
-        bonds = self.bonds.at(rays.node)
-        lower, upper = (1.0 - bonds(rays.before)) / used, (1.0 + bonds(-rays.before)) / used
-        first, is_convex = np.full(n, np.inf), bonds.is_convex(len(used))
-        np.minimum.at(first, rays.number[is_convex], upper[is_convex])
-        near = np.flatnonzero((lower <= first[rays.number] * (1.0 + UTILISATION_TIE)) | ~is_convex)
-        found = np.full(len(used), np.inf)
-        found[near] = bonds.at(near).crossing(rays.before[near], rays.ahead[near], upper[near])
-        return found
+    def _searched(self, before: Float, direction: Float, node: Int, ray: Int, used: Float, n: int) -> Float:
+        """(p,) factors of bonds by bisection, inf for bonds that break after another one of their ray.
+
+        Tractions are `before` + f `direction` (p, c) at the nodes (p,) on the rays (p,) of n.
+        """
+        bonds = self.bonds.at(node)
+        lower, upper = (1.0 - bonds.share(before)) / used, (1.0 + bonds.share(-before)) / used
+        first, is_convex = np.full(n, np.inf), bonds.convex(len(used))
+        np.minimum.at(first, ray[is_convex], upper[is_convex])
+        some = np.flatnonzero((lower <= first[ray] * (1.0 + UTILISATION_TIE)) | ~is_convex)
+        factors = np.full(len(used), np.inf)
+        factors[some] = bonds.at(some).crossing(before[some], direction[some], upper[some])
+        return factors
 
 
-class _Rays(NamedTuple):
-    """Tractions `before` + f `ahead` (p, c) at the nodes (p,), and the number (p,) of the ray of each."""
+def first_break(cell: CoupledInterfaces, law: BondLaw, bonds: BondState, before: Float, after: Float) -> float:
+    """Return the share of the way between tractions (k, c) at which the first bond breaks, or inf.  Collective.
 
-    before: Float
-    ahead: Float
-    node: Int
-    number: Int
+    A convex utilisation, below 1 at the beginning and above 1 at the end, passes 1 once: bisection.  Without convexity
+    the first part of the way with a utilisation above 1 at its end is bisected.
+    """
+    law, bonded = law.in_state(cell, bonds), bonds.status == BONDED
+    step, low, high = after - before, np.zeros(len(before)), np.full(len(before), np.inf)
+    parts = 1 if law.convex(len(before)).all() else PARTS
+    for k in range(1, parts + 1):
+        passes = bonded & (law.share(before + k / parts * step) > 1.0) & np.isinf(high)
+        low, high = np.where(passes, (k - 1) / parts, low), np.where(passes, k / parts, high)
+    over = np.isfinite(high)
+    high = np.where(over, high, 1.0)
+    for _ in range(BISECTIONS if over.any() else 0):
+        middle = (low + high) / 2
+        broken = law.share(before + middle[:, None] * step) > 1.0
+        low, high = np.where(broken, low, middle), np.where(broken, middle, high)
+    return float(cell.comm.allreduce(high[over].min(initial=np.inf), MPI.MIN))
+
+
+def first_change(interface: ContactProblem, state: Equilibrium, end: DualSolution) -> tuple[float, float]:
+    """Return the shares of the way to `end` at which contact begins to change, and is beyond doubt; or 1, 1.
+
+    Beyond doubt a tension or an overlap is twice the solver's error.  A closed node opens when its force vanishes; open
+    nodes of a fixed fibre close when their gap vanishes, open nodes of a free fibre when the fibre has no more room
+    (its gaps are not unique).  Collective.
+    """
+    solver, nodes = interface.solver, interface.nodes
+    tension = np.maximum(interface.scales.force_noise(state.solution), interface.scales.force_noise(end))
+    # Damaged bonds change between tension and compression when their force vanishes.
+    damaged = interface.damaged(state.bonds)
+    at = (state.status == CLOSED) | damaged
+    pressure = np.where(damaged & ~state.bonds.pressed, 1.0, -1.0)[at]
+    before, after = (pressure * lam[nodes.row][at] for lam in (state.solution.lam, end.lam))
+    shares = [shares_to_zero(before, after, tension[at])]
+    # Faces without contact overlap.
+    is_open = (state.status == OPEN) & interface.contact
+    before, after = state.solution.jump[nodes.row], end.jump[nodes.row]
+    noise = max(interface.scales.gap_noise(state.solution.strain), interface.scales.gap_noise(end.strain))
+    if interface.contact and solver.natural.unconstrained_modes.shape[1]:
+        bodies = FloatingBodies(solver.comm, solver.natural, nodes, is_open, noise)
+        shares.append(bodies.admissible_share(before, after))
+    else:
+        shares.append(shares_to_zero(before[is_open], after[is_open], noise))
+    first = np.min(shares, axis=0)
+    solver.comm.Allreduce(MPI.IN_PLACE, first, MPI.MIN)
+    return float(first[0]), float(first[1])

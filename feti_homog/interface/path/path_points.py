@@ -1,4 +1,4 @@
-"""Points of a path of load, from where it goes on, and which bonds break under a state."""
+"""Points of a load path, states from which it goes on, and breaks."""
 
 from __future__ import annotations
 
@@ -8,31 +8,30 @@ from typing import NamedTuple
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
-from feti_homog.interface.contact.rubbing_bonds import held_traction
+from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces, held_traction
 from feti_homog.interface.contact.states import BONDED, BondState, Equilibrium
 from feti_homog.interface.laws.bond_law import BondLaw
-from feti_homog.interface.loads.load import Macroscopic, Multipliers
+from feti_homog.interface.loads import Macroscopic, Multipliers
 from feti_homog.typing import Bool, Float
 
-# Bonds whose utilisation differs by no more than this, relatively, break together: those of a symmetric cell do, but
-# for the solver's error.
+# Bonds whose utilisation differs relatively by less break together: in a symmetric cell they differ by the solver's
+# error alone.
 UTILISATION_TIE = 1e-6
 
 
 @dataclass(frozen=True)
 class PathState:
-    """Position on a path, enough to go on from.
+    """Position on a path, sufficient to go on from.
 
     Attributes:
-        leg, position: the load is the share `position`, 0..1, of the way to waypoint `leg`; of increments, `leg` is the
-            number of those done.
+        leg, position: the load is the share `position`, 0..1, of the way to waypoint `leg`; with increments, `leg` is
+            the number of finished ones.
         bonds, lam: states of the interface nodes and multipliers to begin with.
-        origin: where the leg began.
-        last: the last point's state.
-        broken: fracture energy of the bonds that broke there, in the mode in which each broke, per area of the cell, 0
-            of bonds without toughness; None if none broke.
-        stretched: with friction, energy per area of the springs of damaged bonds before they broke.
+        origin: state at the leg's beginning.
+        last: state at the last point.
+        broken: fracture energy per area at the last point, by the mode in which each bond broke, 0 without toughness;
+            None without a break.
+        stretched: with friction, energy per area in the springs of damaged bonds, before this break.
     """
 
     leg: int
@@ -44,19 +43,18 @@ class PathState:
     broken: float | None = None
     stretched: float = 0.0
 
-    def energies_to(self, here: Macroscopic) -> Energies:
-        """Return those of the way from the last point's state to one under the load at which this stands.
+    def energies_to(self, after: Macroscopic) -> Energies:
+        """Return the energies of the way from the last point to a state.
 
-        The response between them may bend where contact changes, but that loses nothing: the work is what is stored or
-        lost."""
-        lost = 0.0 if self.broken is None else self.last.released_to(here)
-        return Energies(here.stored - self.last.stored + lost, lost, self.broken or 0.0)
+        The response may bend with contact on the way, without losses: the work is stored or released."""
+        lost = 0.0 if self.broken is None else self.last.released_to(after)
+        return Energies(after.stored - self.last.stored + lost, lost, self.broken or 0.0)
 
 
 class Energies(NamedTuple):
-    """Energies per area of the cell of a part of a path.
+    """Energies of a path segment, per cell area.
 
-    The work of the loads, what breaks lost of it, the fracture energy of these breaks, and the heat of friction.
+    Work of the loads, its part that breaks released, fracture energy of these breaks, heat of friction.
     """
 
     work: float
@@ -65,7 +63,7 @@ class Energies(NamedTuple):
     friction: float = 0.0
 
     def plus(self, more: Energies) -> Energies:
-        """Return those of two parts."""
+        """Return the energies of two parts."""
         return Energies(*(a + b for a, b in zip(self, more, strict=True)))
 
 
@@ -74,17 +72,17 @@ NO_ENERGIES = Energies(0.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class Point:
-    """A point of the path.
+    """Point of a path.
 
     Attributes:
-        load_factor: position on the whole path, 0 to 1, every leg taking the same share.
-        scale: the state is `scale` times the equilibrium `state`.
-        state: that equilibrium.
-        broke: number of bonds that part at this state, after it; of increments, that did in the step, before it.
-        softened: number of bonds that lose a tooth there but hold; of increments each once, whatever its teeth.
-        energies: between the last point's state and this one.
-        used: (k,) share of their strength that bonds use in the state, 0 where there are none.
-        after: from where the path goes on.
+        load_factor: position on the path, 0 to 1, with equal shares of all legs.
+        scale: factor of the equilibrium `state` that gives the state of the point.
+        state: equilibrium.
+        broke: number of bonds that part after this state; with increments, in the step before it.
+        softened: number of bonds that lose teeth and hold.
+        energies: energies since the last point.
+        used: (k,) share of their strength that bonds use, 0 without a bond.
+        after: state from which the path goes on.
     """
 
     load_factor: float
@@ -97,52 +95,40 @@ class Point:
     after: PathState
 
 
-class Break(NamedTuple):
-    """Break of some bonds.
-
-    The state of the interface after it, how many part on all ranks and how many soften, and the fracture energy per
-    area of the cell.
-    """
-
-    bonds: BondState
-    parted: int
-    softened: int
-    fracture: float
-
-
 def unloaded(cell: CoupledInterfaces, bonds: BondState) -> PathState:
-    """Return the beginning of a path with the debonded nodes of `bonds`."""
+    """Return the beginning of a path with these bonds."""
     nothing = Macroscopic(np.zeros(len(cell.loads)), np.zeros(len(cell.loads)))
     return PathState(0, 0.0, bonds, cell.no_multipliers(), nothing, nothing)
 
 
-def break_bonds(cell: CoupledInterfaces, law: BondLaw, which: Bool, state: Equilibrium) -> Break:
-    """Break the bonds `which` (k,) in the modes of an equilibrium, whatever its size.  Collective."""
-    traction = held_traction(cell, state)
-    history, parts = law.after(state.bonds, which, traction)
-    status = cell.plane.debond(state.status, parts, state.multipliers.plane)
-    energy = _fracture_energy(cell, law, which, state.bonds, traction)
-    # A first guess, which the search for contact checks.
-    pressed = np.where(which, traction[:, 0] < 0.0, state.bonds.pressed)
+def break_bonds(
+    cell: CoupledInterfaces, law: BondLaw, which: Bool, state: Equilibrium, place: PathState
+) -> tuple[int, int, PathState]:
+    """Break the bonds `which` (k,) in the modes of an equilibrium of any size.  Collective.
+
+    Return the numbers of bonds, on all ranks, that part and that soften, and the path state `place` with the break.
+    """
+    traction, bonds = held_traction(cell, state), state.bonds
+    history, parts = law.after(bonds, which, traction)
+    status = cell.plane.debond(state.status, parts, state.multipliers[0])
+    # A first guess for the search of contact states.
+    pressed = np.where(which, traction[:, 0] < 0.0, bonds.pressed)
+    energy = 0.0
+    if law.has_toughness:
+        energy = float(law.fracture(bonds, which, traction) @ cell.nodes.length[which])
+        energy = float(cell.comm.allreduce(energy) / cell.area)
     parted, softened = (count_on_all_ranks(cell, nodes) for nodes in (parts, which & ~parts))
-    return Break(replace(state.bonds, status=status, history=history, pressed=pressed), parted, softened, energy)
-
-
-def _fracture_energy(cell: CoupledInterfaces, law: BondLaw, which: Bool, bonds: BondState, traction: Float) -> float:
-    """Fracture energy of the bonds `which` (k,) under tractions (k, c), times their lengths, per area; collective."""
-    if not law.has_toughness:
-        return 0.0
-    energy = float(law.fracture(bonds, which, traction) @ cell.nodes.length[which])
-    return float(cell.comm.allreduce(energy) / cell.area)
+    broken = replace(bonds, status=status, history=history, pressed=pressed)
+    return parted, softened, replace(place, bonds=broken, broken=energy)
 
 
 def most_utilised(cell: CoupledInterfaces, law: BondLaw, state: Equilibrium) -> tuple[Float, float, Bool]:
-    """(k,) share of strength that the nodes of this rank use, 0 of debonded ones.
+    """Return the utilisation (k,) of this rank's nodes, 0 if debonded, its largest value, and (k,) nodes with it.
 
-    The largest of all, and which (k,) have it. Collective, rank 0 decides.
+    Collective, rank 0 decides.
     """
     comm = cell.comm
-    used = law.utilisation(cell, state.bonds)(held_traction(cell, state))
+    used = law.in_state(cell, state.bonds).share(held_traction(cell, state))
     used = np.where(state.status == BONDED, used, 0.0)
     largest = comm.bcast(comm.reduce(used.max(initial=0.0), MPI.MAX))
     return used, float(largest), (used >= largest * (1.0 - UTILISATION_TIE)) & (used > 0.0)

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from feti_homog.case.interface_section import Arc
-from feti_homog.interface.tips.debonded_arcs import angles, debonded, tips
+from feti_homog.interface.debonded_arcs import angles, debonded, tips
 
 FIBRES = 3
 HALVES = st.integers(-1440, 1440).map(lambda n: n / 2)

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from feti_homog.interface.loads.load import Load, Macroscopic
+from feti_homog.interface.loads import Load, Macroscopic
 
 COMPONENTS = 4
 BY_STRESS = st.lists(st.booleans(), min_size=COMPONENTS, max_size=COMPONENTS).map(np.array)

@@ -7,7 +7,7 @@ import pytest
 
 from feti_homog.case.bond_laws import LAWS
 from feti_homog.interface.contact.states import BondState
-from feti_homog.interface.laws.registry import law_class
+from feti_homog.interface.laws.bond_law import law_class
 from feti_homog.verify.bond_laws.law import law_of
 
 SECTION = {
@@ -66,7 +66,7 @@ def test_both_agree_on_damaged_bonds(name, components):
     bonds = BondState(np.zeros(k, np.int8), rng.integers(0, teeth, (k, 1)).astype(float), np.zeros(k, bool))
     damage = run.damage(bonds)
     check = law_of({"criterion": name, **SECTION, "damage": damage})
-    np.testing.assert_allclose(run.utilisation(None, bonds)(traction), check.utilisation(traction), rtol=1e-10)
+    np.testing.assert_allclose(run.in_state(None, bonds).share(traction), check.utilisation(traction), rtol=1e-10)
     stiffness = np.array([SECTION[f"{each}_stiffness"] for each in ("normal", "tangential", "axial")])[:components]
     jumps = run.softening(bonds, traction[:, 0] > 0)[:, :components] * traction / stiffness
     np.testing.assert_allclose(jumps, check.jumps(traction), rtol=1e-12)

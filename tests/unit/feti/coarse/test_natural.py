@@ -12,7 +12,7 @@ from mpi4py import MPI
 from scipy.sparse import diags, hstack, identity
 
 from feti_homog.feti.coarse.natural import NaturalCoarseSpace
-from feti_homog.interface.contact.floating_bodies import place
+from feti_homog.interface.contact.floating_bodies import FloatingBodies
 
 FIBRES, NODES = 1000, 8
 ROWS = 2 * NODES * FIBRES
@@ -109,9 +109,9 @@ def test_one_of_many_loose_fibres_that_overlaps_is_moved(coarse):
     bodies = np.stack([np.zeros(len(row), np.int64), 1 + np.repeat(np.arange(FIBRES), NODES)], axis=1)
     nodes, solution = SimpleNamespace(row=row, bodies=bodies), SimpleNamespace(jump=jump)
     with at_most(MOST):
-        found = place(MPI.COMM_SELF, coarse, nodes, np.ones(len(row), bool), solution, 1e-9)
-    assert jump[row].min() < 0.0 and not found.pressed.any()
-    placed = (jump + found.jump(coarse))[row].reshape(FIBRES, NODES)
+        alpha, pressed = FloatingBodies(MPI.COMM_SELF, coarse, nodes, np.ones(len(row), bool), 1e-9).place(solution)
+    assert jump[row].min() < 0.0 and not pressed.any()
+    placed = (jump + coarse.G @ alpha)[row].reshape(FIBRES, NODES)
     assert placed.min() > 0.01 - 1e-9 and np.abs(np.delete(placed, moved, axis=0) - 0.01).max() < 1e-12
 
 
@@ -129,6 +129,7 @@ def test_gaps_within_what_turns_as_one_move_nothing():
     assert space.unconstrained_modes.shape[1] == 1
     nodes = SimpleNamespace(row=2 * np.arange(n), bodies=np.repeat([[0, 1], [1, 2]], NODES, axis=0))
     jump = np.where(np.arange(2 * n) % 2, 0.0, -0.01)
-    found = place(MPI.COMM_SELF, space, nodes, is_open, SimpleNamespace(jump=jump), 1e-9)
-    assert not found.alpha.any() and not found.pressed.any()
+    bodies = FloatingBodies(MPI.COMM_SELF, space, nodes, is_open, 1e-9)
+    alpha, pressed = bodies.place(SimpleNamespace(jump=jump))
+    assert not alpha.any() and not pressed.any()
     space.destroy()

@@ -7,11 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from feti_homog.interface.contact.contact_certificate import coulomb_errors
-from feti_homog.interface.contact.rubbing_bonds import slipped
-from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState
-from feti_homog.interface.friction.condensed_problem import AxialFaces
-from feti_homog.interface.friction.sliding_cell import SlidingCell
+from feti_homog.interface.contact.coupled_interfaces import slipped
+from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, coulomb_errors
+from feti_homog.interface.friction.sliding_cell import AxialFaces, SlidingCell
 from feti_homog.interface.friction.status_system import FORWARD, STICK
 
 

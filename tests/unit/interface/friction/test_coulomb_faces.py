@@ -12,9 +12,16 @@ from reference.friction import RubbingFaces
 from reference.friction_path import FrictionPath
 
 from feti_homog.errors import NotCarriedError
-from feti_homog.interface.friction.coulomb_faces import FREE, INDEFINITE, SEARCHED, CoulombFaces, StuckError
+from feti_homog.interface.friction.coulomb_faces import (
+    FREE,
+    INDEFINITE,
+    SEARCHED,
+    STATUSES,
+    CoulombFaces,
+    StatusSearch,
+    StuckError,
+)
 from feti_homog.interface.friction.face_system import Prescribed
-from feti_homog.interface.friction.status_search import STATUSES, StatusSearch
 from feti_homog.interface.friction.status_system import BACKWARD, FORWARD, OPEN_FACE, STICK, StatusSystem
 
 BY_STRAIN = np.zeros(2, bool)
@@ -160,7 +167,7 @@ def test_paths_of_much_friction_end_where_no_statuses_go_on():
             )
             several = [STATUSES[own] for own in search.allowed]
             found = [search._checked(np.array(own, np.int8)) for own in product(*several)]
-            signs = [faces.solver.sign(*faces.free(each[0], by_stress)) for each in found if each is not None]
+            signs = [faces.sign(each[0], by_stress) for each in found if each is not None]
             assert not signs if str(error) == SEARCHED else signs and max(signs) <= 0
             words[str(error)] += 1
     assert words[SEARCHED] > 5 and set(words) <= {SEARCHED, INDEFINITE}

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from feti_homog.interface.laws.energy import SpringEnergy
-from feti_homog.interface.laws.released import released_energy
+from feti_homog.interface.laws.energy import SpringEnergy, released_energy
 
 # Springs stiffer than any H of these tests.
 STIFF = np.array([[9.0, 9.0]])

@@ -57,7 +57,7 @@ def teeth(law, direction):
     parts = np.array([False])
     while not parts[0]:
         traction = np.array([direction], float)
-        traction /= law.utilisation(None, bonds)(traction)[0]
+        traction /= law.in_state(None, bonds).share(traction)[0]
         d, which = law.damage(bonds)[0], np.array([True])
         pulled = np.array([max(traction[0, 0], 0.0), *traction[0, 1:]])
         yield d, np.linalg.norm(pulled) / (1 - d) / stiffness, traction[0], law.fracture(bonds, which, traction)[0]

@@ -7,7 +7,6 @@ import math
 import numpy as np
 import pytest
 
-from feti_homog.interface.laws.bond_law import Utilisation
 from feti_homog.interface.laws.energy import SpringEnergy
 from feti_homog.interface.laws.strength import MaxStrength, QuadraticStrength, Strength
 from feti_homog.interface.path.onset import Onset
@@ -43,7 +42,7 @@ def used_at(law, factor, before, ahead):
 def test_the_first_bond_of_each_ray(name, components):
     law = CRITERIA[name]
     before, ahead = tractions(components, law)
-    onset = Onset(Utilisation(law), np.ones(NODES, bool))
+    onset = Onset(law, np.ones(NODES, bool))
     found = onset.factors(ahead, np.zeros(RAYS), before).min(axis=1)
     assert np.isfinite(found).sum() > RAYS / 2
     for factor, ray in zip(found, ahead, strict=True):
@@ -84,7 +83,7 @@ def from_zero(law, traction):
 def test_from_zero_the_factors_are_those_of_the_formulas(name):
     law = CRITERIA[name]
     _, ahead = tractions(3, law)
-    onset = Onset(Utilisation(law), np.arange(NODES) != 7)
+    onset = Onset(law, np.arange(NODES) != 7)
     factors = onset.factors(ahead, np.zeros(RAYS))
     with np.errstate(divide="ignore"):
         expected = np.where(np.arange(NODES) == 7, np.inf, from_zero(law, ahead))
@@ -94,7 +93,7 @@ def test_from_zero_the_factors_are_those_of_the_formulas(name):
 
 
 def test_what_is_as_little_as_the_error_breaks_nothing():
-    onset = Onset(Utilisation(CRITERIA["max"]), np.ones(2, bool))
+    onset = Onset(CRITERIA["max"], np.ones(2, bool))
     ahead = np.array([[[1e-9, 0.0], [0.0, 2e-9]]])
     assert np.isinf(onset.factors(ahead, np.array([1e-8]))).all()
     assert np.isfinite(onset.factors(ahead, np.array([1e-10]))).all()

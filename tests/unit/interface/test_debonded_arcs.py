@@ -8,7 +8,7 @@ from scipy.sparse import coo_matrix
 
 from feti_homog.case.interface_section import Arc
 from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN
-from feti_homog.interface.tips.debonded_arcs import InterfaceChains, angles, closing_work, debonded, moved_tips, tips
+from feti_homog.interface.debonded_arcs import InterfaceChains, angles, closing_work, debonded, moved_tips, tips
 
 ROUND = np.arange(0.0, 360.0, 10.0)
 

@@ -5,8 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from feti_homog.interface.friction.followed_statuses import FollowedStatuses
-from feti_homog.interface.friction.status_system import BACKWARD, FORWARD, OPEN_FACE, STICK, StatusSystem, free_rows
+from feti_homog.interface.friction.status_system import (
+    BACKWARD,
+    FORWARD,
+    OPEN_FACE,
+    STICK,
+    FollowedStatuses,
+    StatusSystem,
+    free_rows,
+)
 
 
 def scaled(rng, m):

@@ -1,4 +1,4 @@
-"""Debonded arcs: their tips, the nodes of the interface within them, and the chains of nodes at tips.
+"""Debonded arcs: their tips, their interface nodes, and chains of nodes at tips.
 
 Directions are degrees about the centre of a fibre, from x1 towards x2.  The tips of an arc stay bonded.
 """
@@ -17,9 +17,9 @@ from feti_homog.interface.contact.states import BONDED, Status
 from feti_homog.schema.wording import toml_value
 from feti_homog.typing import Bool, Float, Int
 
-# A node this near to a tip, in degrees, is the tip: coordinates in files and of circles are rounded.
+# A node this close to a tip, in degrees, is the tip: coordinates in files and on circles are rounded.
 TIP_TOLERANCE_DEGREES = 1e-6
-# Number of a fibre and direction of a tip, as `tips` has it -> where the mesh has it.
+# Fibre number and direction of a tip, as `tips` has it -> direction in the mesh.
 MovedTips = Mapping[tuple[int, float], float]
 NOT_MOVED: MovedTips = MappingProxyType({})
 
@@ -28,7 +28,7 @@ class InterfaceChains:
     """Interface nodes with their neighbours along the interface.
 
     Attributes:
-        neighbours: (n, 2) of each node, -1 of nodes that have not two.
+        neighbours: (n, 2) neighbours of nodes, -1 unless there are two.
     """
 
     def __init__(self, adjacency: csr_matrix) -> None:
@@ -38,31 +38,31 @@ class InterfaceChains:
         self.neighbours[two] = adjacency.indices[adjacency.indptr[:-1][two][:, None] + np.arange(2)]
 
     def tips(self, status: Status) -> CrackTips:
-        """Return the tips under the states (n,): one bonded node beside a debonded one. A node between two is none."""
-        known = self.neighbours[:, 0] >= 0
-        debonded = (status != BONDED)[self.neighbours] & known[:, None]
+        """Return the tips under the states (n,): bonded nodes with one debonded neighbour."""
+        has_two = self.neighbours[:, 0] >= 0
+        debonded = (status != BONDED)[self.neighbours] & has_two[:, None]
         node = np.flatnonzero((status == BONDED) & (debonded[:, 0] != debonded[:, 1]))
         pair, side = self.neighbours[node], np.argmax(debonded[node], axis=1)
         return CrackTips(node, np.take_along_axis(pair, side[:, None], 1)[:, 0], pair[np.arange(len(node)), 1 - side])
 
     def onward(self, start: Int, through: Int, steps: int) -> Int:
-        """(t, steps + 1) the nodes start, through, and those that follow; -1 beyond the end of a chain."""
-        found = [start, through]
-        while len(found) <= steps:
-            before, last = found[-2:]
+        """(t, steps + 1) chains from the nodes start and through (t,) on; -1 beyond their end."""
+        nodes = [start, through]
+        while len(nodes) <= steps:
+            before, last = nodes[-2:]
             pair = self.neighbours[last]
             following = np.where(pair[:, 0] == before, pair[:, 1], pair[:, 0])
-            found.append(np.where(last >= 0, following, -1))
-        return np.stack(found, axis=1)
+            nodes.append(np.where(last >= 0, following, -1))
+        return np.stack(nodes, axis=1)
 
 
 @dataclass(frozen=True)
 class CrackTips:
-    """The t tips of the debonded arcs, as numbers of interface nodes.
+    """The t tips of debonded arcs, as numbers of interface nodes.
 
     Attributes:
-        node: (t,) the tip, which is bonded.
-        behind, ahead: (t,) the next node on the debonded and on the bonded side.
+        node: (t,) tips, which are bonded.
+        behind, ahead: (t,) next nodes on the debonded and on the bonded side.
     """
 
     node: Int
@@ -70,30 +70,30 @@ class CrackTips:
     ahead: Int
 
     def chosen(self, which: Int | Bool) -> CrackTips:
-        """Return some of them."""
+        """Return some tips."""
         return CrackTips(self.node[which], self.behind[which], self.ahead[which])
 
 
-def closing_work(length: float, ahead: Float, force: Float, behind: Float, jump: Float) -> Float:
-    """(2,) the work of closing a crack along its last part / the length a of that (Irwin's integral):
+def closing_work(length: float, before: Float, force: Float, behind: Float, jump: Float) -> Float:
+    """(2,) work of closing the last part of a crack, over its length a (Irwin's integral):
 
         sum_k F_k w(a - s_k) / (2 a)  ->  1 / (2 a) int_0^a t(s) w(a - s) ds,
 
-    in opening and in shear, not less than zero.
+    in opening and in shear, at least zero.
 
     Args:
-        ahead, force: (j,) distances s from the tip, which comes first, and forces (j, 2) on bonded nodes before it.
-        behind, jump: (k,) rising distances from the tip, which comes first, and jumps (k, 2) behind it.
+        before, force: (j,) distances s from the tip, the tip first, and forces (j, 2) on bonded nodes before it.
+        behind, jump: (k,) rising distances from the tip, the tip first, and jumps (k, 2) behind it.
     """
-    near = ahead < length
-    w = np.stack([np.interp(length - ahead[near], behind, jump[:, mode]) for mode in (0, 1)], axis=1)
-    return np.asarray(np.maximum((force[near] * w).sum(axis=0), 0.0) / (2 * length))
+    within = before < length
+    w = np.stack([np.interp(length - before[within], behind, jump[:, mode]) for mode in (0, 1)], axis=1)
+    return np.asarray(np.maximum((force[within] * w).sum(axis=0), 0.0) / (2 * length))
 
 
 def tips(arcs: Sequence[Arc], values: Sequence[float], fibres: int) -> dict[int, list[float]]:
-    """Directions in [0, 360) of the tips of arcs on each of so many fibres, which are here numbered from 0.
+    """Return directions in [0, 360) of the tips of arcs, by fibre number from 0.
 
-    An arc without an angle has every one of `values` in turn. Openings of 0 and 360 degrees have no tips.
+    An arc without an angle takes all of `values`.  Openings of 0 and 360 degrees have no tips.
     """
     marks: dict[int, set[float]] = {}
     for arc in arcs:
@@ -105,28 +105,24 @@ def tips(arcs: Sequence[Arc], values: Sequence[float], fibres: int) -> dict[int,
 
 
 def angles(points: Float, fibre: Int, centres: Float, period: Float) -> Float:
-    """Directions (k,) in (-180, 180] of points (k, 2) from the nearest image of centres[fibre], (c, 2).
-
-    NaN where the fibre has no centre.
-    """
+    """(k,) directions in (-180, 180] of points (k, 2) from the nearest image of centres[fibre]; NaN without centre."""
     offset = points - centres[fibre]
     offset -= np.round(offset / period) * period
     return np.asarray(np.degrees(np.arctan2(offset[:, 1], offset[:, 0])))
 
 
-def moved_tips(marks: Mapping[int, Sequence[float]], fibre: Int, direction: Float, most: float) -> MovedTips:
-    """Tips of `tips` that a mesh has elsewhere, by `most` degrees at most.
+def moved_tips(marks: Mapping[int, Sequence[float]], fibre: Int, direction: Float, limit: float) -> MovedTips:
+    """Return the tips that a mesh moves, by at most `limit` degrees, to the nearest of its vertices.
 
-    They are at the nearest of its vertices, which lie on the fibres `fibre` (k,), numbered from 1, in the directions
-    (k,).
+    Vertices lie on the fibres `fibre` (k,), numbered from 1, in the directions (k,).
     """
     moved = {}
     for number, ends in marks.items():
-        own = direction[fibre == number + 1]
+        directions = direction[fibre == number + 1]
         for end in ends:
-            away = (own - end + 180.0) % 360.0 - 180.0
+            away = (directions - end + 180.0) % 360.0 - 180.0
             nearest = away[np.argmin(np.abs(away))] if len(away) else np.inf
-            if TIP_TOLERANCE_DEGREES < abs(nearest) <= most:
+            if TIP_TOLERANCE_DEGREES < abs(nearest) <= limit:
                 moved[number + 1, end] = end + float(nearest)
     return moved
 
@@ -134,30 +130,30 @@ def moved_tips(marks: Mapping[int, Sequence[float]], fibre: Int, direction: Floa
 def debonded(
     arcs: Sequence[Arc], opening: float | None, fibre: Int, angle: Float, moved: MovedTips = NOT_MOVED
 ) -> Bool:
-    """Return whether nodes are within an arc of their fibre: (k,) for the fibres' numbers from 1 and directions (k,).
+    """(k,) True for nodes within an arc, on fibres (k,), numbered from 1, in directions (k,).
 
-    `opening` is that of arcs without an angle; `moved` are the tips that the mesh has elsewhere.
+    Arcs without an angle take `opening`; `moved` are the tips that the mesh has moved.
     """
     inside = np.zeros(len(fibre), bool)
     for arc in arcs:
-        whole = opening if arc.angle is None else arc.angle
-        if whole is None:
+        width = opening if arc.angle is None else arc.angle
+        if width is None:
             raise ValueError("an arc without an angle needs an opening")
-        start, stop = (_ends(arc, side * whole / 2, fibre, moved) for side in (-1, 1))
+        start, stop = (_ends(arc, side * width / 2, fibre, moved) for side in (-1, 1))
         away = (angle - start) % 360.0
         within = (away > TIP_TOLERANCE_DEGREES) & (away < stop - start - TIP_TOLERANCE_DEGREES)
-        within = (within & (0 < whole < 360)) | (whole >= 360.0)
+        within = (within & (0 < width < 360)) | (width >= 360.0)
         inside |= within & (np.isin(fibre, arc.fibre) if isinstance(arc.fibre, tuple) else True)
     return inside
 
 
 def _end(arc: Arc, half: float) -> float:
-    """Direction in [0, 360) of the tip of an arc that is `half` away from its centre."""
+    """Return the direction in [0, 360) of the tip of an arc, `half` away from its centre."""
     return round(arc.centre + half, 9) % 360.0
 
 
 def _ends(arc: Arc, half: float, fibre: Int, moved: MovedTips) -> Float:
-    """(k,) directions of that tip on the fibres (k,), without the turn that brings it to [0, 360)."""
+    """(k,) directions of this tip on the fibres (k,), not reduced to [0, 360)."""
     ends, key = np.full(len(fibre), arc.centre + half), _end(arc, half)
     for (number, end), actual in moved.items():
         if end == key:
@@ -166,21 +162,19 @@ def _ends(arc: Arc, half: float, fibre: Int, moved: MovedTips) -> Float:
 
 
 def faults(arcs: Sequence[Arc], centres: Float, label: str = "interface") -> list[str]:
-    """List the faults of the arcs of the interface of this label on a cell.
-
-    Its fibres have these centres (fibres, 2), NaN where there is none.
-    """
-    found = []
+    """List the faults of the arcs of interface `label`, on fibres with centres (fibres, 2), NaN without one."""
+    messages = []
     for place, arc in enumerate(arcs):
         chosen = range(1, len(centres) + 1) if isinstance(arc.fibre, str) else arc.fibre
         written = arc.fibre if isinstance(arc.fibre, str) or len(arc.fibre) > 1 else arc.fibre[0]
         line = f"[{label}] debonded[{place}].fibre = {toml_value(written)}: "
         if max(chosen, default=0) > len(centres):
-            found.append(f"{line}expected at most {len(centres)}; the cell has {len(centres)} fibres, counted from 1")
+            most = f"expected at most {len(centres)}; the cell has {len(centres)} fibres, counted from 1"
+            messages.append(line + most)
         winding = [number for number in chosen if number <= len(centres) and np.isnan(centres[number - 1, 0])]
         if winding and arc.angle not in (0.0, 360.0):
-            found.append(
+            messages.append(
                 f"{line}fibre {winding[0]} has no centre, for it winds around the cell; expected angle = 360, or "
                 'a physical curve "debonded" in the mesh'
             )
-    return found
+    return messages

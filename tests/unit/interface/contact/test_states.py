@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from feti_homog.interface.contact.contact_certificate import kkt_errors
+from feti_homog.interface.contact.states import kkt_errors
 
 # Two nodes of a stiff interface and two of a soft one, all debonded.
 TRACTION = np.array([[-2e6, 5e5], [-1e6, 0.0], [-3e-6, 0.0], [0.0, 0.0]])

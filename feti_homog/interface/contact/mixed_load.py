@@ -1,0 +1,111 @@
+"""The dual problem under mixed loads: some strains follow from prescribed stresses.
+
+With fixed active rows the response is linear: the answers to the prescribed strains and to unit strains superpose, with
+factors that meet the stresses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from feti_homog.errors import NotCarriedError
+from feti_homog.feti.dual_solution import DualSolution
+from feti_homog.feti.solver import FetiSolver
+from feti_homog.interface.contact.load_scales import LoadScales
+from feti_homog.interface.loads import Load
+from feti_homog.system.parallel.distributed_arrays import allreduce_sum
+from feti_homog.typing import Bool, Float
+
+# Share of the stresses that may act on directions without stiffness: rounding of these.
+UNCARRIED_SHARE = 1e-6
+# Rounding of squared jumps, relative to the torn cell, and of stresses, relative to clamped bodies.
+UNRESISTED = 1e-12
+
+
+def solve(scales: LoadScales, load: Load, start: Float) -> DualSolution:
+    """Return the solution under a load, from the multipliers `start` (owned rows,) on.  Collective.
+
+    Strains that meet no more than noise stay zero.
+
+    Raises:
+        NotCarriedError: the stresses meet no stiffness.
+    """
+    solver = scales.solver
+    if not (load.by_stress.any() and load.values.any()):
+        return solver.solve(load.values, start)
+    unknown = np.flatnonzero(load.by_stress)
+    strains = np.vstack([np.where(load.by_stress, 0.0, load.values), np.eye(len(load.values))[unknown]])
+    starts = np.column_stack([start, np.zeros((len(start), len(unknown)))])
+    needed = slice(0 if strains[0].any() else 1, None)
+    solutions = solver.solve_many(strains[needed], starts[:, needed])
+    stresses = np.stack([solver.stress_integral(solution)[unknown] / scales.size.prod() for solution in solutions])
+    missing = load.values[unknown]
+    if strains[0].any():
+        missing = missing - stresses[0]
+    imposed = scales.imposed_strain(strains[0])
+    largest = scales.sign_noise * float((scales.roots[: len(imposed)] * imposed).max())
+    # Rank 0 decides: rounding on other processors may part the ranks where a stiffness is nearly none.
+    answer = _strains(stresses[-len(unknown) :], missing, scales.roots[unknown], scales.sign_noise, largest)
+    factors = solver.comm.bcast(answer)
+    if factors is None:
+        raise NotCarriedError("nothing in the cell carries the stresses of the load")
+    return superposed(solver, solutions, np.concatenate([np.ones(len(solutions) - len(unknown)), factors]))
+
+
+def _strains(stiffness: Float, stress: Float, roots: Float, share: float, noise: float) -> Float | None:
+    """(u,) strains that make the stresses (u,) by a stiffness (u, u), perhaps singular; None if it cannot carry them.
+
+    Roots (u,) of their own stiffnesses scale the strains, so that none is small beside another.  Scaled stiffnesses
+    below `share` and scaled stresses below `noise` are the solver's error.
+    """
+    eigenvalues, vectors = np.linalg.eigh((stiffness + stiffness.T) / (2 * np.outer(roots, roots)))
+    along, resists = vectors.T @ (stress / roots), eigenvalues > share
+    largest = max(UNCARRIED_SHARE * np.abs(stress / roots).max(), noise)
+    if np.abs(along[~resists]).max(initial=0.0) > largest:
+        return None
+    return np.asarray(vectors[:, resists] @ (along[resists] / eigenvalues[resists]) / roots)
+
+
+def unresisted(solver: FetiSolver, by_stress: Bool, voigt: Float) -> Bool:
+    """(v,) strains, of prescribed stresses (v,), with a share in a strain that strains no body.  Collective.
+
+    Such a strain opens faces without multipliers alone: rigid motions close the jumps of the torn cell, and the torn
+    bodies bear no stress.  `voigt` (v, v) is the stress integral of clamped bodies.
+    """
+    unknown, undetermined = np.flatnonzero(by_stress), np.zeros(len(by_stress), bool)
+    torn = solver.d[:, unknown]
+    opened = solver.natural.project(solver.active.restrict(torn))
+    sizes, open_jumps = (allreduce_sum(solver.comm, jumps.T @ jumps) for jumps in (torn, opened))
+    largest = np.array([np.diag(sizes), np.abs(voigt[unknown, unknown])])
+    scales = np.sqrt(np.where(largest > 0.0, largest, 1.0))
+    pairs = zip((open_jumps, solver.torn_stiffness[np.ix_(unknown, unknown)]), scales, strict=True)
+    values, vectors = np.linalg.eigh(sum(matrix / np.outer(scale, scale) for matrix, scale in pairs))
+    shares = np.abs(vectors[:, values < UNRESISTED]) > UNCARRIED_SHARE
+    undetermined[unknown] = shares.any(axis=1)
+    return np.asarray(solver.comm.bcast(undetermined))
+
+
+def superposed(solver: FetiSolver, solutions: Sequence[DualSolution], factors: Float) -> DualSolution:
+    """Return the sum of solutions with equal active rows, times factors.  Collective."""
+    triples = zip(*((solution.strain, solution.lam, solution.jump) for solution in solutions), strict=True)
+    strain, lam, jump = (np.stack(arrays, axis=1) @ factors for arrays in triples)
+    amplitudes = [solution.alpha for solution in solutions if solution.alpha is not None]
+    if len(amplitudes) < len(solutions):
+        return replace(solutions[0], strain=strain, lam=lam, jump=jump, alpha=None)
+    alpha = np.stack(amplitudes, axis=1) @ factors
+    torn = solver.natural.project(solver.active.restrict(solver.d @ strain))
+    pairs = np.stack([torn, solver.active.restrict(jump)])
+    scale, residual = np.sqrt(allreduce_sum(solver.comm, np.einsum("ij,ij->i", pairs, pairs)))
+    return DualSolution(
+        strain,
+        lam,
+        jump,
+        alpha,
+        max(solution.iterations for solution in solutions),
+        min(solution.reason for solution in solutions),
+        float(residual / (scale or 1.0)),
+        solutions[0].compliance,
+    )

@@ -1,0 +1,80 @@
+"""Loads on a cell, strains or the stresses that work on them, and macroscopic states."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from feti_homog.typing import Bool, Float
+
+# Values below this, relative to the ends of their leg, are zero with rounding.
+LOAD_ROUNDING = 1e-13
+
+
+Multipliers = tuple[Float, ...]
+"""(owned rows,) multipliers of each problem, the plane first."""
+
+
+@dataclass(frozen=True)
+class Macroscopic:
+    """Strains E, temperature changes among them, and their work conjugates Sigma, energy per area of the cell.
+
+    With fixed bonds the cell stores E.Sigma / 2, and E'.Sigma = E.Sigma' for two states (Betti).
+
+    Attributes:
+        strain, stress: (n,).
+    """
+
+    strain: Float
+    stress: Float
+
+    @property
+    def stored(self) -> float:
+        """E.Sigma / 2."""
+        return 0.5 * float(self.strain @ self.stress)
+
+    def scaled(self, factor: float) -> Macroscopic:
+        """Return the state under `factor` times the load."""
+        return Macroscopic(factor * self.strain, factor * self.stress)
+
+    def load(self, by_stress: Bool) -> Load:
+        """Return the load of the state, with (n,) components `by_stress`."""
+        return Load(np.where(by_stress, self.stress, self.strain), by_stress)
+
+    def released_to(self, after: Macroscopic) -> float:
+        """Return the energy released by a break at constant load: 1/2 (E'.Sigma - E.Sigma'), with ' after the break.
+
+        It is the work minus the change of stored energy; at constant strain 1/2 E.(Sigma - Sigma').
+        """
+        return 0.5 * float(after.strain @ self.stress - self.strain @ after.stress)
+
+
+@dataclass(frozen=True)
+class Load:
+    """Values of n macroscopic strains, a temperature change among them, or of their stresses.
+
+    Attributes:
+        values: (n,) strains and stresses.
+        by_stress: (n,) True for stresses.
+    """
+
+    values: Float
+    by_stress: Bool
+
+    @classmethod
+    def strain(cls, values: Float) -> Load:
+        """Return the load of strains (n,)."""
+        return cls(values, np.zeros(len(values), bool))
+
+    def parts(self, sizes: Sequence[int]) -> list[Load]:
+        """Split the load into parts of these sizes."""
+        ends = np.cumsum(sizes)[:-1]
+        return [Load(*part) for part in zip(np.split(self.values, ends), np.split(self.by_stress, ends), strict=True)]
+
+    def after(self, share: float, end: Load) -> Load:
+        """Return the load after a share of the way to another one of the same kinds, without rounding of zeros."""
+        values = (1.0 - share) * self.values + share * end.values
+        largest = np.abs([self.values, end.values]).max(axis=0)
+        return Load(np.where(np.abs(values) <= LOAD_ROUNDING * largest, 0.0, values), self.by_stress)

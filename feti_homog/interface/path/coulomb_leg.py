@@ -1,0 +1,199 @@
+"""Legs with friction on debonded faces: linear pieces, between which statuses change or bonds break.
+
+An equal load step is implicit: slips grow with the sign of the traction at its end.  The way within a step is unknown:
+its heat is the work of final forces on slips, and the work of the loads is stored, released or heat.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from feti_homog.errors import NotCarriedError
+from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
+from feti_homog.interface.contact.states import Equilibrium, Status
+from feti_homog.interface.friction.coulomb_faces import StuckError
+from feti_homog.interface.friction.face_system import Prescribed
+from feti_homog.interface.friction.sliding_cell import SlidingCell
+from feti_homog.interface.laws.bond_law import BondLaw
+from feti_homog.interface.loads import Load, Macroscopic
+from feti_homog.interface.path.leg import Leg
+from feti_homog.interface.path.onset import first_break
+from feti_homog.interface.path.path_points import Energies, PathState, Point
+from feti_homog.system.parallel.mpi_errors import on_root
+from feti_homog.typing import Float
+
+# Share of a leg between points, after which a change of statuses is a point.
+LEAST_SHARE = 0.01
+# Relative accuracy of the largest load that the cell carries.
+LEAST_STEP = 1e-9
+# Changes at one load that count as a cycle.
+MOST_CHANGES_AT_A_LOAD = 200
+# Rounding of leg shares, and of vanishing jumps and strains relative to their last values.
+ROUNDING = 1e-12
+CYCLE = "friction: the statuses of the faces change without end at one load (a cycle)"
+
+
+class CoulombLeg(Leg):
+    """Leg with statuses (n,) of faces and scaled x (m,), as in `CoulombFaces`.
+
+    The rates of a state solve a problem of complementarity, and are constant until a face reaches a limit of its
+    status, a bond its strength, or s = 1.
+
+    A break is an implicit step at constant load to admissible statuses.
+    """
+
+    _state: Equilibrium | None
+
+    def __init__(
+        self,
+        cell: CoupledInterfaces,
+        law: BondLaw,
+        waypoints: Sequence[Load],
+        leg: int,
+        begin: PathState,
+        sliding: SlidingCell,
+    ) -> None:
+        """Settle at `begin`; the first change of statuses after a waypoint is a point.  Collective."""
+        super().__init__(cell, law, waypoints, leg, begin)
+        self.sliding, self._first, self._changes = sliding, begin.position == 0.0, 0
+        self._settle(begin)
+
+    @property
+    def state(self) -> Equilibrium:
+        """Equilibrium at s, computed once.  Collective."""
+        if self._state is None:
+            loads = [*self.waypoints[: self.leg], self._load_at(self._share)]
+            self._state = self.sliding.equilibrium(loads, self._bonds, self._x)
+        return self._state
+
+    def _path_state(self) -> PathState:
+        return replace(super()._path_state(), stretched=self.sliding.stretched(self._x))
+
+    def _on_root(self, find: Callable[..., tuple[Status, Float]], *arguments: Any) -> tuple[Status, Float]:
+        """Return statuses and x that rank 0 finds; every rank stores their product.  Collective."""
+        faces = self.sliding.faces
+
+        def found() -> tuple[Status, Float, Float]:
+            status, x = find(*arguments)
+            return status, x, faces.product(x)
+
+        status, x, product = on_root(self.cell.comm, found)
+        faces.keep(x, product)
+        return status, x
+
+    def _given(self, share: float, x: Float) -> Prescribed:
+        """Return the load at a share of the leg, with the slips of scaled x."""
+        load = self._load_at(share)
+        return Prescribed(load.by_stress, self.sliding.given(load), x[1 : 2 * len(self.sliding.rows) : 2])
+
+    def _stand(self, status: Status, x: Float, mean: Macroscopic, way: Energies) -> None:
+        """Take statuses and scaled x, after a way with these energies."""
+        self._energies = self._energies.plus(way)
+        self._bonds = self.sliding.bonds(self._bonds, status, x)
+        self._status, self._x, self._mean, self._state = status, x, mean, None
+
+    def _settle(self, begin: PathState) -> None:
+        """Find the state at s with the bonds of `begin`, after its break if any.  Collective.
+
+        In a break faces lose the product of jumps and mean forces; slips turn a part into heat by the final forces, and
+        the break has released the rest.
+        """
+        sliding, self._bonds = self.sliding, begin.bonds
+        self._status, self._x = status, x = sliding.begin(begin.bonds, begin.last.strain)
+        self._mean, self._state = sliding.macroscopic(x), None
+        if begin.broken is None:
+            return
+        self._mean, faces = begin.last, sliding.faces
+        status, after = self._on_root(faces.search, status, faces.all_allowed(), self._given(self._share, x), x)
+        lost, heat = (loss / self.cell.area for loss in faces.losses(status, x, after))
+        # Softening bonds lose the energy of their springs.
+        lost += begin.stretched - sliding.stretched(x)
+        lost += sliding.released_along(begin.last, sliding.macroscopic(after))
+        self._go_straight(status, after, lost - heat, heat, begin.broken)
+        self._first = True
+
+    def _go_straight(self, status: Status, x: Float, released: float, heat: float, fracture: float = 0.0) -> None:
+        """Advance straight to scaled x with these statuses, and losses of energy."""
+        before, mean = self._mean, self.sliding.macroscopic(x)
+        work = 0.5 * float((before.stress + mean.stress) @ (mean.strain - before.strain))
+        self._stand(status, x, mean, Energies(work, released, fracture, heat))
+
+    def _advance(self) -> Iterator[Point]:
+        """Advance along the rates up to the next change, and past it.
+
+        Raises:
+            NotCarriedError: nothing carries more, after a point at the largest load.
+            StuckError: no statuses go on, or they change without end.
+        """
+        faces, share = self.sliding.faces, self._share
+        velocity = self.sliding.given(self.end) - self.sliding.given(self.start)
+        try:
+            status, rate = self._on_root(faces.rates, self._status, self._x, self.end.by_stress, velocity)
+        except NotCarriedError:
+            if self._share > self._reported:
+                yield self._point(0, 0, self._path_state())
+            raise
+        if self._follow(status, rate):
+            yield from self._break()
+            yield from self._break_overloaded()
+        elif self._share < 1.0 and (self._first or self._share - self._reported >= LEAST_SHARE):
+            self._first = False
+            yield self._point(0, 0, self._path_state())
+        self._changes = 0 if self._share > share + ROUNDING else self._changes + 1
+        if self._changes > MOST_CHANGES_AT_A_LOAD:
+            raise StuckError(CYCLE)
+
+    def _follow(self, status: Status, rate: Float) -> bool:
+        """Advance along a rate of x up to the next change, and return whether bonds break then.  Collective."""
+        faces, share, sliding = self.sliding.faces, self._share, self.sliding
+        status, x = self._on_root(faces.settled, status, self._given(share, self._x), self._x)
+        change, rest = self.cell.comm.bcast(faces.next_change(status, x, rate)), 1.0 - share
+        if change >= rest - ROUNDING:
+            change = np.inf
+        tractions = (sliding.traction(state) for state in (x, x + min(rest, change) * rate))
+        breaks = first_break(self.cell, self.law, sliding.bonds(self._bonds, status, x), *tractions)
+        way = min(breaks, 1.0) * min(rest, change)
+        after = x + way * rate
+        rounded = (after != 0.0) & (np.abs(after) <= ROUNDING * np.abs(x))
+        after[rounded] = 0.0
+        if not rounded.any():
+            faces.keep(after, faces.product(x) + way * faces.product(rate))
+        self._go_straight(status, after, 0.0, faces.heat(status, x, after) / self.cell.area)
+        self._share = 1.0 if breaks > 1.0 and change >= rest else share + way
+        return breaks <= 1.0
+
+    def _go_to(self, share: float) -> None:
+        """Advance to a share of the leg in one step, or to the largest share that the cell carries.  Collective.
+
+        Raises:
+            NotCarriedError: the cell carries nothing beyond the last step.
+        """
+        sliding, x = self.sliding, self._x
+        self._share, self.limit = on_root(self.cell.comm, self._carried, share)
+        status, after = self._on_root(sliding.faces.step, self._status, self._given(self._share, x), x)
+        heat = sliding.faces.heat_behind(status, x, after) / self.cell.area
+        way = Energies(sliding.stored(after) - sliding.stored(x) + heat, 0.0, 0.0, heat)
+        self._stand(status, after, sliding.macroscopic(after), way)
+
+    def _carried(self, share: float) -> tuple[float, NotCarriedError | None]:
+        """Return this share of the leg, or the largest one that the cell carries with the error beyond it."""
+        low, high, faces = self._share, share, self.sliding.faces
+        try:
+            faces.step(self._status, self._given(share, self._x), self._x)
+        except StuckError:
+            return share, None
+        except NotCarriedError as error:
+            limit = error
+        else:
+            return share, None
+        while high - low > LEAST_STEP * share:
+            middle = (low + high) / 2
+            carries = faces.carries(self._status, self._given(middle, self._x), self._x)
+            low, high = (middle, high) if carries else (low, middle)
+        if low - self._share <= 10 * LEAST_STEP * share:
+            raise limit
+        return low, limit

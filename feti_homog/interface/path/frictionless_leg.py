@@ -1,0 +1,208 @@
+"""Legs without friction: the load is controlled and the response piecewise linear."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from mpi4py import MPI
+
+from feti_homog.errors import NotCarriedError
+from feti_homog.feti.dual_solution import DualSolution
+from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
+from feti_homog.interface.contact.states import BondState, Equilibrium
+from feti_homog.interface.laws.bond_law import BondLaw
+from feti_homog.interface.loads import Load, Macroscopic, Multipliers
+from feti_homog.interface.path.leg import Leg
+from feti_homog.interface.path.onset import first_break, first_change
+from feti_homog.interface.path.path_points import UTILISATION_TIE, PathState, Point, most_utilised
+from feti_homog.typing import Float
+
+# Shares of a leg that count as equal.
+LEAST_SHARE = 1e-9
+# A response is on a straight line up to this many relative tolerances of the Krylov method, or up to the rounding in
+# the best solves, both relative to the largest stress of the line.  The solver, which begins with the multipliers of
+# the line, had errors of a few hundredths of a tolerance.
+OFF_LINE_PER_RTOL, OFF_LINE_ROUNDING = 10.0, 1e-10
+
+
+class FrictionlessLeg(Leg):
+    """Leg whose equilibria do not depend on the way to them.
+
+    From the equilibrium at s the transitions are
+
+        overloaded   by a break, or at tips by a change of contact, with which their released energy jumps.  The worst
+                     bonds break: a point; equilibrium at the same s without them.
+        advance      With a linear response, predict the first break, the beginning of a change of contact, and the
+                     end of the leg.  Equilibrium at the first of these; if the stress is not on the line, or a bond
+                     is overloaded, an event was missed: halve the way until none is.  The result is
+          a break    the worst bonds break: a point; equilibrium at the same s without them;
+          a change   a point; equilibrium a little further, where the change is beyond doubt;
+          less       a point if contact states have changed.
+        touch        Open faces do not carry the stresses of the load: a point where they touch.
+        end          s = 1: a point.
+
+    A predicted change that does not come is a false alarm: up to the next change only halving finds changes.
+    """
+
+    _state: Equilibrium
+
+    def __init__(
+        self, cell: CoupledInterfaces, law: BondLaw, waypoints: Sequence[Load], leg: int, begin: PathState
+    ) -> None:
+        super().__init__(cell, law, waypoints, leg, begin)
+        # Share before which the line bends, and whether the last prediction was a false alarm.
+        self._bends_before, self._false_alarm, self._from = np.inf, False, begin
+
+    @property
+    def state(self) -> Equilibrium:
+        """Equilibrium at s."""
+        return self._state
+
+    def points(self) -> Iterator[Point]:
+        """Yield the points of the leg, up to a solve without convergence.  Collective."""
+        self._settle(self._from)
+        yield from super().points()
+
+    def _is_over(self) -> bool:
+        return self._share >= 1.0 or not self._state.converged
+
+    def _settle(self, begin: PathState) -> None:
+        self._bends_before, self._false_alarm, self._from = np.inf, False, begin
+        self._go_to(self._share)
+
+    def _go_to(self, share: float) -> None:
+        self._stand(share, self._solve(share, self._from.bonds, self._from.lam))
+
+    def _solve(self, share: float, bonds: BondState, lam: Multipliers) -> Equilibrium:
+        return self.cell.equilibrium(self._load_at(share), bonds, lam)
+
+    def _stand(self, share: float, state: Equilibrium) -> None:
+        """Take the equilibrium at a share of the leg, and add the energies of the way."""
+        if share >= self._bends_before:
+            self._bends_before = np.inf
+        self._share, self._state, self._bonds = share, state, state.bonds
+        self._mean = self.cell.macroscopic(state.solutions)
+        self._energies = self._energies.plus(self._from.energies_to(self._mean))
+        self._from = self._path_state()
+
+    def _advance(self) -> Iterator[Point]:
+        """Advance to the next event, or part of the way, and yield its points.  Collective.
+
+        Raises:
+            NotCarriedError: neither open nor touching faces carry the stresses of the load.
+        """
+        state, share = self._state, self._share
+        try:
+            end = self.cell.linear(self.end, state.bonds, state.multipliers)
+        except NotCarriedError:
+            beyond = min(share + LEAST_SHARE, 1.0)
+            touching = self._solve(beyond, state.bonds, state.multipliers)
+            self._stand(share, self._solve(share, touching.bonds, touching.multipliers))
+            yield self._turn(beyond)
+            self._stand(beyond, touching)
+            self._false_alarm = False
+        else:
+            yield from self._advance_towards(end)
+
+    def _advance_towards(self, end: Sequence[DualSolution]) -> Iterator[Point]:
+        """Advance to the next event, or as far as the response is straight, and past it.
+
+        `end` has the solutions at the end of the leg with fixed contact states.
+        """
+        before, share = self._state, self._share
+        breaks, begins, certain = self._predict(end)
+        target = min(breaks, begins, 1.0)
+        is_here = target - share <= LEAST_SHARE and (target == begins or (target == breaks and self._is_due()))
+        reached = is_here or self._approach(target, end)
+        if reached and target == breaks and self._is_due():
+            yield from self._break()
+        elif reached and target == begins:
+            yield from self._change(min(breaks, certain), before)
+        elif self._differs(before):
+            self._false_alarm = False
+            if self._share > self._reported + LEAST_SHARE:
+                yield from self._turned()
+        yield from self._break_overloaded()
+
+    def _predict(self, end: Sequence[DualSolution]) -> tuple[float, float, float]:
+        """Return the shares of the leg at which a bond breaks, contact begins to change, and is beyond doubt.
+
+        Shares are infinite without such an event on the leg.
+        """
+        cell, state, rest = self.cell, self._state, 1.0 - self._share
+        breaks = first_break(cell, self.law, state.bonds, cell.traction(state.solutions), cell.traction(end))
+        begins, certain = (1.0, 1.0) if self._false_alarm else first_change(cell.plane, state, end[0])
+        if begins == 1.0:
+            begins = certain = np.inf
+        return self._share + rest * breaks, self._share + rest * begins, self._share + rest * certain
+
+    def _is_due(self) -> bool:
+        """Return whether the worst bonds are at their strength."""
+        return self._used()[1] > 1.0 - UTILISATION_TIE
+
+    def _approach(self, target: float, end: Sequence[DualSolution]) -> bool:
+        """Advance to the target, or to the first half, quarter, ... of the way with a straight response.
+
+        Return whether it is the target.
+        """
+        start, begin, reached = self._share, self._state, True
+        nearest = min(start + LEAST_SHARE, 1.0)
+        target = max(target, nearest)
+        if target >= self._bends_before:
+            target, reached = max((start + self._bends_before) / 2, nearest), False
+        while True:
+            way = (target - start) / (1.0 - start)
+            lam = tuple((1.0 - way) * a + way * b.lam for a, b in zip(begin.multipliers, end, strict=True))
+            state = self._solve(target, begin.bonds, lam)
+            if target <= nearest or not state.converged or self._continues(end, way, state):
+                break
+            self._bends_before, reached = target, False
+            target = max((start + target) / 2, nearest)
+        self._stand(target, state)
+        return reached
+
+    def _continues(self, end: Sequence[DualSolution], way: float, state: Equilibrium) -> bool:
+        """Return whether a state overloads no bond and has its response on the line to `end`.  Collective."""
+        cell = self.cell
+        _, used, _ = most_utilised(cell, self.law, state)
+        before, after = self._mean, cell.macroscopic(end)
+        ends = np.stack([self._response(before), self._response(after)])
+        error = np.abs((1.0 - way) * ends[0] + way * ends[1] - self._response(cell.macroscopic(state.solutions))).max()
+        strains = np.stack([before.strain, after.strain])
+        largest = max(np.abs(ends).max(), np.abs(cell.least_bonded_stress(strains)).max())
+        tolerance = max(OFF_LINE_PER_RTOL * cell.plane.solver.rtol, OFF_LINE_ROUNDING)
+        return bool(used <= 1.0 + UTILISATION_TIE and error <= tolerance * largest)
+
+    def _response(self, state: Macroscopic) -> Float:
+        """(n,) components that the load does not prescribe: stresses, and strains times a stiffness."""
+        return np.where(self.end.by_stress, self.cell.plane.scales.largest_stiffness * state.strain, state.stress)
+
+    def _change(self, beyond: float, from_state: Equilibrium) -> Iterator[Point]:
+        """Yield the state in which contact begins to change, and advance until the change is beyond doubt.
+
+        If a break or a waypoint is a point at this s, yield the state after the change instead.  Faces that touch
+        without a force may have opened since `from_state`.
+        """
+        before, beyond = self._state, min(max(beyond, self._share + LEAST_SHARE), 1.0)
+        there_is_one = self._share <= self._reported + LEAST_SHARE
+        if not there_is_one:
+            yield self._turn(beyond)
+        self._stand(beyond, self._solve(beyond, before.bonds, before.multipliers))
+        self._false_alarm = not self._differs(from_state)
+        if there_is_one and not self._false_alarm:
+            yield from self._turned()
+
+    def _turned(self) -> Iterator[Point]:
+        """Yield the state after a change of contact, unless a break at this s is a point."""
+        if not self._is_overloaded():
+            yield self._turn(self._share)
+
+    def _turn(self, position: float) -> Point:
+        """Return the state as a point without a break, from which the path goes on at `position`."""
+        return self._point(0, 0, replace(self._path_state(), position=position))
+
+    def _differs(self, before: Equilibrium) -> bool:
+        """Return whether contact states have changed.  Collective."""
+        return bool(self.cell.comm.allreduce(bool(self._state.bonds.differs(before.bonds).any()), MPI.LOR))
