@@ -27,8 +27,7 @@ from feti_homog.results import (
     result_json,
     xdmf,
 )
-from feti_homog.results.checkpoint import Checkpoint, room_of
-from feti_homog.results.events_in_memory import EventsInMemory
+from feti_homog.results.checkpoint import Checkpoint, EventsInMemory, room_of
 from feti_homog.results.field_file import FieldFile
 from feti_homog.results.output_folder import EventLog
 from feti_homog.system.parallel.mpi_errors import all_raise, on_root, on_root_only

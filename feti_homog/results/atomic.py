@@ -52,6 +52,25 @@ def commit(part: Path, path: Path) -> None:
     rename(part, path)
 
 
+def append(path: Path, start: int, content: bytes, lasts: bool) -> None:
+    """Write bytes from byte `start` of a file on, in place of all that follows; if it `lasts`, they are on the disk.
+
+    A reader must recognize unfinished bytes at the end of the file: the writer may be killed.
+
+    Raises:
+        FetiHomogError: the file cannot be written.
+    """
+    with write_errors(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with path.open("r+b" if start else "wb") as stream:
+            stream.seek(start)
+            stream.truncate()
+            stream.write(content)
+            stream.flush()
+            if lasts:
+                os.fsync(stream.fileno())
+
+
 def rename(old: Path, new: Path) -> None:
     """Rename a file or folder within its folder, in one step that lasts.  Raises OSError."""
     os.replace(old, new)
