@@ -11,7 +11,6 @@ from pathlib import Path
 from feti_homog.errors import CaseError
 from feti_homog.materials.voigt import SPATIAL_STRAINS, STRAINS
 from feti_homog.report.text.summary import answers, checks, summary, title_of
-from feti_homog.report.text.table import Column, Table
 from feti_homog.results import atomic, output_folder, result_json
 from feti_homog.typing import Document
 
@@ -63,17 +62,11 @@ def write(directory: Path) -> Path:
 def page(document: Document, directory: Path) -> str:
     """Return the page of a result.  Raises OSError or KeyError where its files are damaged."""
     title, status = escape(title_of(document)), document["status"]
-    laws = [
-        [check.law, check.error, "none" if check.limit is None else check.limit, "holds" if check.holds else "fails"]
-        for check in checks(document)
-    ]
-    columns = [Column("law"), Column("error", form=".1e"), Column("limit", form=".1e"), Column("")]
-    table = Table("Largest relative error of each law over all states", columns, laws)
     style = resources.files("feti_homog.report").joinpath("page.css").read_text(encoding="utf-8")
     sections = {
         "Results": "\n".join(f'<div class="scroll">{answer.html}</div>' for answer in answers(document, MOST_ROWS)),
         "Remarks": "\n".join(_remarks(document)),
-        "Checks": f'<div class="scroll">{table.html}</div>',
+        "Checks": f'<div class="scroll">{checks(document).html}</div>',
         "Pictures": "\n".join(_pictures(directory)) or "<p>None: <code>feti-homog plot</code> draws them.</p>",
         "Summary": f"<pre>{escape(summary(document))}</pre>",
     }

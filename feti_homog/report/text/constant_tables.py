@@ -17,15 +17,13 @@ from feti_homog.materials.constant_names import (
     OF_THE_CELL,
 )
 from feti_homog.materials.voigt import EXPANSIONS
-from feti_homog.report.text.stiffness_tables import UNKNOWN, abreast, with_errors
-from feti_homog.report.text.table import Column, Table, in_brackets, without_noise
+from feti_homog.report.text.stiffness_tables import ENGINEERING, with_errors
+from feti_homog.report.text.table import UNKNOWN, Column, Table, stress_label, without_noise
 from feti_homog.typing import Document
-
-ROWS = (("E1", "E2", "E3"), ("G12", "G13", "G23"), ("nu12", "nu13", "nu23"))
 
 
 def constants(document: Document) -> dict[str, float]:
-    """Return the constants in material axes, in the order of ROWS, those that follow from what the result has.
+    """Return the constants in material axes, in the order of ENGINEERING, those that follow from what the result has.
 
     nu_ij = -eps_j / eps_i under stress along i: nu12 = nu13' E3' / E1' of those with a dash, in the axes of the cell.
     """
@@ -38,7 +36,7 @@ def constants(document: Document) -> dict[str, float]:
 
 def in_material_axes(known: Mapping[str, float]) -> dict[str, float]:
     """Return numbers of constants of the cell by their names in material axes, in which expansions keep theirs."""
-    places = {name: OF_THE_CELL[name] for names in ROWS for name in names}
+    places = {name: OF_THE_CELL[name] for name in ENGINEERING}
     places |= {name: name for name in MATERIAL_EXPANSIONS[:3]}
     return {name: known[own] for name, own in places.items() if own in known}
 
@@ -49,17 +47,12 @@ def standard_deviations(document: Document) -> dict[str, float]:
     return dict(zip(known["constants"], map(float, known["std"]), strict=True))
 
 
-def table(document: Document, label: str) -> list[Table]:
-    """Return the constants as a table; `label` is the unit of stresses in brackets, or empty."""
-    found, off = constants(document), in_material_axes(mesh_errors(document))
-    return [with_errors(f"{MATERIAL_AXES}{label}", found, off)] if found else []
-
-
-def lines(document: Document, label: str) -> list[str]:
-    """Return the same as text, with the estimated errors of the mesh."""
-    found, off = constants(document), in_material_axes(mesh_errors(document))
-    title = f"{MATERIAL_AXES}{label}{'; +- error of the mesh' if off else ''}"
-    return [title, *abreast(ROWS, found, off, width=6)] if found else []
+def table(document: Document) -> Table:
+    """Return the constants in material axes, with their mesh errors."""
+    errors = in_material_axes(mesh_errors(document))
+    title = f"{MATERIAL_AXES}{stress_label(document)}{'; +- error of the mesh' if errors else ''}"
+    computed = constants(document)
+    return with_errors(title, {name: computed[name] for name in ENGINEERING if name in computed}, errors, 3)
 
 
 # Constants of which sensitivities are shown, by whether the cell is in space; all are in result.json.
@@ -112,7 +105,7 @@ def uncertainty(document: Document) -> list[Table]:
         for k, name in ((names.index(name), name) for name in shown(names))
         if found["std"][k] > 0
     ]
-    label = in_brackets(document["case"].get("output", {}).get("stress_unit", ""))
+    label = stress_label(document)
     return [Table(f"Scatter by uncertain constants{label}: std, and their shares of the variance (%)", columns, rows)]
 
 

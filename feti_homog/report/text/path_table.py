@@ -11,7 +11,7 @@ import numpy as np
 from feti_homog.case.mixed_load import TEMPERATURE
 from feti_homog.materials.voigt import voigt_names
 from feti_homog.report.text.point_tables import COUNTS, WIDTH, columns_without_noise, counts, debonded, energies
-from feti_homog.report.text.table import Column, Table, without_noise
+from feti_homog.report.text.table import Column, Table, stress_label, without_noise
 from feti_homog.results import path_curves
 from feti_homog.results.landmarks import LARGEST, PEAK, chosen, fall_of, name_of, peak_of, stresses_of
 from feti_homog.typing import Document
@@ -21,41 +21,23 @@ SHOWN = 5  # of its strains, stresses and the temperature
 SAME_LOAD, CLOSED_CYCLE = 1e-9, 1e-6  # of load factors; of strains or stresses of one waypoint, relative
 
 
-def path_table(document: Document, label: str) -> Table:
-    """Totals of the path, and rows of some of its points."""
-    points, numbers, found = document["path"], chosen(document, ROWS), _path_columns(document)
-    shown = dict(list(found.items())[:SHOWN])
-    rest = [name for name in found if name not in shown]
+def path_table(document: Document, most: int = ROWS) -> Table:
+    """Totals of the path, and at most so many rows of its points."""
+    points, numbers, varying = document["path"], chosen(document, most), _path_columns(document)
+    first = dict(list(varying.items())[:SHOWN])
+    rest = [name for name in varying if name not in first]
     broke = sum(point["broke"] for point in points)
     some = "" if len(numbers) == len(points) else f", {len(numbers)} shown"
     rows = [
-        [k, *(without_noise(column[k]) for column in shown.values()), points[k]["load_factor"], *counts(points[k])]
+        [k, *(without_noise(column[k]) for column in first.values()), points[k]["load_factor"], *counts(points[k])]
         for k in numbers
     ]
-    columns = [Column("point", 5, "d"), *(Column(name, max(11, len(name) + 1)) for name in shown)]
+    columns = [Column("point", 5, "d"), *(Column(name, max(11, len(name) + 1)) for name in first)]
     columns += [Column("load", 9, ".6f"), *COUNTS]
-    totals = [*_peak_lines(document, peak_of(document), label), *_path_energies(document, label)]
+    label = stress_label(document)
+    totals = [*_peak_lines(document, peak_of(document)), *_path_energies(document, label)]
     totals += [f"Also in path.csv: {', '.join(rest)}"] if rest else []
     return Table(f"Path{label}: {len(points)} points{some}; {broke} bonds broke", columns, rows, totals)
-
-
-def peak_table(document: Document, label: str) -> Table:
-    """Return first break, peak and valley: stress, strain and point."""
-    peak = peak_of(document)
-    largest = name_of(document, peak)
-    places = {
-        "first break": ("first_break_stress", "first_break_strain", "first_break_event"),
-        largest: ("stress", "strain", "event"),
-        f"left after the {largest}": ("stress_left", "", "event_left"),
-    }
-    rows = [
-        [words, *(without_noise(peak[name]) if name else "" for name in names)]
-        for words, names in places.items()
-        if names[0] in peak
-    ]
-    columns = [Column(""), Column(f"{peak['stress_name']}{label}"), Column(peak["strain_name"]), Column("point")]
-    titles = {PEAK: "Peak of the path", LARGEST: "Largest stress of the path"}
-    return Table(titles.get(largest, "Largest stress so far"), columns, rows)
 
 
 def _path_columns(document: Document) -> dict[str, Any]:
@@ -76,10 +58,10 @@ def _path_columns(document: Document) -> dict[str, Any]:
     return found | {strains[k]: strain[:, k] for k in others if stresses[k] in given}
 
 
-def _peak_lines(document: Document, peak: Mapping[str, Any], label: str) -> list[str]:
+def _peak_lines(document: Document, peak: Mapping[str, Any]) -> list[str]:
     """Return the peak with the first break and what is left after it, and whether it grows with the toughness."""
     strain, stress = (without_noise(peak[name]) for name in ("strain", "stress"))
-    largest, name = name_of(document, peak), peak["stress_name"] + label
+    largest, name = name_of(document, peak), peak["stress_name"] + stress_label(document)
     begins = {PEAK: f"Peak {name}", LARGEST: f"Largest {name}"}
     text = begins.get(largest, f"Largest {name} so far, the path being cut off")
     text += f": {stress:.6g} at {peak['strain_name']} = {strain:.6g}"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from textwrap import wrap
@@ -12,7 +11,7 @@ from typing import Any
 from feti_homog.case.element_sizes import ASKED
 from feti_homog.report.text.analyses import reported
 from feti_homog.report.text.point_tables import WIDTH
-from feti_homog.report.text.table import Column, Table, in_brackets
+from feti_homog.report.text.table import ERROR, Column, Table
 from feti_homog.typing import Document
 
 LABEL = 12  # columns of the labels at the left
@@ -35,8 +34,8 @@ def summary(document: Document) -> str:
     blocks = [
         _heading(document),
         [*_cell(document), *_solver(document["solver"])],
-        *_answer(document),
-        _checks(document),
+        *(table.lines for table in answers(document)),
+        checks(document).lines,
         [
             *_field("Time", [f"{stage}{GLUE}{took:.2f}{GLUE}s" for stage, took in document["timings"].items()]),
             *_field("Memory", [f"{_bytes(document['memory'])} per rank at most"]),
@@ -54,25 +53,25 @@ def summary(document: Document) -> str:
 def short_summary(document: Document) -> str:
     """Return the answer, the largest error of all checks, and the status."""
     law, error = max(document["checks"].items(), key=lambda check: check[1])
-    checks = _field("Checks", [f"largest relative error {error:.1e} ({law})"])
-    return _joined([_heading(document), *_answer(document), [*checks, *_field("Status", [str(document["status"])])]])
+    verdict = _field("Checks", [f"largest relative error {error:.1e} ({law})"])
+    return _joined(
+        [
+            _heading(document),
+            *(table.lines for table in answers(document)),
+            [*verdict, *_field("Status", [str(document["status"])])],
+        ]
+    )
 
 
 def notebook(document: Document) -> str:
     """Title, tables, checks and status as HTML."""
-    rows = [[check.law, f"{check.error:.1e}"] for check in checks(document)]
-    errors = Table("Largest relative errors", [Column("law"), Column("error")], rows)
-    tables = [table.html for table in (*answers(document, NOTEBOOK_ROWS), errors)]
+    tables = [table.html for table in (*answers(document, NOTEBOOK_ROWS), checks(document))]
     return "\n".join([f"<h4>{escape(title_of(document))}</h4>", *tables, f"<p>{escape(document['status'])}</p>"])
 
 
-def answers(document: Document, most: int) -> list[Table]:
-    """Return the tables of a result: stiffness with moduli and bounds, points of an angle or path, or onsets.
-
-    Tables of points have at most so many rows.
-    """
-    label = in_brackets(document["case"].get("output", {}).get("stress_unit", ""))
-    return reported(document).tables(document, label, most)
+def answers(document: Document, most: int | None = None) -> list[Table]:
+    """Return the tables of a result, those of points with at most so many rows."""
+    return reported(document).tables(document, most)
 
 
 def title_of(document: Document) -> str:
@@ -89,14 +88,6 @@ def _heading(document: Document) -> list[str]:
 
 def _joined(blocks: Iterable[Sequence[str]]) -> str:
     return "\n\n".join("\n".join(block) for block in blocks if block).replace(GLUE, " ")
-
-
-def _answer(document: Document) -> list[list[str]]:
-    """Return the blocks of what was asked for."""
-    output = document["case"].get("output", {})
-    unit, length = output.get("stress_unit", ""), output.get("length_unit", "")
-    label, toughness = in_brackets(unit), in_brackets(f"{unit} {length}") if unit and length else ""
-    return reported(document).lines(document, label, toughness)
 
 
 def _cell(document: Document) -> list[str]:
@@ -170,39 +161,21 @@ def _iterations(counts: Sequence[int]) -> list[str]:
     return [f"{min(counts)} to {max(counts)} a state", f"{sum(counts)} for {len(counts)} states"]
 
 
-@dataclass(frozen=True)
-class Check:
-    """A law with its largest relative error and the limit of it, if there is one."""
-
-    law: str
-    error: float
-    limit: float | None
-
-    @property
-    def holds(self) -> bool:
-        return self.limit is None or self.error <= self.limit
-
-
-def checks(document: Document) -> list[Check]:
-    """Return the laws that were checked; those of contact do not apply where all is bonded."""
+def checks(document: Document) -> Table:
+    """Return the largest relative error of each law, without laws of contact where all is bonded."""
     limit, has_interface = document.get("check_tolerance"), bool(document["case"].get("interface"))
-    contact = document.get("kkt_tolerance", limit)
-    return [
-        Check(law, error, contact if law.startswith("kkt_") else limit)
-        for law, error in document["checks"].items()
-        if error is not None and (has_interface or not law.startswith("kkt_"))
-    ]
-
-
-def _checks(document: Document) -> list[str]:
-    found, limit = checks(document), document.get("check_tolerance")
-    of_contact = {f"; of contact {check.limit:.1e}" for check in found if check.limit != limit}
-    title = "Checks" if limit is None else f"Checks (relative, at most {limit:.1e}{''.join(of_contact)})"
-    verdicts = {True: "pass", False: "FAIL"}
-    return [title] + [
-        f"  {c.law:<{NAME - 2}}{c.error:>14.1e}    {'' if c.limit is None else verdicts[c.holds]}".rstrip()
-        for c in found
-    ]
+    contact, rows, title = document.get("kkt_tolerance", limit), list[list[Any]](), "Checks"
+    for law, error in document["checks"].items():
+        of_contact = law.startswith("kkt_")
+        if error is None or (of_contact and not has_interface):
+            continue
+        most = contact if of_contact else limit
+        rows.append([law, error, *([] if most is None else ["pass" if error <= most else "FAIL"])])
+    if limit is not None:
+        of_contact = f"; of contact {contact:.1e}" if contact != limit and any("kkt_" in row[0] for row in rows) else ""
+        title = f"Checks (relative, at most {limit:.1e}{of_contact})"
+    columns = [Column("law", 2 - NAME, indent=0), Column("error", 14, ERROR), Column("", -8, indent=4)]
+    return Table(title, columns, rows, abreast=1)
 
 
 def _remarks(label: str, remarks: Iterable[str]) -> list[str]:
