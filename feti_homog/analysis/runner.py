@@ -242,11 +242,9 @@ def _write(result: Result, directory: Path, cell: TornCell) -> None:
         written |= {field_file.NAME, *(path.name for path in on_root(cell.comm, xdmf.write, directory))}
     analysis, name = analysis_of(cell.case), cell.case.analysis.type
     if analysis.table:
-        from feti_homog.results import csv_tables  # which a stiffness has none of
-
         points = getattr(result, name)
         rows = points if isinstance(points, tuple) else (points,)
-        written.add(on_root(cell.comm, csv_tables.write, directory / f"{name}.csv", rows).name)
+        written.add(on_root(cell.comm, result_json.write_csv, directory / f"{name}.csv", rows).name)
     written |= {output_folder.LOG} if analysis.events else set()
     on_root_only(cell.comm, output_folder.remove_other_results, directory, written)
 

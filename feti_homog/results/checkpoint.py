@@ -19,7 +19,7 @@ from feti_homog.case.case import Case
 from feti_homog.errors import CaseError, CheckpointError
 from feti_homog.homogenization import phase_laws
 from feti_homog.results import atomic, checkpoint_file
-from feti_homog.results.checkpoint_file import FOLDER, NAME, Arrays, packed, unpacked
+from feti_homog.results.checkpoint_file import FOLDER, NAME, Arrays, packed, records, unpacked
 from feti_homog.system.parallel.mpi_errors import on_root, on_root_only
 
 # Bytes of events up to which they have their multipliers, and of an event without (0.7 kB of 100 fibres).
@@ -118,7 +118,7 @@ class Checkpoint(NoCheckpoint):
             raise CheckpointError(*(f"--resume: {fault}" for fault in error.faults)) from error
 
     def read(self, number: int) -> Arrays:
-        event = on_root_only(self.comm, self._read, number)
+        event = on_root_only(self.comm, lambda: unpacked(next(records(self.path, self._ends[number]))[1]))
         part: Arrays = self.comm.scatter([] if event is None else [_part(event, k) for k in range(self.comm.size)])
         return part
 
@@ -137,18 +137,15 @@ class Checkpoint(NoCheckpoint):
 
     def _count_records(self) -> int:
         checkpoint_file.refuse_former(self.path.parent)
-        self._ends = [end for end, _ in checkpoint_file.records(self.path)] if self.path.is_file() else []
+        self._ends = [end for end, _ in records(self.path)] if self.path.is_file() else []
         return max(len(self._ends) - 1, 0)
 
     def _count(self) -> int:
         if count := self._count_records():
-            found = next(checkpoint_file.records(self.path))[1].decode()
+            found = next(records(self.path))[1].decode()
             if found != self.signature:
                 raise CaseError(f"{self.path} is of another run: expected {self.signature}; found {found}")
         return count
-
-    def _read(self, number: int) -> Arrays:
-        return unpacked(next(checkpoint_file.records(self.path, self._ends[number]))[1])
 
     def _write(
         self, number: int, shared: Mapping[str, Any], gathered: Mapping[str, list[NDArray[Any]]], light: bool

@@ -147,21 +147,12 @@ class FieldFile:
         self._reserved += size
         described = tables(part)
         for symbol, rows in self._rows.items():
-            own = {name: d for name, d in described.items() if rows_of(d) == symbol}
-            if own:
-                self._write_tables(group, rows, part, own)
-
-    def _write_tables(self, group: str, rows: _Rows, part: Any, described: Mapping[str, Description]) -> None:
-        """Make tables of the same rows of a part."""
-        arrays = agree(self._comm, _arrays, group, rows.count, part, described)
-        for name, array in arrays.items():
-            words = self._words(described[name])
-            self._agreed(agree_after, _write_rows, self._file, f"{group}/{name}", rows, array, words)
-
-    def _words(self, described: Description) -> dict[str, str]:
-        """Return the attributes of a dataset: what it holds, and in which unit, by its label if the case gives one."""
-        unit = self._units.get(described.unit) or described.unit or PURE_NUMBER
-        return {"meaning": described.meaning, "unit": unit}
+            of_rows = {name: d for name, d in described.items() if rows_of(d) == symbol}
+            arrays = agree(self._comm, _arrays, group, rows.count, part, of_rows) if of_rows else {}
+            for name, array in arrays.items():
+                d = of_rows[name]
+                words = {"meaning": d.meaning, "unit": self._units.get(d.unit) or d.unit or PURE_NUMBER}
+                self._agreed(agree_after, _write_rows, self._file, f"{group}/{name}", rows, array, words)
 
     def _agreed(self, agreed: Callable[..., Any], function: Callable[..., Any], *args: Any) -> Any:
         """function(*args) by `agree_after` where HDF5 communicates.
@@ -199,20 +190,16 @@ def _create(part: Path, size: int) -> None:
     """Make an empty HDF5 file with `size` bytes of space, by plain calls: HDF5 may crash or hang where they fail."""
     part.parent.mkdir(parents=True, exist_ok=True)
     try:
+        with h5py.File("empty", "w", driver="core", backing_store=False) as file:
+            file.flush()
+            empty = bytes(file.id.get_file_image())
         with part.open("wb") as stream:
-            stream.write(_empty_file())
+            stream.write(empty)
             stream.flush()
             os.posix_fallocate(stream.fileno(), 0, size)
     except OSError:
         part.unlink(missing_ok=True)
         raise
-
-
-def _empty_file() -> bytes:
-    """Return an HDF5 file without content."""
-    with h5py.File("empty", "w", driver="core", backing_store=False) as file:
-        file.flush()
-        return bytes(file.id.get_file_image())
 
 
 def _path_for_mpi(part: Path, opened: contextlib.ExitStack) -> str:

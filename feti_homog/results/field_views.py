@@ -99,7 +99,17 @@ BYTES = 1 << 12  # that a view takes at most; 0.9 KB in the mean were measured
 def add_views(file: Any) -> None:
     """Make the views of all groups of an open file whose tables are complete; empty tables have none."""
     for group, view in _views_of(file):
-        _add_view(file, view, group)
+        original = file[f"{group}/{view.source}"]
+        shape = (len(original), view.components) if view.components else (len(original),)
+        layout = h5py.VirtualLayout(shape, original.dtype)
+        for place, (name, column) in view.columns.items():
+            table = file[f"{group}/{name}"]
+            source = h5py.VirtualSource(".", table.name, shape=table.shape, dtype=table.dtype)
+            target: Any = (slice(None), place) if view.components else slice(None)
+            layout[target] = source if column == WHOLE else source[:, column]
+        dataset = file.create_virtual_dataset(view.path(group), layout, np.zeros((), layout.dtype)[()])
+        dataset.attrs["meaning"] = view.words
+        dataset.attrs["unit"] = original.attrs["unit"]
 
 
 def bytes_of_views(file: Any) -> int:
@@ -108,30 +118,14 @@ def bytes_of_views(file: Any) -> int:
 
 
 def _views_of(file: Any) -> list[tuple[str, View]]:
-    """Group and view of all that the tables of the file allow."""
+    """Group and view of all whose tables are in the file, and not empty."""
     groups = {"interface": VIEWS["interface"]}
     for group in (f"state/{number}" for number in sorted(file.get("state", ()), key=int)):
         groups[group] = SPATIAL_VIEWS if AXIAL in file[group] else VIEWS[GROUP_OF_STATES]
-    return [(group, view) for group, views in groups.items() for view in views if _has_rows(file[group], view)]
-
-
-def _has_rows(group: Any, view: View) -> bool:
-    """Return whether the tables that a view shows are there, and not empty."""
-    names = {name for name, _ in view.columns.values()} | {view.source}
-    return names <= group.keys() and len(group[view.source]) > 0
-
-
-def _add_view(file: Any, view: View, group: str) -> None:
-    """Make one virtual dataset over the tables of a group, with the unit of its source."""
-    original = file[f"{group}/{view.source}"]
-    rows = len(original)
-    shape = (rows, view.components) if view.components else (rows,)
-    layout = h5py.VirtualLayout(shape, original.dtype)
-    for place, (name, column) in view.columns.items():
-        table = file[f"{group}/{name}"]
-        source = h5py.VirtualSource(".", table.name, shape=table.shape, dtype=table.dtype)
-        own: Any = (slice(None), place) if view.components else slice(None)
-        layout[own] = source if column == WHOLE else source[:, column]
-    dataset = file.create_virtual_dataset(view.path(group), layout, np.zeros((), layout.dtype)[()])
-    dataset.attrs["meaning"] = view.words
-    dataset.attrs["unit"] = original.attrs["unit"]
+    return [
+        (group, view)
+        for group, views in groups.items()
+        for view in views
+        if {view.source, *(name for name, _ in view.columns.values())} <= file[group].keys()
+        and len(file[group][view.source]) > 0
+    ]

@@ -10,7 +10,7 @@ import contextlib
 import json
 import os
 import re
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
@@ -97,8 +97,8 @@ def refuse_files_of_others(directory: Path) -> None:
         )
 
 
-def _foreign(paths: Sequence[Path]) -> list[Path]:
-    """Return the files that no run wrote: those without its marks; if none is its own, all that are not empty."""
+def _foreign(paths: list[Path]) -> list[Path]:
+    """Return the files without the marks of a run; if there is no sign of a run, all that are not empty."""
     signs = [path for path in paths if path.name in SIGNS]
     return [path for path in signs or paths if path.stat().st_size and not (signs and _is_own(path))]
 

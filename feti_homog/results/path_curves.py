@@ -131,7 +131,7 @@ def scales_with_toughness(document: Document) -> bool:
     return bool(document.get("path")) and bool(laws) and all(by_energy)
 
 
-class Energies(NamedTuple):
+class EnergyStack(NamedTuple):
     """Parts of the work of the loads per area along a path, at r places from the unloaded cell on.
 
     Attributes:
@@ -149,7 +149,7 @@ class Energies(NamedTuple):
     work: Float
 
 
-def energies(document: Document) -> Energies | None:
+def energies(document: Document) -> EnergyStack | None:
     """Return the energies of a path; None of other results, and of those of older versions, which have them not."""
     points = document.get("path") or [{}]
     if "work" not in points[0]:
@@ -173,7 +173,7 @@ def energies(document: Document) -> Energies | None:
     if (np.diff(place) < 0.0).any():
         place, by_legs = np.append(before - 1.0, np.arange(float(len(points)))), False
         words = "number of the point, in the order of the path"
-    return Energies(place, by_legs, words, shown, column("work"))
+    return EnergyStack(place, by_legs, words, shown, column("work"))
 
 
 def load_controlled(points: Sequence[Point]) -> Float:

@@ -43,7 +43,9 @@ def loads(text: str) -> dict[str, Any]:
     if not isinstance(document, dict):
         raise ValueError("it is damaged: no table of keys and values")
     if KEY not in document:
-        _refuse_damaged_key(document)
+        *others, (_, last) = document.items() if document else [("", None)]
+        if isinstance(last, str) and len(last) == CHECKSUM_DIGITS and last == _checksum(_text(dict(others))):
+            raise ValueError("it is damaged: the key of its checksum has another name")
         return document
     found = document.pop(KEY)
     end = _sealed("{\n}", found)[1:]
@@ -52,13 +54,6 @@ def loads(text: str) -> dict[str, Any]:
     if found != _checksum(_text(document)):
         raise ValueError("it is damaged: its checksum is wrong")
     return document
-
-
-def _refuse_damaged_key(document: Mapping[str, Any]) -> None:
-    """Refuse a document whose last key, of another name than KEY, has the checksum of the others."""
-    *others, (_, last) = document.items() if document else [("", None)]
-    if isinstance(last, str) and len(last) == CHECKSUM_DIGITS and last == _checksum(_text(dict(others))):
-        raise ValueError("it is damaged: the key of its checksum has another name")
 
 
 @dataclass(frozen=True)

@@ -75,9 +75,16 @@ def cell_state(file: Any, state: int) -> ViewedState:
     more = xdmf.SPATIAL_ELEMENTS if AXIAL_DISPLACEMENT in group else {}
     nodes, elements = (_tables(file, state, names) for names in (xdmf.CELL_NODES, xdmf.CELL_ELEMENTS | more))
     points, triangles, strain = file["mesh/points"][()], file["mesh/triangles"][()], group.attrs["strain"]
-    nodes["fluctuation"] = nodes["displacement"] - points @ _gradient(strain).T
+    # H of the displacements H x of the macroscopic strain, in the plane and along the fibres
+    along = strain[[4, 3]] if more else np.zeros(2)
+    gradient = np.vstack([PLANE.gradient(strain[[0, 1, -1]]), AXIAL.gradient(along)])
+    nodes["fluctuation"] = nodes["displacement"] - points @ gradient.T
     in_plane = group["stress"][()]
-    E33 = _strain_33(file, strain, in_plane)
+    if more:
+        E33 = np.full(len(in_plane), strain[2])
+    else:  # as the materials make it, in plane strain and stress
+        rules = out_of_plane(json.loads(file.attrs["case"]), tuple(map(str, file.attrs["phases"])))
+        E33 = np.einsum("ei,ei->e", rules[file["mesh/phase"][()], 1], in_plane)
     elements["strain"] = _strains(points, triangles, nodes["displacement"], E33)
     shears = group["axial_stress"][()] if more else np.zeros((len(triangles), 2))
     S33 = elements["S33"]
@@ -104,23 +111,6 @@ def _tables(file: Any, state: int, places: Mapping[str, str]) -> dict[str, Array
 
 def _in_space(points: Float) -> Float:
     return np.pad(points, [(0, 0), (0, 1)])
-
-
-def _gradient(strain: Float) -> Float:
-    """(3, 2) H of the displacements H x of a macroscopic strain (3,) or (6,)."""
-    along = np.zeros(2) if len(strain) == len(voigt.STRAINS) else strain[[4, 3]]
-    return np.vstack([PLANE.gradient(strain[[0, 1, -1]]), AXIAL.gradient(along)])
-
-
-def _strain_33(file: Any, strain: Float, in_plane: Float) -> Float:
-    """(m,) strains 33 under a macroscopic strain and stresses (m, 3).
-
-    Those of all elements or, in plane strain and stress, as the materials make them.
-    """
-    if len(strain) > len(voigt.STRAINS):
-        return np.full(len(in_plane), strain[2])
-    rules = out_of_plane(json.loads(file.attrs["case"]), tuple(map(str, file.attrs["phases"])))
-    return np.asarray(np.einsum("ei,ei->e", rules[file["mesh/phase"][()], 1], in_plane))
 
 
 def _strains(points: Float, triangles: Array, displacement: Float, E33: Float) -> Float:
@@ -170,9 +160,8 @@ def _write_vtu(directory: Path, name: str, read: Any, file: Any) -> list[Path]:
 
 def _grid(state: ViewedState) -> ET.Element:
     """Return a state as VTK's XML, its arrays in base64."""
-    root = ET.Element(
-        "VTKFile", type="UnstructuredGrid", version="1.0", byte_order="LittleEndian", header_type="UInt64"
-    )
+    form = {"type": "UnstructuredGrid", "version": "1.0", "byte_order": "LittleEndian", "header_type": "UInt64"}
+    root = ET.Element("VTKFile", form)
     m, columns = state.cells.shape
     sizes = {"NumberOfPoints": str(len(state.points)), "NumberOfCells": str(m)}
     piece = ET.SubElement(ET.SubElement(root, "UnstructuredGrid"), "Piece", sizes)
@@ -182,20 +171,15 @@ def _grid(state: ViewedState) -> ET.Element:
         "types": np.full(m, KINDS[columns], np.uint8),
     }
     groups = {"Points": {"Points": state.points}, "Cells": cells, "PointData": state.nodes, "CellData": state.elements}
-    for name, arrays in groups.items():
-        group = ET.SubElement(piece, name)
-        for own, array in arrays.items():
-            group.append(_array(own, array))
+    for group, arrays in groups.items():
+        parent = ET.SubElement(piece, group)
+        for name, array in arrays.items():
+            values = np.ascontiguousarray(array, array.dtype.newbyteorder("<"))
+            width = {"NumberOfComponents": str(values.shape[1])} if values.ndim == 2 else {}
+            form = {"type": TYPES[values.dtype.str[1:]], "Name": name, "format": "binary"}
+            element = ET.SubElement(parent, "DataArray", form | width)
+            element.text = base64.b64encode(np.uint64(values.nbytes).tobytes() + values.tobytes()).decode()
     return root
-
-
-def _array(name: str, array: Array) -> ET.Element:
-    values = np.ascontiguousarray(array, array.dtype.newbyteorder("<"))
-    form = {"type": TYPES[values.dtype.str[1:]], "Name": name, "format": "binary"}
-    columns = {"NumberOfComponents": str(values.shape[1])} if values.ndim == 2 else {}
-    element = ET.Element("DataArray", form | columns)
-    element.text = base64.b64encode(np.uint64(values.nbytes).tobytes() + values.tobytes()).decode()
-    return element
 
 
 def _write_vtkhdf(directory: Path, name: str, read: Any, file: Any) -> list[Path]:
@@ -230,14 +214,10 @@ def _fill_vtkhdf(root: Any, read: Any, file: Any) -> None:
             root["Offsets"] = columns * np.arange(m + 1)
             root["Types"] = np.full(m, KINDS[columns], np.uint8)
         for group, arrays in (("PointData", state.nodes), ("CellData", state.elements)):
-            _append(root.require_group(group), steps.require_group(f"{group}Offsets"), arrays, number, count)
-
-
-def _append(group: Any, offsets: Any, arrays: Mapping[str, Array], number: int, count: int) -> None:
-    """Write the arrays of one of so many states behind those of the states before it."""
-    for name, array in arrays.items():
-        rows = len(array)
-        if number == 0:
-            group.create_dataset(name, (rows * count, *array.shape[1:]), array.dtype)
-            offsets[name] = rows * np.arange(count)
-        group[name][number * rows : (number + 1) * rows] = array
+            tables, offsets = root.require_group(group), steps.require_group(f"{group}Offsets")
+            for name, array in arrays.items():
+                rows = len(array)
+                if number == 0:
+                    tables.create_dataset(name, (rows * count, *array.shape[1:]), array.dtype)
+                    offsets[name] = rows * np.arange(count)
+                tables[name][number * rows : (number + 1) * rows] = array

@@ -7,7 +7,7 @@ of them show, and an array of the bytes of its letters, as many in all states.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -69,17 +69,16 @@ def write(directory: Path) -> list[Path]:
     Raises:
         FetiHomogError: result.h5 cannot be read or a file cannot be written.
     """
-    h5, paths = Path(directory) / field_file.NAME, []
+    h5 = Path(directory) / field_file.NAME
     with atomic.write_errors(Path(directory) / CELL), h5py.File(h5, "r", locking=False) as file:
-        paths.append(_write(h5.with_name(CELL), "cell", file, _cell))
-        if len(file["interface/points"]):
-            paths.append(_write(h5.with_name(INTERFACE), "interface", file, _interface))
-    return paths
+        names = (CELL, INTERFACE) if len(file["interface/points"]) else (CELL,)
+        return [_write(h5.with_name(name), file) for name in names]
 
 
-def _write(path: Path, name: str, file: h5py.File, fill: Callable[[ET.Element, h5py.File, str], None]) -> Path:
-    """One file; `fill` puts mesh and fields of a state into its grid."""
+def _write(path: Path, file: h5py.File) -> Path:
+    """Write one file: mesh and fields of each state of the cell, or of the interface."""
     root = ET.Element("Xdmf", Version="3.0")
+    name = "cell" if path.name == CELL else "interface"
     collection = ET.SubElement(
         ET.SubElement(root, "Domain"), "Grid", Name=name, GridType="Collection", CollectionType="Temporal"
     )
@@ -90,7 +89,16 @@ def _write(path: Path, name: str, file: h5py.File, fill: Callable[[ET.Element, h
         grid = _grid(collection, state, label)
         _numbers(grid, "label", "Scalar", list(label.encode().ljust(longest)))
         _means(grid, file[f"state/{state}"].attrs)
-        fill(grid, file, state)
+        is_spatial = AXIAL in file[f"state/{state}"]
+        if path.name == CELL:
+            kind = "Triangle_6" if file["mesh/triangles"].shape[1] == 6 else "Triangle"
+            _mesh(grid, {"TopologyType": kind}, file["mesh/triangles"], file["mesh/points"])
+            _attributes(grid, file, state, CELL_NODES, "Node")
+            _attributes(grid, file, state, CELL_ELEMENTS | (SPATIAL_ELEMENTS if is_spatial else {}), "Cell")
+        else:
+            vertices = {"TopologyType": "Polyvertex", "NodesPerElement": "1"}
+            _mesh(grid, vertices, file["interface/vertex"], file["interface/points"])
+            _attributes(grid, file, state, INTERFACE_POINTS | (SPATIAL_POINTS if is_spatial else {}), "Node")
     ET.indent(root)
     return atomic.replace(path, lambda part: ET.ElementTree(root).write(part, encoding="utf-8", xml_declaration=True))
 
@@ -125,31 +133,15 @@ def _numbers(grid: ET.Element, name: str, kind: str, values: Sequence[float]) ->
     attribute.append(item)
 
 
-def _cell(grid: ET.Element, file: h5py.File, state: str) -> None:
-    triangles = file["mesh/triangles"]
-    kind = "Triangle_6" if triangles.shape[1] == 6 else "Triangle"
-    _mesh(grid, {"TopologyType": kind}, triangles, file["mesh/points"])
-    _attributes(grid, file, state, CELL_NODES.items(), "Node")
-    more = SPATIAL_ELEMENTS if AXIAL in file[f"state/{state}"] else {}
-    _attributes(grid, file, state, (CELL_ELEMENTS | more).items(), "Cell")
-
-
-def _interface(grid: ET.Element, file: h5py.File, state: str) -> None:
-    vertices = {"TopologyType": "Polyvertex", "NodesPerElement": "1"}
-    _mesh(grid, vertices, file["interface/vertex"], file["interface/points"])
-    more = SPATIAL_POINTS if AXIAL in file[f"state/{state}"] else {}
-    _attributes(grid, file, state, (INTERFACE_POINTS | more).items(), "Node")
-
-
 def _mesh(grid: ET.Element, kind: dict[str, str], connectivity: Any, points: Any) -> None:
     topology = ET.SubElement(grid, "Topology", kind, NumberOfElements=str(len(connectivity)))
     topology.append(_table(connectivity))
     ET.SubElement(grid, "Geometry", GeometryType="XY").append(_table(points))
 
 
-def _attributes(grid: ET.Element, file: h5py.File, state: str, arrays: Iterable[tuple[str, str]], centre: str) -> None:
+def _attributes(grid: ET.Element, file: h5py.File, state: str, arrays: Mapping[str, str], centre: str) -> None:
     """Add the arrays of a state, each with its dataset."""
-    for name, place in arrays:
+    for name, place in arrays.items():
         table = file[place.replace("/K/", f"/{state}/")]
         kind = SHAPES[1 if table.ndim == 1 else table.shape[1]]
         ET.SubElement(grid, "Attribute", Name=name, AttributeType=kind, Center=centre).append(_table(table))
