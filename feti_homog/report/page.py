@@ -63,9 +63,14 @@ def page(document: Document, directory: Path) -> str:
     """Return the page of a result.  Raises OSError or KeyError where its files are damaged."""
     title, status = escape(title_of(document)), document["status"]
     style = resources.files("feti_homog.report").joinpath("page.css").read_text(encoding="utf-8")
+    remarks = [
+        f'<p class="{label.lower()}"><strong>{label}</strong> {escape(remark)}</p>'
+        for label in ("Remark", "Warning", "Fault")
+        for remark in document.get(f"{label.lower()}s", ())
+    ]
     sections = {
         "Results": "\n".join(f'<div class="scroll">{answer.html}</div>' for answer in answers(document, MOST_ROWS)),
-        "Remarks": "\n".join(_remarks(document)),
+        "Remarks": "\n".join(remarks),
         "Checks": f'<div class="scroll">{checks(document).html}</div>',
         "Pictures": "\n".join(_pictures(directory)) or "<p>None: <code>feti-homog plot</code> draws them.</p>",
         "Summary": f"<pre>{escape(summary(document))}</pre>",
@@ -100,12 +105,6 @@ def page(document: Document, directory: Path) -> str:
 </body>
 </html>
 """
-
-
-def _remarks(document: Document) -> Iterable[str]:
-    for label, key in (("Remark", "remarks"), ("Warning", "warnings"), ("Fault", "faults")):
-        for words in document.get(key, ()):
-            yield f'<p class="{label.lower()}"><strong>{label}</strong> {escape(words)}</p>'
 
 
 def _pictures(directory: Path) -> Iterable[str]:

@@ -6,7 +6,7 @@ Cards share their first comments, numbers in fields of a given width, and names.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from textwrap import wrap
 from typing import Any
@@ -173,7 +173,9 @@ def _stiffness(document: Document) -> Float:
     """(6, 6) in the axes of the cell, symmetric positive definite."""
     analysis = document["case"]["analysis"]
     if document["status"] != "done":
-        raise CaseError(f'its status is "{document["status"]}": {_first(document["faults"])}; run the case again')
+        faults = document["faults"] or ["it was not finished"]
+        more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
+        raise CaseError(f'its status is "{document["status"]}": {faults[0]}{more}; run the case again')
     if document.get("effective_stiffness") is None:
         raise CaseError(
             f'analysis.type = "{analysis["type"]}" has no effective stiffness; cards need "stiffness" or "envelope"'
@@ -196,12 +198,6 @@ def _numbers(value: Any, shape: tuple[int, ...]) -> Float:
     if array.shape != shape or not np.isfinite(array).all():
         raise ValueError(f"expected {' x '.join(map(str, shape))} finite numbers")
     return array
-
-
-def _first(faults: Sequence[str]) -> str:
-    """Return the first of some faults, and how many more there are."""
-    more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
-    return f"{faults[0] if faults else 'it was not finished'}{more}"
 
 
 def comments(material: EffectiveMaterial, mark: str) -> list[str]:

@@ -17,23 +17,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from scipy.spatial import cKDTree
 
-from feti_homog.report.plots.cell_frame import (
-    BAR_INCHES,
-    LEAST_BAR,
-    bar_beside,
-    cell_scale,
-    cell_size,
-    figure_of,
-    label_cell_axes,
-)
+from feti_homog.report.plots import drawn_cell, plot_helpers
 from feti_homog.report.plots.decimation import DrawnMesh, outline_edges, triangle_means
-from feti_homog.report.plots.interface_marks import DrawnCell
-from feti_homog.report.plots.plot_helpers import (
-    draw_segments,
-    fill_triangles,
-    plain,
-    value_range,
-)
 from feti_homog.typing import Array
 
 IN_LEGEND = 12  # phases of the legend, which would cover the cell
@@ -48,7 +33,7 @@ LETTER = 0.075  # inches, on the average
 DECADES = 4  # below the density of errors that hardly any area exceeds; less is one colour
 
 
-def figure(cell: DrawnCell) -> Figure:
+def figure(cell: drawn_cell.DrawnCell) -> Figure:
     """Return the materials with the fibres' numbers and, where they differ, the factors of their strengths."""
     drawn, attributes, fibres = cell.drawn, cell.file.attrs, cell.file["fibre"]
     phases = list(attributes["phases"])
@@ -56,7 +41,7 @@ def figure(cell: DrawnCell) -> Figure:
     picture, axes = _outlined(cell, inks[drawn.phase])
     factors = fibres["strength"][:] if "strength" in fibres else np.ones(len(fibres["number"]))
     varies = bool((factors != 1.0).any())
-    write_fibre_numbers(axes, cell, cell_scale(attributes), factors if varies else None)
+    write_fibre_numbers(axes, cell, drawn_cell.cell_scale(attributes), factors if varies else None)
     words = "\nbelow the numbers: strength / that of [interface]" if varies else ""
     axes.set_title(_title(attributes, _count(drawn.body.max() + 1, "body", "bodies")) + words)
     there = np.unique(drawn.phase)
@@ -67,18 +52,21 @@ def figure(cell: DrawnCell) -> Figure:
     return picture
 
 
-def partition(cell: DrawnCell) -> Figure:
+def partition(cell: drawn_cell.DrawnCell) -> Figure:
     """Return the parts into which the bodies are cut; a subdomain across materials has one in each body."""
     drawn = cell.drawn
     parts = drawn.subdomain.max() + 1
-    picture, axes = _outlined(cell, _distinct(parts)[drawn.subdomain])
-    draw_segments(axes, drawn.points[outline_edges(drawn, drawn.subdomain)], "black", 0.5)
+    # Colours of which those with near numbers differ most.
+    colours: Array = mpl.colormaps["tab20"](np.arange(parts) * 7 % 20)
+    colours[:, :3] = 0.3 + 0.7 * colours[:, :3]
+    picture, axes = _outlined(cell, colours[drawn.subdomain])
+    plot_helpers.draw_segments(axes, drawn.points[outline_edges(drawn, drawn.subdomain)], "black", 0.5)
     words = f"{_count(drawn.body.max() + 1, 'body', 'bodies')} in {_count(parts, 'part', 'parts')}"
     axes.set_title(_title(cell.file.attrs, words))
     return picture
 
 
-def mesh_error(cell: DrawnCell) -> Figure | None:
+def mesh_error(cell: drawn_cell.DrawnCell) -> Figure | None:
     """Return the cell in the colours of the density of the error, None without estimates.
 
     The error in a part of the cell relative to the strain energy of the cell, over the part's share of the area; the
@@ -96,32 +84,34 @@ def mesh_error(cell: DrawnCell) -> Figure | None:
     most = float(density.max(initial=0.0))
     if not 0.0 < most < np.inf:
         return None
-    picture, (axes,) = figure_of(file.attrs, panels=1, beside=BAR_INCHES)
-    top = float(value_range(density, area)[0].vmax or most)
+    picture, (axes,) = drawn_cell.figure_of(file.attrs, panels=1, beside=drawn_cell.BAR_INCHES)
+    top = float(plot_helpers.value_range(density, area)[0].vmax or most)
     least = top / 10.0**DECADES
     colours = ScalarMappable(LogNorm(least, top), "magma_r")
-    fill_triangles(axes, drawn, drawn.points, np.asarray(colours.to_rgba(np.maximum(density, least))), edges=False)
+    plot_helpers.fill_triangles(
+        axes, drawn, drawn.points, np.asarray(colours.to_rgba(np.maximum(density, least))), edges=False
+    )
     extend = "both" if most > top else "min"
-    bar = bar_beside(axes, colours, extend, cell_size(file.attrs))
-    letters = int(max(cell_size(file.attrs)[1], LEAST_BAR[1]) / LETTER)
+    bar = drawn_cell.bar_beside(axes, colours, extend, drawn_cell.cell_size(file.attrs))
+    letters = int(max(drawn_cell.cell_size(file.attrs)[1], drawn_cell.LEAST_BAR[1]) / LETTER)
     bar.set_label(fill("error of the strain energy / energy, per share of the area", letters))
-    draw_segments(axes, drawn.points[cell.borders], "black", 0.7)
-    label_cell_axes(axes, file.attrs)
+    plot_helpers.draw_segments(axes, drawn.points[cell.borders], "black", 0.7)
+    drawn_cell.label_cell_axes(axes, file.attrs)
     axes.set_title(_title(file.attrs, "estimated error of the mesh"))
     return picture
 
 
-def _outlined(cell: DrawnCell, colours: Array) -> tuple[Figure, Axes]:
+def _outlined(cell: drawn_cell.DrawnCell, colours: Array) -> tuple[Figure, Axes]:
     """Return the cell in the colours (q, 4) of its triangles, with the outlines of the bodies."""
-    picture, (axes,) = figure_of(cell.file.attrs, panels=1)
-    fill_triangles(axes, cell.drawn, cell.drawn.points, colours, len(cell.drawn.triangles) <= MESH_LINES)
-    draw_segments(axes, cell.drawn.points[cell.borders], "black", 0.9)
-    label_cell_axes(axes, cell.file.attrs)
+    picture, (axes,) = drawn_cell.figure_of(cell.file.attrs, panels=1)
+    plot_helpers.fill_triangles(axes, cell.drawn, cell.drawn.points, colours, len(cell.drawn.triangles) <= MESH_LINES)
+    plot_helpers.draw_segments(axes, cell.drawn.points[cell.borders], "black", 0.9)
+    drawn_cell.label_cell_axes(axes, cell.file.attrs)
     return picture, axes
 
 
 def _title(attributes: Any, words: str) -> str:
-    return f"{plain(attributes['title'])}\n{words}".lstrip()
+    return f"{plot_helpers.plain(attributes['title'])}\n{words}".lstrip()
 
 
 def _material(number: int) -> Any:
@@ -130,18 +120,11 @@ def _material(number: int) -> Any:
     return mpl.colormaps[FIBRES[number % len(FIBRES)]](tone)
 
 
-def _distinct(count: int) -> Array:
-    """Colours (count, 4), of which those with near numbers differ most."""
-    colours: Array = mpl.colormaps["tab20"](np.arange(count) * 7 % 20)
-    colours[:, :3] = 0.3 + 0.7 * colours[:, :3]
-    return colours
-
-
 def _count(number: int, one: str, many: str) -> str:
     return f"{number} {one if number == 1 else many}"
 
 
-def write_fibre_numbers(axes: Axes, cell: DrawnCell, inches: float, factors: Array | None = None) -> None:
+def write_fibre_numbers(axes: Axes, cell: drawn_cell.DrawnCell, inches: float, factors: Array | None = None) -> None:
     """Write each fibre's number on it, on every part of a round one that the sides of the cell cut.
 
     `inches` is a length unit in the picture; below the numbers stand `factors` (f,), if there are any.

@@ -6,7 +6,7 @@ how far these may be magnified; the state of free expansion, a sum of states.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -140,14 +140,11 @@ def _blocks(table: Any, group: int, block: int, function: Callable[[Array], Arra
 
 def _picked(table: Any, numbers: Array, block: int) -> Array:
     """Return the rows `numbers` (ascending) of a table."""
-    return np.concatenate(list(_picks(table, numbers, block)))
-
-
-def _picks(table: Any, numbers: Array, block: int) -> Iterator[Array]:
+    parts = []
     for start in range(0, len(table), block):
         first, last = np.searchsorted(numbers, (start, start + block))
-        rows: Array = table[start : start + block]
-        yield rows[numbers[first:last] - start]
+        parts.append(table[start : start + block][numbers[first:last] - start])
+    return np.concatenate(parts)
 
 
 def drawn_displacement(state: Any, drawn: DrawnMesh) -> Array:

@@ -17,24 +17,7 @@ from matplotlib.ticker import MaxNLocator
 from PIL import Image
 
 from feti_homog.errors import FetiHomogError
-from feti_homog.report.plots.cell_frame import bar_beside
-from feti_homog.report.plots.decimation import drawn_displacement, drawn_mesh, largest_scale
-from feti_homog.report.plots.interface_marks import DAMAGED, STATE_NAMES, DrawnCell, state_legend, states_of_nodes
-from feti_homog.report.plots.load_labels import LoadLabels
-from feti_homog.report.plots.plot_helpers import (
-    STRESS_SYMBOLS,
-    colour_range,
-    draw_segments,
-    largest_length,
-    magnification,
-    nodal_stress,
-    pixels_of,
-    plain,
-    save,
-    shade_triangles,
-    stress_component,
-    stress_label,
-)
+from feti_homog.report.plots import decimation, drawn_cell, plot_helpers
 from feti_homog.report.text.analyses import reported
 from feti_homog.results import atomic, field_file, landmarks
 from feti_homog.results.landmarks import marks
@@ -50,27 +33,27 @@ LOADS_IN_PANEL, LINE = 2, 0.15  # in a line of its title; inches of a line
 
 
 @dataclass(frozen=True)
-class DeformedCell(DrawnCell):
+class DeformedCell(drawn_cell.DrawnCell):
     """Data that all panels share."""
 
     component: str
     colours: tuple[Normalize, str, str]
     scale: float
-    labels: LoadLabels
+    labels: drawn_cell.LoadLabels
     marks: Mapping[int, str]
 
     @classmethod
     def of_states(cls, file: Any, numbers: Sequence[int], document: Document, scale: float, limit: int) -> DeformedCell:
         """Return the stress that the case chooses, or that suits all these states, and one range of colours of all."""
-        cell, states = DrawnCell.of(file, limit), [file[f"state/{n}"] for n in numbers]
-        component = stress_component(document["case"]["output"].get("stress", "auto"), states)
+        cell, states = drawn_cell.DrawnCell.of(file, limit), [file[f"state/{n}"] for n in numbers]
+        component = plot_helpers.stress_component(document["case"]["output"].get("stress", "auto"), states)
         words = marks(document) if reported(document).is_followed else {}
         # At the end, once all fibres have come off, stresses may be many times those of the peak.
         marked = [state for state in states if words.get(int(state.attrs["point"]), "end") != "end"] or states
-        stress = np.concatenate([nodal_stress(state, component, cell.drawn) for state in marked])
-        colours = colour_range(stress, np.tile(cell.drawn.node_areas, len(marked)))
+        stress = np.concatenate([plot_helpers.nodal_stress(state, component, cell.drawn) for state in marked])
+        colours = plot_helpers.colour_range(stress, np.tile(cell.drawn.node_areas, len(marked)))
         parts = vars(cell) | {"component": component, "colours": colours, "scale": scale, "marks": words}
-        return cls(**parts, labels=LoadLabels.of(document))
+        return cls(**parts, labels=drawn_cell.LoadLabels.of(document))
 
     def state(self, number: int) -> Any:
         """Return a state of the file."""
@@ -78,16 +61,16 @@ class DeformedCell(DrawnCell):
 
     def moved(self, number: int) -> Array:
         """(p, 2) places of the drawn nodes."""
-        places: Array = self.drawn.points + self.scale * drawn_displacement(self.state(number), self.drawn)
+        places: Array = self.drawn.points + self.scale * decimation.drawn_displacement(self.state(number), self.drawn)
         return places
 
     def draw(self, axes: Axes, number: int, moved: Array) -> Any:
         """Draw the cell of a state, drawn nodes at `moved`; returns what a colour bar is of."""
         state, (norm, colours, _) = self.state(number), self.colours
-        stress = nodal_stress(state, self.component, self.drawn)
-        shapes = shade_triangles(axes, self.drawn, moved, stress, norm, colours)
-        draw_segments(axes, moved[self.borders], "black", 0.5)
-        self.interface.mark(axes, moved, states_of_nodes(state), magnified=0.8)
+        stress = plot_helpers.nodal_stress(state, self.component, self.drawn)
+        shapes = plot_helpers.shade_triangles(axes, self.drawn, moved, stress, norm, colours)
+        plot_helpers.draw_segments(axes, moved[self.borders], "black", 0.5)
+        self.interface.mark(axes, moved, drawn_cell.states_of_nodes(state), magnified=0.8)
         axes.set_aspect("equal")
         axes.set(xticks=(), yticks=())
         axes.set_axis_off()
@@ -99,7 +82,7 @@ class DeformedCell(DrawnCell):
 
     def bar(self, axes: Axes, shapes: Any, size: tuple[float, float] | None = None) -> None:
         """Draw the colour bar of all states beside axes, of a cell in this size (inches), if it is known."""
-        bar = bar_beside(axes, shapes, self.colours[2], size)
+        bar = drawn_cell.bar_beside(axes, shapes, self.colours[2], size)
         bar.ax.tick_params(labelsize=8)
         bar.locator = MaxNLocator(6)
 
@@ -111,7 +94,8 @@ class DeformedCell(DrawnCell):
     def caption(self) -> str:
         """Return what is drawn."""
         scale = "true scale" if self.scale == 1 else f"displacement × {self.scale:g}"
-        return f"${STRESS_SYMBOLS[self.component]}$ {stress_label(self.file.attrs['stress_unit'])}, {scale}"
+        symbol = plot_helpers.STRESS_SYMBOLS[self.component]
+        return f"${symbol}$ {plot_helpers.stress_label(self.file.attrs['stress_unit'])}, {scale}"
 
 
 def draw_state(
@@ -139,11 +123,16 @@ def draw_state(
             if most is not None:
                 cell = replace(cell, colours=(Normalize(-most, most), "RdBu_r", "both"))
             cell.bar(axes, cell.draw(axes, number, cell.moved(number)))
-            caption, softens = cell.caption, bool((states_of_nodes(file[f"state/{number}"]) == DAMAGED).any())
+            caption, softens = (
+                cell.caption,
+                bool((drawn_cell.states_of_nodes(file[f"state/{number}"]) == drawn_cell.DAMAGED).any()),
+            )
     except (OSError, KeyError) as error:
         raise FetiHomogError(f"cannot draw state {number} of {path}: {error}") from error
     axes.autoscale_view()
-    for line in state_legend([kind for kind in STATE_NAMES if softens or kind != DAMAGED]):
+    for line in drawn_cell.state_legend(
+        [kind for kind in drawn_cell.STATE_NAMES if softens or kind != drawn_cell.DAMAGED]
+    ):
         axes.add_line(line)
     return caption
 
@@ -161,13 +150,13 @@ def _angle(directory: Path, file: Any, document: Document, count: int) -> list[P
     every = range(0, count, count // len(document["angle"]) or 1)
     numbers = [every[round(k)] for k in np.linspace(0, len(every) - 1, min(MAX_PANELS, len(every)))]
     panels = _side_by_side(file, numbers, document, shown_scale(file, document))
-    return [save(panels, directory / "angle_states.png")]
+    return [plot_helpers.save(panels, directory / "angle_states.png")]
 
 
 def _path(directory: Path, file: Any, document: Document, count: int) -> list[Path]:
     scale = shown_scale(file, document)
     panels = _side_by_side(file, landmarks.landmark_states(document, MAX_PANELS, count), document, scale)
-    paths = [save(panels, directory / "path_states.png")]
+    paths = [plot_helpers.save(panels, directory / "path_states.png")]
     frames = landmarks.chosen_states(document, MAX_FRAMES, count)
     return [*paths, _animation(file, frames, document, scale, directory / "path.gif")]
 
@@ -184,16 +173,19 @@ def shown_scale(file: Any, document: Document) -> float:
     chosen = document.get("case", {}).get("output", {}).get("deformation_scale")
     if chosen is not None:
         return float(chosen)
-    drawn = drawn_mesh(file, PANEL_LIMIT)
+    drawn = decimation.drawn_mesh(file, PANEL_LIMIT)
     displacement = opening = 0.0
     largest = math.inf
     for number in reported(document).states(document, MAX_FRAMES, len(file["state"])):
         state = file[f"state/{number}"]
-        u = drawn_displacement(state, drawn)
-        displacement, largest = max(displacement, largest_length(u)), min(largest, largest_scale(u, drawn))
+        u = decimation.drawn_displacement(state, drawn)
+        displacement, largest = (
+            max(displacement, plot_helpers.largest_length(u)),
+            min(largest, decimation.largest_scale(u, drawn)),
+        )
         opening = max(opening, float(state["jump"][:, 0].max(initial=0.0)))
     size = float(min(file.attrs["width"], file.attrs["height"]))
-    scale = magnification(displacement, size, opening, largest)
+    scale = plot_helpers.magnification(displacement, size, opening, largest)
     return max(scale, 1.0) if reported(document).is_load_given(document) else scale
 
 
@@ -212,10 +204,10 @@ def _side_by_side(file: Any, numbers: Sequence[int], document: Document, scale: 
     for axes in grid[len(numbers) :]:
         axes.set_axis_off()
     grid[0].autoscale_view()
-    figure.suptitle(f"{plain(file.attrs['title'])}: {cell.caption}".lstrip(": "), fontsize=11)
-    states = [cell.interface.state(states_of_nodes(cell.state(number))) for number in numbers]
+    figure.suptitle(f"{plot_helpers.plain(file.attrs['title'])}: {cell.caption}".lstrip(": "), fontsize=11)
+    states = [cell.interface.state(drawn_cell.states_of_nodes(cell.state(number))) for number in numbers]
     found = np.unique(np.concatenate(states))
-    handles = state_legend([kind for kind in STATE_NAMES if kind in found])
+    handles = drawn_cell.state_legend([kind for kind in drawn_cell.STATE_NAMES if kind in found])
     if handles:
         figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
     return figure
@@ -252,7 +244,7 @@ def _animation(file: Any, numbers: Sequence[int], document: Document, scale: flo
             artist.remove()
         cell.bar(axes, cell.draw(axes, number, moved), (width, height))
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-        picture = Image.fromarray(pixels_of(figure))
+        picture = Image.fromarray(plot_helpers.pixels_of(figure))
         figure.set_layout_engine("none")
         frames.insert(0, picture.quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE))
     times = [FRAME_TIME] * (len(frames) - 1) + [6 * FRAME_TIME]

@@ -18,33 +18,12 @@ from feti_homog.errors import FetiHomogError
 from feti_homog.materials.voigt import voigt_names
 from feti_homog.report.plots import (
     cell_picture,
+    decimation,
     deformed_panels,
+    drawn_cell,
+    plot_helpers,
     response_curves,
     traction_plots,
-)
-from feti_homog.report.plots.cell_frame import BAR_INCHES, bar_beside, cell_size, figure_of, label_cell_axes
-from feti_homog.report.plots.decimation import (
-    DrawnMesh,
-    FreeExpansion,
-    drawn_displacement,
-    largest_scale,
-    nodal_values,
-)
-from feti_homog.report.plots.interface_marks import DrawnCell, states_of_nodes
-from feti_homog.report.plots.load_labels import LoadLabels
-from feti_homog.report.plots.plot_helpers import (
-    STRESS_SYMBOLS,
-    STYLE,
-    colour_range,
-    draw_segments,
-    largest_length,
-    magnification,
-    nodal_stress,
-    plain,
-    save,
-    shade_triangles,
-    stress_component,
-    stress_label,
 )
 from feti_homog.report.text.analyses import reported
 from feti_homog.results import atomic, field_file, output_folder, result_json
@@ -79,7 +58,7 @@ def plot(directory: Path) -> list[Path]:
     directory = Path(directory)
     atomic.remove_abandoned(directory, output_folder.RESULT_FILE)
     document = result_json.read(directory) if (directory / result_json.NAME).exists() else {}
-    with mpl.rc_context(STYLE):
+    with mpl.rc_context(plot_helpers.STYLE):
         try:
             paths = _pictures(directory, document) if _output(document).get("fields", True) else []
             return paths + response_curves.plot(directory, document)
@@ -96,19 +75,19 @@ def _output(document: Document) -> Document:
 def _pictures(directory: Path, document: Document) -> list[Path]:
     """Return the pictures of result.h5."""
     with h5py.File(directory / field_file.NAME, "r") as file:
-        cell = DrawnCell.of(file)
+        cell = drawn_cell.DrawnCell.of(file)
         found = {"cell": cell_picture.figure(cell), "partition": cell_picture.partition(cell)}
         found |= {"mesh_error": error} if (error := cell_picture.mesh_error(cell)) is not None else {}
-        paths = [save(figure, directory / f"{name}.png") for name, figure in found.items()]
+        paths = [plot_helpers.save(figure, directory / f"{name}.png") for name, figure in found.items()]
         if reported(document).is_curve:
             paths += deformed_panels.plot(directory, file, document)
         else:
             for number in sorted(file.get("state", ()), key=int):
                 state = file[f"state/{number}"]
                 draw = _sheared if is_axial(state) else _deformed
-                shown = FreeExpansion.of(state, document) or state
+                shown = decimation.FreeExpansion.of(state, document) or state
                 name = reported(document).picture or _name(number, state.attrs)
-                paths.append(save(draw(cell, shown, document), directory / f"{name}.png"))
+                paths.append(plot_helpers.save(draw(cell, shown, document), directory / f"{name}.png"))
         return paths + traction_plots.plot(directory, cell, document)
 
 
@@ -122,25 +101,33 @@ def _name(number: str, attributes: Any) -> str:
     return f"case_{'minus_' if value < 0 else ''}{name}"
 
 
-def _deformed(cell: DrawnCell, state: Any, document: Document) -> Figure:
+def _deformed(cell: drawn_cell.DrawnCell, state: Any, document: Document) -> Figure:
     """Return the magnified deformed cell with a stress component in colour, and the outline it has left."""
     drawn, output = cell.drawn, _output(document)
-    displacement = drawn_displacement(state, drawn)
+    displacement = decimation.drawn_displacement(state, drawn)
     size = float(np.ptp(drawn.points, axis=0).min())
-    seen = magnification(largest_length(displacement), size, largest=largest_scale(displacement, drawn))
+    seen = plot_helpers.magnification(
+        plot_helpers.largest_length(displacement), size, largest=decimation.largest_scale(displacement, drawn)
+    )
     chosen = output.get("deformation_scale")
     scale = seen if chosen is None else chosen
     moved = drawn.points + scale * displacement
     figure, axes = _coloured(cell, state, moved, output)
-    draw_segments(axes, _left(cell), UNDEFORMED, 0.7)
+    outline: Array = drawn.points[cell.borders]
+    if drawn.body.max() >= OUTLINED_BODIES:  # the cell alone
+        corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * [cell.file.attrs[name] for name in ("width", "height")]
+        outline = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+    plot_helpers.draw_segments(axes, outline, UNDEFORMED, 0.7)
     undeformed = Line2D([], [], color=UNDEFORMED, linewidth=0.7, label="undeformed")
     _outlined(axes, cell, state, moved, undeformed)
-    load = FREE if isinstance(state, FreeExpansion) else LoadLabels.of(document).label(state.attrs)
-    axes.set_title(f"{plain(cell.file.attrs['title'])}\n{load}, displacement × {scale:g}".lstrip())
+    load = (
+        FREE if isinstance(state, decimation.FreeExpansion) else drawn_cell.LoadLabels.of(document).label(state.attrs)
+    )
+    axes.set_title(f"{plot_helpers.plain(cell.file.attrs['title'])}\n{load}, displacement × {scale:g}".lstrip())
     return figure
 
 
-def _sheared(cell: DrawnCell, state: Any, document: Document) -> Figure:
+def _sheared(cell: drawn_cell.DrawnCell, state: Any, document: Document) -> Figure:
     """Return the cell with an axial stress in colour and lines of equal displacement along the fibres.
 
     That displacement moves nothing in the plane.
@@ -148,43 +135,36 @@ def _sheared(cell: DrawnCell, state: Any, document: Document) -> Figure:
     attributes, points = cell.file.attrs, cell.drawn.points
     figure, axes = _coloured(cell, state, points, _output(document))
     step = draw_levels(axes, state, cell.drawn)
-    words = f"$u_3$ every {step:g} {plain(attributes['length_unit'])}".rstrip()
+    words = f"$u_3$ every {step:g} {plot_helpers.plain(attributes['length_unit'])}".rstrip()
     _outlined(axes, cell, state, points, Line2D([], [], color=LEVEL_INK, linewidth=LEVEL_WIDTH, label=words))
-    axes.set_title(f"{plain(attributes['title'])}\n{LoadLabels.of(document).label(state.attrs)}".lstrip())
+    axes.set_title(
+        f"{plot_helpers.plain(attributes['title'])}\n{drawn_cell.LoadLabels.of(document).label(state.attrs)}".lstrip()
+    )
     return figure
 
 
-def _coloured(cell: DrawnCell, state: Any, moved: Array, output: Document) -> tuple[Figure, Axes]:
+def _coloured(cell: drawn_cell.DrawnCell, state: Any, moved: Array, output: Document) -> tuple[Figure, Axes]:
     """Return the cell, its nodes at `moved`, in the colours of a stress."""
     attributes, drawn = cell.file.attrs, cell.drawn
-    figure, (axes,) = figure_of(attributes, panels=1, beside=BAR_INCHES)
-    component = stress_component(output.get("stress", "auto"), [state])
-    stress = nodal_stress(state, component, drawn)
-    norm, colours, extend = colour_range(stress, drawn.node_areas)
-    shapes = shade_triangles(axes, drawn, moved, stress, norm, colours)
-    bar = bar_beside(axes, shapes, extend, cell_size(attributes))
+    figure, (axes,) = drawn_cell.figure_of(attributes, panels=1, beside=drawn_cell.BAR_INCHES)
+    component = plot_helpers.stress_component(output.get("stress", "auto"), [state])
+    stress = plot_helpers.nodal_stress(state, component, drawn)
+    norm, colours, extend = plot_helpers.colour_range(stress, drawn.node_areas)
+    shapes = plot_helpers.shade_triangles(axes, drawn, moved, stress, norm, colours)
+    bar = drawn_cell.bar_beside(axes, shapes, extend, drawn_cell.cell_size(attributes))
     bar.ax.ticklabel_format(axis="y", scilimits=POWERS)
-    bar.set_label(f"${STRESS_SYMBOLS[component]}$ {stress_label(attributes['stress_unit'])}")
+    bar.set_label(f"${plot_helpers.STRESS_SYMBOLS[component]}$ {plot_helpers.stress_label(attributes['stress_unit'])}")
     return figure, axes
 
 
-def _outlined(axes: Axes, cell: DrawnCell, state: Any, moved: Array, line: Line2D) -> None:
+def _outlined(axes: Axes, cell: drawn_cell.DrawnCell, state: Any, moved: Array, line: Line2D) -> None:
     """Outlines of the bodies and the states of the interfaces, and a legend of them and of another line."""
-    draw_segments(axes, moved[cell.borders], "black", 0.8)
-    marks = cell.interface.mark(axes, moved, states_of_nodes(state))
-    label_cell_axes(axes, cell.file.attrs)
+    plot_helpers.draw_segments(axes, moved[cell.borders], "black", 0.8)
+    marks = cell.interface.mark(axes, moved, drawn_cell.states_of_nodes(state))
+    drawn_cell.label_cell_axes(axes, cell.file.attrs)
     figure: Any = axes.figure
     handles = [*(marks if len(marks) > 1 else ()), line]
     figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), IN_LEGEND), frameon=False)
-
-
-def _left(cell: DrawnCell) -> Array:
-    """Return the undeformed outlines (e, 2, 2): of the bodies if they are few, else of the cell alone."""
-    if cell.drawn.body.max() < OUTLINED_BODIES:
-        outline: Array = cell.drawn.points[cell.borders]
-        return outline
-    corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * [cell.file.attrs[name] for name in ("width", "height")]
-    return np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
 
 
 def is_axial(state: Any) -> bool:
@@ -194,9 +174,9 @@ def is_axial(state: Any) -> bool:
     return not np.any(others) and bool(np.any(strain))
 
 
-def draw_levels(axes: Axes, state: Any, drawn: DrawnMesh) -> float:
+def draw_levels(axes: Axes, state: Any, drawn: decimation.DrawnMesh) -> float:
     """Draw lines of equal displacement along the fibres; returns the step between them."""
-    displacement: Array = nodal_values(state["axial_displacement"], drawn)
+    displacement: Array = decimation.nodal_values(state["axial_displacement"], drawn)
     least, most = float(displacement.min()), float(displacement.max())
     step = round_step((most - least) / LEVELS)
     levels = step * np.arange(math.ceil(least / step), math.floor(most / step) + 1)

@@ -14,17 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from feti_homog.materials.voigt import voigt_names
-from feti_homog.report.plots.interface_marks import BONDED, CLOSED, OPEN, STATE_COLOURS, STATE_NAMES
-from feti_homog.report.plots.plot_helpers import (
-    INK,
-    SYMBOLS,
-    bond_limits,
-    finish_curves,
-    plain,
-    stress_unit,
-    title_of,
-    unit_label,
-)
+from feti_homog.report.plots import drawn_cell, plot_helpers
 from feti_homog.results import landmarks, path_curves
 from feti_homog.results.landmarks import name_of, peak_of
 from feti_homog.typing import Array, Document
@@ -33,7 +23,7 @@ NUMBERED_POINTS = 6  # of a path
 ARROWS, SHORTEST_ARROW = 6, 0.06  # that show its direction: how many, and on steps of which share of the picture
 NEAR = 0.05  # of all points: numbers of points that are nearer stand above each other
 MARKED_POINTS = 60  # points of a path up to which each has a mark
-STATES = {BONDED: "bonded", OPEN: "open", CLOSED: "closed"}
+STATES = {drawn_cell.BONDED: "bonded", drawn_cell.OPEN: "open", drawn_cell.CLOSED: "closed"}
 # Offsets of a number from its point, in points of print, the best first, and half of the room that it takes.
 OFFSETS = ((-6, 16), (-6, 25), (12, 16), (22, 3), (-22, 3), (16, -12), (-16, -12), (0, -20), (28, -22), (-28, 26))
 ROOM = np.array([12.0, 5.0])
@@ -65,13 +55,17 @@ def figure(document: Document) -> Figure:
     upper, middle, lower = picture.subplots(3, 1, height_ratios=(2.2, 1, 1))
     middle.sharex(lower)
     _stress_curves(upper, document, strain, shown, style)
-    upper.set_ylabel(f"macroscopic stress {stress_unit(case)}")
-    upper.set_xlabel(f"macroscopic strain ${SYMBOLS[voigt_names(strains.shape[1])[0][component]]}$")
-    upper.set_title("\n".join([title_of(case, f"plane {case['analysis']['plane']}"), *bond_limits(case)]))
+    upper.set_ylabel(f"macroscopic stress {plot_helpers.stress_unit(case)}")
+    upper.set_xlabel(f"macroscopic strain ${plot_helpers.SYMBOLS[voigt_names(strains.shape[1])[0][component]]}$")
+    upper.set_title(
+        "\n".join([plot_helpers.title_of(case, f"plane {case['analysis']['plane']}"), *plot_helpers.bond_limits(case)])
+    )
     for number in shown:
-        middle.plot(stress[:, number], color=INK[number], linewidth=1.2, **style)
-    _temperature(middle, points, style)
-    middle.set_ylabel(f"stress {stress_unit(case)}")
+        middle.plot(stress[:, number], color=plot_helpers.INK[number], linewidth=1.2, **style)
+    if any(point.get("temperature") for point in points):
+        changes = [point["temperature"] for point in points]
+        _beside(middle, changes, r"change of temperature $\Delta T$", style)
+    middle.set_ylabel(f"stress {plot_helpers.stress_unit(case)}")
     middle.tick_params(labelbottom=False)
     _count_curves(lower, points, style)
     lower.set_xlabel("number of the point, in the order of the path")
@@ -79,21 +73,16 @@ def figure(document: Document) -> Figure:
     kept = landmarks.kept_points(document)
     numbers = [kept[state] for state in landmarks.landmark_states(document, NUMBERED_POINTS, len(kept))]
     curve = np.stack([strain, stress[:, component]], axis=1)
-    _mark_peak(upper, document, INK[component])
+    peak, unit = peak_of(document), case.get("output", {}).get("stress_unit", "")
+    words = f"{name_of(document, peak)} {peak['stress']:.4g} {plot_helpers.plain(unit)}".rstrip()
+    star: dict[str, Any] = {"markersize": 11, "markeredgecolor": "white", "zorder": 5, "linestyle": "none"}
+    upper.plot(peak["strain"], peak["stress"], "*", color=plot_helpers.INK[component], **star, label=words)
     for axes in (upper, middle, lower):
         axes.axhline(0.0, color="0.6", linewidth=0.6, zorder=0)
-        finish_curves(axes)
-    _number_points(upper, (middle, lower), curve, numbers, INK[component])
+        plot_helpers.finish_curves(axes)
+    _number_points(upper, (middle, lower), curve, numbers, plot_helpers.INK[component])
     _damaged_length(lower, document, style)
     return picture
-
-
-def _mark_peak(axes: Axes, document: Document, ink: str) -> None:
-    """Mark the peak, with its stress in words."""
-    peak, unit = peak_of(document), document["case"].get("output", {}).get("stress_unit", "")
-    words = f"{name_of(document, peak)} {peak['stress']:.4g} {plain(unit)}".rstrip()
-    axes.plot(peak["strain"], peak["stress"], "*", color=ink, markersize=11, markeredgecolor="white", zorder=5,
-              linestyle="none", label=words)  # fmt: skip
 
 
 def _stress_curves(
@@ -106,7 +95,7 @@ def _stress_curves(
     rising = path_curves.load_controlled(points[:first]) if document["case"]["path"]["method"] == "events" else None
     along = stress.shape[1] + path_curves.leading_component(document)
     for i in shown:
-        name, ink = SYMBOLS[names[i]], INK[i]
+        name, ink = plot_helpers.SYMBOLS[names[i]], plot_helpers.INK[i]
         thin: dict[str, Any] = {"label": f"${name}$", "linewidth": 1.4} if rising is None else {"linewidth": 0.8}
         from_zero = np.append(0.0, strain[:first]), np.append(0.0, stress[:first, i])
         axes.plot(*from_zero, color=ink, alpha=0.8, **thin, **style)
@@ -123,16 +112,10 @@ def _stress_curves(
     axes.xaxis.set_major_locator(MaxNLocator(7))
 
 
-def _temperature(axes: Axes, points: Sequence[Mapping[str, Any]], style: Mapping[str, Any]) -> None:
-    """Draw the change of temperature along a path, if there is any, on its own axis."""
-    if any(point.get("temperature") for point in points):
-        _beside(axes, [point["temperature"] for point in points], r"change of temperature $\Delta T$", style)
-
-
 def _damaged_length(axes: Axes, document: Document, style: Mapping[str, Any]) -> None:
     """Draw the length of bonds that are damaged but hold, of laws that soften, on its own axis."""
     if "damaged_length" in document["path"][0]:
-        unit = unit_label(document["case"].get("output", {}).get("length_unit", ""))
+        unit = plot_helpers.unit_label(document["case"].get("output", {}).get("length_unit", ""))
         lengths = [sum(point["damaged_length"]) for point in document["path"]]
         _beside(axes, lengths, f"damaged length {unit}".rstrip(), style)
         axes.legend(frameon=False, fontsize=9, loc="upper left", bbox_to_anchor=(1.12, 1.0))
@@ -151,8 +134,9 @@ def _beside(axes: Axes, values: Sequence[float], label: str, style: Mapping[str,
 def _count_curves(axes: Axes, points: Sequence[Mapping[str, Any]], style: Mapping[str, Any]) -> None:
     """Numbers of bonded, open and closed nodes."""
     for kind, key in STATES.items():
-        ink = "0.2" if kind == BONDED else STATE_COLOURS[kind]
-        axes.plot([point[key] for point in points], color=ink, linewidth=1.4, label=STATE_NAMES[kind], **style)
+        ink = "0.2" if kind == drawn_cell.BONDED else drawn_cell.STATE_COLOURS[kind]
+        label = drawn_cell.STATE_NAMES[kind]
+        axes.plot([point[key] for point in points], color=ink, linewidth=1.4, label=label, **style)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_ylabel("interface nodes")
 
@@ -237,8 +221,8 @@ def energies(document: Document) -> Figure | None:
     axes.set_xlim(stack.place[0], stack.place[-1])
     axes.set_ylim(bottom=min(0.0, float(stack.work.min())))
     axes.set_xlabel(stack.words)
-    axes.set_ylabel(f"energy per area {stress_unit(case)}")
-    axes.set_title(title_of(case, "energies along the path"))
+    axes.set_ylabel(f"energy per area {plot_helpers.stress_unit(case)}")
+    axes.set_title(plot_helpers.title_of(case, "energies along the path"))
     axes.spines[["top", "right"]].set_visible(False)
     handles, names = axes.get_legend_handles_labels()
     axes.legend(handles[::-1], names[::-1], frameon=False, fontsize=9, loc="upper left", bbox_to_anchor=(1.0, 1.0))

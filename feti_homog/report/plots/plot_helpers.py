@@ -154,7 +154,10 @@ def value_range(values: Array, areas: Array | None = None) -> tuple[Normalize, s
         middle = 0.5 * (low + high)
         half = 0.5 * (abs(middle) or 1.0)
         return Normalize(middle - half, middle + half), "neither"
-    least, most = _quantiles(values, np.ones_like(values) if areas is None else areas)
+    # As by numpy.percentile, of areas in place of values.
+    order, weights = np.argsort(values), np.ones_like(values) if areas is None else areas
+    below = np.cumsum(weights[order]) - weights[order]
+    least, most = np.interp([OUTLIERS, 1.0 - OUTLIERS], below / max(float(below[-1]), 1e-300), values[order]).tolist()
     slack = 0.05 * (most - least)
     least, most = (low if least - low < slack else least), (high if high - most < slack else most)
     return Normalize(least, most), _outside(values, least, most)
@@ -162,15 +165,6 @@ def value_range(values: Array, areas: Array | None = None) -> tuple[Normalize, s
 
 def _is_uniform(values: Array) -> bool:
     return bool(np.ptp(values) <= UNIFORM * max(np.abs(values).max(), 1e-300))
-
-
-def _quantiles(values: Array, weights: Array) -> tuple[float, float]:
-    """Return the values below and above which OUTLIERS of the weight is, interpolated as by `numpy.percentile`."""
-    order = np.argsort(values)
-    below = np.cumsum(weights[order]) - weights[order]
-    share = below / max(float(below[-1]), 1e-300)
-    least, most = np.interp([OUTLIERS, 1.0 - OUTLIERS], share, values[order])
-    return float(least), float(most)
 
 
 def _outside(values: Array, least: float, most: float) -> str:

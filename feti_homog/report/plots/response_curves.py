@@ -13,17 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 
 from feti_homog.materials.voigt import STRESSES
-from feti_homog.report.plots import path_picture
-from feti_homog.report.plots.plot_helpers import (
-    INK,
-    SYMBOLS,
-    bond_limits,
-    finish_curves,
-    plain,
-    save,
-    stress_unit,
-    title_of,
-)
+from feti_homog.report.plots import path_picture, plot_helpers
 from feti_homog.report.text import constant_tables
 from feti_homog.report.text.analyses import reported
 from feti_homog.report.text.point_tables import shown_entries
@@ -46,7 +36,9 @@ def plot(directory: Path, document: Document) -> list[Path]:
     name = reported(document).name
     pictures = {"sensitivities": sensitivities(document), "energy": path_picture.energies(document)}
     pictures |= {name: CURVES[name](document)} if name in CURVES else {}
-    return [save(drawn, directory / f"{name}.png") for name, drawn in pictures.items() if drawn is not None]
+    return [
+        plot_helpers.save(drawn, directory / f"{name}.png") for name, drawn in pictures.items() if drawn is not None
+    ]
 
 
 def angle(document: Document) -> Figure:
@@ -56,16 +48,16 @@ def angle(document: Document) -> Figure:
     figure = Figure(figsize=(6.4, 4.2), layout="constrained")
     axes = figure.subplots()
     angles = [point["angle"] for point in points]
-    for (name, column), ink, mark in zip(_angle_columns(points, stiff), INK, MARKS, strict=False):
+    for (name, column), ink, mark in zip(_angle_columns(points, stiff), plot_helpers.INK, MARKS, strict=False):
         axes.plot(angles, column, color=ink, marker=mark, markersize=4, linewidth=1.5, label=f"${name}$")
     axes.set_xlabel("debonding angle (degrees)")
-    axes.set_ylabel(f"{'effective stiffness' if stiff else 'macroscopic stress'} {stress_unit(case)}")
+    axes.set_ylabel(f"{'effective stiffness' if stiff else 'macroscopic stress'} {plot_helpers.stress_unit(case)}")
     axes.xaxis.set_major_locator(MultipleLocator(60 if angles[-1] > 180 else 30))
     contact = "contact" if all(bond["contact"] for bond in interface_sections(document)) else "no contact"
     load = "" if stiff else f", $E = [{', '.join(f'{e:g}' for e in points[0]['strain'])}]$"
-    axes.set_title(title_of(case, f"plane {case['analysis']['plane']}, {contact}{load}"))
+    axes.set_title(plot_helpers.title_of(case, f"plane {case['analysis']['plane']}, {contact}{load}"))
     axes.axhline(0.0, color="0.6", linewidth=0.6, zorder=0)
-    finish_curves(axes)
+    plot_helpers.finish_curves(axes)
     if stiff:
         axes.set_ylim(bottom=0.0)
     return figure
@@ -75,7 +67,7 @@ def _angle_columns(points: Sequence[Document], stiff: bool) -> list[tuple[str, A
     """Each curve's name and its values (points,)."""
     if not stiff:
         stress = np.array([point["stress"] for point in points])
-        return list(zip((SYMBOLS[name] for name in STRESSES), stress.T, strict=True))
+        return list(zip((plot_helpers.SYMBOLS[name] for name in STRESSES), stress.T, strict=True))
     stiffness = np.array([point["stiffness"] for point in points])
     return [(f"C_{{{i + 1}{j + 1}}}", stiffness[:, i, j]) for i, j in shown_entries(points).values()]
 
@@ -88,19 +80,24 @@ def envelope(document: Document) -> Figure:
     axes = picture.subplots()
     axes.axhline(0.0, color="0.45", linewidth=0.8, zorder=1)
     axes.axvline(0.0, color="0.45", linewidth=0.8, zorder=1)
-    places, notes = loads(points), _notes(case, len(points) - len(known))
+    places, temperature = loads(points), case["envelope"].get("temperature")
+    notes = [] if temperature is None else [f"$\\Delta T = {{{temperature:g}}}$ first"]
+    notes += [f"no onset in {rest} directions"] if (rest := len(points) - len(known)) else []
     if known:
         drawn = _curve(axes, places, modes(points))
         bar = picture.colorbar(drawn, ax=axes, location="bottom", shrink=0.6, aspect=30)
         bar.set_ticks([0, 30, 60, 90], labels=["0, opens", "30", "60", "90, shears"])
         bar.set_label("mode of the first break (degrees)")
         notes += _limit(axes, places[~np.isnan(places[:, 0])])
-    labels = [f"${SYMBOLS[name]}$" + (f" {stress_unit(case)}" if name.startswith("S") else "") for name in plane]
+    labels = [
+        f"${plot_helpers.SYMBOLS[name]}$" + (f" {plot_helpers.stress_unit(case)}" if name.startswith("S") else "")
+        for name in plane
+    ]
     axes.set(xlabel=labels[0], ylabel=labels[1])
     axes.set_aspect("equal", adjustable="box")
     axes.xaxis.set_major_locator(MaxNLocator(5))  # labels of small stresses are long
-    title = title_of(case, f"onset of debonding, plane {case['analysis']['plane']}")
-    axes.set_title("\n".join([title, *bond_limits(case), *([", ".join(notes)] if notes else [])]))
+    title = plot_helpers.title_of(case, f"onset of debonding, plane {case['analysis']['plane']}")
+    axes.set_title("\n".join([title, *plot_helpers.bond_limits(case), *([", ".join(notes)] if notes else [])]))
     axes.grid(color="0.92", linewidth=0.6)
     axes.set_axisbelow(True)
     return picture
@@ -157,20 +154,12 @@ def _limit(axes: Axes, places: Array) -> list[str]:
     return [f"loads up to {size.max():.4g} are outside"] if far.any() else []
 
 
-def _notes(case: Document, without: int) -> list[str]:
-    """Temperature and how many directions have no onset."""
-    temperature, notes = case["envelope"].get("temperature"), list[str]()
-    if temperature is not None:
-        notes.append(f"$\\Delta T = {{{temperature:g}}}$ first")
-    return [*notes, f"no onset in {without} directions"] if without else notes
-
-
 def sensitivities(document: Document) -> Figure | None:
     """Return the elasticities d ln c / d ln p, a row for each p and a column for each c; None without sensitivities."""
     tables = constant_tables.sensitivities(document)
     if not tables or not tables[0].rows:
         return None
-    names = [plain(str(row[0])) for row in tables[0].rows]
+    names = [plot_helpers.plain(str(row[0])) for row in tables[0].rows]
     values = np.array([[np.nan if isinstance(entry, str) else entry for entry in row[1:]] for row in tables[0].rows])
     left = 0.4 + LETTER * max(map(len, names))
     size = left + CELL[0] * values.shape[1] + 1.2, 1.4 + CELL[1] * len(names)
@@ -188,7 +177,7 @@ def sensitivities(document: Document) -> Figure | None:
     axes.spines[:].set_visible(False)
     picture.colorbar(image, ax=axes, label="relative change / relative change")
     title = "change of a constant (%) by a change of a parameter by 1 %"
-    picture.suptitle(title_of(document["case"], title), fontsize=11)
+    picture.suptitle(plot_helpers.title_of(document["case"], title), fontsize=11)
     return picture
 
 

@@ -15,17 +15,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components, depth_first_order
 from scipy.spatial import cKDTree
 
-from feti_homog.report.plots.interface_marks import (
-    BONDED,
-    CLOSED,
-    OPEN,
-    SAME_PLACE,
-    STATE_COLOURS,
-    STATE_NAMES,
-    DrawnCell,
-)
-from feti_homog.report.plots.load_labels import LoadLabels
-from feti_homog.report.plots.plot_helpers import save, stress_label, unit_label
+from feti_homog.report.plots import drawn_cell, plot_helpers
 from feti_homog.report.text.analyses import reported
 from feti_homog.results.landmarks import peak_of
 from feti_homog.typing import Array, Document
@@ -41,7 +31,7 @@ INK = ("#1f4e9c", "#2a7f3f", "#c44e00")
 NAMES = {"traction": (r"$t_\mathrm{n}$", r"$t_\mathrm{t}$", r"$t_\mathrm{a}$"), "jump": ("gap", "slip", "axial slip")}
 
 
-def plot(directory: Path, cell: DrawnCell, document: Document) -> list[Path]:
+def plot(directory: Path, cell: drawn_cell.DrawnCell, document: Document) -> list[Path]:
     """Draw interface.png, if any state has debonded nodes.
 
     It shows, of a path, the state of its peak, dashed, and the valley after it or the last that shows much, else one
@@ -49,19 +39,23 @@ def plot(directory: Path, cell: DrawnCell, document: Document) -> list[Path]:
     """
     file = cell.file
     names = sorted(file.get("state", ()), key=int)
-    debonded = {name: int((file[f"state/{name}/status"][:] != BONDED).sum()) for name in names}
+    debonded = {name: int((file[f"state/{name}/status"][:] != drawn_cell.BONDED).sum()) for name in names}
     if not any(debonded.values()):
         return []
     total = len(file["interface/points"])
+
+    def touches(name: str) -> bool:
+        return bool((file[f"state/{name}/status"][:] == drawn_cell.CLOSED).any())
+
     # After all bonds are gone there is not much left to see, unless the faces touch.
-    last = next((n for n in reversed(names) if 0 < debonded[n] < total or _touching(file, n)), names[-1])
+    last = next((n for n in reversed(names) if 0 < debonded[n] < total or touches(n)), names[-1])
     partly = [name for name in names if 0 < debonded[name] < total]
     shown = (
         _around_the_peak(file, names, last, document)
         if reported(document).is_followed
         else [(partly or [last])[len(partly) // 2]]
     )
-    return [save(_figure(cell, shown, LoadLabels.of(document)), directory / "interface.png")]
+    return [plot_helpers.save(_figure(cell, shown, drawn_cell.LoadLabels.of(document)), directory / "interface.png")]
 
 
 def _around_the_peak(file: Any, names: list[str], last: str, document: Document) -> list[str]:
@@ -69,19 +63,15 @@ def _around_the_peak(file: Any, names: list[str], last: str, document: Document)
     of_point = {int(file[f"state/{name}"].attrs["point"]): name for name in names}
     peak = peak_of(document)
     before, after = of_point.get(peak["event"], names[0]), of_point.get(peak.get("event_left", -1), last)
-    debonded = (file[f"state/{after}/status"][:] != BONDED).any()
+    debonded = (file[f"state/{after}/status"][:] != drawn_cell.BONDED).any()
     return list(dict.fromkeys([before, after if debonded else last]))
 
 
-def _touching(file: Any, name: str) -> bool:
-    return bool((file[f"state/{name}/status"][:] == CLOSED).any())
-
-
-def _figure(cell: DrawnCell, names: list[str], labels: LoadLabels) -> Figure:
+def _figure(cell: drawn_cell.DrawnCell, names: list[str], labels: drawn_cell.LoadLabels) -> Figure:
     """Return a row for each of the fibres that are most debonded: tractions, and jumps."""
     file = cell.file
     fibre, status = file["interface/fibre"][:], file[f"state/{names[-1]}/status"][:]
-    bodies, count = np.unique(fibre[status != BONDED], return_counts=True)
+    bodies, count = np.unique(fibre[status != drawn_cell.BONDED], return_counts=True)
     chosen = np.sort(bodies[np.argsort(-count, kind="stable")][:MAX_FIBRES])
     figure = Figure(figsize=(9.0, 2.4 * len(chosen) + 1.5), layout="constrained")
     grid = figure.subplots(len(chosen), 2, sharex="row", sharey="col", squeeze=False)
@@ -92,7 +82,11 @@ def _figure(cell: DrawnCell, names: list[str], labels: LoadLabels) -> Figure:
             for name in names:
                 values = _values(file[f"state/{name}"], quantity)[place.nodes]
                 _curves(axes, quantity, place, values, name == names[-1])
-            _finish(axes, place)
+            axes.axhline(0.0, color="0.6", linewidth=0.6)
+            axes.set(xlim=place.ends, xlabel=place.label)
+            if place.ends == DEGREES:
+                axes.xaxis.set_major_locator(MultipleLocator(60))
+            axes.spines[["top", "right"]].set_visible(False)
         row[0].set_title(_name(file, body, place), fontsize=10, loc="left")
     for column in grid.T:
         _clip_spikes(column[0], [line.get_ydata() for axes in column for line in axes.lines])
@@ -145,37 +139,28 @@ def _shade(axes: Axes, place: Coordinate, status: Array) -> None:
     """Mark the debonded parts of the last state; each node stands for half the distance to its neighbours."""
     middle = (place.values[1:] + place.values[:-1]) / 2
     edges = np.concatenate([[place.ends[0]], middle, [place.ends[1]]])
-    for kind in (OPEN, CLOSED):
+    for kind in (drawn_cell.OPEN, drawn_cell.CLOSED):
         for at in np.flatnonzero(status == kind):
-            axes.axvspan(edges[at], edges[at + 1], color=STATE_COLOURS[kind], alpha=0.18, linewidth=0)
-
-
-def _finish(axes: Axes, place: Coordinate) -> None:
-    axes.axhline(0.0, color="0.6", linewidth=0.6)
-    axes.set_xlim(*place.ends)
-    axes.set_xlabel(place.label)
-    if place.ends == DEGREES:
-        axes.xaxis.set_major_locator(MultipleLocator(60))
-    axes.spines[["top", "right"]].set_visible(False)
+            axes.axvspan(edges[at], edges[at + 1], color=drawn_cell.STATE_COLOURS[kind], alpha=0.18, linewidth=0)
 
 
 def _labels(file: Any, figure: Figure, grid: Any, shaded: Array) -> None:
-    stress = stress_label(file.attrs["stress_unit"])
-    length = unit_label(file.attrs["length_unit"]) or "(cell units)"
+    stress = plot_helpers.stress_label(file.attrs["stress_unit"])
+    length = plot_helpers.unit_label(file.attrs["length_unit"]) or "(cell units)"
     for row in grid:
         row[0].set_ylabel(f"traction {stress}")
         row[1].set_ylabel(f"jump {length}")
     for axes in grid[0]:
         axes.legend(frameon=False, fontsize=9, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.1, ncols=3)
     patches = [
-        Patch(color=STATE_COLOURS[kind], alpha=0.18, linewidth=0, label=STATE_NAMES[kind])
-        for kind in (OPEN, CLOSED)
+        Patch(color=drawn_cell.STATE_COLOURS[kind], alpha=0.18, linewidth=0, label=drawn_cell.STATE_NAMES[kind])
+        for kind in (drawn_cell.OPEN, drawn_cell.CLOSED)
         if kind in shaded
     ]
     figure.legend(handles=patches, loc="outside lower center", ncols=2, frameon=False)
 
 
-def _title(file: Any, names: list[str], labels: LoadLabels) -> str:
+def _title(file: Any, names: list[str], labels: drawn_cell.LoadLabels) -> str:
     """Return the last state and, of more, the first."""
     first, last = (file[f"state/{name}"].attrs for name in (names[0], names[-1]))
     title = f"{last['label']}: {labels.label(last, LOADS_IN_LINE)}"
@@ -194,7 +179,7 @@ class Coordinate:
     label: str
 
 
-def coordinate(cell: DrawnCell, body: int) -> Coordinate:
+def coordinate(cell: drawn_cell.DrawnCell, body: int) -> Coordinate:
     """Direction of the normal, in degrees, of a body that is a round fibre, or its coating.
 
     Of any other the arc length, counterclockwise from where the normal is nearest to x1 (around each of its boundaries,
@@ -262,7 +247,9 @@ def _along(points: Array, starts: Array, steps: Array, before: Array, period: Ar
     length = np.linalg.norm(step, axis=2)
     share = np.clip(0.5 + (offset * step).sum(axis=2) / length**2, 0.0, 1.0)
     distance = np.linalg.norm(offset - (share - 0.5)[..., None] * step, axis=2)
-    best = (distance + SAME_PLACE * length * share).argmin(axis=1)  # a vertex is the start of an edge, not an end
+    best = (distance + drawn_cell.SAME_PLACE * length * share).argmin(
+        axis=1
+    )  # a vertex is the start of an edge, not an end
     rows = np.arange(len(points))
     arc: Array = before[near[rows, best]] + (share * length)[rows, best]
     return arc

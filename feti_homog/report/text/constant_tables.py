@@ -74,7 +74,13 @@ def sensitivities(document: Document) -> list[Table]:
         row = [found["derivatives"][k][j] for k in at]
         slopes.append([name, *row])
         shares.append(
-            [name, *(_share(slope * value, found["constant_values"][k]) for slope, k in zip(row, at, strict=True))]
+            [
+                name,
+                *(
+                    without_noise(slope * value / size) if (size := found["constant_values"][k]) else UNKNOWN
+                    for slope, k in zip(row, at, strict=True)
+                ),
+            ]
         )
     words = "Elasticities, the relative change of a constant by that of a parameter"
     words += "; contact at fixed status" * bool(found.get("at_fixed_status"))
@@ -121,8 +127,3 @@ def mesh_errors(document: Document) -> dict[str, float]:
 def shown(names: Sequence[str]) -> list[str]:
     """Return the constants of tables; of a load, and of secants of a cell in space, the first ones."""
     return [name for name in SHOWN["E3" in names] if name in names] if "E1" in names else list(names[:MOST])
-
-
-def _share(change: float, size: float) -> float | str:
-    """Return a relative change, zero in place of noise; text of a constant that is zero."""
-    return without_noise(change / size) if size else UNKNOWN

@@ -7,11 +7,13 @@ from itertools import zip_longest
 from math import floor, log10
 from typing import Any
 
+import numpy as np
+
 from feti_homog.materials.constant_names import ABOUT_FIBRES, CELL_AXES
 from feti_homog.materials.voigt import SPATIAL_STRESSES, STRAINS, voigt_names
 from feti_homog.microstructure.phase_names import COATING
 from feti_homog.report.text.table import UNKNOWN, Column, Table, number, stress_label
-from feti_homog.typing import Document
+from feti_homog.typing import Document, Float
 
 NAMES = Column("", -28)
 STIFF = ("C11", "C22", "C33")
@@ -91,16 +93,17 @@ def thermal(document: Document) -> list[Table]:
     known = {key: title for key, title in THERMAL.items() if document.get(key) is not None}
     names = [stress[1:] for stress in SPATIAL_STRESSES]
     errors = {key: _errors(document)[key] for key in known if _errors(document).get(key) is not None}
-    rows = list(zip(names, *(_rounded(document[key]) for key in known), *errors.values(), strict=True))
+    values = (_rounded(np.array(document[key], float)) for key in known)
+    rows = list(zip(names, *values, *errors.values(), strict=True))
     columns = [Column("", -6), *(Column(title, 22, ".7g") for title in known.values())]
     columns += [Column(f"{key.rpartition('_')[2]}: error", 18, ".1e") for key in errors]
     title = f"Per unit of temperature, {CELL_AXES}{stress_label(document)}"
     return [Table(title, columns, rows)] if known else []
 
 
-def _rounded(numbers: Sequence[float]) -> list[float]:
-    least = 10.0**-THERMAL_DIGITS * max(map(abs, numbers))
-    return [0.0 if abs(entry) <= least else entry for entry in numbers]
+def _rounded(values: Float) -> list[float]:
+    is_seen = np.abs(values) > 10.0**-THERMAL_DIGITS * np.abs(values).max()
+    return [float(value) for value in np.where(is_seen, values, 0.0)]
 
 
 def moduli(document: Document) -> Table:

@@ -38,7 +38,7 @@ def summary(document: Document) -> str:
         checks(document).lines,
         [
             *_field("Time", [f"{stage}{GLUE}{took:.2f}{GLUE}s" for stage, took in document["timings"].items()]),
-            *_field("Memory", [f"{_bytes(document['memory'])} per rank at most"]),
+            *_field("Memory", [f"{_memory(document['memory'])} per rank at most"]),
         ],
         [
             *_remarks("Remark", document.get("remarks", ())),
@@ -98,11 +98,15 @@ def _cell(document: Document) -> list[str]:
     shares = ", ".join(f"{phase} {share:.6f}" for phase, share in fractions.items())
     mesh = [_number(cell["elements"], "element"), _number(cell["nodes"], "node")]
     mesh += [f"order {shape['order']}"] * ("order" in shape) + _sizes(shape, cell)
+    match = list[str]()
+    if (distance := cell.get("match_distance")) is not None:
+        words = f"distances of neighbours differ by {distance:.4f} mean diameters"
+        match = _field("Match", [Path(shape["match"]).name, words])
     shares += f", voids {cell['porosity']:.6f}" if cell.get("porosity") else ""
     return [
         *_field("Cell", [str(shape["geometry"]), size]),
         *_field("Meshed", [f"fibre fraction {cell['fibre_fraction']:.6f}", *([f"({shares})"] if shares else [])]),
-        *_match(shape, cell),
+        *match,
         *_scatter(document.get("fibres", ())),
         *_field("Mesh", mesh),
     ]
@@ -114,13 +118,6 @@ def _sizes(shape: Document, cell: Document) -> list[str]:
         return [f"refine {shape['refine']}"]
     asked = [f"{name} = {shape[name]:g}" for name in ASKED if name in shape]
     return [f"refine {cell['refine']} of mesh_size {cell['mesh_size']:g} for {asked[0]}"] if asked else []
-
-
-def _match(shape: Document, cell: Document) -> list[str]:
-    """Return how far the fibres are from those of a table."""
-    distance = cell.get("match_distance")
-    words = f"distances of neighbours differ by {distance or 0:.4f} mean diameters"
-    return [] if distance is None else _field("Match", [Path(shape["match"]).name, words])
 
 
 def _scatter(fibres: Sequence[Document]) -> list[str]:
@@ -141,7 +138,7 @@ def _solver(solver: Document) -> list[str]:
         *_field("Solver", [*parts, _number(solver["dofs"], "dof")]),
         *_field("Dual", [*dual, f"coarse problem {solver['coarse_dim']}"]),
         *_factorized(solver),
-        *_field("Iterations", _iterations(_listed(solver["iterations"]))),
+        *_field("Iterations", _iterations(solver["iterations"])),
     ]
 
 
@@ -188,13 +185,9 @@ def _field(label: str, words: Sequence[str]) -> list[str]:
     return wrap(text, WIDTH, initial_indent=f"{label:<{LABEL}}", subsequent_indent=" " * LABEL, break_long_words=False)
 
 
-def _listed(value: Any) -> list[Any]:
-    return list(value) if isinstance(value, list | tuple) else [value]
-
-
 def _number(count: int, name: str) -> str:
     return f"{count:,} {name}{'' if count == 1 else 's'}".replace(",", " ")
 
 
-def _bytes(size: float) -> str:
+def _memory(size: float) -> str:
     return f"{size / 2**20:.0f} MiB" if size < 2**30 else f"{size / 2**30:.2f} GiB"

@@ -130,7 +130,14 @@ class Table:
     def cells(self) -> list[list[str]]:
         """The rows as texts, numbers with the decimals of their columns, or else with seven digits."""
         forms = [column.form if SAME_IN_HTML.fullmatch(column.form) else ".7g" for column in self.columns]
-        return [[_cell(value, form) for value, form in zip(row, forms, strict=False)] for row in self.rows]
+        return [
+            # Zero in place of noise, but errors as they are, small ones too.
+            [
+                number(without_noise(value) if form != ERROR else value, "d" if isinstance(value, int) else form)
+                for value, form in zip(row, forms, strict=False)
+            ]
+            for row in self.rows
+        ]
 
     @property
     def html(self) -> str:
@@ -153,13 +160,6 @@ def number(value: Any, form: str) -> str:
 def without_noise(value: Any, size: float = 1.0) -> Any:
     """Return the value; zero in place of a number that is what the solver leaves of zero beside `size`."""
     return 0.0 if isinstance(value, float) and abs(value) <= NOISE * size else value
-
-
-def _cell(value: Any, form: str) -> str:
-    """Return an entry for HTML: zero in place of noise, but errors as they are, small ones too."""
-    if isinstance(value, int):
-        return number(value, "d")
-    return number(value if form == ERROR else without_noise(value), form)
 
 
 def _row(cells: Iterable[str], scope: str, tag: str) -> str:

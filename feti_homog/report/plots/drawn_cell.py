@@ -1,0 +1,203 @@
+"""A cell as pictures show it: its triangles, its frame with a colour bar, its interface, and labels of its load."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from scipy.spatial import cKDTree
+
+from feti_homog.materials.voigt import voigt_names
+from feti_homog.report.plots.decimation import TRIANGLE_LIMIT, DrawnMesh, drawn_mesh, outline_edges
+from feti_homog.report.plots.plot_helpers import SYMBOLS, draw_segments, unit_label
+from feti_homog.report.text.analyses import reported
+from feti_homog.results.path_curves import FAINT, ZERO, components_above, leading_component
+from feti_homog.typing import Array, Document
+
+CELL_INCHES, BAR_INCHES = 4.8, 1.1  # the longer side of a drawn cell, and the room for a colour bar beside it
+BAR, LEAST_BAR = (0.04, 1.0), (0.15, 1.2)  # width and height of a bar: shares of the cell's, and least inches
+BONDED, CLOSED, OPEN, DAMAGED = 0, 1, 2, 3
+STATE_NAMES = {BONDED: "bonded", DAMAGED: "damaged", CLOSED: "in contact", OPEN: "open"}
+STATE_COLOURS = {BONDED: "black", CLOSED: "#ff7f0e", OPEN: "#00a14b", DAMAGED: "#9467bd"}
+STATE_WIDTHS = {BONDED: 0.8, CLOSED: 2.6, OPEN: 2.0, DAMAGED: 2.0}
+# The state of an edge is the one of its ends that comes last here.
+ORDER = np.array(list(STATE_NAMES))
+HALO = 1.6  # points
+SAME_PLACE = 1e-6  # of the width of the cell
+LONG = 2  # strains beyond which a label of a path has the leading one alone
+
+
+@dataclass(frozen=True)
+class InterfaceEdges:
+    """The drawn edges on fibre-matrix interfaces, those of either face, and the interface nodes at their ends."""
+
+    edges: Array  # (e, 2) drawn nodes
+    nodes: Array  # (e, 2) rows of /interface
+
+    @classmethod
+    def of(cls, file: Any, drawn: DrawnMesh, borders: Array) -> InterfaceEdges:
+        """Return those among the outlines of the bodies; /interface has one node for all its periodic images."""
+        points, period = file["interface/points"][:], np.array([file.attrs["width"], file.attrs["height"]])
+        if not len(points):
+            return cls(borders[:0], borders[:0])
+        near = SAME_PLACE * float(period[0])
+        tree = cKDTree(_wrapped(points, period, near), boxsize=period * (1.0 + 1e-12))
+        ends = _wrapped(drawn.points[borders.ravel()], period, near)
+        distance, nearest = tree.query(ends, distance_upper_bound=2 * near)
+        there = np.isfinite(distance).reshape(-1, 2).all(axis=1)
+        return cls(borders[there], nearest.reshape(-1, 2)[there])
+
+    def state(self, status: Array) -> Array:
+        """(e,) states of the edges for those of the nodes: open if an end is, else in contact or damaged if one is."""
+        states: Array = ORDER[np.argsort(ORDER)[status[self.nodes]].max(axis=1, initial=0)]
+        return states
+
+    def mark(self, axes: Axes, points: Array, status: Array, magnified: float = 1.0) -> list[Line2D]:
+        """Draw the edges at the places (p, 2) of the drawn nodes; returns a legend of the states that there are."""
+        states = self.state(status)
+        found = [kind for kind in STATE_NAMES if (states == kind).any()]
+        for kind in found:
+            segments = points[self.edges[states == kind]]
+            cap: Literal["butt", "round"] = "butt" if kind == BONDED else "round"
+            if kind != BONDED:
+                # Seen on every colour: magenta and orange are not, on red.
+                draw_segments(axes, segments, "white", magnified * (STATE_WIDTHS[kind] + HALO), cap)
+            draw_segments(axes, segments, STATE_COLOURS[kind], magnified * STATE_WIDTHS[kind], cap)
+        return state_legend(found)
+
+
+@dataclass(frozen=True)
+class DrawnCell:
+    """An open result.h5 with its drawn triangles, the outlines of its bodies, and its interface."""
+
+    file: Any
+    drawn: DrawnMesh
+    borders: Array  # (e, 2) drawn nodes
+    interface: InterfaceEdges
+
+    @classmethod
+    def of(cls, file: Any, limit: int = TRIANGLE_LIMIT) -> DrawnCell:
+        """Return that of a file, in about so many triangles at most."""
+        drawn = drawn_mesh(file, limit)
+        borders = outline_edges(drawn, drawn.body)
+        return cls(file, drawn, borders, InterfaceEdges.of(file, drawn, borders))
+
+
+def states_of_nodes(state: Any) -> Array:
+    """(k,) states of the interface nodes in a group of result.h5: their status, DAMAGED of damaged bonds that hold."""
+    status = state["status"][:]
+    damage = state["damage"][:] if "damage" in state else np.zeros(len(status))
+    nodes: Array = np.where((status == BONDED) & (damage > 0.0), DAMAGED, status)
+    return nodes
+
+
+def state_legend(kinds: list[int]) -> list[Line2D]:
+    return [Line2D([], [], color=STATE_COLOURS[k], linewidth=STATE_WIDTHS[k], label=STATE_NAMES[k]) for k in kinds]
+
+
+def _wrapped(points: Array, period: Array, near: float) -> Array:
+    """Return the points' images in [0, period), those within `near` of the upper ends at 0."""
+    inside = np.mod(points, period)
+    inside[inside > period - near] = 0.0
+    wrapped: Array = inside
+    return wrapped
+
+
+def figure_of(attributes: Any, panels: int, beside: float = 0.0) -> tuple[Figure, Sequence[Axes]]:
+    """Return a figure with panels for pictures of the cell, and so many inches beside them for a bar."""
+    width, height = cell_size(attributes)
+    size = panels * (width + 0.7) + 0.1 + beside, max(height, LEAST_BAR[1]) + 1.2
+    figure = Figure(figsize=size, layout="compressed")
+    return figure, figure.subplots(1, panels, squeeze=False)[0]
+
+
+def cell_scale(attributes: Any) -> float:
+    """Inches in the picture for a length unit of the cell."""
+    return CELL_INCHES / max(float(attributes["width"]), float(attributes["height"]))
+
+
+def cell_size(attributes: Any) -> tuple[float, float]:
+    """Width and height of the cell in the picture, inches."""
+    scale = cell_scale(attributes)
+    return scale * float(attributes["width"]), scale * float(attributes["height"])
+
+
+def label_cell_axes(axes: Axes, attributes: Any) -> None:
+    unit = unit_label(attributes["length_unit"]) or "(cell units)"
+    axes.set_aspect("equal")
+    axes.autoscale_view()
+    axes.margins(0.03)
+    axes.set_xlabel(f"$x_1$ {unit}")
+    axes.set_ylabel(f"$x_2$ {unit}")
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def bar_beside(axes: Axes, shapes: Any, extend: str, size: tuple[float, float] | None = None) -> Any:
+    """Return the colour bar of shapes, at the right of their axes.
+
+    `size` is that of the cell in the picture, inches: beside a narrow cell the bar is wider, beside a flat one higher.
+    """
+    figure: Any = axes.figure
+    width, height = BAR if size is None else np.maximum(np.divide(LEAST_BAR, size), BAR).tolist()
+    return figure.colorbar(
+        shapes, cax=axes.inset_axes((1.0 + 0.75 * width, 0.5 * (1.0 - height), width, height)), extend=extend
+    )
+
+
+@dataclass(frozen=True)
+class LoadLabels:
+    """Labels of the states of a result.
+
+    Attributes:
+        leading: the component that a path is about; None of others.
+        least_stress: stresses of a path up to which one is what is left of zero.
+        given: the load of analysis "load".
+    """
+
+    leading: int | None = None
+    least_stress: float = 0.0
+    given: Mapping[str, float] | None = None
+
+    @classmethod
+    def of(cls, document: Document) -> LoadLabels:
+        """Return those of a result.json."""
+        analysis = reported(document)
+        if analysis.is_followed:
+            largest = np.abs([point["stress"] for point in document[analysis.name]]).max()
+            return cls(leading_component(document), ZERO * float(largest))
+        return cls(given=document["case"][analysis.name]["to"] if analysis.picture else None)
+
+    def words(self, attributes: Any) -> list[str]:
+        """Return the strains that are seen, and the temperature, of a state with these attributes, as formulas.
+
+        Of a path on which many are seen the leading one and its stress; of a load what it gives.
+        """
+        if self.given is not None:
+            return [_formula(name, value) for name, value in self.given.items()]
+        strain, temperature = np.asarray(attributes["strain"]), float(attributes.get("temperature", 0.0))
+        strains, stresses = voigt_names(len(strain))
+        loads = [(strains[k], float(strain[k])) for k in components_above(FAINT, strain[None])]
+        if self.leading is not None and len(loads) > LONG:
+            stress = float(attributes["stress"][self.leading])
+            loads = [
+                (strains[self.leading], float(strain[self.leading])),
+                (stresses[self.leading], stress if abs(stress) > self.least_stress else 0.0),
+            ]
+        loads += [("temperature", temperature)] * (temperature != 0.0)
+        return [_formula(name, value) for name, value in loads] or ["no strain"]
+
+    def label(self, attributes: Any, in_line: int = 4) -> str:
+        """Join these words, so many in a line."""
+        words = self.words(attributes)
+        return ",\n".join(", ".join(words[k : k + in_line]) for k in range(0, len(words), in_line))
+
+
+def _formula(name: str, value: float) -> str:
+    mantissa, _, exponent = f"{value:.4g}".partition("e")
+    power = rf" \cdot 10^{{{int(exponent)}}}" if exponent else ""
+    return f"${SYMBOLS[name]} = {{{mantissa}}}{power}$"
