@@ -43,7 +43,7 @@ def write(directory: Path) -> Path:
     Call on one rank.
 
     Raises:
-        CaseError: the folder is not that of a result, or a file of it is missing or damaged.
+        CaseError: the folder has no result, or one of its files is missing or damaged.
         FetiHomogError: the report cannot be written.
     """
     if not directory.is_dir():
@@ -75,10 +75,10 @@ def page(document: Document, directory: Path) -> str:
         "Pictures": "\n".join(_pictures(directory)) or "<p>None: <code>feti-homog plot</code> draws them.</p>",
         "Summary": f"<pre>{escape(summary(document))}</pre>",
     }
-    shown = {name: body for name, body in sections.items() if body}
-    links = "\n".join(f'<a href="#{name.lower()}">{name}</a>' for name in shown)
+    filled = {name: body for name, body in sections.items() if body}
+    links = "\n".join(f'<a href="#{name.lower()}">{name}</a>' for name in filled)
     body = "\n".join(
-        f'<section id="{name.lower()}">\n<h2>{name}</h2>\n{text}\n</section>' for name, text in shown.items()
+        f'<section id="{name.lower()}">\n<h2>{name}</h2>\n{text}\n</section>' for name, text in filled.items()
     )
     return f"""<!DOCTYPE html>
 <html lang="en">

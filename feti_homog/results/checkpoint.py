@@ -1,7 +1,7 @@
-"""Checkpoints of a path: its events in one file, to which each is appended, or in memory.
+"""Checkpoints of a path: events appended to one file, or kept in memory.
 
-An event is its load, the states of its bonds and scalars.  As long as there is room it also has multipliers and jumps;
-without, an equilibrium of its load and bonds finds them again.
+An event holds load, bond states and scalars.  As long as there is room it also holds multipliers and jumps; afterwards
+an equilibrium under its load, with its bonds, finds them again.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class NoCheckpoint:
         return 0
 
     def count(self) -> int:
-        """Return the number of events, each of which is checked.
+        """Return the number of events, after a check of each.
 
         Raises:
             CheckpointError: an event is unreadable or of another run.
@@ -53,7 +53,7 @@ class NoCheckpoint:
         return 0
 
     def read(self, number: int) -> Arrays:
-        """Return an event: this rank's part of distributed arrays, all of the other arrays.
+        """Return an event: this rank's part of distributed arrays, other arrays in full.
 
         Raises:
             CaseError: it is unreadable.
@@ -73,13 +73,13 @@ class NoCheckpoint:
         """
 
     def _kept(self, event: Arrays, size: int) -> Arrays:
-        """Return the arrays of an event that are kept behind `size` bytes of events."""
+        """Return the arrays to keep of an event behind `size` bytes of events."""
         has_room = self.room is None or size < self.room
         return event if has_room else {name: v for name, v in event.items() if not FOUND_AGAIN.fullmatch(name)}
 
 
 class EventsInMemory(NoCheckpoint):
-    """Keep the events in memory, for runs that leave no files: each rank its part."""
+    """Keep the events in memory, each rank its part, for runs that leave no files."""
 
     def __init__(self, comm: MPI.Intracomm, room: int | None = WHOLE_BYTES) -> None:
         super().__init__(comm, room)
@@ -142,9 +142,9 @@ class Checkpoint(NoCheckpoint):
 
     def _count(self) -> int:
         if count := self._count_records():
-            found = next(records(self.path))[1].decode()
-            if found != self.signature:
-                raise CaseError(f"{self.path} is of another run: expected {self.signature}; found {found}")
+            written = next(records(self.path))[1].decode()
+            if written != self.signature:
+                raise CaseError(f"{self.path} is of another run: expected {self.signature}; found {written}")
         return count
 
     def _write(
@@ -164,14 +164,14 @@ class Checkpoint(NoCheckpoint):
 
 
 def has_multipliers(event: Arrays) -> bool:
-    """Return whether there was room for the multipliers of an event."""
+    """Return whether an event has its multipliers."""
     return "lam" in event
 
 
 def room_of(case: Case) -> int | None:
-    """Return the bytes up to which a path keeps multipliers; None if states have a past, or all fields are kept.
+    """Return the bytes up to which a path keeps multipliers; None with friction, or if all fields are kept.
 
-    With friction many states are in equilibrium under one load.
+    With friction many equilibria exist under one load.
     """
     return None if case.has_friction or case.output.states == "all" else WHOLE_BYTES
 
@@ -179,13 +179,13 @@ def room_of(case: Case) -> int | None:
 def bytes_at_most(case: Case, multipliers: int, events: int) -> int:
     """Estimate the largest size of the event file (bytes) of a path."""
     more = (len(phase_laws.problems(case)) - 1) * AXIAL_BYTES + case.has_friction * FRICTION_BYTES
-    whole = events * (multipliers * (MULTIPLIER_BYTES + more) + EVENT_BYTES)
+    full = events * (multipliers * (MULTIPLIER_BYTES + more) + EVENT_BYTES)
     room = room_of(case)
-    return whole if room is None else min(whole, room + events * LEAN_BYTES)
+    return full if room is None else min(full, room + events * LEAN_BYTES)
 
 
 def _part(event: Arrays, rank: int) -> Arrays:
-    """Return the event with a rank's share of the distributed arrays."""
+    """Return an event with the distributed arrays cut to the part of `rank`."""
     part = {}
     for name, table in event.items():
         if name.endswith("_ends"):

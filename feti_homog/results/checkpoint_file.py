@@ -1,9 +1,8 @@
-"""The event file of a path, `checkpoint/events` in its result folder: one record an event, appended.
+"""The event file of a path, `checkpoint/events` in its result folder: one appended record per event.
 
-A record has a prefix, the length of its content with the checksums of content and prefix (CRC-32), then the content.
-The first content is the run's signature.  Every other is an event, packed by zlib: a line of JSON with name, type and
-shape of its arrays, then their bytes.  A last record that is shorter than its length was being written when its run was
-killed, and does not count.
+A record is a prefix, content length and CRC-32 checksums of content and prefix, then the content.  The first content is
+the run's signature, every other an event packed by zlib: a JSON line with names, types and shapes of its arrays, then
+their bytes.  A killed run may leave a last record shorter than its length, which does not count.
 """
 
 from __future__ import annotations
@@ -72,7 +71,7 @@ def records(path: Path, start: int = 0) -> Iterator[tuple[int, bytes]]:
 
 
 def _head(line: bytes, path: Path) -> bytes:
-    """Return the first line of an event file; empty if its run was killed while it wrote the line."""
+    """Check the first line of an event file; empty if its run was killed while writing it."""
     expected = begin("").partition(b"\n")[0] + b"\n"
     if line != expected and expected.startswith(line):
         return b""
@@ -125,10 +124,10 @@ def refuse_others(directory: Path) -> None:
             raise CaseError(
                 f"--out {directory}: {folder.name} is a {kind} there, and a run makes a folder of that name"
             )
-        others = [path.name for path in folder.iterdir() if not _is_event(path)] if folder.is_dir() else []
-        if others:
+        foreign = [path.name for path in folder.iterdir() if not _is_event(path)] if folder.is_dir() else []
+        if foreign:
             raise CaseError(
-                f"--out {directory}: no run of this program wrote {folder.name}/{min(others)}, and a run removes "
+                f"--out {directory}: no run of this program wrote {folder.name}/{min(foreign)}, and a run removes "
                 f"{folder.name}; move it away or choose another folder"
             )
 

@@ -35,7 +35,7 @@ def header(cell: TornCell) -> Header:
 
 
 def mesh_part(cell: TornCell) -> MeshPart:
-    """Return the refined meshes of this rank's parts, one after the other."""
+    """Concatenate the refined meshes of this rank's parts."""
     subdomains = cell.parts
     nodes = np.cumsum([0, *(len(s.mesh.points) for s in subdomains)])
     columns = 3 * cell.case.cell.order
@@ -103,9 +103,9 @@ def state_part(cell: TornCell, response: Response, load_factor: float, label: st
 def spatial_state_part(
     cell: TornCell, plane: Response | None, axial: Response | None, load_factor: float, label: str, point: int
 ) -> SpatialStatePart:
-    """Return the fields of the responses of the plane problem and of the axial one in generalized plane strain.
+    """Return the fields in generalized plane strain, from responses of the plane and the axial problem.
 
-    Those of one that is None are zero. Collective when first called.
+    A problem without response has zero fields.  Collective when first called.
 
     Raises:
         ValueError: there is no response, or no axial problem.
@@ -159,17 +159,17 @@ def _at_nodes(
 
 
 def _relative(shares: Float, *responses: Response | None) -> Float32:
-    """(m,) shares of an error of E . Sigma relative to that of all responses."""
+    """(m,) element shares of the error, relative to E . Sigma summed over all responses."""
     energy = sum(2 * response.stored for response in responses if response is not None)
     return (shares / (energy if energy > 0 else 1.0)).astype(np.float32)
 
 
 def _in_axes(normal: Float, pairs: Float) -> Float:
-    """(k, 2) components along x and y of vectors (k, 2) that are normal and tangential; normals (k, 2)."""
+    """(k, 2) components along x and y of normal and tangential `pairs` (k, 2); normals (k, 2)."""
     tangent = np.column_stack([-normal[:, 1], normal[:, 0]])
     return np.asarray(pairs[:, :1] * normal + pairs[:, 1:] * tangent)
 
 
 def _vectors(in_plane: Float, along: Float | None = None) -> Float:
-    """(k, 3) vectors of components (k, 2) in the plane and (k, 1) along x3, by default 0."""
+    """(k, 3) vectors from components (k, 2) in the plane and (k, 1) along x3, by default 0."""
     return np.pad(in_plane, [(0, 0), (0, 1)]) if along is None else np.hstack([in_plane, along])

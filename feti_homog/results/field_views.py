@@ -1,6 +1,6 @@
-"""Datasets of result.h5 that show others as viewers want them: vectors of three components, tensors, single columns.
+"""Datasets of result.h5 for viewers: vectors with three components, tensors, single columns.
 
-They are virtual: HDF5 fills them from the other datasets when they are read, so that they take next to no space.
+They are virtual and nearly free: HDF5 fills them from other datasets when they are read.
 """
 
 from __future__ import annotations
@@ -48,16 +48,16 @@ class View:
 
 def _vector(name: str, third: str = "") -> View:
     columns = {0: (name, 0), 1: (name, 1)} | ({2: (third, WHOLE)} if third else {})
-    words = f"`{name}` with `{third}` as third component" if third else f"`{name}` with a third component 0"
-    return View("vector", name, 3, name, columns, words)
+    sentence = f"`{name}` with `{third}` as third component" if third else f"`{name}` with a third component 0"
+    return View("vector", name, 3, name, columns, sentence)
 
 
 def _tensor(name: str, source: str, entries: Mapping[tuple[int, int], tuple[str, int]]) -> View:
     """Return the symmetric tensor [11, 12, 13, 21, 22, 23, 31, 32, 33] with these entries."""
     places = [(3 * i + j, (min(i, j), max(i, j))) for i in range(3) for j in range(3)]
     columns = {place: entries[pair] for place, pair in places if pair in entries}
-    words = f"tensor of `{source}`, rows of [[11, 12, 13], [12, 22, 23], [13, 23, 33]]"
-    return View("tensor", name, 9, source, columns, words)
+    sentence = f"tensor of `{source}`, rows of [[11, 12, 13], [12, 22, 23], [13, 23, 33]]"
+    return View("tensor", name, 9, source, columns, sentence)
 
 
 def _column(name: str, source: str, column: int) -> View:
@@ -97,7 +97,7 @@ BYTES = 1 << 12  # that a view takes at most; 0.9 KB in the mean were measured
 
 
 def add_views(file: Any) -> None:
-    """Make the views of all groups of an open file whose tables are complete; empty tables have none."""
+    """Add the views to an open file with complete tables; empty tables have no views."""
     for group, view in _views_of(file):
         original = file[f"{group}/{view.source}"]
         shape = (len(original), view.components) if view.components else (len(original),)
@@ -113,12 +113,12 @@ def add_views(file: Any) -> None:
 
 
 def bytes_of_views(file: Any) -> int:
-    """Space that `add_views` takes at most."""
+    """Return the most bytes that `add_views` takes."""
     return BYTES * (1 + len(_views_of(file)))
 
 
 def _views_of(file: Any) -> list[tuple[str, View]]:
-    """Group and view of all whose tables are in the file, and not empty."""
+    """Return group and view for all views whose tables are in the file, and not empty."""
     groups = {"interface": VIEWS["interface"]}
     for group in (f"state/{number}" for number in sorted(file.get("state", ()), key=int)):
         groups[group] = SPATIAL_VIEWS if AXIAL in file[group] else VIEWS[GROUP_OF_STATES]

@@ -47,8 +47,7 @@ def read(directory: Path) -> dict[str, Any]:
     """Return the document of `directory`/result.json.
 
     Raises:
-        CaseError: it is missing, not JSON, no table or changed, or its layout is of another version than that
-            of this program.
+        CaseError: it is missing, not JSON, no table or changed, or its layout has another version.
     """
     path = Path(directory) / NAME
     try:
@@ -57,9 +56,9 @@ def read(directory: Path) -> dict[str, Any]:
         raise input_files.unreadable(path, error) from error
     except ValueError as error:
         raise CaseError(f"cannot read {path}: {error}") from error
-    found = document.get("schema", "none")
-    if found != SCHEMA:
-        raise CaseError(f"{path}: its schema is {found}, this program reads schema {SCHEMA}; run the case again")
+    entry = document.get("schema", "none")
+    if entry != SCHEMA:
+        raise CaseError(f"{path}: its schema is {entry}, this program reads schema {SCHEMA}; run the case again")
     return document
 
 
@@ -103,26 +102,26 @@ class DescribedColumn(NamedTuple):
 
 
 def columns(kind: type) -> Iterator[DescribedColumn]:
-    """Yield the columns that a record of this class fills: the reference table of its file."""
+    """Yield the columns that records of a class fill: the reference table of their file."""
     for name, description in _in_columns(kind).items():
         # Those in the plane are among those in space, in the same order.
         for component in description.spatial_components or _names(name, description):
-            words = f"{component}, {description.meaning}" if description.components else description.meaning
-            yield DescribedColumn(component, description.unit, words)
+            sentence = f"{component}, {description.meaning}" if description.components else description.meaning
+            yield DescribedColumn(component, description.unit, sentence)
 
 
 def write_csv(path: Path, points: Sequence[Any]) -> Path:
-    """Write records of one class, each in a row: numbers under their names, arrays under those of their components.
+    """Write records of one class as rows: numbers under their names, arrays under their component names.
 
-    What no record has, arrays without components and records in records have no column.  Call on one rank.
+    Empty columns, arrays without components and nested records are left out.  Call on one rank.
 
     Raises:
         FetiHomogError: the table cannot be written.
     """
     described = _in_columns(type(points[0])) if points else {}
     rows = [_row(point, described) for point in points]
-    there = {name for row in rows for name in row}
-    names = [column.name for column in columns(type(points[0])) if column.name in there] if rows else []
+    present = {name for row in rows for name in row}
+    names = [column.name for column in columns(type(points[0])) if column.name in present] if rows else []
 
     def write_rows(part: Path) -> None:
         with part.open("w", newline="", encoding="utf-8") as stream:
@@ -134,7 +133,7 @@ def write_csv(path: Path, points: Sequence[Any]) -> Path:
 
 
 def _names(name: str, description: Description) -> tuple[str, ...]:
-    """Return the columns of a field, of an array those of its components in the plane."""
+    """Return the columns of a field: its name, or its components in the plane."""
     return description.components or (name,)
 
 
@@ -150,7 +149,7 @@ def _row(point: Any, described: Mapping[str, Description]) -> dict[str, Any]:
 
 
 def _in_columns(kind: type) -> dict[str, Description]:
-    """Return the fields of a record that fill columns: numbers, and arrays whose components have names."""
+    """Return the record fields that fill columns: numbers, and arrays with named components."""
     hints = get_type_hints(kind)
-    found = {name: d for name, d in descriptions(kind).items() if d.components or not d.shape}
-    return {name: d for name, d in found.items() if not is_record(hints[name])}
+    entry = {name: d for name, d in descriptions(kind).items() if d.components or not d.shape}
+    return {name: d for name, d in entry.items() if not is_record(hints[name])}

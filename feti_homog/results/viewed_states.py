@@ -1,4 +1,4 @@
-"""States of result.h5 as viewers want them, with the fields that follow from those of the file, and as files of VTK.
+"""States of result.h5 for viewers, with derived fields, and as VTK files.
 
 VTK's file formats, .vtu, a file for each state, and .vtkhdf: https://docs.vtk.org/en/latest/vtk_file_formats.
 """
@@ -31,10 +31,10 @@ class ViewedState:
     """One state on its mesh: the cell, or the interface as points.
 
     Attributes:
-        points: (n, 3) places of the nodes; nodes are torn between subdomains.
-        cells: (m, 3 or 6) nodes of the triangles, mid-side nodes last; (k, 1) of the interface.
+        points: (n, 3) node positions; nodes are torn between subdomains.
+        cells: (m, 3 or 6) triangle nodes, mid-side nodes last; (k, 1) interface nodes.
         nodes, elements: arrays by name, with (n, ...) and (m, ...) rows; vectors have three columns, tensors nine.
-        label: that of the state.
+        label: state label.
     """
 
     points: Float
@@ -48,12 +48,12 @@ class ViewedState:
 
 
 def read_state(directory: str | Path, state: int = 0) -> ViewedState:
-    """Return a state of the cell in a folder of results.  Call on one rank.
+    """Return a state of the cell from a result folder.  Call on one rank.
 
     `nodes` has displacement and fluctuation, the periodic part of the displacement (length); `elements` stress and
     strain, tensors of means over the elements, S11, S22, S12, S33, von_mises and principal_1 to 3, the largest first
-    (stress), body, fibre_number, phase and subdomain.  Strains include thermal ones.  What the constants of a material
-    do not determine is NaN.
+    (stress), body, fibre_number, phase and subdomain.  Strains include thermal ones.  Values that the constants of a
+    material do not determine are NaN.
 
     Raises:
         CaseError: there is no result.h5, it cannot be read, or has no such state.
@@ -70,7 +70,7 @@ def read_state(directory: str | Path, state: int = 0) -> ViewedState:
 
 
 def cell_state(file: Any, state: int) -> ViewedState:
-    """Return a state of the cell of an open result.h5, as `read_state`."""
+    """Return a state of the cell from an open result.h5, as `read_state`."""
     group = file[f"state/{state}"]
     more = xdmf.SPATIAL_ELEMENTS if AXIAL_DISPLACEMENT in group else {}
     nodes, elements = (_tables(file, state, names) for names in (xdmf.CELL_NODES, xdmf.CELL_ELEMENTS | more))
@@ -95,7 +95,7 @@ def cell_state(file: Any, state: int) -> ViewedState:
 
 
 def interface_state(file: Any, state: int) -> ViewedState:
-    """Return a state of the interface nodes of an open result.h5: displacements of both faces, tractions, jumps."""
+    """Return a state of the interface nodes: displacements of both faces, tractions, jumps."""
     group = file[f"state/{state}"]
     more = xdmf.SPATIAL_POINTS if AXIAL_DISPLACEMENT in group else {}
     nodes = _tables(file, state, xdmf.INTERFACE_POINTS | more)
@@ -104,9 +104,9 @@ def interface_state(file: Any, state: int) -> ViewedState:
 
 
 def _tables(file: Any, state: int, places: Mapping[str, str]) -> dict[str, Array]:
-    """Return the tables of a state that the file has; those of earlier versions have fewer."""
-    found = {name: place.replace("/K/", f"/{state}/") for name, place in places.items()}
-    return {name: file[place][()] for name, place in found.items() if place in file}
+    """Return the tables of a state that exist; files from earlier versions have fewer."""
+    existing = {name: place.replace("/K/", f"/{state}/") for name, place in places.items()}
+    return {name: file[place][()] for name, place in existing.items() if place in file}
 
 
 def _in_space(points: Float) -> Float:
@@ -114,7 +114,7 @@ def _in_space(points: Float) -> Float:
 
 
 def _strains(points: Float, triangles: Array, displacement: Float, E33: Float) -> Float:
-    """(m, 9) means over the elements of the strains of displacements (n, 3), as tensors."""
+    """(m, 9) strain tensors of displacements (n, 3), averaged over elements."""
     every = np.arange(len(points), dtype=np.int32)
     E11, E22, gamma12 = element_strain(points, triangles, every, displacement[:, :2], PLANE)[0].T
     gamma13, gamma23 = element_strain(points, triangles, every, displacement[:, 2:], AXIAL)[0].T

@@ -1,8 +1,8 @@
-"""result.xdmf and interface.xdmf, by which ParaView finds in result.h5 the cell, the interface and their states.
+"""result.xdmf and interface.xdmf, by which ParaView reads cell, interface and states from result.h5.
 
-All of ParaView's and VTK's readers understand them: whole datasets alone, points with a connectivity, tensors of nine
-components, one collection a file.  The readers take no texts: the label of a state is the name of its block, which two
-of them show, and an array of the bytes of its letters, as many in all states.
+All readers in ParaView and VTK understand them: undivided datasets, points with a connectivity, tensors with nine
+components, one collection per file.  Readers take no texts: a state label is the name of its block, which two readers
+show, and an array with the bytes of its letters, equally long in all states.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ LISTED = {*CELL_ELEMENTS.values(), *INTERFACE_POINTS.values(), *SPATIAL_POINTS.v
 
 
 def _described(*shapes: str) -> dict[str, str]:
-    """Fields of a state that `field_layout` describes and that are not named above, under their own names."""
+    """Return state fields in `field_layout` that no table above names, under their own names."""
     fields = {name: d.shape for name, d in tables(StatePart).items() if f"state/K/{name}" not in LISTED}
     return {name: f"state/K/{name}" for name, shape in fields.items() if shape in shapes}
 
@@ -59,12 +59,10 @@ INTERFACE_POINTS |= _described("(k,)", "(k, 3)")
 
 
 def write(directory: Path) -> list[Path]:
-    """Write result.xdmf and, if there are interface nodes, interface.xdmf for the result.h5 of `directory`.
+    """Write result.xdmf and, with interface nodes, interface.xdmf for `directory`/result.h5; returns their paths.
 
-    Returns their paths. Call on one rank.
-
-    Each has one temporal collection, the time being the number of the state: of fields on the nodes and elements of the
-    cell, or of those at the points of the interface.
+    Each has one temporal collection with state numbers as times: fields on nodes and elements of the cell, or at
+    interface points.  Call on one rank.
 
     Raises:
         FetiHomogError: result.h5 cannot be read or a file cannot be written.
@@ -76,7 +74,7 @@ def write(directory: Path) -> list[Path]:
 
 
 def _write(path: Path, file: h5py.File) -> Path:
-    """Write one file: mesh and fields of each state of the cell, or of the interface."""
+    """Write one file: mesh and fields of each state, for the cell or the interface."""
     root = ET.Element("Xdmf", Version="3.0")
     name = "cell" if path.name == CELL else "interface"
     collection = ET.SubElement(
@@ -104,7 +102,7 @@ def _write(path: Path, file: h5py.File) -> Path:
 
 
 def _grid(collection: ET.Element, state: str, label: str) -> ET.Element:
-    """Return the grid of a state, in a collection of its own: readers pass on the name of a grid in such a one only."""
+    """Return the grid of a state, in its own collection: readers pass on grid names there alone."""
     block = ET.SubElement(collection, "Grid", Name=f"state {state}", GridType="Collection", CollectionType="Spatial")
     ET.SubElement(block, "Time", Value=state)
     return ET.SubElement(block, "Grid", Name=label, GridType="Uniform")

@@ -1,4 +1,4 @@
-"""`feti-homog export`: the material card of a folder of results, in the form of another program or as a table.
+"""`feti-homog export`: the material card of a result folder, for another program or as a table.
 
 Abaqus Keywords Guide, *ELASTIC and *EXPANSION: engineering constants are E1, E2, E3, nu12, nu13, nu23, G12, G13 and, on
 the next line, G23, where nu_ij is the strain along j under stress along i; TYPE=ANISOTROPIC takes the 21 entries
@@ -9,7 +9,7 @@ alpha23 are the tensor's shears, half of the engineering ones.
 
 ANSYS Material Reference, linear elasticity: PRXY, PRYZ, PRXZ are the major Poisson's ratios, PRXY = -eps_y/eps_x under
 stress along x; TB,ANEL takes the lower triangle of the stiffness (TBOPT = 0) by columns, in the order [x, y, z, xy, yz,
-xz] with engineering shears.  ALPX, ALPY, ALPZ are secant coefficients; there are none of shears.
+xz] with engineering shears.  ALPX, ALPY, ALPZ are secant coefficients; shears have none.
 
 MOOSE: ComputeElasticityTensor takes C_ijkl: of `symmetric9` in the order 1111 1122 1133 2222 2233 3333 2323 1313 1212,
 of `symmetric21` the upper triangle by rows in the order [11, 22, 33, 23, 13, 12].  ComputeEigenstrain takes the
@@ -193,8 +193,8 @@ def _rows(material: EffectiveMaterial) -> Iterator[tuple[str, float, str, str]]:
     C = material.stiffness
     for i, j in combinations_with_replacement(range(6), 2):
         digits = "".join(str(axis + 1) for axis in PAIRS[i])
-        words = f"stress {digits} under the unit strain {COMPONENTS[j]}"
-        yield f"C{i + 1}{j + 1}", float(C[i, j]), material.stress_unit, f"stiffness: {words}"
+        text = f"stress {digits} under the unit strain {COMPONENTS[j]}"
+        yield f"C{i + 1}{j + 1}", float(C[i, j]), material.stress_unit, f"stiffness: {text}"
 
 
 def _meaning(name: str, axes: list[int]) -> str:
@@ -220,7 +220,7 @@ SYMMETRIES: dict[str, Callable[[Mapping[str, Any]], EffectiveMaterial]] = {
 
 
 def card(directory: Path, form: str, symmetry: str) -> str:
-    """Return the card, in one of `FORMATS`, of the material of one of `SYMMETRIES` of the result in a folder.
+    """Return the card of a result folder in format `form` (`FORMATS`) and material symmetry `symmetry` (`SYMMETRIES`).
 
     Raises:
         CaseError: there is no such format or result, it is damaged, or it has no material that the format can carry;

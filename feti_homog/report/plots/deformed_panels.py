@@ -1,4 +1,4 @@
-"""The deformed cell at several states of an angle or path, side by side and as an animation, in one range of colour."""
+"""The deformed cell along an angle or path, side by side and animated, in one colour range."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ LOADS_IN_PANEL, LINE = 2, 0.15  # in a line of its title; inches of a line
 
 @dataclass(frozen=True)
 class DeformedCell(drawn_cell.DrawnCell):
-    """Data that all panels share."""
+    """A cell with the colours, scale and labels that all panels share."""
 
     component: str
     colours: tuple[Normalize, str, str]
@@ -44,15 +44,15 @@ class DeformedCell(drawn_cell.DrawnCell):
 
     @classmethod
     def of_states(cls, file: Any, numbers: Sequence[int], document: Document, scale: float, limit: int) -> DeformedCell:
-        """Return the stress that the case chooses, or that suits all these states, and one range of colours of all."""
+        """Choose a stress, by the case or to suit all states, and one colour range."""
         cell, states = drawn_cell.DrawnCell.of(file, limit), [file[f"state/{n}"] for n in numbers]
         component = plot_helpers.stress_component(document["case"]["output"].get("stress", "auto"), states)
-        words = marks(document) if reported(document).is_followed else {}
+        mark_of = marks(document) if reported(document).is_followed else {}
         # At the end, once all fibres have come off, stresses may be many times those of the peak.
-        marked = [state for state in states if words.get(int(state.attrs["point"]), "end") != "end"] or states
+        marked = [state for state in states if mark_of.get(int(state.attrs["point"]), "end") != "end"] or states
         stress = np.concatenate([plot_helpers.nodal_stress(state, component, cell.drawn) for state in marked])
         colours = plot_helpers.colour_range(stress, np.tile(cell.drawn.node_areas, len(marked)))
-        parts = vars(cell) | {"component": component, "colours": colours, "scale": scale, "marks": words}
+        parts = vars(cell) | {"component": component, "colours": colours, "scale": scale, "marks": mark_of}
         return cls(**parts, labels=drawn_cell.LoadLabels.of(document))
 
     def state(self, number: int) -> Any:
@@ -65,7 +65,7 @@ class DeformedCell(drawn_cell.DrawnCell):
         return places
 
     def draw(self, axes: Axes, number: int, moved: Array) -> Any:
-        """Draw the cell of a state, drawn nodes at `moved`; returns what a colour bar is of."""
+        """Draw the cell of a state with nodes at `moved` (p, 2); returns the coloured triangles."""
         state, (norm, colours, _) = self.state(number), self.colours
         stress = plot_helpers.nodal_stress(state, self.component, self.drawn)
         shapes = plot_helpers.shade_triangles(axes, self.drawn, moved, stress, norm, colours)
@@ -81,18 +81,18 @@ class DeformedCell(drawn_cell.DrawnCell):
         return shapes
 
     def bar(self, axes: Axes, shapes: Any, size: tuple[float, float] | None = None) -> None:
-        """Draw the colour bar of all states beside axes, of a cell in this size (inches), if it is known."""
+        """Draw the common colour bar beside axes; `size` is the drawn cell size (inches), if known."""
         bar = drawn_cell.bar_beside(axes, shapes, self.colours[2], size)
         bar.ax.tick_params(labelsize=8)
         bar.locator = MaxNLocator(6)
 
     def lines(self, number: int) -> int:
-        """Lines of the words for the load of a state."""
+        """Count the lines in the load label of a state."""
         return 1 + self.labels.label(self.state(number).attrs, LOADS_IN_PANEL).count("\n")
 
     @property
     def caption(self) -> str:
-        """Return what is drawn."""
+        """Stress symbol, unit and displacement scale in words."""
         scale = "true scale" if self.scale == 1 else f"displacement × {self.scale:g}"
         symbol = plot_helpers.STRESS_SYMBOLS[self.component]
         return f"${symbol}$ {plot_helpers.stress_label(self.file.attrs['stress_unit'])}, {scale}"
@@ -108,8 +108,7 @@ def draw_state(
 ) -> str:
     """Draw a state of `directory`/result.h5 into axes; returns the caption.
 
-    Colours are those from minus `most` to `most`, so that pictures beside each other have one scale; by default those
-    that suit the state.
+    Colours range from minus `most` to `most`, one scale for pictures side by side; by default they suit the state.
 
     `axes.get_legend_handles_labels()` has the marks of bonded, open and closed interfaces.
 
@@ -165,10 +164,10 @@ PANELS = {"angle": _angle, "path": _path}
 
 
 def shown_scale(file: Any, document: Document) -> float:
-    """Return the factor of displacements in all pictures of an angle or a path and in the report.
+    """Return the displacement factor for all pictures of an angle or a path.
 
-    It is that of the case or, by default, one at which the largest displacement and opening are seen and no triangle
-    turns over, but at least 1 under a given load.
+    The case may give it; by default the largest displacement and opening are visible and no triangle turns over, but
+    it is at least 1 under a load of the case.
     """
     chosen = document.get("case", {}).get("output", {}).get("deformation_scale")
     if chosen is not None:
@@ -206,29 +205,29 @@ def _side_by_side(file: Any, numbers: Sequence[int], document: Document, scale: 
     grid[0].autoscale_view()
     figure.suptitle(f"{plot_helpers.plain(file.attrs['title'])}: {cell.caption}".lstrip(": "), fontsize=11)
     states = [cell.interface.state(drawn_cell.states_of_nodes(cell.state(number))) for number in numbers]
-    found = np.unique(np.concatenate(states))
-    handles = drawn_cell.state_legend([kind for kind in drawn_cell.STATE_NAMES if kind in found])
+    present = np.unique(np.concatenate(states))
+    handles = drawn_cell.state_legend([kind for kind in drawn_cell.STATE_NAMES if kind in present])
     if handles:
         figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
     return figure
 
 
 def _inches(size: Array, width: float) -> tuple[float, float]:
-    """Width and height of a cell of this size (2,) in a picture: as wide as may be, but not higher than MOST_HEIGHT."""
+    """Inches of a drawn cell with sides `size` (2,): `width` wide, but at most MOST_HEIGHT high."""
     scale = min(width / size[0], MOST_HEIGHT / size[1])
     return float(scale * size[0]), float(scale * size[1])
 
 
 def _grid(panels: int, ratio: float) -> tuple[int, int]:
-    """Return rows and columns of panels of this ratio of width to height: about as wide as high, few places empty."""
-    wanted = min(math.sqrt(0.7 * panels * ratio), panels)
-    grids = [(rows, -(-panels // rows)) for rows in {max(1, math.floor(wanted)), math.ceil(wanted)}]
+    """Return rows and columns for panels with width / height `ratio`: about square, few places empty."""
+    ideal = min(math.sqrt(0.7 * panels * ratio), panels)
+    grids = [(rows, -(-panels // rows)) for rows in {max(1, math.floor(ideal)), math.ceil(ideal)}]
     grids = [grid for grid in grids if grid[1] <= MOST_COLUMNS] or grids
-    return min(grids, key=lambda grid: (grid[0] * grid[1] - panels, abs(grid[0] - wanted)))
+    return min(grids, key=lambda grid: (grid[0] * grid[1] - panels, abs(grid[0] - ideal)))
 
 
 def _animation(file: Any, numbers: Sequence[int], document: Document, scale: float, path: Path) -> Path:
-    """Frames of one layout, that of the last state."""
+    """Write the animation; all frames have the layout for the last state."""
     cell = DeformedCell.of_states(file, numbers, document, scale, FRAME_LIMIT)
     places = [cell.moved(number) for number in numbers]
     low, high = _corners(places)
@@ -253,7 +252,7 @@ def _animation(file: Any, numbers: Sequence[int], document: Document, scale: flo
 
 
 def _corners(places: Sequence[Array]) -> tuple[Array, Array]:
-    """Lower left and upper right corner of all states, with a margin."""
+    """Lower left and upper right corner around all states, with a margin."""
     low, high = np.min([p.min(axis=0) for p in places], axis=0), np.max([p.max(axis=0) for p in places], axis=0)
     margin = 0.02 * (high - low)
     return low - margin, high + margin

@@ -34,41 +34,41 @@ LONG = 2  # strains beyond which a label of a path has the leading one alone
 
 @dataclass(frozen=True)
 class InterfaceEdges:
-    """The drawn edges on fibre-matrix interfaces, those of either face, and the interface nodes at their ends."""
+    """Drawn edges on both faces of fibre-matrix interfaces, with the interface nodes at their ends."""
 
     edges: Array  # (e, 2) drawn nodes
     nodes: Array  # (e, 2) rows of /interface
 
     @classmethod
     def of(cls, file: Any, drawn: DrawnMesh, borders: Array) -> InterfaceEdges:
-        """Return those among the outlines of the bodies; /interface has one node for all its periodic images."""
+        """Find interface edges among the body outlines; /interface has one node for all its periodic images."""
         points, period = file["interface/points"][:], np.array([file.attrs["width"], file.attrs["height"]])
         if not len(points):
             return cls(borders[:0], borders[:0])
-        near = SAME_PLACE * float(period[0])
-        tree = cKDTree(_wrapped(points, period, near), boxsize=period * (1.0 + 1e-12))
-        ends = _wrapped(drawn.points[borders.ravel()], period, near)
-        distance, nearest = tree.query(ends, distance_upper_bound=2 * near)
-        there = np.isfinite(distance).reshape(-1, 2).all(axis=1)
-        return cls(borders[there], nearest.reshape(-1, 2)[there])
+        tolerance = SAME_PLACE * float(period[0])
+        tree = cKDTree(_wrapped(points, period, tolerance), boxsize=period * (1.0 + 1e-12))
+        ends = _wrapped(drawn.points[borders.ravel()], period, tolerance)
+        distance, nearest = tree.query(ends, distance_upper_bound=2 * tolerance)
+        is_present = np.isfinite(distance).reshape(-1, 2).all(axis=1)
+        return cls(borders[is_present], nearest.reshape(-1, 2)[is_present])
 
     def state(self, status: Array) -> Array:
-        """(e,) states of the edges for those of the nodes: open if an end is, else in contact or damaged if one is."""
+        """(e,) edge states from node states: open if an end is open, else in contact or damaged if an end is."""
         states: Array = ORDER[np.argsort(ORDER)[status[self.nodes]].max(axis=1, initial=0)]
         return states
 
     def mark(self, axes: Axes, points: Array, status: Array, magnified: float = 1.0) -> list[Line2D]:
-        """Draw the edges at the places (p, 2) of the drawn nodes; returns a legend of the states that there are."""
+        """Draw the edges with nodes at `points` (p, 2); returns legend lines for the states present."""
         states = self.state(status)
-        found = [kind for kind in STATE_NAMES if (states == kind).any()]
-        for kind in found:
+        present = [kind for kind in STATE_NAMES if (states == kind).any()]
+        for kind in present:
             segments = points[self.edges[states == kind]]
             cap: Literal["butt", "round"] = "butt" if kind == BONDED else "round"
             if kind != BONDED:
                 # Seen on every colour: magenta and orange are not, on red.
                 draw_segments(axes, segments, "white", magnified * (STATE_WIDTHS[kind] + HALO), cap)
             draw_segments(axes, segments, STATE_COLOURS[kind], magnified * STATE_WIDTHS[kind], cap)
-        return state_legend(found)
+        return state_legend(present)
 
 
 @dataclass(frozen=True)
@@ -82,14 +82,14 @@ class DrawnCell:
 
     @classmethod
     def of(cls, file: Any, limit: int = TRIANGLE_LIMIT) -> DrawnCell:
-        """Return that of a file, in about so many triangles at most."""
+        """Read a cell from an open result.h5 in at most about `limit` triangles."""
         drawn = drawn_mesh(file, limit)
         borders = outline_edges(drawn, drawn.body)
         return cls(file, drawn, borders, InterfaceEdges.of(file, drawn, borders))
 
 
 def states_of_nodes(state: Any) -> Array:
-    """(k,) states of the interface nodes in a group of result.h5: their status, DAMAGED of damaged bonds that hold."""
+    """(k,) interface node states in a group of result.h5: status, or DAMAGED for damaged bonds that hold."""
     status = state["status"][:]
     damage = state["damage"][:] if "damage" in state else np.zeros(len(status))
     nodes: Array = np.where((status == BONDED) & (damage > 0.0), DAMAGED, status)
@@ -100,16 +100,16 @@ def state_legend(kinds: list[int]) -> list[Line2D]:
     return [Line2D([], [], color=STATE_COLOURS[k], linewidth=STATE_WIDTHS[k], label=STATE_NAMES[k]) for k in kinds]
 
 
-def _wrapped(points: Array, period: Array, near: float) -> Array:
-    """Return the points' images in [0, period), those within `near` of the upper ends at 0."""
+def _wrapped(points: Array, period: Array, tolerance: float) -> Array:
+    """Return the points' images in [0, period); within `tolerance` below the period they are 0."""
     inside = np.mod(points, period)
-    inside[inside > period - near] = 0.0
+    inside[inside > period - tolerance] = 0.0
     wrapped: Array = inside
     return wrapped
 
 
 def figure_of(attributes: Any, panels: int, beside: float = 0.0) -> tuple[Figure, Sequence[Axes]]:
-    """Return a figure with panels for pictures of the cell, and so many inches beside them for a bar."""
+    """Return a figure with cell panels and `beside` inches for a colour bar."""
     width, height = cell_size(attributes)
     size = panels * (width + 0.7) + 0.1 + beside, max(height, LEAST_BAR[1]) + 1.2
     figure = Figure(figsize=size, layout="compressed")
@@ -138,9 +138,9 @@ def label_cell_axes(axes: Axes, attributes: Any) -> None:
 
 
 def bar_beside(axes: Axes, shapes: Any, extend: str, size: tuple[float, float] | None = None) -> Any:
-    """Return the colour bar of shapes, at the right of their axes.
+    """Return a colour bar for `shapes`, at the right of their axes.
 
-    `size` is that of the cell in the picture, inches: beside a narrow cell the bar is wider, beside a flat one higher.
+    `size`: drawn cell size (inches); beside a narrow cell the bar is wider, beside a flat one higher.
     """
     figure: Any = axes.figure
     width, height = BAR if size is None else np.maximum(np.divide(LEAST_BAR, size), BAR).tolist()
@@ -151,12 +151,12 @@ def bar_beside(axes: Axes, shapes: Any, extend: str, size: tuple[float, float] |
 
 @dataclass(frozen=True)
 class LoadLabels:
-    """Labels of the states of a result.
+    """Load labels for the states of a result.
 
     Attributes:
-        leading: the component that a path is about; None of others.
-        least_stress: stresses of a path up to which one is what is left of zero.
-        given: the load of analysis "load".
+        leading: component whose strain leads a path; None for other analyses.
+        least_stress: stresses up to this size are rounding.
+        given: load of analysis "load", by name.
     """
 
     leading: int | None = None
@@ -165,7 +165,7 @@ class LoadLabels:
 
     @classmethod
     def of(cls, document: Document) -> LoadLabels:
-        """Return those of a result.json."""
+        """Read leading component and load from a result.json."""
         analysis = reported(document)
         if analysis.is_followed:
             largest = np.abs([point["stress"] for point in document[analysis.name]]).max()
@@ -173,9 +173,9 @@ class LoadLabels:
         return cls(given=document["case"][analysis.name]["to"] if analysis.picture else None)
 
     def words(self, attributes: Any) -> list[str]:
-        """Return the strains that are seen, and the temperature, of a state with these attributes, as formulas.
+        """Return visible strains and temperature of a state as formulas.
 
-        Of a path on which many are seen the leading one and its stress; of a load what it gives.
+        A path with many strains has the leading one and its stress, a load the components it gives.
         """
         if self.given is not None:
             return [_formula(name, value) for name, value in self.given.items()]
@@ -192,9 +192,9 @@ class LoadLabels:
         return [_formula(name, value) for name, value in loads] or ["no strain"]
 
     def label(self, attributes: Any, in_line: int = 4) -> str:
-        """Join these words, so many in a line."""
-        words = self.words(attributes)
-        return ",\n".join(", ".join(words[k : k + in_line]) for k in range(0, len(words), in_line))
+        """Join the formulas of a state, `in_line` per line."""
+        formulas = self.words(attributes)
+        return ",\n".join(", ".join(formulas[k : k + in_line]) for k in range(0, len(formulas), in_line))
 
 
 def _formula(name: str, value: float) -> str:

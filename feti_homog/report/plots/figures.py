@@ -1,4 +1,4 @@
-"""The pictures of a result: the cell, the deformed cell of each load case, and those of an angle or path."""
+"""The pictures of a result: cell, deformed cell under each load, curves and panels of an angle or path."""
 
 from __future__ import annotations
 
@@ -39,18 +39,18 @@ IN_LEGEND = 2  # entries of a legend in a line: four are wider than a narrow cel
 
 
 def plot(directory: Path) -> list[Path]:
-    """Draws the pictures of `directory`/result.h5 and result.json beside them and returns their paths.
+    """Draw the pictures of a result folder beside its files; returns their paths.
 
-    - cell.png: materials; partition.png: parts of bodies; mesh_error.png: where the estimated error of the mesh is;
-    - of each load case case_E11.png, case_minus_E11.png, ... (unit strains), case_temperature.png or state_K.png;
-      that of the temperature expands freely if its expansion is known, else it is held;
+    - cell.png: materials; partition.png: body parts; mesh_error.png: estimated mesh error;
+    - each load: case_E11.png, case_minus_E11.png, ... (unit strains), case_temperature.png or state_K.png; under
+      temperature the cell expands freely if its expansion is known, else its strain is zero;
     - sensitivities.png, if the case asks for them;
-    - of `angle` angle.png and angle_states.png, of `path` path.png, path_states.png, path.gif and energy.png;
-    - of `load` load.png, of `envelope` envelope.png;
+    - `angle`: angle.png, angle_states.png; `path`: path.png, path_states.png, path.gif, energy.png;
+    - `load`: load.png; `envelope`: envelope.png;
     - interface.png, if some interface is debonded.
 
-    If there is a result.json, its case.output chooses the stress component (else that of the unit strain) and the
-    deformation scale. A case without fields has the curves alone. Call on one rank.
+    [output] of the case in result.json chooses stress component (default: by the unit strain) and deformation scale.
+    A case without fields has curves alone.  Call on one rank.
 
     Raises:
         FetiHomogError: result.h5 cannot be read, or a picture cannot be written.
@@ -68,26 +68,26 @@ def plot(directory: Path) -> list[Path]:
 
 def _output(document: Document) -> Document:
     """Return the section [output] of the case, empty without a result.json."""
-    found: Document = document.get("case", {}).get("output", {})
-    return found
+    entries: Document = document.get("case", {}).get("output", {})
+    return entries
 
 
 def _pictures(directory: Path, document: Document) -> list[Path]:
     """Return the pictures of result.h5."""
     with h5py.File(directory / field_file.NAME, "r") as file:
         cell = drawn_cell.DrawnCell.of(file)
-        found = {"cell": cell_picture.figure(cell), "partition": cell_picture.partition(cell)}
-        found |= {"mesh_error": error} if (error := cell_picture.mesh_error(cell)) is not None else {}
-        paths = [plot_helpers.save(figure, directory / f"{name}.png") for name, figure in found.items()]
+        entries = {"cell": cell_picture.figure(cell), "partition": cell_picture.partition(cell)}
+        entries |= {"mesh_error": error} if (error := cell_picture.mesh_error(cell)) is not None else {}
+        paths = [plot_helpers.save(figure, directory / f"{name}.png") for name, figure in entries.items()]
         if reported(document).is_curve:
             paths += deformed_panels.plot(directory, file, document)
         else:
             for number in sorted(file.get("state", ()), key=int):
                 state = file[f"state/{number}"]
                 draw = _sheared if is_axial(state) else _deformed
-                shown = decimation.FreeExpansion.of(state, document) or state
+                visible = decimation.FreeExpansion.of(state, document) or state
                 name = reported(document).picture or _name(number, state.attrs)
-                paths.append(plot_helpers.save(draw(cell, shown, document), directory / f"{name}.png"))
+                paths.append(plot_helpers.save(draw(cell, visible, document), directory / f"{name}.png"))
         return paths + traction_plots.plot(directory, cell, document)
 
 
@@ -128,15 +128,15 @@ def _deformed(cell: drawn_cell.DrawnCell, state: Any, document: Document) -> Fig
 
 
 def _sheared(cell: drawn_cell.DrawnCell, state: Any, document: Document) -> Figure:
-    """Return the cell with an axial stress in colour and lines of equal displacement along the fibres.
+    """Return the cell with an axial stress in colour and lines of equal axial displacement u_3.
 
-    That displacement moves nothing in the plane.
+    u_3 moves nothing in the plane.
     """
     attributes, points = cell.file.attrs, cell.drawn.points
     figure, axes = _coloured(cell, state, points, _output(document))
     step = draw_levels(axes, state, cell.drawn)
-    words = f"$u_3$ every {step:g} {plot_helpers.plain(attributes['length_unit'])}".rstrip()
-    _outlined(axes, cell, state, points, Line2D([], [], color=LEVEL_INK, linewidth=LEVEL_WIDTH, label=words))
+    caption = f"$u_3$ every {step:g} {plot_helpers.plain(attributes['length_unit'])}".rstrip()
+    _outlined(axes, cell, state, points, Line2D([], [], color=LEVEL_INK, linewidth=LEVEL_WIDTH, label=caption))
     axes.set_title(
         f"{plot_helpers.plain(attributes['title'])}\n{drawn_cell.LoadLabels.of(document).label(state.attrs)}".lstrip()
     )
@@ -144,7 +144,7 @@ def _sheared(cell: drawn_cell.DrawnCell, state: Any, document: Document) -> Figu
 
 
 def _coloured(cell: drawn_cell.DrawnCell, state: Any, moved: Array, output: Document) -> tuple[Figure, Axes]:
-    """Return the cell, its nodes at `moved`, in the colours of a stress."""
+    """Return the cell with nodes at `moved` (p, 2), coloured by a stress."""
     attributes, drawn = cell.file.attrs, cell.drawn
     figure, (axes,) = drawn_cell.figure_of(attributes, panels=1, beside=drawn_cell.BAR_INCHES)
     component = plot_helpers.stress_component(output.get("stress", "auto"), [state])
@@ -158,7 +158,7 @@ def _coloured(cell: drawn_cell.DrawnCell, state: Any, moved: Array, output: Docu
 
 
 def _outlined(axes: Axes, cell: drawn_cell.DrawnCell, state: Any, moved: Array, line: Line2D) -> None:
-    """Outlines of the bodies and the states of the interfaces, and a legend of them and of another line."""
+    """Draw body outlines and interface states, with a legend for both and for `line`."""
     plot_helpers.draw_segments(axes, moved[cell.borders], "black", 0.8)
     marks = cell.interface.mark(axes, moved, drawn_cell.states_of_nodes(state))
     drawn_cell.label_cell_axes(axes, cell.file.attrs)
@@ -170,25 +170,25 @@ def _outlined(axes: Axes, cell: drawn_cell.DrawnCell, state: Any, moved: Array, 
 def is_axial(state: Any) -> bool:
     """Return whether a state shears the cell along the fibres alone."""
     strain = state.attrs["strain"]
-    others = [*strain[[0, 1, -1]], strain[2], state.attrs["temperature"]] if len(strain) > 3 else strain
-    return not np.any(others) and bool(np.any(strain))
+    components = [*strain[[0, 1, -1]], strain[2], state.attrs["temperature"]] if len(strain) > 3 else strain
+    return not np.any(components) and bool(np.any(strain))
 
 
 def draw_levels(axes: Axes, state: Any, drawn: decimation.DrawnMesh) -> float:
-    """Draw lines of equal displacement along the fibres; returns the step between them."""
+    """Draw lines of equal axial displacement; returns the step between them."""
     displacement: Array = decimation.nodal_values(state["axial_displacement"], drawn)
-    least, most = float(displacement.min()), float(displacement.max())
-    step = round_step((most - least) / LEVELS)
-    levels = step * np.arange(math.ceil(least / step), math.floor(most / step) + 1)
+    low, high = float(displacement.min()), float(displacement.max())
+    step = round_step((high - low) / LEVELS)
+    levels = step * np.arange(math.ceil(low / step), math.floor(high / step) + 1)
     x, y = drawn.points.T
     mesh = Triangulation(x, y, drawn.triangles)
     axes.tricontour(mesh, displacement, levels=levels, colors=LEVEL_INK, linewidths=LEVEL_WIDTH, linestyles="solid")
     return step
 
 
-def round_step(wanted: float) -> float:
+def round_step(ideal: float) -> float:
     """1, 2 or 5 times a power of ten, not less than wanted."""
-    if wanted <= 0.0:
+    if ideal <= 0.0:
         return 1.0
-    power = 10.0 ** math.floor(math.log10(wanted))
-    return power * next(factor for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= wanted * (1 - 1e-9))
+    power = 10.0 ** math.floor(math.log10(ideal))
+    return power * next(factor for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= ideal * (1 - 1e-9))

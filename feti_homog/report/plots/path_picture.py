@@ -1,6 +1,6 @@
-"""path.png and energy.png: stresses, states of the interface and energies along a path.
+"""path.png and energy.png: stresses, interface states and energies along a path.
 
-Numbers of points stand in free places beside the curves, where they hide nothing.
+Point numbers stand in free places beside the curves.
 """
 
 from __future__ import annotations
@@ -41,26 +41,26 @@ AREAS = {
 
 
 def figure(document: Document) -> Figure:
-    """Stresses against the leading strain.
+    """Draw stresses against the leading strain.
 
-    Below, they and the numbers of bonded, open and closed nodes against the number of the point, for the first folds
-    back. Some points are numbered in all three.
+    Below: stresses, and counts of bonded, open and closed nodes, against point numbers, as the first curve folds back.
+    Some points are numbered in all three.
     """
     points, case = document["path"], document["case"]
-    component, shown = path_curves.leading_component(document), path_curves.shown_stresses(document)
+    component, components = path_curves.leading_component(document), path_curves.shown_stresses(document)
     strains, stress = (np.array([point[name] for point in points]) for name in ("strain", "stress"))
     strain = strains[:, component]
     style: dict[str, Any] = {"marker": "o", "markersize": 2.5} if len(points) <= MARKED_POINTS else {}
     picture = Figure(figsize=(7.2, 8.0), layout="constrained")
     upper, middle, lower = picture.subplots(3, 1, height_ratios=(2.2, 1, 1))
     middle.sharex(lower)
-    _stress_curves(upper, document, strain, shown, style)
+    _stress_curves(upper, document, strain, components, style)
     upper.set_ylabel(f"macroscopic stress {plot_helpers.stress_unit(case)}")
     upper.set_xlabel(f"macroscopic strain ${plot_helpers.SYMBOLS[voigt_names(strains.shape[1])[0][component]]}$")
     upper.set_title(
         "\n".join([plot_helpers.title_of(case, f"plane {case['analysis']['plane']}"), *plot_helpers.bond_limits(case)])
     )
-    for number in shown:
+    for number in components:
         middle.plot(stress[:, number], color=plot_helpers.INK[number], linewidth=1.2, **style)
     if any(point.get("temperature") for point in points):
         changes = [point["temperature"] for point in points]
@@ -70,13 +70,13 @@ def figure(document: Document) -> Figure:
     _count_curves(lower, points, style)
     lower.set_xlabel("number of the point, in the order of the path")
     # The panels of path_states.png show the same points.
-    kept = landmarks.kept_points(document)
-    numbers = [kept[state] for state in landmarks.landmark_states(document, NUMBERED_POINTS, len(kept))]
+    by_state = landmarks.kept_points(document)
+    numbers = [by_state[state] for state in landmarks.landmark_states(document, NUMBERED_POINTS, len(by_state))]
     curve = np.stack([strain, stress[:, component]], axis=1)
     peak, unit = peak_of(document), case.get("output", {}).get("stress_unit", "")
-    words = f"{name_of(document, peak)} {peak['stress']:.4g} {plot_helpers.plain(unit)}".rstrip()
+    caption = f"{name_of(document, peak)} {peak['stress']:.4g} {plot_helpers.plain(unit)}".rstrip()
     star: dict[str, Any] = {"markersize": 11, "markeredgecolor": "white", "zorder": 5, "linestyle": "none"}
-    upper.plot(peak["strain"], peak["stress"], "*", color=plot_helpers.INK[component], **star, label=words)
+    upper.plot(peak["strain"], peak["stress"], "*", color=plot_helpers.INK[component], **star, label=caption)
     for axes in (upper, middle, lower):
         axes.axhline(0.0, color="0.6", linewidth=0.6, zorder=0)
         plot_helpers.finish_curves(axes)
@@ -86,15 +86,15 @@ def figure(document: Document) -> Figure:
 
 
 def _stress_curves(
-    axes: Axes, document: Document, strain: Array, shown: Sequence[int], style: Mapping[str, Any]
+    axes: Axes, document: Document, strain: Array, components: Sequence[int], style: Mapping[str, Any]
 ) -> None:
-    """Draw the first leg with its snap-back, and thick the response to a controlled load on all legs."""
+    """Draw the first leg with its snap-back; thick lines: the response to a controlled load, on all legs."""
     points, first = document["path"], path_curves.first_leg(document)
     stress = np.array([point["stress"] for point in points])
     names = voigt_names(stress.shape[1])[1]
     rising = path_curves.load_controlled(points[:first]) if document["case"]["path"]["method"] == "events" else None
     along = stress.shape[1] + path_curves.leading_component(document)
-    for i in shown:
+    for i in components:
         name, ink = plot_helpers.SYMBOLS[names[i]], plot_helpers.INK[i]
         thin: dict[str, Any] = {"label": f"${name}$", "linewidth": 1.4} if rising is None else {"linewidth": 0.8}
         from_zero = np.append(0.0, strain[:first]), np.append(0.0, stress[:first, i])
@@ -113,7 +113,7 @@ def _stress_curves(
 
 
 def _damaged_length(axes: Axes, document: Document, style: Mapping[str, Any]) -> None:
-    """Draw the length of bonds that are damaged but hold, of laws that soften, on its own axis."""
+    """Draw the length of damaged bonds that hold, by softening laws, on an axis of its own."""
     if "damaged_length" in document["path"][0]:
         unit = plot_helpers.unit_label(document["case"].get("output", {}).get("length_unit", ""))
         lengths = [sum(point["damaged_length"]) for point in document["path"]]
@@ -122,17 +122,17 @@ def _damaged_length(axes: Axes, document: Document, style: Mapping[str, Any]) ->
 
 
 def _beside(axes: Axes, values: Sequence[float], label: str, style: Mapping[str, Any]) -> None:
-    """Draw values along a path on an axis at the right."""
-    beside = axes.twinx()
-    beside.plot(values, color="0.5", linestyle="--", linewidth=1.0, **style)
-    beside.axhline(0.0, linestyle="none")  # from which they are measured
-    beside.set_ylabel(label, color="0.4", fontsize=8)
-    beside.tick_params(colors="0.4", labelsize=8)
-    beside.spines["top"].set_visible(False)
+    """Draw values along a path, on an axis at the right."""
+    right = axes.twinx()
+    right.plot(values, color="0.5", linestyle="--", linewidth=1.0, **style)
+    right.axhline(0.0, linestyle="none")  # from which they are measured
+    right.set_ylabel(label, color="0.4", fontsize=8)
+    right.tick_params(colors="0.4", labelsize=8)
+    right.spines["top"].set_visible(False)
 
 
 def _count_curves(axes: Axes, points: Sequence[Mapping[str, Any]], style: Mapping[str, Any]) -> None:
-    """Numbers of bonded, open and closed nodes."""
+    """Draw counts of bonded, open and closed nodes."""
     for kind, key in STATES.items():
         ink = "0.2" if kind == drawn_cell.BONDED else drawn_cell.STATE_COLOURS[kind]
         label = drawn_cell.STATE_NAMES[kind]
@@ -142,7 +142,7 @@ def _count_curves(axes: Axes, points: Sequence[Mapping[str, Any]], style: Mappin
 
 
 def _number_points(upper: Axes, below: Sequence[Axes], curve: Array, numbers: Sequence[int], ink: str) -> None:
-    """Draw the numbers of some points of a curve (points, 2), arrows in its ink, and lines at their numbers below."""
+    """Write point numbers along a curve (points, 2), with arrows in its ink and lines in the panels below."""
     style: dict[str, Any] = {"color": "0.3", "fontsize": 7, "ha": "center", "va": "center"}
     pointer: dict[str, Any] = {"arrowstyle": "-", "color": "0.3", "linewidth": 0.5, "shrinkA": 0, "shrinkB": 2}
     span, level = max(len(curve) - 1, 1), 0
@@ -160,7 +160,7 @@ def _number_points(upper: Axes, below: Sequence[Axes], curve: Array, numbers: Se
 
 
 def _direction_marks(curve: Array) -> list[tuple[Array, Array]]:
-    """Return starts and ends of arrows on a curve (points, 2): in the middles of its longest steps, and few."""
+    """Return starts and ends of at most ARROWS arrows, in the middle of the longest curve steps."""
     steps = np.diff(np.vstack([np.zeros(2), curve]), axis=0)
     extent = np.ptp(np.vstack([np.zeros(2), curve]), axis=0)
     length = np.linalg.norm(steps / np.where(extent > 0.0, extent, 1.0), axis=1)
@@ -171,32 +171,34 @@ def _direction_marks(curve: Array) -> list[tuple[Array, Array]]:
 
 
 def free_offsets(axes: Axes, points: Array) -> list[tuple[int, int]]:
-    """Return an offset of the number of each point (k, 2), where neither a curve nor another number is, if there is.
+    """Return an offset for each point number (k, 2), if possible clear of curves and other numbers.
 
     The limits of the axes are final afterwards.
     """
     axes.set_ylim(axes.get_ylim())
     to_print = POINTS_PER_INCH / axes.figure.dpi
-    taken = np.vstack([_samples(line.get_transform().transform(line.get_xydata())) for line in axes.lines]) * to_print
+    occupied = (
+        np.vstack([_samples(line.get_transform().transform(line.get_xydata())) for line in axes.lines]) * to_print
+    )
     corners = axes.get_window_extent().get_points() * to_print
     chosen = []
     for place in axes.transData.transform(points) * to_print:
-        crowds = [_crowd(place + offset, taken, corners) for offset in OFFSETS]
+        crowds = [_crowd(place + offset, occupied, corners) for offset in OFFSETS]
         chosen.append(OFFSETS[int(np.argmin(crowds))])
         number = place + chosen[-1]
-        taken = np.vstack([taken, number + ROOM * np.array([[-1, 0], [0, 0], [1, 0]])])
+        occupied = np.vstack([occupied, number + ROOM * np.array([[-1, 0], [0, 0], [1, 0]])])
     return chosen
 
 
-def _crowd(centre: Array, taken: Array, corners: Array) -> float:
-    """Return how many of the places that are taken (n, 2) lie in the room around a centre; inf outside the axes."""
+def _crowd(centre: Array, occupied: Array, corners: Array) -> float:
+    """Count occupied places (n, 2) in the room around a centre; inf outside the axes."""
     if (centre - ROOM < corners[0]).any() or (centre + ROOM > corners[1]).any():
         return np.inf
-    return float((np.abs(taken - centre) <= ROOM).all(axis=1).sum())
+    return float((np.abs(occupied - centre) <= ROOM).all(axis=1).sum())
 
 
 def _samples(line: Array) -> Array:
-    """Return points along a line (n, 2), evenly spaced."""
+    """Return evenly spaced points along a line (n, 2)."""
     line = line[np.isfinite(line).all(axis=1)]
     if len(line) < 2:
         return line
@@ -206,7 +208,7 @@ def _samples(line: Array) -> Array:
 
 
 def energies(document: Document) -> Figure | None:
-    """Return the energies per area along a path, stacked over the position on it; None of results without them."""
+    """Draw energies per area, stacked over the path position; None for results without energies."""
     stack = path_curves.energies(document)
     if stack is None:
         return None

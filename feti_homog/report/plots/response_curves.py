@@ -1,4 +1,4 @@
-"""Pictures of the numbers of result.json: angle.png, envelope.png and sensitivities.png; of paths by `path_picture`."""
+"""Pictures from numbers in result.json: angle.png, envelope.png, sensitivities.png; `path_picture` draws paths."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def plot(directory: Path, document: Document) -> list[Path]:
 
 
 def angle(document: Document) -> Figure:
-    """Stiffnesses or stresses against the debonding angle."""
+    """Draw stiffnesses or stresses against the debonding angle."""
     points, case = document["angle"], document["case"]
     stiff = "stiffness" in points[0]
     figure = Figure(figsize=(6.4, 4.2), layout="constrained")
@@ -64,7 +64,7 @@ def angle(document: Document) -> Figure:
 
 
 def _angle_columns(points: Sequence[Document], stiff: bool) -> list[tuple[str, Array]]:
-    """Each curve's name and its values (points,)."""
+    """Return name and values (points,) for each curve."""
     if not stiff:
         stress = np.array([point["stress"] for point in points])
         return list(zip((plot_helpers.SYMBOLS[name] for name in STRESSES), stress.T, strict=True))
@@ -73,17 +73,17 @@ def _angle_columns(points: Sequence[Document], stiff: bool) -> list[tuple[str, A
 
 
 def envelope(document: Document) -> Figure:
-    """Return the curve, with equal axes, in the colours of the mode in which the first bond breaks."""
+    """Draw the onset curve with equal axes, coloured by the mode of the first break."""
     case, points = document["case"], document["envelope"]
-    plane, known = case["envelope"]["plane"], [point for point in points if "factor" in point]
+    plane, broken = case["envelope"]["plane"], [point for point in points if "factor" in point]
     picture = Figure(figsize=(6.6, 5.6), layout="constrained")
     axes = picture.subplots()
     axes.axhline(0.0, color="0.45", linewidth=0.8, zorder=1)
     axes.axvline(0.0, color="0.45", linewidth=0.8, zorder=1)
     places, temperature = loads(points), case["envelope"].get("temperature")
     notes = [] if temperature is None else [f"$\\Delta T = {{{temperature:g}}}$ first"]
-    notes += [f"no onset in {rest} directions"] if (rest := len(points) - len(known)) else []
-    if known:
+    notes += [f"no onset in {rest} directions"] if (rest := len(points) - len(broken)) else []
+    if broken:
         drawn = _curve(axes, places, modes(points))
         bar = picture.colorbar(drawn, ax=axes, location="bottom", shrink=0.6, aspect=30)
         bar.set_ticks([0, 30, 60, 90], labels=["0, opens", "30", "60", "90, shears"])
@@ -104,14 +104,14 @@ def envelope(document: Document) -> Figure:
 
 
 def loads(points: Sequence[Document]) -> Array:
-    """(n, 2) the two components at onset, NaN where there is none."""
+    """(n, 2) both components at onset, NaN for directions without one."""
     angle = np.radians([point["angle"] for point in points])
     factor = np.array([point.get("factor", np.nan) for point in points])
     return np.asarray(factor[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1))
 
 
 def modes(points: Sequence[Document]) -> Array:
-    """(n,) degrees, 0 opens and 90 shears: psi, or of strengths by the shares that are used; NaN without an onset."""
+    """(n,) mode in degrees, 0 opens and 90 shears: psi, or by the used shares of strengths; NaN without onset."""
     if any("psi" in point for point in points):
         return np.array([point.get("psi", np.nan) for point in points])
     normal, tangential, axial = (
@@ -122,13 +122,13 @@ def modes(points: Sequence[Document]) -> Array:
 
 
 def _curve(axes: Axes, places: Array, mode: Array) -> LineCollection:
-    """Return the closed curve through the loads (n, 2), open where there is no onset."""
+    """Draw the closed curve through the loads (n, 2), open where directions have no onset."""
     ends = np.roll(places, -1, axis=0)
-    whole = ~np.isnan(places[:, 0]) & ~np.isnan(ends[:, 0])
-    if whole.all():
+    joined = ~np.isnan(places[:, 0]) & ~np.isnan(ends[:, 0])
+    if joined.all():
         axes.fill(places[:, 0], places[:, 1], color="0.96", zorder=0)
-    lines = LineCollection(list(np.stack([places, ends], axis=1)[whole]), linewidths=2.2, cmap="viridis")
-    lines.set_array((mode + np.roll(mode, -1))[whole] / 2)
+    lines = LineCollection(list(np.stack([places, ends], axis=1)[joined]), linewidths=2.2, cmap="viridis")
+    lines.set_array((mode + np.roll(mode, -1))[joined] / 2)
     lines.set_clim(0.0, 90.0)
     axes.add_collection(lines)
     if len(places) <= MARKED:
@@ -137,16 +137,13 @@ def _curve(axes: Axes, places: Array, mode: Array) -> LineCollection:
 
 
 def _limit(axes: Axes, places: Array) -> list[str]:
-    """Let the axes hold all loads (n, 2), or those that are not far away from the others, and zero.
-
-    What is not shown, in words.
-    """
+    """Limit the axes to zero and loads (n, 2) not far beyond the median; returns a note on hidden loads."""
     size = np.linalg.norm(places, axis=1)
     usual = float(np.median(size))
     far = size > FARTHEST * usual
     beyond = places[far] / np.where(size > 0.0, size, 1.0)[far, None] * SHOWN * usual
-    shown = np.concatenate([places[~far], beyond, np.zeros((1, 2))])
-    low, high = shown.min(axis=0), shown.max(axis=0)
+    visible = np.concatenate([places[~far], beyond, np.zeros((1, 2))])
+    low, high = visible.min(axis=0), visible.max(axis=0)
     middle, half = (low + high) / 2, MARGIN * (high - low) / 2
     half = np.maximum(half, 0.05 * half.max() or 1.0)
     axes.set_xlim(middle[0] - half[0], middle[0] + half[0])
@@ -155,21 +152,23 @@ def _limit(axes: Axes, places: Array) -> list[str]:
 
 
 def sensitivities(document: Document) -> Figure | None:
-    """Return the elasticities d ln c / d ln p, a row for each p and a column for each c; None without sensitivities."""
+    """Draw elasticities d ln c / d ln p, rows p and columns c; None without sensitivities."""
     tables = constant_tables.sensitivities(document)
     if not tables or not tables[0].rows:
         return None
     names = [plot_helpers.plain(str(row[0])) for row in tables[0].rows]
     values = np.array([[np.nan if isinstance(entry, str) else entry for entry in row[1:]] for row in tables[0].rows])
-    left = 0.4 + LETTER * max(map(len, names))
-    size = left + CELL[0] * values.shape[1] + 1.2, 1.4 + CELL[1] * len(names)
+    names_width = 0.4 + LETTER * max(map(len, names))
+    size = names_width + CELL[0] * values.shape[1] + 1.2, 1.4 + CELL[1] * len(names)
     picture = Figure(figsize=size, layout="constrained")
     axes = picture.subplots()
-    most = max(float(np.abs(values[np.isfinite(values)]).max(initial=0.0)), FAINTEST)
-    image = axes.imshow(values, cmap="RdBu_r", norm=Normalize(-most, most), aspect="auto")
+    highest = max(float(np.abs(values[np.isfinite(values)]).max(initial=0.0)), FAINTEST)
+    image = axes.imshow(values, cmap="RdBu_r", norm=Normalize(-highest, highest), aspect="auto")
     for (row, column), value in np.ndenumerate(values):
-        words = "-" if np.isnan(value) else f"{value:.2f}" if abs(value) >= FAINTEST else ""
-        axes.text(column, row, words, ha="center", va="center", color="white" if abs(value) > DARK * most else "black")
+        text = "-" if np.isnan(value) else f"{value:.2f}" if abs(value) >= FAINTEST else ""
+        axes.text(
+            column, row, text, ha="center", va="center", color="white" if abs(value) > DARK * highest else "black"
+        )
     heads = [column.name.replace("_", "_\n") for column in tables[0].columns[1:]]
     axes.set_xticks(range(values.shape[1]), heads)
     axes.set_yticks(range(len(names)), names)

@@ -34,8 +34,7 @@ NAMES = {"traction": (r"$t_\mathrm{n}$", r"$t_\mathrm{t}$", r"$t_\mathrm{a}$"), 
 def plot(directory: Path, cell: drawn_cell.DrawnCell, document: Document) -> list[Path]:
     """Draw interface.png, if any state has debonded nodes.
 
-    It shows, of a path, the state of its peak, dashed, and the valley after it or the last that shows much, else one
-    state.
+    A path shows its peak, dashed, and the valley after it or a late state; other analyses one state.
     """
     file = cell.file
     names = sorted(file.get("state", ()), key=int)
@@ -50,16 +49,18 @@ def plot(directory: Path, cell: drawn_cell.DrawnCell, document: Document) -> lis
     # After all bonds are gone there is not much left to see, unless the faces touch.
     last = next((n for n in reversed(names) if 0 < debonded[n] < total or touches(n)), names[-1])
     partly = [name for name in names if 0 < debonded[name] < total]
-    shown = (
+    names_drawn = (
         _around_the_peak(file, names, last, document)
         if reported(document).is_followed
         else [(partly or [last])[len(partly) // 2]]
     )
-    return [plot_helpers.save(_figure(cell, shown, drawn_cell.LoadLabels.of(document)), directory / "interface.png")]
+    return [
+        plot_helpers.save(_figure(cell, names_drawn, drawn_cell.LoadLabels.of(document)), directory / "interface.png")
+    ]
 
 
 def _around_the_peak(file: Any, names: list[str], last: str, document: Document) -> list[str]:
-    """Return the states at the peak of a path, or the first, and in the valley after it, or the `last`."""
+    """Return the states at the peak, or the first, and in the valley after it, or the `last`."""
     of_point = {int(file[f"state/{name}"].attrs["point"]): name for name in names}
     peak = peak_of(document)
     before, after = of_point.get(peak["event"], names[0]), of_point.get(peak.get("event_left", -1), last)
@@ -68,7 +69,7 @@ def _around_the_peak(file: Any, names: list[str], last: str, document: Document)
 
 
 def _figure(cell: drawn_cell.DrawnCell, names: list[str], labels: drawn_cell.LoadLabels) -> Figure:
-    """Return a row for each of the fibres that are most debonded: tractions, and jumps."""
+    """Draw tractions and jumps around the most debonded fibres, a row each."""
     file = cell.file
     fibre, status = file["interface/fibre"][:], file[f"state/{names[-1]}/status"][:]
     bodies, count = np.unique(fibre[status != drawn_cell.BONDED], return_counts=True)
@@ -101,7 +102,7 @@ def _figure(cell: drawn_cell.DrawnCell, names: list[str], labels: drawn_cell.Loa
 
 
 def _clip_spikes(axes: Axes, curves: list[Any]) -> None:
-    """Limit the range, which axes share, where a few nodes at singular tips are beyond all others."""
+    """Limit the shared range where a few nodes at singular tips exceed all others."""
     values = np.concatenate([np.asarray(curve, float) for curve in curves])
     low, high = np.percentile(values, (SPIKES, 100.0 - SPIKES))
     room = SPIKE_ROOM * (high - low)
@@ -115,7 +116,7 @@ def _name(file: Any, body: int, place: Coordinate) -> str:
 
 
 def _values(state: Any, quantity: str) -> Array:
-    """(k, 2) tractions or jumps, or (k, 3) if there are any along the fibres."""
+    """(k, 2) tractions or jumps; (k, 3) with components along the fibres."""
     values: Array = state[quantity][:]
     if f"axial_{quantity}" not in state or not (axial := state[f"axial_{quantity}"][:]).any():
         return values
@@ -123,7 +124,7 @@ def _values(state: Any, quantity: str) -> Array:
 
 
 def _curves(axes: Axes, quantity: str, place: Coordinate, values: Array, last: bool) -> None:
-    """Draw the values at the nodes of a fibre, as a closed curve if the nodes surround it."""
+    """Draw nodal values (k, 2 or 3) around a fibre, as a closed curve if nodes surround it."""
     at, turn = place.values, place.ends[1] - place.ends[0]
     if place.ends == DEGREES and len(at) > 1 and at[0] + turn - at[-1] < MOST_UNEVEN * np.diff(at).max():
         at, values = (
@@ -136,7 +137,7 @@ def _curves(axes: Axes, quantity: str, place: Coordinate, values: Array, last: b
 
 
 def _shade(axes: Axes, place: Coordinate, status: Array) -> None:
-    """Mark the debonded parts of the last state; each node stands for half the distance to its neighbours."""
+    """Shade debonded parts in the last state; each node stands for half the distance to its neighbours."""
     middle = (place.values[1:] + place.values[:-1]) / 2
     edges = np.concatenate([[place.ends[0]], middle, [place.ends[1]]])
     for kind in (drawn_cell.OPEN, drawn_cell.CLOSED):
@@ -161,7 +162,7 @@ def _labels(file: Any, figure: Figure, grid: Any, shaded: Array) -> None:
 
 
 def _title(file: Any, names: list[str], labels: drawn_cell.LoadLabels) -> str:
-    """Return the last state and, of more, the first."""
+    """Describe the last state and, if different, the first."""
     first, last = (file[f"state/{name}"].attrs for name in (names[0], names[-1]))
     title = f"{last['label']}: {labels.label(last, LOADS_IN_LINE)}"
     if len(names) > 1:
@@ -171,7 +172,7 @@ def _title(file: Any, names: list[str], labels: drawn_cell.LoadLabels) -> str:
 
 @dataclass(frozen=True)
 class Coordinate:
-    """The nodes of a fibre in the order of their place along it."""
+    """Interface nodes in order along a fibre outline."""
 
     nodes: Array  # (k,) rows of /interface
     values: Array  # (k,) ascending
@@ -180,29 +181,29 @@ class Coordinate:
 
 
 def coordinate(cell: drawn_cell.DrawnCell, body: int) -> Coordinate:
-    """Direction of the normal, in degrees, of a body that is a round fibre, or its coating.
+    """Return the coordinate along a body outline: on round fibres and their coatings the normal direction (degrees).
 
-    Of any other the arc length, counterclockwise from where the normal is nearest to x1 (around each of its boundaries,
-    if it has several, one after the other).
+    Other bodies have the arc length, counterclockwise from the node whose normal is nearest to x1; several boundaries
+    follow each other.
     """
     file, edges = cell.file, cell.interface.nodes
-    own = np.flatnonzero(file["interface/fibre"][:] == body)
+    of_body = np.flatnonzero(file["interface/fibre"][:] == body)
     normal = file["interface/normal"][:]
-    radius = file["fibre/radius"][:][np.isin(file["fibre/number"][:], file["interface/fibre_number"][:][own])]
+    radius = file["fibre/radius"][:][np.isin(file["fibre/number"][:], file["interface/fibre_number"][:][of_body])]
     if np.isfinite(radius).all():
-        angle = np.degrees(np.arctan2(normal[own, 1], normal[own, 0]))
+        angle = np.degrees(np.arctan2(normal[of_body, 1], normal[of_body, 0]))
         order = np.argsort(angle)
-        return Coordinate(own[order], angle[order], DEGREES, "direction of the normal (degrees)")
+        return Coordinate(of_body[order], angle[order], DEGREES, "direction of the normal (degrees)")
     period = np.array([file.attrs["width"], file.attrs["height"]])
-    chain = np.unique(np.sort(edges[np.isin(edges, own).all(axis=1)], axis=1), axis=0)
-    length, total = _arc_length(file["interface/points"][:], normal, own, chain, period)
+    chain = np.unique(np.sort(edges[np.isin(edges, of_body).all(axis=1)], axis=1), axis=0)
+    length, total = _arc_length(file["interface/points"][:], normal, of_body, chain, period)
     order = np.argsort(length, kind="stable")
     unit = file.attrs["length_unit"] or "cell units"
-    return Coordinate(own[order], length[order], (0.0, total), f"arc length, counterclockwise ({unit})")
+    return Coordinate(of_body[order], length[order], (0.0, total), f"arc length, counterclockwise ({unit})")
 
 
-def _arc_length(points: Array, normal: Array, own: Array, chain: Array, period: Array) -> tuple[Array, float]:
-    """(k,) arc length of the nodes `own`, and that of all boundaries, which the edges (e, 2) of a coarse mesh make."""
+def _arc_length(points: Array, normal: Array, of_body: Array, chain: Array, period: Array) -> tuple[Array, float]:
+    """(k,) arc length of nodes `of_body`, and the total length of all boundaries; `chain`: boundary edges (e, 2)."""
     starts, steps, before, total = [], [], [], 0.0
     for line in _lines(chain, normal, points, period):
         sides = _shortest(np.diff(points[line], axis=0), period)
@@ -211,14 +212,13 @@ def _arc_length(points: Array, normal: Array, own: Array, chain: Array, period: 
         steps.append(sides)
         before.append(np.append(total, ends[:-1]))
         total = float(ends[-1])
-    return _along(points[own], np.concatenate(starts), np.concatenate(steps), np.concatenate(before), period), total
+    return _along(points[of_body], np.concatenate(starts), np.concatenate(steps), np.concatenate(before), period), total
 
 
 def _lines(chain: Array, normal: Array, points: Array, period: Array) -> list[Array]:
-    """Return the boundaries that edges make, each as its nodes in counterclockwise order.
+    """Chain edges (e, 2) to boundaries, each a counterclockwise node list.
 
-    Of a closed one the first node comes again at the end. It begins where the normal is nearest to x1, or at its end if
-    it is open.
+    A closed boundary repeats its first node, whose normal is nearest to x1; an open one begins at an end.
     """
     vertices, ends = np.unique(chain, return_inverse=True)
     first, second = ends.reshape(-1, 2).T
@@ -240,10 +240,10 @@ def _lines(chain: Array, normal: Array, points: Array, period: Array) -> list[Ar
 
 
 def _along(points: Array, starts: Array, steps: Array, before: Array, period: Array) -> Array:
-    """(k,) arc length of points: where each is on the nearest edge, from `starts` by `steps` (e, 2)."""
+    """(k,) arc length of each point on its nearest edge; edges go from `starts` by `steps` (e, 2)."""
     tree = cKDTree(np.mod(starts + 0.5 * steps, period) % period, boxsize=period)
-    near = tree.query(np.mod(points, period) % period, k=min(NEAREST, len(starts)))[1].reshape(len(points), -1)
-    offset, step = _shortest(points[:, None] - starts[near] - 0.5 * steps[near], period), steps[near]
+    nearest = tree.query(np.mod(points, period) % period, k=min(NEAREST, len(starts)))[1].reshape(len(points), -1)
+    offset, step = _shortest(points[:, None] - starts[nearest] - 0.5 * steps[nearest], period), steps[nearest]
     length = np.linalg.norm(step, axis=2)
     share = np.clip(0.5 + (offset * step).sum(axis=2) / length**2, 0.0, 1.0)
     distance = np.linalg.norm(offset - (share - 0.5)[..., None] * step, axis=2)
@@ -251,11 +251,11 @@ def _along(points: Array, starts: Array, steps: Array, before: Array, period: Ar
         axis=1
     )  # a vertex is the start of an edge, not an end
     rows = np.arange(len(points))
-    arc: Array = before[near[rows, best]] + (share * length)[rows, best]
+    arc: Array = before[nearest[rows, best]] + (share * length)[rows, best]
     return arc
 
 
 def _shortest(vectors: Array, period: Array) -> Array:
-    """Return the shortest images of vectors on the torus."""
+    """Return vectors (..., 2) shortened by whole periods."""
     shortest: Array = vectors - period * np.round(vectors / period)
     return shortest

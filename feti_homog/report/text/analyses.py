@@ -1,6 +1,6 @@
-"""Results of each analysis as summary, pictures and pages show them: the registry of the report.
+"""The registry of the report: how summary, pictures and pages show each analysis.
 
-Curves of an analysis are found by its name: `response_curves.CURVES`, `deformed_panels.PANELS`.
+Modules of pictures find an analysis by its name: `response_curves.CURVES`, `deformed_panels.PANELS`.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from feti_homog.results.landmarks import chosen_states
 from feti_homog.typing import Document
 
 
-def _evenly(document: Document, most: int, count: int) -> list[int]:
-    return sorted({round(k) for k in np.linspace(0, count - 1, min(most, count))})
+def _evenly(document: Document, limit: int, count: int) -> list[int]:
+    return sorted({round(k) for k in np.linspace(0, count - 1, min(limit, count))})
 
 
 def _changes(document: Document) -> list[Table]:
@@ -30,7 +30,7 @@ def _changes(document: Document) -> list[Table]:
 
 
 def _stiffness_tables(document: Document) -> list[Table]:
-    """Return the effective stiffness with all constants and limits that follow from it."""
+    """Return effective stiffness, constants and bounds."""
     last = [*point_tables.tip_table(document, document.get("tips")), *_changes(document)]
     if plane_state_of(document).is_spatial:
         first = [table(document)] if document.get("constants") else []
@@ -42,16 +42,16 @@ def _stiffness_tables(document: Document) -> list[Table]:
 
 @dataclass(frozen=True)
 class ReportedAnalysis:
-    """An analysis whose entry in result.json has its name; that of the stiffness has others.
+    """An analysis; its entry in result.json has its name, except for the stiffness.
 
     Attributes:
         title: the name in words.
-        tables: its tables; of points at most so many rows, None for as many as the summary prints.
+        tables: tables for a result with at most `limit` rows of points; None for the rows of the summary.
         is_curve: whether its states are points of a curve, shown side by side.
-        is_followed: whether the first and the last of them matter most.
-        picture: name of the picture of a state, "" for that of its unit load.
-        is_load_given: whether states of a result are under a load of the case, not under unit strains.
-        states: numbers of at most so many of the first states, whose count comes last.
+        is_followed: whether first and last states matter most.
+        picture: picture name of a state, "" for the name of its unit load.
+        is_load_given: whether states are under a load of the case, not under unit strains.
+        states: numbers of at most `limit` states among the first `count`.
     """
 
     name: str
@@ -64,18 +64,18 @@ class ReportedAnalysis:
     states: Callable[[Document, int, int], list[int]] = _evenly
 
 
-STIFFNESS = ReportedAnalysis("stiffness", "effective stiffness", lambda document, most: _stiffness_tables(document))
+STIFFNESS = ReportedAnalysis("stiffness", "effective stiffness", lambda document, limit: _stiffness_tables(document))
 ANGLE = ReportedAnalysis(
     "angle",
     "debonding angle",
-    lambda document, most: [point_tables.angle_table(document, most), *point_tables.angle_tip_table(document)],
+    lambda document, limit: [point_tables.angle_table(document, limit), *point_tables.angle_tip_table(document)],
     is_curve=True,
     is_load_given=lambda document: document.get("case", {}).get("angle", {}).get("strain") is not None,
 )
 PATH = ReportedAnalysis(
     "path",
     "load path",
-    lambda document, most: [path_table(document, most or ROWS)],
+    lambda document, limit: [path_table(document, limit or ROWS)],
     is_curve=True,
     is_followed=True,
     is_load_given=lambda document: True,
@@ -84,7 +84,7 @@ PATH = ReportedAnalysis(
 LOAD = ReportedAnalysis(
     "load",
     "equilibrium under a load",
-    lambda document, most: [
+    lambda document, limit: [
         point_tables.load_table(document),
         *point_tables.tip_table(document, document["load"].get("tips")),
         *_changes(document),
@@ -95,14 +95,14 @@ LOAD = ReportedAnalysis(
 ENVELOPE = ReportedAnalysis(
     "envelope",
     "onset of debonding",
-    lambda document, most: [
-        point_tables.envelope_table(document, most or point_tables.ENVELOPE_ROWS),
+    lambda document, limit: [
+        point_tables.envelope_table(document, limit or point_tables.ENVELOPE_ROWS),
         *_stiffness_tables(document),
     ],
 )
-ANALYSES = {each.name: each for each in (ANGLE, PATH, LOAD, ENVELOPE, STIFFNESS)}
+ANALYSES = {entry.name: entry for entry in (ANGLE, PATH, LOAD, ENVELOPE, STIFFNESS)}
 
 
 def reported(document: Document) -> ReportedAnalysis:
-    """Return the analysis of a result.json; of an empty one, that of states without numbers, the stiffness."""
+    """Return the analysis of a result.json; the stiffness for an empty one, which has states alone."""
     return next((analysis for name, analysis in ANALYSES.items() if document.get(name)), STIFFNESS)

@@ -1,4 +1,4 @@
-"""The points of an angle, a path, a load or an envelope, and the energy release rates at their tips, as tables."""
+"""Tables of an angle, a load or an envelope, and of energy release rates at tips."""
 
 from __future__ import annotations
 
@@ -40,16 +40,16 @@ Point = Mapping[str, Any]
 
 
 def shown_entries(points: Sequence[Point]) -> dict[str, tuple[int, int]]:
-    """Names and places of the entries of the stiffnesses of an angle's points that are shown."""
+    """Return names and places of the stiffness entries that tables of an angle show."""
     return ENTRIES if len(points[0]["stiffness"]) == len(STRAINS) else SPATIAL_ENTRIES
 
 
-def angle_table(document: Document, most: int | None = None) -> Table:
-    """Return a row for each angle, or for some: stiffnesses or stresses, and the states of the interface nodes."""
+def angle_table(document: Document, limit: int | None = None) -> Table:
+    """Return stiffnesses or stresses and interface node counts, at most `limit` angles."""
     points, stiff = document["angle"], "stiffness" in document["angle"][0]
     entries = shown_entries(points) if stiff else {}
     counted = COUNTS if len(entries) <= len(ENTRIES) else []
-    some = points[:: -(-len(points) // (most or len(points)))]
+    some = points[:: -(-len(points) // (limit or len(points)))]
 
     def row(point: Point) -> list[Any]:
         values = [point["stiffness"][i][j] for i, j in entries.values()] if stiff else point["stress"]
@@ -63,14 +63,14 @@ def angle_table(document: Document, most: int | None = None) -> Table:
 
 
 def columns_without_noise(values: Sequence[Sequence[float]]) -> Any:
-    """Return values (n, c) with zeros in the columns that have no more than the solver leaves of zero."""
+    """Return values (n, c) with zeros in columns that hold nothing but solver noise."""
     columns = np.array(values, float)
     is_there = np.isin(np.arange(columns.shape[1]), path_curves.components_above(path_curves.ZERO, columns))
     return np.where(is_there, columns, 0.0)
 
 
 def load_table(document: Document) -> Table:
-    """Return the equilibrium under one load: strains, stresses, energies, and the states of the interface nodes."""
+    """Return the equilibrium under one load: strains, stresses, energies, interface node counts."""
     point, label = document["load"], stress_label(document)
     strain, sigma = (map(without_noise, columns_without_noise([point[name]])[0]) for name in ("strain", "stress"))
     strains, stresses = voigt_names(len(point["strain"]))
@@ -91,7 +91,7 @@ def energies(point: Point, label: str) -> list[str]:
 
 
 def debonded(document: Document, point: Point) -> list[str]:
-    """Return the share of the interfaces that has debonded, and those of the pairs of phases if there are several."""
+    """Return the debonded share of the interfaces, and of each phase pair if there are several."""
     text = f"Debonded: {100 * point['debonded_share']:.1f} % of the interfaces"
     if "debonded_shares" in point:
         shares = zip(document["case"]["interface"], point["debonded_shares"], strict=True)
@@ -104,22 +104,22 @@ def counts(point: Point) -> list[int]:
     return [point[state] for state in STATES]
 
 
-def envelope_table(document: Document, most: int = ENVELOPE_ROWS) -> Table:
-    """Return the least and the largest load, and the first bond that breaks in some directions."""
+def envelope_table(document: Document, limit: int = ENVELOPE_ROWS) -> Table:
+    """Return least and largest onset load, and the first bond to break in at most `limit` directions."""
     axes, points = document["case"]["envelope"]["plane"], document["envelope"]
     broken, title = [point for point in points if "factor" in point], _envelope_title(document)
     rest = len(points) - len(broken)
     above = [f"  no load breaks a bond in {rest} of them"] if rest else []
     if not broken:
         return Table(title, [], [], above)
-    for words, choose in (("least", min), ("largest", max)):
+    for extreme, choose in (("least", min), ("largest", max)):
         point = choose(broken, key=_load)
-        above.append(f"  {words:<9}{_load(point):.7g} at {point['angle']:g} degrees")
+        above.append(f"  {extreme:<9}{_load(point):.7g} at {point['angle']:g} degrees")
     names = [name for name in ONSET if name in broken[0]]
     used = "traction / strength" if "normal" in names else "psi of its traction"
     above.append(f"  first bond: its fibre, its direction there (degrees), {used}")
     columns = [Column("angle", 8), *(Column(axis, 12, ".6g") for axis in axes), *map(ONSET.__getitem__, names)]
-    rows = [_onset(point, names) for point in _evenly(points, most)]
+    rows = [_onset(point, names) for point in _evenly(points, limit)]
     return Table(title, columns, rows, above)
 
 
@@ -132,13 +132,13 @@ def _envelope_title(document: Document) -> str:
 
 
 def components(point: Point) -> tuple[float, float]:
-    """Return the two components of the load at onset."""
+    """Return both components of the onset load."""
     angle, load = radians(point["angle"]), _load(point)
     return without_noise(load * cos(angle), load), without_noise(load * sin(angle), load)
 
 
 def _onset(point: Point, names: Sequence[str]) -> list[Any]:
-    """Direction, load and these numbers of a direction."""
+    """Return angle, both load components and `names` of a direction."""
     if "factor" not in point:
         return [point["angle"], "none", "none", *[""] * len(names)]
     return [point["angle"], *components(point), *(without_noise(point[name]) for name in names)]
@@ -148,16 +148,16 @@ def _load(point: Point) -> float:
     return float(point["factor"])
 
 
-def _evenly(points: Sequence[Point], most: int) -> list[Point]:
-    """Evenly spaced directions, the first among them."""
-    step = max(1, -(-len(points) // most))
+def _evenly(points: Sequence[Point], limit: int) -> list[Point]:
+    """Return evenly spaced directions from the first on, at most about `limit`."""
+    step = max(1, -(-len(points) // limit))
     while len(points) % step:
         step += 1
     return list(points[::step])
 
 
 def tip_table(document: Document, tips: Document | None) -> list[Table]:
-    """For each load the tip of the largest G; none without tips."""
+    """Return the tip with the largest G for each load; nothing without tips."""
     largest = _largest(tips)
     rows = [[load, *_rates(tip)] for load, tip in largest.items()]
     columns = [Column("load", 9), *_rate_columns(largest)]
@@ -165,7 +165,7 @@ def tip_table(document: Document, tips: Document | None) -> list[Table]:
 
 
 def angle_tip_table(document: Document) -> list[Table]:
-    """For each angle the largest G of each load, or of a single load all about the tip; none without tips."""
+    """Return the largest G for each angle and load, with all tip numbers under a single load."""
     largest = [(point["angle"], tips) for point in document["angle"] if (tips := _largest(point.get("tips")))]
     loads, title = dict.fromkeys(load for _, tips in largest for load in tips), TIP_TITLE + toughness_label(document)
     if len(loads) == 1:
@@ -176,7 +176,7 @@ def angle_tip_table(document: Document) -> list[Table]:
 
 
 def _largest(tips: Document | None) -> dict[str, Document]:
-    """Return the tip of the largest G of each load, in the order of the loads."""
+    """Return the tip with the largest G for each load, in load order."""
     best: dict[str, Document] = {}
     names = ["load", *(column.name for column in RATES), *([SECTION.name] if tips and SECTION.name in tips else [])]
     for values in zip(*(tips[name] for name in names), strict=True) if tips else ():
@@ -188,8 +188,8 @@ def _largest(tips: Document | None) -> dict[str, Document]:
 
 
 def _rate_columns(tips: Mapping[str, Document]) -> list[Column]:
-    shown = [replace(column, name="at") if column.name == "angle" else column for column in RATES]
-    return [*shown, *([SECTION] if any(SECTION.name in tip for tip in tips.values()) else [])]
+    rate_columns = [replace(column, name="at") if column.name == "angle" else column for column in RATES]
+    return [*rate_columns, *([SECTION] if any(SECTION.name in tip for tip in tips.values()) else [])]
 
 
 def _rates(tip: Document) -> list[Any]:

@@ -1,4 +1,4 @@
-"""Stiffness, what a unit of temperature does, moduli and constants beside their bounds and estimates, as tables."""
+"""Tables of stiffness, thermal constants, moduli and engineering constants, with bounds and estimates."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ ABREAST, PAIRS = 5, 2  # constants beside each other in text
 
 
 def stiffnesses(document: Document) -> list[Table]:
-    """L^ef, also under minus the unit strains, to the digit that is the last of its largest entry."""
+    """Return L^ef, also under minus the unit strains, all entries to the last digit of the largest."""
     titles = {"effective_stiffness": "Effective stiffness", "effective_stiffness_compression": "Under minus E"}
     tables, errors, label = list[Table](), _errors(document), stress_label(document)
     for key, title in titles.items():
@@ -47,15 +47,15 @@ def stiffnesses(document: Document) -> list[Table]:
 
 
 def _errors(document: Document) -> Document:
-    """Return the estimated errors of the mesh, empty of a result without."""
-    found: Document = document.get("mesh_error") or {}
-    return found
+    """Return the mesh errors of a result; empty without estimates."""
+    estimated: Document = document.get("mesh_error") or {}
+    return estimated
 
 
 def value_and_error(value: float, error: float | None, form: str) -> tuple[str, str]:
-    """Return a constant and its error.
+    """Return a constant and its error as texts.
 
-    The error has two digits, which give the number of those of the constant; in this format and empty without an error.
+    The error has two digits, the constant as many decimals; without an error the constant has format `form`.
     """
     if error is None:
         return number(value, form), ""
@@ -66,7 +66,7 @@ def value_and_error(value: float, error: float | None, form: str) -> tuple[str, 
 
 
 def with_errors(title: str, values: Mapping[str, float], errors: Mapping[str, float], abreast: int) -> Table:
-    """Return constants with their mesh errors, so many beside each other in text; ratios have six decimals there."""
+    """Return constants with mesh errors, `abreast` per line in text; in pairs ratios have six decimals."""
     rows = []
     for name, computed in values.items():
         form = ".6f" if abreast == PAIRS and name not in STRESS_MODULI else ".7g"
@@ -77,28 +77,28 @@ def with_errors(title: str, values: Mapping[str, float], errors: Mapping[str, fl
     return Table(title, columns[: 3 if errors else 2], rows, abreast=abreast)
 
 
-def _matrix(title: str, rows: Sequence[Sequence[float]], given: str = "") -> Table:
+def _matrix(title: str, rows: Sequence[Sequence[float]], fixed: str = "") -> Table:
     strains, stresses = voigt_names(len(rows))
     in_plane = len(rows) == len(STRAINS)
-    names, width, digits, most, short = (NAMES, 16, 8, 1e8, ".7e") if in_plane else (Column("", -6), 12, 7, 1e6, ".4e")
+    names, width, digits, limit, short = (NAMES, 16, 8, 1e8, ".7e") if in_plane else (Column("", -6), 12, 7, 1e6, ".4e")
     largest = max(abs(entry) for row in rows for entry in row)
-    form = f".{digits - 1 - floor(log10(largest))}f" if 10.0 ** (4 - digits) < largest < most else short
-    form = given or form
+    form = f".{digits - 1 - floor(log10(largest))}f" if 10.0 ** (4 - digits) < largest < limit else short
+    form = fixed or form
     named = [[name, *row] for name, row in zip(stresses, rows, strict=True)]
     return Table(title, [names, *(Column(name, width, form) for name in strains)], named, title_in_head=in_plane)
 
 
 def thermal(document: Document) -> list[Table]:
-    """Return the table of thermal constants: a row per component, a column per known quantity."""
-    known = {key: title for key, title in THERMAL.items() if document.get(key) is not None}
+    """Return thermal constants: a row per component, a column per known quantity."""
+    present = {key: title for key, title in THERMAL.items() if document.get(key) is not None}
     names = [stress[1:] for stress in SPATIAL_STRESSES]
-    errors = {key: _errors(document)[key] for key in known if _errors(document).get(key) is not None}
-    values = (_rounded(np.array(document[key], float)) for key in known)
+    errors = {key: _errors(document)[key] for key in present if _errors(document).get(key) is not None}
+    values = (_rounded(np.array(document[key], float)) for key in present)
     rows = list(zip(names, *values, *errors.values(), strict=True))
-    columns = [Column("", -6), *(Column(title, 22, ".7g") for title in known.values())]
+    columns = [Column("", -6), *(Column(title, 22, ".7g") for title in present.values())]
     columns += [Column(f"{key.rpartition('_')[2]}: error", 18, ".1e") for key in errors]
     title = f"Per unit of temperature, {CELL_AXES}{stress_label(document)}"
-    return [Table(title, columns, rows)] if known else []
+    return [Table(title, columns, rows)] if present else []
 
 
 def _rounded(values: Float) -> list[float]:
@@ -107,7 +107,7 @@ def _rounded(values: Float) -> list[float]:
 
 
 def moduli(document: Document) -> Table:
-    """Engineering moduli of the plane state: in text moduli on the left, ratios on the right."""
+    """Return engineering moduli of the plane state: in text moduli left, ratios right."""
     values, errors = document["moduli"], _errors(document).get("constants", {})
     sides = [name for name in values if name in STRESS_MODULI], [name for name in values if name not in STRESS_MODULI]
     names = [name for pair in zip_longest(*sides) for name in pair if name is not None]
@@ -116,7 +116,7 @@ def moduli(document: Document) -> Table:
 
 
 def bounds(document: Document) -> Table:
-    """Lower bound, computed value and upper bound; values outside are marked."""
+    """Return lower bound, computed value and upper bound; values outside are marked."""
     if not document.get("bounds"):
         return Table("Bounds: none of cells with voids", [], [])
     limits, computed, rows = document["bounds"], document["effective_stiffness"], []
@@ -133,7 +133,7 @@ def bounds(document: Document) -> Table:
 
 
 def constants(document: Document) -> list[Table]:
-    """Return engineering constants in space; those along and across the fibres with estimates and bounds."""
+    """Return engineering constants in space; constants about the fibres with estimates and bounds."""
     tables, values = list[Table](), document.get("constants")
     if values is not None:
         title = f"Engineering constants, {CELL_AXES}{stress_label(document)}"
@@ -143,7 +143,7 @@ def constants(document: Document) -> list[Table]:
 
 
 def _estimates(document: Document) -> Table:
-    """Return a row for each source of constants that has one, a column for each constant that some source has."""
+    """Return constants about the fibres: a row per source, a column per constant known from any source."""
     sources = _sources(document)
     names = [name for name in ABOUT_FIBRES if any(name in row for row in sources.values())]
     rows = [
@@ -159,7 +159,7 @@ def _estimates(document: Document) -> Table:
 
 
 def _ranges(document: Document) -> list[str]:
-    """Return the line about moduli over all directions across the fibres, if they are known."""
+    """Return the range of moduli over all directions across the fibres, if known."""
     if (across := document.get("transverse_moduli")) is None:
         return []
     ranges = (f"{n} from {_short(across[f'{n}_least'])} to {_short(across[f'{n}_largest'])}" for n in ("E", "G"))
@@ -167,17 +167,17 @@ def _ranges(document: Document) -> list[str]:
 
 
 def _sources(document: Document) -> dict[str, Document]:
-    """Return the known constants of this cell, by each method, and the bounds."""
+    """Return known constants about the fibres by source: this cell, its errors, estimates, bounds."""
     limits = _known(document.get("fibre_bounds") or {})
     errors, sources = _errors(document).get("constants", {}), {THIS_CELL: document["transversely_isotropic"]}
     sources |= {ITS_ERROR: {name: errors[name] for name in ABOUT_FIBRES if name in errors}} if errors else {}
     sources |= {name.replace("_", " "): row for name, row in (document.get("estimates") or {}).items()}
     sources |= {name: {key: limits[key][k] for key in limits} for k, name in enumerate((LOWER, UPPER))}
-    return {title: known for title, row in sources.items() if (known := _known(row))}
+    return {title: present for title, row in sources.items() if (present := _known(row))}
 
 
 def _why_no_estimates(document: Document) -> list[str]:
-    """Return the kind of cells that have estimates, if this cell has none."""
+    """Return the kind of cell that has estimates, if this cell has none."""
     case, cell = document.get("case", {}), document.get("cell", {})
     if document.get("estimates") is not None:
         return []

@@ -23,13 +23,12 @@ NOTEBOOK_ROWS = 20  # of a table of points
 
 
 def summary(document: Document) -> str:
-    """Return the document in lines of at most 79 columns, without a newline at the end.
+    """Return the printed summary of a result, lines up to 79 columns, tables up to 100 (but for long names).
 
-    Tables have at most 100 (but for long names).
+    Cell, solver, tables of the analysis, checks, timings, memory, remarks, warnings, faults and status.
 
-    Cell, solver, effective stiffness with moduli and bounds or else the points of `angle` or `path`, the state of
-    `load`, onsets, checks, timings, memory, warnings and status.
-    Other keys are left out. Raises KeyError if one that it prints is missing.
+    Raises:
+        KeyError: a key of these is missing.
     """
     blocks = [
         _heading(document),
@@ -51,7 +50,7 @@ def summary(document: Document) -> str:
 
 
 def short_summary(document: Document) -> str:
-    """Return the answer, the largest error of all checks, and the status."""
+    """Return the tables of a result, its largest check error, and its status."""
     law, error = max(document["checks"].items(), key=lambda check: check[1])
     verdict = _field("Checks", [f"largest relative error {error:.1e} ({law})"])
     return _joined(
@@ -64,18 +63,18 @@ def short_summary(document: Document) -> str:
 
 
 def notebook(document: Document) -> str:
-    """Title, tables, checks and status as HTML."""
+    """Return title, tables, checks and status as HTML."""
     tables = [table.html for table in (*answers(document, NOTEBOOK_ROWS), checks(document))]
     return "\n".join([f"<h4>{escape(title_of(document))}</h4>", *tables, f"<p>{escape(document['status'])}</p>"])
 
 
 def answers(document: Document, most: int | None = None) -> list[Table]:
-    """Return the tables of a result, those of points with at most so many rows."""
+    """Return the tables of a result, with at most `most` rows of points."""
     return reported(document).tables(document, most)
 
 
 def title_of(document: Document) -> str:
-    """Name, analysis and plane state of the case."""
+    """Return case name, analysis and plane state."""
     case = document["case"]
     what = reported(document).title
     return f"{case.get('name', '')}: {what}, plane {case['analysis']['plane']}".lstrip(": ")
@@ -100,8 +99,8 @@ def _cell(document: Document) -> list[str]:
     mesh += [f"order {shape['order']}"] * ("order" in shape) + _sizes(shape, cell)
     match = list[str]()
     if (distance := cell.get("match_distance")) is not None:
-        words = f"distances of neighbours differ by {distance:.4f} mean diameters"
-        match = _field("Match", [Path(shape["match"]).name, words])
+        phrases = f"distances of neighbours differ by {distance:.4f} mean diameters"
+        match = _field("Match", [Path(shape["match"]).name, phrases])
     shares += f", voids {cell['porosity']:.6f}" if cell.get("porosity") else ""
     return [
         *_field("Cell", [str(shape["geometry"]), size]),
@@ -113,7 +112,7 @@ def _cell(document: Document) -> list[str]:
 
 
 def _sizes(shape: Document, cell: Document) -> list[str]:
-    """Return how often elements were split, and the coarse mesh where the program chose it."""
+    """Return the refinement, and the coarse mesh size where the program chose it."""
     if "refine" in shape:
         return [f"refine {shape['refine']}"]
     asked = [f"{name} = {shape[name]:g}" for name in ASKED if name in shape]
@@ -121,7 +120,7 @@ def _sizes(shape: Document, cell: Document) -> list[str]:
 
 
 def _scatter(fibres: Sequence[Document]) -> list[str]:
-    """Return the range of the strengths of fibres, where they differ."""
+    """Return the strength range of the fibres, if strengths differ."""
     factors = [fibre["strength"] for fibre in fibres if "strength" in fibre]
     if not factors:
         return []
@@ -159,7 +158,7 @@ def _iterations(counts: Sequence[int]) -> list[str]:
 
 
 def checks(document: Document) -> Table:
-    """Return the largest relative error of each law, without laws of contact where all is bonded."""
+    """Return the largest relative error of each law; laws of contact need an interface."""
     limit, has_interface = document.get("check_tolerance"), bool(document["case"].get("interface"))
     contact, rows, title = document.get("kkt_tolerance", limit), list[list[Any]](), "Checks"
     for law, error in document["checks"].items():
@@ -179,9 +178,9 @@ def _remarks(label: str, remarks: Iterable[str]) -> list[str]:
     return [line for remark in remarks for line in _field(label, [str(remark)])]
 
 
-def _field(label: str, words: Sequence[str]) -> list[str]:
-    """Return a label and its words, separated by commas, in as many lines as it takes."""
-    text = ", ".join(words).replace(", (", " (")
+def _field(label: str, phrases: Sequence[str]) -> list[str]:
+    """Return a label and its words, joined by commas and wrapped to WIDTH columns."""
+    text = ", ".join(phrases).replace(", (", " (")
     return wrap(text, WIDTH, initial_indent=f"{label:<{LABEL}}", subsequent_indent=" " * LABEL, break_long_words=False)
 
 

@@ -23,7 +23,7 @@ UNKNOWN = "-"
 
 
 def unit(name: str, stress_unit: str) -> str:
-    """Return the unit of a key of a case file, dotted, or of a column of a sweep's table; empty if it has none."""
+    """Return the unit of a dotted case key or a sweep column; empty without one."""
     last = name.rpartition(".")[2].removesuffix("_mesh_error")
     if last.startswith("seconds_"):
         return "s"
@@ -33,22 +33,22 @@ def unit(name: str, stress_unit: str) -> str:
 
 
 def with_unit(name: str, stress_unit: str) -> str:
-    """Return the name and, in brackets, the unit that it has."""
+    """Return the name with its unit, if any, in brackets."""
     return name + in_brackets(unit(name, stress_unit))
 
 
 def in_brackets(unit: str) -> str:
-    """Return the unit for a title: in brackets after a space; empty if there is none."""
+    """Return a unit in brackets after a space; empty without a unit."""
     return f" ({unit})" if unit else ""
 
 
 def stress_label(document: Document) -> str:
-    """Return the unit of stresses of a result, in brackets."""
+    """Return the stress unit of a result, in brackets."""
     return in_brackets(document["case"].get("output", {}).get("stress_unit", ""))
 
 
 def toughness_label(document: Document) -> str:
-    """Return the unit of energy release rates of a result, in brackets; empty unless both units are given."""
+    """Return the unit of energy release rates, in brackets; empty unless the case labels both units."""
     output = document["case"].get("output", {})
     stress, length = output.get("stress_unit", ""), output.get("length_unit", "")
     return in_brackets(f"{stress} {length}") if stress and length else ""
@@ -76,7 +76,7 @@ class Column:
         return f"{self.name:<{-self.width}}" if self.width < 0 else f"{self.name:>{self.width}}"
 
     def cell(self, value: Any) -> str:
-        """Return an entry in text: texts as they are, numbers in the format of the column."""
+        """Return a cell as text: texts as they are, numbers in column format."""
         if self.width < 0:
             return f"{' ' * self.indent + value:<{-self.width}}"
         return f" {number(value, self.form):>{self.width - 1}}"
@@ -128,7 +128,7 @@ class Table:
 
     @property
     def cells(self) -> list[list[str]]:
-        """The rows as texts, numbers with the decimals of their columns, or else with seven digits."""
+        """The rows as texts: numbers with the column decimals, or seven digits."""
         forms = [column.form if SAME_IN_HTML.fullmatch(column.form) else ".7g" for column in self.columns]
         return [
             # Zero in place of noise, but errors as they are, small ones too.
@@ -150,7 +150,7 @@ class Table:
 
 
 def number(value: Any, form: str) -> str:
-    """Return a number in a format, without the sign of a zero that it is rounded to; texts as they are."""
+    """Return a number in a format, without the sign of a rounded zero; texts as they are."""
     if isinstance(value, str):
         return value
     text = format(value, form)
@@ -158,7 +158,7 @@ def number(value: Any, form: str) -> str:
 
 
 def without_noise(value: Any, size: float = 1.0) -> Any:
-    """Return the value; zero in place of a number that is what the solver leaves of zero beside `size`."""
+    """Return the value, or zero for a number that is solver noise relative to `size`."""
     return 0.0 if isinstance(value, float) and abs(value) <= NOISE * size else value
 
 
