@@ -128,8 +128,6 @@ def marks(document: Document) -> dict[int, str]:
     }
 
 
-FEWEST_MARKED = 3  # points of a path whose marks show how it went
-
 Drop = tuple[float, int, int]
 """Stress fall (a strain jump scaled to stress), and the points before and after."""
 
@@ -253,7 +251,7 @@ def landmark_states(document: Document, rows: int, count: int) -> list[int]:
     """
     among, marked = kept_points(document)[:count], marks(document)
     entries = [state for state, point in enumerate(among) if point in marked]
-    return entries if len(entries) >= FEWEST_MARKED else chosen_states(document, rows, count)
+    return entries if len(entries) >= 3 else chosen_states(document, rows, count)
 
 
 def chosen_states(document: Document, rows: int, count: int) -> list[int]:

@@ -41,7 +41,6 @@ RESULT_FILE = re.compile(
 # Of these those that show that a run has written to the folder.
 SIGNS = (result_json.NAME, field_file.NAME, LOG, LOCK)
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
-HEAD = 1 << 20  # bytes of result.h5 in which its attributes are
 
 
 def usable(directory: Path) -> None:
@@ -111,7 +110,7 @@ def _is_own(path: Path) -> bool:
             return False
         return isinstance(document, dict) and {"version", "case", "solver"} <= document.keys()
     with input_files.opened(path) as stream:
-        head = stream.read(HEAD)
+        head = stream.read(1 << 20)  # which has the attributes of result.h5
     if path.name == field_file.NAME:
         return head.startswith(HDF5_SIGNATURE) and PROGRAM.encode() in head
     return path.name != LOG or head.startswith(LOG_HEADER.encode())

@@ -20,7 +20,6 @@ from feti_homog.typing import Float
 SAME_LOAD = 1e-9  # load factors that differ by less, relatively, are one
 # Of the largest component: what the solver leaves of zero is less, and what would not be seen beside it.
 ZERO, FAINT = 1e-7, 1e-4
-PLACES_BEFORE = 16  # at which energies are known before the first point
 
 Point = Mapping[str, Any]
 Document = Mapping[str, Any]
@@ -153,7 +152,7 @@ def energies(document: Document) -> EnergyStack | None:
         return None
 
     # Up to the first point all is linear.
-    before = np.linspace(0.0, 1.0, PLACES_BEFORE, endpoint=False)
+    before = np.linspace(0.0, 1.0, 16, endpoint=False)
 
     def column(name: str, power: int = 2) -> Float:
         values = [float(point.get(name) or 0.0) for point in points]

@@ -20,7 +20,6 @@ from feti_homog.results import atomic
 from feti_homog.system.runtime.records import BYTES, described
 
 KEY = "checksum"
-CHECKSUM_DIGITS = 8
 BLOCK = 1 << 26  # bytes
 
 
@@ -44,7 +43,7 @@ def loads(text: str) -> dict[str, Any]:
         raise ValueError("it is damaged: no table of keys and values")
     if KEY not in document:
         *rest, (_, last) = document.items() if document else [("", None)]
-        if isinstance(last, str) and len(last) == CHECKSUM_DIGITS and last == _checksum(_text(dict(rest))):
+        if isinstance(last, str) and len(last) == 8 and last == _checksum(_text(dict(rest))):
             raise ValueError("it is damaged: the key of its checksum has another name")
         return document
     stored = document.pop(KEY)

@@ -25,7 +25,6 @@ ORDER = [PAIRS.index(tuple(sorted((FIBRE_FIRST[i], FIBRE_FIRST[j])))) for i, j i
 COUPLINGS = ~np.eye(6, dtype=bool)
 """(6, 6) where the stiffness of an orthotropic material is 0 in its axes."""
 COUPLINGS[:3, :3] = False
-LONGEST = 100
 AXES = (
     f"Axis 1 is the fibre, x3 of the cell; axes 2 and 3 are x1 and x2 of the cell. So {', '.join(OF_THE_CELL)} of this "
     f"card are {', '.join(OF_THE_CELL.values())} of the cell. nu_ij = -eps_j/eps_i under stress along i."
@@ -215,7 +214,7 @@ def comments(material: EffectiveMaterial, mark: str) -> list[str]:
         paragraphs.append(f"Estimated errors by the mesh: {_listed(material.errors)}.")
     if material.scatter:
         paragraphs.append(f"Standard deviations by uncertain constants of the phases: {_listed(material.scatter)}.")
-    lines = (line for text in paragraphs for line in wrap(text.encode("ascii", "backslashreplace").decode(), LONGEST))
+    lines = (line for text in paragraphs for line in wrap(text.encode("ascii", "backslashreplace").decode(), 100))
     return [f"{mark} {line}" for line in lines]
 
 

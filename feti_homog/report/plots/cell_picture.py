@@ -22,15 +22,9 @@ from feti_homog.report.plots.decimation import DrawnMesh, outline_edges, triangl
 from feti_homog.typing import Array
 
 IN_LEGEND = 12  # phases of the legend, which would cover the cell
-MESH_LINES = 6000  # triangles up to which their edges are drawn
 MATRIX = "#ece8df"
 FIBRES = ("Blues", "Oranges", "Greens", "Purples", "Reds", "Greys")  # one colour map for each phase
-MOST_NUMBERS = 2000  # of fibres; of more none could be read
-INSIDE, SEEN = 0.4, 0.85  # of a radius: how far from the sides a number stands, and how far at most from the centre
-POINTS_PER_INCH, CHARACTERS = 72, 2.2
-LEAST_SIZE, LARGEST_SIZE = 3.0, 11.0  # of the letters, in points
-LETTER = 0.075  # inches, on the average
-DECADES = 4  # below the density of errors that hardly any area exceeds; less is one colour
+LEAST_SIZE = 3.0  # of the letters, in points
 
 
 def figure(cell: drawn_cell.DrawnCell) -> Figure:
@@ -86,14 +80,14 @@ def mesh_error(cell: drawn_cell.DrawnCell) -> Figure | None:
         return None
     picture, (axes,) = drawn_cell.figure_of(file.attrs, panels=1, beside=drawn_cell.BAR_INCHES)
     top = float(plot_helpers.value_range(density, area)[0].vmax or highest)
-    lowest = top / 10.0**DECADES
+    lowest = top / 10.0**4  # less, on hardly any area, is one colour
     colours = ScalarMappable(LogNorm(lowest, top), "magma_r")
     plot_helpers.fill_triangles(
         axes, drawn, drawn.points, np.asarray(colours.to_rgba(np.maximum(density, lowest))), edges=False
     )
     extend = "both" if highest > top else "min"
     bar = drawn_cell.bar_beside(axes, colours, extend, drawn_cell.cell_size(file.attrs))
-    letters = int(max(drawn_cell.cell_size(file.attrs)[1], drawn_cell.LEAST_BAR[1]) / LETTER)
+    letters = int(max(drawn_cell.cell_size(file.attrs)[1], drawn_cell.LEAST_BAR[1]) / 0.075)
     bar.set_label(fill("error of the strain energy / energy, per share of the area", letters))
     plot_helpers.draw_segments(axes, drawn.points[cell.borders], "black", 0.7)
     drawn_cell.label_cell_axes(axes, file.attrs)
@@ -104,7 +98,7 @@ def mesh_error(cell: drawn_cell.DrawnCell) -> Figure | None:
 def _outlined(cell: drawn_cell.DrawnCell, colours: Array) -> tuple[Figure, Axes]:
     """Return the cell with triangle colours (q, 4) and body outlines."""
     picture, (axes,) = drawn_cell.figure_of(cell.file.attrs, panels=1)
-    plot_helpers.fill_triangles(axes, cell.drawn, cell.drawn.points, colours, len(cell.drawn.triangles) <= MESH_LINES)
+    plot_helpers.fill_triangles(axes, cell.drawn, cell.drawn.points, colours, len(cell.drawn.triangles) <= 6000)
     plot_helpers.draw_segments(axes, cell.drawn.points[cell.borders], "black", 0.9)
     drawn_cell.label_cell_axes(axes, cell.file.attrs)
     return picture, axes
@@ -130,7 +124,7 @@ def write_fibre_numbers(axes: Axes, cell: drawn_cell.DrawnCell, inches: float, f
     `inches` is a length unit in the picture; below the numbers stand `factors` (f,), if there are any.
     """
     fibres, drawn = cell.file["fibre"], cell.drawn
-    if len(fibres["number"]) > MOST_NUMBERS:
+    if len(fibres["number"]) > 2000:  # none could be read
         return
     period, low = np.array([cell.file.attrs[name] for name in ("width", "height")]), drawn.points.min(axis=0)
     outline = cKDTree(drawn.points[np.unique(cell.borders)])
@@ -140,7 +134,7 @@ def write_fibre_numbers(axes: Axes, cell: drawn_cell.DrawnCell, inches: float, f
             places, room = _on_images(centre, radius, low, period), radius
         else:
             places, room = _inside(drawn, body, outline)
-        size = float(np.clip(room * inches * POINTS_PER_INCH / CHARACTERS, LEAST_SIZE, LARGEST_SIZE))
+        size = float(np.clip(room * inches * 72 / 2.2, LEAST_SIZE, 11.0))  # points, 2.2 characters in the room
         text = str(number)
         if factors is not None:
             text, size = f"{number}\n{factors[k]:.2f}", max(0.75 * size, LEAST_SIZE)
@@ -152,9 +146,9 @@ def _on_images(centre: Array, radius: float, low: Array, period: Array) -> Array
     """(p, 2) image centres of a circle near the cell, moved into it."""
     shifts = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), axis=-1).reshape(-1, 2)
     images = centre + shifts * period
-    margin = np.minimum(INSIDE * radius, 0.4 * period)
+    margin = np.minimum(0.4 * radius, 0.4 * period)
     moved = np.clip(images, low + margin, low + period - margin)
-    places: Array = moved[np.linalg.norm(moved - images, axis=1) <= SEEN * radius]
+    places: Array = moved[np.linalg.norm(moved - images, axis=1) <= 0.85 * radius]
     return places
 
 

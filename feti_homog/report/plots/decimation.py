@@ -19,7 +19,6 @@ from feti_homog.typing import Array, Document
 
 LEAST_AREA = 0.5  # area of a triangle in a picture / its own: at zero it would be turned over
 TRIANGLE_LIMIT = 100_000  # triangles in a picture
-BLOCK_ROWS = 1 << 18
 SAME_PLACE = 1e-6  # of the size of the cell
 LOADS = (*SPATIAL_STRAINS, "temperature")
 QUARTERS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])  # of a six-node triangle
@@ -61,7 +60,7 @@ class DrawnMesh:
         return numbers
 
 
-def drawn_mesh(file: Any, limit: int = TRIANGLE_LIMIT, block: int = BLOCK_ROWS) -> DrawnMesh:
+def drawn_mesh(file: Any, limit: int = TRIANGLE_LIMIT, block: int = 1 << 18) -> DrawnMesh:
     """Return the finest nested mesh of an open result.h5 with at most `limit` triangles, or else its coarsest.
 
     Its tables are read `block` rows at a time.

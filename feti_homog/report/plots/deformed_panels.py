@@ -25,8 +25,7 @@ from feti_homog.typing import Array, Document
 
 MAX_PANELS = 6
 MAX_FRAMES, FRAME_TIME = 24, 250  # of the animation; milliseconds
-FRAME_LIMIT, PANEL_LIMIT, STATE_LIMIT = 8000, 30_000, 60_000  # triangles in a frame, a panel, a picture of one state
-MOST_COLUMNS = 3
+PANEL_LIMIT = 30_000  # triangles in a panel
 INCHES, BAR = 8.0, 0.55  # of all panels of a row, and of the colour bar in each
 FRAME, MOST_HEIGHT = 3.6, 6.0  # width of a cell in the animation; largest height of a cell in it and in a panel; inches
 LOADS_IN_PANEL, LINE = 2, 0.15  # in a line of its title; inches of a line
@@ -118,7 +117,7 @@ def draw_state(
     path = directory / field_file.NAME
     try:
         with h5py.File(path, "r") as file:
-            cell = DeformedCell.of_states(file, [number], {"case": {"output": {"stress": stress}}}, scale, STATE_LIMIT)
+            cell = DeformedCell.of_states(file, [number], {"case": {"output": {"stress": stress}}}, scale, 60_000)
             if most is not None:
                 cell = replace(cell, colours=(Normalize(-most, most), "RdBu_r", "both"))
             cell.bar(axes, cell.draw(axes, number, cell.moved(number)))
@@ -222,13 +221,13 @@ def _grid(panels: int, ratio: float) -> tuple[int, int]:
     """Return rows and columns for panels with width / height `ratio`: about square, few places empty."""
     ideal = min(math.sqrt(0.7 * panels * ratio), panels)
     grids = [(rows, -(-panels // rows)) for rows in {max(1, math.floor(ideal)), math.ceil(ideal)}]
-    grids = [grid for grid in grids if grid[1] <= MOST_COLUMNS] or grids
+    grids = [grid for grid in grids if grid[1] <= 3] or grids
     return min(grids, key=lambda grid: (grid[0] * grid[1] - panels, abs(grid[0] - ideal)))
 
 
 def _animation(file: Any, numbers: Sequence[int], document: Document, scale: float, path: Path) -> Path:
     """Write the animation; all frames have the layout for the last state."""
-    cell = DeformedCell.of_states(file, numbers, document, scale, FRAME_LIMIT)
+    cell = DeformedCell.of_states(file, numbers, document, scale, 8000)
     places = [cell.moved(number) for number in numbers]
     low, high = _corners(places)
     size = high - low

@@ -19,7 +19,7 @@ from feti_homog.report.text.analyses import reported
 from feti_homog.results.path_curves import FAINT, ZERO, components_above, leading_component
 from feti_homog.typing import Array, Document
 
-CELL_INCHES, BAR_INCHES = 4.8, 1.1  # the longer side of a drawn cell, and the room for a colour bar beside it
+BAR_INCHES = 1.1  # room for a colour bar beside the cell
 BAR, LEAST_BAR = (0.04, 1.0), (0.15, 1.2)  # width and height of a bar: shares of the cell's, and least inches
 BONDED, CLOSED, OPEN, DAMAGED = 0, 1, 2, 3
 STATE_NAMES = {BONDED: "bonded", DAMAGED: "damaged", CLOSED: "in contact", OPEN: "open"}
@@ -27,9 +27,7 @@ STATE_COLOURS = {BONDED: "black", CLOSED: "#ff7f0e", OPEN: "#00a14b", DAMAGED: "
 STATE_WIDTHS = {BONDED: 0.8, CLOSED: 2.6, OPEN: 2.0, DAMAGED: 2.0}
 # The state of an edge is the one of its ends that comes last here.
 ORDER = np.array(list(STATE_NAMES))
-HALO = 1.6  # points
 SAME_PLACE = 1e-6  # of the width of the cell
-LONG = 2  # strains beyond which a label of a path has the leading one alone
 
 
 @dataclass(frozen=True)
@@ -66,7 +64,7 @@ class InterfaceEdges:
             cap: Literal["butt", "round"] = "butt" if kind == BONDED else "round"
             if kind != BONDED:
                 # Seen on every colour: magenta and orange are not, on red.
-                draw_segments(axes, segments, "white", magnified * (STATE_WIDTHS[kind] + HALO), cap)
+                draw_segments(axes, segments, "white", magnified * (STATE_WIDTHS[kind] + 1.6), cap)
             draw_segments(axes, segments, STATE_COLOURS[kind], magnified * STATE_WIDTHS[kind], cap)
         return state_legend(present)
 
@@ -118,7 +116,7 @@ def figure_of(attributes: Any, panels: int, beside: float = 0.0) -> tuple[Figure
 
 def cell_scale(attributes: Any) -> float:
     """Inches in the picture for a length unit of the cell."""
-    return CELL_INCHES / max(float(attributes["width"]), float(attributes["height"]))
+    return 4.8 / max(float(attributes["width"]), float(attributes["height"]))
 
 
 def cell_size(attributes: Any) -> tuple[float, float]:
@@ -182,7 +180,7 @@ class LoadLabels:
         strain, temperature = np.asarray(attributes["strain"]), float(attributes.get("temperature", 0.0))
         strains, stresses = voigt_names(len(strain))
         loads = [(strains[k], float(strain[k])) for k in components_above(FAINT, strain[None])]
-        if self.leading is not None and len(loads) > LONG:
+        if self.leading is not None and len(loads) > 2:
             stress = float(attributes["stress"][self.leading])
             loads = [
                 (strains[self.leading], float(strain[self.leading])),

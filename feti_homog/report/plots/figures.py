@@ -30,12 +30,8 @@ from feti_homog.results import atomic, field_file, output_folder, result_json
 from feti_homog.typing import Array, Document
 
 LEVEL_INK, LEVEL_WIDTH = "0.15", 0.6  # of lines of equal displacement along the fibres
-LEVELS = 12  # about so many lines
-OUTLINED_BODIES = 8  # up to which the deformed cell is drawn over all that it has left
 FREE = r"free expansion by $\Delta T = 1$"
-POWERS = (-2, 4)  # of ten between which numbers of a colour bar have no common factor
 UNDEFORMED = "0.5"
-IN_LEGEND = 2  # entries of a legend in a line: four are wider than a narrow cell
 
 
 def plot(directory: Path) -> list[Path]:
@@ -114,7 +110,7 @@ def _deformed(cell: drawn_cell.DrawnCell, state: Any, document: Document) -> Fig
     moved = drawn.points + scale * displacement
     figure, axes = _coloured(cell, state, moved, output)
     outline: Array = drawn.points[cell.borders]
-    if drawn.body.max() >= OUTLINED_BODIES:  # the cell alone
+    if drawn.body.max() >= 8:  # the cell alone
         corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * [cell.file.attrs[name] for name in ("width", "height")]
         outline = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
     plot_helpers.draw_segments(axes, outline, UNDEFORMED, 0.7)
@@ -152,7 +148,7 @@ def _coloured(cell: drawn_cell.DrawnCell, state: Any, moved: Array, output: Docu
     norm, colours, extend = plot_helpers.colour_range(stress, drawn.node_areas)
     shapes = plot_helpers.shade_triangles(axes, drawn, moved, stress, norm, colours)
     bar = drawn_cell.bar_beside(axes, shapes, extend, drawn_cell.cell_size(attributes))
-    bar.ax.ticklabel_format(axis="y", scilimits=POWERS)
+    bar.ax.ticklabel_format(axis="y", scilimits=(-2, 4))
     bar.set_label(f"${plot_helpers.STRESS_SYMBOLS[component]}$ {plot_helpers.stress_label(attributes['stress_unit'])}")
     return figure, axes
 
@@ -164,7 +160,7 @@ def _outlined(axes: Axes, cell: drawn_cell.DrawnCell, state: Any, moved: Array, 
     drawn_cell.label_cell_axes(axes, cell.file.attrs)
     figure: Any = axes.figure
     handles = [*(marks if len(marks) > 1 else ()), line]
-    figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), IN_LEGEND), frameon=False)
+    figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 2), frameon=False)
 
 
 def is_axial(state: Any) -> bool:
@@ -178,7 +174,7 @@ def draw_levels(axes: Axes, state: Any, drawn: decimation.DrawnMesh) -> float:
     """Draw lines of equal axial displacement; returns the step between them."""
     displacement: Array = decimation.nodal_values(state["axial_displacement"], drawn)
     low, high = float(displacement.min()), float(displacement.max())
-    step = round_step((high - low) / LEVELS)
+    step = round_step((high - low) / 12)
     levels = step * np.arange(math.ceil(low / step), math.floor(high / step) + 1)
     x, y = drawn.points.T
     mesh = Triangulation(x, y, drawn.triangles)

@@ -19,16 +19,11 @@ from feti_homog.results import landmarks, path_curves
 from feti_homog.results.landmarks import name_of, peak_of
 from feti_homog.typing import Array, Document
 
-NUMBERED_POINTS = 6  # of a path
-ARROWS, SHORTEST_ARROW = 6, 0.06  # that show its direction: how many, and on steps of which share of the picture
-NEAR = 0.05  # of all points: numbers of points that are nearer stand above each other
-MARKED_POINTS = 60  # points of a path up to which each has a mark
+ARROWS = 6  # at most, along a path
 STATES = {drawn_cell.BONDED: "bonded", drawn_cell.OPEN: "open", drawn_cell.CLOSED: "closed"}
 # Offsets of a number from its point, in points of print, the best first, and half of the room that it takes.
 OFFSETS = ((-6, 16), (-6, 25), (12, 16), (22, 3), (-22, 3), (16, -12), (-16, -12), (0, -20), (28, -22), (-28, 26))
 ROOM = np.array([12.0, 5.0])
-SAMPLES = 4000  # of each curve
-POINTS_PER_INCH = 72.0
 # Of the parts in the order of `path_curves.energies`.
 AREAS = {
     "stored in the bodies": "#9db8de",
@@ -50,7 +45,7 @@ def figure(document: Document) -> Figure:
     component, components = path_curves.leading_component(document), path_curves.shown_stresses(document)
     strains, stress = (np.array([point[name] for point in points]) for name in ("strain", "stress"))
     strain = strains[:, component]
-    style: dict[str, Any] = {"marker": "o", "markersize": 2.5} if len(points) <= MARKED_POINTS else {}
+    style: dict[str, Any] = {"marker": "o", "markersize": 2.5} if len(points) <= 60 else {}
     picture = Figure(figsize=(7.2, 8.0), layout="constrained")
     upper, middle, lower = picture.subplots(3, 1, height_ratios=(2.2, 1, 1))
     middle.sharex(lower)
@@ -71,7 +66,7 @@ def figure(document: Document) -> Figure:
     lower.set_xlabel("number of the point, in the order of the path")
     # The panels of path_states.png show the same points.
     by_state = landmarks.kept_points(document)
-    numbers = [by_state[state] for state in landmarks.landmark_states(document, NUMBERED_POINTS, len(by_state))]
+    numbers = [by_state[state] for state in landmarks.landmark_states(document, 6, len(by_state))]
     curve = np.stack([strain, stress[:, component]], axis=1)
     peak, unit = peak_of(document), case.get("output", {}).get("stress_unit", "")
     caption = f"{name_of(document, peak)} {peak['stress']:.4g} {plot_helpers.plain(unit)}".rstrip()
@@ -151,7 +146,7 @@ def _number_points(upper: Axes, below: Sequence[Axes], curve: Array, numbers: Se
     for place, number in enumerate(numbers):
         for axes in below:
             axes.axvline(number, color="0.7", linewidth=0.7, linestyle=":", zorder=0)
-        level = level + 1 if place and number - numbers[place - 1] < NEAR * span else 0
+        level = level + 1 if place and number - numbers[place - 1] < 0.05 * span else 0
         above = (number, 1.05 + 0.1 * level)
         below[0].annotate(str(number), above, xycoords=below[0].get_xaxis_transform(), annotation_clip=False, **style)
     pointer = {"arrowstyle": "-|>", "color": ink, "linewidth": 0, "shrinkB": 0, "mutation_scale": 15}
@@ -167,7 +162,7 @@ def _direction_marks(curve: Array) -> list[tuple[Array, Array]]:
     longest = np.argsort(-length, kind="stable")[:ARROWS]
     starts = np.vstack([np.zeros(2), curve[:-1]])
     middles = starts + 0.5 * steps
-    return [(starts[k], middles[k] + 0.02 * steps[k]) for k in sorted(longest) if length[k] > SHORTEST_ARROW]
+    return [(starts[k], middles[k] + 0.02 * steps[k]) for k in sorted(longest) if length[k] > 0.06]
 
 
 def free_offsets(axes: Axes, points: Array) -> list[tuple[int, int]]:
@@ -176,7 +171,7 @@ def free_offsets(axes: Axes, points: Array) -> list[tuple[int, int]]:
     The limits of the axes are final afterwards.
     """
     axes.set_ylim(axes.get_ylim())
-    to_print = POINTS_PER_INCH / axes.figure.dpi
+    to_print = 72.0 / axes.figure.dpi
     occupied = (
         np.vstack([_samples(line.get_transform().transform(line.get_xydata())) for line in axes.lines]) * to_print
     )
@@ -203,7 +198,7 @@ def _samples(line: Array) -> Array:
     if len(line) < 2:
         return line
     length = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1)))
-    at = np.linspace(0.0, length[-1], SAMPLES)
+    at = np.linspace(0.0, length[-1], 4000)
     return np.column_stack([np.interp(at, length, column) for column in line.T])
 
 

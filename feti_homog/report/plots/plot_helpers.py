@@ -27,27 +27,23 @@ from feti_homog.results import atomic
 from feti_homog.results.path_curves import FAINT, components_above, interface_sections
 from feti_homog.typing import Array, Document
 
-# Of macroscopic strains and stresses by their names, and of stresses.
+# Symbols of macroscopic strains and stresses by name, and of local stresses.
 SYMBOLS = {
     **{name: f"{name[:-2].replace('gamma', chr(92) + 'gamma')}_{{{name[-2:]}}}" for name in SPATIAL_STRAINS},
     **{name: rf"\Sigma_{{{name[1:]}}}" for name in SPATIAL_STRESSES},
     "temperature": r"\Delta T",
 }
 STRESS_SYMBOLS = {name: rf"\sigma_{{{name[1:]}}}" for name in SPATIAL_STRESSES}
-# Where a state of result.h5 has the stresses: the table, and its column if it has more than one.
+# Table of each stress in a state of result.h5, and its column if the table has several.
 STRESS_TABLES: dict[str, tuple[str, int | None]] = {
     **{name: ("stress", column) for column, name in enumerate(STRESSES)},
     "S33": ("stress_33", None),
     **{name: ("axial_stress", column) for column, name in enumerate(AXIAL_STRESSES)},
 }
-# Fields that vary by less, relatively, have one colour; share of one sign below which zero is not in the middle; share
-# of the area that may lie outside of a colour range, at either end.
-UNIFORM, ONE_SIGN, OUTLIERS = 0.01, 0.1, 0.005
+OUTLIERS = 0.005  # share of the area that may lie outside of a colour range, at either end
 INK = ("#1f4e9c", "#c44e00", "#2a7f3f", "#7a3e9d", "#8a6d00", "#0f7c8c", "#8c1d40")  # of curves
 STYLE = {"font.size": 10, "axes.titlesize": 11, "axes.linewidth": 0.8}
 DPI, PADDING, CUT = 200, 0.08, 0.02  # dots per inch; inches, the last of what may lie beyond the sides of a figure
-# Shares of the cell that the largest displacement and opening are drawn as, and to which the former may be stretched.
-SEEN_DISPLACEMENT, SEEN_OPENING, MOST_DISPLACEMENT = 0.1, 0.04, 0.25
 
 
 def save(figure: Figure, path: Path) -> Path:
@@ -138,7 +134,7 @@ def colour_range(values: Array, areas: Array | None = None) -> tuple[Normalize, 
     """
     norm, extend = value_range(values, areas)
     bottom, top = float(norm.vmin or 0.0), float(norm.vmax or 0.0)
-    if min(-bottom, top) <= ONE_SIGN * max(-bottom, top) or _is_uniform(values):
+    if min(-bottom, top) <= 0.1 * max(-bottom, top) or _is_uniform(values):
         return norm, "viridis", extend
     top = max(-bottom, top)
     return Normalize(-top, top), "RdBu_r", _outside(values, -top, top)
@@ -164,7 +160,7 @@ def value_range(values: Array, areas: Array | None = None) -> tuple[Normalize, s
 
 
 def _is_uniform(values: Array) -> bool:
-    return bool(np.ptp(values) <= UNIFORM * max(np.abs(values).max(), 1e-300))
+    return bool(np.ptp(values) <= 0.01 * max(np.abs(values).max(), 1e-300))
 
 
 def _outside(values: Array, bottom: float, top: float) -> str:
@@ -175,14 +171,14 @@ def _outside(values: Array, bottom: float, top: float) -> str:
 def magnification(displacement: float, size: float, opening: float = 0.0, largest: float = math.inf) -> float:
     """Return a displacement factor, 1, 2 or 5 times a power of ten, at most `largest`.
 
-    The largest displacement is drawn as about a tenth of the cell size, or more to show a narrow opening.
+    The largest displacement is drawn as about a tenth of the cell size, or up to a quarter to show a narrow opening.
     """
     if displacement == 0.0:
         return 1.0
-    ideal = SEEN_DISPLACEMENT * size / displacement
+    ideal = 0.1 * size / displacement
     if opening > 0.0:
-        top = MOST_DISPLACEMENT * size / displacement
-        ideal = max(ideal, min(SEEN_OPENING * size / opening, top))
+        top = 0.25 * size / displacement
+        ideal = max(ideal, min(0.04 * size / opening, top))
     power = 10.0 ** math.floor(math.log10(min(ideal, largest)))
     rounded = [factor * power for factor in (1, 2, 5, 10) if factor * power <= largest]
     return min(rounded, key=lambda scale: abs(math.log(scale / ideal)))

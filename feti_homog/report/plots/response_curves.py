@@ -21,14 +21,8 @@ from feti_homog.results.path_curves import interface_sections
 from feti_homog.typing import Array, Document
 
 MARKS = ("o", "s", "^", "D", "v", "P", "X")
-# Loads beyond so many times the median are outside of the picture: those of directions that hardly open a bond.
-FARTHEST, SHOWN = 6.0, 3.0
-MARGIN = 1.12
-MARKED = 180  # directions up to which each has a mark
 CELL = (0.95, 0.42)  # inches of an entry
-LETTER = 0.085  # inches
 FAINTEST = 0.005  # below which an entry has no number
-DARK = 0.6  # share of the largest from which numbers are white
 
 
 def plot(directory: Path, document: Document) -> list[Path]:
@@ -131,7 +125,7 @@ def _curve(axes: Axes, places: Array, mode: Array) -> LineCollection:
     lines.set_array((mode + np.roll(mode, -1))[joined] / 2)
     lines.set_clim(0.0, 90.0)
     axes.add_collection(lines)
-    if len(places) <= MARKED:
+    if len(places) <= 180:
         axes.scatter(places[:, 0], places[:, 1], c=mode, cmap="viridis", vmin=0.0, vmax=90.0, s=14, zorder=3)
     return lines
 
@@ -140,11 +134,11 @@ def _limit(axes: Axes, places: Array) -> list[str]:
     """Limit the axes to zero and loads (n, 2) not far beyond the median; returns a note on hidden loads."""
     size = np.linalg.norm(places, axis=1)
     usual = float(np.median(size))
-    far = size > FARTHEST * usual
-    beyond = places[far] / np.where(size > 0.0, size, 1.0)[far, None] * SHOWN * usual
+    far = size > 6.0 * usual  # directions that hardly open a bond
+    beyond = places[far] / np.where(size > 0.0, size, 1.0)[far, None] * 3.0 * usual
     visible = np.concatenate([places[~far], beyond, np.zeros((1, 2))])
     low, high = visible.min(axis=0), visible.max(axis=0)
-    middle, half = (low + high) / 2, MARGIN * (high - low) / 2
+    middle, half = (low + high) / 2, 1.12 * (high - low) / 2
     half = np.maximum(half, 0.05 * half.max() or 1.0)
     axes.set_xlim(middle[0] - half[0], middle[0] + half[0])
     axes.set_ylim(middle[1] - half[1], middle[1] + half[1])
@@ -158,7 +152,7 @@ def sensitivities(document: Document) -> Figure | None:
         return None
     names = [plot_helpers.plain(str(row[0])) for row in tables[0].rows]
     values = np.array([[np.nan if isinstance(entry, str) else entry for entry in row[1:]] for row in tables[0].rows])
-    names_width = 0.4 + LETTER * max(map(len, names))
+    names_width = 0.4 + 0.085 * max(map(len, names))
     size = names_width + CELL[0] * values.shape[1] + 1.2, 1.4 + CELL[1] * len(names)
     picture = Figure(figsize=size, layout="constrained")
     axes = picture.subplots()
@@ -166,9 +160,7 @@ def sensitivities(document: Document) -> Figure | None:
     image = axes.imshow(values, cmap="RdBu_r", norm=Normalize(-highest, highest), aspect="auto")
     for (row, column), value in np.ndenumerate(values):
         text = "-" if np.isnan(value) else f"{value:.2f}" if abs(value) >= FAINTEST else ""
-        axes.text(
-            column, row, text, ha="center", va="center", color="white" if abs(value) > DARK * highest else "black"
-        )
+        axes.text(column, row, text, ha="center", va="center", color="white" if abs(value) > 0.6 * highest else "black")
     heads = [column.name.replace("_", "_\n") for column in tables[0].columns[1:]]
     axes.set_xticks(range(values.shape[1]), heads)
     axes.set_yticks(range(len(names)), names)

@@ -21,12 +21,8 @@ from feti_homog.results.landmarks import peak_of
 from feti_homog.typing import Array, Document
 
 DEGREES = (-180.0, 180.0)
-NEAREST = 8  # edges of which the one is looked for that a node lies on
-MAX_FIBRES = 4
 LOADS_IN_LINE = 7
-# Nodes are all around a fibre if the distance of the first and the last is not so many times that of others.
-MOST_UNEVEN = 2.0
-SPIKES, SPIKE_ROOM = 2.0, 1.0  # per cent of the nodes, at either end; how far beyond the others they are drawn
+SPIKES = 2.0  # per cent of the nodes, at either end
 INK = ("#1f4e9c", "#2a7f3f", "#c44e00")
 NAMES = {"traction": (r"$t_\mathrm{n}$", r"$t_\mathrm{t}$", r"$t_\mathrm{a}$"), "jump": ("gap", "slip", "axial slip")}
 
@@ -73,7 +69,7 @@ def _figure(cell: drawn_cell.DrawnCell, names: list[str], labels: drawn_cell.Loa
     file = cell.file
     fibre, status = file["interface/fibre"][:], file[f"state/{names[-1]}/status"][:]
     bodies, count = np.unique(fibre[status != drawn_cell.BONDED], return_counts=True)
-    chosen = np.sort(bodies[np.argsort(-count, kind="stable")][:MAX_FIBRES])
+    chosen = np.sort(bodies[np.argsort(-count, kind="stable")][:4])
     figure = Figure(figsize=(9.0, 2.4 * len(chosen) + 1.5), layout="constrained")
     grid = figure.subplots(len(chosen), 2, sharex="row", sharey="col", squeeze=False)
     for row, body in zip(grid, chosen, strict=True):
@@ -105,7 +101,7 @@ def _clip_spikes(axes: Axes, curves: list[Any]) -> None:
     """Limit the shared range where a few nodes at singular tips exceed all others."""
     values = np.concatenate([np.asarray(curve, float) for curve in curves])
     low, high = np.percentile(values, (SPIKES, 100.0 - SPIKES))
-    room = SPIKE_ROOM * (high - low)
+    room = high - low
     if values.min() < low - room or values.max() > high + room:
         axes.set_ylim(max(values.min(), low - room), min(values.max(), high + room))
 
@@ -126,7 +122,8 @@ def _values(state: Any, quantity: str) -> Array:
 def _curves(axes: Axes, quantity: str, place: Coordinate, values: Array, last: bool) -> None:
     """Draw nodal values (k, 2 or 3) around a fibre, as a closed curve if nodes surround it."""
     at, turn = place.values, place.ends[1] - place.ends[0]
-    if place.ends == DEGREES and len(at) > 1 and at[0] + turn - at[-1] < MOST_UNEVEN * np.diff(at).max():
+    # Nodes are all around if the gap between last and first is less than twice the others.
+    if place.ends == DEGREES and len(at) > 1 and at[0] + turn - at[-1] < 2.0 * np.diff(at).max():
         at, values = (
             np.concatenate([at[-1:] - turn, at, at[:1] + turn]),
             np.concatenate([values[-1:], values, values[:1]]),
@@ -242,7 +239,7 @@ def _lines(chain: Array, normal: Array, points: Array, period: Array) -> list[Ar
 def _along(points: Array, starts: Array, steps: Array, before: Array, period: Array) -> Array:
     """(k,) arc length of each point on its nearest edge; edges go from `starts` by `steps` (e, 2)."""
     tree = cKDTree(np.mod(starts + 0.5 * steps, period) % period, boxsize=period)
-    nearest = tree.query(np.mod(points, period) % period, k=min(NEAREST, len(starts)))[1].reshape(len(points), -1)
+    nearest = tree.query(np.mod(points, period) % period, k=min(8, len(starts)))[1].reshape(len(points), -1)
     offset, step = _shortest(points[:, None] - starts[nearest] - 0.5 * steps[nearest], period), steps[nearest]
     length = np.linalg.norm(step, axis=2)
     share = np.clip(0.5 + (offset * step).sum(axis=2) / length**2, 0.0, 1.0)

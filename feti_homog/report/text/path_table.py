@@ -17,14 +17,12 @@ from feti_homog.results.landmarks import LARGEST, PEAK, chosen, fall_of, name_of
 from feti_homog.typing import Document
 
 ROWS = 15  # of the table
-SHOWN = 5  # of its strains, stresses and the temperature
-SAME_LOAD, CLOSED_CYCLE = 1e-9, 1e-6  # of load factors; of strains or stresses of one waypoint, relative
 
 
 def path_table(document: Document, limit: int = ROWS) -> Table:
     """Return totals of the path above at most `limit` rows of points."""
     points, numbers, varying = document["path"], chosen(document, limit), _path_columns(document)
-    first = dict(list(varying.items())[:SHOWN])
+    first = dict(list(varying.items())[:5])
     rest = [name for name in varying if name not in first]
     broke = sum(point["broke"] for point in points)
     some = "" if len(numbers) == len(points) else f", {len(numbers)} shown"
@@ -99,10 +97,10 @@ def _afterwards(document: Document, peak: Mapping[str, Any], largest: str) -> st
 def _closed_cycle(document: Document) -> str:
     """Describe the last loop area: the work since a waypoint with the same strains."""
     points, legs = document["path"], path_curves.legs(document)
-    ends = [p for p in points if abs(p["load_factor"] * legs - round(p["load_factor"] * legs)) < SAME_LOAD]
+    ends = [p for p in points if abs(p["load_factor"] * legs - round(p["load_factor"] * legs)) < path_curves.SAME_LOAD]
     for point in reversed(ends[:-1]):
         pair = np.array([point["strain"], ends[-1]["strain"]])
-        if np.ptp(pair, axis=0).max() <= CLOSED_CYCLE * np.abs(pair).max():
+        if np.ptp(pair, axis=0).max() <= 1e-6 * np.abs(pair).max():
             return f", area of the last closed loop {ends[-1]['work'] - point['work']:.6g}"
     return ""
 

@@ -24,13 +24,9 @@ THERMAL = {
     "thermal_stress_compression": "under minus one",
     "thermal_expansion": "thermal expansion",
 }
-THERMAL_DIGITS = 7  # below the last of the largest there is zero
 THIS_CELL, ITS_ERROR, LOWER, UPPER = "this cell", "error of its mesh", "lower bound", "upper bound"
 MESH_ERROR = "Mesh error, estimated"
-# Of a value by which an error is below the digits that are printed without it.
-NO_ERROR = 1e-7
-LEAST_DECIMAL, MOST_DECIMAL = 1e-4, 1e8  # numbers between these are printed to the digits of their errors
-ABREAST, PAIRS = 5, 2  # constants beside each other in text
+PAIRS = 2  # constants beside each other in text
 
 
 def stiffnesses(document: Document) -> list[Table]:
@@ -59,7 +55,8 @@ def value_and_error(value: float, error: float | None, form: str) -> tuple[str, 
     """
     if error is None:
         return number(value, form), ""
-    if not error > NO_ERROR * abs(value) or not LEAST_DECIMAL < abs(value) < MOST_DECIMAL:
+    # An error below the digits printed without it, or a constant of extreme size.
+    if not error > 1e-7 * abs(value) or not 1e-4 < abs(value) < 1e8:
         return number(value, form), f"{error:.1e}"
     decimals = max(0, 1 - floor(log10(error)))
     return f"{value:.{decimals}f}", f"{error:.{decimals}f}"
@@ -102,7 +99,7 @@ def thermal(document: Document) -> list[Table]:
 
 
 def _rounded(values: Float) -> list[float]:
-    is_seen = np.abs(values) > 10.0**-THERMAL_DIGITS * np.abs(values).max()
+    is_seen = np.abs(values) > 10.0**-7 * np.abs(values).max()
     return [float(value) for value in np.where(is_seen, values, 0.0)]
 
 
@@ -155,7 +152,7 @@ def _estimates(document: Document) -> Table:
     below += [f"  no closed estimates, which are of {why}" for why in _why_no_estimates(document)]
     deviation = 100 * document["transversely_isotropic"]["deviation"]
     title = f"Along the fibres and across them{stress_label(document)}; {deviation:.2g} % from transversely isotropic"
-    return Table(title, columns, rows, _ranges(document), below, most_columns=ABREAST)
+    return Table(title, columns, rows, _ranges(document), below, most_columns=5)
 
 
 def _ranges(document: Document) -> list[str]:

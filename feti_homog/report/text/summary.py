@@ -17,9 +17,6 @@ from feti_homog.typing import Document
 LABEL = 12  # columns of the labels at the left
 NAME = 28  # columns of the names of checks
 GLUE = "\N{NO-BREAK SPACE}"  # at which no line is broken
-LISTED = 12  # numbers of iterations that are reported one by one
-
-NOTEBOOK_ROWS = 20  # of a table of points
 
 
 def summary(document: Document) -> str:
@@ -64,7 +61,7 @@ def short_summary(document: Document) -> str:
 
 def notebook(document: Document) -> str:
     """Return title, tables, checks and status as HTML."""
-    tables = [table.html for table in (*answers(document, NOTEBOOK_ROWS), checks(document))]
+    tables = [table.html for table in (*answers(document, 20), checks(document))]
     return "\n".join([f"<h4>{escape(title_of(document))}</h4>", *tables, f"<p>{escape(document['status'])}</p>"])
 
 
@@ -152,7 +149,7 @@ def _factorized(solver: Document) -> list[str]:
 def _iterations(counts: Sequence[int]) -> list[str]:
     if not any(counts):
         return [f"none in {_number(len(counts), 'state')}"]
-    if len(counts) <= LISTED:
+    if len(counts) <= 12:
         return [str(count) for count in counts]
     return [f"{min(counts)} to {max(counts)} a state", f"{sum(counts)} for {len(counts)} states"]
 
