@@ -223,20 +223,16 @@ def chosen(document: Document, rows: int, among: Sequence[int] | None = None) ->
     if len(numbers) <= rows:
         return [int(number) for number in numbers]
     fixed = {0, len(numbers) - 1}
-    for group in (marks(document), _deepest(document), path_curves.ends_of_legs(document)):
+    of_events = document["case"]["path"]["method"] == "events"
+    around = drops(points, path_curves.legs(document) if of_events else 0)
+    deepest = max(around)[1:] if around else ()
+    for group in (marks(document), deepest, path_curves.ends_of_legs(document)):
         places = np.flatnonzero(np.isin(numbers, list(group))).tolist()
         fixed = fixed.union(places) if len(fixed.union(places)) <= rows else fixed
     broken = np.cumsum([point["broke"] for point in points])[numbers]
     counts = np.linspace(broken[0], broken[-1], rows - len(fixed) + 2)[1:-1]
     evenly = {int(np.abs(broken - count).argmin()) for count in counts}
     return [int(numbers[place]) for place in sorted(evenly | fixed)]
-
-
-def _deepest(document: Document) -> tuple[int, ...]:
-    """Return the points before and after the deepest drop; empty without drops."""
-    of_events = document["case"]["path"]["method"] == "events"
-    around = drops(document["path"], path_curves.legs(document) if of_events else 0)
-    return max(around)[1:] if around else ()
 
 
 def kept_points(document: Document) -> list[int]:

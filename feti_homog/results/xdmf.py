@@ -84,13 +84,17 @@ def _write(path: Path, file: h5py.File) -> Path:
     labels = [str(file[f"state/{state}"].attrs["label"]) for state in states]
     longest = max((len(label.encode()) for label in labels), default=0)
     for state, label in zip(states, labels, strict=True):
-        grid = _grid(collection, state, label)
+        # A collection for each state: readers pass on names of grids in one alone.
+        kind = {"Name": f"state {state}", "GridType": "Collection", "CollectionType": "Spatial"}
+        block = ET.SubElement(collection, "Grid", kind)
+        ET.SubElement(block, "Time", Value=state)
+        grid = ET.SubElement(block, "Grid", Name=label, GridType="Uniform")
         _numbers(grid, "label", "Scalar", list(label.encode().ljust(longest)))
         _means(grid, file[f"state/{state}"].attrs)
         is_spatial = AXIAL in file[f"state/{state}"]
         if path.name == CELL:
-            kind = "Triangle_6" if file["mesh/triangles"].shape[1] == 6 else "Triangle"
-            _mesh(grid, {"TopologyType": kind}, file["mesh/triangles"], file["mesh/points"])
+            triangles = "Triangle_6" if file["mesh/triangles"].shape[1] == 6 else "Triangle"
+            _mesh(grid, {"TopologyType": triangles}, file["mesh/triangles"], file["mesh/points"])
             _attributes(grid, file, state, CELL_NODES, "Node")
             _attributes(grid, file, state, CELL_ELEMENTS | (SPATIAL_ELEMENTS if is_spatial else {}), "Cell")
         else:
@@ -99,13 +103,6 @@ def _write(path: Path, file: h5py.File) -> Path:
             _attributes(grid, file, state, INTERFACE_POINTS | (SPATIAL_POINTS if is_spatial else {}), "Node")
     ET.indent(root)
     return atomic.replace(path, lambda part: ET.ElementTree(root).write(part, encoding="utf-8", xml_declaration=True))
-
-
-def _grid(collection: ET.Element, state: str, label: str) -> ET.Element:
-    """Return the grid of a state, in its own collection: readers pass on grid names there alone."""
-    block = ET.SubElement(collection, "Grid", Name=f"state {state}", GridType="Collection", CollectionType="Spatial")
-    ET.SubElement(block, "Time", Value=state)
-    return ET.SubElement(block, "Grid", Name=label, GridType="Uniform")
 
 
 def _means(grid: ET.Element, attributes: Mapping[str, Any]) -> None:

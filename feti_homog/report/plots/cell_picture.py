@@ -31,7 +31,10 @@ def figure(cell: drawn_cell.DrawnCell) -> Figure:
     """Return the materials with the fibres' numbers and, where they differ, the factors of their strengths."""
     drawn, attributes, fibres = cell.drawn, cell.file.attrs, cell.file["fibre"]
     phases = list(attributes["phases"])
-    inks = np.array([mpl.colors.to_rgba(MATRIX), *(_material(k) for k in range(len(phases) - 1))])
+    # A colour map for each of the first phases, which differ most; then other tones.
+    tones = [0.55 - 0.25 * (k // len(FIBRES) * 0.618 % 1.0) for k in range(len(phases) - 1)]
+    materials = [mpl.colormaps[FIBRES[k % len(FIBRES)]](tone) for k, tone in enumerate(tones)]
+    inks = np.array([mpl.colors.to_rgba(MATRIX), *materials])
     picture, axes = _outlined(cell, inks[drawn.phase])
     factors = fibres["strength"][:] if "strength" in fibres else np.ones(len(fibres["number"]))
     varies = bool((factors != 1.0).any())
@@ -108,12 +111,6 @@ def _title(attributes: Any, text: str) -> str:
     return f"{plot_helpers.plain(attributes['title'])}\n{text}".lstrip()
 
 
-def _material(number: int) -> Any:
-    """Return the colour of a phase other than the matrix; the first phases differ most."""
-    tone = 0.55 - 0.25 * (number // len(FIBRES) * 0.618 % 1.0)
-    return mpl.colormaps[FIBRES[number % len(FIBRES)]](tone)
-
-
 def _count(number: int, one: str, many: str) -> str:
     return f"{number} {one if number == 1 else many}"
 
@@ -148,8 +145,7 @@ def _on_images(centre: Array, radius: float, low: Array, period: Array) -> Array
     images = centre + shifts * period
     margin = np.minimum(0.4 * radius, 0.4 * period)
     moved = np.clip(images, low + margin, low + period - margin)
-    places: Array = moved[np.linalg.norm(moved - images, axis=1) <= 0.85 * radius]
-    return places
+    return np.asarray(moved[np.linalg.norm(moved - images, axis=1) <= 0.85 * radius])
 
 
 def _inside(drawn: DrawnMesh, body: int, outline: cKDTree) -> tuple[Array, float]:

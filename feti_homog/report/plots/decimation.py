@@ -41,8 +41,7 @@ class DrawnMesh:
     @cached_property
     def areas(self) -> Array:
         """(q,) areas of the triangles."""
-        result: Array = np.abs(_determinant(_sides(self.points, self))) / 2
-        return result
+        return np.asarray(np.abs(_determinant(_sides(self.points, self))) / 2)
 
     @cached_property
     def node_areas(self) -> Array:
@@ -56,8 +55,7 @@ class DrawnMesh:
         body = np.zeros(len(self.points), np.int64)
         body[self.triangles] = self.body[:, None]
         keys = np.column_stack([body, np.round(self.points / tolerance).astype(np.int64)])
-        numbers: Array = np.unique(keys, axis=0, return_inverse=True)[1].ravel()
-        return numbers
+        return np.asarray(np.unique(keys, axis=0, return_inverse=True)[1].ravel())
 
 
 def drawn_mesh(file: Any, limit: int = TRIANGLE_LIMIT, block: int = 1 << 18) -> DrawnMesh:
@@ -96,8 +94,7 @@ def node_means(values: Array, drawn: DrawnMesh) -> Array:
     """Average triangle values (q,) at the nodes drawn (p,), weighted by area, within each body."""
     place, weights = drawn.places[drawn.triangles].ravel(), np.repeat(drawn.areas, 3)
     sums = np.bincount(place, np.repeat(values * drawn.areas, 3)) / np.bincount(place, weights)
-    means: Array = sums[drawn.places]
-    return means
+    return np.asarray(sums[drawn.places])
 
 
 def outline_edges(drawn: DrawnMesh, label: Array) -> Array:
@@ -116,18 +113,15 @@ def outline_edges(drawn: DrawnMesh, label: Array) -> Array:
     twins = cKDTree(middle).query_pairs(1e-6 * np.ptp(drawn.points, axis=0).max(), output_type="ndarray")
     is_border = np.ones(len(border), dtype=bool)
     is_border[twins[owner[twins[:, 0]] == owner[twins[:, 1]]].ravel()] = False
-    outline: Array = border[is_border]
-    return outline
+    return np.asarray(border[is_border])
 
 
 def _corners(rows: Array, pieces: int) -> Array:
     """Return triangles (q, 3) from rows (g, group, 3 or 6): corner i is vertex i of one triangle in the group."""
     if pieces > 1:
-        quarters: Array = rows[:, 0][:, QUARTERS].reshape(-1, 3)
-        return quarters
+        return np.asarray(rows[:, 0][:, QUARTERS].reshape(-1, 3))
     members = np.arange(3) * ((rows.shape[1] - 1) // 3)
-    corners: Array = rows[:, members, np.arange(3)]
-    return corners
+    return np.asarray(rows[:, members, np.arange(3)])
 
 
 def _blocks(table: Any, group: int, block: int, function: Callable[[Array], Array]) -> Array:
@@ -156,8 +150,7 @@ def drawn_displacement(state: Any, drawn: DrawnMesh) -> Array:
     shear = 0.5 * loads["gamma12"]
     fluctuation = displacement - drawn.points @ np.array([[loads["E11"], shear], [shear, loads["E22"]]])
     areas = _determinant(_sides(drawn.points, drawn))
-    shifted: Array = displacement - np.average(fluctuation[drawn.triangles].mean(axis=1), axis=0, weights=areas)
-    return shifted
+    return np.asarray(displacement - np.average(fluctuation[drawn.triangles].mean(axis=1), axis=0, weights=areas))
 
 
 def largest_scale(displacement: Array, drawn: DrawnMesh) -> float:
@@ -187,8 +180,7 @@ def _sides(values: Array, drawn: DrawnMesh) -> Array:
 
 def _determinant(rows: Array) -> Array:
     """(q,) determinants of (q, 2, 2)."""
-    result: Array = rows[:, 0, 0] * rows[:, 1, 1] - rows[:, 0, 1] * rows[:, 1, 0]
-    return result
+    return np.asarray(rows[:, 0, 0] * rows[:, 1, 1] - rows[:, 0, 1] * rows[:, 1, 0])
 
 
 @dataclass(frozen=True)

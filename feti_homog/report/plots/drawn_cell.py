@@ -52,8 +52,7 @@ class InterfaceEdges:
 
     def state(self, status: Array) -> Array:
         """(e,) edge states from node states: open if an end is open, else in contact or damaged if an end is."""
-        states: Array = ORDER[np.argsort(ORDER)[status[self.nodes]].max(axis=1, initial=0)]
-        return states
+        return np.asarray(ORDER[np.argsort(ORDER)[status[self.nodes]].max(axis=1, initial=0)])
 
     def mark(self, axes: Axes, points: Array, status: Array, magnified: float = 1.0) -> list[Line2D]:
         """Draw the edges with nodes at `points` (p, 2); returns legend lines for the states present."""
@@ -90,8 +89,7 @@ def states_of_nodes(state: Any) -> Array:
     """(k,) interface node states in a group of result.h5: status, or DAMAGED for damaged bonds that hold."""
     status = state["status"][:]
     damage = state["damage"][:] if "damage" in state else np.zeros(len(status))
-    nodes: Array = np.where((status == BONDED) & (damage > 0.0), DAMAGED, status)
-    return nodes
+    return np.asarray(np.where((status == BONDED) & (damage > 0.0), DAMAGED, status))
 
 
 def state_legend(kinds: list[int]) -> list[Line2D]:
@@ -102,8 +100,7 @@ def _wrapped(points: Array, period: Array, tolerance: float) -> Array:
     """Return the points' images in [0, period); within `tolerance` below the period they are 0."""
     inside = np.mod(points, period)
     inside[inside > period - tolerance] = 0.0
-    wrapped: Array = inside
-    return wrapped
+    return np.asarray(inside)
 
 
 def figure_of(attributes: Any, panels: int, beside: float = 0.0) -> tuple[Figure, Sequence[Axes]]:

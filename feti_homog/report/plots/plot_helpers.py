@@ -81,8 +81,7 @@ def _trimmed(pixels: Array, padding: int) -> Array:
         inked = np.flatnonzero(drawn.any(axis=axis))
         low, high = (inked[0], inked[-1] + 1) if len(inked) else (0, drawn.shape[1 - axis])
         places.append(slice(max(low - padding, 0), high + padding))
-    part: Array = pixels[tuple(places)]
-    return part
+    return np.asarray(pixels[tuple(places)])
 
 
 def finish_curves(axes: Axes) -> None:

@@ -84,7 +84,9 @@ def _figure(cell: drawn_cell.DrawnCell, names: list[str], labels: drawn_cell.Loa
             if place.ends == DEGREES:
                 axes.xaxis.set_major_locator(MultipleLocator(60))
             axes.spines[["top", "right"]].set_visible(False)
-        row[0].set_title(_name(file, body, place), fontsize=10, loc="left")
+        fibre_name = f"fibre {file['interface/fibre_number'][place.nodes[0]]}"
+        is_fibre = body in file["fibre/body"][:]
+        row[0].set_title(fibre_name if is_fibre else f"coating of {fibre_name}", fontsize=10, loc="left")
     for column in grid.T:
         _clip_spikes(column[0], [line.get_ydata() for axes in column for line in axes.lines])
     _labels(file, figure, grid, status[np.isin(fibre, chosen)])
@@ -104,11 +106,6 @@ def _clip_spikes(axes: Axes, curves: list[Any]) -> None:
     room = high - low
     if values.min() < low - room or values.max() > high + room:
         axes.set_ylim(max(values.min(), low - room), min(values.max(), high + room))
-
-
-def _name(file: Any, body: int, place: Coordinate) -> str:
-    number = file["interface/fibre_number"][place.nodes[0]]
-    return f"fibre {number}" if body in file["fibre/body"][:] else f"coating of fibre {number}"
 
 
 def _values(state: Any, quantity: str) -> Array:
@@ -248,11 +245,9 @@ def _along(points: Array, starts: Array, steps: Array, before: Array, period: Ar
         axis=1
     )  # a vertex is the start of an edge, not an end
     rows = np.arange(len(points))
-    arc: Array = before[nearest[rows, best]] + (share * length)[rows, best]
-    return arc
+    return np.asarray(before[nearest[rows, best]] + (share * length)[rows, best])
 
 
 def _shortest(vectors: Array, period: Array) -> Array:
     """Return vectors (..., 2) shortened by whole periods."""
-    shortest: Array = vectors - period * np.round(vectors / period)
-    return shortest
+    return np.asarray(vectors - period * np.round(vectors / period))

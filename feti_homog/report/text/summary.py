@@ -129,21 +129,16 @@ def _scatter(fibres: Sequence[Document]) -> list[str]:
 
 def _solver(solver: Document) -> list[str]:
     parts = [_number(solver["ranks"], "rank"), _number(solver["subdomains"], "subdomain")]
-    dual = [_number(solver["multipliers"], "multiplier"), f"kernel {solver['kernel_dim']}"]
+    dual, factorized = [_number(solver["multipliers"], "multiplier"), f"kernel {solver['kernel_dim']}"], list[str]()
+    if (count := solver.get("factorizations")) is not None:  # of the axial problem too
+        coarse = f"coarse problem {_number(solver.get('coarse_factorizations', 0), 'time')}"
+        factorized = [f"{count} {'matrix' if count == 1 else 'matrices'} of subdomains", coarse]
     return [
         *_field("Solver", [*parts, _number(solver["dofs"], "dof")]),
         *_field("Dual", [*dual, f"coarse problem {solver['coarse_dim']}"]),
-        *_factorized(solver),
+        *(_field("Factorized", factorized) if factorized else []),
         *_field("Iterations", _iterations(solver["iterations"])),
     ]
-
-
-def _factorized(solver: Document) -> list[str]:
-    if "factorizations" not in solver:
-        return []
-    coarse = f"coarse problem {_number(solver.get('coarse_factorizations', 0), 'time')}"
-    count = solver["factorizations"]  # of the axial problem too
-    return _field("Factorized", [f"{count} {'matrix' if count == 1 else 'matrices'} of subdomains", coarse])
 
 
 def _iterations(counts: Sequence[int]) -> list[str]:
