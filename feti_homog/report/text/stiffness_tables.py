@@ -149,7 +149,7 @@ def _estimates(document: Document) -> Table:
     ]
     columns = [Column("", -22), *(Column(name, max(13, len(name) + 2)) for name in names)]
     below = [f"  {UNKNOWN}: not available from this method"] if any(UNKNOWN in row for row in rows) else []
-    below += [f"  no closed estimates, which are of {why}" for why in _why_no_estimates(document)]
+    below += [f"  closed-form estimates exist for {why} only" for why in _why_no_estimates(document)]
     deviation = 100 * document["transversely_isotropic"]["deviation"]
     title = f"Along the fibres and across them{stress_label(document)}; {deviation:.2g} % from transversely isotropic"
     return Table(title, columns, rows, _ranges(document), below, most_columns=5)

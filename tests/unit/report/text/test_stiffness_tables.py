@@ -41,7 +41,7 @@ def test_a_row_for_each_source_and_a_column_for_each_constant_that_one_knows():
 )
 def test_a_cell_without_estimates_is_reported_of_what_they_are(more, words):
     (table,) = constants({"case": {}, "transversely_isotropic": CELL, **more})
-    assert table.lines[-1] == f"  no closed estimates, which are of {words}"
+    assert table.lines[-1] == f"  closed-form estimates exist for {words} only"
 
 
 def test_the_range_over_directions_stands_above_the_table():
