@@ -21,8 +21,7 @@ from feti_homog.interface.contact.load_scales import ABSURD
 from feti_homog.interface.contact.states import OPEN, BondState, Equilibrium
 from feti_homog.interface.loads import Load
 from feti_homog.materials.voigt import SPATIAL_STRAINS, SPATIAL_STRESSES, STRAINS
-from feti_homog.results.checkpoint import Checkpoint
-from feti_homog.results.events_in_memory import NoCheckpoint
+from feti_homog.results.checkpoint import NoCheckpoint
 from feti_homog.system.runtime.progress import Progress
 from feti_homog.typing import Float
 
@@ -117,7 +116,7 @@ class AnalysisContext:
     checks: Checks
     states: StateRecorder
     progress: Progress
-    checkpoint: Checkpoint
+    checkpoint: NoCheckpoint
     resume: bool = False
     log: Callable[[str], object] = lambda line: None
     events: str = "result.path"

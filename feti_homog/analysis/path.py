@@ -13,7 +13,7 @@ from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.criteria import criterion_of
 from feti_homog.analysis.event_progress import BARS, EventProgress
 from feti_homog.analysis.mesh_errors import check_accuracy, state_error
-from feti_homog.analysis.path_events import Work, averages, found_again, holding, last_confirmed, restored, stored
+from feti_homog.analysis.path_events import Work, averages, found_again, holding, read, restored, stored
 from feti_homog.analysis.registry import Analysis
 from feti_homog.analysis.result_records import PathPoint, Peak
 from feti_homog.analysis.tip_records import TipRecorder
@@ -28,7 +28,7 @@ from feti_homog.interface.path.frictionless_leg import FrictionlessLeg
 from feti_homog.interface.path.path_following import events, increments
 from feti_homog.interface.path.path_points import Energies, Point, unloaded
 from feti_homog.materials.voigt import voigt_names
-from feti_homog.results.checkpoint_file import is_whole
+from feti_homog.results.checkpoint import has_multipliers
 from feti_homog.results.landmarks import kept, marks, peak_of
 
 MOST_NAMED = 8  # fibres in a remark
@@ -48,15 +48,13 @@ def follow(context: AnalysisContext, path: LoadPath, law: BondLaw) -> dict[str, 
     `states` has the numbers of the points whose fields are recorded; which, is chosen when all are known.
     """
     check_accuracy(context)
-    known = _known(context)
+    known = _known(context, law)
     work, entries, last = Work(), list[dict[str, Any]](), None
-    confirmed = [-1] * len(context.loads.problems)
     progress = EventProgress(context.progress, BARS[path.method], context.events)
-    with context.checkpoint, progress as shown:
+    with progress as shown:
         for number, (point, energies, responses) in enumerate(_points(context, path, law, known)):
             place = f"at {point.load_factor:.6f}, {responses[0].leading}"
             place += "" if energies is None else ", from the checkpoint"
-            confirmed = last_confirmed(confirmed, number, point)
             if energies is not None:
                 work.resume_from(*energies, point)
             else:
@@ -65,7 +63,7 @@ def follow(context: AnalysisContext, path: LoadPath, law: BondLaw) -> dict[str, 
                     # Teeth are many and found again at once.
                     light = point.broke == 0 < point.softened
                     event = stored(point, responses, work, context.loads.interfaces)
-                    context.checkpoint.write(number, *event, light=light, settled=min(confirmed))
+                    context.checkpoint.write(number, *event, light=light)
             _report(context, shown, f"{_label(path, number)} {place}", responses)
             entries.append(_entry(context, law, point, responses, work))
             shown.advance(point.load_factor, f"{len(entries)} {path.method}, {_counts(entries[-1])}")
@@ -103,7 +101,7 @@ def _document(context: AnalysisContext, entries: Sequence[dict[str, Any]]) -> di
     return {"case": context.case.resolved(), "path": entries}
 
 
-def _known(context: AnalysisContext) -> int:
+def _known(context: AnalysisContext, law: BondLaw) -> int:
     """Return how many events of the checkpoint are used; if none are wanted it is cleared.
 
     Raises:
@@ -111,12 +109,13 @@ def _known(context: AnalysisContext) -> int:
     """
     if context.resume:
         known = context.checkpoint.count()
-        if (held := holding(context, known)) < known:
-            context.progress.say(f"  event {held} of the checkpoint does not hold: it and all after it are found again")
-            context.checkpoint.keep(held)
-        words = f"{held} events are taken from the checkpoint"
+        if (count := holding(context, law, known)) < known:
+            context.progress.say(
+                f"  event {count} of the checkpoint does not hold: it and all after it are found again"
+            )
+        words = f"{count} events are taken from the checkpoint"
         context.progress.say(f"  {words if known else 'there is no checkpoint: the path begins at its beginning'}")
-        return held
+        return count
     if dropped := context.checkpoint.clear():
         context.progress.say(f"  {dropped} events of an earlier run are dropped; --resume would have gone on from them")
     return 0
@@ -138,7 +137,7 @@ def _points(
     for number in range(known):
         event = context.checkpoint.read(number)
         point, energies = restored(event, cell)
-        if number == known - 1 and not is_whole(event):  # whoever removed the files after it
+        if number == known - 1 and not has_multipliers(event):  # from which the path goes on
             point = found_again(point, cell, law)
         begin, responses = point.after, averages(event, point, context.loads)
         yield point, energies, responses
@@ -252,7 +251,7 @@ def _kept(
     tips = TipRecorder(context.cell, context.loads.interfaces, law) if law.has_tips else None
     with context.progress.stage("states") as words:
         for number in context.progress.bar(numbers, "states"):
-            point = last if number == len(entries) - 1 else _read(context, law, number)
+            point = last if number == len(entries) - 1 else read(context, law, number)[1]
             point, responses = _checked(context, point, _label(path, number))
             if tips is not None:
                 entries[number]["tips"] = tips.of(point)
@@ -262,13 +261,6 @@ def _kept(
                 context.record_state(responses, point.load_factor, _label(path, number), number)
         words.append(f"{len(numbers)} of {len(entries)} points")
     return {"states": numbers} if context.states.has_place else {}
-
-
-def _read(context: AnalysisContext, law: BondLaw, number: int) -> Point:
-    """Return a point of the checkpoint, with its equilibrium also if the event is lean.  Collective."""
-    event, cell = context.checkpoint.read(number), context.loads.interfaces
-    point, _ = restored(event, cell)
-    return point if is_whole(event) else found_again(point, cell, law)
 
 
 def _checked(context: AnalysisContext, point: Point, name: str) -> tuple[Point, Sequence[Response]]:

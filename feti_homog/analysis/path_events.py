@@ -17,6 +17,7 @@ from feti_homog.interface.contact.states import BondState, Equilibrium
 from feti_homog.interface.laws.bond_law import BondLaw
 from feti_homog.interface.loads import Load, Macroscopic
 from feti_homog.interface.path.path_points import NO_ENERGIES, Energies, PathState, Point, most_utilised
+from feti_homog.results.checkpoint import has_multipliers
 from feti_homog.results.checkpoint_file import Arrays
 
 # Conditions of contact; the last is known only with friction.
@@ -27,7 +28,6 @@ UNCHECKED = -1.0  # the error of a law that was not checked
 EMPTY = np.zeros(0)
 # Behind the names of what belongs to each problem.
 SUFFIXES = ("", "_axial")
-AMPLITUDES = tuple(f"alpha{suffix}" for suffix in SUFFIXES)
 
 
 @dataclass
@@ -142,32 +142,37 @@ def _load(state: Equilibrium) -> Load:
     return Load(np.concatenate(values), np.concatenate(by_stress))
 
 
-def holding(context: AnalysisContext, known: int) -> int:
+def read(context: AnalysisContext, law: BondLaw, number: int) -> tuple[Arrays, Point]:
+    """Return an event of the checkpoint and its point, whose multipliers are found again if missing.  Collective."""
+    event, cell = context.checkpoint.read(number), context.loads.interfaces
+    point, _ = restored(event, cell)
+    return event, point if has_multipliers(event) else found_again(point, cell, law)
+
+
+def holding(context: AnalysisContext, law: BondLaw, known: int) -> int:
     """Return how many of the known events of the checkpoint hold.
 
     Those after the last before which F lambda confirmed all problems, each at an event of its own or at one after it,
-    are confirmed here, up to one whose checks fail.  Collective.
+    are confirmed here, up to one whose checks fail or whose means are wrong.  Collective.
     """
-    cell, first, waiting = context.loads.interfaces, known, set(AMPLITUDES)
+    first, waiting = known, set(SUFFIXES[: len(context.loads.problems)])
     while first and (waiting := waiting - _confirmed(context.checkpoint.read(first - 1))):
         first -= 1
     for number in range(first, known):
-        point, _ = restored(context.checkpoint.read(number), cell)
-        for response in context.loads.responses(cell.completed(point.state), point.scale):
-            if any(not error <= context.checks.tolerance(law) for law, error in response.checks.items()):
+        event, point = read(context, law, number)
+        responses = context.loads.responses(context.loads.interfaces.completed(point.state), point.scale)
+        for response, kept in zip(responses, averages(event, point, context.loads), strict=True):
+            if any(not error <= context.checks.tolerance(name) for name, error in response.checks.items()):
+                return number
+            change = np.abs(response.stress - kept.stress).max()
+            if not change <= context.checks.tolerance("stress") * np.abs(response.stress).max():
                 return number
     return known
 
 
 def _confirmed(event: Arrays) -> set[str]:
-    """Return the amplitudes of the problems that F lambda confirmed at an event, or of a lean one after it."""
-    return {name for name in AMPLITUDES if not np.isnan(event.get(name, EMPTY)).any()}
-
-
-def last_confirmed(before: Sequence[int], number: int, point: Point) -> list[int]:
-    """Return the last event at which F lambda confirmed each problem: `number`, of this point, or those `before`."""
-    states = zip(before, point.state.problems, strict=True)
-    return [last if state.solution.alpha is None else number for last, state in states]
+    """Return the suffixes of the problems that F lambda confirmed at an event."""
+    return {suffix for suffix in SUFFIXES if event.get(f"confirmed{suffix}", False)}
 
 
 def _averages(response: Response) -> dict[str, Any]:
@@ -187,6 +192,7 @@ def _taken_apart(state: Equilibrium, kernel: int) -> tuple[dict[str, Any], Array
         "load": np.stack([state.load.values, state.load.by_stress]),
         "strain": solution.strain,
         "alpha": np.full(kernel, np.nan) if solution.alpha is None else solution.alpha,
+        "confirmed": solution.alpha is not None,
         "residual": solution.residual,
         "asked": state.asked,
         "certificate": [state.certificate.get(law, np.nan) for law in KKT_LAWS],

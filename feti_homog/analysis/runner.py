@@ -27,8 +27,7 @@ from feti_homog.results import (
     result_json,
     xdmf,
 )
-from feti_homog.results.checkpoint import Checkpoint, room_of
-from feti_homog.results.events_in_memory import EventsInMemory
+from feti_homog.results.checkpoint import Checkpoint, EventsInMemory, room_of
 from feti_homog.results.field_file import FieldFile
 from feti_homog.results.output_folder import EventLog
 from feti_homog.system.parallel.mpi_errors import all_raise, on_root, on_root_only
@@ -191,11 +190,9 @@ def _write(result: Result, directory: Path, cell: TornCell) -> None:
         written |= {field_file.NAME, *(path.name for path in on_root(cell.comm, xdmf.write, directory))}
     analysis, name = analysis_of(cell.case), cell.case.analysis.type
     if analysis.table:
-        from feti_homog.results import csv_tables  # which a stiffness has none of
-
         points = getattr(result, name)
         rows = points if isinstance(points, tuple) else (points,)
-        written.add(on_root(cell.comm, csv_tables.write, directory / f"{name}.csv", rows).name)
+        written.add(on_root(cell.comm, result_json.write_csv, directory / f"{name}.csv", rows).name)
     written |= {output_folder.LOG} if analysis.events else set()
     on_root_only(cell.comm, output_folder.remove_other_results, directory, written)
 

@@ -11,7 +11,6 @@ from pathlib import Path
 from feti_homog.errors import CaseError
 from feti_homog.materials.voigt import SPATIAL_STRAINS, STRAINS
 from feti_homog.report.text.summary import answers, checks, summary, title_of
-from feti_homog.report.text.table import Column, Table
 from feti_homog.results import atomic, output_folder, result_json
 from feti_homog.typing import Document
 
@@ -44,7 +43,7 @@ def write(directory: Path) -> Path:
     Call on one rank.
 
     Raises:
-        CaseError: the folder is not that of a result, or a file of it is missing or damaged.
+        CaseError: the folder has no result, or one of its files is missing or damaged.
         FetiHomogError: the report cannot be written.
     """
     if not directory.is_dir():
@@ -63,24 +62,23 @@ def write(directory: Path) -> Path:
 def page(document: Document, directory: Path) -> str:
     """Return the page of a result.  Raises OSError or KeyError where its files are damaged."""
     title, status = escape(title_of(document)), document["status"]
-    laws = [
-        [check.law, check.error, "none" if check.limit is None else check.limit, "holds" if check.holds else "fails"]
-        for check in checks(document)
-    ]
-    columns = [Column("law"), Column("error", form=".1e"), Column("limit", form=".1e"), Column("")]
-    table = Table("Largest relative error of each law over all states", columns, laws)
     style = resources.files("feti_homog.report").joinpath("page.css").read_text(encoding="utf-8")
+    remarks = [
+        f'<p class="{label.lower()}"><strong>{label}</strong> {escape(remark)}</p>'
+        for label in ("Remark", "Warning", "Fault")
+        for remark in document.get(f"{label.lower()}s", ())
+    ]
     sections = {
         "Results": "\n".join(f'<div class="scroll">{answer.html}</div>' for answer in answers(document, MOST_ROWS)),
-        "Remarks": "\n".join(_remarks(document)),
-        "Checks": f'<div class="scroll">{table.html}</div>',
+        "Remarks": "\n".join(remarks),
+        "Checks": f'<div class="scroll">{checks(document).html}</div>',
         "Pictures": "\n".join(_pictures(directory)) or "<p>None: <code>feti-homog plot</code> draws them.</p>",
         "Summary": f"<pre>{escape(summary(document))}</pre>",
     }
-    shown = {name: body for name, body in sections.items() if body}
-    links = "\n".join(f'<a href="#{name.lower()}">{name}</a>' for name in shown)
+    filled = {name: body for name, body in sections.items() if body}
+    links = "\n".join(f'<a href="#{name.lower()}">{name}</a>' for name in filled)
     body = "\n".join(
-        f'<section id="{name.lower()}">\n<h2>{name}</h2>\n{text}\n</section>' for name, text in shown.items()
+        f'<section id="{name.lower()}">\n<h2>{name}</h2>\n{text}\n</section>' for name, text in filled.items()
     )
     return f"""<!DOCTYPE html>
 <html lang="en">
@@ -107,12 +105,6 @@ def page(document: Document, directory: Path) -> str:
 </body>
 </html>
 """
-
-
-def _remarks(document: Document) -> Iterable[str]:
-    for label, key in (("Remark", "remarks"), ("Warning", "warnings"), ("Fault", "faults")):
-        for words in document.get(key, ()):
-            yield f'<p class="{label.lower()}"><strong>{label}</strong> {escape(words)}</p>'
 
 
 def _pictures(directory: Path) -> Iterable[str]:

@@ -1,6 +1,6 @@
-"""Files that are there whole or not at all, whoever reads and whenever the writer ends.
+"""Files that appear complete or not at all, whenever their writer ends.
 
-What is written is on the disk, with its name, before the writer goes on: file and folder are synchronised.
+File and folder are synchronised: content and name are on the disk before the writer goes on.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ def replace(path: Path, write: Callable[[Path], object]) -> Path:
     """Let `write` make a file beside `path`, which then takes its place in one step; returns `path`.
 
     Raises:
-        FetiHomogError: the file cannot be written; what was at `path` is untouched.
+        FetiHomogError: the file cannot be written; an earlier file at `path` is untouched.
     """
     part = part_of(path)
     with write_errors(path):
@@ -37,12 +37,12 @@ def replace(path: Path, write: Callable[[Path], object]) -> Path:
 
 
 def replace_text(path: Path, text: str) -> Path:
-    """Return the same with a text. Raises FetiHomogError as `replace` does."""
+    """Write a text file as `replace` does, with its errors."""
     return replace(path, lambda part: part.write_text(text, encoding="utf-8"))
 
 
 def part_of(path: Path) -> Path:
-    """Return the name, beside `path`, of a file that is being written: no other process writes one of that name."""
+    """Return the name of an unfinished file beside `path`, which no other process writes."""
     return path.with_name(f"{path.name}.{file_locks.tag()}.part")
 
 
@@ -50,6 +50,25 @@ def commit(part: Path, path: Path) -> None:
     """Give the finished file `part` the name `path`, in one step that lasts.  Raises OSError."""
     _synchronise(part)
     rename(part, path)
+
+
+def append(path: Path, start: int, content: bytes, lasts: bool) -> None:
+    """Write bytes from byte `start` of a file on, in place of all that follows; if it `lasts`, they are on the disk.
+
+    A reader must recognize unfinished bytes at the end of the file: the writer may be killed.
+
+    Raises:
+        FetiHomogError: the file cannot be written.
+    """
+    with write_errors(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with path.open("r+b" if start else "wb") as stream:
+            stream.seek(start)
+            stream.truncate()
+            stream.write(content)
+            stream.flush()
+            if lasts:
+                os.fsync(stream.fileno())
 
 
 def rename(old: Path, new: Path) -> None:
@@ -60,7 +79,7 @@ def rename(old: Path, new: Path) -> None:
 
 
 def remove_unfinished(folder: Path, names: re.Pattern[str]) -> None:
-    """Remove what writers of files of these names that were killed have left; for whoever alone may write there."""
+    """Remove unfinished files from killed writers; for the only process that may write in the folder."""
     unfinished = re.compile(rf"({names.pattern})\..+\.\d+\.part")
     for path in folder.glob("*.part"):
         if unfinished.fullmatch(path.name):
@@ -69,7 +88,7 @@ def remove_unfinished(folder: Path, names: re.Pattern[str]) -> None:
 
 
 def remove_abandoned(folder: Path, names: re.Pattern[str]) -> None:
-    """Remove what writers on this machine that were killed have left; for whoever writes there beside others."""
+    """Remove unfinished files from killed writers on this machine; other processes may write in the folder."""
     part = re.compile(rf"({names.pattern})\.(?P<tag>.+)\.part")
     for path in folder.glob("*.part"):
         if (match := part.fullmatch(path.name)) and file_locks.has_ended(match["tag"]):
@@ -78,13 +97,13 @@ def remove_abandoned(folder: Path, names: re.Pattern[str]) -> None:
 
 
 def write_errors(path: Path) -> contextlib.AbstractContextManager[None]:
-    """In the block, failures of the file system and of HDF5 (RuntimeError) become a FetiHomogError about `path`."""
+    """Report failed writes in the block as FetiHomogError about `path`, RuntimeErrors of HDF5 too."""
     return file_errors("write", path)
 
 
 @contextlib.contextmanager
 def file_errors(verb: str, path: Path) -> Iterator[None]:
-    """Provide the same with another verb."""
+    """Report failures in the block as FetiHomogError "cannot `verb` `path`", RuntimeErrors of HDF5 too."""
     try:
         yield
     except (OSError, RuntimeError) as error:

@@ -1,143 +1,159 @@
-"""A file of events of a path: arrays of all of them together, in HDF5 behind a header with format and checksum.
+"""The event file of a path, `checkpoint/events` in its result folder: one appended record per event.
 
-A table of HDF5 takes 0.2 ms, so arrays that packing makes little smaller stand in one, BYTES, one after the other.
+A record is a prefix, content length and CRC-32 checksums of content and prefix, then the content.  The first content is
+the run's signature, every other an event packed by zlib: a JSON line with names, types and shapes of its arrays, then
+their bytes.  A killed run may leave a last record shorter than its length, which does not count.
 """
 
 from __future__ import annotations
 
-import hashlib
+import contextlib
 import json
 import re
-from collections.abc import Mapping
+import struct
+import zlib
+from collections.abc import Iterator
+from itertools import count
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 from numpy.typing import NDArray
 
 from feti_homog.errors import CaseError
+from feti_homog.results import atomic
 
-FORMAT = 10  # to be raised when what an event holds changes
-# HDF5 leaves so many bytes at the beginning of a file to its writer; there stands the header.
-USER_BLOCK = 512
-HEADER = re.compile(rb"feti-homog checkpoint, format (\d+), sha256 ([0-9a-f]{64})\n")
-UNMARKED = re.compile(rb"\x89HDF\r\n\x1a\n")  # HDF5's own first bytes, as in format 1
-# Bytes from which on an array is packed: of several events most states repeat, and of one most jumps are zero.
-LEAST_PACKED, LEAST_PACKED_OF_ONE = 2**12, 2**15
-PACKING = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
-# Arrays of an event that an equilibrium with the states of its bonds has again.
-FOUND_AGAIN = re.compile(r"(lam|jump|used|alpha)(_axial)?(_ends)?")
-BYTES = "bytes"
+FOLDER, DROPPED, NAME = "checkpoint", "checkpoint.dropped", "events"  # the second folder while it is removed
+FORMAT = 11  # to be raised when the content of an event changes
+HEAD = re.compile(rb"feti-homog checkpoint, format (\d+)\n")
+# Also files that formats up to 10 had, one an event, and unfinished ones among them.
+EVENT_FILE = re.compile(rf"{NAME}|\d{{6,}}\.h5(\..+\.\d+\.part)?")
+PREFIX = struct.Struct("<QII")
 
 Arrays = dict[str, NDArray[Any]]
 
 
-def write(path: Path, events: Arrays, signature: str, number: int) -> None:
-    """Write arrays (events, ...) of a run with this signature, of which `number` is the first event."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    image = _image(events, {"signature": signature, "number": number})
-    header = f"feti-homog checkpoint, format {FORMAT}, sha256 {hashlib.sha256(image).hexdigest()}\n"
-    path.write_bytes(header.encode().ljust(USER_BLOCK, b"\0") + image)
+def begin(signature: str) -> bytes:
+    """Return the first bytes of an event file: its format, and the record of the signature."""
+    return b"feti-homog checkpoint, format %d\n" % FORMAT + record(signature.encode())
 
 
-def read(path: Path) -> tuple[Arrays, str, int]:
-    """Return the arrays of a file, the signature of its run, and the number of its first event.
-
-    Raises:
-        CaseError: it is unreadable.
-    """
-    try:
-        _check_bytes(path)
-        with h5py.File(path, "r") as file:
-            signature, found = str(file.attrs.get("signature", "")), int(file.attrs.get("number", -1))
-            events = {name: table[()] for name, table in file.items() if name != BYTES}
-            return events | _apart(file[BYTES][()], json.loads(file.attrs["layout"])), signature, found
-    except CaseError:
-        raise
-    except Exception as error:  # h5py may raise anything
-        raise CaseError(f"{path} is no readable event of a path: {error}") from error
+def record(content: bytes) -> bytes:
+    """Return a content behind its prefix."""
+    numbers = len(content), zlib.crc32(content)
+    return PREFIX.pack(*numbers, zlib.crc32(b"%d %d" % numbers)) + content
 
 
-def length(events: Arrays) -> int:
-    """Return the number of events that have these arrays."""
-    return len(next(iter(events.values())))
-
-
-def events_in(path: Path) -> int:
-    """Count the events of a file; 1 if it cannot be read."""
-    try:
-        return length(read(path)[0])
-    except CaseError:
-        return 1
-
-
-def lean(event: Arrays) -> Arrays:
-    """Return an event without what an equilibrium has again."""
-    return {name: value for name, value in event.items() if not FOUND_AGAIN.fullmatch(name)}
-
-
-def is_whole(event: Arrays) -> bool:
-    """Return whether an event has multipliers."""
-    return "lam" in event
-
-
-def row(events: Arrays, number: int) -> Arrays:
-    """Return an event of several that stand together."""
-    return {name: table[number] for name, table in events.items()}
-
-
-def _digest(path: Path) -> str:
-    """SHA-256 of what follows the user block."""
-    with path.open("rb") as file:
-        file.seek(USER_BLOCK)
-        return hashlib.file_digest(file, "sha256").hexdigest()
-
-
-def _pays_to_pack(value: NDArray[Any]) -> bool:
-    if len(value) > 1:
-        return value.nbytes >= LEAST_PACKED
-    return value.nbytes >= LEAST_PACKED_OF_ONE and np.count_nonzero(value) < value.size / 4
-
-
-def _apart(content: NDArray[np.uint8], layout: list[tuple[str, str, list[int]]]) -> Arrays:
-    """Return the arrays of this layout, which stand one after the other."""
-    arrays, start = Arrays(), 0
-    for name, kind, shape in layout:
-        size = int(np.prod(shape)) * np.dtype(kind).itemsize
-        arrays[name] = content[start : start + size].copy().view(kind).reshape(shape)
-        start += size
-    return arrays
-
-
-def _image(events: Arrays, attributes: Mapping[str, Any]) -> bytes:
-    """Return an HDF5 file in memory: on a full disk HDF5 may crash, and writing bytes does not."""
-    with h5py.File("event", "w", driver="core", backing_store=False) as file:
-        packed = {name: value for name, value in events.items() if _pays_to_pack(value)}
-        for name, value in packed.items():
-            file.create_dataset(name, data=value, **PACKING)
-        others = {name: np.ascontiguousarray(value) for name, value in events.items() if name not in packed}
-        layout = [(name, value.dtype.str, value.shape) for name, value in others.items()]
-        file.create_dataset(BYTES, data=np.frombuffer(b"".join(map(bytes, others.values())), np.uint8))
-        file.attrs.update({**attributes, "layout": json.dumps(layout)})
-        file.flush()
-        return bytes(file.id.get_file_image())
-
-
-def _check_bytes(path: Path) -> None:
-    """Refuse a file of another format or other bytes than were written, before HDF5, which a wrong bit may crash.
+def records(path: Path, start: int = 0) -> Iterator[tuple[int, bytes]]:
+    """Yield end and content of each record, from the file's beginning or from the end `start` of a record.
 
     Raises:
-        CaseError: what is wrong.
+        CaseError: the file has another format or is damaged.
     """
-    with path.open("rb") as file:
-        start = file.read(USER_BLOCK)
-    header = HEADER.match(start)
-    version = int(header[1]) if header else int(UNMARKED.match(start) is not None)
-    if version not in (0, FORMAT):
-        raise CaseError(
-            f"{path} has the checkpoints' format {version}, this program reads format {FORMAT}; "
-            "go on with the program that wrote it, or start again without --resume"
-        )
-    if header is None or header[2].decode() != _digest(path):
-        raise CaseError(f"{path} is damaged: its checksum is wrong")
+    try:
+        with path.open("rb") as stream:
+            place = stream.seek(start) or len(_head(stream.readline(), path))
+            for number in count():
+                prefix = stream.read(PREFIX.size)
+                if place == 0 or len(prefix) < PREFIX.size:
+                    return
+                size, checksum, of_both = PREFIX.unpack(prefix)
+                is_sound = of_both == zlib.crc32(b"%d %d" % (size, checksum))
+                content = stream.read(size) if is_sound else b""
+                if is_sound and len(content) < size:
+                    return
+                if not is_sound or zlib.crc32(content) != checksum:
+                    raise CaseError(f"{path} is damaged: the checksum of record {number} is wrong")
+                place += PREFIX.size + size
+                yield place, content
+    except OSError as error:
+        raise CaseError(f"{path} is no readable event file: {error.strerror}") from error
+
+
+def _head(line: bytes, path: Path) -> bytes:
+    """Check the first line of an event file; empty if its run was killed while writing it."""
+    expected = begin("").partition(b"\n")[0] + b"\n"
+    if line != expected and expected.startswith(line):
+        return b""
+    if (match := HEAD.fullmatch(line)) is None:
+        raise CaseError(f"{path} is damaged: it does not begin as an event file")
+    if int(match[1]) != FORMAT:
+        raise _other_format(path, int(match[1]))
+    return line
+
+
+def refuse_former(folder: Path) -> None:
+    """Refuse a folder with event files of an earlier format.  Raises CaseError."""
+    if former := sorted(path.name for path in folder.glob("[0-9]*.h5")):
+        raise _other_format(folder / former[0], "10 or less")
+
+
+def _other_format(path: Path, number: int | str) -> CaseError:
+    return CaseError(
+        f"{path} has the checkpoints' format {number}, this program reads format {FORMAT}; "
+        "go on with the program that wrote it, or start again without --resume"
+    )
+
+
+def packed(event: Arrays) -> bytes:
+    """Return an event as the content of a record."""
+    layout = [(name, value.dtype.str, value.shape) for name, value in event.items()]
+    return zlib.compress(b"\n".join([json.dumps(layout).encode(), b"".join(v.tobytes() for v in event.values())]), 1)
+
+
+def unpacked(content: bytes) -> Arrays:
+    """Return the event of a record."""
+    layout, _, data = zlib.decompress(content).partition(b"\n")
+    event, start = Arrays(), 0
+    for name, kind, shape in json.loads(layout):
+        event[name] = np.frombuffer(data, kind, int(np.prod(shape)), start).reshape(shape).copy()
+        start += event[name].nbytes
+    return event
+
+
+def refuse_others(directory: Path) -> None:
+    """Check that a run may write its events to `directory`/checkpoint, and remove them.  Call on one rank.
+
+    Raises:
+        CaseError: it is no folder, or has other files than events.
+        OSError: it cannot be read.
+    """
+    for folder in (directory / FOLDER, directory / DROPPED):
+        if folder.is_symlink() or (folder.exists() and not folder.is_dir()):
+            kind = "link" if folder.is_symlink() else "file"
+            raise CaseError(
+                f"--out {directory}: {folder.name} is a {kind} there, and a run makes a folder of that name"
+            )
+        foreign = [path.name for path in folder.iterdir() if not _is_event(path)] if folder.is_dir() else []
+        if foreign:
+            raise CaseError(
+                f"--out {directory}: no run of this program wrote {folder.name}/{min(foreign)}, and a run removes "
+                f"{folder.name}; move it away or choose another folder"
+            )
+
+
+def remove(directory: Path) -> None:
+    """Remove the events in `directory`; their folder exists complete or not at all.  Call on one rank.
+
+    Raises:
+        FetiHomogError: the folder cannot be renamed.
+    """
+    folder, dropped = directory / FOLDER, directory / DROPPED
+    _remove_events(dropped)
+    if folder.is_dir():
+        with atomic.file_errors("remove", folder):
+            atomic.rename(folder, dropped)
+        _remove_events(dropped)
+
+
+def _remove_events(folder: Path) -> None:
+    """Remove the events of a folder as far as possible: the next run removes the rest."""
+    with contextlib.suppress(OSError):
+        for path in folder.iterdir():
+            if _is_event(path):
+                path.unlink()
+        folder.rmdir()
+
+
+def _is_event(path: Path) -> bool:
+    return EVENT_FILE.fullmatch(path.name) is not None and path.is_file()

@@ -38,13 +38,12 @@ if TYPE_CHECKING:
 
 NAME = "result.h5"
 PURE_NUMBER = "1"  # the unit of what has none
-# Bytes for what HDF5 itself adds to the file and to each table (0.6 KB a table were measured).
-RESERVE, TABLE_RESERVE = 1 << 17, 1 << 12
+RESERVE = 1 << 17  # bytes that HDF5 itself adds to the file
 
 
 @dataclass(frozen=True)
 class _Rows:
-    """The place of this rank's rows in a table that all ranks share, in the order of the ranks."""
+    """This rank's rows in a shared table, ranks in order."""
 
     start: int
     count: int
@@ -61,12 +60,11 @@ class FieldFile:
 
     `field_layout` lists its tables and attributes, `field_views` which of them show others.
 
-    Until `close` the file is called `part`. As a context manager it closes when the block ends well; an error that
-    all ranks raise removes it, any other exception leaves the unfinished file. Empty parts still need their columns:
-    shape (0, 2).
+    Until `close` the file is called `part`.  As a context manager it closes when the block ends well; an error that
+    all ranks raise removes it, any other exception leaves the unfinished file.  Empty parts need their columns: (0, 2).
 
     Raises:
-        FetiHomogError: the file cannot be written; on every rank, and what there was of it is removed.
+        FetiHomogError: the file cannot be written; on every rank, after its unfinished file is removed.
     """
 
     def __init__(
@@ -103,14 +101,14 @@ class FieldFile:
         self._write_part("interface", interface)
 
     def write_state(self, number: int, state: StatePart) -> None:
-        """Add state `number` (0, 1, ...) and flushes. The cell's own numbers are the same on all ranks."""
+        """Add state `number` (0, 1, ...) and flush; cell means are equal on all ranks."""
         group = f"state/{number}"
         self._write_part(group, state)
         self._agreed(agree_after, _set_attributes, self._file, group, attributes(state))
         self._agreed(agree_after, self._file.flush)
 
     def close(self) -> Path:
-        """Completes the file, gives it its final name, and returns its path."""
+        """Complete the file under its final name; returns its path."""
         self._agreed(agree_after, self._opened.close)
         self._agreed(on_root_only, _complete, self.part, self.path)
         self._is_open = False
@@ -131,9 +129,9 @@ class FieldFile:
             self._remove()
 
     def _bytes(self, part: Any) -> int:
-        """Bytes that the tables of a part take, those of all ranks."""
+        """Return the bytes of a part's tables, summed over ranks."""
         return sum(
-            TABLE_RESERVE
+            (1 << 12)  # HDF5's own, of which 0.6 KB were measured
             + np.dtype(d.dtype).itemsize
             * int(np.prod(np.shape(getattr(part, name))[1:]))
             * self._rows[rows_of(d)].total
@@ -141,27 +139,18 @@ class FieldFile:
         )
 
     def _write_part(self, group: str, part: Any) -> None:
-        """Make the tables of a group, each rank giving its rows."""
+        """Write the tables of a group, each rank its rows."""
         size = self._bytes(part)
         self._agreed(on_root_only, _reserve, self.part, self._reserved, size)
         self._reserved += size
         described = tables(part)
         for symbol, rows in self._rows.items():
-            own = {name: d for name, d in described.items() if rows_of(d) == symbol}
-            if own:
-                self._write_tables(group, rows, part, own)
-
-    def _write_tables(self, group: str, rows: _Rows, part: Any, described: Mapping[str, Description]) -> None:
-        """Make tables of the same rows of a part."""
-        arrays = agree(self._comm, _arrays, group, rows.count, part, described)
-        for name, array in arrays.items():
-            words = self._words(described[name])
-            self._agreed(agree_after, _write_rows, self._file, f"{group}/{name}", rows, array, words)
-
-    def _words(self, described: Description) -> dict[str, str]:
-        """Return the attributes of a dataset: what it holds, and in which unit, by its label if the case gives one."""
-        unit = self._units.get(described.unit) or described.unit or PURE_NUMBER
-        return {"meaning": described.meaning, "unit": unit}
+            of_rows = {name: d for name, d in described.items() if rows_of(d) == symbol}
+            arrays = agree(self._comm, _arrays, group, rows.count, part, of_rows) if of_rows else {}
+            for name, array in arrays.items():
+                d = of_rows[name]
+                texts = {"meaning": d.meaning, "unit": self._units.get(d.unit) or d.unit or PURE_NUMBER}
+                self._agreed(agree_after, _write_rows, self._file, f"{group}/{name}", rows, array, texts)
 
     def _agreed(self, agreed: Callable[..., Any], function: Callable[..., Any], *args: Any) -> Any:
         """function(*args) by `agree_after` where HDF5 communicates.
@@ -175,7 +164,7 @@ class FieldFile:
             raise
 
     def _remove(self) -> None:
-        """Close and remove the file, once. On a full disk HDF5 can close it only after it was cut to nothing."""
+        """Close and remove the file, once; on a full disk HDF5 closes a file only if cut to nothing before."""
         self._is_open = False
         file_locks.files.discard(self.part)
         if self._comm.rank == 0:
@@ -199,8 +188,11 @@ def _create(part: Path, size: int) -> None:
     """Make an empty HDF5 file with `size` bytes of space, by plain calls: HDF5 may crash or hang where they fail."""
     part.parent.mkdir(parents=True, exist_ok=True)
     try:
+        with h5py.File("empty", "w", driver="core", backing_store=False) as file:
+            file.flush()
+            empty = bytes(file.id.get_file_image())
         with part.open("wb") as stream:
-            stream.write(_empty_file())
+            stream.write(empty)
             stream.flush()
             os.posix_fallocate(stream.fileno(), 0, size)
     except OSError:
@@ -208,27 +200,20 @@ def _create(part: Path, size: int) -> None:
         raise
 
 
-def _empty_file() -> bytes:
-    """Return an HDF5 file without content."""
-    with h5py.File("empty", "w", driver="core", backing_store=False) as file:
-        file.flush()
-        return bytes(file.id.get_file_image())
-
-
 def _path_for_mpi(part: Path, opened: contextlib.ExitStack) -> str:
-    """Names the file by a descriptor of its folder, until `opened` is closed: MPI-IO keeps names in short buffers."""
+    """Name the file by a descriptor of its folder, until `opened` closes: MPI-IO has short name buffers."""
     folder = os.open(part.parent, os.O_RDONLY)
     opened.callback(os.close, folder)
     return f"/proc/self/fd/{folder}/{part.name}"
 
 
 def _open(path: str, comm: Comm, opened: contextlib.ExitStack) -> Any:
-    """Return the file, opened by all ranks until `opened` is closed."""
+    """Open the file on all ranks, until `opened` closes."""
     return opened.enter_context(h5py.File(path, "r+", driver="mpio", comm=comm))
 
 
 def _complete(part: Path, path: Path) -> None:
-    """Add the views and gives the file its name, on one rank: on all each view would cost as much as a table."""
+    """Add views and give the file its name, on one rank: on all ranks a view would cost as much as a table."""
     # Nobody else has the file, and some file systems cannot lock.
     with h5py.File(part, "r", locking=False) as file:
         size = bytes_of_views(file)
@@ -253,15 +238,15 @@ def _arrays(group: str, count: int, part: Any, described: Mapping[str, Descripti
 
 
 def _reserve(part: Path, start: int, size: int) -> None:
-    """Take the space on the disk: were it to end while MPI-IO writes, some ranks might wait for ever."""
+    """Reserve disk space: if it ends while MPI-IO writes, some ranks may wait for ever."""
     with part.open("r+b") as stream:
         os.posix_fallocate(stream.fileno(), start, size)
 
 
-def _write_rows(file: Any, name: str, rows: _Rows, array: NDArray[Any], words: Mapping[str, str]) -> None:
-    """Make a table and writes this rank's rows. An empty rank takes part with an empty selection."""
+def _write_rows(file: Any, name: str, rows: _Rows, array: NDArray[Any], texts: Mapping[str, str]) -> None:
+    """Make a table and write this rank's rows; an empty rank takes part with an empty selection."""
     table = file.create_dataset(name, (rows.total, *array.shape[1:]), array.dtype)
-    _set_attributes(file, name, words)
+    _set_attributes(file, name, texts)
     memory, place = h5py.h5s.create_simple(array.shape), table.id.get_space()
     if rows.count:
         place.select_hyperslab((rows.start,) + (0,) * (array.ndim - 1), array.shape)

@@ -1,7 +1,7 @@
-"""Layout of result.h5: the parts that each rank hands over, and where the file has them.
+"""Layout of result.h5: the parts that ranks hand over, and their places in the file.
 
-Lengths are in the unit of the cell, stresses in that of the moduli.  n nodes, m elements, k interface nodes, f fibres
-are all of the file's, of which each rank has a part; nodes are torn, so that each body in a subdomain has its own.
+Lengths have the cell's unit, stresses the moduli's.  The file has n nodes, m elements, k interface nodes, f fibres, of
+which each rank holds a part; nodes are torn: each body in a subdomain has its own.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class MeshPart:
 
 @dataclass(frozen=True)
 class FibrePart:
-    """The f fibres, all of them on the first rank: numbered as in case files."""
+    """The f fibres, all on the first rank, numbered as in case files."""
 
     number: AnyInt = described("number in `fibre = N` of case files, from 1", shape="(f,)", dtype="int32")
     body: AnyInt = described("body in /mesh/body", shape="(f,)", dtype="int32")
@@ -98,7 +98,7 @@ class InterfacePart:
 
 @dataclass(frozen=True, repr=False)
 class StatePart:
-    """One load case or state of the cell and this rank's part of its fields."""
+    """One state of the cell and this rank's part of its fields."""
 
     strain: Float = described(f"macroscopic strain {', '.join(STRAINS)}", shape="(3,)")
     stress_mean: Float = described(f"macroscopic stress {', '.join(STRESSES)}", STRESS, "(3,)", name="stress")
@@ -159,7 +159,7 @@ class Item:
 
 
 def items() -> Iterator[Item]:
-    """All that result.h5 holds in plane strain and stress, with unit and meaning: the reference table of the file."""
+    """Yield all datasets and attributes of result.h5 in plane strain and stress: its reference table."""
     yield from items_of(Header, "", ())
     yield Item("/", "attribute created_by", "", "text", "", f"`{PROGRAM}`")
     for group, part in GROUPS.items():
@@ -167,17 +167,17 @@ def items() -> Iterator[Item]:
 
 
 def tables(part: Any) -> dict[str, Description]:
-    """Return the fields of a part that are datasets, those with a row for each node, element or interface node."""
+    """Return the fields of a part that are datasets: with a row per node, element, interface node or fibre."""
     return {name: d for name, d in descriptions(part).items() if rows_of(d)}
 
 
 def attributes(part: Any) -> dict[str, Any]:
-    """Return the other fields, by the names of the attributes, with their values."""
+    """Return the other fields as attributes, values by name."""
     return {d.name or name: getattr(part, name) for name, d in descriptions(part).items() if not rows_of(d)}
 
 
 def rows_of(description: Description) -> str:
-    """Return the kind of rows of a dataset: `n` nodes, `m` elements, `k` interface nodes, `f` fibres; empty if none."""
+    """Return the row kind of a dataset: `n` nodes, `m` elements, `k` interface nodes, `f` fibres; else empty."""
     first = description.shape[1:2]
     return first if first in ("n", "m", "k", "f") else ""
 
@@ -189,8 +189,8 @@ def items_of(part: type, group: str, views: Iterable[View]) -> Iterator[Item]:
         if rows_of(d):
             yield Item(f"/{group}/{name}", "dataset", d.shape, d.dtype, d.unit, d.meaning)
         else:
-            words = type_words(hints[name], d)
-            yield Item(f"/{group}", f"attribute {d.name or name}", d.shape, words, d.unit, d.meaning)
+            type_name = type_words(hints[name], d)
+            yield Item(f"/{group}", f"attribute {d.name or name}", d.shape, type_name, d.unit, d.meaning)
     for view in views:
         d = descriptions(part)[view.source]
         shape = f"({rows_of(d)}, {view.components})" if view.components else f"({rows_of(d)},)"
@@ -199,9 +199,9 @@ def items_of(part: type, group: str, views: Iterable[View]) -> Iterator[Item]:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class SpatialStatePart(StatePart):
-    """A load case of generalized plane strain and this rank's part of its fields.
+    """One state in generalized plane strain and this rank's part of its fields.
 
-    They do not vary along x3 but for the displacement E33 x3.
+    Fields are constant along x3, except for the displacement E33 x3.
     """
 
     strain: Float = described(f"macroscopic strain {', '.join(SPATIAL_STRAINS)}", shape="(6,)")

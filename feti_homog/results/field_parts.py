@@ -10,7 +10,7 @@ import numpy as np
 
 from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response
-from feti_homog.homogenization.recovered_fields import out_of_plane_stress, recover
+from feti_homog.homogenization.recovered_fields import RecoveredFields, out_of_plane_stress, recover
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.results.field_layout import FibrePart, Header, InterfacePart, MeshPart, SpatialStatePart, StatePart
 from feti_homog.typing import Float, Float32
@@ -35,7 +35,7 @@ def header(cell: TornCell) -> Header:
 
 
 def mesh_part(cell: TornCell) -> MeshPart:
-    """Return the refined meshes of this rank's parts, one after the other."""
+    """Concatenate the refined meshes of this rank's parts."""
     subdomains = cell.parts
     nodes = np.cumsum([0, *(len(s.mesh.points) for s in subdomains)])
     columns = 3 * cell.case.cell.order
@@ -86,35 +86,26 @@ def interface_part(cell: TornCell) -> InterfacePart:
 
 def state_part(cell: TornCell, response: Response, load_factor: float, label: str, point: int) -> StatePart:
     """Return the fields of a response in plane strain or stress. Collective when first called."""
-    fields, nodes = recover(cell, response), cell.jumps.nodes
-    opening = _in_axes(nodes.normal, fields.jump)
-    fibre = fields.displacement[cell.class_nodes[nodes.fibre_node]]
+    fields = recover(cell, response)
     return StatePart(
         strain=response.strain,
         stress_mean=response.stress,
         load_factor=load_factor,
         point=point,
         label=label,
-        displacement=fields.displacement,
         stress=fields.stress,
         stress_33=out_of_plane_stress(cell, fields.stress),
         mesh_error=_relative(fields.shares, response),
-        traction=fields.traction,
-        jump=fields.jump,
-        traction_vector=_vectors(_in_axes(nodes.normal, fields.traction)),
-        jump_vector=_vectors(opening),
-        displacement_fibre=_vectors(fibre),
-        displacement_matrix=_vectors(fibre + opening),
-        **_bonds(cell, response),
+        **_at_nodes(cell, response, fields),
     )
 
 
 def spatial_state_part(
     cell: TornCell, plane: Response | None, axial: Response | None, load_factor: float, label: str, point: int
 ) -> SpatialStatePart:
-    """Return the fields of the responses of the plane problem and of the axial one in generalized plane strain.
+    """Return the fields in generalized plane strain, from responses of the plane and the axial problem.
 
-    Those of one that is None are zero. Collective when first called.
+    A problem without response has zero fields.  Collective when first called.
 
     Raises:
         ValueError: there is no response, or no axial problem.
@@ -123,9 +114,6 @@ def spatial_state_part(
     if response is None or cell.axial is None:
         raise ValueError("expected a response of a cell with an axial problem")
     in_plane, along = recover(cell, plane), recover(cell.axial, axial)
-    nodes = cell.jumps.nodes
-    opening = _vectors(_in_axes(nodes.normal, in_plane.jump), along.jump)
-    fibre = _vectors(in_plane.displacement, along.displacement)[cell.class_nodes[nodes.fibre_node]]
     return SpatialStatePart(
         strain=phase_laws.spatial_vector(*(r if r is None else r.strain for r in (plane, axial))),
         stress_mean=phase_laws.spatial_vector(*(r if r is None else r.stress for r in (plane, axial))),
@@ -133,45 +121,55 @@ def spatial_state_part(
         load_factor=load_factor,
         point=point,
         label=label,
-        displacement=in_plane.displacement,
         stress=in_plane.stress[:, :3],
         stress_33=in_plane.stress[:, 3],
         mesh_error=_relative(in_plane.shares + along.shares, plane, axial),
         axial_displacement=along.displacement[:, 0],
         axial_stress=along.stress[:, ::-1],  # the axial problem has [13, 23], the file [23, 13]
-        traction=in_plane.traction,
-        jump=in_plane.jump,
         axial_traction=along.traction[:, 0],
         axial_jump=along.jump[:, 0],
-        traction_vector=_vectors(_in_axes(nodes.normal, in_plane.traction), along.traction),
-        jump_vector=opening,
-        displacement_fibre=fibre,
-        displacement_matrix=fibre + opening,
-        **_bonds(cell, response),
+        **_at_nodes(cell, response, in_plane, along),
     )
 
 
-def _bonds(cell: TornCell, response: Response) -> dict[str, Any]:
-    """Return status, damage and sliding of the interface nodes, none of which has parted in a cell cut across."""
-    if cell.summary.across:
-        none = np.zeros(len(cell.jumps.nodes.row), np.int8)
-        return {"status": none, "damage": none.astype(float), "sliding": none}
-    state = response.state
-    return {"status": state.status, "damage": response.damage, "sliding": state.bonds.sliding_signs}
+def _at_nodes(
+    cell: TornCell, response: Response, in_plane: RecoveredFields, along: RecoveredFields | None = None
+) -> dict[str, Any]:
+    """Return displacements, and tractions, jumps, status, damage and sliding at the interface nodes.
+
+    No interface node of a cell cut across has parted.
+    """
+    nodes, more = cell.jumps.nodes, [None] * 3 if along is None else [along.displacement, along.traction, along.jump]
+    opening = _vectors(_in_axes(nodes.normal, in_plane.jump), more[2])
+    fibre = _vectors(in_plane.displacement, more[0])[cell.class_nodes[nodes.fibre_node]]
+    none, state = np.zeros(len(nodes.row), np.int8), response.state
+    is_across = cell.summary.across
+    return {
+        "displacement": in_plane.displacement,
+        "traction": in_plane.traction,
+        "jump": in_plane.jump,
+        "traction_vector": _vectors(_in_axes(nodes.normal, in_plane.traction), more[1]),
+        "jump_vector": opening,
+        "displacement_fibre": fibre,
+        "displacement_matrix": fibre + opening,
+        "status": none if is_across else state.status,
+        "damage": none.astype(float) if is_across else response.damage,
+        "sliding": none if is_across else state.bonds.sliding_signs,
+    }
 
 
 def _relative(shares: Float, *responses: Response | None) -> Float32:
-    """(m,) shares of an error of E . Sigma relative to that of all responses."""
+    """(m,) element shares of the error, relative to E . Sigma summed over all responses."""
     energy = sum(2 * response.stored for response in responses if response is not None)
     return (shares / (energy if energy > 0 else 1.0)).astype(np.float32)
 
 
 def _in_axes(normal: Float, pairs: Float) -> Float:
-    """(k, 2) components along x and y of vectors (k, 2) that are normal and tangential; normals (k, 2)."""
+    """(k, 2) components along x and y of normal and tangential `pairs` (k, 2); normals (k, 2)."""
     tangent = np.column_stack([-normal[:, 1], normal[:, 0]])
     return np.asarray(pairs[:, :1] * normal + pairs[:, 1:] * tangent)
 
 
 def _vectors(in_plane: Float, along: Float | None = None) -> Float:
-    """(k, 3) vectors of components (k, 2) in the plane and (k, 1) along x3, by default 0."""
+    """(k, 3) vectors from components (k, 2) in the plane and (k, 1) along x3, by default 0."""
     return np.pad(in_plane, [(0, 0), (0, 1)]) if along is None else np.hstack([in_plane, along])

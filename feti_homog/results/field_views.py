@@ -1,6 +1,6 @@
-"""Datasets of result.h5 that show others as viewers want them: vectors of three components, tensors, single columns.
+"""Datasets of result.h5 for viewers: vectors with three components, tensors, single columns.
 
-They are virtual: HDF5 fills them from the other datasets when they are read, so that they take next to no space.
+They are virtual and nearly free: HDF5 fills them from other datasets when they are read.
 """
 
 from __future__ import annotations
@@ -48,16 +48,16 @@ class View:
 
 def _vector(name: str, third: str = "") -> View:
     columns = {0: (name, 0), 1: (name, 1)} | ({2: (third, WHOLE)} if third else {})
-    words = f"`{name}` with `{third}` as third component" if third else f"`{name}` with a third component 0"
-    return View("vector", name, 3, name, columns, words)
+    sentence = f"`{name}` with `{third}` as third component" if third else f"`{name}` with a third component 0"
+    return View("vector", name, 3, name, columns, sentence)
 
 
 def _tensor(name: str, source: str, entries: Mapping[tuple[int, int], tuple[str, int]]) -> View:
     """Return the symmetric tensor [11, 12, 13, 21, 22, 23, 31, 32, 33] with these entries."""
     places = [(3 * i + j, (min(i, j), max(i, j))) for i in range(3) for j in range(3)]
     columns = {place: entries[pair] for place, pair in places if pair in entries}
-    words = f"tensor of `{source}`, rows of [[11, 12, 13], [12, 22, 23], [13, 23, 33]]"
-    return View("tensor", name, 9, source, columns, words)
+    sentence = f"tensor of `{source}`, rows of [[11, 12, 13], [12, 22, 23], [13, 23, 33]]"
+    return View("tensor", name, 9, source, columns, sentence)
 
 
 def _column(name: str, source: str, column: int) -> View:
@@ -93,45 +93,37 @@ SPATIAL_VIEWS: tuple[View, ...] = (
     *(_column(name, "axial_stress", column) for column, name in enumerate(AXIAL_STRESSES)),
 )
 
-BYTES = 1 << 12  # that a view takes at most; 0.9 KB in the mean were measured
-
 
 def add_views(file: Any) -> None:
-    """Make the views of all groups of an open file whose tables are complete; empty tables have none."""
+    """Add the views to an open file with complete tables; empty tables have no views."""
     for group, view in _views_of(file):
-        _add_view(file, view, group)
+        original = file[f"{group}/{view.source}"]
+        shape = (len(original), view.components) if view.components else (len(original),)
+        layout = h5py.VirtualLayout(shape, original.dtype)
+        for place, (name, column) in view.columns.items():
+            table = file[f"{group}/{name}"]
+            source = h5py.VirtualSource(".", table.name, shape=table.shape, dtype=table.dtype)
+            target: Any = (slice(None), place) if view.components else slice(None)
+            layout[target] = source if column == WHOLE else source[:, column]
+        dataset = file.create_virtual_dataset(view.path(group), layout, np.zeros((), layout.dtype)[()])
+        dataset.attrs["meaning"] = view.words
+        dataset.attrs["unit"] = original.attrs["unit"]
 
 
 def bytes_of_views(file: Any) -> int:
-    """Space that `add_views` takes at most."""
-    return BYTES * (1 + len(_views_of(file)))
+    """Return the most bytes that `add_views` takes."""
+    return (1 << 12) * (1 + len(_views_of(file)))  # 0.9 KB a view in the mean were measured
 
 
 def _views_of(file: Any) -> list[tuple[str, View]]:
-    """Group and view of all that the tables of the file allow."""
+    """Return group and view for all views whose tables are in the file, and not empty."""
     groups = {"interface": VIEWS["interface"]}
     for group in (f"state/{number}" for number in sorted(file.get("state", ()), key=int)):
         groups[group] = SPATIAL_VIEWS if AXIAL in file[group] else VIEWS[GROUP_OF_STATES]
-    return [(group, view) for group, views in groups.items() for view in views if _has_rows(file[group], view)]
-
-
-def _has_rows(group: Any, view: View) -> bool:
-    """Return whether the tables that a view shows are there, and not empty."""
-    names = {name for name, _ in view.columns.values()} | {view.source}
-    return names <= group.keys() and len(group[view.source]) > 0
-
-
-def _add_view(file: Any, view: View, group: str) -> None:
-    """Make one virtual dataset over the tables of a group, with the unit of its source."""
-    original = file[f"{group}/{view.source}"]
-    rows = len(original)
-    shape = (rows, view.components) if view.components else (rows,)
-    layout = h5py.VirtualLayout(shape, original.dtype)
-    for place, (name, column) in view.columns.items():
-        table = file[f"{group}/{name}"]
-        source = h5py.VirtualSource(".", table.name, shape=table.shape, dtype=table.dtype)
-        own: Any = (slice(None), place) if view.components else slice(None)
-        layout[own] = source if column == WHOLE else source[:, column]
-    dataset = file.create_virtual_dataset(view.path(group), layout, np.zeros((), layout.dtype)[()])
-    dataset.attrs["meaning"] = view.words
-    dataset.attrs["unit"] = original.attrs["unit"]
+    return [
+        (group, view)
+        for group, views in groups.items()
+        for view in views
+        if {view.source, *(name for name, _ in view.columns.values())} <= file[group].keys()
+        and len(file[group][view.source]) > 0
+    ]

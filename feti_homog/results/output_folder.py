@@ -1,7 +1,6 @@
-"""The folder that results go to: one run at a time writes there, and no file of others is replaced; its events.log.
+"""The result folder and its events.log: one run at a time writes there, and no foreign file is replaced.
 
-A run recognizes its own files by their content, not by a marker beside them: a file of somebody else may come to a
-folder of results later, under one of their names.
+A run recognizes its own files by content, not by a marker: somebody may later put a file with one of their names there.
 """
 
 from __future__ import annotations
@@ -10,14 +9,14 @@ import contextlib
 import json
 import os
 import re
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.materials.voigt import SPATIAL_STRAINS
-from feti_homog.results import atomic, checkpoint_folder, field_file, result_json
+from feti_homog.results import atomic, checkpoint_file, field_file, result_json
 from feti_homog.results.field_layout import PROGRAM
 from feti_homog.system.parallel.mpi_errors import on_root
 from feti_homog.system.runtime import input_files
@@ -42,13 +41,12 @@ RESULT_FILE = re.compile(
 # Of these those that show that a run has written to the folder.
 SIGNS = (result_json.NAME, field_file.NAME, LOG, LOCK)
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
-HEAD = 1 << 20  # bytes of result.h5 in which its attributes are
 
 
 def usable(directory: Path) -> None:
-    """Check that `directory` is one, or can be made, can be written to, and that no run writes to it just now.
+    """Check that `directory` is a folder or can be made, is writable, and that no run writes there now.
 
-    Nothing is made yet.
+    Makes nothing.
 
     Raises:
         CaseError: it cannot be used.
@@ -56,13 +54,13 @@ def usable(directory: Path) -> None:
     try:
         with contextlib.suppress(FileNotFoundError, NotADirectoryError):
             os.stat(atomic.part_of(directory / LONGEST))  # is such a name too long?
-        there = next(p for p in (directory.absolute(), *directory.absolute().parents) if os.path.lexists(p))
-        if there.is_symlink() and not there.exists():
-            raise CaseError(f"--out {directory}: expected a folder, but {there} is a link that leads nowhere")
-        if not there.is_dir():
-            raise CaseError(f"--out {directory}: expected a folder, but {there} is a file")
-        if not os.access(there, os.W_OK | os.X_OK):
-            raise CaseError(f"--out {directory}: expected a folder that can be written to; {there} cannot")
+        existing = next(p for p in (directory.absolute(), *directory.absolute().parents) if os.path.lexists(p))
+        if existing.is_symlink() and not existing.exists():
+            raise CaseError(f"--out {directory}: expected a folder, but {existing} is a link that leads nowhere")
+        if not existing.is_dir():
+            raise CaseError(f"--out {directory}: expected a folder, but {existing} is a file")
+        if not os.access(existing, os.W_OK | os.X_OK):
+            raise CaseError(f"--out {directory}: expected a folder that can be written to; {existing} cannot")
     except OSError as error:
         raise CaseError(f"--out {directory}: cannot be used: {error.strerror}") from error
     if (directory / LOCK).is_symlink():  # whose file elsewhere would get the name of the holder
@@ -72,7 +70,7 @@ def usable(directory: Path) -> None:
 
 
 def refuse_files_of_others(directory: Path) -> None:
-    """Check that a run may write all its files to `directory`, and replace those that are there.  Call on one rank.
+    """Check that a run may write all its files to `directory`, and replace existing ones.  Call on one rank.
 
     Raises:
         CaseError: a folder stands where a file is to be or the other way round, or a file has the name of a run's and
@@ -86,7 +84,7 @@ def refuse_files_of_others(directory: Path) -> None:
             kind = "a folder there" if path.is_dir() else "" if path.exists() else "a link there that leads nowhere"
             if kind:
                 raise CaseError(f"--out {directory}: {path.name} is {kind}, and a run writes a file of that name")
-        checkpoint_folder.refuse_others(directory)
+        checkpoint_file.refuse_others(directory)
         foreign = _foreign(paths)
     except OSError as error:
         raise CaseError(f"--out {directory}: its files cannot be read: {error.strerror}") from error
@@ -97,8 +95,8 @@ def refuse_files_of_others(directory: Path) -> None:
         )
 
 
-def _foreign(paths: Sequence[Path]) -> list[Path]:
-    """Return the files that no run wrote: those without its marks; if none is its own, all that are not empty."""
+def _foreign(paths: list[Path]) -> list[Path]:
+    """Return files without the marks of a run; without any sign of a run, all that are not empty."""
     signs = [path for path in paths if path.name in SIGNS]
     return [path for path in signs or paths if path.stat().st_size and not (signs and _is_own(path))]
 
@@ -112,7 +110,7 @@ def _is_own(path: Path) -> bool:
             return False
         return isinstance(document, dict) and {"version", "case", "solver"} <= document.keys()
     with input_files.opened(path) as stream:
-        head = stream.read(HEAD)
+        head = stream.read(1 << 20)  # which has the attributes of result.h5
     if path.name == field_file.NAME:
         return head.startswith(HDF5_SIGNATURE) and PROGRAM.encode() in head
     return path.name != LOG or head.startswith(LOG_HEADER.encode())
@@ -120,10 +118,10 @@ def _is_own(path: Path) -> bool:
 
 @contextmanager
 def held(directory: Path, comm: Intracomm, say: Callable[[str], object]) -> Iterator[None]:
-    """Provide the folder, made with its parents, is this run's alone while the block lasts. Collective.
+    """Make the folder with its parents and lock it for this run while the block lasts.  Collective.
 
-    What earlier runs left unfinished in it is removed; so are, at the end, the folders made here that are empty.
-    Where the file system has no locks, `say` gets a warning and the run goes on without one.
+    Removes unfinished files from earlier runs and, at the end, new folders that are empty.  On a file system without
+    locks `say` gets a warning and the run goes on without one.
 
     Raises:
         CaseError: it cannot be made, or another run has it.
@@ -143,7 +141,7 @@ def held(directory: Path, comm: Intracomm, say: Callable[[str], object]) -> Iter
 
 
 def remove_other_results(directory: Path, written: Collection[str]) -> None:
-    """Remove what an earlier run left of the files of a result but for those named `written`.  Call on one rank."""
+    """Remove result files from an earlier run, except for names in `written`.  Call on one rank."""
     for path in directory.iterdir():
         if RESULT_FILE.fullmatch(path.name) and path.name not in written and not path.is_dir():
             with contextlib.suppress(OSError):
@@ -151,7 +149,7 @@ def remove_other_results(directory: Path, written: Collection[str]) -> None:
 
 
 def write_product(path: Path, text: str) -> Path:
-    """Write what a command makes in place of a result, a card or a table of fibres, to a file; returns its path.
+    """Write the product of a command, a card or a fibre table, to a file; returns its path.
 
     A link stays; the file that it leads to is written.
 
@@ -173,7 +171,7 @@ def write_product(path: Path, text: str) -> Path:
 
 
 def _hold(lock: Lock, directory: Path) -> tuple[list[Path], str]:
-    """Make and lock the folder; returns the folders made, the innermost first, and a warning if it is not locked."""
+    """Make and lock the folder; returns new folders, innermost first, and a warning if it has no lock."""
     made = [path for path in (directory, *directory.parents) if not path.exists()]
     try:
         directory.mkdir(parents=True, exist_ok=True)
@@ -194,7 +192,7 @@ def _hold(lock: Lock, directory: Path) -> tuple[list[Path], str]:
 
 
 def _remove_empty(folders: list[Path]) -> None:
-    """Remove these folders, each in the next, as far as they are empty."""
+    """Remove nested folders, innermost first, as far as they are empty."""
     with contextlib.suppress(OSError):
         for folder in folders:
             folder.rmdir()
@@ -205,7 +203,7 @@ def _busy(directory: Path, who: str) -> CaseError:
 
 
 class EventLog:
-    """The log in `directory`, written by rank 0 from the first line on; an earlier one is replaced.
+    """The event log in `directory`, written by rank 0; its first line replaces an earlier log.
 
     If it cannot be written `say` gets one warning, and the path goes on without it: the log holds no results.
     """
@@ -230,7 +228,7 @@ class EventLog:
             self.close()
 
     def close(self) -> None:
-        """No more lines."""
+        """End the log."""
         self._wanted = False
         if self._stream is not None:
             with contextlib.suppress(OSError):  # every line was written when it was given

@@ -1,7 +1,7 @@
-"""Numbers of stress-strain paths: what a rising load follows, the first leg, the components that are shown.
+"""Curves of stress-strain paths: the response to a rising load, first leg, energies, components to show.
 
-Points are those of `path` in result.json: mappings with `load_factor`, `strain` and `stress`, of c components in Voigt
-order: [11, 22, 12], or [11, 22, 33, 23, 13, 12] of generalized plane strain; stresses in the unit of the moduli.
+Points are entries of `path` in result.json: mappings with `load_factor`, `strain` and `stress`, c components in Voigt
+order: [11, 22, 12], or [11, 22, 33, 23, 13, 12] in generalized plane strain; stresses in the moduli's unit.
 """
 
 from __future__ import annotations
@@ -20,14 +20,13 @@ from feti_homog.typing import Float
 SAME_LOAD = 1e-9  # load factors that differ by less, relatively, are one
 # Of the largest component: what the solver leaves of zero is less, and what would not be seen beside it.
 ZERO, FAINT = 1e-7, 1e-4
-PLACES_BEFORE = 16  # at which energies are known before the first point
 
 Point = Mapping[str, Any]
 Document = Mapping[str, Any]
 
 
 def targets(document: Document) -> tuple[dict[str, float], ...]:
-    """Return the waypoints of a path, or the one load, in full: by name the strain or the stress of each component."""
+    """Return the waypoints of a path, or the one load, with strain or stress of each component by name."""
     return completed(_given(document), document["case"]["analysis"]["plane"])
 
 
@@ -41,26 +40,26 @@ def named_components(document: Document) -> list[int]:
 def _given(document: Document) -> list[Strain | MixedLoad]:
     """Return the loads as the case gives them."""
     section = document["case"].get("path") or document["case"]["load"]
-    given = section.get("waypoints") or [section[name] for name in ("strain", "to") if name in section]
-    return [MixedLoad(**load) if isinstance(load, Mapping) else tuple(load) for load in given]
+    as_written = section.get("waypoints") or [section[name] for name in ("strain", "to") if name in section]
+    return [MixedLoad(**load) if isinstance(load, Mapping) else tuple(load) for load in as_written]
 
 
 def changed_components(document: Document) -> list[int]:
     """Return the components that the waypoints change, in Voigt order."""
-    pairs, found = plane_state_of(document).components, set[int]()
+    pairs, matches = plane_state_of(document).components, set[int]()
     before: Mapping[str, float] = {stress: 0.0 for _, stress in pairs}
     for target in targets(document):
         for component, names in enumerate(pairs):
             values = [{name: load[name] for name in names if load.get(name)} for load in (before, target)]
-            found |= {component} if values[0] != values[1] else set()
+            matches |= {component} if values[0] != values[1] else set()
         before = target
-    return sorted(found)
+    return sorted(matches)
 
 
 def leading_component(document: Document) -> int:
-    """Return the component of the largest strain among those that the waypoints of a path change.
+    """Return the component with the largest strain among components that the waypoints change.
 
-    Of all if they change but the temperature.
+    Among all if they change nothing but the temperature.
     """
     largest = np.abs([point["strain"] for point in document["path"]]).max(axis=0)
     changed = changed_components(document) or list(range(len(largest)))
@@ -68,31 +67,31 @@ def leading_component(document: Document) -> int:
 
 
 def components_above(share: float, values: Float) -> list[int]:
-    """Columns of (n, c) with entries above this share of the largest of all."""
+    """Return the columns of (n, c) with entries above a share of the largest entry."""
     largest = np.abs(values).max(axis=0, initial=0.0)
     return [int(column) for column in np.flatnonzero(largest > share * largest.max(initial=0.0))]
 
 
 def shown_stresses(document: Document) -> list[int]:
-    """Return the components whose stress is seen on a path; the leading one if there is no stress."""
-    found = components_above(FAINT, np.array([point["stress"] for point in document["path"]], float))
-    return found or [leading_component(document)]
+    """Return the components with visible stress on a path; the leading one if no stress acts."""
+    matches = components_above(FAINT, np.array([point["stress"] for point in document["path"]], float))
+    return matches or [leading_component(document)]
 
 
 def what_rises(document: Document) -> str:
-    """Return the name of the load that rises on the first leg of a path: "strain" if there is no other, or "load"."""
+    """Return "strain" if nothing but strains rises on the first leg of a path, else "load"."""
     first = targets(document)[0]
-    others = {*plane_state_of(document).stresses, TEMPERATURE}
-    return "load" if any(first[name] for name in others & first.keys()) else "strain"
+    other_loads = {*plane_state_of(document).stresses, TEMPERATURE}
+    return "load" if any(first[name] for name in other_loads & first.keys()) else "strain"
 
 
 def legs(document: Document) -> int:
-    """Return how many straight legs the path of a case has."""
+    """Return the number of straight legs in the path of a case."""
     return len(document["case"]["path"].get("waypoints", [0]))
 
 
 def first_leg(document: Document) -> int:
-    """Return how many points of a path are on its first leg; of increments all, for they are drawn alike."""
+    """Return the number of points on the first leg; all of increments, which are drawn alike."""
     points = document["path"]
     if document["case"]["path"]["method"] == "increments":
         return len(points)
@@ -101,45 +100,42 @@ def first_leg(document: Document) -> int:
 
 
 def ends_of_legs(document: Document) -> list[int]:
-    """Numbers of the points at the waypoints of a path."""
+    """Return the numbers of the points at waypoints."""
     position = np.array([point["load_factor"] for point in document["path"]]) * (count := legs(document))
-    found = (np.flatnonzero(np.abs(position - leg) <= SAME_LOAD * count) for leg in range(1, count + 1))
-    return [int(numbers[-1]) for numbers in found if len(numbers)]
+    matches = (np.flatnonzero(np.abs(position - leg) <= SAME_LOAD * count) for leg in range(1, count + 1))
+    return [int(numbers[-1]) for numbers in matches if len(numbers)]
 
 
 def is_proportional(document: Document) -> bool:
-    """Return whether every point is on a ray of its own from zero.
-
-    It is so for events along one leg, where the response is homogeneous.
-    """
+    """Return whether every point lies on a ray from zero: events along one leg, where the response is homogeneous."""
     return document["case"]["path"]["method"] == "events" and legs(document) == 1
 
 
 def interface_sections(document: Document) -> Sequence[Mapping[str, Any]]:
-    """Return the sections of interfaces of a case, none of perfect bonding."""
+    """Return the [interface] sections of a case, none for perfect bonding."""
     sections = document["case"].get("interface", [])
     return sections if isinstance(sections, list) else [sections]
 
 
 def scales_with_toughness(document: Document) -> bool:
-    """Return whether strains and stresses of a path are as the root of the toughness.
+    """Return whether strains and stresses of a path are proportional to the root of the toughness.
 
-    Its loads grow alike, and bonds break by energy on springs that the toughness does not change.
+    Bonds break by energy, on springs that the toughness does not change.
     """
     laws = [LAWS.get(section.get("criterion", DEFAULT)) for section in interface_sections(document)]
     by_energy = [law is not None and "toughness" in law.keys and not law.softens for law in laws]
     return bool(document.get("path")) and bool(laws) and all(by_energy)
 
 
-class Energies(NamedTuple):
-    """Parts of the work of the loads per area along a path, at r places from the unloaded cell on.
+class EnergyStack(NamedTuple):
+    """Work of the loads per area along a path and its parts, at r places from the unloaded cell on.
 
     Attributes:
-        place: (r,) share of the load on each leg and the number of those before, or `by_legs` is false where the load
-            falls, and they are numbers of points, those before the first below 0.
-        words: what these are.
-        parts: by name those that are not zero, (r,) each, in the order in which they are stacked.
-        work: (r,) their sum, but for rounding.
+        place: (r,) if `by_legs`, number of earlier legs plus load share on the leg; else, where the load falls, point
+            numbers, below 0 before the first point.
+        words: axis label for `place`.
+        parts: nonzero parts by name, (r,) each, in stacking order.
+        work: (r,) sum of the parts, but for rounding.
     """
 
     place: Float
@@ -149,14 +145,14 @@ class Energies(NamedTuple):
     work: Float
 
 
-def energies(document: Document) -> Energies | None:
-    """Return the energies of a path; None of other results, and of those of older versions, which have them not."""
+def energies(document: Document) -> EnergyStack | None:
+    """Return the energies of a path; None for other results, and from older versions without energies."""
     points = document.get("path") or [{}]
     if "work" not in points[0]:
         return None
 
     # Up to the first point all is linear.
-    before = np.linspace(0.0, 1.0, PLACES_BEFORE, endpoint=False)
+    before = np.linspace(0.0, 1.0, 16, endpoint=False)
 
     def column(name: str, power: int = 2) -> Float:
         values = [float(point.get(name) or 0.0) for point in points]
@@ -167,17 +163,17 @@ def energies(document: Document) -> Energies | None:
     rest = "lost in breaks" + (" beyond it" if fracture.any() else "")
     parts = {"stored in the bodies": stored - springs, "stored in springs": springs, "fracture energy": fracture}
     parts |= {rest: lost - fracture, "heat of friction": column("friction_heat")}
-    shown = {name: values for name, values in parts.items() if np.abs(values).max() > ZERO * np.abs(stored).max()}
+    visible = {name: values for name, values in parts.items() if np.abs(values).max() > ZERO * np.abs(stored).max()}
     place, by_legs = column("load_factor", 1) * legs(document), True
     words = "leg of the path" if legs(document) > 1 else "share of the load"
     if (np.diff(place) < 0.0).any():
         place, by_legs = np.append(before - 1.0, np.arange(float(len(points)))), False
         words = "number of the point, in the order of the path"
-    return Energies(place, by_legs, words, shown, column("work"))
+    return EnergyStack(place, by_legs, words, visible, column("work"))
 
 
 def load_controlled(points: Sequence[Point]) -> Float:
-    """(v, 2 c) stresses and strains at the corners of a proportional path when the load only rises.
+    """(v, 2 c) stresses and strains at the corners of a proportional path under a rising load.
 
     At a load t where bonds break, all break whose load is lower once the first are gone: at that load the cell comes to
     the next branch that holds, each branch being a ray through zero: Sigma(t) = Sigma(t') t / t', and so the strains.
@@ -193,9 +189,9 @@ def load_controlled(points: Sequence[Point]) -> Float:
 
 
 def rising_strain(document: Document) -> Float | None:
-    """(v, c + 1) stresses and the size of the leading strain along a path of one leg, the load only rising.
+    """(v, c + 1) stresses and leading strain, made positive, along a one-leg path under a rising load.
 
-    None of any other result, and where that strain does not rise with the load.
+    None for other results, and where the strain does not rise with the load.
     """
     points = document.get("path")
     if not points or legs(document) != 1:
@@ -214,9 +210,9 @@ def rising_strain(document: Document) -> Float | None:
 
 
 def first_drop(points: Sequence[Point]) -> tuple[Float, int]:
-    """(c,) stress left when the bonds that break at the first point of a proportional path are gone, and a point.
+    """Return the stress (c,) left after the first break of a proportional path at constant load.
 
-    The load is held there; the number is that of the point whose branch the stress is on.
+    Also the number of the point on whose branch the stress lies.
     """
     load = points[0]["load_factor"]
     number = next((n for n, point in enumerate(points) if n and point["load_factor"] >= load), len(points) - 1)

@@ -1,18 +1,20 @@
-"""result.json: the document of a run, written whole or not at all."""
+"""result.json, the document of a run, and its points as CSV tables, each written whole or not at all."""
 
 from __future__ import annotations
 
+import csv
 import math
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, get_type_hints
 
 import numpy as np
 
 from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.results import atomic, seals
 from feti_homog.system.runtime import input_files
+from feti_homog.system.runtime.records import Description, descriptions, is_record, plain
 
 NAME = "result.json"
 SCHEMA = 1  # version of the layout: to be raised when a key is renamed, removed or changes its meaning
@@ -45,8 +47,7 @@ def read(directory: Path) -> dict[str, Any]:
     """Return the document of `directory`/result.json.
 
     Raises:
-        CaseError: it is missing, not JSON, no table or changed, or its layout is of another version than that
-            of this program.
+        CaseError: it is missing, not JSON, no table or changed, or its layout has another version.
     """
     path = Path(directory) / NAME
     try:
@@ -55,9 +56,9 @@ def read(directory: Path) -> dict[str, Any]:
         raise input_files.unreadable(path, error) from error
     except ValueError as error:
         raise CaseError(f"cannot read {path}: {error}") from error
-    found = document.get("schema", "none")
-    if found != SCHEMA:
-        raise CaseError(f"{path}: its schema is {found}, this program reads schema {SCHEMA}; run the case again")
+    entry = document.get("schema", "none")
+    if entry != SCHEMA:
+        raise CaseError(f"{path}: its schema is {entry}, this program reads schema {SCHEMA}; run the case again")
     return document
 
 
@@ -90,3 +91,65 @@ def _not_finite(value: Any, place: str) -> Iterator[tuple[str, float]]:
 
 def _inside(place: str, key: str) -> str:
     return f"{place}.{key}" if place else key
+
+
+class DescribedColumn(NamedTuple):
+    """A column of a CSV file."""
+
+    name: str
+    unit: str
+    meaning: str
+
+
+def columns(kind: type) -> Iterator[DescribedColumn]:
+    """Yield the columns that records of a class fill: the reference table of their file."""
+    for name, description in _in_columns(kind).items():
+        # Those in the plane are among those in space, in the same order.
+        for component in description.spatial_components or _names(name, description):
+            sentence = f"{component}, {description.meaning}" if description.components else description.meaning
+            yield DescribedColumn(component, description.unit, sentence)
+
+
+def write_csv(path: Path, points: Sequence[Any]) -> Path:
+    """Write records of one class as rows: numbers under their names, arrays under their component names.
+
+    Empty columns, arrays without components and nested records are left out.  Call on one rank.
+
+    Raises:
+        FetiHomogError: the table cannot be written.
+    """
+    described = _in_columns(type(points[0])) if points else {}
+    rows = [_row(point, described) for point in points]
+    present = {name for row in rows for name in row}
+    names = [column.name for column in columns(type(points[0])) if column.name in present] if rows else []
+
+    def write_rows(part: Path) -> None:
+        with part.open("w", newline="", encoding="utf-8") as stream:
+            writer = csv.DictWriter(stream, names)
+            writer.writeheader()
+            writer.writerows(rows)
+
+    return atomic.replace(path, write_rows)
+
+
+def _names(name: str, description: Description) -> tuple[str, ...]:
+    """Return the columns of a field: its name, or its components in the plane."""
+    return description.components or (name,)
+
+
+def _row(point: Any, described: Mapping[str, Description]) -> dict[str, Any]:
+    row: dict[str, Any] = {}
+    for name, value in plain(point).items():
+        if name in described:
+            values, components = np.ravel(value).tolist(), _names(name, described[name])
+            if len(values) > len(components):
+                components = described[name].spatial_components
+            row |= dict(zip(components, values, strict=True))
+    return row
+
+
+def _in_columns(kind: type) -> dict[str, Description]:
+    """Return the record fields that fill columns: numbers, and arrays with named components."""
+    hints = get_type_hints(kind)
+    entry = {name: d for name, d in descriptions(kind).items() if d.components or not d.shape}
+    return {name: d for name, d in entry.items() if not is_record(hints[name])}

@@ -20,21 +20,20 @@ from feti_homog.results import atomic
 from feti_homog.system.runtime.records import BYTES, described
 
 KEY = "checksum"
-CHECKSUM_DIGITS = 8
 BLOCK = 1 << 26  # bytes
 
 
 def dumps(document: Mapping[str, Any]) -> str:
-    """Return the text of a document with, as its last key, the checksum of the others. Raises ValueError for NaN."""
+    """Return the text of a document with its checksum as last key.  Raises ValueError for NaN."""
     text = _text({key: value for key, value in document.items() if key != KEY})
     return _sealed(text, _checksum(text))
 
 
 def loads(text: str) -> dict[str, Any]:
-    """Return the document of a text, without its checksum; one that has none is taken as it is.
+    """Return the document of a text, without its checksum; a text without one is read unchecked.
 
     Raises:
-        ValueError: it is not JSON, no table, or not what was written.
+        ValueError: it is not JSON, no table, or changed since it was written.
     """
     try:
         document = json.loads(text)
@@ -43,22 +42,17 @@ def loads(text: str) -> dict[str, Any]:
     if not isinstance(document, dict):
         raise ValueError("it is damaged: no table of keys and values")
     if KEY not in document:
-        _refuse_damaged_key(document)
+        *rest, (_, last) = document.items() if document else [("", None)]
+        if isinstance(last, str) and len(last) == 8 and last == _checksum(_text(dict(rest))):
+            raise ValueError("it is damaged: the key of its checksum has another name")
         return document
-    found = document.pop(KEY)
-    end = _sealed("{\n}", found)[1:]
-    if text.endswith(end) and _checksum(text[: -len(end)] + "\n}") == found:  # as it was written
+    stored = document.pop(KEY)
+    end = _sealed("{\n}", stored)[1:]
+    if text.endswith(end) and _checksum(text[: -len(end)] + "\n}") == stored:  # as it was written
         return document
-    if found != _checksum(_text(document)):
+    if stored != _checksum(_text(document)):
         raise ValueError("it is damaged: its checksum is wrong")
     return document
-
-
-def _refuse_damaged_key(document: Mapping[str, Any]) -> None:
-    """Refuse a document whose last key, of another name than KEY, has the checksum of the others."""
-    *others, (_, last) = document.items() if document else [("", None)]
-    if isinstance(last, str) and len(last) == CHECKSUM_DIGITS and last == _checksum(_text(dict(others))):
-        raise ValueError("it is damaged: the key of its checksum has another name")
 
 
 @dataclass(frozen=True)

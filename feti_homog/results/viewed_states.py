@@ -1,4 +1,4 @@
-"""States of result.h5 as viewers want them, with the fields that follow from those of the file, and as files of VTK.
+"""States of result.h5 for viewers, with derived fields, and as VTK files.
 
 VTK's file formats, .vtu, a file for each state, and .vtkhdf: https://docs.vtk.org/en/latest/vtk_file_formats.
 """
@@ -31,10 +31,10 @@ class ViewedState:
     """One state on its mesh: the cell, or the interface as points.
 
     Attributes:
-        points: (n, 3) places of the nodes; nodes are torn between subdomains.
-        cells: (m, 3 or 6) nodes of the triangles, mid-side nodes last; (k, 1) of the interface.
+        points: (n, 3) node positions; nodes are torn between subdomains.
+        cells: (m, 3 or 6) triangle nodes, mid-side nodes last; (k, 1) interface nodes.
         nodes, elements: arrays by name, with (n, ...) and (m, ...) rows; vectors have three columns, tensors nine.
-        label: that of the state.
+        label: state label.
     """
 
     points: Float
@@ -48,12 +48,12 @@ class ViewedState:
 
 
 def read_state(directory: str | Path, state: int = 0) -> ViewedState:
-    """Return a state of the cell in a folder of results.  Call on one rank.
+    """Return a state of the cell from a result folder.  Call on one rank.
 
     `nodes` has displacement and fluctuation, the periodic part of the displacement (length); `elements` stress and
     strain, tensors of means over the elements, S11, S22, S12, S33, von_mises and principal_1 to 3, the largest first
-    (stress), body, fibre_number, phase and subdomain.  Strains include thermal ones.  What the constants of a material
-    do not determine is NaN.
+    (stress), body, fibre_number, phase and subdomain.  Strains include thermal ones.  Values that the constants of a
+    material do not determine are NaN.
 
     Raises:
         CaseError: there is no result.h5, it cannot be read, or has no such state.
@@ -70,14 +70,21 @@ def read_state(directory: str | Path, state: int = 0) -> ViewedState:
 
 
 def cell_state(file: Any, state: int) -> ViewedState:
-    """Return a state of the cell of an open result.h5, as `read_state`."""
+    """Return a state of the cell from an open result.h5, as `read_state`."""
     group = file[f"state/{state}"]
     more = xdmf.SPATIAL_ELEMENTS if AXIAL_DISPLACEMENT in group else {}
     nodes, elements = (_tables(file, state, names) for names in (xdmf.CELL_NODES, xdmf.CELL_ELEMENTS | more))
     points, triangles, strain = file["mesh/points"][()], file["mesh/triangles"][()], group.attrs["strain"]
-    nodes["fluctuation"] = nodes["displacement"] - points @ _gradient(strain).T
+    # H of the displacements H x of the macroscopic strain, in the plane and along the fibres
+    along = strain[[4, 3]] if more else np.zeros(2)
+    gradient = np.vstack([PLANE.gradient(strain[[0, 1, -1]]), AXIAL.gradient(along)])
+    nodes["fluctuation"] = nodes["displacement"] - points @ gradient.T
     in_plane = group["stress"][()]
-    E33 = _strain_33(file, strain, in_plane)
+    if more:
+        E33 = np.full(len(in_plane), strain[2])
+    else:  # as the materials make it, in plane strain and stress
+        rules = out_of_plane(json.loads(file.attrs["case"]), tuple(map(str, file.attrs["phases"])))
+        E33 = np.einsum("ei,ei->e", rules[file["mesh/phase"][()], 1], in_plane)
     elements["strain"] = _strains(points, triangles, nodes["displacement"], E33)
     shears = group["axial_stress"][()] if more else np.zeros((len(triangles), 2))
     S33 = elements["S33"]
@@ -88,7 +95,7 @@ def cell_state(file: Any, state: int) -> ViewedState:
 
 
 def interface_state(file: Any, state: int) -> ViewedState:
-    """Return a state of the interface nodes of an open result.h5: displacements of both faces, tractions, jumps."""
+    """Return a state of the interface nodes: displacements of both faces, tractions, jumps."""
     group = file[f"state/{state}"]
     more = xdmf.SPATIAL_POINTS if AXIAL_DISPLACEMENT in group else {}
     nodes = _tables(file, state, xdmf.INTERFACE_POINTS | more)
@@ -97,34 +104,17 @@ def interface_state(file: Any, state: int) -> ViewedState:
 
 
 def _tables(file: Any, state: int, places: Mapping[str, str]) -> dict[str, Array]:
-    """Return the tables of a state that the file has; those of earlier versions have fewer."""
-    found = {name: place.replace("/K/", f"/{state}/") for name, place in places.items()}
-    return {name: file[place][()] for name, place in found.items() if place in file}
+    """Return the tables of a state that exist; files from earlier versions have fewer."""
+    existing = {name: place.replace("/K/", f"/{state}/") for name, place in places.items()}
+    return {name: file[place][()] for name, place in existing.items() if place in file}
 
 
 def _in_space(points: Float) -> Float:
     return np.pad(points, [(0, 0), (0, 1)])
 
 
-def _gradient(strain: Float) -> Float:
-    """(3, 2) H of the displacements H x of a macroscopic strain (3,) or (6,)."""
-    along = np.zeros(2) if len(strain) == len(voigt.STRAINS) else strain[[4, 3]]
-    return np.vstack([PLANE.gradient(strain[[0, 1, -1]]), AXIAL.gradient(along)])
-
-
-def _strain_33(file: Any, strain: Float, in_plane: Float) -> Float:
-    """(m,) strains 33 under a macroscopic strain and stresses (m, 3).
-
-    Those of all elements or, in plane strain and stress, as the materials make them.
-    """
-    if len(strain) > len(voigt.STRAINS):
-        return np.full(len(in_plane), strain[2])
-    rules = out_of_plane(json.loads(file.attrs["case"]), tuple(map(str, file.attrs["phases"])))
-    return np.asarray(np.einsum("ei,ei->e", rules[file["mesh/phase"][()], 1], in_plane))
-
-
 def _strains(points: Float, triangles: Array, displacement: Float, E33: Float) -> Float:
-    """(m, 9) means over the elements of the strains of displacements (n, 3), as tensors."""
+    """(m, 9) strain tensors of displacements (n, 3), averaged over elements."""
     every = np.arange(len(points), dtype=np.int32)
     E11, E22, gamma12 = element_strain(points, triangles, every, displacement[:, :2], PLANE)[0].T
     gamma13, gamma23 = element_strain(points, triangles, every, displacement[:, 2:], AXIAL)[0].T
@@ -170,9 +160,8 @@ def _write_vtu(directory: Path, name: str, read: Any, file: Any) -> list[Path]:
 
 def _grid(state: ViewedState) -> ET.Element:
     """Return a state as VTK's XML, its arrays in base64."""
-    root = ET.Element(
-        "VTKFile", type="UnstructuredGrid", version="1.0", byte_order="LittleEndian", header_type="UInt64"
-    )
+    form = {"type": "UnstructuredGrid", "version": "1.0", "byte_order": "LittleEndian", "header_type": "UInt64"}
+    root = ET.Element("VTKFile", form)
     m, columns = state.cells.shape
     sizes = {"NumberOfPoints": str(len(state.points)), "NumberOfCells": str(m)}
     piece = ET.SubElement(ET.SubElement(root, "UnstructuredGrid"), "Piece", sizes)
@@ -182,20 +171,15 @@ def _grid(state: ViewedState) -> ET.Element:
         "types": np.full(m, KINDS[columns], np.uint8),
     }
     groups = {"Points": {"Points": state.points}, "Cells": cells, "PointData": state.nodes, "CellData": state.elements}
-    for name, arrays in groups.items():
-        group = ET.SubElement(piece, name)
-        for own, array in arrays.items():
-            group.append(_array(own, array))
+    for group, arrays in groups.items():
+        parent = ET.SubElement(piece, group)
+        for name, array in arrays.items():
+            values = np.ascontiguousarray(array, array.dtype.newbyteorder("<"))
+            width = {"NumberOfComponents": str(values.shape[1])} if values.ndim == 2 else {}
+            form = {"type": TYPES[values.dtype.str[1:]], "Name": name, "format": "binary"}
+            element = ET.SubElement(parent, "DataArray", form | width)
+            element.text = base64.b64encode(np.uint64(values.nbytes).tobytes() + values.tobytes()).decode()
     return root
-
-
-def _array(name: str, array: Array) -> ET.Element:
-    values = np.ascontiguousarray(array, array.dtype.newbyteorder("<"))
-    form = {"type": TYPES[values.dtype.str[1:]], "Name": name, "format": "binary"}
-    columns = {"NumberOfComponents": str(values.shape[1])} if values.ndim == 2 else {}
-    element = ET.Element("DataArray", form | columns)
-    element.text = base64.b64encode(np.uint64(values.nbytes).tobytes() + values.tobytes()).decode()
-    return element
 
 
 def _write_vtkhdf(directory: Path, name: str, read: Any, file: Any) -> list[Path]:
@@ -230,14 +214,10 @@ def _fill_vtkhdf(root: Any, read: Any, file: Any) -> None:
             root["Offsets"] = columns * np.arange(m + 1)
             root["Types"] = np.full(m, KINDS[columns], np.uint8)
         for group, arrays in (("PointData", state.nodes), ("CellData", state.elements)):
-            _append(root.require_group(group), steps.require_group(f"{group}Offsets"), arrays, number, count)
-
-
-def _append(group: Any, offsets: Any, arrays: Mapping[str, Array], number: int, count: int) -> None:
-    """Write the arrays of one of so many states behind those of the states before it."""
-    for name, array in arrays.items():
-        rows = len(array)
-        if number == 0:
-            group.create_dataset(name, (rows * count, *array.shape[1:]), array.dtype)
-            offsets[name] = rows * np.arange(count)
-        group[name][number * rows : (number + 1) * rows] = array
+            tables, offsets = root.require_group(group), steps.require_group(f"{group}Offsets")
+            for name, array in arrays.items():
+                rows = len(array)
+                if number == 0:
+                    tables.create_dataset(name, (rows * count, *array.shape[1:]), array.dtype)
+                    offsets[name] = rows * np.arange(count)
+                tables[name][number * rows : (number + 1) * rows] = array

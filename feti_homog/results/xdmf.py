@@ -1,13 +1,13 @@
-"""result.xdmf and interface.xdmf, by which ParaView finds in result.h5 the cell, the interface and their states.
+"""result.xdmf and interface.xdmf, by which ParaView reads cell, interface and states from result.h5.
 
-All of ParaView's and VTK's readers understand them: whole datasets alone, points with a connectivity, tensors of nine
-components, one collection a file.  The readers take no texts: the label of a state is the name of its block, which two
-of them show, and an array of the bytes of its letters, as many in all states.
+All readers in ParaView and VTK understand them: undivided datasets, points with a connectivity, tensors with nine
+components, one collection per file.  Readers take no texts: a state label is the name of its block, which two readers
+show, and an array with the bytes of its letters, equally long in all states.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -49,7 +49,7 @@ LISTED = {*CELL_ELEMENTS.values(), *INTERFACE_POINTS.values(), *SPATIAL_POINTS.v
 
 
 def _described(*shapes: str) -> dict[str, str]:
-    """Fields of a state that `field_layout` describes and that are not named above, under their own names."""
+    """Return state fields in `field_layout` that no table above names, under their own names."""
     fields = {name: d.shape for name, d in tables(StatePart).items() if f"state/K/{name}" not in LISTED}
     return {name: f"state/K/{name}" for name, shape in fields.items() if shape in shapes}
 
@@ -59,27 +59,24 @@ INTERFACE_POINTS |= _described("(k,)", "(k, 3)")
 
 
 def write(directory: Path) -> list[Path]:
-    """Write result.xdmf and, if there are interface nodes, interface.xdmf for the result.h5 of `directory`.
+    """Write result.xdmf and, with interface nodes, interface.xdmf for `directory`/result.h5; returns their paths.
 
-    Returns their paths. Call on one rank.
-
-    Each has one temporal collection, the time being the number of the state: of fields on the nodes and elements of the
-    cell, or of those at the points of the interface.
+    Each has one temporal collection with state numbers as times: fields on nodes and elements of the cell, or at
+    interface points.  Call on one rank.
 
     Raises:
         FetiHomogError: result.h5 cannot be read or a file cannot be written.
     """
-    h5, paths = Path(directory) / field_file.NAME, []
+    h5 = Path(directory) / field_file.NAME
     with atomic.write_errors(Path(directory) / CELL), h5py.File(h5, "r", locking=False) as file:
-        paths.append(_write(h5.with_name(CELL), "cell", file, _cell))
-        if len(file["interface/points"]):
-            paths.append(_write(h5.with_name(INTERFACE), "interface", file, _interface))
-    return paths
+        names = (CELL, INTERFACE) if len(file["interface/points"]) else (CELL,)
+        return [_write(h5.with_name(name), file) for name in names]
 
 
-def _write(path: Path, name: str, file: h5py.File, fill: Callable[[ET.Element, h5py.File, str], None]) -> Path:
-    """One file; `fill` puts mesh and fields of a state into its grid."""
+def _write(path: Path, file: h5py.File) -> Path:
+    """Write one file: mesh and fields of each state, for the cell or the interface."""
     root = ET.Element("Xdmf", Version="3.0")
+    name = "cell" if path.name == CELL else "interface"
     collection = ET.SubElement(
         ET.SubElement(root, "Domain"), "Grid", Name=name, GridType="Collection", CollectionType="Temporal"
     )
@@ -87,19 +84,25 @@ def _write(path: Path, name: str, file: h5py.File, fill: Callable[[ET.Element, h
     labels = [str(file[f"state/{state}"].attrs["label"]) for state in states]
     longest = max((len(label.encode()) for label in labels), default=0)
     for state, label in zip(states, labels, strict=True):
-        grid = _grid(collection, state, label)
+        # A collection for each state: readers pass on names of grids in one alone.
+        kind = {"Name": f"state {state}", "GridType": "Collection", "CollectionType": "Spatial"}
+        block = ET.SubElement(collection, "Grid", kind)
+        ET.SubElement(block, "Time", Value=state)
+        grid = ET.SubElement(block, "Grid", Name=label, GridType="Uniform")
         _numbers(grid, "label", "Scalar", list(label.encode().ljust(longest)))
         _means(grid, file[f"state/{state}"].attrs)
-        fill(grid, file, state)
+        is_spatial = AXIAL in file[f"state/{state}"]
+        if path.name == CELL:
+            triangles = "Triangle_6" if file["mesh/triangles"].shape[1] == 6 else "Triangle"
+            _mesh(grid, {"TopologyType": triangles}, file["mesh/triangles"], file["mesh/points"])
+            _attributes(grid, file, state, CELL_NODES, "Node")
+            _attributes(grid, file, state, CELL_ELEMENTS | (SPATIAL_ELEMENTS if is_spatial else {}), "Cell")
+        else:
+            vertices = {"TopologyType": "Polyvertex", "NodesPerElement": "1"}
+            _mesh(grid, vertices, file["interface/vertex"], file["interface/points"])
+            _attributes(grid, file, state, INTERFACE_POINTS | (SPATIAL_POINTS if is_spatial else {}), "Node")
     ET.indent(root)
     return atomic.replace(path, lambda part: ET.ElementTree(root).write(part, encoding="utf-8", xml_declaration=True))
-
-
-def _grid(collection: ET.Element, state: str, label: str) -> ET.Element:
-    """Return the grid of a state, in a collection of its own: readers pass on the name of a grid in such a one only."""
-    block = ET.SubElement(collection, "Grid", Name=f"state {state}", GridType="Collection", CollectionType="Spatial")
-    ET.SubElement(block, "Time", Value=state)
-    return ET.SubElement(block, "Grid", Name=label, GridType="Uniform")
 
 
 def _means(grid: ET.Element, attributes: Mapping[str, Any]) -> None:
@@ -125,31 +128,15 @@ def _numbers(grid: ET.Element, name: str, kind: str, values: Sequence[float]) ->
     attribute.append(item)
 
 
-def _cell(grid: ET.Element, file: h5py.File, state: str) -> None:
-    triangles = file["mesh/triangles"]
-    kind = "Triangle_6" if triangles.shape[1] == 6 else "Triangle"
-    _mesh(grid, {"TopologyType": kind}, triangles, file["mesh/points"])
-    _attributes(grid, file, state, CELL_NODES.items(), "Node")
-    more = SPATIAL_ELEMENTS if AXIAL in file[f"state/{state}"] else {}
-    _attributes(grid, file, state, (CELL_ELEMENTS | more).items(), "Cell")
-
-
-def _interface(grid: ET.Element, file: h5py.File, state: str) -> None:
-    vertices = {"TopologyType": "Polyvertex", "NodesPerElement": "1"}
-    _mesh(grid, vertices, file["interface/vertex"], file["interface/points"])
-    more = SPATIAL_POINTS if AXIAL in file[f"state/{state}"] else {}
-    _attributes(grid, file, state, (INTERFACE_POINTS | more).items(), "Node")
-
-
 def _mesh(grid: ET.Element, kind: dict[str, str], connectivity: Any, points: Any) -> None:
     topology = ET.SubElement(grid, "Topology", kind, NumberOfElements=str(len(connectivity)))
     topology.append(_table(connectivity))
     ET.SubElement(grid, "Geometry", GeometryType="XY").append(_table(points))
 
 
-def _attributes(grid: ET.Element, file: h5py.File, state: str, arrays: Iterable[tuple[str, str]], centre: str) -> None:
+def _attributes(grid: ET.Element, file: h5py.File, state: str, arrays: Mapping[str, str], centre: str) -> None:
     """Add the arrays of a state, each with its dataset."""
-    for name, place in arrays:
+    for name, place in arrays.items():
         table = file[place.replace("/K/", f"/{state}/")]
         kind = SHAPES[1 if table.ndim == 1 else table.shape[1]]
         ET.SubElement(grid, "Attribute", Name=name, AttributeType=kind, Center=centre).append(_table(table))

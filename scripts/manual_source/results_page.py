@@ -8,8 +8,8 @@ from markdown_text import code, page, table
 
 from feti_homog.analysis.result import schema_keys
 from feti_homog.analysis.result_records import AnglePoint, EnvelopePoint, LoadPoint, PathPoint
-from feti_homog.results.csv_tables import Column, columns
 from feti_homog.results.field_layout import Item, items, spatial_items
+from feti_homog.results.result_json import DescribedColumn, columns
 from feti_homog.studies.sweep.report.tables import COLUMNS, STATISTICS_COLUMNS
 
 INTRODUCTION = """\
@@ -64,5 +64,5 @@ def _fields(described: Iterable[Item]) -> str:
     return table(["place", "name", "shape", "type", "unit", "meaning"], rows)
 
 
-def _columns(described: Iterable[Column], head: str = "column") -> str:
+def _columns(described: Iterable[DescribedColumn], head: str = "column") -> str:
     return table([head, "unit", "meaning"], [(code(c.name), c.unit, c.meaning) for c in described])

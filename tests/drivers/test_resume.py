@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support import events
 from support.command_line import command_line
 from support.hooks import WAIT, Hook, HookedJob
 
@@ -111,30 +112,28 @@ def document(out: Path):
     return json.loads((out / "result.json").read_text())
 
 
-def events(out: Path) -> int:
-    return len(list((out / "checkpoint").glob("[0-9]*.h5")))
-
-
 def killed(ranks: int, case: Path, out: Path, at: int, *words: str, moment: str = "kept") -> int:
     """Run until there are `at` events, and in the moment of `MOMENTS`, then kill -9; returns how many are there."""
     with HookedJob(ranks, [MOMENTS[moment](out, at)], "run", case, "--out", out, *words) as job:
         assert job.reported() == "0 here"
         job.killed()
-    return events(out)
+    return events.count(out)
 
 
-def committed(when: str, after: bool) -> Hook:
-    """When the file of an event gets its name."""
-    return Hook("feti_homog.results.atomic:commit", WAIT, when=when, after=after)
-
-
-# When a path is killed: the last of so many events has just been kept, or the next is written or computed, or a second
-# file has been kept after one of several events.
+WRITE = "feti_homog.results.checkpoint:Checkpoint._write"
+APPEND = "feti_homog.results.atomic:append"
+COUNT = (
+    "os.path.exists('{0}') and "
+    "len([*__import__('feti_homog.results.checkpoint_file', fromlist=['records'])"
+    ".records(__import__('pathlib').Path('{0}'))]) - 1"
+)
+# When a path is killed: the last of so many events has just been kept, or the next is written or computed, or so many
+# events have been kept without waiting for the disk.
 MOMENTS = {
-    "kept": lambda _, at: committed(f"args[1].name == '{at - 1:06d}.h5'", after=True),
-    "written": lambda _, at: committed(f"args[1].name == '{at:06d}.h5'", after=False),
-    "several": lambda *_: committed("'000000.h5' < args[1].name < '999999.h5'", after=True),
-    "computed": lambda out, at: Hook(SOLVE, WAIT, when=f"os.path.exists('{out}/checkpoint/{at - 1:06d}.h5')"),
+    "kept": lambda _, at: Hook(WRITE, WAIT, when=f"args[1] == {at - 1}", after=True),
+    "written": lambda _, at: Hook(WRITE, WAIT, when=f"args[1] == {at}"),
+    "light": lambda _, at: Hook(APPEND, WAIT, when="args[1] and not args[3]", call=at, after=True),
+    "computed": lambda out, at: Hook(SOLVE, WAIT, when=f"{COUNT.format(out / 'checkpoint/events')} == {at}"),
 }
 
 
@@ -191,12 +190,12 @@ def test_paths_of_every_kind_resume(tmp_path, ranks, kind):
     case = case_file(tmp_path, **KINDS[kind])
     assert command_line(ranks, "run", case, "--out", tmp_path / "whole").returncode == 0
     softens = kind == "softening"
-    files = killed(ranks, case, tmp_path / "out", 8, moment="several" if softens else "kept")
+    count = killed(ranks, case, tmp_path / "out", 8, moment="light" if softens else "kept")
     job = command_line(ranks, "run", case, "--out", tmp_path / "out", "--resume")
     assert job.returncode == 0, job.stderr
     found, expected = (document(tmp_path / name) for name in ("out", "whole"))
     kept = found["resumed"]
-    assert (files == 2 < kept < len(expected["path"])) if softens else (files == kept == 8)
+    assert count == kept < len(expected["path"]) and (count > 8 if softens else count == 8)
     assert_same_curve(found["path"], expected["path"])
     if softens:
         assert sum(point["softened"] for point in expected["path"][:kept]) > 0
@@ -256,11 +255,11 @@ def test_checkpoints_of_another_case_are_refused(tmp_path, interrupted, ranks, c
         text, count = re.subn(rf"^{old}.*$", new, text, flags=re.MULTILINE)
         assert count == 1
     (tmp_path / "case.toml").write_text(text)
-    kept = events(tmp_path / "out")
+    kept = events.count(tmp_path / "out")
     job = command_line(ranks, "run", tmp_path / "case.toml", "--out", tmp_path / "out", "--resume")
     assert job.returncode == 2 and message in job.stderr and "Traceback" not in job.stderr
     assert job.stderr.count("error: --resume:") == 1
-    assert events(tmp_path / "out") == kept
+    assert events.count(tmp_path / "out") == kept
 
 
 def test_a_path_does_not_go_on_with_another_mesh(tmp_path):
@@ -273,23 +272,24 @@ def test_a_path_does_not_go_on_with_another_mesh(tmp_path):
     words = ("run", tmp_path / "case.toml", "--out", tmp_path / "out")
     shutil.copy(meshes / "square.msh", mesh)
     command_line(2, *words)
-    kept = events(tmp_path / "out")
+    kept = events.count(tmp_path / "out")
     shutil.copy(meshes / "two_fibres.msh", mesh)
     job = command_line(2, *words, "--resume")
     assert kept > 0 and job.returncode == 2 and "is of another run: expected case" in job.stderr
-    assert "Traceback" not in job.stderr and events(tmp_path / "out") == kept
+    assert "Traceback" not in job.stderr and events.count(tmp_path / "out") == kept
 
 
-@pytest.mark.parametrize("damage", ["truncated", "garbage", "missing"])
+@pytest.mark.parametrize("damage", ["garbage", "overwritten"])
 def test_unreadable_checkpoints_are_refused(tmp_path, interrupted, damage):
     shutil.copytree(interrupted, tmp_path / "out")
-    path = tmp_path / "out" / "checkpoint" / "000002.h5"
-    if damage == "missing":
-        path.unlink()
+    path = tmp_path / "out" / "checkpoint" / "events"
+    if damage == "garbage":
+        path.write_bytes(os.urandom(3000))
     else:
-        path.write_bytes(path.read_bytes()[:1000] if damage == "truncated" else os.urandom(3000))
+        content = path.read_bytes()
+        path.write_bytes(content[:1000] + bytes(100) + content[1100:])
     job = command_line(2, "run", case_file(tmp_path), "--out", tmp_path / "out", "--resume")
-    assert job.returncode == 2 and "--resume: " in job.stderr and "000002" in job.stderr
+    assert job.returncode == 2 and "--resume: " in job.stderr and "checkpoint/events is damaged" in job.stderr
     assert "Traceback" not in job.stderr
 
 

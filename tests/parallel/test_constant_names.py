@@ -12,8 +12,8 @@ import pytest
 
 from feti_homog import Case, run
 from feti_homog.materials.constants import ABOUT_FIBRES, OF_THE_CELL, constants
-from feti_homog.report.cards import csv_table
 from feti_homog.report.cards.effective_material import in_axes_of_the_cell
+from feti_homog.report.cards.export import csv_table
 from feti_homog.report.text import constant_tables, stiffness_tables
 from feti_homog.report.text.summary import summary
 from feti_homog.studies.fit.predictions import available
@@ -72,7 +72,7 @@ def test_every_constant_has_one_name(result):
 def test_cards_have_the_names_of_material_axes(result):
     document = plain(result[1].document)
     cell = outputs(document) | {"nu31": np.nan, "nu32": np.nan}
-    card = csv_table.text(in_axes_of_the_cell(document))
+    card = csv_table(in_axes_of_the_cell(document))
     rows = {row["name"]: float(row["value"]) for row in csv.DictReader(io.StringIO(card))}
     for name, of_the_cell in OF_THE_CELL.items():
         assert np.isnan(cell[of_the_cell]) or rows[name] == pytest.approx(cell[of_the_cell], rel=1e-9)

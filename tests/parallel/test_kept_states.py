@@ -18,6 +18,7 @@ from feti_homog.analysis import runner
 from feti_homog.errors import ConvergenceError
 from feti_homog.materials.voigt import STRAINS, STRESSES
 from feti_homog.results import checkpoint_file, field_file
+from feti_homog.results.checkpoint import has_multipliers
 from feti_homog.system.parallel.mpi_errors import on_root
 from feti_homog.verify.certificate import verify
 
@@ -167,15 +168,16 @@ def test_an_interrupted_path_keeps_the_same_states(comm, shared_path, whole, kin
     on_root(comm, assert_kept_of, shared_path, expected)
 
 
+@pytest.mark.parametrize("room", [0, 20_000])
 @pytest.mark.parametrize("kind", OTHER_PATHS)
-def test_states_of_lean_events_are_solved_again(comm, shared_path, whole, kind):
-    """Events have no multipliers as soon as a later one is confirmed; the path is ended and goes on, too."""
+def test_states_without_multipliers_are_solved_again(comm, shared_path, whole, kind, room):
+    """There is room for the multipliers of no event, or of the first ones; the path is ended and goes on, too."""
     known, expected = len(document(whole(kind))["path"]) * 2 // 3, whole(kind)
-    with mock.patch.object(runner, "room_of", return_value=0):
+    with mock.patch.object(runner, "room_of", return_value=room):
         with pytest.raises(ConvergenceError, match="max_events"):
             run(case(kind, 5, max_events=known), comm, out=shared_path, resume=False)
-        files = on_root(comm, lambda: [*map(checkpoint_file.read, (shared_path / "checkpoint").iterdir())])
-        parallel_assert(comm, any(not checkpoint_file.is_whole(events) for events, _, _ in files))
+        found = on_root(comm, multipliers_of, shared_path / "checkpoint/events")
+        parallel_assert(comm, not found[-1] and len(found) == known and any(found) == (room > 0))
         result = run(case(kind, 5), comm, out=shared_path, resume=True)
         in_memory = run(case(kind, 5), comm, fields=True)
     assert result.resumed == known and in_memory.states == result.states
@@ -188,28 +190,10 @@ def test_states_of_lean_events_are_solved_again(comm, shared_path, whole, kind):
             np.testing.assert_allclose(state.stress, other["stress"], rtol=0, atol=SOLVED_AGAIN * scale)
 
 
-def test_a_path_goes_on_from_a_lean_event(comm, shared_path, whole):
-    """The files after the last lean event are gone, as where a user removes one that is damaged."""
-    kind, expected = "released", whole("released")
-    known = len(document(expected)["path"]) * 2 // 3
-    with mock.patch.object(runner, "room_of", return_value=0), pytest.raises(ConvergenceError, match="max_events"):
-        run(case(kind, 5, max_events=known), comm, out=shared_path, resume=False)
-    left = on_root(comm, remove_whole_files, shared_path / "checkpoint")
-    result = run(case(kind, 5), comm, out=shared_path, resume=True)
-    assert 0 < result.resumed == left < known
-    on_root(comm, assert_kept_of, shared_path, expected, SOLVED_AGAIN)
-
-
-def remove_whole_files(folder: Path) -> int:
-    """Return how many events are left."""
-    lean = 0
-    for path in sorted(folder.iterdir()):
-        events, _, _ = checkpoint_file.read(path)
-        if checkpoint_file.is_whole(events):
-            path.unlink()
-        else:
-            lean += checkpoint_file.length(events)
-    return lean
+def multipliers_of(path: Path) -> list[bool]:
+    """Return which events of a file have multipliers."""
+    contents = [content for _, content in checkpoint_file.records(path)]
+    return [has_multipliers(checkpoint_file.unpacked(content)) for content in contents[1:]]
 
 
 def test_states_in_memory_are_those_of_the_files(comm, whole):

@@ -104,15 +104,16 @@ def test_teeth_converge_to_the_law(comm):
     assert errors[-1] < 0.02
 
 
-def falsify(folder):
+def falsify(path):
     """Scale multipliers of the last of the teeth, which F lambda did not confirm; returns the number of its event."""
-    file = max(path for path in folder.glob("*.h5") if checkpoint_file.events_in(path) > 1)
-    events, signature, first = checkpoint_file.read(file)
-    last = int(np.flatnonzero(events["path"][:, 5] > 0)[-1])
-    assert np.isnan(events["alpha"][last]).all() and last > 0
-    events["lam"][last] *= 1.0 + 1e-3
-    checkpoint_file.write(file, events, signature, first)
-    return first + last
+    signature, *contents = [content for _, content in checkpoint_file.records(path)]
+    events = [*map(checkpoint_file.unpacked, contents)]
+    last = max(number for number, event in enumerate(events) if event["path"][5] > 0)
+    assert np.isnan(events[last]["alpha"]).all() and not events[last]["confirmed"] and last > 0
+    events[last]["lam"] *= 1.0 + 1e-3
+    records = [checkpoint_file.record(checkpoint_file.packed(event)) for event in events]
+    path.write_bytes(checkpoint_file.begin(signature.decode()) + b"".join(records))
+    return last
 
 
 @pytest.mark.parametrize("falsified", [False, True])
@@ -128,7 +129,7 @@ def test_a_path_goes_on_where_it_was_ended(comm, shared_path, falsified):
     with pytest.raises(ConvergenceError, match="max_events"):
         run(Case.parse(written), comm, out=shared_path / "out")
     if falsified:
-        known = on_root(comm, falsify, shared_path / "out" / "checkpoint")
+        known = on_root(comm, falsify, shared_path / "out" / "checkpoint" / "events")
     del written["path"]["max_events"]
     result = run(Case.parse(written), comm, out=shared_path / "out", resume=True)
     assert result.resumed == known and len(result.path) == len(whole)

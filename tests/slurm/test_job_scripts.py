@@ -8,6 +8,7 @@ import re
 from pathlib import Path
 
 import pytest
+from support import events
 from support.jobs import ROOT
 from support.one_node_slurm import Job, wait
 from support.sweep_files import BY_BODIES, CASE, FAILING, FAILING_POINTS, rows, sweep_file
@@ -134,10 +135,10 @@ def test_a_cancelled_path_goes_on_with_what_it_had(slurm, elsewhere):
     out = elsewhere / "out"
     path = ("submit_case", "case.toml", "out", "--ntasks=2")
     (job,) = submitted(slurm, elsewhere, *path)
-    wait(lambda: len(list((out / "checkpoint").glob("*.h5"))) >= 5, 30, "the path has no events")
+    wait(lambda: events.count(out) >= 5, 30, "the path has no events")
     slurm.run("scancel", job)
     assert slurm.ended(job)[0].state == "CANCELLED"
-    kept = len(list((out / "checkpoint").glob("*.h5")))
+    kept = events.count(out)
     (job,) = submitted(slurm, elsewhere, *path, "--", "--resume")
     assert slurm.ended(job) == [DONE], log(out, job)
     result = json.loads((out / "result.json").read_text())

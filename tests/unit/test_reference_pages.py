@@ -18,8 +18,8 @@ from feti_homog.analysis.result import schema_keys
 from feti_homog.analysis.result_records import AnglePoint, EnvelopePoint, PathPoint
 from feti_homog.analysis.runner import run
 from feti_homog.case.case import Case
-from feti_homog.results.csv_tables import columns
 from feti_homog.results.field_layout import items, spatial_items
+from feti_homog.results.result_json import columns
 from feti_homog.studies.sweep import collect, execute, plan
 from feti_homog.studies.sweep.report.outputs import outputs
 from feti_homog.studies.sweep.report.tables import COLUMNS, OUTPUT_COLUMNS, STATISTICS_COLUMNS

@@ -1,12 +1,9 @@
-"""The effective material of a result in the axes of a card, of which axis 1 is the fibre, and what all cards have.
-
-Cards share their first comments, numbers in fields of a given width, and names.
-"""
+"""The effective material of a result in card axes, axis 1 along the fibre; comments, numbers and names of all cards."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from textwrap import wrap
 from typing import Any
@@ -28,7 +25,6 @@ ORDER = [PAIRS.index(tuple(sorted((FIBRE_FIRST[i], FIBRE_FIRST[j])))) for i, j i
 COUPLINGS = ~np.eye(6, dtype=bool)
 """(6, 6) where the stiffness of an orthotropic material is 0 in its axes."""
 COUPLINGS[:3, :3] = False
-LONGEST = 100
 AXES = (
     f"Axis 1 is the fibre, x3 of the cell; axes 2 and 3 are x1 and x2 of the cell. So {', '.join(OF_THE_CELL)} of this "
     f"card are {', '.join(OF_THE_CELL.values())} of the cell. nu_ij = -eps_j/eps_i under stress along i."
@@ -41,18 +37,18 @@ is far above what irregular meshes make of symmetric cells (1e-6), and below wha
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class EffectiveMaterial:
-    """A linear elastic material in axes of which 1 is the fibre, and 2 and 3 are x1 and x2 of the cell.
+    """A linear elastic material in card axes: 1 along the fibre, 2 and 3 along x1 and x2 of the cell.
 
     Attributes:
-        name: of the case.
-        version: of the program.
+        name: case name.
+        version: program version.
         stress_unit: the case's label, empty if it has none.
         symmetry: in words.
         compliance: (6, 6) in Voigt's order [11, 22, 33, 23, 13, 12] with engineering shears, symmetric
             positive definite.
         expansion: (6,) strains per unit of temperature in the same order, or None.
-        errors: estimated errors of `constants` and of expansions by the mesh, of those that are known.
-        scatter: their standard deviations by uncertain constants of the case, of those that are known.
+        errors: known mesh errors, by the names in `constants` and of expansions.
+        scatter: known standard deviations by uncertain constants of the case, by the same names.
     """
 
     name: str
@@ -91,28 +87,26 @@ class EffectiveMaterial:
 
 
 def in_axes_of_the_cell(document: Document) -> EffectiveMaterial:
-    """Return the material of the stiffness and expansion of a result.
-
-    It is orthotropic if its other entries are negligible.
+    """Return the material with stiffness and expansion as computed; orthotropic if the other entries are negligible.
 
     Raises:
         CaseError: the result has no linear spatial stiffness, or did not converge.
         KeyError, TypeError, ValueError: it is damaged.
     """
     C = _stiffness(document)[np.ix_(ORDER, ORDER)]
-    given = document.get("thermal_expansion")
-    expansion = None if given is None else _numbers(given, (6,))[ORDER]
+    computed = document.get("thermal_expansion")
+    expansion = None if computed is None else _numbers(computed, (6,))[ORDER]
     compliance = np.linalg.inv(C)
     size = np.sqrt(np.diag(C))
     sizes = [float(np.abs(C / np.outer(size, size))[COUPLINGS].max())]
-    words = f"couplings of shears of up to {sizes[0]:.2g} sqrt(Cii Cjj)"
+    text = f"couplings of shears of up to {sizes[0]:.2g} sqrt(Cii Cjj)"
     if expansion is not None:
         sizes.append(float(np.abs(expansion[3:]).max() / max(np.abs(expansion).max(), TINY)))
-        words += f" and shears of up to {sizes[1]:.2g} of the largest expansion"
+        text += f" and shears of up to {sizes[1]:.2g} of the largest expansion"
     if max(sizes) > NEGLIGIBLE:
-        symmetry = f"Not orthotropic in these axes, for there are {words}; {NEGLIGIBLE} would be left out."
+        symmetry = f"Not orthotropic in these axes, for there are {text}; {NEGLIGIBLE} would be left out."
     else:
-        symmetry = f"Orthotropic; {words} are left out."
+        symmetry = f"Orthotropic; {text} are left out."
         compliance = np.where(COUPLINGS, 0.0, compliance)
         expansion = None if expansion is None else expansion * [1, 1, 1, 0, 0, 0]
     return EffectiveMaterial(
@@ -126,26 +120,26 @@ def in_axes_of_the_cell(document: Document) -> EffectiveMaterial:
 
 
 def nearest_transversely_isotropic(document: Document) -> EffectiveMaterial:
-    """Return the material of the transversely isotropic constants of a result.
+    """Return the nearest transversely isotropic material of a result.
 
     Raises:
         CaseError: the result has none, or did not converge.
         KeyError, TypeError, ValueError: it is damaged.
     """
     _stiffness(document)
-    given = document["transversely_isotropic"]
+    computed = document["transversely_isotropic"]
     names = ("E_axial", "E_transverse", "nu_axial", "nu_transverse", "G_axial")
-    E_a, E_t, nu_a, nu_t, G_a = _numbers([given[name] for name in names], (5,))
+    E_a, E_t, nu_a, nu_t, G_a = _numbers([computed[name] for name in names], (5,))
     compliance = np.diag([1 / E_a, 1 / E_t, 1 / E_t, 2 * (1 + nu_t) / E_t, 1 / G_a, 1 / G_a])
     compliance[0, 1:3] = compliance[1:3, 0] = -nu_a / E_a
     compliance[1, 2] = compliance[2, 1] = -nu_t / E_t
     if not is_positive_definite(compliance):
         raise ValueError("transversely_isotropic: no stable material")
     expansion = None
-    if given["expansion_axial"] is not None:
-        axial, transverse = _numbers([given["expansion_axial"], given["expansion_transverse"]], (2,))
+    if computed["expansion_axial"] is not None:
+        axial, transverse = _numbers([computed["expansion_axial"], computed["expansion_transverse"]], (2,))
         expansion = np.array([axial, transverse, transverse, 0.0, 0.0, 0.0])
-    symmetry = f"The nearest transversely isotropic material, at a relative distance of {given['deviation']:.2g}."
+    symmetry = f"The nearest transversely isotropic material, at a relative distance of {computed['deviation']:.2g}."
     errors = (document.get("mesh_error") or {}).get("constants", {})
     scatter = constant_tables.standard_deviations(document)
     return EffectiveMaterial(
@@ -158,9 +152,14 @@ def nearest_transversely_isotropic(document: Document) -> EffectiveMaterial:
     )
 
 
-def _on_card(known: Mapping[str, float]) -> dict[str, float]:
-    """Return numbers of constants about the fibres by their names on the card of a transversely isotropic material."""
-    return {name: float(known[own]) for own, each in ABOUT_FIBRES.items() if own in known for name in each.card}
+def _on_card(numbers: Mapping[str, float]) -> dict[str, float]:
+    """Return numbers of constants about the fibres, by card name."""
+    return {
+        name: float(numbers[constant])
+        for constant, about in ABOUT_FIBRES.items()
+        if constant in numbers
+        for name in about.card
+    }
 
 
 def _origin(document: Document) -> dict[str, Any]:
@@ -173,14 +172,16 @@ def _stiffness(document: Document) -> Float:
     """(6, 6) in the axes of the cell, symmetric positive definite."""
     analysis = document["case"]["analysis"]
     if document["status"] != "done":
-        raise CaseError(f'its status is "{document["status"]}": {_first(document["faults"])}; run the case again')
+        faults = document["faults"] or ["it was not finished"]
+        more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
+        raise CaseError(f'its status is "{document["status"]}": {faults[0]}{more}; run the case again')
     if document.get("effective_stiffness") is None:
         raise CaseError(
             f'analysis.type = "{analysis["type"]}" has no effective stiffness; cards need "stiffness" or "envelope"'
         )
     if analysis["plane"] != "generalized":
-        words = f'plane = "{analysis["plane"]}" gives constants of the plane; cards need plane = "generalized"'
-        raise CaseError(words)
+        text = f'plane = "{analysis["plane"]}" gives constants of the plane; cards need plane = "generalized"'
+        raise CaseError(text)
     if document.get("effective_stiffness_compression") is not None:
         raise CaseError("its debonded faces touch under some loads alone; cards are of linear materials")
     C = _numbers(document["effective_stiffness"], (6, 6))
@@ -198,14 +199,8 @@ def _numbers(value: Any, shape: tuple[int, ...]) -> Float:
     return array
 
 
-def _first(faults: Sequence[str]) -> str:
-    """Return the first of some faults, and how many more there are."""
-    more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
-    return f"{faults[0] if faults else 'it was not finished'}{more}"
-
-
 def comments(material: EffectiveMaterial, mark: str) -> list[str]:
-    """Return the first lines of a card, each after the mark of a comment, in ASCII."""
+    """Return the first lines of a card in ASCII, each behind the comment mark."""
     stress = material.stress_unit or "the unit of the moduli in the case file"
     paragraphs = [
         f"Effective material of {material.name}, by feti_homog {material.version}.",
@@ -219,7 +214,7 @@ def comments(material: EffectiveMaterial, mark: str) -> list[str]:
         paragraphs.append(f"Estimated errors by the mesh: {_listed(material.errors)}.")
     if material.scatter:
         paragraphs.append(f"Standard deviations by uncertain constants of the phases: {_listed(material.scatter)}.")
-    lines = (line for words in paragraphs for line in wrap(words.encode("ascii", "backslashreplace").decode(), LONGEST))
+    lines = (line for text in paragraphs for line in wrap(text.encode("ascii", "backslashreplace").decode(), 100))
     return [f"{mark} {line}" for line in lines]
 
 

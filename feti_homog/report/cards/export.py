@@ -1,26 +1,217 @@
-"""`feti-homog export`: the material card of a folder of results."""
+"""`feti-homog export`: the material card of a result folder, for another program or as a table.
+
+Abaqus Keywords Guide, *ELASTIC and *EXPANSION: engineering constants are E1, E2, E3, nu12, nu13, nu23, G12, G13 and, on
+the next line, G23, where nu_ij is the strain along j under stress along i; TYPE=ANISOTROPIC takes the 21 entries
+D_ijkl of `ABAQUS_ENTRIES`, eight to a line.  Numbers have up to 20 characters (Input syntax rules).
+
+CalculiX CrunchiX user's manual, *ELASTIC and *EXPANSION; fields of 20 characters are read.  Its alpha12, alpha13,
+alpha23 are the tensor's shears, half of the engineering ones.
+
+ANSYS Material Reference, linear elasticity: PRXY, PRYZ, PRXZ are the major Poisson's ratios, PRXY = -eps_y/eps_x under
+stress along x; TB,ANEL takes the lower triangle of the stiffness (TBOPT = 0) by columns, in the order [x, y, z, xy, yz,
+xz] with engineering shears.  ALPX, ALPY, ALPZ are secant coefficients; shears have none.
+
+MOOSE: ComputeElasticityTensor takes C_ijkl: of `symmetric9` in the order 1111 1122 1133 2222 2233 3333 2323 1313 1212,
+of `symmetric21` the upper triangle by rows in the order [11, 22, 33, 23, 13, 12].  ComputeEigenstrain takes the
+components 11, 22, 33, 23, 13, 12 of a tensor, so half of the engineering shears.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import csv
+import io
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from itertools import combinations_with_replacement
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from feti_homog.errors import CaseError
-from feti_homog.report.cards import abaqus, ansys, csv_table, moose
+from feti_homog.materials.constants import MATERIAL_EXPANSIONS
 from feti_homog.report.cards.effective_material import (
+    PAIRS,
     EffectiveMaterial,
+    comments,
+    identifier,
     in_axes_of_the_cell,
     nearest_transversely_isotropic,
+    number,
 )
 from feti_homog.results import result_json
+from feti_homog.typing import Float
+
+FIELD, FIELDS = 20, 8  # characters of a number and numbers of a line, of Abaqus
+TENSOR_SHEARS = np.array([1.0, 1.0, 1.0, 0.5, 0.5, 0.5])
+ABAQUS_ORDER = (0, 1, 2, 5, 4, 3)
+"""Where in [11, 22, 33, 23, 13, 12] the components of Abaqus' order [11, 22, 33, 12, 13, 23] stand."""
+ABAQUS_ENTRIES = tuple((ABAQUS_ORDER[row], ABAQUS_ORDER[column]) for column in range(6) for row in range(column + 1))
+"""Rows and columns of D1111, D1122, D2222, D1133, ..., D2323: the upper triangle by columns."""
+ANSYS_ORDER = (0, 1, 2, 5, 3, 4)
+"""Where in [11, 22, 33, 23, 13, 12] the components of [x, y, z, xy, yz, xz] stand."""
+ANSYS_ENTRIES = tuple((ANSYS_ORDER[row], ANSYS_ORDER[column]) for column in range(6) for row in range(column, 6))
+"""Rows and columns of D11, D21, ..., D61, D22, ..., D66."""
+ANSYS_LABELS = {
+    "EX": "E1", "EY": "E2", "EZ": "E3", "PRXY": "nu12", "PRYZ": "nu23", "PRXZ": "nu13",
+    "GXY": "G12", "GYZ": "G23", "GXZ": "G13",
+}  # fmt: skip
+SYMMETRIC9 = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2), (3, 3), (4, 4), (5, 5))
+SYMMETRIC21 = tuple((row, column) for row in range(6) for column in range(row, 6))
+CSV_COLUMNS = ("name", "value", "unit", "meaning")
+FIBRE_AXES = ("the fibre (x3 of the cell)", "x1 of the cell", "x2 of the cell")
+COMPONENTS = ("11", "22", "33", "gamma23", "gamma13", "gamma12")
+
+
+def abaqus(material: EffectiveMaterial) -> str:
+    """Return the card. Raises CaseError for an expansion with shears."""
+    if material.expansion is not None and material.expansion[3:].any():
+        # Abaqus' guide leaves open whether alpha12 of TYPE=ANISO is the tensor's shear or the engineering one.
+        raise CaseError(
+            "its thermal expansion has shears in its axes, which cards for Abaqus do not carry; "
+            "use --transversely-isotropic"
+        )
+    lines = [*comments(material, "**"), *elastic(material, "ANISOTROPIC")]
+    if material.expansion is not None:
+        lines += expansion("ORTHO", material.expansion[:3])
+    return "\n".join(lines)
+
+
+def elastic(material: EffectiveMaterial, anisotropic: str) -> Iterator[str]:
+    """*MATERIAL and *ELASTIC; `anisotropic` is the TYPE of all 21 entries."""
+    yield f"*MATERIAL, NAME={identifier(material.name)}"
+    if material.is_orthotropic:
+        yield "*ELASTIC, TYPE=ENGINEERING CONSTANTS"
+        yield "** E1, E2, E3, nu12, nu13, nu23, G12, G13, and on the next line G23"
+        yield from data_lines(material.constants.values())
+    else:
+        C = material.stiffness
+        names = ["D" + "".join(str(axis + 1) for axis in (*PAIRS[i], *PAIRS[j])) for i, j in ABAQUS_ENTRIES]
+        yield f"*ELASTIC, TYPE={anisotropic}"
+        yield from (f"** {', '.join(names[k : k + FIELDS])}" for k in range(0, len(names), FIELDS))
+        yield from data_lines(C[i, j] for i, j in ABAQUS_ENTRIES)
+
+
+def expansion(kind: str, values: Float) -> list[str]:
+    """*EXPANSION of this TYPE."""
+    return [f"*EXPANSION, TYPE={kind}", *data_lines(values)]
+
+
+def data_lines(values: Iterable[float]) -> list[str]:
+    """Return the numbers, separated by commas, eight to a line."""
+    fields = [number(value, FIELD) for value in values]
+    return [", ".join(fields[k : k + FIELDS]) for k in range(0, len(fields), FIELDS)]
+
+
+def calculix(material: EffectiveMaterial) -> str:
+    """Return the card of CalculiX, with TYPE=ANISO for all 21 entries."""
+    lines = [*comments(material, "**"), *elastic(material, "ANISO")]
+    if material.expansion is not None and material.is_orthotropic:
+        lines += expansion("ORTHO", material.expansion[:3])
+    elif material.expansion is not None:
+        lines += expansion("ANISO", (material.expansion * TENSOR_SHEARS)[list(ABAQUS_ORDER)])
+    return "\n".join(lines)
+
+
+def ansys(material: EffectiveMaterial) -> str:
+    """Return the card. Raises CaseError for an expansion with shears."""
+    alpha = material.expansion
+    if alpha is not None and alpha[3:].any():
+        raise CaseError(
+            "its thermal expansion has shears in its axes, for which ANSYS has no constants; "
+            "use --transversely-isotropic"
+        )
+    lines = [*comments(material, "!"), "! Material 1; x, y, z are axes 1, 2, 3. To be read in /PREP7."]
+    if material.is_orthotropic:
+        lines += [f"MP,{label},1,{number(material.constants[name])}" for label, name in ANSYS_LABELS.items()]
+    else:
+        C = material.stiffness
+        values = [number(C[i, j]) for i, j in ANSYS_ENTRIES]
+        lines += ["! Stiffness in the order x, y, z, xy, yz, xz: D11, D21, D31, D41, D51, D61, D22, ..., D66"]
+        lines += ["TB,ANEL,1,1,21,0"]
+        lines += [f"TBDATA,{k + 1},{','.join(values[k : k + 6])}" for k in range(0, len(values), 6)]
+    if alpha is not None:
+        lines += [f"MP,ALP{axis},1,{number(alpha[i])}" for i, axis in enumerate("XYZ")]
+    return "\n".join(lines)
+
+
+def moose(material: EffectiveMaterial) -> str:
+    """Return the card: a block [Materials]."""
+    name, C = identifier(material.name), material.stiffness
+    method, entries = ("symmetric9", SYMMETRIC9) if material.is_orthotropic else ("symmetric21", SYMMETRIC21)
+    lines = [*comments(material, "#"), "[Materials]"]
+    lines += _block(
+        f"{name}_elasticity",
+        type="ComputeElasticityTensor",
+        fill_method=method,
+        C_ijkl=_quoted(C[i, j] for i, j in entries),
+    )
+    if material.expansion is not None:
+        lines += ["  # The name of the expansion belongs in eigenstrain_names of the strain."]
+        lines += _block(
+            f"{name}_temperature_rise",
+            type="ParsedMaterial",
+            property_name=f"{name}_temperature_rise",
+            coupled_variables="'temperature'",
+            constant_names="'stress_free_temperature'",
+            constant_expressions="'0'",
+            expression="'temperature - stress_free_temperature'",
+        )
+        lines += _block(
+            f"{name}_expansion",
+            type="ComputeEigenstrain",
+            eigen_base=_quoted(material.expansion * TENSOR_SHEARS),
+            prefactor=f"{name}_temperature_rise",
+            eigenstrain_name=f"{name}_expansion",
+        )
+    return "\n".join([*lines, "[]"])
+
+
+def _block(name: str, **parameters: str) -> list[str]:
+    return [f"  [{name}]", *(f"    {key} = {value}" for key, value in parameters.items()), "  []"]
+
+
+def _quoted(values: Iterable[float]) -> str:
+    return f"'{' '.join(number(value) for value in values)}'"
+
+
+def csv_table(material: EffectiveMaterial) -> str:
+    """Return the table: engineering constants, expansions, and the stiffness in the order [11, 22, 33, 23, 13, 12]."""
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(CSV_COLUMNS)
+    writer.writerows((name, number(value), unit, meaning) for name, value, unit, meaning in _rows(material))
+    return stream.getvalue().removesuffix("\n")
+
+
+def _rows(material: EffectiveMaterial) -> Iterator[tuple[str, float, str, str]]:
+    for name, value in material.constants.items():
+        axes = [int(digit) for digit in name if digit.isdigit()]
+        yield name, value, "" if name.startswith("nu") else material.stress_unit, _meaning(name, axes)
+    if material.expansion is not None:
+        for name, component, value in zip(MATERIAL_EXPANSIONS, COMPONENTS, material.expansion, strict=True):
+            yield name, float(value), "1 / temperature", f"thermal strain {component} per unit of temperature"
+    C = material.stiffness
+    for i, j in combinations_with_replacement(range(6), 2):
+        digits = "".join(str(axis + 1) for axis in PAIRS[i])
+        text = f"stress {digits} under the unit strain {COMPONENTS[j]}"
+        yield f"C{i + 1}{j + 1}", float(C[i, j]), material.stress_unit, f"stiffness: {text}"
+
+
+def _meaning(name: str, axes: list[int]) -> str:
+    where = " and ".join(f"axis {axis}, {FIBRE_AXES[axis - 1]}" for axis in axes)
+    if name.startswith("E"):
+        return f"Young's modulus along {where}"
+    if name.startswith("G"):
+        return f"shear modulus between {where}"
+    return f"-eps_{axes[1]}/eps_{axes[0]} under stress along axis {axes[0]}: {where}"
+
 
 FORMATS: dict[str, Callable[[EffectiveMaterial], str]] = {
-    "abaqus": abaqus.text,
-    "calculix": abaqus.calculix_text,
-    "ansys": ansys.text,
-    "moose": moose.text,
-    "csv": csv_table.text,
+    "abaqus": abaqus,
+    "calculix": calculix,
+    "ansys": ansys,
+    "moose": moose,
+    "csv": csv_table,
 }
 SYMMETRIES: dict[str, Callable[[Mapping[str, Any]], EffectiveMaterial]] = {
     "orthotropic": in_axes_of_the_cell,
@@ -29,7 +220,7 @@ SYMMETRIES: dict[str, Callable[[Mapping[str, Any]], EffectiveMaterial]] = {
 
 
 def card(directory: Path, form: str, symmetry: str) -> str:
-    """Return the card, in one of `FORMATS`, of the material of one of `SYMMETRIES` of the result in a folder.
+    """Return the card of a result folder in format `form` (`FORMATS`) and material symmetry `symmetry` (`SYMMETRIES`).
 
     Raises:
         CaseError: there is no such format or result, it is damaged, or it has no material that the format can carry;

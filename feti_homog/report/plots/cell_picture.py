@@ -1,6 +1,6 @@
 """Pictures of the undeformed cell: cell.png, partition.png and mesh_error.png.
 
-The numbers of the fibres are those that `fibre = N` of a case file means.
+Fibres have the numbers N of `fibre = N` in case files.
 """
 
 from __future__ import annotations
@@ -17,72 +17,57 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from scipy.spatial import cKDTree
 
-from feti_homog.report.plots.cell_frame import (
-    BAR_INCHES,
-    LEAST_BAR,
-    bar_beside,
-    cell_scale,
-    cell_size,
-    figure_of,
-    label_cell_axes,
-)
+from feti_homog.report.plots import drawn_cell, plot_helpers
 from feti_homog.report.plots.decimation import DrawnMesh, outline_edges, triangle_means
-from feti_homog.report.plots.interface_marks import DrawnCell
-from feti_homog.report.plots.plot_helpers import (
-    draw_segments,
-    fill_triangles,
-    plain,
-    value_range,
-)
 from feti_homog.typing import Array
 
 IN_LEGEND = 12  # phases of the legend, which would cover the cell
-MESH_LINES = 6000  # triangles up to which their edges are drawn
 MATRIX = "#ece8df"
 FIBRES = ("Blues", "Oranges", "Greens", "Purples", "Reds", "Greys")  # one colour map for each phase
-MOST_NUMBERS = 2000  # of fibres; of more none could be read
-INSIDE, SEEN = 0.4, 0.85  # of a radius: how far from the sides a number stands, and how far at most from the centre
-POINTS_PER_INCH, CHARACTERS = 72, 2.2
-LEAST_SIZE, LARGEST_SIZE = 3.0, 11.0  # of the letters, in points
-LETTER = 0.075  # inches, on the average
-DECADES = 4  # below the density of errors that hardly any area exceeds; less is one colour
+LEAST_SIZE = 3.0  # of the letters, in points
 
 
-def figure(cell: DrawnCell) -> Figure:
+def figure(cell: drawn_cell.DrawnCell) -> Figure:
     """Return the materials with the fibres' numbers and, where they differ, the factors of their strengths."""
     drawn, attributes, fibres = cell.drawn, cell.file.attrs, cell.file["fibre"]
     phases = list(attributes["phases"])
-    inks = np.array([mpl.colors.to_rgba(MATRIX), *(_material(k) for k in range(len(phases) - 1))])
+    # A colour map for each of the first phases, which differ most; then other tones.
+    tones = [0.55 - 0.25 * (k // len(FIBRES) * 0.618 % 1.0) for k in range(len(phases) - 1)]
+    materials = [mpl.colormaps[FIBRES[k % len(FIBRES)]](tone) for k, tone in enumerate(tones)]
+    inks = np.array([mpl.colors.to_rgba(MATRIX), *materials])
     picture, axes = _outlined(cell, inks[drawn.phase])
     factors = fibres["strength"][:] if "strength" in fibres else np.ones(len(fibres["number"]))
     varies = bool((factors != 1.0).any())
-    write_fibre_numbers(axes, cell, cell_scale(attributes), factors if varies else None)
-    words = "\nbelow the numbers: strength / that of [interface]" if varies else ""
-    axes.set_title(_title(attributes, _count(drawn.body.max() + 1, "body", "bodies")) + words)
-    there = np.unique(drawn.phase)
-    entries = [Patch(facecolor=inks[k], edgecolor="black", linewidth=0.6, label=phases[k]) for k in there[:IN_LEGEND]]
-    if len(there) > IN_LEGEND:
-        entries.append(Patch(facecolor="none", edgecolor="none", label=f"and {len(there) - IN_LEGEND} others"))
+    write_fibre_numbers(axes, cell, drawn_cell.cell_scale(attributes), factors if varies else None)
+    text = "\nbelow the numbers: strength / that of [interface]" if varies else ""
+    axes.set_title(_title(attributes, _count(drawn.body.max() + 1, "body", "bodies")) + text)
+    present = np.unique(drawn.phase)
+    entries = [Patch(facecolor=inks[k], edgecolor="black", linewidth=0.6, label=phases[k]) for k in present[:IN_LEGEND]]
+    if len(present) > IN_LEGEND:
+        entries.append(Patch(facecolor="none", edgecolor="none", label=f"and {len(present) - IN_LEGEND} others"))
     picture.legend(handles=entries, loc="outside lower center", ncols=3, frameon=False)
     return picture
 
 
-def partition(cell: DrawnCell) -> Figure:
+def partition(cell: drawn_cell.DrawnCell) -> Figure:
     """Return the parts into which the bodies are cut; a subdomain across materials has one in each body."""
     drawn = cell.drawn
     parts = drawn.subdomain.max() + 1
-    picture, axes = _outlined(cell, _distinct(parts)[drawn.subdomain])
-    draw_segments(axes, drawn.points[outline_edges(drawn, drawn.subdomain)], "black", 0.5)
-    words = f"{_count(drawn.body.max() + 1, 'body', 'bodies')} in {_count(parts, 'part', 'parts')}"
-    axes.set_title(_title(cell.file.attrs, words))
+    # Colours of which those with near numbers differ most.
+    colours: Array = mpl.colormaps["tab20"](np.arange(parts) * 7 % 20)
+    colours[:, :3] = 0.3 + 0.7 * colours[:, :3]
+    picture, axes = _outlined(cell, colours[drawn.subdomain])
+    plot_helpers.draw_segments(axes, drawn.points[outline_edges(drawn, drawn.subdomain)], "black", 0.5)
+    text = f"{_count(drawn.body.max() + 1, 'body', 'bodies')} in {_count(parts, 'part', 'parts')}"
+    axes.set_title(_title(cell.file.attrs, text))
     return picture
 
 
-def mesh_error(cell: DrawnCell) -> Figure | None:
-    """Return the cell in the colours of the density of the error, None without estimates.
+def mesh_error(cell: drawn_cell.DrawnCell) -> Figure | None:
+    """Return the cell coloured by its mesh error density; None without estimates.
 
-    The error in a part of the cell relative to the strain energy of the cell, over the part's share of the area; the
-    largest of all states.  That of singular tips is above the range, otherwise all else would have one colour.
+    Density: share of the strain energy error over share of the area, the largest in all states.  Singular tips lie
+    above the colour range, otherwise the rest would have one colour.
     """
     file, drawn = cell.file, cell.drawn
     tables = [state["mesh_error"] for state in file.get("state", {}).values() if "mesh_error" in state]
@@ -93,61 +78,50 @@ def mesh_error(cell: DrawnCell) -> Figure | None:
     area = np.abs(x * v - y * u) / 2 / (file.attrs["width"] * file.attrs["height"])
     elements = drawn.group / drawn.pieces
     density: Array = np.max([triangle_means(table, None, drawn) for table in tables], axis=0) * elements / area
-    most = float(density.max(initial=0.0))
-    if not 0.0 < most < np.inf:
+    highest = float(density.max(initial=0.0))
+    if not 0.0 < highest < np.inf:
         return None
-    picture, (axes,) = figure_of(file.attrs, panels=1, beside=BAR_INCHES)
-    top = float(value_range(density, area)[0].vmax or most)
-    least = top / 10.0**DECADES
-    colours = ScalarMappable(LogNorm(least, top), "magma_r")
-    fill_triangles(axes, drawn, drawn.points, np.asarray(colours.to_rgba(np.maximum(density, least))), edges=False)
-    extend = "both" if most > top else "min"
-    bar = bar_beside(axes, colours, extend, cell_size(file.attrs))
-    letters = int(max(cell_size(file.attrs)[1], LEAST_BAR[1]) / LETTER)
+    picture, (axes,) = drawn_cell.figure_of(file.attrs, panels=1, beside=drawn_cell.BAR_INCHES)
+    top = float(plot_helpers.value_range(density, area)[0].vmax or highest)
+    lowest = top / 10.0**4  # less, on hardly any area, is one colour
+    colours = ScalarMappable(LogNorm(lowest, top), "magma_r")
+    plot_helpers.fill_triangles(
+        axes, drawn, drawn.points, np.asarray(colours.to_rgba(np.maximum(density, lowest))), edges=False
+    )
+    extend = "both" if highest > top else "min"
+    bar = drawn_cell.bar_beside(axes, colours, extend, drawn_cell.cell_size(file.attrs))
+    letters = int(max(drawn_cell.cell_size(file.attrs)[1], drawn_cell.LEAST_BAR[1]) / 0.075)
     bar.set_label(fill("error of the strain energy / energy, per share of the area", letters))
-    draw_segments(axes, drawn.points[cell.borders], "black", 0.7)
-    label_cell_axes(axes, file.attrs)
+    plot_helpers.draw_segments(axes, drawn.points[cell.borders], "black", 0.7)
+    drawn_cell.label_cell_axes(axes, file.attrs)
     axes.set_title(_title(file.attrs, "estimated error of the mesh"))
     return picture
 
 
-def _outlined(cell: DrawnCell, colours: Array) -> tuple[Figure, Axes]:
-    """Return the cell in the colours (q, 4) of its triangles, with the outlines of the bodies."""
-    picture, (axes,) = figure_of(cell.file.attrs, panels=1)
-    fill_triangles(axes, cell.drawn, cell.drawn.points, colours, len(cell.drawn.triangles) <= MESH_LINES)
-    draw_segments(axes, cell.drawn.points[cell.borders], "black", 0.9)
-    label_cell_axes(axes, cell.file.attrs)
+def _outlined(cell: drawn_cell.DrawnCell, colours: Array) -> tuple[Figure, Axes]:
+    """Return the cell with triangle colours (q, 4) and body outlines."""
+    picture, (axes,) = drawn_cell.figure_of(cell.file.attrs, panels=1)
+    plot_helpers.fill_triangles(axes, cell.drawn, cell.drawn.points, colours, len(cell.drawn.triangles) <= 6000)
+    plot_helpers.draw_segments(axes, cell.drawn.points[cell.borders], "black", 0.9)
+    drawn_cell.label_cell_axes(axes, cell.file.attrs)
     return picture, axes
 
 
-def _title(attributes: Any, words: str) -> str:
-    return f"{plain(attributes['title'])}\n{words}".lstrip()
-
-
-def _material(number: int) -> Any:
-    """Return the colour of a phase other than the matrix: those of the first ones differ most."""
-    tone = 0.55 - 0.25 * (number // len(FIBRES) * 0.618 % 1.0)
-    return mpl.colormaps[FIBRES[number % len(FIBRES)]](tone)
-
-
-def _distinct(count: int) -> Array:
-    """Colours (count, 4), of which those with near numbers differ most."""
-    colours: Array = mpl.colormaps["tab20"](np.arange(count) * 7 % 20)
-    colours[:, :3] = 0.3 + 0.7 * colours[:, :3]
-    return colours
+def _title(attributes: Any, text: str) -> str:
+    return f"{plot_helpers.plain(attributes['title'])}\n{text}".lstrip()
 
 
 def _count(number: int, one: str, many: str) -> str:
     return f"{number} {one if number == 1 else many}"
 
 
-def write_fibre_numbers(axes: Axes, cell: DrawnCell, inches: float, factors: Array | None = None) -> None:
-    """Write each fibre's number on it, on every part of a round one that the sides of the cell cut.
+def write_fibre_numbers(axes: Axes, cell: drawn_cell.DrawnCell, inches: float, factors: Array | None = None) -> None:
+    """Write each fibre's number on it; on every part of a round fibre cut by the cell sides.
 
     `inches` is a length unit in the picture; below the numbers stand `factors` (f,), if there are any.
     """
     fibres, drawn = cell.file["fibre"], cell.drawn
-    if len(fibres["number"]) > MOST_NUMBERS:
+    if len(fibres["number"]) > 2000:  # none could be read
         return
     period, low = np.array([cell.file.attrs[name] for name in ("width", "height")]), drawn.points.min(axis=0)
     outline = cKDTree(drawn.points[np.unique(cell.borders)])
@@ -157,26 +131,25 @@ def write_fibre_numbers(axes: Axes, cell: DrawnCell, inches: float, factors: Arr
             places, room = _on_images(centre, radius, low, period), radius
         else:
             places, room = _inside(drawn, body, outline)
-        size = float(np.clip(room * inches * POINTS_PER_INCH / CHARACTERS, LEAST_SIZE, LARGEST_SIZE))
-        words = str(number)
+        size = float(np.clip(room * inches * 72 / 2.2, LEAST_SIZE, 11.0))  # points, 2.2 characters in the room
+        text = str(number)
         if factors is not None:
-            words, size = f"{number}\n{factors[k]:.2f}", max(0.75 * size, LEAST_SIZE)
+            text, size = f"{number}\n{factors[k]:.2f}", max(0.75 * size, LEAST_SIZE)
         for x, y in places:
-            axes.text(x, y, words, fontsize=size, ha="center", va="center", clip_on=True)
+            axes.text(x, y, text, fontsize=size, ha="center", va="center", clip_on=True)
 
 
 def _on_images(centre: Array, radius: float, low: Array, period: Array) -> Array:
-    """(p, 2) the centres of a circle's images, moved into the cell, if they are near enough."""
+    """(p, 2) image centres of a circle near the cell, moved into it."""
     shifts = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), axis=-1).reshape(-1, 2)
     images = centre + shifts * period
-    margin = np.minimum(INSIDE * radius, 0.4 * period)
+    margin = np.minimum(0.4 * radius, 0.4 * period)
     moved = np.clip(images, low + margin, low + period - margin)
-    places: Array = moved[np.linalg.norm(moved - images, axis=1) <= SEEN * radius]
-    return places
+    return np.asarray(moved[np.linalg.norm(moved - images, axis=1) <= 0.85 * radius])
 
 
 def _inside(drawn: DrawnMesh, body: int, outline: cKDTree) -> tuple[Array, float]:
-    """(1, 2) the place in a body that is farthest from the outlines, and how far it is."""
+    """(1, 2) the place in a body farthest from the outlines, and its distance."""
     middles = drawn.points[drawn.triangles[drawn.body == body]].mean(axis=1)
     distance = outline.query(middles)[0]
     best = int(np.argmax(distance))

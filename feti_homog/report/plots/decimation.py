@@ -1,12 +1,12 @@
-"""The part of result.h5 that pictures show.
+"""A coarse mesh of result.h5 for pictures, with fields on it.
 
-It has about TRIANGLE_LIMIT triangles at most, read in blocks, their outlines, the values and displacements on them, and
-how far these may be magnified; the state of free expansion, a sum of states.
+At most about TRIANGLE_LIMIT triangles, read in blocks; outlines, values, displacements and their largest scale; the
+free expansion as a sum of states.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -19,7 +19,6 @@ from feti_homog.typing import Array, Document
 
 LEAST_AREA = 0.5  # area of a triangle in a picture / its own: at zero it would be turned over
 TRIANGLE_LIMIT = 100_000  # triangles in a picture
-BLOCK_ROWS = 1 << 18
 SAME_PLACE = 1e-6  # of the size of the cell
 LOADS = (*SPATIAL_STRAINS, "temperature")
 QUARTERS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])  # of a six-node triangle
@@ -27,7 +26,7 @@ QUARTERS = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])  # of a six-no
 
 @dataclass(frozen=True)
 class DrawnMesh:
-    """The drawn triangles: those of the file, or coarser ones that hold `group` of them each."""
+    """Triangles of a picture: from the file, or coarser, `group` file triangles in each."""
 
     block: int  # rows of a table read at once
     group: int
@@ -42,26 +41,24 @@ class DrawnMesh:
     @cached_property
     def areas(self) -> Array:
         """(q,) areas of the triangles."""
-        found: Array = np.abs(_determinant(_sides(self.points, self))) / 2
-        return found
+        return np.asarray(np.abs(_determinant(_sides(self.points, self))) / 2)
 
     @cached_property
     def node_areas(self) -> Array:
-        """(p,) a third of the areas of the triangles at each node."""
+        """(p,) a third of the triangle areas around each node."""
         return np.bincount(self.triangles.ravel(), np.repeat(self.areas / 3, 3), len(self.points))
 
     @cached_property
     def places(self) -> Array:
-        """(p,) number of the place of each node in its body: nodes are torn between the subdomains of a body."""
-        near = SAME_PLACE * np.ptp(self.points, axis=0).max()
+        """(p,) place number of each node in its body, whose subdomains have nodes at the same places."""
+        tolerance = SAME_PLACE * np.ptp(self.points, axis=0).max()
         body = np.zeros(len(self.points), np.int64)
         body[self.triangles] = self.body[:, None]
-        keys = np.column_stack([body, np.round(self.points / near).astype(np.int64)])
-        numbers: Array = np.unique(keys, axis=0, return_inverse=True)[1].ravel()
-        return numbers
+        keys = np.column_stack([body, np.round(self.points / tolerance).astype(np.int64)])
+        return np.asarray(np.unique(keys, axis=0, return_inverse=True)[1].ravel())
 
 
-def drawn_mesh(file: Any, limit: int = TRIANGLE_LIMIT, block: int = BLOCK_ROWS) -> DrawnMesh:
+def drawn_mesh(file: Any, limit: int = TRIANGLE_LIMIT, block: int = 1 << 18) -> DrawnMesh:
     """Return the finest nested mesh of an open result.h5 with at most `limit` triangles, or else its coarsest.
 
     Its tables are read `block` rows at a time.
@@ -82,27 +79,26 @@ def drawn_mesh(file: Any, limit: int = TRIANGLE_LIMIT, block: int = BLOCK_ROWS) 
 
 
 def nodal_values(table: Any, drawn: DrawnMesh) -> Array:
-    """Return the rows (p, 2) of a table on nodes at the nodes drawn."""
+    """Return the rows (p, 2) of a nodal table at the nodes drawn."""
     return _picked(table, drawn.nodes, drawn.block)
 
 
 def triangle_means(table: Any, column: int | None, drawn: DrawnMesh) -> Array:
-    """Return the means (q,) of a column of a table on elements, or of one that has none, over each triangle drawn."""
-    own = ... if column is None else (..., column)
-    means = _blocks(table, drawn.group, drawn.block, lambda rows: rows[own].mean(axis=1))
+    """Return element values (q,) averaged over each triangle drawn: a table column, or a table without columns."""
+    selection = ... if column is None else (..., column)
+    means = _blocks(table, drawn.group, drawn.block, lambda rows: rows[selection].mean(axis=1))
     return np.repeat(means, drawn.pieces)
 
 
 def node_means(values: Array, drawn: DrawnMesh) -> Array:
-    """Return the means (p,) of values (q,) on triangles at the nodes drawn, weighted by area, within each body."""
+    """Average triangle values (q,) at the nodes drawn (p,), weighted by area, within each body."""
     place, weights = drawn.places[drawn.triangles].ravel(), np.repeat(drawn.areas, 3)
     sums = np.bincount(place, np.repeat(values * drawn.areas, 3)) / np.bincount(place, weights)
-    means: Array = sums[drawn.places]
-    return means
+    return np.asarray(sums[drawn.places])
 
 
 def outline_edges(drawn: DrawnMesh, label: Array) -> Array:
-    """Return the edges (e, 2) between triangles of different label, on both sides, and those of the cell.
+    """Return the edges (e, 2) between triangles with different labels, from both sides, and along the cell border.
 
     Nodes are torn, so an edge with one triangle is on the border of a subdomain; it has a twin in the same
     place across the border, and none on the border of the cell.
@@ -115,24 +111,21 @@ def outline_edges(drawn: DrawnMesh, label: Array) -> Array:
     border, owner = ordered[first[count == 1]], owner[first[count == 1]]
     middle = drawn.points[border].mean(axis=1)
     twins = cKDTree(middle).query_pairs(1e-6 * np.ptp(drawn.points, axis=0).max(), output_type="ndarray")
-    kept = np.ones(len(border), dtype=bool)
-    kept[twins[owner[twins[:, 0]] == owner[twins[:, 1]]].ravel()] = False
-    outline: Array = border[kept]
-    return outline
+    is_border = np.ones(len(border), dtype=bool)
+    is_border[twins[owner[twins[:, 0]] == owner[twins[:, 1]]].ravel()] = False
+    return np.asarray(border[is_border])
 
 
 def _corners(rows: Array, pieces: int) -> Array:
-    """Return the drawn triangles (q, 3) of rows (g, group, 3 or 6): corner i is vertex i of one of the group."""
+    """Return triangles (q, 3) from rows (g, group, 3 or 6): corner i is vertex i of one triangle in the group."""
     if pieces > 1:
-        quarters: Array = rows[:, 0][:, QUARTERS].reshape(-1, 3)
-        return quarters
+        return np.asarray(rows[:, 0][:, QUARTERS].reshape(-1, 3))
     members = np.arange(3) * ((rows.shape[1] - 1) // 3)
-    corners: Array = rows[:, members, np.arange(3)]
-    return corners
+    return np.asarray(rows[:, members, np.arange(3)])
 
 
 def _blocks(table: Any, group: int, block: int, function: Callable[[Array], Array]) -> Array:
-    """Return function of each block of a table, its rows in groups: (g, group, columns)."""
+    """Return `function` of each table block, with rows in groups (g, group, columns)."""
     step = max(group, block - block % group)
     blocks = (table[start : start + step] for start in range(0, len(table), step))
     return np.concatenate([function(rows.reshape(-1, group, *rows.shape[1:])) for rows in blocks])
@@ -140,29 +133,24 @@ def _blocks(table: Any, group: int, block: int, function: Callable[[Array], Arra
 
 def _picked(table: Any, numbers: Array, block: int) -> Array:
     """Return the rows `numbers` (ascending) of a table."""
-    return np.concatenate(list(_picks(table, numbers, block)))
-
-
-def _picks(table: Any, numbers: Array, block: int) -> Iterator[Array]:
+    parts = []
     for start in range(0, len(table), block):
         first, last = np.searchsorted(numbers, (start, start + block))
-        rows: Array = table[start : start + block]
-        yield rows[numbers[first:last] - start]
+        parts.append(table[start : start + block][numbers[first:last] - start])
+    return np.concatenate(parts)
 
 
 def drawn_displacement(state: Any, drawn: DrawnMesh) -> Array:
-    """(p, 2) u of a state of result.h5 at the nodes drawn.
+    """(p, 2) displacements u of a state at the nodes drawn.
 
-    It is shifted so that the mean of u* = u - E x over the triangles drawn is zero: the solution leaves the translation
-    open, and without it the cell stays in place.
+    Shifted to zero mean of u* = u - E x over the triangles drawn: the solution leaves the translation open.
     """
     displacement = nodal_values(state["displacement"], drawn)
     loads = dict(zip(voigt_names(len(state.attrs["strain"]))[0], state.attrs["strain"], strict=True))
     shear = 0.5 * loads["gamma12"]
     fluctuation = displacement - drawn.points @ np.array([[loads["E11"], shear], [shear, loads["E22"]]])
     areas = _determinant(_sides(drawn.points, drawn))
-    shifted: Array = displacement - np.average(fluctuation[drawn.triangles].mean(axis=1), axis=0, weights=areas)
-    return shifted
+    return np.asarray(displacement - np.average(fluctuation[drawn.triangles].mean(axis=1), axis=0, weights=areas))
 
 
 def largest_scale(displacement: Array, drawn: DrawnMesh) -> float:
@@ -185,20 +173,19 @@ def largest_scale(displacement: Array, drawn: DrawnMesh) -> float:
 
 
 def _sides(values: Array, drawn: DrawnMesh) -> Array:
-    """(q, 2, 2) the differences of values (p, 2) along two sides of each triangle drawn."""
+    """(q, 2, 2) differences of nodal values (p, 2) along two sides of each triangle."""
     first, second, third = np.moveaxis(values[drawn.triangles], 1, 0)
     return np.stack([second - first, third - first], axis=1)
 
 
 def _determinant(rows: Array) -> Array:
     """(q,) determinants of (q, 2, 2)."""
-    found: Array = rows[:, 0, 0] * rows[:, 1, 1] - rows[:, 0, 1] * rows[:, 1, 0]
-    return found
+    return np.asarray(rows[:, 0, 0] * rows[:, 1, 1] - rows[:, 0, 1] * rows[:, 1, 0])
 
 
 @dataclass(frozen=True)
 class SummedTable:
-    """Sum of tables times factors, row by row as it is read."""
+    """Sum of tables times factors, formed as rows are read."""
 
     tables: Sequence[Any]
     factors: Sequence[float]
@@ -213,9 +200,9 @@ class SummedTable:
 
 @dataclass(frozen=True)
 class FreeExpansion:
-    """The state u = u_T + sum_j alpha_j u_j of the unit loads' states, of which pictures read fields of the cell.
+    """The state u = u_T + sum_j alpha_j u_j, a sum of unit load states, read as a state of result.h5.
 
-    Where no face touches, the states superpose; interfaces are those of the state of the temperature, the last one.
+    Where no face touches, states superpose; the interface has the status of the last one, under temperature.
     """
 
     file: Any
@@ -225,20 +212,20 @@ class FreeExpansion:
 
     @classmethod
     def of(cls, state: Any, document: Document) -> FreeExpansion | None:
-        """Return that of the state of a unit of temperature; None of another state, and without an expansion."""
+        """Return the free expansion if `state` is under a unit temperature and its expansion is known, else None."""
         strain, temperature = state.attrs["strain"], state.attrs.get("temperature", 0.0)
         expansion = document.get("thermal_expansion")
         if expansion is None or len(strain) != len(expansion) or np.any(strain) or temperature != 1.0:
             return None
-        found = {}
+        result = {}
         for other in state.file["state"].values():
             loads = np.append(other.attrs["strain"], other.attrs["temperature"])
             if np.count_nonzero(loads) == 1 and loads.max() == 1.0:
-                found[LOADS[int(loads.argmax())]] = other
-        if len(found) < len(LOADS):
+                result[LOADS[int(loads.argmax())]] = other
+        if len(result) < len(LOADS):
             return None
         attributes = dict(state.attrs) | {"strain": np.array(expansion), "stress": np.zeros(len(expansion))}
-        return cls(state.file, [found[load] for load in LOADS], [*expansion, 1.0], attributes)
+        return cls(state.file, [result[load] for load in LOADS], [*expansion, 1.0], attributes)
 
     def __contains__(self, name: str) -> bool:
         return name in self.states[-1]

@@ -1,4 +1,4 @@
-"""The deformed cell at several states of an angle or path, side by side and as an animation, in one range of colour."""
+"""The deformed cell along an angle or path, side by side and animated, in one colour range."""
 
 from __future__ import annotations
 
@@ -17,24 +17,7 @@ from matplotlib.ticker import MaxNLocator
 from PIL import Image
 
 from feti_homog.errors import FetiHomogError
-from feti_homog.report.plots.cell_frame import bar_beside
-from feti_homog.report.plots.decimation import drawn_displacement, drawn_mesh, largest_scale
-from feti_homog.report.plots.interface_marks import DAMAGED, STATE_NAMES, DrawnCell, state_legend, states_of_nodes
-from feti_homog.report.plots.load_labels import LoadLabels
-from feti_homog.report.plots.plot_helpers import (
-    STRESS_SYMBOLS,
-    colour_range,
-    draw_segments,
-    largest_length,
-    magnification,
-    nodal_stress,
-    pixels_of,
-    plain,
-    save,
-    shade_triangles,
-    stress_component,
-    stress_label,
-)
+from feti_homog.report.plots import decimation, drawn_cell, plot_helpers
 from feti_homog.report.text.analyses import reported
 from feti_homog.results import atomic, field_file, landmarks
 from feti_homog.results.landmarks import marks
@@ -42,35 +25,34 @@ from feti_homog.typing import Array, Document
 
 MAX_PANELS = 6
 MAX_FRAMES, FRAME_TIME = 24, 250  # of the animation; milliseconds
-FRAME_LIMIT, PANEL_LIMIT, STATE_LIMIT = 8000, 30_000, 60_000  # triangles in a frame, a panel, a picture of one state
-MOST_COLUMNS = 3
+PANEL_LIMIT = 30_000  # triangles in a panel
 INCHES, BAR = 8.0, 0.55  # of all panels of a row, and of the colour bar in each
 FRAME, MOST_HEIGHT = 3.6, 6.0  # width of a cell in the animation; largest height of a cell in it and in a panel; inches
 LOADS_IN_PANEL, LINE = 2, 0.15  # in a line of its title; inches of a line
 
 
 @dataclass(frozen=True)
-class DeformedCell(DrawnCell):
-    """Data that all panels share."""
+class DeformedCell(drawn_cell.DrawnCell):
+    """A cell with the colours, scale and labels that all panels share."""
 
     component: str
     colours: tuple[Normalize, str, str]
     scale: float
-    labels: LoadLabels
+    labels: drawn_cell.LoadLabels
     marks: Mapping[int, str]
 
     @classmethod
     def of_states(cls, file: Any, numbers: Sequence[int], document: Document, scale: float, limit: int) -> DeformedCell:
-        """Return the stress that the case chooses, or that suits all these states, and one range of colours of all."""
-        cell, states = DrawnCell.of(file, limit), [file[f"state/{n}"] for n in numbers]
-        component = stress_component(document["case"]["output"].get("stress", "auto"), states)
-        words = marks(document) if reported(document).is_followed else {}
+        """Choose a stress, by the case or to suit all states, and one colour range."""
+        cell, states = drawn_cell.DrawnCell.of(file, limit), [file[f"state/{n}"] for n in numbers]
+        component = plot_helpers.stress_component(document["case"]["output"].get("stress", "auto"), states)
+        mark_of = marks(document) if reported(document).is_followed else {}
         # At the end, once all fibres have come off, stresses may be many times those of the peak.
-        marked = [state for state in states if words.get(int(state.attrs["point"]), "end") != "end"] or states
-        stress = np.concatenate([nodal_stress(state, component, cell.drawn) for state in marked])
-        colours = colour_range(stress, np.tile(cell.drawn.node_areas, len(marked)))
-        parts = vars(cell) | {"component": component, "colours": colours, "scale": scale, "marks": words}
-        return cls(**parts, labels=LoadLabels.of(document))
+        marked = [state for state in states if mark_of.get(int(state.attrs["point"]), "end") != "end"] or states
+        stress = np.concatenate([plot_helpers.nodal_stress(state, component, cell.drawn) for state in marked])
+        colours = plot_helpers.colour_range(stress, np.tile(cell.drawn.node_areas, len(marked)))
+        parts = vars(cell) | {"component": component, "colours": colours, "scale": scale, "marks": mark_of}
+        return cls(**parts, labels=drawn_cell.LoadLabels.of(document))
 
     def state(self, number: int) -> Any:
         """Return a state of the file."""
@@ -78,16 +60,16 @@ class DeformedCell(DrawnCell):
 
     def moved(self, number: int) -> Array:
         """(p, 2) places of the drawn nodes."""
-        places: Array = self.drawn.points + self.scale * drawn_displacement(self.state(number), self.drawn)
+        places: Array = self.drawn.points + self.scale * decimation.drawn_displacement(self.state(number), self.drawn)
         return places
 
     def draw(self, axes: Axes, number: int, moved: Array) -> Any:
-        """Draw the cell of a state, drawn nodes at `moved`; returns what a colour bar is of."""
+        """Draw the cell of a state with nodes at `moved` (p, 2); returns the coloured triangles."""
         state, (norm, colours, _) = self.state(number), self.colours
-        stress = nodal_stress(state, self.component, self.drawn)
-        shapes = shade_triangles(axes, self.drawn, moved, stress, norm, colours)
-        draw_segments(axes, moved[self.borders], "black", 0.5)
-        self.interface.mark(axes, moved, states_of_nodes(state), magnified=0.8)
+        stress = plot_helpers.nodal_stress(state, self.component, self.drawn)
+        shapes = plot_helpers.shade_triangles(axes, self.drawn, moved, stress, norm, colours)
+        plot_helpers.draw_segments(axes, moved[self.borders], "black", 0.5)
+        self.interface.mark(axes, moved, drawn_cell.states_of_nodes(state), magnified=0.8)
         axes.set_aspect("equal")
         axes.set(xticks=(), yticks=())
         axes.set_axis_off()
@@ -98,20 +80,21 @@ class DeformedCell(DrawnCell):
         return shapes
 
     def bar(self, axes: Axes, shapes: Any, size: tuple[float, float] | None = None) -> None:
-        """Draw the colour bar of all states beside axes, of a cell in this size (inches), if it is known."""
-        bar = bar_beside(axes, shapes, self.colours[2], size)
+        """Draw the common colour bar beside axes; `size` is the drawn cell size (inches), if known."""
+        bar = drawn_cell.bar_beside(axes, shapes, self.colours[2], size)
         bar.ax.tick_params(labelsize=8)
         bar.locator = MaxNLocator(6)
 
     def lines(self, number: int) -> int:
-        """Lines of the words for the load of a state."""
+        """Count the lines in the load label of a state."""
         return 1 + self.labels.label(self.state(number).attrs, LOADS_IN_PANEL).count("\n")
 
     @property
     def caption(self) -> str:
-        """Return what is drawn."""
+        """Stress symbol, unit and displacement scale in words."""
         scale = "true scale" if self.scale == 1 else f"displacement × {self.scale:g}"
-        return f"${STRESS_SYMBOLS[self.component]}$ {stress_label(self.file.attrs['stress_unit'])}, {scale}"
+        symbol = plot_helpers.STRESS_SYMBOLS[self.component]
+        return f"${symbol}$ {plot_helpers.stress_label(self.file.attrs['stress_unit'])}, {scale}"
 
 
 def draw_state(
@@ -124,8 +107,7 @@ def draw_state(
 ) -> str:
     """Draw a state of `directory`/result.h5 into axes; returns the caption.
 
-    Colours are those from minus `most` to `most`, so that pictures beside each other have one scale; by default those
-    that suit the state.
+    Colours range from minus `most` to `most`, one scale for pictures side by side; by default they suit the state.
 
     `axes.get_legend_handles_labels()` has the marks of bonded, open and closed interfaces.
 
@@ -135,15 +117,20 @@ def draw_state(
     path = directory / field_file.NAME
     try:
         with h5py.File(path, "r") as file:
-            cell = DeformedCell.of_states(file, [number], {"case": {"output": {"stress": stress}}}, scale, STATE_LIMIT)
+            cell = DeformedCell.of_states(file, [number], {"case": {"output": {"stress": stress}}}, scale, 60_000)
             if most is not None:
                 cell = replace(cell, colours=(Normalize(-most, most), "RdBu_r", "both"))
             cell.bar(axes, cell.draw(axes, number, cell.moved(number)))
-            caption, softens = cell.caption, bool((states_of_nodes(file[f"state/{number}"]) == DAMAGED).any())
+            caption, softens = (
+                cell.caption,
+                bool((drawn_cell.states_of_nodes(file[f"state/{number}"]) == drawn_cell.DAMAGED).any()),
+            )
     except (OSError, KeyError) as error:
         raise FetiHomogError(f"cannot draw state {number} of {path}: {error}") from error
     axes.autoscale_view()
-    for line in state_legend([kind for kind in STATE_NAMES if softens or kind != DAMAGED]):
+    for line in drawn_cell.state_legend(
+        [kind for kind in drawn_cell.STATE_NAMES if softens or kind != drawn_cell.DAMAGED]
+    ):
         axes.add_line(line)
     return caption
 
@@ -161,13 +148,13 @@ def _angle(directory: Path, file: Any, document: Document, count: int) -> list[P
     every = range(0, count, count // len(document["angle"]) or 1)
     numbers = [every[round(k)] for k in np.linspace(0, len(every) - 1, min(MAX_PANELS, len(every)))]
     panels = _side_by_side(file, numbers, document, shown_scale(file, document))
-    return [save(panels, directory / "angle_states.png")]
+    return [plot_helpers.save(panels, directory / "angle_states.png")]
 
 
 def _path(directory: Path, file: Any, document: Document, count: int) -> list[Path]:
     scale = shown_scale(file, document)
     panels = _side_by_side(file, landmarks.landmark_states(document, MAX_PANELS, count), document, scale)
-    paths = [save(panels, directory / "path_states.png")]
+    paths = [plot_helpers.save(panels, directory / "path_states.png")]
     frames = landmarks.chosen_states(document, MAX_FRAMES, count)
     return [*paths, _animation(file, frames, document, scale, directory / "path.gif")]
 
@@ -176,24 +163,27 @@ PANELS = {"angle": _angle, "path": _path}
 
 
 def shown_scale(file: Any, document: Document) -> float:
-    """Return the factor of displacements in all pictures of an angle or a path and in the report.
+    """Return the displacement factor for all pictures of an angle or a path.
 
-    It is that of the case or, by default, one at which the largest displacement and opening are seen and no triangle
-    turns over, but at least 1 under a given load.
+    The case may give it; by default the largest displacement and opening are visible and no triangle turns over, but
+    it is at least 1 under a load of the case.
     """
     chosen = document.get("case", {}).get("output", {}).get("deformation_scale")
     if chosen is not None:
         return float(chosen)
-    drawn = drawn_mesh(file, PANEL_LIMIT)
+    drawn = decimation.drawn_mesh(file, PANEL_LIMIT)
     displacement = opening = 0.0
     largest = math.inf
     for number in reported(document).states(document, MAX_FRAMES, len(file["state"])):
         state = file[f"state/{number}"]
-        u = drawn_displacement(state, drawn)
-        displacement, largest = max(displacement, largest_length(u)), min(largest, largest_scale(u, drawn))
+        u = decimation.drawn_displacement(state, drawn)
+        displacement, largest = (
+            max(displacement, plot_helpers.largest_length(u)),
+            min(largest, decimation.largest_scale(u, drawn)),
+        )
         opening = max(opening, float(state["jump"][:, 0].max(initial=0.0)))
     size = float(min(file.attrs["width"], file.attrs["height"]))
-    scale = magnification(displacement, size, opening, largest)
+    scale = plot_helpers.magnification(displacement, size, opening, largest)
     return max(scale, 1.0) if reported(document).is_load_given(document) else scale
 
 
@@ -212,32 +202,32 @@ def _side_by_side(file: Any, numbers: Sequence[int], document: Document, scale: 
     for axes in grid[len(numbers) :]:
         axes.set_axis_off()
     grid[0].autoscale_view()
-    figure.suptitle(f"{plain(file.attrs['title'])}: {cell.caption}".lstrip(": "), fontsize=11)
-    states = [cell.interface.state(states_of_nodes(cell.state(number))) for number in numbers]
-    found = np.unique(np.concatenate(states))
-    handles = state_legend([kind for kind in STATE_NAMES if kind in found])
+    figure.suptitle(f"{plot_helpers.plain(file.attrs['title'])}: {cell.caption}".lstrip(": "), fontsize=11)
+    states = [cell.interface.state(drawn_cell.states_of_nodes(cell.state(number))) for number in numbers]
+    present = np.unique(np.concatenate(states))
+    handles = drawn_cell.state_legend([kind for kind in drawn_cell.STATE_NAMES if kind in present])
     if handles:
         figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
     return figure
 
 
 def _inches(size: Array, width: float) -> tuple[float, float]:
-    """Width and height of a cell of this size (2,) in a picture: as wide as may be, but not higher than MOST_HEIGHT."""
+    """Inches of a drawn cell with sides `size` (2,): `width` wide, but at most MOST_HEIGHT high."""
     scale = min(width / size[0], MOST_HEIGHT / size[1])
     return float(scale * size[0]), float(scale * size[1])
 
 
 def _grid(panels: int, ratio: float) -> tuple[int, int]:
-    """Return rows and columns of panels of this ratio of width to height: about as wide as high, few places empty."""
-    wanted = min(math.sqrt(0.7 * panels * ratio), panels)
-    grids = [(rows, -(-panels // rows)) for rows in {max(1, math.floor(wanted)), math.ceil(wanted)}]
-    grids = [grid for grid in grids if grid[1] <= MOST_COLUMNS] or grids
-    return min(grids, key=lambda grid: (grid[0] * grid[1] - panels, abs(grid[0] - wanted)))
+    """Return rows and columns for panels with width / height `ratio`: about square, few places empty."""
+    ideal = min(math.sqrt(0.7 * panels * ratio), panels)
+    grids = [(rows, -(-panels // rows)) for rows in {max(1, math.floor(ideal)), math.ceil(ideal)}]
+    grids = [grid for grid in grids if grid[1] <= 3] or grids
+    return min(grids, key=lambda grid: (grid[0] * grid[1] - panels, abs(grid[0] - ideal)))
 
 
 def _animation(file: Any, numbers: Sequence[int], document: Document, scale: float, path: Path) -> Path:
-    """Frames of one layout, that of the last state."""
-    cell = DeformedCell.of_states(file, numbers, document, scale, FRAME_LIMIT)
+    """Write the animation; all frames have the layout for the last state."""
+    cell = DeformedCell.of_states(file, numbers, document, scale, 8000)
     places = [cell.moved(number) for number in numbers]
     low, high = _corners(places)
     size = high - low
@@ -252,7 +242,7 @@ def _animation(file: Any, numbers: Sequence[int], document: Document, scale: flo
             artist.remove()
         cell.bar(axes, cell.draw(axes, number, moved), (width, height))
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-        picture = Image.fromarray(pixels_of(figure))
+        picture = Image.fromarray(plot_helpers.pixels_of(figure))
         figure.set_layout_engine("none")
         frames.insert(0, picture.quantize(256, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE))
     times = [FRAME_TIME] * (len(frames) - 1) + [6 * FRAME_TIME]
@@ -261,7 +251,7 @@ def _animation(file: Any, numbers: Sequence[int], document: Document, scale: flo
 
 
 def _corners(places: Sequence[Array]) -> tuple[Array, Array]:
-    """Lower left and upper right corner of all states, with a margin."""
+    """Lower left and upper right corner around all states, with a margin."""
     low, high = np.min([p.min(axis=0) for p in places], axis=0), np.max([p.max(axis=0) for p in places], axis=0)
     margin = 0.02 * (high - low)
     return low - margin, high + margin

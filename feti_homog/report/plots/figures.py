@@ -1,4 +1,4 @@
-"""The pictures of a result: the cell, the deformed cell of each load case, and those of an angle or path."""
+"""The pictures of a result: cell, deformed cell under each load, curves and panels of an angle or path."""
 
 from __future__ import annotations
 
@@ -18,60 +18,35 @@ from feti_homog.errors import FetiHomogError
 from feti_homog.materials.voigt import voigt_names
 from feti_homog.report.plots import (
     cell_picture,
+    decimation,
     deformed_panels,
+    drawn_cell,
+    plot_helpers,
     response_curves,
     traction_plots,
-)
-from feti_homog.report.plots.cell_frame import BAR_INCHES, bar_beside, cell_size, figure_of, label_cell_axes
-from feti_homog.report.plots.decimation import (
-    DrawnMesh,
-    FreeExpansion,
-    drawn_displacement,
-    largest_scale,
-    nodal_values,
-)
-from feti_homog.report.plots.interface_marks import DrawnCell, states_of_nodes
-from feti_homog.report.plots.load_labels import LoadLabels
-from feti_homog.report.plots.plot_helpers import (
-    STRESS_SYMBOLS,
-    STYLE,
-    colour_range,
-    draw_segments,
-    largest_length,
-    magnification,
-    nodal_stress,
-    plain,
-    save,
-    shade_triangles,
-    stress_component,
-    stress_label,
 )
 from feti_homog.report.text.analyses import reported
 from feti_homog.results import atomic, field_file, output_folder, result_json
 from feti_homog.typing import Array, Document
 
 LEVEL_INK, LEVEL_WIDTH = "0.15", 0.6  # of lines of equal displacement along the fibres
-LEVELS = 12  # about so many lines
-OUTLINED_BODIES = 8  # up to which the deformed cell is drawn over all that it has left
 FREE = r"free expansion by $\Delta T = 1$"
-POWERS = (-2, 4)  # of ten between which numbers of a colour bar have no common factor
 UNDEFORMED = "0.5"
-IN_LEGEND = 2  # entries of a legend in a line: four are wider than a narrow cell
 
 
 def plot(directory: Path) -> list[Path]:
-    """Draws the pictures of `directory`/result.h5 and result.json beside them and returns their paths.
+    """Draw the pictures of a result folder beside its files; returns their paths.
 
-    - cell.png: materials; partition.png: parts of bodies; mesh_error.png: where the estimated error of the mesh is;
-    - of each load case case_E11.png, case_minus_E11.png, ... (unit strains), case_temperature.png or state_K.png;
-      that of the temperature expands freely if its expansion is known, else it is held;
+    - cell.png: materials; partition.png: body parts; mesh_error.png: estimated mesh error;
+    - each load: case_E11.png, case_minus_E11.png, ... (unit strains), case_temperature.png or state_K.png; under
+      temperature the cell expands freely if its expansion is known, else its strain is zero;
     - sensitivities.png, if the case asks for them;
-    - of `angle` angle.png and angle_states.png, of `path` path.png, path_states.png, path.gif and energy.png;
-    - of `load` load.png, of `envelope` envelope.png;
+    - `angle`: angle.png, angle_states.png; `path`: path.png, path_states.png, path.gif, energy.png;
+    - `load`: load.png; `envelope`: envelope.png;
     - interface.png, if some interface is debonded.
 
-    If there is a result.json, its case.output chooses the stress component (else that of the unit strain) and the
-    deformation scale. A case without fields has the curves alone. Call on one rank.
+    [output] of the case in result.json chooses stress component (default: by the unit strain) and deformation scale.
+    A case without fields has curves alone.  Call on one rank.
 
     Raises:
         FetiHomogError: result.h5 cannot be read, or a picture cannot be written.
@@ -79,7 +54,7 @@ def plot(directory: Path) -> list[Path]:
     directory = Path(directory)
     atomic.remove_abandoned(directory, output_folder.RESULT_FILE)
     document = result_json.read(directory) if (directory / result_json.NAME).exists() else {}
-    with mpl.rc_context(STYLE):
+    with mpl.rc_context(plot_helpers.STYLE):
         try:
             paths = _pictures(directory, document) if _output(document).get("fields", True) else []
             return paths + response_curves.plot(directory, document)
@@ -89,26 +64,26 @@ def plot(directory: Path) -> list[Path]:
 
 def _output(document: Document) -> Document:
     """Return the section [output] of the case, empty without a result.json."""
-    found: Document = document.get("case", {}).get("output", {})
-    return found
+    entries: Document = document.get("case", {}).get("output", {})
+    return entries
 
 
 def _pictures(directory: Path, document: Document) -> list[Path]:
     """Return the pictures of result.h5."""
     with h5py.File(directory / field_file.NAME, "r") as file:
-        cell = DrawnCell.of(file)
-        found = {"cell": cell_picture.figure(cell), "partition": cell_picture.partition(cell)}
-        found |= {"mesh_error": error} if (error := cell_picture.mesh_error(cell)) is not None else {}
-        paths = [save(figure, directory / f"{name}.png") for name, figure in found.items()]
+        cell = drawn_cell.DrawnCell.of(file)
+        entries = {"cell": cell_picture.figure(cell), "partition": cell_picture.partition(cell)}
+        entries |= {"mesh_error": error} if (error := cell_picture.mesh_error(cell)) is not None else {}
+        paths = [plot_helpers.save(figure, directory / f"{name}.png") for name, figure in entries.items()]
         if reported(document).is_curve:
             paths += deformed_panels.plot(directory, file, document)
         else:
             for number in sorted(file.get("state", ()), key=int):
                 state = file[f"state/{number}"]
                 draw = _sheared if is_axial(state) else _deformed
-                shown = FreeExpansion.of(state, document) or state
+                visible = decimation.FreeExpansion.of(state, document) or state
                 name = reported(document).picture or _name(number, state.attrs)
-                paths.append(save(draw(cell, shown, document), directory / f"{name}.png"))
+                paths.append(plot_helpers.save(draw(cell, visible, document), directory / f"{name}.png"))
         return paths + traction_plots.plot(directory, cell, document)
 
 
@@ -122,93 +97,94 @@ def _name(number: str, attributes: Any) -> str:
     return f"case_{'minus_' if value < 0 else ''}{name}"
 
 
-def _deformed(cell: DrawnCell, state: Any, document: Document) -> Figure:
+def _deformed(cell: drawn_cell.DrawnCell, state: Any, document: Document) -> Figure:
     """Return the magnified deformed cell with a stress component in colour, and the outline it has left."""
     drawn, output = cell.drawn, _output(document)
-    displacement = drawn_displacement(state, drawn)
+    displacement = decimation.drawn_displacement(state, drawn)
     size = float(np.ptp(drawn.points, axis=0).min())
-    seen = magnification(largest_length(displacement), size, largest=largest_scale(displacement, drawn))
+    seen = plot_helpers.magnification(
+        plot_helpers.largest_length(displacement), size, largest=decimation.largest_scale(displacement, drawn)
+    )
     chosen = output.get("deformation_scale")
     scale = seen if chosen is None else chosen
     moved = drawn.points + scale * displacement
     figure, axes = _coloured(cell, state, moved, output)
-    draw_segments(axes, _left(cell), UNDEFORMED, 0.7)
+    outline: Array = drawn.points[cell.borders]
+    if drawn.body.max() >= 8:  # the cell alone
+        corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * [cell.file.attrs[name] for name in ("width", "height")]
+        outline = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+    plot_helpers.draw_segments(axes, outline, UNDEFORMED, 0.7)
     undeformed = Line2D([], [], color=UNDEFORMED, linewidth=0.7, label="undeformed")
     _outlined(axes, cell, state, moved, undeformed)
-    load = FREE if isinstance(state, FreeExpansion) else LoadLabels.of(document).label(state.attrs)
-    axes.set_title(f"{plain(cell.file.attrs['title'])}\n{load}, displacement × {scale:g}".lstrip())
+    load = (
+        FREE if isinstance(state, decimation.FreeExpansion) else drawn_cell.LoadLabels.of(document).label(state.attrs)
+    )
+    axes.set_title(f"{plot_helpers.plain(cell.file.attrs['title'])}\n{load}, displacement × {scale:g}".lstrip())
     return figure
 
 
-def _sheared(cell: DrawnCell, state: Any, document: Document) -> Figure:
-    """Return the cell with an axial stress in colour and lines of equal displacement along the fibres.
+def _sheared(cell: drawn_cell.DrawnCell, state: Any, document: Document) -> Figure:
+    """Return the cell with an axial stress in colour and lines of equal axial displacement u_3.
 
-    That displacement moves nothing in the plane.
+    u_3 moves nothing in the plane.
     """
     attributes, points = cell.file.attrs, cell.drawn.points
     figure, axes = _coloured(cell, state, points, _output(document))
     step = draw_levels(axes, state, cell.drawn)
-    words = f"$u_3$ every {step:g} {plain(attributes['length_unit'])}".rstrip()
-    _outlined(axes, cell, state, points, Line2D([], [], color=LEVEL_INK, linewidth=LEVEL_WIDTH, label=words))
-    axes.set_title(f"{plain(attributes['title'])}\n{LoadLabels.of(document).label(state.attrs)}".lstrip())
+    caption = f"$u_3$ every {step:g} {plot_helpers.plain(attributes['length_unit'])}".rstrip()
+    _outlined(axes, cell, state, points, Line2D([], [], color=LEVEL_INK, linewidth=LEVEL_WIDTH, label=caption))
+    axes.set_title(
+        f"{plot_helpers.plain(attributes['title'])}\n{drawn_cell.LoadLabels.of(document).label(state.attrs)}".lstrip()
+    )
     return figure
 
 
-def _coloured(cell: DrawnCell, state: Any, moved: Array, output: Document) -> tuple[Figure, Axes]:
-    """Return the cell, its nodes at `moved`, in the colours of a stress."""
+def _coloured(cell: drawn_cell.DrawnCell, state: Any, moved: Array, output: Document) -> tuple[Figure, Axes]:
+    """Return the cell with nodes at `moved` (p, 2), coloured by a stress."""
     attributes, drawn = cell.file.attrs, cell.drawn
-    figure, (axes,) = figure_of(attributes, panels=1, beside=BAR_INCHES)
-    component = stress_component(output.get("stress", "auto"), [state])
-    stress = nodal_stress(state, component, drawn)
-    norm, colours, extend = colour_range(stress, drawn.node_areas)
-    shapes = shade_triangles(axes, drawn, moved, stress, norm, colours)
-    bar = bar_beside(axes, shapes, extend, cell_size(attributes))
-    bar.ax.ticklabel_format(axis="y", scilimits=POWERS)
-    bar.set_label(f"${STRESS_SYMBOLS[component]}$ {stress_label(attributes['stress_unit'])}")
+    figure, (axes,) = drawn_cell.figure_of(attributes, panels=1, beside=drawn_cell.BAR_INCHES)
+    component = plot_helpers.stress_component(output.get("stress", "auto"), [state])
+    stress = plot_helpers.nodal_stress(state, component, drawn)
+    norm, colours, extend = plot_helpers.colour_range(stress, drawn.node_areas)
+    shapes = plot_helpers.shade_triangles(axes, drawn, moved, stress, norm, colours)
+    bar = drawn_cell.bar_beside(axes, shapes, extend, drawn_cell.cell_size(attributes))
+    bar.ax.ticklabel_format(axis="y", scilimits=(-2, 4))
+    bar.set_label(f"${plot_helpers.STRESS_SYMBOLS[component]}$ {plot_helpers.stress_label(attributes['stress_unit'])}")
     return figure, axes
 
 
-def _outlined(axes: Axes, cell: DrawnCell, state: Any, moved: Array, line: Line2D) -> None:
-    """Outlines of the bodies and the states of the interfaces, and a legend of them and of another line."""
-    draw_segments(axes, moved[cell.borders], "black", 0.8)
-    marks = cell.interface.mark(axes, moved, states_of_nodes(state))
-    label_cell_axes(axes, cell.file.attrs)
+def _outlined(axes: Axes, cell: drawn_cell.DrawnCell, state: Any, moved: Array, line: Line2D) -> None:
+    """Draw body outlines and interface states, with a legend for both and for `line`."""
+    plot_helpers.draw_segments(axes, moved[cell.borders], "black", 0.8)
+    marks = cell.interface.mark(axes, moved, drawn_cell.states_of_nodes(state))
+    drawn_cell.label_cell_axes(axes, cell.file.attrs)
     figure: Any = axes.figure
     handles = [*(marks if len(marks) > 1 else ()), line]
-    figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), IN_LEGEND), frameon=False)
-
-
-def _left(cell: DrawnCell) -> Array:
-    """Return the undeformed outlines (e, 2, 2): of the bodies if they are few, else of the cell alone."""
-    if cell.drawn.body.max() < OUTLINED_BODIES:
-        outline: Array = cell.drawn.points[cell.borders]
-        return outline
-    corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) * [cell.file.attrs[name] for name in ("width", "height")]
-    return np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+    figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 2), frameon=False)
 
 
 def is_axial(state: Any) -> bool:
     """Return whether a state shears the cell along the fibres alone."""
     strain = state.attrs["strain"]
-    others = [*strain[[0, 1, -1]], strain[2], state.attrs["temperature"]] if len(strain) > 3 else strain
-    return not np.any(others) and bool(np.any(strain))
+    components = [*strain[[0, 1, -1]], strain[2], state.attrs["temperature"]] if len(strain) > 3 else strain
+    return not np.any(components) and bool(np.any(strain))
 
 
-def draw_levels(axes: Axes, state: Any, drawn: DrawnMesh) -> float:
-    """Draw lines of equal displacement along the fibres; returns the step between them."""
-    displacement: Array = nodal_values(state["axial_displacement"], drawn)
-    least, most = float(displacement.min()), float(displacement.max())
-    step = round_step((most - least) / LEVELS)
-    levels = step * np.arange(math.ceil(least / step), math.floor(most / step) + 1)
+def draw_levels(axes: Axes, state: Any, drawn: decimation.DrawnMesh) -> float:
+    """Draw lines of equal axial displacement; returns the step between them."""
+    displacement: Array = decimation.nodal_values(state["axial_displacement"], drawn)
+    low, high = float(displacement.min()), float(displacement.max())
+    step = round_step((high - low) / 12)
+    levels = step * np.arange(math.ceil(low / step), math.floor(high / step) + 1)
     x, y = drawn.points.T
     mesh = Triangulation(x, y, drawn.triangles)
     axes.tricontour(mesh, displacement, levels=levels, colors=LEVEL_INK, linewidths=LEVEL_WIDTH, linestyles="solid")
     return step
 
 
-def round_step(wanted: float) -> float:
+def round_step(ideal: float) -> float:
     """1, 2 or 5 times a power of ten, not less than wanted."""
-    if wanted <= 0.0:
+    if ideal <= 0.0:
         return 1.0
-    power = 10.0 ** math.floor(math.log10(wanted))
-    return power * next(factor for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= wanted * (1 - 1e-9))
+    power = 10.0 ** math.floor(math.log10(ideal))
+    return power * next(factor for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= ideal * (1 - 1e-9))

@@ -1,6 +1,6 @@
-"""path.png and energy.png: stresses, states of the interface and energies along a path.
+"""path.png and energy.png: stresses, interface states and energies along a path.
 
-Numbers of points stand in free places beside the curves, where they hide nothing.
+Point numbers stand in free places beside the curves.
 """
 
 from __future__ import annotations
@@ -14,31 +14,16 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from feti_homog.materials.voigt import voigt_names
-from feti_homog.report.plots.interface_marks import BONDED, CLOSED, OPEN, STATE_COLOURS, STATE_NAMES
-from feti_homog.report.plots.plot_helpers import (
-    INK,
-    SYMBOLS,
-    bond_limits,
-    finish_curves,
-    plain,
-    stress_unit,
-    title_of,
-    unit_label,
-)
+from feti_homog.report.plots import drawn_cell, plot_helpers
 from feti_homog.results import landmarks, path_curves
 from feti_homog.results.landmarks import name_of, peak_of
 from feti_homog.typing import Array, Document
 
-NUMBERED_POINTS = 6  # of a path
-ARROWS, SHORTEST_ARROW = 6, 0.06  # that show its direction: how many, and on steps of which share of the picture
-NEAR = 0.05  # of all points: numbers of points that are nearer stand above each other
-MARKED_POINTS = 60  # points of a path up to which each has a mark
-STATES = {BONDED: "bonded", OPEN: "open", CLOSED: "closed"}
+ARROWS = 6  # at most, along a path
+STATES = {drawn_cell.BONDED: "bonded", drawn_cell.OPEN: "open", drawn_cell.CLOSED: "closed"}
 # Offsets of a number from its point, in points of print, the best first, and half of the room that it takes.
 OFFSETS = ((-6, 16), (-6, 25), (12, 16), (22, 3), (-22, 3), (16, -12), (-16, -12), (0, -20), (28, -22), (-28, 26))
 ROOM = np.array([12.0, 5.0])
-SAMPLES = 4000  # of each curve
-POINTS_PER_INCH = 72.0
 # Of the parts in the order of `path_curves.energies`.
 AREAS = {
     "stored in the bodies": "#9db8de",
@@ -51,62 +36,61 @@ AREAS = {
 
 
 def figure(document: Document) -> Figure:
-    """Stresses against the leading strain.
+    """Draw stresses against the leading strain.
 
-    Below, they and the numbers of bonded, open and closed nodes against the number of the point, for the first folds
-    back. Some points are numbered in all three.
+    Below: stresses, and counts of bonded, open and closed nodes, against point numbers, as the first curve folds back.
+    Some points are numbered in all three.
     """
     points, case = document["path"], document["case"]
-    component, shown = path_curves.leading_component(document), path_curves.shown_stresses(document)
+    component, components = path_curves.leading_component(document), path_curves.shown_stresses(document)
     strains, stress = (np.array([point[name] for point in points]) for name in ("strain", "stress"))
     strain = strains[:, component]
-    style: dict[str, Any] = {"marker": "o", "markersize": 2.5} if len(points) <= MARKED_POINTS else {}
+    style: dict[str, Any] = {"marker": "o", "markersize": 2.5} if len(points) <= 60 else {}
     picture = Figure(figsize=(7.2, 8.0), layout="constrained")
     upper, middle, lower = picture.subplots(3, 1, height_ratios=(2.2, 1, 1))
     middle.sharex(lower)
-    _stress_curves(upper, document, strain, shown, style)
-    upper.set_ylabel(f"macroscopic stress {stress_unit(case)}")
-    upper.set_xlabel(f"macroscopic strain ${SYMBOLS[voigt_names(strains.shape[1])[0][component]]}$")
-    upper.set_title("\n".join([title_of(case, f"plane {case['analysis']['plane']}"), *bond_limits(case)]))
-    for number in shown:
-        middle.plot(stress[:, number], color=INK[number], linewidth=1.2, **style)
-    _temperature(middle, points, style)
-    middle.set_ylabel(f"stress {stress_unit(case)}")
+    _stress_curves(upper, document, strain, components, style)
+    upper.set_ylabel(f"macroscopic stress {plot_helpers.stress_unit(case)}")
+    upper.set_xlabel(f"macroscopic strain ${plot_helpers.SYMBOLS[voigt_names(strains.shape[1])[0][component]]}$")
+    upper.set_title(
+        "\n".join([plot_helpers.title_of(case, f"plane {case['analysis']['plane']}"), *plot_helpers.bond_limits(case)])
+    )
+    for number in components:
+        middle.plot(stress[:, number], color=plot_helpers.INK[number], linewidth=1.2, **style)
+    if any(point.get("temperature") for point in points):
+        changes = [point["temperature"] for point in points]
+        _beside(middle, changes, r"change of temperature $\Delta T$", style)
+    middle.set_ylabel(f"stress {plot_helpers.stress_unit(case)}")
     middle.tick_params(labelbottom=False)
     _count_curves(lower, points, style)
     lower.set_xlabel("number of the point, in the order of the path")
     # The panels of path_states.png show the same points.
-    kept = landmarks.kept_points(document)
-    numbers = [kept[state] for state in landmarks.landmark_states(document, NUMBERED_POINTS, len(kept))]
+    by_state = landmarks.kept_points(document)
+    numbers = [by_state[state] for state in landmarks.landmark_states(document, 6, len(by_state))]
     curve = np.stack([strain, stress[:, component]], axis=1)
-    _mark_peak(upper, document, INK[component])
+    peak, unit = peak_of(document), case.get("output", {}).get("stress_unit", "")
+    caption = f"{name_of(document, peak)} {peak['stress']:.4g} {plot_helpers.plain(unit)}".rstrip()
+    star: dict[str, Any] = {"markersize": 11, "markeredgecolor": "white", "zorder": 5, "linestyle": "none"}
+    upper.plot(peak["strain"], peak["stress"], "*", color=plot_helpers.INK[component], **star, label=caption)
     for axes in (upper, middle, lower):
         axes.axhline(0.0, color="0.6", linewidth=0.6, zorder=0)
-        finish_curves(axes)
-    _number_points(upper, (middle, lower), curve, numbers, INK[component])
+        plot_helpers.finish_curves(axes)
+    _number_points(upper, (middle, lower), curve, numbers, plot_helpers.INK[component])
     _damaged_length(lower, document, style)
     return picture
 
 
-def _mark_peak(axes: Axes, document: Document, ink: str) -> None:
-    """Mark the peak, with its stress in words."""
-    peak, unit = peak_of(document), document["case"].get("output", {}).get("stress_unit", "")
-    words = f"{name_of(document, peak)} {peak['stress']:.4g} {plain(unit)}".rstrip()
-    axes.plot(peak["strain"], peak["stress"], "*", color=ink, markersize=11, markeredgecolor="white", zorder=5,
-              linestyle="none", label=words)  # fmt: skip
-
-
 def _stress_curves(
-    axes: Axes, document: Document, strain: Array, shown: Sequence[int], style: Mapping[str, Any]
+    axes: Axes, document: Document, strain: Array, components: Sequence[int], style: Mapping[str, Any]
 ) -> None:
-    """Draw the first leg with its snap-back, and thick the response to a controlled load on all legs."""
+    """Draw the first leg with its snap-back; thick lines: the response to a controlled load, on all legs."""
     points, first = document["path"], path_curves.first_leg(document)
     stress = np.array([point["stress"] for point in points])
     names = voigt_names(stress.shape[1])[1]
     rising = path_curves.load_controlled(points[:first]) if document["case"]["path"]["method"] == "events" else None
     along = stress.shape[1] + path_curves.leading_component(document)
-    for i in shown:
-        name, ink = SYMBOLS[names[i]], INK[i]
+    for i in components:
+        name, ink = plot_helpers.SYMBOLS[names[i]], plot_helpers.INK[i]
         thin: dict[str, Any] = {"label": f"${name}$", "linewidth": 1.4} if rising is None else {"linewidth": 0.8}
         from_zero = np.append(0.0, strain[:first]), np.append(0.0, stress[:first, i])
         axes.plot(*from_zero, color=ink, alpha=0.8, **thin, **style)
@@ -123,42 +107,37 @@ def _stress_curves(
     axes.xaxis.set_major_locator(MaxNLocator(7))
 
 
-def _temperature(axes: Axes, points: Sequence[Mapping[str, Any]], style: Mapping[str, Any]) -> None:
-    """Draw the change of temperature along a path, if there is any, on its own axis."""
-    if any(point.get("temperature") for point in points):
-        _beside(axes, [point["temperature"] for point in points], r"change of temperature $\Delta T$", style)
-
-
 def _damaged_length(axes: Axes, document: Document, style: Mapping[str, Any]) -> None:
-    """Draw the length of bonds that are damaged but hold, of laws that soften, on its own axis."""
+    """Draw the length of damaged bonds that hold, by softening laws, on an axis of its own."""
     if "damaged_length" in document["path"][0]:
-        unit = unit_label(document["case"].get("output", {}).get("length_unit", ""))
+        unit = plot_helpers.unit_label(document["case"].get("output", {}).get("length_unit", ""))
         lengths = [sum(point["damaged_length"]) for point in document["path"]]
         _beside(axes, lengths, f"damaged length {unit}".rstrip(), style)
         axes.legend(frameon=False, fontsize=9, loc="upper left", bbox_to_anchor=(1.12, 1.0))
 
 
 def _beside(axes: Axes, values: Sequence[float], label: str, style: Mapping[str, Any]) -> None:
-    """Draw values along a path on an axis at the right."""
-    beside = axes.twinx()
-    beside.plot(values, color="0.5", linestyle="--", linewidth=1.0, **style)
-    beside.axhline(0.0, linestyle="none")  # from which they are measured
-    beside.set_ylabel(label, color="0.4", fontsize=8)
-    beside.tick_params(colors="0.4", labelsize=8)
-    beside.spines["top"].set_visible(False)
+    """Draw values along a path, on an axis at the right."""
+    right = axes.twinx()
+    right.plot(values, color="0.5", linestyle="--", linewidth=1.0, **style)
+    right.axhline(0.0, linestyle="none")  # from which they are measured
+    right.set_ylabel(label, color="0.4", fontsize=8)
+    right.tick_params(colors="0.4", labelsize=8)
+    right.spines["top"].set_visible(False)
 
 
 def _count_curves(axes: Axes, points: Sequence[Mapping[str, Any]], style: Mapping[str, Any]) -> None:
-    """Numbers of bonded, open and closed nodes."""
+    """Draw counts of bonded, open and closed nodes."""
     for kind, key in STATES.items():
-        ink = "0.2" if kind == BONDED else STATE_COLOURS[kind]
-        axes.plot([point[key] for point in points], color=ink, linewidth=1.4, label=STATE_NAMES[kind], **style)
+        ink = "0.2" if kind == drawn_cell.BONDED else drawn_cell.STATE_COLOURS[kind]
+        label = drawn_cell.STATE_NAMES[kind]
+        axes.plot([point[key] for point in points], color=ink, linewidth=1.4, label=label, **style)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_ylabel("interface nodes")
 
 
 def _number_points(upper: Axes, below: Sequence[Axes], curve: Array, numbers: Sequence[int], ink: str) -> None:
-    """Draw the numbers of some points of a curve (points, 2), arrows in its ink, and lines at their numbers below."""
+    """Write point numbers along a curve (points, 2), with arrows in its ink and lines in the panels below."""
     style: dict[str, Any] = {"color": "0.3", "fontsize": 7, "ha": "center", "va": "center"}
     pointer: dict[str, Any] = {"arrowstyle": "-", "color": "0.3", "linewidth": 0.5, "shrinkA": 0, "shrinkB": 2}
     span, level = max(len(curve) - 1, 1), 0
@@ -167,7 +146,7 @@ def _number_points(upper: Axes, below: Sequence[Axes], curve: Array, numbers: Se
     for place, number in enumerate(numbers):
         for axes in below:
             axes.axvline(number, color="0.7", linewidth=0.7, linestyle=":", zorder=0)
-        level = level + 1 if place and number - numbers[place - 1] < NEAR * span else 0
+        level = level + 1 if place and number - numbers[place - 1] < 0.05 * span else 0
         above = (number, 1.05 + 0.1 * level)
         below[0].annotate(str(number), above, xycoords=below[0].get_xaxis_transform(), annotation_clip=False, **style)
     pointer = {"arrowstyle": "-|>", "color": ink, "linewidth": 0, "shrinkB": 0, "mutation_scale": 15}
@@ -176,53 +155,55 @@ def _number_points(upper: Axes, below: Sequence[Axes], curve: Array, numbers: Se
 
 
 def _direction_marks(curve: Array) -> list[tuple[Array, Array]]:
-    """Return starts and ends of arrows on a curve (points, 2): in the middles of its longest steps, and few."""
+    """Return starts and ends of at most ARROWS arrows, in the middle of the longest curve steps."""
     steps = np.diff(np.vstack([np.zeros(2), curve]), axis=0)
     extent = np.ptp(np.vstack([np.zeros(2), curve]), axis=0)
     length = np.linalg.norm(steps / np.where(extent > 0.0, extent, 1.0), axis=1)
     longest = np.argsort(-length, kind="stable")[:ARROWS]
     starts = np.vstack([np.zeros(2), curve[:-1]])
     middles = starts + 0.5 * steps
-    return [(starts[k], middles[k] + 0.02 * steps[k]) for k in sorted(longest) if length[k] > SHORTEST_ARROW]
+    return [(starts[k], middles[k] + 0.02 * steps[k]) for k in sorted(longest) if length[k] > 0.06]
 
 
 def free_offsets(axes: Axes, points: Array) -> list[tuple[int, int]]:
-    """Return an offset of the number of each point (k, 2), where neither a curve nor another number is, if there is.
+    """Return an offset for each point number (k, 2), if possible clear of curves and other numbers.
 
     The limits of the axes are final afterwards.
     """
     axes.set_ylim(axes.get_ylim())
-    to_print = POINTS_PER_INCH / axes.figure.dpi
-    taken = np.vstack([_samples(line.get_transform().transform(line.get_xydata())) for line in axes.lines]) * to_print
+    to_print = 72.0 / axes.figure.dpi
+    occupied = (
+        np.vstack([_samples(line.get_transform().transform(line.get_xydata())) for line in axes.lines]) * to_print
+    )
     corners = axes.get_window_extent().get_points() * to_print
     chosen = []
     for place in axes.transData.transform(points) * to_print:
-        crowds = [_crowd(place + offset, taken, corners) for offset in OFFSETS]
+        crowds = [_crowd(place + offset, occupied, corners) for offset in OFFSETS]
         chosen.append(OFFSETS[int(np.argmin(crowds))])
         number = place + chosen[-1]
-        taken = np.vstack([taken, number + ROOM * np.array([[-1, 0], [0, 0], [1, 0]])])
+        occupied = np.vstack([occupied, number + ROOM * np.array([[-1, 0], [0, 0], [1, 0]])])
     return chosen
 
 
-def _crowd(centre: Array, taken: Array, corners: Array) -> float:
-    """Return how many of the places that are taken (n, 2) lie in the room around a centre; inf outside the axes."""
+def _crowd(centre: Array, occupied: Array, corners: Array) -> float:
+    """Count occupied places (n, 2) in the room around a centre; inf outside the axes."""
     if (centre - ROOM < corners[0]).any() or (centre + ROOM > corners[1]).any():
         return np.inf
-    return float((np.abs(taken - centre) <= ROOM).all(axis=1).sum())
+    return float((np.abs(occupied - centre) <= ROOM).all(axis=1).sum())
 
 
 def _samples(line: Array) -> Array:
-    """Return points along a line (n, 2), evenly spaced."""
+    """Return evenly spaced points along a line (n, 2)."""
     line = line[np.isfinite(line).all(axis=1)]
     if len(line) < 2:
         return line
     length = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1)))
-    at = np.linspace(0.0, length[-1], SAMPLES)
+    at = np.linspace(0.0, length[-1], 4000)
     return np.column_stack([np.interp(at, length, column) for column in line.T])
 
 
 def energies(document: Document) -> Figure | None:
-    """Return the energies per area along a path, stacked over the position on it; None of results without them."""
+    """Draw energies per area, stacked over the path position; None for results without energies."""
     stack = path_curves.energies(document)
     if stack is None:
         return None
@@ -237,8 +218,8 @@ def energies(document: Document) -> Figure | None:
     axes.set_xlim(stack.place[0], stack.place[-1])
     axes.set_ylim(bottom=min(0.0, float(stack.work.min())))
     axes.set_xlabel(stack.words)
-    axes.set_ylabel(f"energy per area {stress_unit(case)}")
-    axes.set_title(title_of(case, "energies along the path"))
+    axes.set_ylabel(f"energy per area {plot_helpers.stress_unit(case)}")
+    axes.set_title(plot_helpers.title_of(case, "energies along the path"))
     axes.spines[["top", "right"]].set_visible(False)
     handles, names = axes.get_legend_handles_labels()
     axes.legend(handles[::-1], names[::-1], frameon=False, fontsize=9, loc="upper left", bbox_to_anchor=(1.0, 1.0))

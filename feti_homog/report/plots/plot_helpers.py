@@ -27,27 +27,23 @@ from feti_homog.results import atomic
 from feti_homog.results.path_curves import FAINT, components_above, interface_sections
 from feti_homog.typing import Array, Document
 
-# Of macroscopic strains and stresses by their names, and of stresses.
+# Symbols of macroscopic strains and stresses by name, and of local stresses.
 SYMBOLS = {
     **{name: f"{name[:-2].replace('gamma', chr(92) + 'gamma')}_{{{name[-2:]}}}" for name in SPATIAL_STRAINS},
     **{name: rf"\Sigma_{{{name[1:]}}}" for name in SPATIAL_STRESSES},
     "temperature": r"\Delta T",
 }
 STRESS_SYMBOLS = {name: rf"\sigma_{{{name[1:]}}}" for name in SPATIAL_STRESSES}
-# Where a state of result.h5 has the stresses: the table, and its column if it has more than one.
+# Table of each stress in a state of result.h5, and its column if the table has several.
 STRESS_TABLES: dict[str, tuple[str, int | None]] = {
     **{name: ("stress", column) for column, name in enumerate(STRESSES)},
     "S33": ("stress_33", None),
     **{name: ("axial_stress", column) for column, name in enumerate(AXIAL_STRESSES)},
 }
-# Fields that vary by less, relatively, have one colour; share of one sign below which zero is not in the middle; share
-# of the area that may lie outside of a colour range, at either end.
-UNIFORM, ONE_SIGN, OUTLIERS = 0.01, 0.1, 0.005
+OUTLIERS = 0.005  # share of the area that may lie outside of a colour range, at either end
 INK = ("#1f4e9c", "#c44e00", "#2a7f3f", "#7a3e9d", "#8a6d00", "#0f7c8c", "#8c1d40")  # of curves
 STYLE = {"font.size": 10, "axes.titlesize": 11, "axes.linewidth": 0.8}
 DPI, PADDING, CUT = 200, 0.08, 0.02  # dots per inch; inches, the last of what may lie beyond the sides of a figure
-# Shares of the cell that the largest displacement and opening are drawn as, and to which the former may be stretched.
-SEEN_DISPLACEMENT, SEEN_OPENING, MOST_DISPLACEMENT = 0.1, 0.04, 0.25
 
 
 def save(figure: Figure, path: Path) -> Path:
@@ -69,7 +65,7 @@ def save(figure: Figure, path: Path) -> Path:
 
 
 def pixels_of(figure: Figure) -> Array:
-    """Return the drawn figure (rows, columns, 3). Letters that the font lacks are boxes, without a warning each."""
+    """Return the drawn figure (rows, columns, 3); letters missing in the font are boxes, without warnings."""
     canvas: Any = FigureCanvasAgg(figure)
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", r"Glyph \d+")
@@ -78,19 +74,18 @@ def pixels_of(figure: Figure) -> Array:
 
 
 def _trimmed(pixels: Array, padding: int) -> Array:
-    """Return the part of an image (rows, columns, 3) that is not white, with some white around."""
+    """Return an image (rows, columns, 3) cut to its content and `padding` white pixels around."""
     drawn = (pixels != 255).any(axis=2)
     places = []
     for axis in (1, 0):
-        found = np.flatnonzero(drawn.any(axis=axis))
-        low, high = (found[0], found[-1] + 1) if len(found) else (0, drawn.shape[1 - axis])
+        inked = np.flatnonzero(drawn.any(axis=axis))
+        low, high = (inked[0], inked[-1] + 1) if len(inked) else (0, drawn.shape[1 - axis])
         places.append(slice(max(low - padding, 0), high + padding))
-    part: Array = pixels[tuple(places)]
-    return part
+    return np.asarray(pixels[tuple(places)])
 
 
 def finish_curves(axes: Axes) -> None:
-    """Draw a faint grid behind the curves, without a box around, and their legend at the right."""
+    """Draw a faint grid behind the curves, and their legend at the right."""
     faint_grid(axes)
     handles, names = axes.get_legend_handles_labels()
     if handles:
@@ -98,14 +93,14 @@ def finish_curves(axes: Axes) -> None:
 
 
 def faint_grid(axes: Axes) -> None:
-    """Draw a faint grid behind what is drawn, without a box around."""
+    """Draw a faint grid behind axes content, and no box around."""
     axes.grid(color="0.92", linewidth=0.6)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)
 
 
 def fill_triangles(axes: Axes, drawn: DrawnMesh, points: Array, colours: Array, edges: bool) -> None:
-    """Fill the triangles with colours (q, 4); antialiasing would leave seams."""
+    """Fill triangles with colours (q, 4), without antialiasing, which would leave seams."""
     style: dict[str, Any] = {"edgecolors": "none", "antialiased": False}
     if edges:
         style = {"edgecolors": "0.55", "linewidths": 0.15}
@@ -114,7 +109,7 @@ def fill_triangles(axes: Axes, drawn: DrawnMesh, points: Array, colours: Array, 
 
 
 def shade_triangles(axes: Axes, drawn: DrawnMesh, points: Array, values: Array, norm: Normalize, colours: str) -> Any:
-    """Return the triangles in smooth colours of values (p,) at their nodes, which are at `points` (p, 2)."""
+    """Draw triangles with nodes at `points` (p, 2), in smooth colours for nodal values (p,)."""
     x, y = points.T
     mesh = Triangulation(x, y, drawn.triangles)
     return axes.tripcolor(mesh, values, shading="gouraud", norm=norm, cmap=colours)
@@ -123,7 +118,7 @@ def shade_triangles(axes: Axes, drawn: DrawnMesh, points: Array, values: Array, 
 def draw_segments(
     axes: Axes, segments: Array, colour: str, width: float, cap: Literal["butt", "round"] = "butt"
 ) -> None:
-    """Draws segments (e, 2, 2) as one path, in which they join without spots."""
+    """Draw segments (e, 2, 2) as one path, which joins them without spots."""
     path = Path2D(segments.reshape(-1, 2), [Path2D.MOVETO, Path2D.LINETO] * len(segments))
     lines = PathPatch(path, fill=False, edgecolor=colour, linewidth=width, capstyle=cap, snap=False)
     axes.add_artist(lines)
@@ -132,77 +127,71 @@ def draw_segments(
 
 
 def colour_range(values: Array, areas: Array | None = None) -> tuple[Normalize, str, str]:
-    """Colour range, map and the ends at which values lie outside; zero is white if both signs matter.
+    """Return colour range, colour map and the ends with values outside; zero is white if both signs matter.
 
-    Values (n,) count by their `areas` (n,), all alike by default: meshes are fine at tips, where stresses are singular.
+    Values (n,) have weights `areas` (n,), 1 by default: meshes are fine at tips, where stresses are singular.
     """
     norm, extend = value_range(values, areas)
-    least, most = float(norm.vmin or 0.0), float(norm.vmax or 0.0)
-    if min(-least, most) <= ONE_SIGN * max(-least, most) or _is_uniform(values):
+    bottom, top = float(norm.vmin or 0.0), float(norm.vmax or 0.0)
+    if min(-bottom, top) <= 0.1 * max(-bottom, top) or _is_uniform(values):
         return norm, "viridis", extend
-    most = max(-least, most)
-    return Normalize(-most, most), "RdBu_r", _outside(values, -most, most)
+    top = max(-bottom, top)
+    return Normalize(-top, top), "RdBu_r", _outside(values, -top, top)
 
 
 def value_range(values: Array, areas: Array | None = None) -> tuple[Normalize, str]:
-    """Colour range and the ends at which values lie outside; those on the extreme 0.5 % of the area may, at either end.
+    """Return colour range and the ends with values outside: at either end the extreme 0.5 % by area may be.
 
-    Of a field that is uniform to 1 % it is so wide that it has one colour.
+    A field uniform to 1 % has one colour.
     """
     low, high = float(values.min()), float(values.max())
     if _is_uniform(values):
         middle = 0.5 * (low + high)
         half = 0.5 * (abs(middle) or 1.0)
         return Normalize(middle - half, middle + half), "neither"
-    least, most = _quantiles(values, np.ones_like(values) if areas is None else areas)
-    slack = 0.05 * (most - least)
-    least, most = (low if least - low < slack else least), (high if high - most < slack else most)
-    return Normalize(least, most), _outside(values, least, most)
+    # As by numpy.percentile, of areas in place of values.
+    order, weights = np.argsort(values), np.ones_like(values) if areas is None else areas
+    below = np.cumsum(weights[order]) - weights[order]
+    bottom, top = np.interp([OUTLIERS, 1.0 - OUTLIERS], below / max(float(below[-1]), 1e-300), values[order]).tolist()
+    slack = 0.05 * (top - bottom)
+    bottom, top = (low if bottom - low < slack else bottom), (high if high - top < slack else top)
+    return Normalize(bottom, top), _outside(values, bottom, top)
 
 
 def _is_uniform(values: Array) -> bool:
-    return bool(np.ptp(values) <= UNIFORM * max(np.abs(values).max(), 1e-300))
+    return bool(np.ptp(values) <= 0.01 * max(np.abs(values).max(), 1e-300))
 
 
-def _quantiles(values: Array, weights: Array) -> tuple[float, float]:
-    """Return the values below and above which OUTLIERS of the weight is, interpolated as by `numpy.percentile`."""
-    order = np.argsort(values)
-    below = np.cumsum(weights[order]) - weights[order]
-    share = below / max(float(below[-1]), 1e-300)
-    least, most = np.interp([OUTLIERS, 1.0 - OUTLIERS], share, values[order])
-    return float(least), float(most)
-
-
-def _outside(values: Array, least: float, most: float) -> str:
-    ends = (bool(values.min() < least), bool(values.max() > most))
+def _outside(values: Array, bottom: float, top: float) -> str:
+    ends = (bool(values.min() < bottom), bool(values.max() > top))
     return {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}[ends]
 
 
 def magnification(displacement: float, size: float, opening: float = 0.0, largest: float = math.inf) -> float:
-    """1, 2 or 5 times a power of ten, at most `largest`, at which both are seen in a cell of this size.
+    """Return a displacement factor, 1, 2 or 5 times a power of ten, at most `largest`.
 
-    The largest displacement is drawn as about a tenth of the cell; if there is a narrow opening, as more than that.
+    The largest displacement is drawn as about a tenth of the cell size, or up to a quarter to show a narrow opening.
     """
     if displacement == 0.0:
         return 1.0
-    wanted = SEEN_DISPLACEMENT * size / displacement
+    ideal = 0.1 * size / displacement
     if opening > 0.0:
-        most = MOST_DISPLACEMENT * size / displacement
-        wanted = max(wanted, min(SEEN_OPENING * size / opening, most))
-    power = 10.0 ** math.floor(math.log10(min(wanted, largest)))
+        top = 0.25 * size / displacement
+        ideal = max(ideal, min(0.04 * size / opening, top))
+    power = 10.0 ** math.floor(math.log10(min(ideal, largest)))
     rounded = [factor * power for factor in (1, 2, 5, 10) if factor * power <= largest]
-    return min(rounded, key=lambda scale: abs(math.log(scale / wanted)))
+    return min(rounded, key=lambda scale: abs(math.log(scale / ideal)))
 
 
 def largest_length(vectors: Array) -> float:
-    """Return the largest length of vectors (n, 2)."""
+    """Return the length of the longest vector (n, 2)."""
     return float(np.linalg.norm(vectors, axis=1).max(initial=0.0))
 
 
 def stress_component(chosen: str, states: Sequence[Any]) -> str:
-    """Return the stress that is chosen, else that of the largest strain of these states.
+    """Return the chosen stress, else the stress paired with the largest strain in these states.
 
-    A macroscopic stress works on that strain; of all strains if there is no stress.
+    Only strains with a macroscopic stress count, or all if no stress acts.
     """
     if chosen in STRESS_SYMBOLS:
         return chosen
@@ -212,18 +201,18 @@ def stress_component(chosen: str, states: Sequence[Any]) -> str:
 
 
 def drawn_stress(state: Any, component: str, drawn: DrawnMesh) -> Array:
-    """Return the stress (q,) of a state in each triangle drawn."""
+    """Return a stress component of a state in each triangle drawn (q,)."""
     table, column = STRESS_TABLES[component]
     return triangle_means(state[table], column, drawn)
 
 
 def nodal_stress(state: Any, component: str, drawn: DrawnMesh) -> Array:
-    """Return the stress (p,) of a state at the nodes drawn: means of the triangles of the same body."""
+    """Return a stress component at the nodes drawn (p,), averaged over triangles in the same body."""
     return node_means(drawn_stress(state, component, drawn), drawn)
 
 
 def bond_limits(case: Document) -> list[str]:
-    """Describe the law of each interface of a case, a line each; of several with the phases that it is between."""
+    """Describe each interface law in a line; several laws with their phases."""
     bonds, output = interface_sections({"case": case}) or [{}], case.get("output", {})
     stress, length = output.get("stress_unit", ""), output.get("length_unit", "")
     units = stress, f"{stress} {length}" if stress and length else ""
@@ -233,17 +222,17 @@ def bond_limits(case: Document) -> list[str]:
 
 
 def _limits(bond: Document, units: tuple[str, str]) -> str:
-    """Describe a law with constants in these units, of stresses and of energies per area."""
+    """Describe a law; `units` are for stresses and for energies per area."""
     criterion = bond.get("criterion", DEFAULT)
-    symbols = [each for each in LAWS[criterion].symbols if bond.get(each[1])]
-    given = [(symbol, key, units[0 if of_stress else 1]) for symbol, key, of_stress in symbols]
-    words = [f"${symbol} = {bond[key]:g}$ {plain(label)}".rstrip() for symbol, key, label in given]
+    symbols = [entry for entry in LAWS[criterion].symbols if bond.get(entry[1])]
+    constants = [(symbol, key, units[0 if of_stress else 1]) for symbol, key, of_stress in symbols]
+    phrase = [f"${symbol} = {bond[key]:g}$ {plain(label)}".rstrip() for symbol, key, label in constants]
     law = f"{criterion} law" if LAWS[criterion].softens else f"law {criterion}"
-    return ", ".join([law, *words]) if words else "no debonding by load"
+    return ", ".join([law, *phrase]) if phrase else "no debonding by load"
 
 
 def plain(text: str) -> str:
-    """Return a user's text for Matplotlib, which would read formulas between dollars."""
+    """Return a user's text with dollars escaped, between which Matplotlib reads formulas."""
     return text.replace("$", r"\$")
 
 
@@ -252,15 +241,15 @@ def unit_label(label: str) -> str:
 
 
 def stress_label(label: str) -> str:
-    """Return the unit of stresses for an axis; of a case without a label, the moduli have it."""
+    """Return the stress unit for an axis; without a label in the case, the unit of the moduli."""
     return unit_label(label) or "(unit of the moduli)"
 
 
 def stress_unit(case: Document) -> str:
-    """Return the unit of stresses of a case for an axis."""
+    """Return the stress unit of a case for an axis."""
     return stress_label(case.get("output", {}).get("stress_unit", ""))
 
 
-def title_of(case: Document, words: str) -> str:
-    """Return the name of a case, if it has one, and these words."""
-    return f"{plain(case.get('name', ''))}: {words}".lstrip(": ")
+def title_of(case: Document, phrase: str) -> str:
+    """Return case name, if any, and `phrase`."""
+    return f"{plain(case.get('name', ''))}: {phrase}".lstrip(": ")

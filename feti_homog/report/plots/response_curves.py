@@ -1,4 +1,4 @@
-"""Pictures of the numbers of result.json: angle.png, envelope.png and sensitivities.png; of paths by `path_picture`."""
+"""Pictures from numbers in result.json: angle.png, envelope.png, sensitivities.png; `path_picture` draws paths."""
 
 from __future__ import annotations
 
@@ -13,17 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, MultipleLocator
 
 from feti_homog.materials.voigt import STRESSES
-from feti_homog.report.plots import path_picture
-from feti_homog.report.plots.plot_helpers import (
-    INK,
-    SYMBOLS,
-    bond_limits,
-    finish_curves,
-    plain,
-    save,
-    stress_unit,
-    title_of,
-)
+from feti_homog.report.plots import path_picture, plot_helpers
 from feti_homog.report.text import constant_tables
 from feti_homog.report.text.analyses import reported
 from feti_homog.report.text.point_tables import shown_entries
@@ -31,14 +21,8 @@ from feti_homog.results.path_curves import interface_sections
 from feti_homog.typing import Array, Document
 
 MARKS = ("o", "s", "^", "D", "v", "P", "X")
-# Loads beyond so many times the median are outside of the picture: those of directions that hardly open a bond.
-FARTHEST, SHOWN = 6.0, 3.0
-MARGIN = 1.12
-MARKED = 180  # directions up to which each has a mark
 CELL = (0.95, 0.42)  # inches of an entry
-LETTER = 0.085  # inches
 FAINTEST = 0.005  # below which an entry has no number
-DARK = 0.6  # share of the largest from which numbers are white
 
 
 def plot(directory: Path, document: Document) -> list[Path]:
@@ -46,75 +30,82 @@ def plot(directory: Path, document: Document) -> list[Path]:
     name = reported(document).name
     pictures = {"sensitivities": sensitivities(document), "energy": path_picture.energies(document)}
     pictures |= {name: CURVES[name](document)} if name in CURVES else {}
-    return [save(drawn, directory / f"{name}.png") for name, drawn in pictures.items() if drawn is not None]
+    return [
+        plot_helpers.save(drawn, directory / f"{name}.png") for name, drawn in pictures.items() if drawn is not None
+    ]
 
 
 def angle(document: Document) -> Figure:
-    """Stiffnesses or stresses against the debonding angle."""
+    """Draw stiffnesses or stresses against the debonding angle."""
     points, case = document["angle"], document["case"]
     stiff = "stiffness" in points[0]
     figure = Figure(figsize=(6.4, 4.2), layout="constrained")
     axes = figure.subplots()
     angles = [point["angle"] for point in points]
-    for (name, column), ink, mark in zip(_angle_columns(points, stiff), INK, MARKS, strict=False):
+    for (name, column), ink, mark in zip(_angle_columns(points, stiff), plot_helpers.INK, MARKS, strict=False):
         axes.plot(angles, column, color=ink, marker=mark, markersize=4, linewidth=1.5, label=f"${name}$")
     axes.set_xlabel("debonding angle (degrees)")
-    axes.set_ylabel(f"{'effective stiffness' if stiff else 'macroscopic stress'} {stress_unit(case)}")
+    axes.set_ylabel(f"{'effective stiffness' if stiff else 'macroscopic stress'} {plot_helpers.stress_unit(case)}")
     axes.xaxis.set_major_locator(MultipleLocator(60 if angles[-1] > 180 else 30))
     contact = "contact" if all(bond["contact"] for bond in interface_sections(document)) else "no contact"
     load = "" if stiff else f", $E = [{', '.join(f'{e:g}' for e in points[0]['strain'])}]$"
-    axes.set_title(title_of(case, f"plane {case['analysis']['plane']}, {contact}{load}"))
+    axes.set_title(plot_helpers.title_of(case, f"plane {case['analysis']['plane']}, {contact}{load}"))
     axes.axhline(0.0, color="0.6", linewidth=0.6, zorder=0)
-    finish_curves(axes)
+    plot_helpers.finish_curves(axes)
     if stiff:
         axes.set_ylim(bottom=0.0)
     return figure
 
 
 def _angle_columns(points: Sequence[Document], stiff: bool) -> list[tuple[str, Array]]:
-    """Each curve's name and its values (points,)."""
+    """Return name and values (points,) for each curve."""
     if not stiff:
         stress = np.array([point["stress"] for point in points])
-        return list(zip((SYMBOLS[name] for name in STRESSES), stress.T, strict=True))
+        return list(zip((plot_helpers.SYMBOLS[name] for name in STRESSES), stress.T, strict=True))
     stiffness = np.array([point["stiffness"] for point in points])
     return [(f"C_{{{i + 1}{j + 1}}}", stiffness[:, i, j]) for i, j in shown_entries(points).values()]
 
 
 def envelope(document: Document) -> Figure:
-    """Return the curve, with equal axes, in the colours of the mode in which the first bond breaks."""
+    """Draw the onset curve with equal axes, coloured by the mode of the first break."""
     case, points = document["case"], document["envelope"]
-    plane, known = case["envelope"]["plane"], [point for point in points if "factor" in point]
+    plane, broken = case["envelope"]["plane"], [point for point in points if "factor" in point]
     picture = Figure(figsize=(6.6, 5.6), layout="constrained")
     axes = picture.subplots()
     axes.axhline(0.0, color="0.45", linewidth=0.8, zorder=1)
     axes.axvline(0.0, color="0.45", linewidth=0.8, zorder=1)
-    places, notes = loads(points), _notes(case, len(points) - len(known))
-    if known:
+    places, temperature = loads(points), case["envelope"].get("temperature")
+    notes = [] if temperature is None else [f"$\\Delta T = {{{temperature:g}}}$ first"]
+    notes += [f"no onset in {rest} directions"] if (rest := len(points) - len(broken)) else []
+    if broken:
         drawn = _curve(axes, places, modes(points))
         bar = picture.colorbar(drawn, ax=axes, location="bottom", shrink=0.6, aspect=30)
         bar.set_ticks([0, 30, 60, 90], labels=["0, opens", "30", "60", "90, shears"])
         bar.set_label("mode of the first break (degrees)")
         notes += _limit(axes, places[~np.isnan(places[:, 0])])
-    labels = [f"${SYMBOLS[name]}$" + (f" {stress_unit(case)}" if name.startswith("S") else "") for name in plane]
+    labels = [
+        f"${plot_helpers.SYMBOLS[name]}$" + (f" {plot_helpers.stress_unit(case)}" if name.startswith("S") else "")
+        for name in plane
+    ]
     axes.set(xlabel=labels[0], ylabel=labels[1])
     axes.set_aspect("equal", adjustable="box")
     axes.xaxis.set_major_locator(MaxNLocator(5))  # labels of small stresses are long
-    title = title_of(case, f"onset of debonding, plane {case['analysis']['plane']}")
-    axes.set_title("\n".join([title, *bond_limits(case), *([", ".join(notes)] if notes else [])]))
+    title = plot_helpers.title_of(case, f"onset of debonding, plane {case['analysis']['plane']}")
+    axes.set_title("\n".join([title, *plot_helpers.bond_limits(case), *([", ".join(notes)] if notes else [])]))
     axes.grid(color="0.92", linewidth=0.6)
     axes.set_axisbelow(True)
     return picture
 
 
 def loads(points: Sequence[Document]) -> Array:
-    """(n, 2) the two components at onset, NaN where there is none."""
+    """(n, 2) both components at onset, NaN for directions without one."""
     angle = np.radians([point["angle"] for point in points])
     factor = np.array([point.get("factor", np.nan) for point in points])
     return np.asarray(factor[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1))
 
 
 def modes(points: Sequence[Document]) -> Array:
-    """(n,) degrees, 0 opens and 90 shears: psi, or of strengths by the shares that are used; NaN without an onset."""
+    """(n,) mode in degrees, 0 opens and 90 shears: psi, or by the used shares of strengths; NaN without onset."""
     if any("psi" in point for point in points):
         return np.array([point.get("psi", np.nan) for point in points])
     normal, tangential, axial = (
@@ -125,62 +116,51 @@ def modes(points: Sequence[Document]) -> Array:
 
 
 def _curve(axes: Axes, places: Array, mode: Array) -> LineCollection:
-    """Return the closed curve through the loads (n, 2), open where there is no onset."""
+    """Draw the closed curve through the loads (n, 2), open where directions have no onset."""
     ends = np.roll(places, -1, axis=0)
-    whole = ~np.isnan(places[:, 0]) & ~np.isnan(ends[:, 0])
-    if whole.all():
+    joined = ~np.isnan(places[:, 0]) & ~np.isnan(ends[:, 0])
+    if joined.all():
         axes.fill(places[:, 0], places[:, 1], color="0.96", zorder=0)
-    lines = LineCollection(list(np.stack([places, ends], axis=1)[whole]), linewidths=2.2, cmap="viridis")
-    lines.set_array((mode + np.roll(mode, -1))[whole] / 2)
+    lines = LineCollection(list(np.stack([places, ends], axis=1)[joined]), linewidths=2.2, cmap="viridis")
+    lines.set_array((mode + np.roll(mode, -1))[joined] / 2)
     lines.set_clim(0.0, 90.0)
     axes.add_collection(lines)
-    if len(places) <= MARKED:
+    if len(places) <= 180:
         axes.scatter(places[:, 0], places[:, 1], c=mode, cmap="viridis", vmin=0.0, vmax=90.0, s=14, zorder=3)
     return lines
 
 
 def _limit(axes: Axes, places: Array) -> list[str]:
-    """Let the axes hold all loads (n, 2), or those that are not far away from the others, and zero.
-
-    What is not shown, in words.
-    """
+    """Limit the axes to zero and loads (n, 2) not far beyond the median; returns a note on hidden loads."""
     size = np.linalg.norm(places, axis=1)
     usual = float(np.median(size))
-    far = size > FARTHEST * usual
-    beyond = places[far] / np.where(size > 0.0, size, 1.0)[far, None] * SHOWN * usual
-    shown = np.concatenate([places[~far], beyond, np.zeros((1, 2))])
-    low, high = shown.min(axis=0), shown.max(axis=0)
-    middle, half = (low + high) / 2, MARGIN * (high - low) / 2
+    far = size > 6.0 * usual  # directions that hardly open a bond
+    beyond = places[far] / np.where(size > 0.0, size, 1.0)[far, None] * 3.0 * usual
+    visible = np.concatenate([places[~far], beyond, np.zeros((1, 2))])
+    low, high = visible.min(axis=0), visible.max(axis=0)
+    middle, half = (low + high) / 2, 1.12 * (high - low) / 2
     half = np.maximum(half, 0.05 * half.max() or 1.0)
     axes.set_xlim(middle[0] - half[0], middle[0] + half[0])
     axes.set_ylim(middle[1] - half[1], middle[1] + half[1])
     return [f"loads up to {size.max():.4g} are outside"] if far.any() else []
 
 
-def _notes(case: Document, without: int) -> list[str]:
-    """Temperature and how many directions have no onset."""
-    temperature, notes = case["envelope"].get("temperature"), list[str]()
-    if temperature is not None:
-        notes.append(f"$\\Delta T = {{{temperature:g}}}$ first")
-    return [*notes, f"no onset in {without} directions"] if without else notes
-
-
 def sensitivities(document: Document) -> Figure | None:
-    """Return the elasticities d ln c / d ln p, a row for each p and a column for each c; None without sensitivities."""
+    """Draw elasticities d ln c / d ln p, rows p and columns c; None without sensitivities."""
     tables = constant_tables.sensitivities(document)
     if not tables or not tables[0].rows:
         return None
-    names = [plain(str(row[0])) for row in tables[0].rows]
+    names = [plot_helpers.plain(str(row[0])) for row in tables[0].rows]
     values = np.array([[np.nan if isinstance(entry, str) else entry for entry in row[1:]] for row in tables[0].rows])
-    left = 0.4 + LETTER * max(map(len, names))
-    size = left + CELL[0] * values.shape[1] + 1.2, 1.4 + CELL[1] * len(names)
+    names_width = 0.4 + 0.085 * max(map(len, names))
+    size = names_width + CELL[0] * values.shape[1] + 1.2, 1.4 + CELL[1] * len(names)
     picture = Figure(figsize=size, layout="constrained")
     axes = picture.subplots()
-    most = max(float(np.abs(values[np.isfinite(values)]).max(initial=0.0)), FAINTEST)
-    image = axes.imshow(values, cmap="RdBu_r", norm=Normalize(-most, most), aspect="auto")
+    highest = max(float(np.abs(values[np.isfinite(values)]).max(initial=0.0)), FAINTEST)
+    image = axes.imshow(values, cmap="RdBu_r", norm=Normalize(-highest, highest), aspect="auto")
     for (row, column), value in np.ndenumerate(values):
-        words = "-" if np.isnan(value) else f"{value:.2f}" if abs(value) >= FAINTEST else ""
-        axes.text(column, row, words, ha="center", va="center", color="white" if abs(value) > DARK * most else "black")
+        text = "-" if np.isnan(value) else f"{value:.2f}" if abs(value) >= FAINTEST else ""
+        axes.text(column, row, text, ha="center", va="center", color="white" if abs(value) > 0.6 * highest else "black")
     heads = [column.name.replace("_", "_\n") for column in tables[0].columns[1:]]
     axes.set_xticks(range(values.shape[1]), heads)
     axes.set_yticks(range(len(names)), names)
@@ -188,7 +168,7 @@ def sensitivities(document: Document) -> Figure | None:
     axes.spines[:].set_visible(False)
     picture.colorbar(image, ax=axes, label="relative change / relative change")
     title = "change of a constant (%) by a change of a parameter by 1 %"
-    picture.suptitle(title_of(document["case"], title), fontsize=11)
+    picture.suptitle(plot_helpers.title_of(document["case"], title), fontsize=11)
     return picture
 
 

@@ -15,74 +15,61 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components, depth_first_order
 from scipy.spatial import cKDTree
 
-from feti_homog.report.plots.interface_marks import (
-    BONDED,
-    CLOSED,
-    OPEN,
-    SAME_PLACE,
-    STATE_COLOURS,
-    STATE_NAMES,
-    DrawnCell,
-)
-from feti_homog.report.plots.load_labels import LoadLabels
-from feti_homog.report.plots.plot_helpers import save, stress_label, unit_label
+from feti_homog.report.plots import drawn_cell, plot_helpers
 from feti_homog.report.text.analyses import reported
 from feti_homog.results.landmarks import peak_of
 from feti_homog.typing import Array, Document
 
 DEGREES = (-180.0, 180.0)
-NEAREST = 8  # edges of which the one is looked for that a node lies on
-MAX_FIBRES = 4
 LOADS_IN_LINE = 7
-# Nodes are all around a fibre if the distance of the first and the last is not so many times that of others.
-MOST_UNEVEN = 2.0
-SPIKES, SPIKE_ROOM = 2.0, 1.0  # per cent of the nodes, at either end; how far beyond the others they are drawn
+SPIKES = 2.0  # per cent of the nodes, at either end
 INK = ("#1f4e9c", "#2a7f3f", "#c44e00")
 NAMES = {"traction": (r"$t_\mathrm{n}$", r"$t_\mathrm{t}$", r"$t_\mathrm{a}$"), "jump": ("gap", "slip", "axial slip")}
 
 
-def plot(directory: Path, cell: DrawnCell, document: Document) -> list[Path]:
+def plot(directory: Path, cell: drawn_cell.DrawnCell, document: Document) -> list[Path]:
     """Draw interface.png, if any state has debonded nodes.
 
-    It shows, of a path, the state of its peak, dashed, and the valley after it or the last that shows much, else one
-    state.
+    A path shows its peak, dashed, and the valley after it or a late state; other analyses one state.
     """
     file = cell.file
     names = sorted(file.get("state", ()), key=int)
-    debonded = {name: int((file[f"state/{name}/status"][:] != BONDED).sum()) for name in names}
+    debonded = {name: int((file[f"state/{name}/status"][:] != drawn_cell.BONDED).sum()) for name in names}
     if not any(debonded.values()):
         return []
     total = len(file["interface/points"])
+
+    def touches(name: str) -> bool:
+        return bool((file[f"state/{name}/status"][:] == drawn_cell.CLOSED).any())
+
     # After all bonds are gone there is not much left to see, unless the faces touch.
-    last = next((n for n in reversed(names) if 0 < debonded[n] < total or _touching(file, n)), names[-1])
+    last = next((n for n in reversed(names) if 0 < debonded[n] < total or touches(n)), names[-1])
     partly = [name for name in names if 0 < debonded[name] < total]
-    shown = (
+    names_drawn = (
         _around_the_peak(file, names, last, document)
         if reported(document).is_followed
         else [(partly or [last])[len(partly) // 2]]
     )
-    return [save(_figure(cell, shown, LoadLabels.of(document)), directory / "interface.png")]
+    return [
+        plot_helpers.save(_figure(cell, names_drawn, drawn_cell.LoadLabels.of(document)), directory / "interface.png")
+    ]
 
 
 def _around_the_peak(file: Any, names: list[str], last: str, document: Document) -> list[str]:
-    """Return the states at the peak of a path, or the first, and in the valley after it, or the `last`."""
+    """Return the states at the peak, or the first, and in the valley after it, or the `last`."""
     of_point = {int(file[f"state/{name}"].attrs["point"]): name for name in names}
     peak = peak_of(document)
     before, after = of_point.get(peak["event"], names[0]), of_point.get(peak.get("event_left", -1), last)
-    debonded = (file[f"state/{after}/status"][:] != BONDED).any()
+    debonded = (file[f"state/{after}/status"][:] != drawn_cell.BONDED).any()
     return list(dict.fromkeys([before, after if debonded else last]))
 
 
-def _touching(file: Any, name: str) -> bool:
-    return bool((file[f"state/{name}/status"][:] == CLOSED).any())
-
-
-def _figure(cell: DrawnCell, names: list[str], labels: LoadLabels) -> Figure:
-    """Return a row for each of the fibres that are most debonded: tractions, and jumps."""
+def _figure(cell: drawn_cell.DrawnCell, names: list[str], labels: drawn_cell.LoadLabels) -> Figure:
+    """Draw tractions and jumps around the most debonded fibres, a row each."""
     file = cell.file
     fibre, status = file["interface/fibre"][:], file[f"state/{names[-1]}/status"][:]
-    bodies, count = np.unique(fibre[status != BONDED], return_counts=True)
-    chosen = np.sort(bodies[np.argsort(-count, kind="stable")][:MAX_FIBRES])
+    bodies, count = np.unique(fibre[status != drawn_cell.BONDED], return_counts=True)
+    chosen = np.sort(bodies[np.argsort(-count, kind="stable")][:4])
     figure = Figure(figsize=(9.0, 2.4 * len(chosen) + 1.5), layout="constrained")
     grid = figure.subplots(len(chosen), 2, sharex="row", sharey="col", squeeze=False)
     for row, body in zip(grid, chosen, strict=True):
@@ -92,8 +79,14 @@ def _figure(cell: DrawnCell, names: list[str], labels: LoadLabels) -> Figure:
             for name in names:
                 values = _values(file[f"state/{name}"], quantity)[place.nodes]
                 _curves(axes, quantity, place, values, name == names[-1])
-            _finish(axes, place)
-        row[0].set_title(_name(file, body, place), fontsize=10, loc="left")
+            axes.axhline(0.0, color="0.6", linewidth=0.6)
+            axes.set(xlim=place.ends, xlabel=place.label)
+            if place.ends == DEGREES:
+                axes.xaxis.set_major_locator(MultipleLocator(60))
+            axes.spines[["top", "right"]].set_visible(False)
+        fibre_name = f"fibre {file['interface/fibre_number'][place.nodes[0]]}"
+        is_fibre = body in file["fibre/body"][:]
+        row[0].set_title(fibre_name if is_fibre else f"coating of {fibre_name}", fontsize=10, loc="left")
     for column in grid.T:
         _clip_spikes(column[0], [line.get_ydata() for axes in column for line in axes.lines])
     _labels(file, figure, grid, status[np.isin(fibre, chosen)])
@@ -107,21 +100,16 @@ def _figure(cell: DrawnCell, names: list[str], labels: LoadLabels) -> Figure:
 
 
 def _clip_spikes(axes: Axes, curves: list[Any]) -> None:
-    """Limit the range, which axes share, where a few nodes at singular tips are beyond all others."""
+    """Limit the shared range where a few nodes at singular tips exceed all others."""
     values = np.concatenate([np.asarray(curve, float) for curve in curves])
     low, high = np.percentile(values, (SPIKES, 100.0 - SPIKES))
-    room = SPIKE_ROOM * (high - low)
+    room = high - low
     if values.min() < low - room or values.max() > high + room:
         axes.set_ylim(max(values.min(), low - room), min(values.max(), high + room))
 
 
-def _name(file: Any, body: int, place: Coordinate) -> str:
-    number = file["interface/fibre_number"][place.nodes[0]]
-    return f"fibre {number}" if body in file["fibre/body"][:] else f"coating of fibre {number}"
-
-
 def _values(state: Any, quantity: str) -> Array:
-    """(k, 2) tractions or jumps, or (k, 3) if there are any along the fibres."""
+    """(k, 2) tractions or jumps; (k, 3) with components along the fibres."""
     values: Array = state[quantity][:]
     if f"axial_{quantity}" not in state or not (axial := state[f"axial_{quantity}"][:]).any():
         return values
@@ -129,9 +117,10 @@ def _values(state: Any, quantity: str) -> Array:
 
 
 def _curves(axes: Axes, quantity: str, place: Coordinate, values: Array, last: bool) -> None:
-    """Draw the values at the nodes of a fibre, as a closed curve if the nodes surround it."""
+    """Draw nodal values (k, 2 or 3) around a fibre, as a closed curve if nodes surround it."""
     at, turn = place.values, place.ends[1] - place.ends[0]
-    if place.ends == DEGREES and len(at) > 1 and at[0] + turn - at[-1] < MOST_UNEVEN * np.diff(at).max():
+    # Nodes are all around if the gap between last and first is less than twice the others.
+    if place.ends == DEGREES and len(at) > 1 and at[0] + turn - at[-1] < 2.0 * np.diff(at).max():
         at, values = (
             np.concatenate([at[-1:] - turn, at, at[:1] + turn]),
             np.concatenate([values[-1:], values, values[:1]]),
@@ -142,41 +131,32 @@ def _curves(axes: Axes, quantity: str, place: Coordinate, values: Array, last: b
 
 
 def _shade(axes: Axes, place: Coordinate, status: Array) -> None:
-    """Mark the debonded parts of the last state; each node stands for half the distance to its neighbours."""
+    """Shade debonded parts in the last state; each node stands for half the distance to its neighbours."""
     middle = (place.values[1:] + place.values[:-1]) / 2
     edges = np.concatenate([[place.ends[0]], middle, [place.ends[1]]])
-    for kind in (OPEN, CLOSED):
+    for kind in (drawn_cell.OPEN, drawn_cell.CLOSED):
         for at in np.flatnonzero(status == kind):
-            axes.axvspan(edges[at], edges[at + 1], color=STATE_COLOURS[kind], alpha=0.18, linewidth=0)
-
-
-def _finish(axes: Axes, place: Coordinate) -> None:
-    axes.axhline(0.0, color="0.6", linewidth=0.6)
-    axes.set_xlim(*place.ends)
-    axes.set_xlabel(place.label)
-    if place.ends == DEGREES:
-        axes.xaxis.set_major_locator(MultipleLocator(60))
-    axes.spines[["top", "right"]].set_visible(False)
+            axes.axvspan(edges[at], edges[at + 1], color=drawn_cell.STATE_COLOURS[kind], alpha=0.18, linewidth=0)
 
 
 def _labels(file: Any, figure: Figure, grid: Any, shaded: Array) -> None:
-    stress = stress_label(file.attrs["stress_unit"])
-    length = unit_label(file.attrs["length_unit"]) or "(cell units)"
+    stress = plot_helpers.stress_label(file.attrs["stress_unit"])
+    length = plot_helpers.unit_label(file.attrs["length_unit"]) or "(cell units)"
     for row in grid:
         row[0].set_ylabel(f"traction {stress}")
         row[1].set_ylabel(f"jump {length}")
     for axes in grid[0]:
         axes.legend(frameon=False, fontsize=9, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.1, ncols=3)
     patches = [
-        Patch(color=STATE_COLOURS[kind], alpha=0.18, linewidth=0, label=STATE_NAMES[kind])
-        for kind in (OPEN, CLOSED)
+        Patch(color=drawn_cell.STATE_COLOURS[kind], alpha=0.18, linewidth=0, label=drawn_cell.STATE_NAMES[kind])
+        for kind in (drawn_cell.OPEN, drawn_cell.CLOSED)
         if kind in shaded
     ]
     figure.legend(handles=patches, loc="outside lower center", ncols=2, frameon=False)
 
 
-def _title(file: Any, names: list[str], labels: LoadLabels) -> str:
-    """Return the last state and, of more, the first."""
+def _title(file: Any, names: list[str], labels: drawn_cell.LoadLabels) -> str:
+    """Describe the last state and, if different, the first."""
     first, last = (file[f"state/{name}"].attrs for name in (names[0], names[-1]))
     title = f"{last['label']}: {labels.label(last, LOADS_IN_LINE)}"
     if len(names) > 1:
@@ -186,7 +166,7 @@ def _title(file: Any, names: list[str], labels: LoadLabels) -> str:
 
 @dataclass(frozen=True)
 class Coordinate:
-    """The nodes of a fibre in the order of their place along it."""
+    """Interface nodes in order along a fibre outline."""
 
     nodes: Array  # (k,) rows of /interface
     values: Array  # (k,) ascending
@@ -194,30 +174,30 @@ class Coordinate:
     label: str
 
 
-def coordinate(cell: DrawnCell, body: int) -> Coordinate:
-    """Direction of the normal, in degrees, of a body that is a round fibre, or its coating.
+def coordinate(cell: drawn_cell.DrawnCell, body: int) -> Coordinate:
+    """Return the coordinate along a body outline: on round fibres and their coatings the normal direction (degrees).
 
-    Of any other the arc length, counterclockwise from where the normal is nearest to x1 (around each of its boundaries,
-    if it has several, one after the other).
+    Other bodies have the arc length, counterclockwise from the node whose normal is nearest to x1; several boundaries
+    follow each other.
     """
     file, edges = cell.file, cell.interface.nodes
-    own = np.flatnonzero(file["interface/fibre"][:] == body)
+    of_body = np.flatnonzero(file["interface/fibre"][:] == body)
     normal = file["interface/normal"][:]
-    radius = file["fibre/radius"][:][np.isin(file["fibre/number"][:], file["interface/fibre_number"][:][own])]
+    radius = file["fibre/radius"][:][np.isin(file["fibre/number"][:], file["interface/fibre_number"][:][of_body])]
     if np.isfinite(radius).all():
-        angle = np.degrees(np.arctan2(normal[own, 1], normal[own, 0]))
+        angle = np.degrees(np.arctan2(normal[of_body, 1], normal[of_body, 0]))
         order = np.argsort(angle)
-        return Coordinate(own[order], angle[order], DEGREES, "direction of the normal (degrees)")
+        return Coordinate(of_body[order], angle[order], DEGREES, "direction of the normal (degrees)")
     period = np.array([file.attrs["width"], file.attrs["height"]])
-    chain = np.unique(np.sort(edges[np.isin(edges, own).all(axis=1)], axis=1), axis=0)
-    length, total = _arc_length(file["interface/points"][:], normal, own, chain, period)
+    chain = np.unique(np.sort(edges[np.isin(edges, of_body).all(axis=1)], axis=1), axis=0)
+    length, total = _arc_length(file["interface/points"][:], normal, of_body, chain, period)
     order = np.argsort(length, kind="stable")
     unit = file.attrs["length_unit"] or "cell units"
-    return Coordinate(own[order], length[order], (0.0, total), f"arc length, counterclockwise ({unit})")
+    return Coordinate(of_body[order], length[order], (0.0, total), f"arc length, counterclockwise ({unit})")
 
 
-def _arc_length(points: Array, normal: Array, own: Array, chain: Array, period: Array) -> tuple[Array, float]:
-    """(k,) arc length of the nodes `own`, and that of all boundaries, which the edges (e, 2) of a coarse mesh make."""
+def _arc_length(points: Array, normal: Array, of_body: Array, chain: Array, period: Array) -> tuple[Array, float]:
+    """(k,) arc length of nodes `of_body`, and the total length of all boundaries; `chain`: boundary edges (e, 2)."""
     starts, steps, before, total = [], [], [], 0.0
     for line in _lines(chain, normal, points, period):
         sides = _shortest(np.diff(points[line], axis=0), period)
@@ -226,14 +206,13 @@ def _arc_length(points: Array, normal: Array, own: Array, chain: Array, period: 
         steps.append(sides)
         before.append(np.append(total, ends[:-1]))
         total = float(ends[-1])
-    return _along(points[own], np.concatenate(starts), np.concatenate(steps), np.concatenate(before), period), total
+    return _along(points[of_body], np.concatenate(starts), np.concatenate(steps), np.concatenate(before), period), total
 
 
 def _lines(chain: Array, normal: Array, points: Array, period: Array) -> list[Array]:
-    """Return the boundaries that edges make, each as its nodes in counterclockwise order.
+    """Chain edges (e, 2) to boundaries, each a counterclockwise node list.
 
-    Of a closed one the first node comes again at the end. It begins where the normal is nearest to x1, or at its end if
-    it is open.
+    A closed boundary repeats its first node, whose normal is nearest to x1; an open one begins at an end.
     """
     vertices, ends = np.unique(chain, return_inverse=True)
     first, second = ends.reshape(-1, 2).T
@@ -255,20 +234,20 @@ def _lines(chain: Array, normal: Array, points: Array, period: Array) -> list[Ar
 
 
 def _along(points: Array, starts: Array, steps: Array, before: Array, period: Array) -> Array:
-    """(k,) arc length of points: where each is on the nearest edge, from `starts` by `steps` (e, 2)."""
+    """(k,) arc length of each point on its nearest edge; edges go from `starts` by `steps` (e, 2)."""
     tree = cKDTree(np.mod(starts + 0.5 * steps, period) % period, boxsize=period)
-    near = tree.query(np.mod(points, period) % period, k=min(NEAREST, len(starts)))[1].reshape(len(points), -1)
-    offset, step = _shortest(points[:, None] - starts[near] - 0.5 * steps[near], period), steps[near]
+    nearest = tree.query(np.mod(points, period) % period, k=min(8, len(starts)))[1].reshape(len(points), -1)
+    offset, step = _shortest(points[:, None] - starts[nearest] - 0.5 * steps[nearest], period), steps[nearest]
     length = np.linalg.norm(step, axis=2)
     share = np.clip(0.5 + (offset * step).sum(axis=2) / length**2, 0.0, 1.0)
     distance = np.linalg.norm(offset - (share - 0.5)[..., None] * step, axis=2)
-    best = (distance + SAME_PLACE * length * share).argmin(axis=1)  # a vertex is the start of an edge, not an end
+    best = (distance + drawn_cell.SAME_PLACE * length * share).argmin(
+        axis=1
+    )  # a vertex is the start of an edge, not an end
     rows = np.arange(len(points))
-    arc: Array = before[near[rows, best]] + (share * length)[rows, best]
-    return arc
+    return np.asarray(before[nearest[rows, best]] + (share * length)[rows, best])
 
 
 def _shortest(vectors: Array, period: Array) -> Array:
-    """Return the shortest images of vectors on the torus."""
-    shortest: Array = vectors - period * np.round(vectors / period)
-    return shortest
+    """Return vectors (..., 2) shortened by whole periods."""
+    return np.asarray(vectors - period * np.round(vectors / period))

@@ -12,17 +12,15 @@ import numpy as np
 
 from feti_homog.materials.constants import ABOUT_FIBRES, MATERIAL_AXES, MATERIAL_EXPANSIONS, OF_THE_CELL
 from feti_homog.materials.voigt import EXPANSIONS
-from feti_homog.report.text.stiffness_tables import UNKNOWN, abreast, with_errors
-from feti_homog.report.text.table import Column, Table, in_brackets, without_noise
+from feti_homog.report.text.stiffness_tables import ENGINEERING, with_errors
+from feti_homog.report.text.table import UNKNOWN, Column, Table, stress_label, without_noise
 from feti_homog.typing import Document
-
-ROWS = (("E1", "E2", "E3"), ("G12", "G13", "G23"), ("nu12", "nu13", "nu23"))
 
 
 def constants(document: Document) -> dict[str, float]:
-    """Return the constants in material axes, in the order of ROWS, those that follow from what the result has.
+    """Return the constants in material axes that a result determines, in the order of ENGINEERING.
 
-    nu_ij = -eps_j / eps_i under stress along i: nu12 = nu13' E3' / E1' of those with a dash, in the axes of the cell.
+    nu_ij = -eps_j / eps_i under stress along i: nu12 = nu13' E3' / E1' with primed constants in cell axes.
     """
     cell: dict[str, float] = dict(document.get("constants") or {})
     for name, ratio, across in (("nu31", "nu13", "E1"), ("nu32", "nu23", "E2")):
@@ -31,30 +29,25 @@ def constants(document: Document) -> dict[str, float]:
     return in_material_axes(cell)
 
 
-def in_material_axes(known: Mapping[str, float]) -> dict[str, float]:
-    """Return numbers of constants of the cell by their names in material axes, in which expansions keep theirs."""
-    places = {name: OF_THE_CELL[name] for names in ROWS for name in names}
+def in_material_axes(numbers: Mapping[str, float]) -> dict[str, float]:
+    """Rename numbers from cell axes to material axes; expansions keep their names."""
+    places = {name: OF_THE_CELL[name] for name in ENGINEERING}
     places |= {name: name for name in MATERIAL_EXPANSIONS[:3]}
-    return {name: known[own] for name, own in places.items() if own in known}
+    return {name: numbers[constant] for name, constant in places.items() if constant in numbers}
 
 
 def standard_deviations(document: Document) -> dict[str, float]:
-    """Return those of all constants of the cell, in its axes, that uncertain constants of the case cause."""
-    known = document.get("uncertainty") or {"constants": (), "std": ()}
-    return dict(zip(known["constants"], map(float, known["std"]), strict=True))
+    """Return standard deviations of the cell constants, in cell axes, by uncertain constants of the case."""
+    numbers = document.get("uncertainty") or {"constants": (), "std": ()}
+    return dict(zip(numbers["constants"], map(float, numbers["std"]), strict=True))
 
 
-def table(document: Document, label: str) -> list[Table]:
-    """Return the constants as a table; `label` is the unit of stresses in brackets, or empty."""
-    found, off = constants(document), in_material_axes(mesh_errors(document))
-    return [with_errors(f"{MATERIAL_AXES}{label}", found, off)] if found else []
-
-
-def lines(document: Document, label: str) -> list[str]:
-    """Return the same as text, with the estimated errors of the mesh."""
-    found, off = constants(document), in_material_axes(mesh_errors(document))
-    title = f"{MATERIAL_AXES}{label}{'; +- error of the mesh' if off else ''}"
-    return [title, *abreast(ROWS, found, off, width=6)] if found else []
+def table(document: Document) -> Table:
+    """Return the constants in material axes, with their mesh errors."""
+    errors = in_material_axes(mesh_errors(document))
+    title = f"{MATERIAL_AXES}{stress_label(document)}{'; +- error of the mesh' if errors else ''}"
+    computed = constants(document)
+    return with_errors(title, {name: computed[name] for name in ENGINEERING if name in computed}, errors, 3)
 
 
 # Constants of which sensitivities are shown, by whether the cell is in space; all are in result.json.
@@ -66,65 +59,66 @@ MOST = 9  # of other constants
 
 
 def sensitivities(document: Document) -> list[Table]:
-    """Elasticities d ln c / d ln p of constants c by parameters p, and derivatives dc / dp; none if not asked for."""
-    if (found := document.get("sensitivities")) is None:
+    """Return elasticities d ln c / d ln p and derivatives dc / dp, if the case asks for sensitivities."""
+    if (section := document.get("sensitivities")) is None:
         return []
-    constants, width = found["constants"], max(map(len, found["parameters"]), default=0) + 4
+    constants, width = section["constants"], max(map(len, section["parameters"]), default=0) + 4
     at = [constants.index(name) for name in shown(constants)]
     slopes, shares = list[list[Any]](), list[list[Any]]()
-    for j, (name, value) in enumerate(zip(found["parameters"], found["parameter_values"], strict=True)):
-        row = [found["derivatives"][k][j] for k in at]
+    for j, (name, value) in enumerate(zip(section["parameters"], section["parameter_values"], strict=True)):
+        row = [section["derivatives"][k][j] for k in at]
         slopes.append([name, *row])
         shares.append(
-            [name, *(_share(slope * value, found["constant_values"][k]) for slope, k in zip(row, at, strict=True))]
+            [
+                name,
+                *(
+                    without_noise(slope * value / size) if (size := section["constant_values"][k]) else UNKNOWN
+                    for slope, k in zip(row, at, strict=True)
+                ),
+            ]
         )
-    words = "Elasticities, the relative change of a constant by that of a parameter"
-    words += "; contact at fixed status" * bool(found.get("at_fixed_status"))
+    text = "Elasticities, the relative change of a constant by that of a parameter"
+    text += "; contact at fixed status" * bool(section.get("at_fixed_status"))
     heads = [(constants[k], max(12, len(constants[k]) + 2)) for k in at]
     return [
         Table(title, [Column("", -width), *(Column(*head, form) for head in heads)], rows)
-        for title, form, rows in ((words, ".4f", shares), ("Derivatives by the same parameters", ".3g", slopes))
+        for title, form, rows in ((text, ".4f", shares), ("Derivatives by the same parameters", ".3g", slopes))
     ]
 
 
 def uncertainty(document: Document) -> list[Table]:
-    """Constants with their scatter by phases and error of the mesh, and shares of uncertain constants; none without."""
-    if (found := document.get("uncertainty")) is None:
+    """Return constants with their scatter, mesh error and variance shares, if the case has uncertain constants."""
+    if (section := document.get("uncertainty")) is None:
         return []
-    names, values = found["constants"], document["sensitivities"]["constant_values"]
+    names, values = section["constants"], document["sensitivities"]["constant_values"]
     errors = mesh_errors(document)
-    inputs = [name.removeprefix("material.") for name in found["parameters"]]
+    inputs = [name.removeprefix("material.") for name in section["parameters"]]
     columns = [Column("", -24), Column("value"), Column("+- phases"), Column("+- mesh")]
     columns += [Column(name, max(12, len(name) + 2), ".1f") for name in inputs]
     rows = [
         [
             name,
             values[k],
-            found["std"][k],
+            section["std"][k],
             errors.get(name, UNKNOWN),
-            *(100 * share for share in found["shares"][k]),
+            *(100 * share for share in section["shares"][k]),
         ]
         for k, name in ((names.index(name), name) for name in shown(names))
-        if found["std"][k] > 0
+        if section["std"][k] > 0
     ]
-    label = in_brackets(document["case"].get("output", {}).get("stress_unit", ""))
+    label = stress_label(document)
     return [Table(f"Scatter by uncertain constants{label}: std, and their shares of the variance (%)", columns, rows)]
 
 
 def mesh_errors(document: Document) -> dict[str, float]:
-    """Return the estimated errors of constants by the mesh, of entries and expansions by their places, too."""
-    known: Document = document.get("mesh_error") or {}
-    entries = np.ndenumerate(np.array(known.get("effective_stiffness", [])))
-    strains = dict(zip(EXPANSIONS[:3], map(float, known.get("thermal_expansion", ())), strict=False))
+    """Return estimated mesh errors of constants, stiffness entries (C11, ...) and expansions, by name."""
+    numbers: Document = document.get("mesh_error") or {}
+    entries = np.ndenumerate(np.array(numbers.get("effective_stiffness", [])))
+    strains = dict(zip(EXPANSIONS[:3], map(float, numbers.get("thermal_expansion", ())), strict=False))
     named = {f"C{i + 1}{j + 1}": float(error) for (i, j), error in entries}
-    return named | {**known.get("constants", {})} | strains
+    return named | {**numbers.get("constants", {})} | strains
 
 
 def shown(names: Sequence[str]) -> list[str]:
-    """Return the constants of tables; of a load, and of secants of a cell in space, the first ones."""
+    """Return the constants that tables show; the first MOST for a load or secants in space."""
     return [name for name in SHOWN["E3" in names] if name in names] if "E1" in names else list(names[:MOST])
-
-
-def _share(change: float, size: float) -> float | str:
-    """Return a relative change, zero in place of noise; text of a constant that is zero."""
-    return without_noise(change / size) if size else UNKNOWN

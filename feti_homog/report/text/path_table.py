@@ -1,4 +1,4 @@
-"""The points of a path as a table of the summary: its peak, its energies, and rows of some points."""
+"""The table of a path: peak, energies, and rows of some points."""
 
 from __future__ import annotations
 
@@ -11,75 +11,55 @@ import numpy as np
 from feti_homog.case.loads import TEMPERATURE
 from feti_homog.materials.voigt import voigt_names
 from feti_homog.report.text.point_tables import COUNTS, WIDTH, columns_without_noise, counts, debonded, energies
-from feti_homog.report.text.table import Column, Table, without_noise
+from feti_homog.report.text.table import Column, Table, stress_label, without_noise
 from feti_homog.results import path_curves
 from feti_homog.results.landmarks import LARGEST, PEAK, chosen, fall_of, name_of, peak_of, stresses_of
 from feti_homog.typing import Document
 
 ROWS = 15  # of the table
-SHOWN = 5  # of its strains, stresses and the temperature
-SAME_LOAD, CLOSED_CYCLE = 1e-9, 1e-6  # of load factors; of strains or stresses of one waypoint, relative
 
 
-def path_table(document: Document, label: str) -> Table:
-    """Totals of the path, and rows of some of its points."""
-    points, numbers, found = document["path"], chosen(document, ROWS), _path_columns(document)
-    shown = dict(list(found.items())[:SHOWN])
-    rest = [name for name in found if name not in shown]
+def path_table(document: Document, limit: int = ROWS) -> Table:
+    """Return totals of the path above at most `limit` rows of points."""
+    points, numbers, varying = document["path"], chosen(document, limit), _path_columns(document)
+    first = dict(list(varying.items())[:5])
+    rest = [name for name in varying if name not in first]
     broke = sum(point["broke"] for point in points)
     some = "" if len(numbers) == len(points) else f", {len(numbers)} shown"
     rows = [
-        [k, *(without_noise(column[k]) for column in shown.values()), points[k]["load_factor"], *counts(points[k])]
+        [k, *(without_noise(column[k]) for column in first.values()), points[k]["load_factor"], *counts(points[k])]
         for k in numbers
     ]
-    columns = [Column("point", 5, "d"), *(Column(name, max(11, len(name) + 1)) for name in shown)]
+    columns = [Column("point", 5, "d"), *(Column(name, max(11, len(name) + 1)) for name in first)]
     columns += [Column("load", 9, ".6f"), *COUNTS]
-    totals = [*_peak_lines(document, peak_of(document), label), *_path_energies(document, label)]
+    label = stress_label(document)
+    totals = [*_peak_lines(document, peak_of(document)), *_path_energies(document, label)]
     totals += [f"Also in path.csv: {', '.join(rest)}"] if rest else []
     return Table(f"Path{label}: {len(points)} points{some}; {broke} bonds broke", columns, rows, totals)
 
 
-def peak_table(document: Document, label: str) -> Table:
-    """Return first break, peak and valley: stress, strain and point."""
-    peak = peak_of(document)
-    largest = name_of(document, peak)
-    places = {
-        "first break": ("first_break_stress", "first_break_strain", "first_break_event"),
-        largest: ("stress", "strain", "event"),
-        f"left after the {largest}": ("stress_left", "", "event_left"),
-    }
-    rows = [
-        [words, *(without_noise(peak[name]) if name else "" for name in names)]
-        for words, names in places.items()
-        if names[0] in peak
-    ]
-    columns = [Column(""), Column(f"{peak['stress_name']}{label}"), Column(peak["strain_name"]), Column("point")]
-    titles = {PEAK: "Peak of the path", LARGEST: "Largest stress of the path"}
-    return Table(titles.get(largest, "Largest stress so far"), columns, rows)
-
-
 def _path_columns(document: Document) -> dict[str, Any]:
-    """Return the columns that vary along a path.
+    """Return the columns that vary along a path, (n,) each.
 
-    They are the leading strain, stresses that are named or present, the temperature, and other strains under stresses.
+    Leading strain, stresses that waypoints name or that act, temperature, and strains under prescribed stresses.
     """
     points = document["path"]
     strain, stress = (columns_without_noise([point[name] for point in points]) for name in ("strain", "stress"))
     strains, stresses = voigt_names(strain.shape[1])
     leading = path_curves.leading_component(document)
-    there = {*path_curves.named_components(document), *path_curves.components_above(path_curves.FAINT, stress)}
-    found = {strains[leading]: strain[:, leading]} | {stresses[k]: stress[:, k] for k in sorted(there)}
+    visible = {*path_curves.named_components(document), *path_curves.components_above(path_curves.FAINT, stress)}
+    curves = {strains[leading]: strain[:, leading]} | {stresses[k]: stress[:, k] for k in sorted(visible)}
     if any(point.get("temperature") for point in points):
-        found[TEMPERATURE] = np.array([point["temperature"] for point in points])
-    given = {name for target in path_curves.targets(document) for name in target}
-    others = path_curves.components_above(path_curves.FAINT, strain)
-    return found | {strains[k]: strain[:, k] for k in others if stresses[k] in given}
+        curves[TEMPERATURE] = np.array([point["temperature"] for point in points])
+    prescribed = {name for target in path_curves.targets(document) for name in target}
+    more = path_curves.components_above(path_curves.FAINT, strain)
+    return curves | {strains[k]: strain[:, k] for k in more if stresses[k] in prescribed}
 
 
-def _peak_lines(document: Document, peak: Mapping[str, Any], label: str) -> list[str]:
-    """Return the peak with the first break and what is left after it, and whether it grows with the toughness."""
+def _peak_lines(document: Document, peak: Mapping[str, Any]) -> list[str]:
+    """Describe peak, first break, stress left after the peak, and scaling by the toughness."""
     strain, stress = (without_noise(peak[name]) for name in ("strain", "stress"))
-    largest, name = name_of(document, peak), peak["stress_name"] + label
+    largest, name = name_of(document, peak), peak["stress_name"] + stress_label(document)
     begins = {PEAK: f"Peak {name}", LARGEST: f"Largest {name}"}
     text = begins.get(largest, f"Largest {name} so far, the path being cut off")
     text += f": {stress:.6g} at {peak['strain_name']} = {strain:.6g}"
@@ -89,9 +69,9 @@ def _peak_lines(document: Document, peak: Mapping[str, Any], label: str) -> list
         text += f"; first break {first:.6g} at {at:.6g} (point {peak['first_break_event']})"
     text += _afterwards(document, peak, largest)
     events = {"the first break": peak.get("first_break_event"), f"the {largest}": peak["event"]}
-    errors = {words: document["path"][event].get("mesh_error") for words, event in events.items() if event is not None}
-    known = [f"{error:.1e} at {words}" for words, error in errors.items() if error is not None]
-    text += f"; mesh error of the energy {', '.join(known)}" if known else ""
+    errors = {place: document["path"][event].get("mesh_error") for place, event in events.items() if event is not None}
+    parts = [f"{error:.1e} at {place}" for place, error in errors.items() if error is not None]
+    text += f"; mesh error of the energy {', '.join(parts)}" if parts else ""
     lines = wrap(text, WIDTH, subsequent_indent="  ")
     if path_curves.scales_with_toughness(document):
         lines.append("Scaling: strains and stresses of the path are as the root of the toughness")
@@ -99,7 +79,7 @@ def _peak_lines(document: Document, peak: Mapping[str, Any], label: str) -> list
 
 
 def _afterwards(document: Document, peak: Mapping[str, Any], largest: str) -> str:
-    """Return what comes after the largest stress in words: a valley, still larger stresses, an end near it."""
+    """Describe the path after the largest stress: a valley, still larger stresses, or an end near the peak."""
     text, stresses = "", stresses_of(document, peak)
     if "event_left" in peak:
         lost = 1.0 - peak["stress_left"] / peak["stress"]
@@ -115,21 +95,21 @@ def _afterwards(document: Document, peak: Mapping[str, Any], largest: str) -> st
 
 
 def _closed_cycle(document: Document) -> str:
-    """Return the area of the last loop in words: the work since a waypoint of the same strains."""
+    """Describe the last loop area: the work since a waypoint with the same strains."""
     points, legs = document["path"], path_curves.legs(document)
-    ends = [p for p in points if abs(p["load_factor"] * legs - round(p["load_factor"] * legs)) < SAME_LOAD]
+    ends = [p for p in points if abs(p["load_factor"] * legs - round(p["load_factor"] * legs)) < path_curves.SAME_LOAD]
     for point in reversed(ends[:-1]):
         pair = np.array([point["strain"], ends[-1]["strain"]])
-        if np.ptp(pair, axis=0).max() <= CLOSED_CYCLE * np.abs(pair).max():
+        if np.ptp(pair, axis=0).max() <= 1e-6 * np.abs(pair).max():
             return f", area of the last closed loop {ends[-1]['work'] - point['work']:.6g}"
     return ""
 
 
 def _path_energies(document: Document, label: str) -> list[str]:
-    """Return the lines about energies along a path.
+    """Return lines about energies along a path.
 
-    They give the work of the loads, the energy stored at the end, the energy lost by breaks, along all equilibria and
-    under a rising load, and the debonded share.
+    Work of the loads, energy stored at the end, energy lost by breaks along all equilibria and under a rising load,
+    and the debonded share.
     """
     last = document["path"][-1]
     where = " on the first leg" if path_curves.legs(document) > 1 else ""

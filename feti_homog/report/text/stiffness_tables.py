@@ -1,239 +1,190 @@
-"""Stiffness, what a unit of temperature does, moduli and constants beside their bounds and estimates, as tables."""
+"""Tables of stiffness, thermal constants, moduli and engineering constants, with bounds and estimates."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from itertools import zip_longest
 from math import floor, log10
 from typing import Any
 
+import numpy as np
+
 from feti_homog.materials.constants import ABOUT_FIBRES, CELL_AXES
 from feti_homog.materials.voigt import SPATIAL_STRESSES, STRAINS, voigt_names
 from feti_homog.microstructure.phase_names import COATING
-from feti_homog.report.text.table import Column, Table, number, with_unit
-from feti_homog.typing import Document
+from feti_homog.report.text.table import UNKNOWN, Column, Table, number, stress_label
+from feti_homog.typing import Document, Float
 
 NAMES = Column("", -28)
 STIFF = ("C11", "C22", "C33")
 STRESS_MODULI = ("E1", "E2", "G12", "bulk", "shear")  # in the unit of the stresses; the others are ratios
-ENGINEERING = (("E1", "E2", "E3"), ("G12", "G13", "G23"), ("nu12", "nu13", "nu23"))
+ENGINEERING = ("E1", "E2", "E3", "G12", "G13", "G23", "nu12", "nu13", "nu23")
 THERMAL = {
     "thermal_stress": "thermal stress",
     "thermal_stress_compression": "under minus one",
     "thermal_expansion": "thermal expansion",
 }
-THERMAL_DIGITS = 7  # below the last of the largest there is zero
-THIS_CELL, ITS_ERROR, LOWER, UPPER, UNKNOWN = "this cell", "error of its mesh", "lower bound", "upper bound", "-"
+THIS_CELL, ITS_ERROR, LOWER, UPPER = "this cell", "error of its mesh", "lower bound", "upper bound"
 MESH_ERROR = "Mesh error, estimated"
-# Of a value by which an error is below the digits that are printed without it.
-NO_ERROR = 1e-7
-LEAST_DECIMAL, MOST_DECIMAL = 1e-4, 1e8  # numbers between these are printed to the digits of their errors
-ABREAST = 5  # constants beside each other in text
+PAIRS = 2  # constants beside each other in text
 
 
-def stiffnesses(document: Document, label: str, under_minus: str = "Under minus E") -> list[Table]:
-    """L^ef, also under minus the unit strains, to the digit that is the last of its largest entry.
-
-    `label` is the unit of stresses in brackets, or empty.
-    """
-    titles = {"effective_stiffness": "Effective stiffness", "effective_stiffness_compression": under_minus}
-    found, errors = list[Table](), _errors(document)
+def stiffnesses(document: Document) -> list[Table]:
+    """Return L^ef, also under minus the unit strains, all entries to the last digit of the largest."""
+    titles = {"effective_stiffness": "Effective stiffness", "effective_stiffness_compression": "Under minus E"}
+    tables, errors, label = list[Table](), _errors(document), stress_label(document)
     for key, title in titles.items():
         if document.get(key) is not None:
             axes = "" if len(document[key]) == len(STRAINS) else f", {CELL_AXES}"
-            found.append(_matrix(f"{title}{axes}{label}", document[key]))
+            tables.append(_matrix(f"{title}{axes}{label}", document[key]))
         if errors.get(key) is not None:
-            found.append(_matrix(f"{MESH_ERROR}{label}", errors[key], ".1e"))
-    return found
+            tables.append(_matrix(f"{MESH_ERROR}{label}", errors[key], ".1e"))
+    return tables
 
 
 def _errors(document: Document) -> Document:
-    """Return the estimated errors of the mesh, empty of a result without."""
-    found: Document = document.get("mesh_error") or {}
-    return found
+    """Return the mesh errors of a result; empty without estimates."""
+    estimated: Document = document.get("mesh_error") or {}
+    return estimated
 
 
 def value_and_error(value: float, error: float | None, form: str) -> tuple[str, str]:
-    """Return a constant and its error.
+    """Return a constant and its error as texts.
 
-    The error has two digits, which give the number of those of the constant; in this format and empty without an error.
+    The error has two digits, the constant as many decimals; without an error the constant has format `form`.
     """
     if error is None:
         return number(value, form), ""
-    if not error > NO_ERROR * abs(value) or not LEAST_DECIMAL < abs(value) < MOST_DECIMAL:
+    # An error below the digits printed without it, or a constant of extreme size.
+    if not error > 1e-7 * abs(value) or not 1e-4 < abs(value) < 1e8:
         return number(value, form), f"{error:.1e}"
     decimals = max(0, 1 - floor(log10(error)))
     return f"{value:.{decimals}f}", f"{error:.{decimals}f}"
 
 
-def with_errors(title: str, values: Mapping[str, float], errors: Mapping[str, float], unit: str = "") -> Table:
-    """Return constants, stresses among them with their unit, and a column of errors, if any is known."""
-    rows = [
-        [with_unit(name, unit), *(text for text in value_and_error(value, errors.get(name), ".7g") if text)]
-        for name, value in values.items()
-    ]
-    return Table(title, [NAMES, Column("computed"), *([Column("mesh error", 12, ".1e")] if errors else [])], rows)
-
-
-def abreast(
-    rows: Sequence[Sequence[str]], values: Mapping[str, float], errors: Mapping[str, float], width: int
-) -> list[str]:
-    """Return lines of those constants of each row that are known, with their errors; names take so many columns."""
-    words = {}
+def with_errors(title: str, values: Mapping[str, float], errors: Mapping[str, float], abreast: int) -> Table:
+    """Return constants with mesh errors, `abreast` per line in text; in pairs ratios have six decimals."""
+    rows = []
     for name, computed in values.items():
-        value, error = value_and_error(computed, errors.get(name), ".7g")
-        words[name] = f"{name:<{width}}{value:>13}{_beside(error)}"
-    known = ([words[name] for name in names if name in words] for names in rows)
-    return [f"  {'    '.join(row)}".rstrip() for row in known if row]
+        form = ".6f" if abreast == PAIRS and name not in STRESS_MODULI else ".7g"
+        value, error = value_and_error(computed, errors.get(name), form)
+        rows.append([name, value, f"+- {error}" if error else ""][: 3 if errors else 2])
+    width = max((len(name) for name in values), default=0) + 2
+    columns = [Column("", -width, indent=0), Column("computed", 13), Column("mesh error", -13, indent=1)]
+    return Table(title, columns[: 3 if errors else 2], rows, abreast=abreast)
 
 
-def _beside(error: str) -> str:
-    """Return an error as it stands behind its value."""
-    return f" +- {error:<9}" if error else ""
-
-
-def _matrix(title: str, rows: Sequence[Sequence[float]], given: str = "") -> Table:
+def _matrix(title: str, rows: Sequence[Sequence[float]], fixed: str = "") -> Table:
     strains, stresses = voigt_names(len(rows))
     in_plane = len(rows) == len(STRAINS)
-    names, width, digits, most, short = (NAMES, 16, 8, 1e8, ".7e") if in_plane else (Column("", -6), 12, 7, 1e6, ".4e")
+    names, width, digits, limit, short = (NAMES, 16, 8, 1e8, ".7e") if in_plane else (Column("", -6), 12, 7, 1e6, ".4e")
     largest = max(abs(entry) for row in rows for entry in row)
-    form = f".{digits - 1 - floor(log10(largest))}f" if 10.0 ** (4 - digits) < largest < most else short
-    form = given or form
+    form = f".{digits - 1 - floor(log10(largest))}f" if 10.0 ** (4 - digits) < largest < limit else short
+    form = fixed or form
     named = [[name, *row] for name, row in zip(stresses, rows, strict=True)]
     return Table(title, [names, *(Column(name, width, form) for name in strains)], named, title_in_head=in_plane)
 
 
-def thermal(document: Document, label: str) -> list[Table]:
-    """Return the table of thermal constants: a row per component, a column per known quantity."""
-    known = {key: title for key, title in THERMAL.items() if document.get(key) is not None}
+def thermal(document: Document) -> list[Table]:
+    """Return thermal constants: a row per component, a column per known quantity."""
+    present = {key: title for key, title in THERMAL.items() if document.get(key) is not None}
     names = [stress[1:] for stress in SPATIAL_STRESSES]
-    errors = {key: _errors(document)[key] for key in known if _errors(document).get(key) is not None}
-    rows = list(zip(names, *(_rounded(document[key]) for key in known), *errors.values(), strict=True))
-    columns = [Column("", -6), *(Column(title, 22, ".7g") for title in known.values())]
+    errors = {key: _errors(document)[key] for key in present if _errors(document).get(key) is not None}
+    values = (_rounded(np.array(document[key], float)) for key in present)
+    rows = list(zip(names, *values, *errors.values(), strict=True))
+    columns = [Column("", -6), *(Column(title, 22, ".7g") for title in present.values())]
     columns += [Column(f"{key.rpartition('_')[2]}: error", 18, ".1e") for key in errors]
-    return [Table(f"Per unit of temperature, {CELL_AXES}{label}", columns, rows)] if known else []
+    title = f"Per unit of temperature, {CELL_AXES}{stress_label(document)}"
+    return [Table(title, columns, rows)] if present else []
 
 
-def _rounded(numbers: Sequence[float]) -> list[float]:
-    least = 10.0**-THERMAL_DIGITS * max(map(abs, numbers))
-    return [0.0 if abs(entry) <= least else entry for entry in numbers]
+def _rounded(values: Float) -> list[float]:
+    is_seen = np.abs(values) > 10.0**-7 * np.abs(values).max()
+    return [float(value) for value in np.where(is_seen, values, 0.0)]
 
 
-def moduli(document: Document, unit: str) -> list[Table]:
-    """Engineering moduli of the plane state, each with its unit."""
-    values, errors = document.get("moduli") or {}, _errors(document).get("constants", {})
-    return [with_errors("Engineering moduli", values, errors, unit)] if values else []
+def moduli(document: Document) -> Table:
+    """Return engineering moduli of the plane state: in text moduli left, ratios right."""
+    values, errors = document["moduli"], _errors(document).get("constants", {})
+    sides = [name for name in values if name in STRESS_MODULI], [name for name in values if name not in STRESS_MODULI]
+    names = [name for pair in zip_longest(*sides) for name in pair if name is not None]
+    title = f"Engineering moduli{stress_label(document)}"
+    return with_errors(title, {name: values[name] for name in names}, errors, PAIRS)
 
 
-def moduli_lines(document: Document, label: str) -> list[str]:
-    """Return the same as text: moduli on the left, ratios on the right."""
-    left, right = list[str](), list[str]()
-    for name, modulus in document["moduli"].items():
-        form, width, column = (".7g", 6, left) if name in STRESS_MODULI else (".6f", 11, right)
-        value, error = value_and_error(modulus, _errors(document).get("constants", {}).get(name), form)
-        column.append(f"{name:<{width}}{value:>13}{_beside(error)}")
-    pairs = zip_longest(left, right, fillvalue="")
-    return [f"Engineering moduli{label}", *(f"  {modulus:<34}{ratio}".rstrip() for modulus, ratio in pairs)]
-
-
-def bounds(document: Document, label: str) -> list[Table]:
-    """Lower bound, computed value and upper bound; those outside are marked."""
+def bounds(document: Document) -> Table:
+    """Return lower bound, computed value and upper bound; values outside are marked."""
     if not document.get("bounds"):
-        return []
-    found, here, rows = document["bounds"], document["effective_stiffness"], []
+        return Table("Bounds: none of cells with voids", [], [])
+    limits, computed, rows = document["bounds"], document["effective_stiffness"], []
     for i, name in enumerate(STIFF):
-        lower, value, upper = found["reuss"][i][i], here[i][i], found["voigt"][i][i]
+        lower, value, upper = limits["reuss"][i][i], computed[i][i], limits["voigt"][i][i]
         inside = lower - 1e-9 * abs(lower) <= value <= upper + 1e-9 * abs(upper)
         rows.append([f"{name} Reuss, Voigt", lower, value, upper, *([] if inside else ["outside"])])
     # These hold for isotropic cells only, so a value outside is no fault.
-    for name, (lower, upper) in (found["hashin_shtrikman"] or {}).items():
+    for name, (lower, upper) in (limits["hashin_shtrikman"] or {}).items():
         rows.append([f"{name} Hashin-Shtr.", lower, document["moduli"][name], upper])
     columns = [NAMES, *(Column(name, 14, ".7g") for name in ("lower", "computed", "upper"))]
     columns += [Column("", 9)] if any(len(row) > len(columns) for row in rows) else []
-    return [Table(f"Bounds{label}", columns, rows, title_in_head=True)]
+    return Table(f"Bounds{stress_label(document)}", columns, rows, title_in_head=True)
 
 
-def constants(document: Document, label: str) -> list[Table]:
-    """Engineering constants in space, their range across the fibres, and closed estimates and bounds beside them."""
-    found, errors = list[Table](), _errors(document).get("constants", {})
-    if (values := document.get("constants")) is not None:
-        found.append(with_errors(f"Engineering constants, {CELL_AXES}{label}", values, errors))
-    if (across := document.get("transverse_moduli")) is not None:
-        ends = ("least", "largest")
-        rows = [[name, *(across[f"{name}_{end}"] for end in ends)] for name in ("E", "G")]
-        title = f"Over all directions across the fibres{label}"
-        found.append(Table(title, [NAMES, *map(Column, ends)], rows))
-    return [*found, *estimates(document, label)]
-
-
-def constants_lines(document: Document, label: str) -> list[list[str]]:
-    """Return the same as blocks of text; empty blocks where nothing is known."""
-    values, block = document.get("constants"), list[str]()
+def constants(document: Document) -> list[Table]:
+    """Return engineering constants in space; constants about the fibres with estimates and bounds."""
+    tables, values = list[Table](), document.get("constants")
     if values is not None:
-        rows = abreast(ENGINEERING, values, _errors(document).get("constants", {}), width=5)
-        block = [f"Engineering constants, {CELL_AXES}{label}", *rows]
-    return [block, *(_estimates_lines(document, table) for table in estimates(document, label))]
+        title = f"Engineering constants, {CELL_AXES}{stress_label(document)}"
+        values = {name: values[name] for name in ENGINEERING if name in values}
+        tables.append(with_errors(title, values, _errors(document).get("constants", {}), 3))
+    return [*tables, *([_estimates(document)] if document.get("transversely_isotropic") is not None else [])]
 
 
-def estimates(document: Document, label: str) -> list[Table]:
-    """Constants along the fibres and across them.
-
-    A row for each source that has one, a column for each constant that some source has.
-    """
-    if document.get("transversely_isotropic") is None:
-        return []
-    rows = {title: _known(row) for title, row in _sources(document).items()}
-    names = [name for name in ABOUT_FIBRES if any(name in row for row in rows.values())]
-    forms = {ITS_ERROR: ".1e"}
-    cells = [
-        [title, *(_short(row.get(name), forms.get(title, ".5g")) for name in names)]
-        for title, row in rows.items()
-        if row
+def _estimates(document: Document) -> Table:
+    """Return constants about the fibres: a row per source, a column per constant known from any source."""
+    sources = _sources(document)
+    names = [name for name in ABOUT_FIBRES if any(name in row for row in sources.values())]
+    rows = [
+        [title, *(_short(row.get(name), ".1e" if title == ITS_ERROR else ".5g") for name in names)]
+        for title, row in sources.items()
     ]
     columns = [Column("", -22), *(Column(name, max(13, len(name) + 2)) for name in names)]
-    return [Table(f"Along the fibres and across them{label}", columns, cells)]
+    below = [f"  {UNKNOWN}: not available from this method"] if any(UNKNOWN in row for row in rows) else []
+    below += [f"  closed-form estimates exist for {why} only" for why in _why_no_estimates(document)]
+    deviation = 100 * document["transversely_isotropic"]["deviation"]
+    title = f"Along the fibres and across them{stress_label(document)}; {deviation:.2g} % from transversely isotropic"
+    return Table(title, columns, rows, _ranges(document), below, most_columns=5)
+
+
+def _ranges(document: Document) -> list[str]:
+    """Return the range of moduli over all directions across the fibres, if known."""
+    if (across := document.get("transverse_moduli")) is None:
+        return []
+    ranges = (f"{n} from {_short(across[f'{n}_least'])} to {_short(across[f'{n}_largest'])}" for n in ("E", "G"))
+    return [f"  over all directions across: {', '.join(ranges)}"]
 
 
 def _sources(document: Document) -> dict[str, Document]:
-    """Return the constants of this cell, by each method, and the bounds."""
+    """Return known constants about the fibres by source: this cell, its errors, estimates, bounds."""
     limits = _known(document.get("fibre_bounds") or {})
     errors, sources = _errors(document).get("constants", {}), {THIS_CELL: document["transversely_isotropic"]}
     sources |= {ITS_ERROR: {name: errors[name] for name in ABOUT_FIBRES if name in errors}} if errors else {}
     sources |= {name.replace("_", " "): row for name, row in (document.get("estimates") or {}).items()}
-    return sources | {name: {key: limits[key][k] for key in limits} for k, name in enumerate((LOWER, UPPER))}
+    sources |= {name: {key: limits[key][k] for key in limits} for k, name in enumerate((LOWER, UPPER))}
+    return {title: present for title, row in sources.items() if (present := _known(row))}
 
 
-def _estimates_lines(document: Document, table: Table) -> list[str]:
-    """Return a few constants beside each other, the others below them."""
-    cell, across = document["transversely_isotropic"], document.get("transverse_moduli")
-    lines = [f"{table.title}; {100 * cell['deviation']:.2g} % from transversely isotropic"]
-    if across is not None:
-        ranges = (f"{n} from {_short(across[f'{n}_least'])} to {_short(across[f'{n}_largest'])}" for n in ("E", "G"))
-        lines.append(f"  over all directions across: {', '.join(ranges)}")
-    for first in range(1, len(table.columns), ABREAST):
-        part = [0, *range(first, min(first + ABREAST, len(table.columns)))]
-        rows = [[row[k] for k in part] for row in table.rows]
-        known = [row for row in rows if set(row[1:]) != {UNKNOWN}]
-        lines += replace(table, columns=[table.columns[k] for k in part], rows=known).lines[1:]
-    if any(UNKNOWN in row for row in table.rows):
-        lines.append(f"  {UNKNOWN}: not available from this method")
-    why = _why_no_estimates(document)
-    return [*lines, *([f"  no closed estimates, which are of {why}"] if why else [])]
-
-
-def _why_no_estimates(document: Document) -> str:
-    """Return the cells of which there are estimates, where there are none of this one; empty if there are."""
+def _why_no_estimates(document: Document) -> list[str]:
+    """Return the kind of cell that has estimates, if this cell has none."""
     case, cell = document.get("case", {}), document.get("cell", {})
     if document.get("estimates") is not None:
-        return ""
+        return []
     if len(cell.get("fractions", ())) == 1:
-        return "composites"
+        return ["composites"]
     if cell.get("porosity"):
-        return "cells without voids"
+        return ["cells without voids"]
     if COATING in case.get("material", {}):
-        return "fibres without coatings"
-    return "round fibres that are bonded, all alike" if case.get("interface") else "round fibres"
+        return ["fibres without coatings"]
+    return ["round fibres that are bonded, all alike" if case.get("interface") else "round fibres"]
 
 
 def _known(row: Document) -> dict[str, Any]:

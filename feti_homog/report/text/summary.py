@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from textwrap import wrap
@@ -11,34 +10,30 @@ from typing import Any
 
 from feti_homog.report.text.analyses import reported
 from feti_homog.report.text.point_tables import WIDTH
-from feti_homog.report.text.table import Column, Table, in_brackets
+from feti_homog.report.text.table import ERROR, Column, Table
 from feti_homog.typing import Document
 
 LABEL = 12  # columns of the labels at the left
 NAME = 28  # columns of the names of checks
 GLUE = "\N{NO-BREAK SPACE}"  # at which no line is broken
-LISTED = 12  # numbers of iterations that are reported one by one
-
-NOTEBOOK_ROWS = 20  # of a table of points
 
 
 def summary(document: Document) -> str:
-    """Return the document in lines of at most 79 columns, without a newline at the end.
+    """Return the printed summary of a result, lines up to 79 columns, tables up to 100 (but for long names).
 
-    Tables have at most 100 (but for long names).
+    Cell, solver, tables of the analysis, checks, timings, memory, remarks, warnings, faults and status.
 
-    Cell, solver, effective stiffness with moduli and bounds or else the points of `angle` or `path`, the state of
-    `load`, onsets, checks, timings, memory, warnings and status.
-    Other keys are left out. Raises KeyError if one that it prints is missing.
+    Raises:
+        KeyError: a key of these is missing.
     """
     blocks = [
         _heading(document),
         [*_cell(document), *_solver(document["solver"])],
-        *_answer(document),
-        _checks(document),
+        *(table.lines for table in answers(document)),
+        checks(document).lines,
         [
             *_field("Time", [f"{stage}{GLUE}{took:.2f}{GLUE}s" for stage, took in document["timings"].items()]),
-            *_field("Memory", [f"{_bytes(document['memory'])} per rank at most"]),
+            *_field("Memory", [f"{_memory(document['memory'])} per rank at most"]),
         ],
         [
             *_remarks("Remark", document.get("remarks", ())),
@@ -51,31 +46,31 @@ def summary(document: Document) -> str:
 
 
 def short_summary(document: Document) -> str:
-    """Return the answer, the largest error of all checks, and the status."""
+    """Return the tables of a result, its largest check error, and its status."""
     law, error = max(document["checks"].items(), key=lambda check: check[1])
-    checks = _field("Checks", [f"largest relative error {error:.1e} ({law})"])
-    return _joined([_heading(document), *_answer(document), [*checks, *_field("Status", [str(document["status"])])]])
+    verdict = _field("Checks", [f"largest relative error {error:.1e} ({law})"])
+    return _joined(
+        [
+            _heading(document),
+            *(table.lines for table in answers(document)),
+            [*verdict, *_field("Status", [str(document["status"])])],
+        ]
+    )
 
 
 def notebook(document: Document) -> str:
-    """Title, tables, checks and status as HTML."""
-    rows = [[check.law, f"{check.error:.1e}"] for check in checks(document)]
-    errors = Table("Largest relative errors", [Column("law"), Column("error")], rows)
-    tables = [table.html for table in (*answers(document, NOTEBOOK_ROWS), errors)]
+    """Return title, tables, checks and status as HTML."""
+    tables = [table.html for table in (*answers(document, 20), checks(document))]
     return "\n".join([f"<h4>{escape(title_of(document))}</h4>", *tables, f"<p>{escape(document['status'])}</p>"])
 
 
-def answers(document: Document, most: int) -> list[Table]:
-    """Return the tables of a result: stiffness with moduli and bounds, points of an angle or path, or onsets.
-
-    Tables of points have at most so many rows.
-    """
-    label = in_brackets(document["case"].get("output", {}).get("stress_unit", ""))
-    return reported(document).tables(document, label, most)
+def answers(document: Document, most: int | None = None) -> list[Table]:
+    """Return the tables of a result, with at most `most` rows of points."""
+    return reported(document).tables(document, most)
 
 
 def title_of(document: Document) -> str:
-    """Name, analysis and plane state of the case."""
+    """Return case name, analysis and plane state."""
     case = document["case"]
     what = reported(document).title
     return f"{case.get('name', '')}: {what}, plane {case['analysis']['plane']}".lstrip(": ")
@@ -90,14 +85,6 @@ def _joined(blocks: Iterable[Sequence[str]]) -> str:
     return "\n\n".join("\n".join(block) for block in blocks if block).replace(GLUE, " ")
 
 
-def _answer(document: Document) -> list[list[str]]:
-    """Return the blocks of what was asked for."""
-    output = document["case"].get("output", {})
-    unit, length = output.get("stress_unit", ""), output.get("length_unit", "")
-    label, toughness = in_brackets(unit), in_brackets(f"{unit} {length}") if unit and length else ""
-    return reported(document).lines(document, label, toughness)
-
-
 def _cell(document: Document) -> list[str]:
     cell, case = document["cell"], document["case"]
     unit = case.get("output", {}).get("length_unit", "")
@@ -106,33 +93,30 @@ def _cell(document: Document) -> list[str]:
     shares = ", ".join(f"{phase} {share:.6f}" for phase, share in fractions.items())
     mesh = [_number(cell["elements"], "element"), _number(cell["nodes"], "node")]
     mesh += [f"order {shape['order']}"] * ("order" in shape) + _sizes(shape, cell)
+    match = list[str]()
+    if (distance := cell.get("match_distance")) is not None:
+        phrases = f"distances of neighbours differ by {distance:.4f} mean diameters"
+        match = _field("Match", [Path(shape["match"]).name, phrases])
     shares += f", voids {cell['porosity']:.6f}" if cell.get("porosity") else ""
     return [
         *_field("Cell", [str(shape["geometry"]), size]),
         *_field("Meshed", [f"fibre fraction {cell['fibre_fraction']:.6f}", *([f"({shares})"] if shares else [])]),
-        *_match(shape, cell),
+        *match,
         *_scatter(document.get("fibres", ())),
         *_field("Mesh", mesh),
     ]
 
 
 def _sizes(shape: Document, cell: Document) -> list[str]:
-    """Return how often elements were split, and the coarse mesh where the program chose it."""
+    """Return the refinement, and the coarse mesh size where the program chose it."""
     if "refine" in shape:
         return [f"refine {shape['refine']}"]
     size = f"refine {cell['refine']} of mesh_size {cell['mesh_size']:g}"
     return [f"{size} for accuracy = {shape['accuracy']:g}"] if "accuracy" in shape else []
 
 
-def _match(shape: Document, cell: Document) -> list[str]:
-    """Return how far the fibres are from those of a table."""
-    distance = cell.get("match_distance")
-    words = f"distances of neighbours differ by {distance or 0:.4f} mean diameters"
-    return [] if distance is None else _field("Match", [Path(shape["match"]).name, words])
-
-
 def _scatter(fibres: Sequence[Document]) -> list[str]:
-    """Return the range of the strengths of fibres, where they differ."""
+    """Return the strength range of the fibres, if strengths differ."""
     factors = [fibre["strength"] for fibre in fibres if "strength" in fibre]
     if not factors:
         return []
@@ -144,83 +128,56 @@ def _scatter(fibres: Sequence[Document]) -> list[str]:
 
 def _solver(solver: Document) -> list[str]:
     parts = [_number(solver["ranks"], "rank"), _number(solver["subdomains"], "subdomain")]
-    dual = [_number(solver["multipliers"], "multiplier"), f"kernel {solver['kernel_dim']}"]
+    dual, factorized = [_number(solver["multipliers"], "multiplier"), f"kernel {solver['kernel_dim']}"], list[str]()
+    if (count := solver.get("factorizations")) is not None:  # of the axial problem too
+        coarse = f"coarse problem {_number(solver.get('coarse_factorizations', 0), 'time')}"
+        factorized = [f"{count} {'matrix' if count == 1 else 'matrices'} of subdomains", coarse]
     return [
         *_field("Solver", [*parts, _number(solver["dofs"], "dof")]),
         *_field("Dual", [*dual, f"coarse problem {solver['coarse_dim']}"]),
-        *_factorized(solver),
-        *_field("Iterations", _iterations(_listed(solver["iterations"]))),
+        *(_field("Factorized", factorized) if factorized else []),
+        *_field("Iterations", _iterations(solver["iterations"])),
     ]
-
-
-def _factorized(solver: Document) -> list[str]:
-    if "factorizations" not in solver:
-        return []
-    coarse = f"coarse problem {_number(solver.get('coarse_factorizations', 0), 'time')}"
-    count = solver["factorizations"]  # of the axial problem too
-    return _field("Factorized", [f"{count} {'matrix' if count == 1 else 'matrices'} of subdomains", coarse])
 
 
 def _iterations(counts: Sequence[int]) -> list[str]:
     if not any(counts):
         return [f"none in {_number(len(counts), 'state')}"]
-    if len(counts) <= LISTED:
+    if len(counts) <= 12:
         return [str(count) for count in counts]
     return [f"{min(counts)} to {max(counts)} a state", f"{sum(counts)} for {len(counts)} states"]
 
 
-@dataclass(frozen=True)
-class Check:
-    """A law with its largest relative error and the limit of it, if there is one."""
-
-    law: str
-    error: float
-    limit: float | None
-
-    @property
-    def holds(self) -> bool:
-        return self.limit is None or self.error <= self.limit
-
-
-def checks(document: Document) -> list[Check]:
-    """Return the laws that were checked; those of contact do not apply where all is bonded."""
+def checks(document: Document) -> Table:
+    """Return the largest relative error of each law; laws of contact need an interface."""
     limit, has_interface = document.get("check_tolerance"), bool(document["case"].get("interface"))
-    contact = document.get("kkt_tolerance", limit)
-    return [
-        Check(law, error, contact if law.startswith("kkt_") else limit)
-        for law, error in document["checks"].items()
-        if error is not None and (has_interface or not law.startswith("kkt_"))
-    ]
-
-
-def _checks(document: Document) -> list[str]:
-    found, limit = checks(document), document.get("check_tolerance")
-    of_contact = {f"; of contact {check.limit:.1e}" for check in found if check.limit != limit}
-    title = "Checks" if limit is None else f"Checks (relative, at most {limit:.1e}{''.join(of_contact)})"
-    verdicts = {True: "pass", False: "FAIL"}
-    return [title] + [
-        f"  {c.law:<{NAME - 2}}{c.error:>14.1e}    {'' if c.limit is None else verdicts[c.holds]}".rstrip()
-        for c in found
-    ]
+    contact, rows, title = document.get("kkt_tolerance", limit), list[list[Any]](), "Checks"
+    for law, error in document["checks"].items():
+        of_contact = law.startswith("kkt_")
+        if error is None or (of_contact and not has_interface):
+            continue
+        most = contact if of_contact else limit
+        rows.append([law, error, *([] if most is None else ["pass" if error <= most else "FAIL"])])
+    if limit is not None:
+        of_contact = f"; of contact {contact:.1e}" if contact != limit and any("kkt_" in row[0] for row in rows) else ""
+        title = f"Checks (relative, at most {limit:.1e}{of_contact})"
+    columns = [Column("law", 2 - NAME, indent=0), Column("error", 14, ERROR), Column("", -8, indent=4)]
+    return Table(title, columns, rows, abreast=1)
 
 
 def _remarks(label: str, remarks: Iterable[str]) -> list[str]:
     return [line for remark in remarks for line in _field(label, [str(remark)])]
 
 
-def _field(label: str, words: Sequence[str]) -> list[str]:
-    """Return a label and its words, separated by commas, in as many lines as it takes."""
-    text = ", ".join(words).replace(", (", " (")
+def _field(label: str, phrases: Sequence[str]) -> list[str]:
+    """Return a label and its words, joined by commas and wrapped to WIDTH columns."""
+    text = ", ".join(phrases).replace(", (", " (")
     return wrap(text, WIDTH, initial_indent=f"{label:<{LABEL}}", subsequent_indent=" " * LABEL, break_long_words=False)
-
-
-def _listed(value: Any) -> list[Any]:
-    return list(value) if isinstance(value, list | tuple) else [value]
 
 
 def _number(count: int, name: str) -> str:
     return f"{count:,} {name}{'' if count == 1 else 's'}".replace(",", " ")
 
 
-def _bytes(size: float) -> str:
+def _memory(size: float) -> str:
     return f"{size / 2**20:.0f} MiB" if size < 2**30 else f"{size / 2**30:.2f} GiB"

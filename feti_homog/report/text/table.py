@@ -1,4 +1,4 @@
-"""Tables of a result, rows made once, written as text for a terminal and as HTML; units of their columns."""
+"""Tables of a result, written as text for a terminal and as HTML; units of their columns."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
 from typing import Any
+
+from feti_homog.typing import Document
 
 STRESSES = ("young", "stiffness", "normal_strength", "tangential_strength", "axial_strength", "tractions",
            "dissipated", "dissipated_strain_controlled", "work", "load_stored")  # fmt: skip
@@ -17,10 +19,11 @@ FIXED = {"angle": "degrees", "centre": "degrees", "values": "degrees", "memory":
 ERROR = ".1e"
 SAME_IN_HTML = re.compile(rf"\.\d+f|{re.escape(ERROR)}")
 NOISE = 1e-12  # what the solver leaves of a zero
+UNKNOWN = "-"
 
 
 def unit(name: str, stress_unit: str) -> str:
-    """Return the unit of a key of a case file, dotted, or of a column of a sweep's table; empty if it has none."""
+    """Return the unit of a dotted case key or a sweep column; empty without one."""
     last = name.rpartition(".")[2].removesuffix("_mesh_error")
     if last.startswith("seconds_"):
         return "s"
@@ -30,13 +33,25 @@ def unit(name: str, stress_unit: str) -> str:
 
 
 def with_unit(name: str, stress_unit: str) -> str:
-    """Return the name and, in brackets, the unit that it has."""
+    """Return the name with its unit, if any, in brackets."""
     return name + in_brackets(unit(name, stress_unit))
 
 
 def in_brackets(unit: str) -> str:
-    """Return the unit for a title: in brackets after a space; empty if there is none."""
+    """Return a unit in brackets after a space; empty without a unit."""
     return f" ({unit})" if unit else ""
+
+
+def stress_label(document: Document) -> str:
+    """Return the stress unit of a result, in brackets."""
+    return in_brackets(document["case"].get("output", {}).get("stress_unit", ""))
+
+
+def toughness_label(document: Document) -> str:
+    """Return the unit of energy release rates, in brackets; empty unless the case labels both units."""
+    output = document["case"].get("output", {})
+    stress, length = output.get("stress_unit", ""), output.get("length_unit", "")
+    return in_brackets(f"{stress} {length}") if stress and length else ""
 
 
 @dataclass(frozen=True)
@@ -61,7 +76,7 @@ class Column:
         return f"{self.name:<{-self.width}}" if self.width < 0 else f"{self.name:>{self.width}}"
 
     def cell(self, value: Any) -> str:
-        """Return an entry in text: texts as they are, numbers in the format of the column."""
+        """Return a cell as text: texts as they are, numbers in column format."""
         if self.width < 0:
             return f"{' ' * self.indent + value:<{-self.width}}"
         return f" {number(value, self.form):>{self.width - 1}}"
@@ -72,44 +87,70 @@ class Table:
     """Rows of texts and numbers, each as long as `columns` or shorter.
 
     Attributes:
-        above: lines of the text between title and heads.
+        above, below: lines of the text before the heads, and after the rows; notes in HTML.
         title_in_head: in text the title stands where the first column has its head.
+        abreast: rows that stand beside each other in text, without heads; 0 for one row a line.
+        most_columns: columns behind the first in text; more are blocks below each other, without unknown rows.
     """
 
     title: str
     columns: Sequence[Column]
     rows: Sequence[Sequence[Any]]
     above: Sequence[str] = ()
+    below: Sequence[str] = ()
     title_in_head: bool = False
+    abreast: int = 0
+    most_columns: int = 100
 
     @property
     def lines(self) -> list[str]:
         """The table as text."""
-        head = "".join(column.head for column in self.columns)
-        rows = ("".join(column.cell(value) for column, value in zip(self.columns, row)) for row in self.rows)  # noqa: B905
-        if self.title_in_head:
-            first = -self.columns[0].width
-            return [line.rstrip() for line in (f"{self.title:<{first}}{head[first:]}", *rows)]
-        return [line.rstrip() for line in (self.title, *self.above, head, *rows)]
+        title, blocks = [self.title, *self.above], list[str]()
+        step = self.most_columns
+        for first in range(1, len(self.columns), step):
+            columns = [self.columns[0], *self.columns[first : first + step]]
+            head = "".join(column.head for column in columns)
+            rows = [[*row[:1], *row[first : first + step]] for row in self.rows]
+            texts = [
+                "".join(column.cell(value) for column, value in zip(columns, row, strict=False))
+                for row in rows
+                if set(row[1:]) != {UNKNOWN}
+            ]
+            if self.abreast:
+                groups = (texts[k : k + self.abreast] for k in range(0, len(texts), self.abreast))
+                blocks += ["  " + "    ".join(group) for group in groups]
+            elif self.title_in_head:
+                width = -self.columns[0].width
+                title, blocks = [], [f"{self.title:<{width}}{head[width:]}", *texts]
+            else:
+                blocks += [head, *texts]
+        return [line.rstrip() for line in (*title, *blocks, *self.below)]
 
     @property
     def cells(self) -> list[list[str]]:
-        """The rows as texts, numbers with the decimals of their columns, or else with seven digits."""
+        """The rows as texts: numbers with the column decimals, or seven digits."""
         forms = [column.form if SAME_IN_HTML.fullmatch(column.form) else ".7g" for column in self.columns]
-        return [[_cell(value, form) for value, form in zip(row, forms, strict=False)] for row in self.rows]
+        return [
+            # Zero in place of noise, but errors as they are, small ones too.
+            [
+                number(without_noise(value) if form != ERROR else value, "d" if isinstance(value, int) else form)
+                for value, form in zip(row, forms, strict=False)
+            ]
+            for row in self.rows
+        ]
 
     @property
     def html(self) -> str:
         """The table as HTML."""
         head = _row((column.name for column in self.columns), "col", 'th scope="col"')
         rows = "\n".join(_row(row, "row", "td") for row in self.cells)
-        return (
-            f"<table><caption>{escape(self.title)}</caption>\n<thead>{head}</thead>\n<tbody>\n{rows}\n</tbody></table>"
-        )
+        notes = "".join(f"<small>{escape(line)}</small>" for line in (*self.above, *self.below))
+        caption = f"<caption>{escape(self.title)}{notes}</caption>"
+        return f"<table>{caption}\n<thead>{head}</thead>\n<tbody>\n{rows}\n</tbody></table>"
 
 
 def number(value: Any, form: str) -> str:
-    """Return a number in a format, without the sign of a zero that it is rounded to; texts as they are."""
+    """Return a number in a format, without the sign of a rounded zero; texts as they are."""
     if isinstance(value, str):
         return value
     text = format(value, form)
@@ -117,18 +158,11 @@ def number(value: Any, form: str) -> str:
 
 
 def without_noise(value: Any, size: float = 1.0) -> Any:
-    """Return the value; zero in place of a number that is what the solver leaves of zero beside `size`."""
+    """Return the value, or zero for a number that is solver noise relative to `size`."""
     return 0.0 if isinstance(value, float) and abs(value) <= NOISE * size else value
 
 
-def _cell(value: Any, form: str) -> str:
-    """Return an entry for HTML: zero in place of noise, but errors as they are, small ones too."""
-    if isinstance(value, int):
-        return number(value, "d")
-    return number(value if form == ERROR else without_noise(value), form)
-
-
 def _row(cells: Iterable[str], scope: str, tag: str) -> str:
-    first, *others = cells
-    rest = "".join(f"<{tag}>{escape(cell)}</{tag.partition(' ')[0]}>" for cell in others)
+    first, *more = cells
+    rest = "".join(f"<{tag}>{escape(cell)}</{tag.partition(' ')[0]}>" for cell in more)
     return f'<tr><th scope="{scope}">{escape(first)}</th>{rest}</tr>'

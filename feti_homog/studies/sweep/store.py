@@ -22,7 +22,7 @@ import tomli_w
 
 from feti_homog.case.case import Case
 from feti_homog.errors import CaseError, FetiHomogError
-from feti_homog.results import atomic, checkpoint_folder, output_folder, result_json, seals
+from feti_homog.results import atomic, checkpoint_file, output_folder, result_json, seals
 from feti_homog.schema.values import INF
 from feti_homog.studies.sweep.plan import Sweep, SweepCase, identity_of
 from feti_homog.system.runtime import input_files
@@ -187,7 +187,7 @@ def reset(directory: Path, entry: SweepCase, status: Status) -> None:
         (folder / ERROR_FILE).unlink(missing_ok=True)
     except OSError as error:
         raise FetiHomogError(f"cannot write {folder}: {error.strerror}") from error
-    checkpoint_folder.remove(folder)
+    checkpoint_file.remove(folder)
     set_aside(directory, entry, status)
 
 

@@ -16,7 +16,8 @@ from feti_homog.materials.constants import EngineeringConstants, Moduli, Transve
 from feti_homog.report.text.point_tables import STATES
 from feti_homog.report.text.table import unit
 from feti_homog.results import atomic
-from feti_homog.results.csv_tables import Column, columns
+from feti_homog.results.result_json import DescribedColumn as Column
+from feti_homog.results.result_json import columns
 from feti_homog.studies.sweep.report.sweep_table import SweepTable
 from feti_homog.system.runtime.records import STRESS
 

@@ -11,8 +11,8 @@ import pytest
 from support.effective_results import BORON_ALUMINIUM, COSINES, DISTINCT, TURNED, document, turned_stiffness
 from support.jobs import PATIENCE
 
-from feti_homog.report.cards import abaqus
 from feti_homog.report.cards.effective_material import in_axes_of_the_cell
+from feti_homog.report.cards.export import calculix
 
 pytestmark = pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed (Debian: calculix-ccx)")
 
@@ -65,7 +65,7 @@ def strains(folder, card):
 
 @pytest.mark.parametrize("sample", [BORON_ALUMINIUM, DISTINCT, TURNED], ids=["boron", "distinct", "turned"])
 def test_unit_stresses_and_warmth(tmp_path, sample):
-    found = strains(tmp_path, abaqus.calculix_text(in_axes_of_the_cell(document(sample))))
+    found = strains(tmp_path, calculix(in_axes_of_the_cell(document(sample))))
     S = np.linalg.inv(turned_stiffness(sample.stiffness_in_the_cell, COSINES.T))[:, [0, 1, 2, 5, 4, 3]]
     tensor = np.array([[S[0], S[5] / 2, S[4] / 2], [S[5] / 2, S[1], S[3] / 2], [S[4] / 2, S[3] / 2, S[2]]])
     assert np.abs(found[:6] - np.moveaxis(tensor, 2, 0)).max() < DIGITS * np.abs(tensor).max()

@@ -8,7 +8,7 @@ import pytest
 from support.effective_results import DISTINCT, document
 
 from feti_homog.errors import CaseError
-from feti_homog.report.cards import abaqus, export
+from feti_homog.report.cards import export
 from feti_homog.report.cards.effective_material import in_axes_of_the_cell
 from feti_homog.results import output_folder, result_json
 
@@ -20,7 +20,7 @@ def folder(tmp_path):
 
 
 def test_the_card_is_that_of_result_json(folder):
-    expected = abaqus.text(in_axes_of_the_cell(document(DISTINCT)))
+    expected = export.abaqus(in_axes_of_the_cell(document(DISTINCT)))
     assert export.card(folder, "abaqus", "orthotropic") == expected
     assert "The nearest transversely isotropic" in export.card(folder, "abaqus", "transversely isotropic")
 

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from feti_homog.report.plots import deformed_panels
-from feti_homog.report.plots.cell_frame import BAR_INCHES, LEAST_BAR, bar_beside, cell_size, figure_of, label_cell_axes
+from feti_homog.report.plots.drawn_cell import BAR_INCHES, LEAST_BAR, bar_beside, cell_size, figure_of, label_cell_axes
 from feti_homog.report.plots.plot_helpers import DPI, pixels_of, save
 
 

@@ -14,7 +14,7 @@ from support.sample_output import Sample, in_space, sample
 
 from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.report.plots import cell_picture, decimation, figures, plot_helpers
-from feti_homog.report.plots.interface_marks import DrawnCell, InterfaceEdges
+from feti_homog.report.plots.drawn_cell import DrawnCell, InterfaceEdges
 from feti_homog.results.field_file import FieldFile
 from feti_homog.results.result_json import SCHEMA
 

@@ -19,16 +19,13 @@ from PIL import Image
 from support.figure_words import panels
 from support.sample_output import Sample, in_space, sample
 
-from feti_homog.report.plots import deformed_panels, figures, plot_helpers, response_curves, traction_plots
-from feti_homog.report.plots.interface_marks import BONDED, CLOSED
-from feti_homog.report.plots.load_labels import LoadLabels
+from feti_homog.report.plots import deformed_panels, figures, plot_helpers, response_curves
+from feti_homog.report.plots.drawn_cell import BONDED, CLOSED, LoadLabels
 from feti_homog.report.plots.path_picture import figure as path_picture
 from feti_homog.results.field_file import FieldFile
 from feti_homog.results.result_json import SCHEMA
 
 pytestmark = pytest.mark.slow
-
-DRAWING = (figures, deformed_panels, response_curves, traction_plots)
 
 
 def path_of(strains: list[float]) -> dict[str, Any]:
@@ -60,8 +57,7 @@ def drawn(directory: Path, monkeypatch: Any) -> dict[str, Figure]:
         found[path.name] = figure
         return path
 
-    for module in DRAWING:
-        monkeypatch.setattr(module, "save", keep)
+    monkeypatch.setattr(plot_helpers, "save", keep)
     figures.plot(directory)
     return found
 

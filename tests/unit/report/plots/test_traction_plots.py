@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from support.sample_output import Sample, sample
 
 from feti_homog.report.plots.cell_picture import write_fibre_numbers
-from feti_homog.report.plots.interface_marks import DrawnCell
+from feti_homog.report.plots.drawn_cell import DrawnCell
 from feti_homog.report.plots.traction_plots import Coordinate, coordinate
 from feti_homog.results.field_file import FieldFile
 

@@ -17,7 +17,8 @@ def test_what_is_left_is_that_after_the_peak() -> None:
         "event_left": 3, "first_break_stress": 30.0, "first_break_strain": 0.005, "first_break_event": 2,
     }  # fmt: skip
     case = {"analysis": {"plane": "strain"}, "path": {"method": "events", "strain": [1.0, 0.0, 0.0]}}
-    lines = _peak_lines({"case": case, "path": [{"stress": [0.0, 0.0, 0.0]}] * 4}, peak, " (MPa)")
+    case["output"] = {"stress_unit": "MPa"}
+    lines = _peak_lines({"case": case, "path": [{"stress": [0.0, 0.0, 0.0]}] * 4}, peak)
     assert " ".join(" ".join(lines).split()) == (
         "Peak S11 (MPa): 40 at E11 = 0.006 (point 1); first break 30 at 0.005 (point 2); "
         "20 after the peak as the strain rises, 50.0% less (point 3)"
@@ -54,6 +55,6 @@ def along(stresses: list[float], broke: int = 0) -> dict[str, Any]:
 def test_a_peak_is_a_stress_after_which_the_path_falls(stresses, broke, begins, ends, mark) -> None:
     document = along([float(stress) for stress in stresses], broke)
     peak = peak_of(document)
-    words = " ".join(" ".join(_peak_lines(document, peak, "")).split())
+    words = " ".join(" ".join(_peak_lines(document, peak)).split())
     assert words.startswith(begins) and words.endswith(ends)
     assert marks(document)[peak["event"]].removeprefix("first break and ") == mark

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from feti_homog.report.text.point_tables import angle_table, components, envelope_lines
+from feti_homog.report.text.point_tables import angle_table, components, envelope_table
 
 
 def document(count: int, names: tuple[str, ...], without: tuple[int, ...] = (), **section: Any) -> dict[str, Any]:
@@ -17,12 +17,15 @@ def document(count: int, names: tuple[str, ...], without: tuple[int, ...] = (), 
         if number not in without:
             point |= {"factor": 10.0 + number, "fibre": 2, "bond_angle": -12.5} | dict.fromkeys(names, 0.25)
         points.append(point)
-    return {"case": {"envelope": {"plane": ["S22", "S12"]} | section}, "envelope": points}
+    return {
+        "case": {"envelope": {"plane": ["S22", "S12"]} | section, "output": {"stress_unit": "MPa"}},
+        "envelope": points,
+    }
 
 
 def test_the_least_and_the_largest_load_and_some_directions():
     whole = document(72, ("normal", "tangential", "axial"))
-    lines = envelope_lines(whole, " (MPa)")
+    lines = envelope_table(whole).lines
     assert lines[0] == "Onset of debonding in the plane S22, S12 (MPa): 72 directions"
     assert lines[1].split() == ["least", "10", "at", "0", "degrees"]
     assert lines[2].strip() == "largest  81 at 355 degrees"
@@ -33,7 +36,7 @@ def test_the_least_and_the_largest_load_and_some_directions():
 
 
 def test_directions_without_an_onset_are_counted():
-    lines = envelope_lines(document(8, ("psi",), without=(0, 3), temperature=-50.0), "")
+    lines = envelope_table(document(8, ("psi",), without=(0, 3), temperature=-50.0)).lines
     assert lines[0].endswith("8 directions, after a temperature of -50")
     assert lines[1].strip() == "no load breaks a bond in 2 of them"
     assert lines[6].split() == ["0", "none", "none"] and lines[5].split()[-1] == "psi"
@@ -41,14 +44,14 @@ def test_directions_without_an_onset_are_counted():
 
 
 def test_nothing_may_break():
-    lines = envelope_lines(document(4, (), without=(0, 1, 2, 3)), "")
+    lines = envelope_table(document(4, (), without=(0, 1, 2, 3))).lines
     assert len(lines) == 2
 
 
 def test_strains_have_no_unit():
     whole = document(4, ("psi",))
     whole["case"]["envelope"]["plane"] = ["E11", "gamma12"]
-    assert envelope_lines(whole, " (MPa)")[0] == "Onset of debonding in the plane E11, gamma12: 4 directions"
+    assert envelope_table(whole).lines[0] == "Onset of debonding in the plane E11, gamma12: 4 directions"
 
 
 @pytest.mark.parametrize(("angle", "expected"), [(0.0, (3.0, 0.0)), (90.0, (0.0, 3.0)), (180.0, (-3.0, 0.0))])
@@ -60,5 +63,6 @@ def test_counts_of_nodes_of_an_angle_name_their_unit_strain():
     """Each of the three unit strains opens and closes other nodes."""
     counts = {"angle": 90.0, "bonded": 9, "open": 2, "closed": 1}
     words = "bonded, open, closed: interface nodes under the unit strain gamma12"
-    assert words in angle_table([counts | {"stiffness": [[9.0, 2, 0], [2, 8, 0], [0, 0, 3]]}], "").lines
-    assert words not in angle_table([counts | {"stress": [1.0, 2.0, 3.0]}], "").lines
+    stiffness, stress = {"stiffness": [[9.0, 2, 0], [2, 8, 0], [0, 0, 3]]}, {"stress": [1.0, 2.0, 3.0]}
+    assert words in angle_table({"case": {}, "angle": [counts | stiffness]}).lines
+    assert words not in angle_table({"case": {}, "angle": [counts | stress]}).lines

@@ -4,21 +4,22 @@ from __future__ import annotations
 
 import pytest
 
-from feti_homog.report.text.stiffness_tables import constants_lines
+from feti_homog.report.text.stiffness_tables import constants
 
 CELL = {"E_axial": 41.7, "G_transverse": 3.7, "expansion_axial": None, "deviation": 0.002}
 AXES = dict.fromkeys(("E1", "E2", "E3", "nu12", "nu13", "nu23", "G12", "G13", "G23"), 1.5)
 
 
 def test_without_constants_there_is_nothing():
-    assert constants_lines({}, "") == [[]]
+    assert constants({"case": {}}) == []
 
 
 def test_a_row_for_each_source_and_a_column_for_each_constant_that_one_knows():
     estimates = {"halpin_tsai": {"E_axial": 41.6, "G_transverse": None}, "chamis": {"E_axial": None}}
     document = {"constants": AXES, "transversely_isotropic": CELL, "estimates": estimates}
     document["fibre_bounds"] = {"E_axial": [40.0, 43.0], "nu_axial": None}
-    axes, table = constants_lines(document, " (GPa)")
+    document["case"] = {"output": {"stress_unit": "GPa"}}
+    axes, table = (each.lines for each in constants(document))
     assert len(axes) == 4 and axes[0].endswith("(GPa)")
     assert "0.2 %" in table[0] and table[1].split() == ["E_axial", "G_transverse"]
     assert [line.split()[-2:] for line in table[2:-1]] == [
@@ -39,11 +40,11 @@ def test_a_row_for_each_source_and_a_column_for_each_constant_that_one_knows():
     ],
 )
 def test_a_cell_without_estimates_is_reported_of_what_they_are(more, words):
-    _, table = constants_lines({"transversely_isotropic": CELL, **more}, "")
-    assert table[-1] == f"  no closed estimates, which are of {words}"
+    (table,) = constants({"case": {}, "transversely_isotropic": CELL, **more})
+    assert table.lines[-1] == f"  closed-form estimates exist for {words} only"
 
 
 def test_the_range_over_directions_stands_above_the_table():
     across = {"E_least": 9.81, "E_largest": 10.93, "G_least": 3.3, "G_largest": 3.82}
-    _, table = constants_lines({"transversely_isotropic": CELL, "transverse_moduli": across}, "")
-    assert table[1] == "  over all directions across: E from 9.81 to 10.93, G from 3.3 to 3.82"
+    (table,) = constants({"case": {}, "transversely_isotropic": CELL, "transverse_moduli": across})
+    assert table.lines[1] == "  over all directions across: E from 9.81 to 10.93, G from 3.3 to 3.82"

@@ -1,0 +1,198 @@
+"""A cell as pictures show it: its triangles, its frame with a colour bar, its interface, and labels of its load."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from scipy.spatial import cKDTree
+
+from feti_homog.materials.voigt import voigt_names
+from feti_homog.report.plots.decimation import TRIANGLE_LIMIT, DrawnMesh, drawn_mesh, outline_edges
+from feti_homog.report.plots.plot_helpers import SYMBOLS, draw_segments, unit_label
+from feti_homog.report.text.analyses import reported
+from feti_homog.results.path_curves import FAINT, ZERO, components_above, leading_component
+from feti_homog.typing import Array, Document
+
+BAR_INCHES = 1.1  # room for a colour bar beside the cell
+BAR, LEAST_BAR = (0.04, 1.0), (0.15, 1.2)  # width and height of a bar: shares of the cell's, and least inches
+BONDED, CLOSED, OPEN, DAMAGED = 0, 1, 2, 3
+STATE_NAMES = {BONDED: "bonded", DAMAGED: "damaged", CLOSED: "in contact", OPEN: "open"}
+STATE_COLOURS = {BONDED: "black", CLOSED: "#ff7f0e", OPEN: "#00a14b", DAMAGED: "#9467bd"}
+STATE_WIDTHS = {BONDED: 0.8, CLOSED: 2.6, OPEN: 2.0, DAMAGED: 2.0}
+# The state of an edge is the one of its ends that comes last here.
+ORDER = np.array(list(STATE_NAMES))
+SAME_PLACE = 1e-6  # of the width of the cell
+
+
+@dataclass(frozen=True)
+class InterfaceEdges:
+    """Drawn edges on both faces of fibre-matrix interfaces, with the interface nodes at their ends."""
+
+    edges: Array  # (e, 2) drawn nodes
+    nodes: Array  # (e, 2) rows of /interface
+
+    @classmethod
+    def of(cls, file: Any, drawn: DrawnMesh, borders: Array) -> InterfaceEdges:
+        """Find interface edges among the body outlines; /interface has one node for all its periodic images."""
+        points, period = file["interface/points"][:], np.array([file.attrs["width"], file.attrs["height"]])
+        if not len(points):
+            return cls(borders[:0], borders[:0])
+        tolerance = SAME_PLACE * float(period[0])
+        tree = cKDTree(_wrapped(points, period, tolerance), boxsize=period * (1.0 + 1e-12))
+        ends = _wrapped(drawn.points[borders.ravel()], period, tolerance)
+        distance, nearest = tree.query(ends, distance_upper_bound=2 * tolerance)
+        is_present = np.isfinite(distance).reshape(-1, 2).all(axis=1)
+        return cls(borders[is_present], nearest.reshape(-1, 2)[is_present])
+
+    def state(self, status: Array) -> Array:
+        """(e,) edge states from node states: open if an end is open, else in contact or damaged if an end is."""
+        return np.asarray(ORDER[np.argsort(ORDER)[status[self.nodes]].max(axis=1, initial=0)])
+
+    def mark(self, axes: Axes, points: Array, status: Array, magnified: float = 1.0) -> list[Line2D]:
+        """Draw the edges with nodes at `points` (p, 2); returns legend lines for the states present."""
+        states = self.state(status)
+        present = [kind for kind in STATE_NAMES if (states == kind).any()]
+        for kind in present:
+            segments = points[self.edges[states == kind]]
+            cap: Literal["butt", "round"] = "butt" if kind == BONDED else "round"
+            if kind != BONDED:
+                # Seen on every colour: magenta and orange are not, on red.
+                draw_segments(axes, segments, "white", magnified * (STATE_WIDTHS[kind] + 1.6), cap)
+            draw_segments(axes, segments, STATE_COLOURS[kind], magnified * STATE_WIDTHS[kind], cap)
+        return state_legend(present)
+
+
+@dataclass(frozen=True)
+class DrawnCell:
+    """An open result.h5 with its drawn triangles, the outlines of its bodies, and its interface."""
+
+    file: Any
+    drawn: DrawnMesh
+    borders: Array  # (e, 2) drawn nodes
+    interface: InterfaceEdges
+
+    @classmethod
+    def of(cls, file: Any, limit: int = TRIANGLE_LIMIT) -> DrawnCell:
+        """Read a cell from an open result.h5 in at most about `limit` triangles."""
+        drawn = drawn_mesh(file, limit)
+        borders = outline_edges(drawn, drawn.body)
+        return cls(file, drawn, borders, InterfaceEdges.of(file, drawn, borders))
+
+
+def states_of_nodes(state: Any) -> Array:
+    """(k,) interface node states in a group of result.h5: status, or DAMAGED for damaged bonds that hold."""
+    status = state["status"][:]
+    damage = state["damage"][:] if "damage" in state else np.zeros(len(status))
+    return np.asarray(np.where((status == BONDED) & (damage > 0.0), DAMAGED, status))
+
+
+def state_legend(kinds: list[int]) -> list[Line2D]:
+    return [Line2D([], [], color=STATE_COLOURS[k], linewidth=STATE_WIDTHS[k], label=STATE_NAMES[k]) for k in kinds]
+
+
+def _wrapped(points: Array, period: Array, tolerance: float) -> Array:
+    """Return the points' images in [0, period); within `tolerance` below the period they are 0."""
+    inside = np.mod(points, period)
+    inside[inside > period - tolerance] = 0.0
+    return np.asarray(inside)
+
+
+def figure_of(attributes: Any, panels: int, beside: float = 0.0) -> tuple[Figure, Sequence[Axes]]:
+    """Return a figure with cell panels and `beside` inches for a colour bar."""
+    width, height = cell_size(attributes)
+    size = panels * (width + 0.7) + 0.1 + beside, max(height, LEAST_BAR[1]) + 1.2
+    figure = Figure(figsize=size, layout="compressed")
+    return figure, figure.subplots(1, panels, squeeze=False)[0]
+
+
+def cell_scale(attributes: Any) -> float:
+    """Inches in the picture for a length unit of the cell."""
+    return 4.8 / max(float(attributes["width"]), float(attributes["height"]))
+
+
+def cell_size(attributes: Any) -> tuple[float, float]:
+    """Width and height of the cell in the picture, inches."""
+    scale = cell_scale(attributes)
+    return scale * float(attributes["width"]), scale * float(attributes["height"])
+
+
+def label_cell_axes(axes: Axes, attributes: Any) -> None:
+    unit = unit_label(attributes["length_unit"]) or "(cell units)"
+    axes.set_aspect("equal")
+    axes.autoscale_view()
+    axes.margins(0.03)
+    axes.set_xlabel(f"$x_1$ {unit}")
+    axes.set_ylabel(f"$x_2$ {unit}")
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def bar_beside(axes: Axes, shapes: Any, extend: str, size: tuple[float, float] | None = None) -> Any:
+    """Return a colour bar for `shapes`, at the right of their axes.
+
+    `size`: drawn cell size (inches); beside a narrow cell the bar is wider, beside a flat one higher.
+    """
+    figure: Any = axes.figure
+    width, height = BAR if size is None else np.maximum(np.divide(LEAST_BAR, size), BAR).tolist()
+    return figure.colorbar(
+        shapes, cax=axes.inset_axes((1.0 + 0.75 * width, 0.5 * (1.0 - height), width, height)), extend=extend
+    )
+
+
+@dataclass(frozen=True)
+class LoadLabels:
+    """Load labels for the states of a result.
+
+    Attributes:
+        leading: component whose strain leads a path; None for other analyses.
+        least_stress: stresses up to this size are rounding.
+        given: load of analysis "load", by name.
+    """
+
+    leading: int | None = None
+    least_stress: float = 0.0
+    given: Mapping[str, float] | None = None
+
+    @classmethod
+    def of(cls, document: Document) -> LoadLabels:
+        """Read leading component and load from a result.json."""
+        analysis = reported(document)
+        if analysis.is_followed:
+            largest = np.abs([point["stress"] for point in document[analysis.name]]).max()
+            return cls(leading_component(document), ZERO * float(largest))
+        return cls(given=document["case"][analysis.name]["to"] if analysis.picture else None)
+
+    def words(self, attributes: Any) -> list[str]:
+        """Return visible strains and temperature of a state as formulas.
+
+        A path with many strains has the leading one and its stress, a load the components it gives.
+        """
+        if self.given is not None:
+            return [_formula(name, value) for name, value in self.given.items()]
+        strain, temperature = np.asarray(attributes["strain"]), float(attributes.get("temperature", 0.0))
+        strains, stresses = voigt_names(len(strain))
+        loads = [(strains[k], float(strain[k])) for k in components_above(FAINT, strain[None])]
+        if self.leading is not None and len(loads) > 2:
+            stress = float(attributes["stress"][self.leading])
+            loads = [
+                (strains[self.leading], float(strain[self.leading])),
+                (stresses[self.leading], stress if abs(stress) > self.least_stress else 0.0),
+            ]
+        loads += [("temperature", temperature)] * (temperature != 0.0)
+        return [_formula(name, value) for name, value in loads] or ["no strain"]
+
+    def label(self, attributes: Any, in_line: int = 4) -> str:
+        """Join the formulas of a state, `in_line` per line."""
+        formulas = self.words(attributes)
+        return ",\n".join(", ".join(formulas[k : k + in_line]) for k in range(0, len(formulas), in_line))
+
+
+def _formula(name: str, value: float) -> str:
+    mantissa, _, exponent = f"{value:.4g}".partition("e")
+    power = rf" \cdot 10^{{{int(exponent)}}}" if exponent else ""
+    return f"${SYMBOLS[name]} = {{{mantissa}}}{power}$"
