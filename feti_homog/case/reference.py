@@ -170,15 +170,15 @@ def _petsc_table() -> TableReference:
 def _uncertainty_table() -> TableReference:
     place = f"[{UNCERTAINTY}]"
     words = (
-        "Standard deviation of a constant of [material.PHASE], or of a stiffness of [interface], whose value is the "
-        "mean. In place of both, the constant itself may be {mean, std} or {mean, cv}, cv = std / |mean|."
+        "Standard deviation of a number, whose value is the mean. In place of both, the number itself may be {mean, "
+        "std} or {mean, cv}, cv = std / |mean|."
     )
     std = KeyRow(UNCERTAINTY, place, "SECTION.KEY", "a number above 0", "that of the key", "", "", words)
     accepts = "a list of [KEY, KEY, VALUE], values from -1 to 1"
-    pairs = KeyRow(UNCERTAINTY, place, CORRELATION, accepts, "", "", "", "Correlation of pairs of these constants.")
+    pairs = KeyRow(UNCERTAINTY, place, CORRELATION, accepts, "", "", "", "Correlation of pairs of these numbers.")
     meaning = (
-        "scatter of constants, which a stiffness or a load passes on to all its results, of first order. "
-        "`feti-homog uncertainty` does so for any number of a case, also of sizes, strengths and loads."
+        "scatter of numbers, which `feti-homog uncertainty` passes on to constants, onsets and peaks, of first order. "
+        "`feti-homog run` takes none."
     )
     return TableReference(UNCERTAINTY, place, meaning, (std, pairs))
 

@@ -57,7 +57,6 @@ CASES = {
     "bonded": {
         "analysis": {"type": "stiffness", "plane": "strain"},
         "output": BASE["output"] | {"sensitivities": True},
-        "uncertainty": {"material.fibre.young": 1.0},
     },
     "debonded": {"analysis": {"type": "stiffness", "plane": "strain"}, "interface": HALF_OPEN},
     "matched": {

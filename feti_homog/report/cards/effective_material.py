@@ -52,7 +52,6 @@ class EffectiveMaterial:
             positive definite.
         expansion: (6,) strains per unit of temperature in the same order, or None.
         errors: estimated errors of `constants` and of expansions by the mesh, of those that are known.
-        scatter: their standard deviations by uncertain constants of the case, of those that are known.
     """
 
     name: str
@@ -62,7 +61,6 @@ class EffectiveMaterial:
     compliance: Float
     expansion: Float | None
     errors: Mapping[str, float]
-    scatter: Mapping[str, float]
 
     @property
     def is_orthotropic(self) -> bool:
@@ -121,7 +119,6 @@ def in_axes_of_the_cell(document: Document) -> EffectiveMaterial:
         compliance=(compliance + compliance.T) / 2.0,
         expansion=expansion,
         errors=constant_tables.in_material_axes(constant_tables.mesh_errors(document)),
-        scatter=constant_tables.in_material_axes(constant_tables.standard_deviations(document)),
     )
 
 
@@ -147,14 +144,12 @@ def nearest_transversely_isotropic(document: Document) -> EffectiveMaterial:
         expansion = np.array([axial, transverse, transverse, 0.0, 0.0, 0.0])
     symmetry = f"The nearest transversely isotropic material, at a relative distance of {given['deviation']:.2g}."
     errors = (document.get("mesh_error") or {}).get("constants", {})
-    scatter = constant_tables.standard_deviations(document)
     return EffectiveMaterial(
         **_origin(document),
         symmetry=symmetry,
         compliance=compliance,
         expansion=expansion,
         errors=_on_card(errors),
-        scatter=_on_card(scatter),
     )
 
 
@@ -217,8 +212,6 @@ def comments(material: EffectiveMaterial, mark: str) -> list[str]:
         paragraphs.append("No thermal expansion: not every phase of the case gives one.")
     if material.errors:
         paragraphs.append(f"Estimated errors by the mesh: {_listed(material.errors)}.")
-    if material.scatter:
-        paragraphs.append(f"Standard deviations by uncertain constants of the phases: {_listed(material.scatter)}.")
     lines = (line for words in paragraphs for line in wrap(words.encode("ascii", "backslashreplace").decode(), LONGEST))
     return [f"{mark} {line}" for line in lines]
 

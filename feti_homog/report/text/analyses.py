@@ -29,19 +29,17 @@ def _angle_lines(document: Document, label: str, toughness: str) -> list[list[st
 
 
 def _load_lines(document: Document, label: str, toughness: str) -> list[list[str]]:
-    tables = [*point_tables.tip_table(document["load"].get("tips"), toughness), *_changes(document)]
+    tables = [
+        *point_tables.tip_table(document["load"].get("tips"), toughness),
+        *constant_tables.sensitivities(document),
+    ]
     return [point_tables.load_lines(document, label), *(table.lines for table in tables)]
-
-
-def _changes(document: Document) -> list[Table]:
-    """Return the tables of sensitivities and of scatter, if the case asks for them."""
-    return [*constant_tables.sensitivities(document), *constant_tables.uncertainty(document)]
 
 
 def _stiffness_lines(document: Document, label: str, toughness: str) -> list[list[str]]:
     """Return the effective stiffness with what follows from it; units in brackets."""
     blocks = [table.lines for table in stiffness_tables.stiffnesses(document, label)]
-    tables = [*point_tables.tip_table(document.get("tips"), toughness), *_changes(document)]
+    tables = [*point_tables.tip_table(document.get("tips"), toughness), *constant_tables.sensitivities(document)]
     last = [table.lines for table in tables]
     if plane_state_of(document).is_spatial:
         thermal = [table.lines for table in stiffness_tables.thermal(document, label)]
@@ -62,7 +60,7 @@ def _stiffness_tables(document: Document, label: str, most: int) -> list[Table]:
         *stiffness_tables.constants(document, label),
         *stiffness_tables.moduli(document, document["case"].get("output", {}).get("stress_unit", "")),
         *stiffness_tables.bounds(document, label),
-        *_changes(document),
+        *constant_tables.sensitivities(document),
     ]
 
 
@@ -120,7 +118,7 @@ LOAD = ReportedAnalysis(
     "load",
     "equilibrium under a load",
     _load_lines,
-    lambda document, label, most: [point_tables.load_table(document, label), *_changes(document)],
+    lambda document, label, most: [point_tables.load_table(document, label), *constant_tables.sensitivities(document)],
     picture="load",
     is_load_given=lambda document: True,
 )

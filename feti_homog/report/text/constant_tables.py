@@ -1,4 +1,4 @@
-"""Constants in the axes of the material, and derivatives and scatter of constants, as tables.
+"""Constants in the axes of the material, and derivatives of constants, as tables.
 
 Axes 1, 2, 3 of the material, as data sheets and cards have them, are x3, along the fibres, x1, x2 of the cell.
 """
@@ -18,7 +18,7 @@ from feti_homog.materials.constant_names import (
 )
 from feti_homog.materials.voigt import EXPANSIONS
 from feti_homog.report.text.stiffness_tables import UNKNOWN, abreast, with_errors
-from feti_homog.report.text.table import Column, Table, in_brackets, without_noise
+from feti_homog.report.text.table import Column, Table, without_noise
 from feti_homog.typing import Document
 
 ROWS = (("E1", "E2", "E3"), ("G12", "G13", "G23"), ("nu12", "nu13", "nu23"))
@@ -41,12 +41,6 @@ def in_material_axes(known: Mapping[str, float]) -> dict[str, float]:
     places = {name: OF_THE_CELL[name] for names in ROWS for name in names}
     places |= {name: name for name in MATERIAL_EXPANSIONS[:3]}
     return {name: known[own] for name, own in places.items() if own in known}
-
-
-def standard_deviations(document: Document) -> dict[str, float]:
-    """Return those of all constants of the cell, in its axes, that uncertain constants of the case cause."""
-    known = document.get("uncertainty") or {"constants": (), "std": ()}
-    return dict(zip(known["constants"], map(float, known["std"]), strict=True))
 
 
 def table(document: Document, label: str) -> list[Table]:
@@ -90,30 +84,6 @@ def sensitivities(document: Document) -> list[Table]:
         Table(title, [Column("", -width), *(Column(*head, form) for head in heads)], rows)
         for title, form, rows in ((words, ".4f", shares), ("Derivatives by the same parameters", ".3g", slopes))
     ]
-
-
-def uncertainty(document: Document) -> list[Table]:
-    """Constants with their scatter by phases and error of the mesh, and shares of uncertain constants; none without."""
-    if (found := document.get("uncertainty")) is None:
-        return []
-    names, values = found["constants"], document["sensitivities"]["constant_values"]
-    errors = mesh_errors(document)
-    inputs = [name.removeprefix("material.") for name in found["parameters"]]
-    columns = [Column("", -24), Column("value"), Column("+- phases"), Column("+- mesh")]
-    columns += [Column(name, max(12, len(name) + 2), ".1f") for name in inputs]
-    rows = [
-        [
-            name,
-            values[k],
-            found["std"][k],
-            errors.get(name, UNKNOWN),
-            *(100 * share for share in found["shares"][k]),
-        ]
-        for k, name in ((names.index(name), name) for name in shown(names))
-        if found["std"][k] > 0
-    ]
-    label = in_brackets(document["case"].get("output", {}).get("stress_unit", ""))
-    return [Table(f"Scatter by uncertain constants{label}: std, and their shares of the variance (%)", columns, rows)]
 
 
 def mesh_errors(document: Document) -> dict[str, float]:

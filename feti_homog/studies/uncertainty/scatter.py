@@ -27,7 +27,6 @@ from feti_homog.case.uncertainty import (
     SECTIONS,
     UNCERTAINTY,
     Uncertainty,
-    is_constant,
     number_at,
     read_uncertainty,
     with_number,
@@ -107,7 +106,7 @@ def parse(values: Mapping[str, Any], folder: Path) -> Study:
     """Return the study of nested dictionaries. Raises CaseError as `load`."""
     document, faults = to_document(values), list[str]()
     realisations = _realisations(document.pop(SWEEP, None), faults)
-    uncertainty = read_uncertainty(document, faults, anywhere=True)
+    uncertainty = read_uncertainty(document, faults)
     output = document.setdefault("output", {})
     if not isinstance(output, dict):
         faults.append(f"output = {toml_value(output)}: expected a section [output]")
@@ -128,12 +127,9 @@ def parse(values: Mapping[str, Any], folder: Path) -> Study:
 
 
 def is_study(values: Mapping[str, Any]) -> bool:
-    """Return whether a document has uncertain numbers that `feti-homog run` does not take."""
+    """Return whether a document has uncertain numbers."""
     document = to_document(values)
-    uncertainty, analysis = read_uncertainty(document, [], anywhere=True), document.get("analysis")
-    kind = analysis.get("type") if isinstance(analysis, dict) else None
-    is_special = kind not in DIFFERENTIABLE or not all(is_constant(_path(name)) for name in uncertainty.std)
-    return bool(uncertainty.std) and is_special
+    return UNCERTAINTY in document or bool(read_uncertainty(document, []).std)
 
 
 def of_document(document: Mapping[str, Any], folder: Path, comm: Intracomm) -> str:
