@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from feti_homog.analysis.result import Result
     from feti_homog.results.viewed_states import ViewedState
-    from feti_homog.studies.sweep.report.sweep_table import SweepTable
+    from feti_homog.studies.sweep_table import SweepTable
 
 
 def run(
@@ -88,15 +88,15 @@ def run_sweep(
         ConvergenceError: cases failed; `collect_sweep` makes the table of the others.
     """
     comm = _started(comm)
-    from feti_homog.studies.sweep import collect, execute, plan
+    from feti_homog.studies import case_runs, collect, sweep_cases
     from feti_homog.system.parallel.mpi_errors import on_root
 
     if isinstance(cases, Mapping):
-        expanded = on_root(comm, plan.expand, cases, Path())
+        expanded = on_root(comm, sweep_cases.expand, cases, Path())
     else:
-        expanded = on_root(comm, plan.load, cases)
+        expanded = on_root(comm, sweep_cases.load, cases)
     group = comm.size if ranks_per_case is None else ranks_per_case
-    execute.run_all(expanded, folder(out), comm, group, retry, quiet)
+    case_runs.run_all(expanded, folder(out), comm, group, retry, quiet)
     return on_root(comm, collect.read, Path(out))
 
 
@@ -109,7 +109,7 @@ def collect_sweep(out: str | Path, comm: Intracomm | None = None, *, pictures: b
         CaseError: `out` is no folder of a sweep.
     """
     comm = _started(comm)
-    from feti_homog.studies.sweep import collect
+    from feti_homog.studies import collect
     from feti_homog.system.parallel.mpi_errors import on_root
 
     return on_root(comm, collect.collect, Path(out), pictures)
@@ -134,15 +134,14 @@ def run_fit(
         ConvergenceError: a case failed, or the data do not determine the unknowns.
     """
     comm = _started(comm)
-    from feti_homog.studies.fit import description, execute
+    from feti_homog.studies import fit_file
     from feti_homog.system.parallel.mpi_errors import on_root
 
     if isinstance(fit, str | Path):
-        read = on_root(comm, description.load, Path(fit))
+        study = on_root(comm, fit_file.load, Path(fit))
     else:
-        read = on_root(comm, description.parse, fit, Path())
-    group = comm.size if ranks_per_case is None else ranks_per_case
-    return execute.run(read, folder(out), comm, group, retry, quiet)
+        study = on_root(comm, fit_file.parse, fit, Path())
+    return study.run(folder(out), comm, comm.size if ranks_per_case is None else ranks_per_case, retry, quiet)
 
 
 def draw_state(axes: Axes, out: str | Path, number: int = 0, **choices: Any) -> str:

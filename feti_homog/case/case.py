@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -13,7 +12,7 @@ from typing import Any
 from feti_homog.case import element_sizes
 from feti_homog.case.cell_files import checked_cell
 from feti_homog.case.cell_section import GEOMETRY, Cell
-from feti_homog.case.document import read_document, to_document
+from feti_homog.case.document import read_document, short_digest, to_document
 from feti_homog.case.interface_faults import idle_friction_keys, read_interfaces
 from feti_homog.case.interface_section import Arc, InterfaceSection, interface_tables
 from feti_homog.case.load_section import (
@@ -177,7 +176,7 @@ class Case:
         document.get("path", {}).pop("max_events", None)
         document["cell"] = {k: v for k, v in document["cell"].items() if k not in ("file", "match")}
         content = b"".join(input_files.read(path) for path in (self.cell.file, self.cell.match) if path is not None)
-        return hashlib.sha256(json.dumps(document, sort_keys=True).encode() + content).hexdigest()[:16]
+        return short_digest(json.dumps(document, sort_keys=True).encode() + content)
 
 
 def load(path: str | Path) -> Case:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.case.document import TomlPath
+from feti_homog.case.document import TomlPath, leaves
 from feti_homog.schema.values import is_number, magnitudes_in_words
 from feti_homog.schema.wording import dotted_key, toml_value
 from feti_homog.typing import Float
@@ -63,7 +63,8 @@ def read_uncertainty(document: dict[str, Any], faults: list[str]) -> Uncertainty
     if not isinstance(table, dict):
         faults.append(f"{UNCERTAINTY} = {toml_value(table)}: expected a section [{UNCERTAINTY}]")
         return Uncertainty({})
-    given = [*_leaves({name: value for name, value in table.items() if name != CORRELATION})]
+    stds = leaves({name: value for name, value in table.items() if name != CORRELATION})
+    given = [(path, value) for path, value in stds if value != {}]
     for section in document:
         document[section] = _means(document[section], (section,), given, faults)
     return _checked(document, given, table.get(CORRELATION, []), faults)
@@ -148,15 +149,6 @@ def _deviation(value: Mapping[str, Any]) -> float | None:
         return None
     spread = value["std"] if "std" in value else value["cv"] * abs(value["mean"])
     return float(spread) if spread > 0 else None
-
-
-def _leaves(table: Mapping[str, Any], above: TomlPath = ()) -> Iterator[tuple[TomlPath, Any]]:
-    for name, value in table.items():
-        path = (*above, *name.split("."))
-        if isinstance(value, dict):
-            yield from _leaves(value, path)
-        else:
-            yield path, value
 
 
 def number_at(document: Mapping[str, Any], path: TomlPath) -> float | None:

@@ -17,8 +17,8 @@ from feti_homog.report.cards import csv_table
 from feti_homog.report.cards.effective_material import in_axes_of_the_cell
 from feti_homog.report.text import constant_tables, stiffness_tables
 from feti_homog.report.text.summary import summary
-from feti_homog.studies.fit.predictions import available
-from feti_homog.studies.sweep.report.outputs import outputs
+from feti_homog.studies.outputs import outputs
+from feti_homog.studies.predictions import available
 from feti_homog.system.runtime.records import plain
 
 pytestmark = pytest.mark.parallel

@@ -12,7 +12,7 @@ from feti_homog.case.interface_faults import COMMON
 from feti_homog.case.interface_section import InterfaceSection
 from feti_homog.errors import CaseError
 from feti_homog.schema.keys import keys_of
-from feti_homog.studies.sweep.plan import case_documents
+from feti_homog.studies.sweep_cases import case_documents
 
 OUTER, INNER = ["coating", "matrix"], ["fibre", "coating"]
 STRONG = {"normal_strength": 1.0}

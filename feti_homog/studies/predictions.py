@@ -19,7 +19,7 @@ from feti_homog.materials.voigt import voigt_names
 from feti_homog.report.text.point_tables import STATES
 from feti_homog.results import path_curves
 from feti_homog.results.path_curves import Document
-from feti_homog.studies.sweep.report.outputs import outputs
+from feti_homog.studies.outputs import outputs
 from feti_homog.typing import Float
 
 TOUGHNESS = "toughness"

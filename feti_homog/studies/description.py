@@ -27,8 +27,8 @@ from feti_homog.homogenization.unit_cell import cut
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.microstructure.phase_names import COATING
 from feti_homog.results import checkpoint
-from feti_homog.studies.sweep import plan
-from feti_homog.studies.sweep.plan import Sweep, case_names
+from feti_homog.studies import sweep_cases
+from feti_homog.studies.sweep_cases import Sweep, case_names
 from feti_homog.system.parallel.mpi_errors import on_root, on_root_only
 from feti_homog.system.petsc.options import case_options
 
@@ -190,7 +190,7 @@ def of_document(document: dict[str, Any], folder: Path, comm: Intracomm) -> str:
     """
     if SWEEP not in document:
         return with_options(on_root(comm, cases.parse, document, folder), comm)
-    sweep = on_root(comm, plan.expand, document, folder)
+    sweep = on_root(comm, sweep_cases.expand, document, folder)
     points = len({entry.point for entry in sweep.entries})
     words = f"sweep      {len(sweep.cases)} cases, {points} points, all of them valid; the first:"
     return first_of(sweep, words, comm)

@@ -1,4 +1,4 @@
-"""The outputs of a case: the numbers of its result.json by the names of the sweep's columns."""
+"""Outputs of a case: numbers of its result.json by the columns of cases.csv; the meaning of all columns."""
 
 from __future__ import annotations
 
@@ -7,10 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from feti_homog.materials.bounds import Moduli
 from feti_homog.materials.plane_state import GENERALIZED, PLANE_STRAIN
+from feti_homog.materials.spatial_constants import EngineeringConstants, TransverselyIsotropic
 from feti_homog.materials.voigt import EXPANSIONS, SPATIAL_STRESSES, STRESSES, THERMAL_STRESSES, voigt_names
 from feti_homog.report.text import point_tables
+from feti_homog.results.csv_tables import Column, columns
 from feti_homog.results.landmarks import peak_of
+from feti_homog.system.runtime.records import STRESS
 from feti_homog.typing import Document
 
 PHASES_OF_ONE_FIBRE = 2
@@ -159,3 +163,85 @@ def _load(point: Document | None) -> dict[str, float]:
     if point is None:
         return {}
     return _at_point("load", point) | {f"load_{name}": point[name] for name in ("stored", *point_tables.STATES)}
+
+
+CASE_COLUMNS = (
+    Column("case", "", "number of the case, from 1"),
+    Column("folder", "", "folder of the case, below the folder of the sweep"),
+    Column("point", "", "number of the point, from 1"),
+    Column("realisation", "", "number of the realisation of the point, from 1"),
+    Column("status", "", "`done`, `not converged`, `failed`, `damaged`, `running` or `waiting`"),
+    Column("reason", "", "why there is no result"),
+)
+INPUT_COLUMNS = (Column("SECTION.KEY", "that of the key", "value of a key that varies"),)
+MODULI = {column.name for column in columns(Moduli)}
+OUTPUT_COLUMNS = (
+    Column("fraction_meshed", "", "share of all fibres in the meshed area"),
+    Column("fraction_PHASE", "", "share of a phase in the meshed area, if there are more than matrix and fibre"),
+    Column("porosity", "", "share of voids in the area of the cell, where there are some"),
+    Column("match_distance", "", "of cells with `match`: how far they are from the table, in mean diameters"),
+    Column("refine", "", "halvings of the mesh, of one that is solved once more those of its finer mesh"),
+    Column("elements", "", "triangles of the refined mesh"),
+    Column("nodes", "", "nodes of the refined mesh, once for each body in each subdomain: depends on ranks"),
+    Column("ranks", "", "MPI ranks"),
+    Column("subdomains", "", "subdomains that the bodies are cut into"),
+    Column("dofs", "", "degrees of freedom of all subdomains"),
+    Column("multipliers", "", "Lagrange multipliers of the dual problem"),
+    Column("iterations", "", "Krylov iterations of all states"),
+    Column("Cij", STRESS, "entry of L^ef; beside generalized plane strain C66 is the shear modulus of all"),
+    Column("Cij_compression", STRESS, "the same under minus the unit strains, with contact"),
+    Column("thermal_Sij", f"{STRESS} per unit of temperature", "stress per unit of temperature at no strain"),
+    Column("expansion_x1", "1 / temperature", "strain along x1 per unit of temperature at no stress; expansion_x2 too"),
+    Column("expansion_STRAIN", "1 / temperature", "the same of a shear strain"),
+    Column("anisotropy_normal", STRESS, "C11 - C22"),
+    Column("anisotropy_shear", STRESS, "C33 - (C11 + C22 - 2 C12) / 4; with generalized plane strain C66 - ..."),
+    *columns(Moduli),
+    *(column for column in columns(EngineeringConstants) if column.name not in MODULI),
+    *columns(TransverselyIsotropic),
+    Column("NAME_mesh_error", "that of NAME", "estimated error of an entry or constant by its mesh"),
+    Column("energy_mesh_error", "", "estimated relative error of the strain energy, the largest under any strain"),
+    Column("Cii_reuss", STRESS, "lower bound of Cii"),
+    Column("Cii_voigt", STRESS, "upper bound of Cii"),
+    Column("bulk_lower", STRESS, "lower bound of bulk, by Hashin and Shtrikman"),
+    Column("bulk_upper", STRESS, "upper bound of bulk, by Hashin and Shtrikman"),
+    Column("shear_lower", STRESS, "lower bound of shear, by Hashin and Shtrikman"),
+    Column("shear_upper", STRESS, "upper bound of shear, by Hashin and Shtrikman"),
+    Column("angle_ANGLE_Cij", STRESS, "entry of L^ef at an opening of that many degrees"),
+    Column("angle_ANGLE_Sij", STRESS, "macroscopic stress at an opening of that many degrees"),
+    Column("onset_load_factor", "", "load factor at which the first bond of a path breaks or softens"),
+    Column("dissipated", STRESS, "energy lost to all breaks of a path, per area of the cell"),
+    Column("work", STRESS, "work of the loads along a path, per area of the cell"),
+    Column("onset_Sij", STRESS, "macroscopic stress where the first bond of a path breaks or softens"),
+    Column("onset_STRAIN", "", "macroscopic strain where the first bond of a path breaks or softens"),
+    Column(
+        "peak_Sij",
+        STRESS,
+        "largest in magnitude of a path, with its sign, also where it ends before it falls; of the leading strain as "
+        "`peak` has it",
+    ),
+    Column("peak_STRAIN", "", "strain at the peak of the stress of the component whose strain leads"),
+    Column("end_Sij", STRESS, "macroscopic stress at the end of a path"),
+    Column("end_STRAIN", "", "macroscopic strain at the end of a path"),
+    Column("end_STATUS", "", "interface nodes that are bonded, open or closed at the end of a path"),
+    Column("load_STRAIN", "", "macroscopic strain under the load of analysis `load`"),
+    Column("load_Sij", STRESS, "macroscopic stress under it"),
+    Column("load_stored", STRESS, "elastic energy stored under it, per area of the cell"),
+    Column("load_STATUS", "", "interface nodes that are bonded, open or closed under it"),
+    Column("envelope_AXIS", "that of the axis", "load at onset along the first axis of an envelope"),
+    Column("envelope_least_AXIS_AXIS", "that of the axes", "least load at onset of all directions"),
+    Column("envelope_largest_AXIS_AXIS", "that of the axes", "largest, if every direction has one"),
+    Column("check_LAW", "", "largest relative error of a law, as in result.json"),
+    Column("seconds_STAGE", "s", "wall time of a stage, the largest over ranks"),
+    Column("memory", "bytes", "peak resident memory, the largest over ranks"),
+)
+COLUMNS = (*CASE_COLUMNS, *INPUT_COLUMNS, *OUTPUT_COLUMNS)
+STATISTICS_COLUMNS = (
+    Column("point", "", "number of the point, from 1"),
+    *INPUT_COLUMNS,
+    Column("output", "", "name of a column of cases.csv"),
+    Column("unit", "", "its unit"),
+    Column("count", "", "finished realisations of the point that have it"),
+    Column("mean", "that of the output", "mean over them"),
+    Column("std", "that of the output", "standard deviation, from two on"),
+    Column("ci95", "that of the output", "half the width of the 95 % confidence interval of the mean"),
+)
