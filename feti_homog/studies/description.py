@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,16 +37,17 @@ if TYPE_CHECKING:
 
 
 def describe(case: Case, comm: MPI.Intracomm) -> str:
-    """Describe a run of the case on these ranks; empty except on rank 0.  Collective.
+    """Describe a run of the case on these ranks, under its own options; empty except on rank 0.  Collective.
 
     Raises as `tear`.
     """
-    lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
-    own = cut(case, lattice, comm, BY_COST)
-    constraints = share_entities(comm, own.submeshes, own.table, own.pairs, lattice).constraints
-    options = database_options()
-    loads = comm.gather((len(own.submeshes.index), len(own.submeshes.member)))
-    return on_root_only(comm, _described, case, own.summary, lattice, 2 * constraints, loads, options) or ""
+    with case_options(case.petsc):
+        lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
+        part = cut(case, lattice, comm, BY_COST)
+        constraints = share_entities(comm, part.submeshes, part.table, part.pairs, lattice).constraints
+        loads = comm.gather((len(part.submeshes.index), len(part.submeshes.member))) or []
+        options = database_options()
+        return on_root_only(comm, _described, case, part.summary, lattice, 2 * constraints, loads, options) or ""
 
 
 def _described(
@@ -58,43 +59,37 @@ def _described(
     options: SolverOptions,
 ) -> str:
     """Return the text of `describe`; `loads` are the subdomains and the coarse triangles of each rank."""
-    own = [subdomains for subdomains, _ in loads]
+    subdomains = [count for count, _ in loads]
     nodes = [triangles * lattice.intervals**2 // 2 for _, triangles in loads]
     elements = summary.coarse_triangles * len(lattice.triangles)
-    plan = _plan(case, summary, multipliers, max(_applications(case, summary.across).values()), options, own)
+    plan = _plan(case, summary, multipliers, options, subdomains)
     columns = multipliers if plan.preconditioner == "influence" else 0
     problems = _applications(case, summary.across or columns > 0)
-    errors = cost_model.has_errors(case)
     triangles, most_ranks = summary.coarse_triangles, summary.coarse_triangles if summary.across else summary.bodies
-    taken = cost_model.estimate(nodes, own, triangles, most_ranks, problems, columns, errors)
+    cost = cost_model.estimate(nodes, subdomains, triangles, most_ranks, problems, columns, cost_model.has_errors(case))
     unresolved = process_zone.warnings(case, summary.width, summary.interface_edge)
+    solver = plan.in_words if multipliers else "one factor of the whole cell: no multipliers, no iterations"
     lines = [
         f"case       {case.name}: {case.analysis.type}, plane {case.analysis.plane}",
         f"cell       {summary.width:g} x {summary.height:g}, phases {', '.join(summary.phases)}",
         *([f"voids      {summary.voids}"] if summary.voids else []),
-        f"mesh       {summary.coarse_triangles} coarse triangles, {elements} "
+        f"mesh       {triangles} coarse triangles, {elements} "
         f"elements of order {case.cell.order}, about {2 * sum(nodes)} degrees of freedom",
         *(
             [f"sizes      mesh_size = {case.cell.mesh_size:g}, refine = {case.cell.refine}, as asked for by {asked}"]
             if (asked := element_sizes.asked(case.cell))
             else []
         ),
-        *_fibres_lines(case, summary),
-        *_mix_lines(case, summary),
-        *_match_lines(case, summary),
+        *_fibre_lines(case, summary),
         f"tearing    {summary.bodies} bodies, {_subdomains(summary.subdomains)}, {multipliers} multipliers",
-        f"solver     {_solver(plan, multipliers)}",
+        f"solver     {solver}",
         *(
             f"rank {rank:<5} {_subdomains(count)}, about {2 * n} degrees of freedom"
-            for rank, (count, n) in enumerate(zip(own, nodes, strict=True))
+            for rank, (count, n) in enumerate(zip(subdomains, nodes, strict=True))
         ),
-        *cost_model.estimate_lines(taken, len(loads), summary.across),
-        *_path_lines(case, summary, multipliers, nodes, taken, columns),
-        *(
-            [cost_model.fields_line(case, sum(nodes), elements, multipliers // 2, len(loads))]
-            if case.output.fields
-            else []
-        ),
+        *cost_model.estimate_lines(cost, len(loads), summary.across),
+        *_path_lines(case, summary, multipliers, nodes, cost, columns),
+        *_field_lines(case, sum(nodes), elements, multipliers // 2, len(loads)),
         *(f"warning    {warning}" for warning in (*case.warnings(), *summary.warnings(), *unresolved)),
         *(f"remark     {remark}" for remark in (*case.remarks(), *summary.remarks)),
         "the case is valid",
@@ -103,24 +98,24 @@ def _described(
 
 
 def _path_lines(
-    case: Case, summary: CellSummary, multipliers: int, nodes: Sequence[int], taken: cost_model.Estimate, columns: int
+    case: Case, summary: CellSummary, multipliers: int, nodes: Sequence[int], cost: cost_model.Estimate, columns: int
 ) -> list[str]:
     """Return the lines about the events of a path; none of another analysis, or of a cell without interfaces."""
-    teeth, memory = teeth_of(case), cost_model.memory_to_the_end(taken, columns, len(nodes))
-    lines = cost_model.events_lines(case, multipliers, summary.fibres, teeth, nodes, taken.seconds, memory)
+    teeth, memory = teeth_of(case), cost_model.memory_to_the_end(cost, columns, len(nodes))
+    lines = cost_model.events_lines(case, multipliers, summary.fibres, teeth, nodes, cost.seconds, memory)
     if not lines or case.path is None:
         return []
     events = case.path.increments or multipliers // 2 * teeth
     return [*lines, cost_model.checkpoint_line(checkpoint.bytes_at_most(case, multipliers, events))]
 
 
+def _field_lines(case: Case, nodes: int, elements: int, interface_nodes: int, ranks: int) -> list[str]:
+    return [cost_model.fields_line(case, nodes, elements, interface_nodes, ranks)] if case.output.fields else []
+
+
 def _applications(case: Case, easy: bool) -> dict[int, int]:
-    """Return for each problem, by its displacements of a node, how many times it applies its dual operator."""
+    """Return the number of applications of each problem's dual operator, by its displacements of a node."""
     return {p.components: cost_model.applications(case, p, easy) for p in phase_laws.problems(case)}
-
-
-def _solver(plan: SolverPlan, multipliers: int) -> str:
-    return plan.in_words if multipliers else "one factor of the whole cell: no multipliers, no iterations"
 
 
 def _subdomains(count: int) -> str:
@@ -128,58 +123,41 @@ def _subdomains(count: int) -> str:
 
 
 def _plan(
-    case: Case,
-    summary: CellSummary,
-    multipliers: int,
-    applications: int,
-    options: SolverOptions,
-    own: Sequence[int],
+    case: Case, summary: CellSummary, multipliers: int, options: SolverOptions, subdomains: Sequence[int]
 ) -> SolverPlan:
-    """Plan of the plane problem, if its operators are of the kind asked for; pieces are dense by default.
-
-    `own` are the subdomains of each rank.
+    """Return the plan of the plane problem; pieces are dense by default, and `subdomains` are those of each rank.
 
     Raises:
         CaseError: as `solver_plan.choose`; or with friction there are no influence columns.
     """
     dense = options.operator != "implicit"
     has_thin = COATING in case.materials and not summary.across
-    one_each = summary.across and len(own) > 1 and set(own) == {1}
+    one_each = summary.across and len(subdomains) > 1 and set(subdomains) == {1}
+    applications = max(_applications(case, summary.across).values())
     sizes = ProblemSizes(applications, summary.is_cut, dense, dense, multipliers, has_thin, one_each)
-    found = solver_plan.choose(sizes, options)
-    if case.has_friction and found.preconditioner != "influence":
+    plan = solver_plan.choose(sizes, options)
+    if case.has_friction and plan.preconditioner != "influence":
         raise CaseError(solver_plan.WITHOUT_INVERSE)
-    return found
+    return plan
 
 
-def _fibres_lines(case: Case, summary: CellSummary) -> list[str]:
-    """Return how many fibres interfaces or a table have; of discs and ellipses their mean radius and fraction."""
-    if case.interface is None and case.cell.table is None:
-        return []
-    frames = summary.frames[summary.fibre_bodies]
-    is_hollow = case.cell.table is not None and bool((case.cell.table.inner_radius > 0).any())
-    sizes = ""
-    if len(frames) and np.isfinite(frames).all() and not is_hollow:  # polygons have none
-        radii = np.sqrt(np.abs(np.linalg.det(frames)))
-        fraction = np.pi * (radii**2).sum() / (summary.width * summary.height)
-        sizes = f", mean radius {radii.mean():.4g}, fraction {fraction:.4f}"
-    return [f"fibres     {summary.fibres}, numbered from 1{sizes}"]
-
-
-def _match_lines(case: Case, summary: CellSummary) -> list[str]:
-    if case.cell.match is None:
-        return []
-    words = "mean diameters, the distance of the distributions of nearest and second neighbours"
-    return [f"match      {case.cell.match.name}, to {summary.match_distance:.4f} {words}"]
-
-
-def _mix_lines(case: Case, summary: CellSummary) -> list[str]:
-    """Return how many fibres each phase of a mix has got, and how large they are."""
-    if case.cell.mix is None:
-        return []
-    phase, radii = summary.constituent_phase[summary.is_fibre], summary.radii[summary.is_fibre]
-    own = [(name, radii[phase == k]) for k, name in enumerate(summary.phases) if name in case.cell.mix]
-    return [f"mix        {', '.join(f'{len(r)} of {name}, mean radius {r.mean():.6g}' for name, r in own)}"]
+def _fibre_lines(case: Case, summary: CellSummary) -> Iterator[str]:
+    """Yield numbers and sizes of fibres: of interfaces or a table, of the phases of a mix, of a match."""
+    if case.interface is not None or case.cell.table is not None:
+        frames, sizes = summary.frames[summary.fibre_bodies], ""
+        is_hollow = case.cell.table is not None and bool((case.cell.table.inner_radius > 0).any())
+        if len(frames) and np.isfinite(frames).all() and not is_hollow:  # polygons have none
+            radii = np.sqrt(np.abs(np.linalg.det(frames)))
+            fraction = np.pi * (radii**2).sum() / (summary.width * summary.height)
+            sizes = f", mean radius {radii.mean():.4g}, fraction {fraction:.4f}"
+        yield f"fibres     {summary.fibres}, numbered from 1{sizes}"
+    if case.cell.mix is not None:
+        phase, radii = summary.constituent_phase[summary.is_fibre], summary.radii[summary.is_fibre]
+        mixed = [(name, radii[phase == k]) for k, name in enumerate(summary.phases) if name in case.cell.mix]
+        yield f"mix        {', '.join(f'{len(r)} of {name}, mean radius {r.mean():.6g}' for name, r in mixed)}"
+    if case.cell.match is not None:
+        distance = "mean diameters, the distance of the distributions of nearest and second neighbours"
+        yield f"match      {case.cell.match.name}, to {summary.match_distance:.4f} {distance}"
 
 
 def of_document(document: dict[str, Any], folder: Path, comm: Intracomm) -> str:
@@ -189,24 +167,18 @@ def of_document(document: dict[str, Any], folder: Path, comm: Intracomm) -> str:
         CaseError, MeshError: the document is faulty, or the cell of its first case.
     """
     if SWEEP not in document:
-        return with_options(on_root(comm, cases.parse, document, folder), comm)
+        return describe(on_root(comm, cases.parse, document, folder), comm)
     sweep = on_root(comm, sweep_cases.expand, document, folder)
     points = len({entry.point for entry in sweep.entries})
-    words = f"sweep      {len(sweep.cases)} cases, {points} points, all of them valid; the first:"
-    return first_of(sweep, words, comm)
+    heading = f"sweep      {len(sweep.cases)} cases, {points} points, all of them valid; the first:"
+    return first_of(sweep, heading, comm)
 
 
-def first_of(sweep: Sweep, words: str, comm: Intracomm) -> str:
-    """Return a line and the description of the first case.  Collective.  Raises as `describe`."""
+def first_of(sweep: Sweep, heading: str, comm: Intracomm) -> str:
+    """Return a heading and the description of the first case.  Collective.  Raises as `describe`."""
     check_options(sweep)
-    text = with_options(sweep.cases[0], comm)
-    return f"{words}\n{text}" if comm.rank == 0 else ""
-
-
-def with_options(case: Case, comm: Intracomm) -> str:
-    """Describe a case under its own options.  Collective.  Raises as `describe`."""
-    with case_options(case.petsc):
-        return describe(case, comm)
+    text = describe(sweep.cases[0], comm)
+    return f"{heading}\n{text}" if comm.rank == 0 else ""
 
 
 def check_options(sweep: Sweep) -> None:

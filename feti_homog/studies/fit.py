@@ -116,16 +116,12 @@ class Fit(Study):
 
 
 def _set_output(document: dict[str, Any]) -> None:
-    """Let a case write its numbers alone, with exact derivatives where they exist."""
-    output = document.get("output", {})
+    """Let a case write its numbers alone, and a stiffness its derivatives unless debonded faces may touch."""
+    analysis, output = document.get("analysis"), document.get("output", {})
     if isinstance(output, dict):
-        has_derivatives = _is_stiffness(document) and not _may_touch(document)
+        is_stiffness = isinstance(analysis, dict) and analysis.get("type") == "stiffness"
+        has_derivatives = is_stiffness and not _may_touch(document)
         document["output"] = {"mesh_error": False} | output | SILENT | {"sensitivities": has_derivatives}
-
-
-def _is_stiffness(document: Mapping[str, Any]) -> bool:
-    analysis = document.get("analysis")
-    return isinstance(analysis, dict) and analysis.get("type") == "stiffness"
 
 
 def _may_touch(document: Mapping[str, Any]) -> bool:
@@ -220,9 +216,6 @@ class Evaluations:
         """Run the cases of tests at values of the unknowns; returns their results on rank 0.  Collective."""
         comm = self.evaluator.comm
         documents = self.evaluator.results(name, on_root(comm, self.fit.cases, places))
-        tests = [test for test, _ in places]
-        return on_root_only(comm, self._answers, documents, tests) or []
-
-    def _answers(self, documents: Sequence[Mapping[str, Any]], tests: Sequence[int]) -> list[Answer]:
-        pairs = zip(documents, tests, strict=True)
-        return [Answer(document, predicted(document, self.fit.data_of(test))) for document, test in pairs]
+        data = [self.fit.data_of(test) for test, _ in places]
+        pairs = zip(documents, data, strict=False)  # other ranks have no results
+        return on_root_only(comm, lambda: [Answer(result, predicted(result, y)) for result, y in pairs]) or []

@@ -18,7 +18,6 @@ from feti_homog.system.runtime.records import STRESS
 from feti_homog.typing import Document
 
 PHASES_OF_ONE_FIBRE = 2
-ERROR, ENERGY_ERROR = "_mesh_error", "energy_mesh_error"
 
 
 def numbers(planes: Iterable[str | None]) -> tuple[int, ...]:
@@ -35,104 +34,72 @@ def outputs(document: Document, numbers: Sequence[int] = PLANE_STRAIN.numbers) -
     `numbers` of strains in the plane, in names.
     """
     solver = document["solver"]
-    found = _cell(document["cell"])
-    found |= {name: solver[name] for name in ("ranks", "subdomains", "dofs", "multipliers")}
-    found |= {"iterations": sum(solver["iterations"])}
-    for name, suffix in (("effective_stiffness", ""), ("effective_stiffness_compression", "_compression")):
-        found |= _entries(document.get(name, ()), numbers, suffix)
-    found |= _thermal(document)
-    found |= _anisotropy(document.get("effective_stiffness"))
-    for section in ("moduli", "constants", "transversely_isotropic"):
-        found |= {name: value for name, value in document.get(section, {}).items() if value is not None}
-    errors = _mesh_errors(document.get("mesh_error", {}), numbers)
-    found |= {name: v for name, v in errors.items() if name == ENERGY_ERROR or name.removesuffix(ERROR) in found}
-    found |= _bounds(document.get("bounds", {}), numbers)
-    found |= _angles(document.get("angle", ()), numbers) | _path(document)
-    found |= _load(document.get("load"))
-    found |= _envelope(document)
-    found |= {f"check_{name}": error for name, error in document["checks"].items()}
-    found |= {f"seconds_{stage}": took for stage, took in document["timings"].items()}
-    return {name: float(value) for name, value in (found | {"memory": document["memory"]}).items()}
+    values = _cell(document["cell"])
+    values |= {name: solver[name] for name in ("ranks", "subdomains", "dofs", "multipliers")}
+    values |= {"iterations": sum(solver["iterations"])} | _constants(document, numbers)
+    for point in document.get("angle", ()):
+        entries = _entries(point["stiffness"], numbers) if "stiffness" in point else _named(STRESSES, point["stress"])
+        values |= {f"angle_{point['angle']:g}_{name}": value for name, value in entries.items()}
+    values |= _path(document) | _envelope(document)
+    if (load := document.get("load")) is not None:
+        values |= _at_point("load", load) | {f"load_{name}": load[name] for name in ("stored", *point_tables.STATES)}
+    values |= {f"check_{name}": error for name, error in document["checks"].items()}
+    values |= {f"seconds_{stage}": seconds for stage, seconds in document["timings"].items()}
+    return {name: float(value) for name, value in (values | {"memory": document["memory"]}).items()}
 
 
 def _cell(cell: Mapping[str, Any]) -> dict[str, float]:
     """Return the numbers of the mesh."""
-    found = {"fraction_meshed": cell["fibre_fraction"], "elements": cell["elements"], "nodes": cell["nodes"]}
+    values = {"fraction_meshed": cell["fibre_fraction"], "elements": cell["elements"], "nodes": cell["nodes"]}
     fractions = cell.get("fractions", {})
     if len(fractions) > PHASES_OF_ONE_FIBRE:
-        found |= {f"fraction_{phase}": share for phase, share in fractions.items()}
+        values |= {f"fraction_{phase}": share for phase, share in fractions.items()}
     if cell.get("porosity"):
-        found["porosity"] = cell["porosity"]
-    return found | {name: cell[name] for name in ("refine", "match_distance") if name in cell}
+        values["porosity"] = cell["porosity"]
+    return values | {name: cell[name] for name in ("refine", "match_distance") if name in cell}
+
+
+def _constants(document: Document, numbers: Sequence[int]) -> dict[str, float]:
+    """Return stiffnesses and constants, their estimated errors, and bounds."""
+    values = _linear(document, numbers)
+    if (stiffness := document.get("effective_stiffness")) is not None:
+        C = np.asarray(stiffness)
+        values["anisotropy_normal"] = C[0, 0] - C[1, 1]
+        values["anisotropy_shear"] = C[-1, -1] - (C[0, 0] + C[1, 1] - 2 * C[0, 1]) / 4
+    for section in ("moduli", "constants", "transversely_isotropic"):
+        values |= {name: value for name, value in document.get(section, {}).items() if value is not None}
+    if errors := document.get("mesh_error", {}):
+        known = _linear(errors, numbers) | errors.get("constants", {})
+        values |= {f"{name}_mesh_error": error for name, error in known.items() if name in values}
+        values["energy_mesh_error"] = errors["energy"]
+    return values | _bounds(document.get("bounds") or {}, numbers)
+
+
+def _linear(section: Document, numbers: Sequence[int]) -> dict[str, float]:
+    """Return stiffness, thermal stress and expansion in a section, of a result or its mesh errors."""
+    values = _entries(section.get("effective_stiffness", ()), numbers)
+    values |= _entries(section.get("effective_stiffness_compression", ()), numbers, "_compression")
+    values |= _named(THERMAL_STRESSES, section.get("thermal_stress", ()))
+    return values | _named(EXPANSIONS, section.get("thermal_expansion", ()))
+
+
+def _named(names: Iterable[str], values: Iterable[float]) -> dict[str, float]:
+    return dict(zip(names, values, strict=False))
 
 
 def _entries(stiffness: Any, numbers: Sequence[int], suffix: str = "") -> dict[str, float]:
     """C11, C12, ... of a stiffness (6, 6), or (3, 3) with the `numbers`; none of an empty one."""
     rows = range(1, 7) if len(stiffness) == len(SPATIAL_STRESSES) else numbers
-    names = [f"C{i}{j}{suffix}" for i in rows for j in rows]
-    return dict(zip(names, np.ravel(stiffness).tolist(), strict=False))
-
-
-def _thermal(document: Document) -> dict[str, float]:
-    """Stress and strain per unit of temperature, if they are known."""
-    found = dict(zip(THERMAL_STRESSES, document.get("thermal_stress", ()), strict=False))
-    return found | dict(zip(EXPANSIONS, document.get("thermal_expansion", ()), strict=False))
-
-
-def _mesh_errors(errors: Document, numbers: Sequence[int]) -> dict[str, float]:
-    """Estimated errors of the entries and constants, by their names with an ending."""
-    found = _entries(errors.get("effective_stiffness", ()), numbers)
-    found |= _entries(errors.get("effective_stiffness_compression", ()), numbers, "_compression")
-    found |= _thermal(errors) | errors.get("constants", {})
-    named = {f"{name}{ERROR}": value for name, value in found.items()}
-    return named | ({ENERGY_ERROR: errors["energy"]} if errors else {})
-
-
-def _envelope(document: Document) -> dict[str, float]:
-    """Return loads at onset of an envelope.
-
-    They are that along the first axis, the least, and the largest if every direction has one.
-    """
-    if not document.get("envelope"):
-        return {}
-    first, second = document["case"]["envelope"]["plane"]
-    known = sorted((point for point in document["envelope"] if "factor" in point), key=lambda point: point["factor"])
-    along = {f"envelope_{first}": point for point in document["envelope"][:1] if "factor" in point}
-    least = {f"envelope_least_{first}_{second}": known[0]} if known else {}
-    is_closed = len(known) == len(document["envelope"])
-    places = along | least | ({f"envelope_largest_{first}_{second}": known[-1]} if is_closed else {})
-    return {name: point["factor"] for name, point in places.items()}
-
-
-def _anisotropy(stiffness: Any) -> dict[str, float]:
-    """Two numbers, in the unit of stress, the means of which are zero if the composite is isotropic in the plane."""
-    if stiffness is None:
-        return {}
-    C = np.asarray(stiffness)
-    return {
-        "anisotropy_normal": float(C[0, 0] - C[1, 1]),
-        "anisotropy_shear": float(C[-1, -1] - (C[0, 0] + C[1, 1] - 2 * C[0, 1]) / 4),
-    }
+    return _named((f"C{i}{j}{suffix}" for i in rows for j in rows), np.ravel(stiffness).tolist())
 
 
 def _bounds(bounds: Document, numbers: Sequence[int]) -> dict[str, float]:
     sides = {
         f"C{i}{i}_{side}": bounds[side][k][k] for side in ("reuss", "voigt") if bounds for k, i in enumerate(numbers)
     }
-    for modulus, pair in ((bounds.get("hashin_shtrikman") or {}) if bounds else {}).items():
+    for modulus, pair in (bounds.get("hashin_shtrikman") or {}).items():
         sides |= {f"{modulus}_lower": pair[0], f"{modulus}_upper": pair[1]}
     return sides
-
-
-def _angles(points: Sequence[Document], numbers: Sequence[int]) -> dict[str, float]:
-    found: dict[str, float] = {}
-    for point in points:
-        if "stiffness" in point:
-            values = _entries(point["stiffness"], numbers)
-        else:
-            values = dict(zip(STRESSES, point["stress"], strict=True))
-        found |= {f"angle_{point['angle']:g}_{name}": value for name, value in values.items()}
-    return found
 
 
 def _path(document: Document) -> dict[str, float]:
@@ -144,25 +111,31 @@ def _path(document: Document) -> dict[str, float]:
     stresses = voigt_names(stress.shape[1])[1]
     peak = stress[np.abs(stress).argmax(axis=0), range(len(stresses))]
     onset = next((point for point in points if point["broke"] or point.get("softened")), None)
-    found = {} if onset is None else {"onset_load_factor": onset["load_factor"]} | _at_point("onset", onset)
-    found |= _at_point("end", points[-1])
-    found |= {name: points[-1][name] for name in ("dissipated", "work")}
-    found |= {f"peak_{name}": value for name, value in zip(stresses, peak.tolist(), strict=True)}
+    values = {} if onset is None else {"onset_load_factor": onset["load_factor"]} | _at_point("onset", onset)
+    values |= _at_point("end", points[-1])
+    values |= {name: points[-1][name] for name in ("dissipated", "work")}
+    values |= {f"peak_{name}": value for name, value in zip(stresses, peak.tolist(), strict=True)}
     summit = peak_of(document)
-    found |= {f"peak_{summit[f'{kind}_name']}": summit[kind] for kind in ("stress", "strain")}
-    return found | {f"end_{state}": points[-1][state] for state in point_tables.STATES}
+    values |= {f"peak_{summit[f'{kind}_name']}": summit[kind] for kind in ("stress", "strain")}
+    return values | {f"end_{state}": points[-1][state] for state in point_tables.STATES}
+
+
+def _envelope(document: Document) -> dict[str, float]:
+    """Return loads at onset of an envelope: along its first axis, least, and largest if every direction has one."""
+    points = document.get("envelope")
+    if not points:
+        return {}
+    first, second = document["case"]["envelope"]["plane"]
+    factors = sorted(point["factor"] for point in points if "factor" in point)
+    values = {f"envelope_{first}": point["factor"] for point in points[:1] if "factor" in point}
+    values |= {f"envelope_least_{first}_{second}": factors[0]} if factors else {}
+    is_closed = len(factors) == len(points)
+    return values | ({f"envelope_largest_{first}_{second}": factors[-1]} if is_closed else {})
 
 
 def _at_point(place: str, point: Document) -> dict[str, float]:
     names = zip(voigt_names(len(point["strain"])), (point["strain"], point["stress"]), strict=True)
-    return {f"{place}_{name}": value for keys, found in names for name, value in zip(keys, found, strict=True)}
-
-
-def _load(point: Document | None) -> dict[str, float]:
-    """Strains, stresses and energy of the equilibrium under one load, and the interface nodes."""
-    if point is None:
-        return {}
-    return _at_point("load", point) | {f"load_{name}": point[name] for name in ("stored", *point_tables.STATES)}
+    return {f"{place}_{name}": value for keys, values in names for name, value in zip(keys, values, strict=True)}
 
 
 CASE_COLUMNS = (

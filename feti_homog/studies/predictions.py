@@ -77,12 +77,9 @@ def predicted(document: Document, data: Sequence[Datum]) -> Float:
     found = _values(document)
     missing = [datum for datum in data if datum.strain is None and datum.name not in found]
     if missing:
-        raise CaseError(*(f"[measured] {each.name}: this result has no such value{_reason(each)}" for each in missing))
+        without = {True: "this result has no such value; no bond breaks", False: "this result has no such value"}
+        raise CaseError(*(f"[measured] {d.name}: {without[d.name.startswith('onset_')]}" for d in missing))
     return np.array([found[each.name] if each.strain is None else _on_curve(document, each)[0] for each in data])
-
-
-def _reason(datum: Datum) -> str:
-    return "; no bond breaks" if datum.name.startswith("onset_") else ""
 
 
 def exact_derivatives(document: Document, data: Sequence[Datum], name: str) -> Float | None:

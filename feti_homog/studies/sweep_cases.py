@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import copy
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +31,7 @@ class SweepCase:
         point: number of its values, from 1: all realisations of a point have the same.
         realisation: from 1.
         inputs: the keys that vary, dotted, with their values.
-        identity: digest of the computation.
+        identity: digest of the computation; empty before the case is checked.
     """
 
     number: int
@@ -61,16 +61,6 @@ class Sweep:
     @property
     def stress_unit(self) -> str:
         return self.cases[0].output.stress_unit
-
-
-@dataclass(frozen=True)
-class CaseDocument:
-    """The document of a case that is not checked yet: its point and realisation, from 1, and the inputs that vary."""
-
-    point: int
-    realisation: int
-    inputs: dict[str, Any]
-    document: dict[str, Any]
 
 
 def load(path: str | Path) -> Sweep:
@@ -122,16 +112,15 @@ def cases_at(
     if lines:
         raise CaseError(*dict.fromkeys(lines))
     name, checked, numbers_by_fault = str(document.get("name", "case")), [], dict[str, list[int]]()
-    for number, each in enumerate(unchecked, start=1):
+    for entry, case_document in unchecked:
         if complete is not None:
-            complete(each.document)
+            complete(case_document)
         try:
-            case = cases.parse(each.document | {"name": f"{name}-{number:04d}"}, folder)
-            identity = identity_of(case.digest(), case.petsc)
-            checked.append((SweepCase(number, each.point, each.realisation, each.inputs, identity), case))
+            case = cases.parse(case_document | {"name": f"{name}-{entry.number:04d}"}, folder)
+            checked.append((replace(entry, identity=identity_of(case.digest(), case.petsc)), case))
         except CaseError as error:
             for fault in error.faults:
-                numbers_by_fault.setdefault(fault, []).append(number)
+                numbers_by_fault.setdefault(fault, []).append(entry.number)
     if numbers_by_fault:
         raise CaseError(*(f"{case_names(numbers)}: {fault}" for fault, numbers in numbers_by_fault.items()))
     entries, parsed = zip(*checked, strict=True)
@@ -159,8 +148,8 @@ def case_documents(
     realisations: int | None,
     faults: list[str],
     section: str = SWEEP,
-) -> list[CaseDocument]:
-    """Return the cases in their order: all points, then the next realisation of those with a random cell.
+) -> list[tuple[SweepCase, dict[str, Any]]]:
+    """Return the cases and their documents: all points, then the next realisation of points with a random cell.
 
     Faults of the points, in a section, and of their number of realisations are added to `faults`.
     """
@@ -171,23 +160,25 @@ def case_documents(
     if realisations is not None and "cell.seed" in keys:
         faults.append(f"[{SWEEP}] realisations: excludes cell.seed, the first of which is that of [cell]")
     faults += [f"[{section}] {key}: given twice" for key in dict.fromkeys(keys) if keys.count(key) > 1]
-    return [] if faults else list(_ordered(points, documents, realisations))
+    return [] if faults else _in_order(points, documents, realisations)
 
 
-def _ordered(
+def _in_order(
     points: Sequence[Assignment], documents: Sequence[dict[str, Any]], realisations: int | None
-) -> Iterator[CaseDocument]:
-    """Yield the cases; the seed of a realisation is that of [cell] or one of those after it, unless it is faulty."""
+) -> list[tuple[SweepCase, dict[str, Any]]]:
+    """Return the cases; seeds of realisations count up from the seed in [cell], unless it is faulty."""
+    ordered = list[tuple[SweepCase, dict[str, Any]]]()
     for realisation in range(1, (realisations or 1) + 1):
         for point, (assignment, document) in enumerate(zip(points, documents, strict=True), start=1):
-            inputs = _inputs(assignment)
+            inputs, varied = _inputs(assignment), document
             if realisations is not None and _is_random(document):
                 first = document["cell"].get("seed", 0)
-                seed = first + realisation - 1 if isinstance(first, int) else first
-                cell = document["cell"] | {"seed": seed}
-                yield CaseDocument(point, realisation, inputs | {"cell.seed": seed}, document | {"cell": cell})
-            elif realisation == 1:
-                yield CaseDocument(point, realisation, inputs, document)
+                inputs["cell.seed"] = first + realisation - 1 if isinstance(first, int) else first
+                varied = document | {"cell": document["cell"] | {"seed": inputs["cell.seed"]}}
+            elif realisation > 1:
+                continue
+            ordered.append((SweepCase(len(ordered) + 1, point, realisation, inputs, ""), varied))
+    return ordered
 
 
 def _with_values(base: Mapping[str, Any], point: Assignment, faults: list[str], section: str) -> dict[str, Any]:

@@ -147,9 +147,9 @@ def test_what_is_read_of_the_first_section_is_common_to_all():
 def test_sweeps_vary_a_key_of_one_section():
     base = document([STRONG | {"between": OUTER}, STRONG | {"between": INNER}])
     faults: list[str] = []
-    (found,) = case_documents(base, [{("interface", "2", "normal_strength"): 5.0}], None, faults)
+    ((_, varied),) = case_documents(base, [{("interface", "2", "normal_strength"): 5.0}], None, faults)
     assert not faults
-    assert [interface["normal_strength"] for interface in found.document["interface"]] == [1.0, 5.0]
+    assert [interface["normal_strength"] for interface in varied["interface"]] == [1.0, 5.0]
 
 
 @pytest.mark.parametrize(
