@@ -1,4 +1,4 @@
-"""`feti-homog run`, `check`, `keys`, `schema`, `options`: run and check a case file; the reference of its keys."""
+"""`feti-homog run`, `check`, `keys`, `options`: run and check a case file; the reference of its keys."""
 
 from __future__ import annotations
 
