@@ -9,10 +9,10 @@ From a program of one's own, under `mpirun` or not:
     run(case, out="results", fields=True).fields    # with files, and with mesh and states in memory
 
 - `Case`: a checked case, of a file (`Case.load`) or of a document of the same sections (`Case.parse`).
-- `run`: a case's `Result`.  `run_sweep`, `collect_sweep`: those of many cases, and their table.
+- `run`: a case's `Result`.  `run_sweep`, `collect_sweep`: results of many cases, and their table.
 - `run_fit`: constants of cases from measured values.
 - `draw_state`: the deformed cell of a state into Matplotlib's axes.  `read_state`: its fields as arrays.
-- `launch`: a program with options of its own and PETSc's, whose errors end as those of the command line do.
+- `launch`: a program with options of its own and PETSc's, whose errors end as on the command line.
 - `CaseError`, `MeshError`, `ConvergenceError`, all of them `FetiHomogError`: raised on all ranks, `faults` in words.
 """
 
@@ -34,23 +34,9 @@ if TYPE_CHECKING:
     from feti_homog.case.case import Case
 
 __all__ = [
-    "Case",
-    "CaseError",
-    "ConvergenceError",
-    "FetiHomogError",
-    "MeshError",
-    "Result",
-    "__version__",
-    "collect_sweep",
-    "draw_state",
-    "launch",
-    "read_state",
-    "run",
-    "run_fit",
-    "run_sweep",
-]
-
-
+    "Case", "CaseError", "ConvergenceError", "FetiHomogError", "MeshError", "Result", "__version__", "collect_sweep",
+    "draw_state", "launch", "read_state", "run", "run_fit", "run_sweep",
+]  # fmt: skip
 HOMES = {"Result": "analysis.result", "Case": "case.case"}
 
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from feti_homog.case.case import Case
 from feti_homog.errors import EXIT_DONE, CaseError, LibraryError
+from feti_homog.system.parallel.mpi_errors import on_root, on_root_only, run_main
 from feti_homog.system.petsc import libraries
 from feti_homog.system.petsc.option_table import unknown_to_petsc
 from feti_homog.system.petsc.option_values import faulty_values, named_values, petsc_words, split_argv
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
     from feti_homog.analysis.result import Result
     from feti_homog.results.viewed_states import ViewedState
-    from feti_homog.studies.sweep.report.sweep_table import SweepTable
+    from feti_homog.studies.sweep_table import SweepTable
 
 
 def run(
@@ -88,15 +89,14 @@ def run_sweep(
         ConvergenceError: cases failed; `collect_sweep` makes the table of the others.
     """
     comm = _started(comm)
-    from feti_homog.studies.sweep import collect, execute, plan
-    from feti_homog.system.parallel.mpi_errors import on_root
+    from feti_homog.studies import case_runs, collect, sweep_cases
 
     if isinstance(cases, Mapping):
-        expanded = on_root(comm, plan.expand, cases, Path())
+        sweep = on_root(comm, sweep_cases.expand, cases, Path())
     else:
-        expanded = on_root(comm, plan.load, cases)
+        sweep = on_root(comm, sweep_cases.load, cases)
     group = comm.size if ranks_per_case is None else ranks_per_case
-    execute.run_all(expanded, folder(out), comm, group, retry, quiet)
+    case_runs.run_all(sweep, folder(out), comm, group, retry, quiet)
     return on_root(comm, collect.read, Path(out))
 
 
@@ -109,8 +109,7 @@ def collect_sweep(out: str | Path, comm: Intracomm | None = None, *, pictures: b
         CaseError: `out` is no folder of a sweep.
     """
     comm = _started(comm)
-    from feti_homog.studies.sweep import collect
-    from feti_homog.system.parallel.mpi_errors import on_root
+    from feti_homog.studies import collect
 
     return on_root(comm, collect.collect, Path(out), pictures)
 
@@ -134,15 +133,13 @@ def run_fit(
         ConvergenceError: a case failed, or the data do not determine the unknowns.
     """
     comm = _started(comm)
-    from feti_homog.studies.fit import description, execute
-    from feti_homog.system.parallel.mpi_errors import on_root
+    from feti_homog.studies import fit_file
 
     if isinstance(fit, str | Path):
-        read = on_root(comm, description.load, Path(fit))
+        study = on_root(comm, fit_file.load, Path(fit))
     else:
-        read = on_root(comm, description.parse, fit, Path())
-    group = comm.size if ranks_per_case is None else ranks_per_case
-    return execute.run(read, folder(out), comm, group, retry, quiet)
+        study = on_root(comm, fit_file.parse, fit, Path())
+    return study.run(folder(out), comm, comm.size if ranks_per_case is None else ranks_per_case, retry, quiet)
 
 
 def draw_state(axes: Axes, out: str | Path, number: int = 0, **choices: Any) -> str:
@@ -203,30 +200,18 @@ def start(command: Callable[[Sequence[str], Intracomm], int], argv: Sequence[str
         return error.exit_code
     from mpi4py import MPI
 
-    from feti_homog.system.parallel.mpi_errors import run_main
-
     def main() -> int:
-        _start_petsc(petsc, MPI.COMM_WORLD)
+        options = named_values(petsc)
+        faults = [*faulty_values(options), *unknown_to_petsc(options)]
+        if faults:
+            raise CaseError(*faults)
+        try:
+            libraries.start_petsc([sys.argv[0], *petsc_words(options)], MPI.COMM_WORLD)
+        except RuntimeError as error:  # raised by petsc4py before PETSc can name it
+            raise CaseError(f"PETSc does not start with {' '.join(petsc)}: {error}") from error
         return command(words, MPI.COMM_WORLD)
 
     return run_main(MPI.COMM_WORLD, main)
-
-
-def _start_petsc(words: Sequence[str], comm: Intracomm) -> None:
-    """Start PETSc with its words of the command line.  Collective.
-
-    Raises:
-        CaseError: it cannot be started with them.
-        LibraryError: petsc4py does not fit NumPy.
-    """
-    options = named_values(words)
-    faults = [*faulty_values(options), *unknown_to_petsc(options)]
-    if faults:
-        raise CaseError(*faults)
-    try:
-        libraries.start_petsc([sys.argv[0], *petsc_words(options)], comm)
-    except RuntimeError as error:  # PETSc's own, which there is no PETSc yet to name
-        raise CaseError(f"PETSc does not start with {' '.join(words)}: {error}") from error
 
 
 def folder(name: str | Path) -> Path:
@@ -243,8 +228,6 @@ def folder(name: str | Path) -> Path:
 
 def parsed(parser: argparse.ArgumentParser, words: Sequence[str], comm: Intracomm) -> argparse.Namespace:
     """Return the arguments; help, version and argparse's own complaints are printed by rank 0. Collective."""
-    from feti_homog.system.parallel.mpi_errors import on_root_only
-
     printed = io.StringIO()
     try:
         with contextlib.ExitStack() as redirected:

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NoReturn
 
 from feti_homog.api import parsed, start
-from feti_homog.commands import fibres, products, run, sweep
+from feti_homog.commands import products, run, studies
 from feti_homog.errors import EXIT_DONE, CaseError
 from feti_homog.system.petsc.option_table import help_text
 from feti_homog.system.petsc.option_values import split_argv
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 LAUNCHER_HELP = "Switches of Open MPI go to mpirun: --allow-run-as-root, --oversubscribe (more ranks than cores)."
 GONE = {"statistics": "is drivers/fibre_statistics.py now", "schema": "is gone: `feti-homog keys` has all keys"}
 """Removed commands, each with its replacement."""
-COMMANDS = (run.add, products.add, fibres.add, sweep.add, run.add_reference)
+COMMANDS = (run.add, products.add, products.add_fibres, studies.add, run.add_reference)
 
 
 class Parser(argparse.ArgumentParser):

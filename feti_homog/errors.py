@@ -27,18 +27,14 @@ class FetiHomogError(Exception):
         more = len(faults) - MOST_FAULTS
         if more > 1:  # one more is as short as the count, or is the count
             faults = (*faults[:MOST_FAULTS], f"{more} more faults")
-        self.faults = tuple(map(_line, faults))
+        lines = map(escaped, faults)
+        end = LONGEST_LINE - KEPT_END - 3
+        # The reason stands at the end of a line.
+        self.faults = tuple(f"{n[:end]}...{n[-KEPT_END:]}" if len(n) > LONGEST_LINE else n for n in lines)
         super().__init__("\n".join(self.faults))
 
     def __reduce__(self) -> tuple[type[FetiHomogError], tuple[Any, ...]]:
         return type(self), self.faults
-
-
-def _line(fault: str) -> str:
-    line = escaped(fault)
-    if len(line) > LONGEST_LINE:  # the reason stands at its end
-        line = f"{line[: LONGEST_LINE - KEPT_END - 3]}...{line[-KEPT_END:]}"
-    return line
 
 
 class CaseError(FetiHomogError):

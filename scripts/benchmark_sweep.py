@@ -72,10 +72,10 @@ def loop(path: Path) -> None:
     from benchmark_tool import PEERS, peer  # starts PETSc
     from mpi4py import MPI
 
-    from feti_homog.studies.sweep import plan
+    from feti_homog.studies import sweep_cases
     from feti_homog.system.runtime.progress import Progress
 
-    for case in plan.expand(tomllib.loads(path.read_text()), path.parent).cases:
+    for case in sweep_cases.expand(tomllib.loads(path.read_text()), path.parent).cases:
         peer(PEERS[PEER], case, Progress(MPI.COMM_WORLD, quiet=True), None, RTOL)
 
 

@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from support import fitted_composites as composites
 
 from feti_homog import launch
-from feti_homog.studies.fit.estimation import estimate
+from feti_homog.studies.estimation import estimate
 
 
 def main(given: argparse.Namespace, comm: Intracomm) -> None:

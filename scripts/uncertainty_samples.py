@@ -16,6 +16,7 @@ import numpy as np
 from mpi4py.MPI import Intracomm
 
 from feti_homog import Case, launch, run
+from feti_homog.case.uncertainty import read_uncertainty
 
 CASE: dict[str, Any] = {
     "cell": {"geometry": "hexagonal", "fibre_fraction": 0.55, "mesh_size": 0.3, "order": 1},
@@ -25,7 +26,7 @@ CASE: dict[str, Any] = {
     },
     "uncertainty": {"correlation": [["material.matrix.young", "material.matrix.poisson", 0.3]]},
     "analysis": {"type": "stiffness", "plane": "generalized"},
-    "output": {"mesh_error": False},
+    "output": {"mesh_error": False, "sensitivities": True},
 }
 
 
@@ -33,25 +34,26 @@ def main(given: argparse.Namespace, comm: Intracomm) -> None:
     """Compare both; samples are divided among the ranks."""
     from mpi4py import MPI
 
-    case = Case.parse(CASE)
-    first = run(case, comm)
-    propagated = first.uncertainty
-    names, std = propagated.parameters, propagated.parameter_std
-    covariance = np.outer(std, std) * case.uncertainty.matrix()
-    means = [case.resolved()["material"][name.split(".")[1]][name.split(".")[2]] for name in names]
+    document = copy.deepcopy(CASE)
+    uncertainty = read_uncertainty(document, [])
+    names, std = tuple(uncertainty.std), np.array([*uncertainty.std.values()])
+    slopes = run(Case.parse(document), comm).sensitivities
+    propagated, _ = uncertainty.propagated(slopes.derivatives[:, [slopes.parameters.index(name) for name in names]])
+    covariance = np.outer(std, std) * uncertainty.matrix()
+    means = [document["material"][name.split(".")[1]][name.split(".")[2]] for name in names]
     samples = np.random.default_rng(1).multivariate_normal(means, covariance, given.samples)
     own = [constants(names, row, MPI.COMM_SELF) for row in samples[comm.rank :: comm.size]]
     found = np.concatenate(comm.allgather(np.array(own)))
     if comm.rank == 0:
         print(f"{'':<16}{'first order':>14}{'samples':>14}{'difference':>12}   +- {(2 * given.samples) ** -0.5:.1%}")
-        for name, a, b in zip(propagated.constants, propagated.std, found.std(axis=0, ddof=1), strict=True):
+        for name, a, b in zip(slopes.constants, propagated, found.std(axis=0, ddof=1), strict=True):
             if a > 0:
                 print(f"{name:<16}{a:>14.5g}{b:>14.5g}{a / b - 1:>12.1%}")
 
 
 def constants(names: tuple[str, ...], values: Any, comm: Any) -> Any:
     """Return all constants of a cell with these values."""
-    document = copy.deepcopy(CASE) | {"output": {"mesh_error": False, "sensitivities": True}}
+    document = copy.deepcopy(CASE)
     del document["uncertainty"]
     for name, value in zip(names, values, strict=True):
         _, phase, key = name.split(".")

@@ -134,14 +134,3 @@ class Sensitivities:
         """(n, p) d ln constant / d ln parameter; NaN of constants that are 0."""
         values = np.where(self.constant_values == 0.0, np.nan, self.constant_values)
         return np.asarray(self.derivatives * self.parameter_values / values[:, None])
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class UncertainConstants:
-    """Scatter of the n constants of a cell by that of p constants of its phases and interfaces, of first order."""
-
-    parameters: tuple[str, ...] = described("uncertain constants of the case, such as `material.fibre.young`")
-    parameter_std: Float = described("their standard deviations, each in its unit", "", "(p,)")
-    constants: tuple[str, ...] = described("as in `sensitivities`")
-    std: Float = described("their standard deviations, each in its unit", "", "(n,)")
-    shares: Float = described("share of each parameter in the variance of each constant", "", "(n, p)")

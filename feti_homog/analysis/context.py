@@ -153,8 +153,8 @@ class AnalysisContext:
 
     @property
     def needs_sensitivities(self) -> bool:
-        """True if the case asks for derivatives, or has uncertain constants."""
-        return self.case.output.sensitivities or bool(self.case.uncertainty.std)
+        """True if the case asks for derivatives."""
+        return self.case.output.sensitivities
 
     def bonds(self, opening: float | None) -> BondState:
         """State of the interfaces before any load: prescribed debonded nodes are open."""

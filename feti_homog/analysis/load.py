@@ -8,14 +8,14 @@ from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.mesh_errors import note_accuracy, state_error
 from feti_homog.analysis.registry import Analysis
 from feti_homog.analysis.result_records import LoadPoint
-from feti_homog.analysis.sensitivities import load_sensitivities, propagated
+from feti_homog.analysis.sensitivities import load_sensitivities
 from feti_homog.analysis.tip_records import IN_PLANE_LOADS
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
     """`load`: the state under the load, with what is debonded from the start, open or in contact.
 
-    `tips` of its arcs if only strains of the plane are there; `sensitivities` and `uncertainty` if the case asks.
+    `tips` of its arcs if only strains of the plane are there; `sensitivities` if the case asks.
     """
     cell, (target,) = context.loads.interfaces, context.case.targets
     bonds = context.bonds(None)
@@ -34,7 +34,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     document: dict[str, Any] = {"load": LoadPoint(**point)}
     if context.needs_sensitivities:
         document |= load_sensitivities(context, context.loads.load(target), responses)
-    return document | (propagated(context.case, document) if context.case.uncertainty.std else {})
+    return document
 
 
 ANALYSIS = Analysis(run, table=True)

@@ -16,7 +16,6 @@ from feti_homog.analysis.cell_records import (
     Sensitivities,
     SolverInfo,
     StiffnessBounds,
-    UncertainConstants,
 )
 from feti_homog.analysis.result_records import (
     EITHER_STIFFNESS,
@@ -105,7 +104,6 @@ class Result:
         moduli, bounds: of perfectly bonded cells, else None.
         mesh_error: estimated errors by the mesh of a stiffness and of what follows from it, unless the case forgoes it.
         sensitivities: derivatives of a stiffness by the constants of the case, if it asks for them, else None.
-        uncertainty: scatter of a stiffness and what follows from it, if constants of the case are uncertain, else None.
         tips: energy release rates of a stiffness with debonded arcs, else None; those of an angle are in its points.
         angle, path, envelope: the points of these analyses, else None; `points` has those of the first two as arrays.
         fields: mesh, interface and states on this rank if they were asked for, else None; not written to result.json.
@@ -165,9 +163,6 @@ class Result:
     mesh_error: MeshError | None = described("estimated errors of a stiffness by its mesh", default=None)
     sensitivities: Sensitivities | None = described(
         "derivatives of a stiffness, if the case asks for them", default=None
-    )
-    uncertainty: UncertainConstants | None = described(
-        "scatter of a stiffness and what follows from it, if constants of the case are uncertain", default=None
     )
     tips: TipRates | None = described("energy release rates at the tips of debonded arcs, of a stiffness", default=None)
     angle: tuple[AnglePoint, ...] | None = described("points of analysis `angle`, as in angle.csv", default=None)

@@ -9,10 +9,8 @@ from typing import Any
 import numpy as np
 from scipy.linalg import block_diag
 
-from feti_homog.analysis.cell_records import Sensitivities, UncertainConstants
+from feti_homog.analysis.cell_records import Sensitivities
 from feti_homog.analysis.context import AnalysisContext
-from feti_homog.case.case import Case
-from feti_homog.errors import CaseError
 from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.sensitivities import derivatives
@@ -141,26 +139,3 @@ def _at_status(
             context.checks.record(f"{name}, derivatives, {load}", response)
         found.append(own)
     return found
-
-
-def propagated(case: Case, document: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the entry `uncertainty` of `Result`, as `Uncertainty.propagated`.
-
-    Raises:
-        CaseError: the answer does not depend on an uncertain constant.
-    """
-    found: Sensitivities = document["sensitivities"]
-    std = case.uncertainty.std
-    idle = [name for name in std if name not in found.parameters]
-    if idle:
-        raise CaseError(*(f"[uncertainty] {name}: the {case.analysis.type} does not depend on it" for name in idle))
-    J = found.derivatives[:, [found.parameters.index(name) for name in std]]
-    deviation, shares = case.uncertainty.propagated(J)
-    own = UncertainConstants(
-        parameters=tuple(std),
-        parameter_std=np.array([*std.values()]),
-        constants=found.constants,
-        std=deviation,
-        shares=shares,
-    )
-    return {"uncertainty": own}

@@ -18,7 +18,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     """`effective_stiffness`, whose columns are the stresses under the unit strains.
 
     With contact between debonded faces also `effective_stiffness_compression`, its columns -Sigma(-E); `tips` of
-    debonded arcs under each of them; `mesh_error` of the estimated errors; `sensitivities` and `uncertainty` if
+    debonded arcs under each of them; `mesh_error` of the estimated errors; `sensitivities` if
     the case asks for them.
 
     If a temperature is a load, `thermal_stress` under a unit of it, and `thermal_stress_compression`.
@@ -45,10 +45,9 @@ def run(context: AnalysisContext) -> dict[str, Any]:
         document["tips"] = context.tips.of(under, loads)
     document |= constants(context.cell, document)
     if context.needs_sensitivities:
-        from feti_homog.analysis.sensitivities import propagated, sensitivities  # few runs ask for them
+        from feti_homog.analysis.sensitivities import sensitivities  # few runs ask for them
 
         document |= sensitivities(context, document, first, one_sided)
-        document |= propagated(context.case, document) if context.case.uncertainty.std else {}
     return document | mesh_error(context, document, errors, errors_of_minus)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -13,7 +12,7 @@ from typing import Any
 from feti_homog.case import cell_sizes
 from feti_homog.case.cell_files import checked_cell
 from feti_homog.case.cell_section import GEOMETRY, Cell
-from feti_homog.case.document import read_document, to_document
+from feti_homog.case.document import read_document, short_digest, to_document
 from feti_homog.case.interface_section import Arc, InterfaceSection, interface_tables
 from feti_homog.case.loads import AnalysisSection, Angle, Envelope, LoadPath, SingleLoad, Stiffness, completed
 from feti_homog.case.material_sections import phase_faults, provider, read_materials
@@ -34,7 +33,7 @@ from feti_homog.case.sections import (
     Scalar,
     read_petsc,
 )
-from feti_homog.case.uncertainty import UNCERTAINTY, Uncertainty, read_uncertainty
+from feti_homog.case.uncertainty import UNCERTAINTY
 from feti_homog.errors import CaseError
 from feti_homog.materials.forms import Material
 from feti_homog.materials.laws import contrast_lines
@@ -44,6 +43,11 @@ from feti_homog.schema.wording import suggestion, toml_key, toml_value
 from feti_homog.system.runtime import input_files
 
 FIELDS = {"load": "single_load"}  # of a section whose name is that of a method
+STUDIES = {
+    SWEEP: "this file describes many cases; `feti-homog sweep` runs them",
+    UNCERTAINTY: "a run takes no scatter; `feti-homog uncertainty` passes it on to results",
+}
+"""Sections of files with many cases, each with the command that takes them."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +59,6 @@ class Case:
         interfaces: none if the bonding is perfect; of several each has its pair of phases.
         angle, path, single_load, envelope: there if the analysis is of that type; single_load is the section [load].
         petsc: options without dash.
-        uncertainty: of constants, whose means the case has.
     """
 
     name: str
@@ -70,7 +73,6 @@ class Case:
     decomposition: Decomposition
     output: Output
     petsc: dict[str, Scalar]
-    uncertainty: Uncertainty
 
     @classmethod
     def load(cls, path: str | Path) -> Case:
@@ -146,8 +148,7 @@ class Case:
         document |= {section: to_table(contents, selected) for section, contents in given.items()}
         if len(self.interfaces) > 1:
             document["interface"] = [to_table(interface, selected) for interface in self.interfaces]
-        uncertain = {UNCERTAINTY: self.uncertainty.to_table()} if self.uncertainty.std else {}
-        return document | uncertain | {"petsc": dict(self.petsc)}
+        return document | {"petsc": dict(self.petsc)}
 
     def digest(self, with_output: bool = True) -> str:
         """Short name of what the case computes, and writes if `with_output`; not of its name, options, max_events."""
@@ -157,7 +158,7 @@ class Case:
         document.get("path", {}).pop("max_events", None)
         document["cell"] = {k: v for k, v in document["cell"].items() if k not in ("file", "match")}
         content = b"".join(input_files.read(path) for path in (self.cell.file, self.cell.match) if path is not None)
-        return hashlib.sha256(json.dumps(document, sort_keys=True).encode() + content).hexdigest()[:16]
+        return short_digest(json.dumps(document, sort_keys=True).encode() + content)
 
 
 def load(path: str | Path) -> Case:
@@ -195,9 +196,7 @@ def check_stored(values: Mapping[str, Any]) -> None:
 
 def _read_sections(document: dict[str, Any], folder: Path | None) -> tuple[dict[str, Any], list[str]]:
     """Return what sections hold, with the files of [cell] in `folder` if one is given, and their faults."""
-    uncertain_faults: list[str] = []
-    uncertainty = read_uncertainty(document, uncertain_faults)
-    reader = TableReader(_selected(document), KEY_OWNERS, _top_level_faults(document) + uncertain_faults)
+    reader = TableReader(_selected(document), KEY_OWNERS, _top_level_faults(document))
     selected, faults = reader.selected, reader.faults
     of_rules = [[*rule.faults(document, selected)] for rule in RULES]
     foreign = {rule.path[0] for rule, found in zip(RULES, of_rules, strict=True) if found and rule.holds is None}
@@ -211,7 +210,6 @@ def _read_sections(document: dict[str, Any], folder: Path | None) -> tuple[dict[
         **{FIELDS.get(name, name): _read_section(document, name, reader) for name in SECTIONS_OF_AN_ANALYSIS},
         "output": _read_section(document, "output", reader),
         "petsc": read_petsc(document.get("petsc", {}), faults),
-        "uncertainty": uncertainty,
     }
     faults += chain.from_iterable(of_rules)
     # What has keys of other cases is not looked into.
@@ -241,10 +239,9 @@ def _top_level_faults(document: Mapping[str, Any]) -> list[str]:
         hint = suggestion(name, TOP_LEVEL, KEY_OWNERS)
         if name in FIT_SECTIONS:
             hint = "it belongs to the file of a fit; `feti-homog fit` runs it"
-        if name == SWEEP:
-            words = f"{SWEEP} = {toml_value(value)}: expected a section [{SWEEP}]"
-            many = "[sweep]: this file describes many cases; `feti-homog sweep` runs them"
-            faults.append(many if isinstance(value, dict) else words)
+        if name in STUDIES:
+            words = f"{name} = {toml_value(value)}: expected a section [{name}]"
+            faults.append(f"[{name}]: {STUDIES[name]}" if isinstance(value, dict) else words)
         elif name not in TOP_LEVEL and isinstance(value, dict):
             faults.append(f"[{toml_key(name)}]: unknown section; {hint}")
         elif name not in TOP_LEVEL:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path, PurePath
 from typing import Any
 
@@ -89,6 +90,23 @@ def _to_toml(value: Any, path: TomlPath, faults: list[str]) -> Any:
     if isinstance(value, np.generic):
         return value.item()
     return str(value) if isinstance(value, PurePath) else value
+
+
+def leaves(
+    table: Mapping[str, Any], is_value: Callable[[TomlPath, Any], bool] | None = None, above: TomlPath = ()
+) -> Iterator[tuple[TomlPath, Any]]:
+    """Yield the paths and values of a nested table with dotted keys; empty tables and `is_value` ones are values."""
+    for name, value in table.items():
+        path = (*above, *name.split("."))
+        if isinstance(value, dict) and value and not (is_value and is_value(path, value)):
+            yield from leaves(value, is_value, path)
+        else:
+            yield path, value
+
+
+def short_digest(content: bytes) -> str:
+    """Return 16 hexadecimal digits that differ for different contents."""
+    return hashlib.sha256(content).hexdigest()[:16]
 
 
 def _named_items(table: Mapping[Any, Any], path: TomlPath, faults: list[str]) -> list[tuple[str, Any]]:

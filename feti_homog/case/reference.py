@@ -97,17 +97,17 @@ PETSC_OPTION = KeyRow(
     "An option of the solver, such as feti_ksp_rtol = 1e-10; `feti-homog options` lists them.",
 )  # fmt: skip
 UNCERTAINTY_MEANING = (
-    "scatter of constants, which a stiffness or a load passes on to all its results, of first order. "
-    "`feti-homog uncertainty` does so for any number of a case, also of sizes, strengths and loads."
+    "scatter of numbers, which `feti-homog uncertainty` passes on to constants, onsets and peaks, of first order. "
+    "`feti-homog run` takes none."
 )
 DEVIATION = KeyRow(
     UNCERTAINTY, f"[{UNCERTAINTY}]", "SECTION.KEY", "a number above 0", "that of the key", "", "",
-    "Standard deviation of a constant of [material.PHASE], or of a stiffness of [interface], whose value is the "
-    "mean. In place of both, the constant itself may be {mean, std} or {mean, cv}, cv = std / |mean|.",
+    "Standard deviation of a number, whose value is the mean. In place of both, the number itself may be {mean, std} "
+    "or {mean, cv}, cv = std / |mean|.",
 )  # fmt: skip
 PAIRS = KeyRow(
     UNCERTAINTY, f"[{UNCERTAINTY}]", CORRELATION, "a list of [KEY, KEY, VALUE], values from -1 to 1", "", "", "",
-    "Correlation of pairs of these constants.",
+    "Correlation of pairs of these numbers.",
 )  # fmt: skip
 AXIS = KeyRow(SWEEP, f"[{SWEEP}]", "SECTION.KEY", AXIS_EXPECTED, "", "", "", AXIS_MEANING)
 

@@ -22,7 +22,6 @@ from feti_homog.case.section_values import (
     SEED,
     STATES,
 )
-from feti_homog.case.uncertainty import UNCERTAINTY
 from feti_homog.materials.forms import MATERIAL_FORMS
 from feti_homog.schema.keys import Key, key, keys_of
 from feti_homog.schema.values import boolean, choice, file_name, integer, is_number, real, text
@@ -233,7 +232,7 @@ SECTIONS_OF_AN_ANALYSIS = {
 """Sections that must be given for one type of analysis, and belong to no other."""
 
 REQUIRED = ("cell", "material", "analysis")
-TOP_LEVEL = (*SECTIONS, "material", "petsc", UNCERTAINTY, "name")
+TOP_LEVEL = (*SECTIONS, "material", "petsc", "name")
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Uncertain constants of a case: KEY = {mean, std} or {mean, cv} in place of a number, and their correlation."""
+"""Uncertain numbers of a case: KEY = {mean, std} or {mean, cv} in place of a number, and their correlation."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.case.document import TomlPath
+from feti_homog.case.document import TomlPath, leaves
 from feti_homog.schema.values import is_number, magnitudes_in_words
 from feti_homog.schema.wording import dotted_key, toml_value
 from feti_homog.typing import Float
@@ -21,21 +21,17 @@ DIFFERENTIABLE = ("stiffness", "load")
 """Types of analyses that have derivatives."""
 ROUNDING = 1e-12
 EXPECTED = "expected {mean, std} or {mean, cv}, numbers, std and cv above 0"
-PLACES = (
-    "expected a constant of [material.PHASE], or a stiffness of [interface]; of any number `feti-homog uncertainty` "
-    "finds the scatter"
-)
 
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """Standard deviations of constants by dotted key, and correlations of pairs of them."""
+    """Standard deviations of numbers by dotted key, and correlations of pairs."""
 
     std: Mapping[str, float]
     correlation: tuple[tuple[str, str, float], ...] = ()
 
     def matrix(self) -> Float:
-        """(p, p) correlation of all constants."""
+        """(p, p) correlation of all numbers."""
         names, found = [*self.std], np.eye(len(self.std))
         for first, second, value in self.correlation:
             i, j = names.index(first), names.index(second)
@@ -56,33 +52,30 @@ class Uncertainty:
         return scale * np.sqrt(variance), shares
 
     def to_table(self) -> dict[str, Any]:
-        """Return the section [uncertainty] of a case whose constants are their means; empty of none."""
+        """Return the section [uncertainty] of a case with means in place of numbers; empty without any."""
         pairs = {CORRELATION: [list(pair) for pair in self.correlation]} if self.correlation else {}
         return {**self.std, **pairs}
 
 
-def read_uncertainty(document: dict[str, Any], faults: list[str], anywhere: bool = False) -> Uncertainty:
-    """Take the uncertainties out of a document, in which means are left: of constants, or of numbers `anywhere`."""
+def read_uncertainty(document: dict[str, Any], faults: list[str]) -> Uncertainty:
+    """Take the uncertain numbers out of a document, which keeps their means."""
     table = document.pop(UNCERTAINTY, {})
     if not isinstance(table, dict):
         faults.append(f"{UNCERTAINTY} = {toml_value(table)}: expected a section [{UNCERTAINTY}]")
         return Uncertainty({})
-    given = [*_leaves({name: value for name, value in table.items() if name != CORRELATION})]
-    for section in [name for name in document if anywhere or name in SECTIONS]:
+    stds = leaves({name: value for name, value in table.items() if name != CORRELATION})
+    given = [(path, value) for path, value in stds if value != {}]
+    for section in document:
         document[section] = _means(document[section], (section,), given, faults)
-    return _checked(document, given, table.get(CORRELATION, []), faults, anywhere)
+    return _checked(document, given, table.get(CORRELATION, []), faults)
 
 
 def _checked(
-    document: Mapping[str, Any], given: Sequence[tuple[TomlPath, Any]], pairs: Any, faults: list[str], anywhere: bool
+    document: Mapping[str, Any], given: Sequence[tuple[TomlPath, Any]], pairs: Any, faults: list[str]
 ) -> Uncertainty:
     """Return the uncertainties of standard deviations and correlated pairs; empty, with faults, of faulty ones."""
     named = {".".join(path): value for path, value in dict(given).items()}
-    faults += [*_deviation_faults(document, given, anywhere), *_pair_faults(pairs, named)]
-    analysis = document.get("analysis")
-    if given and not anywhere and isinstance(analysis, dict) and analysis.get("type") not in DIFFERENTIABLE:
-        types = " or ".join(map(toml_value, DIFFERENTIABLE))
-        faults.append(f"[{UNCERTAINTY}]: belongs to [analysis] type = {types}")
+    faults += [*_deviation_faults(document, given), *_pair_faults(pairs, named)]
     if faults:
         return Uncertainty({})
     found = Uncertainty(named, tuple((first, second, float(value)) for first, second, value in pairs))
@@ -91,9 +84,7 @@ def _checked(
     return found
 
 
-def _deviation_faults(
-    document: Mapping[str, Any], given: Sequence[tuple[TomlPath, Any]], anywhere: bool
-) -> Iterator[str]:
+def _deviation_faults(document: Mapping[str, Any], given: Sequence[tuple[TomlPath, Any]]) -> Iterator[str]:
     """Yield what is wrong with standard deviations and their places."""
     paths = [path for path, _ in given]
     for path, value in dict(given).items():
@@ -105,13 +96,6 @@ def _deviation_faults(
             yield f"{name} = {toml_value(value)}: {words}"
         elif number_at(document, path) is None:
             yield f"{name}: expected a key of the case whose value is a number"
-        elif not anywhere and not is_constant(path):
-            yield f"{name}: {PLACES}"
-
-
-def is_constant(path: TomlPath) -> bool:
-    """Return whether there are derivatives by the key."""
-    return path[0] == "material" or (path[0] == "interface" and path[-1].endswith("_stiffness"))
 
 
 def _pair_faults(pairs: Any, named: Mapping[str, Any]) -> Iterator[str]:
@@ -165,15 +149,6 @@ def _deviation(value: Mapping[str, Any]) -> float | None:
         return None
     spread = value["std"] if "std" in value else value["cv"] * abs(value["mean"])
     return float(spread) if spread > 0 else None
-
-
-def _leaves(table: Mapping[str, Any], above: TomlPath = ()) -> Iterator[tuple[TomlPath, Any]]:
-    for name, value in table.items():
-        path = (*above, *name.split("."))
-        if isinstance(value, dict):
-            yield from _leaves(value, path)
-        else:
-            yield path, value
 
 
 def number_at(document: Mapping[str, Any], path: TomlPath) -> float | None:

@@ -27,10 +27,8 @@ from feti_homog.typing import Float
 def table(source: Path) -> str:
     """Return the table of a case file or a folder of results, with a row for each fibre and for each void.
 
-    Fibres are in the order of their numbers; there are columns `a`, `b` and `angle` if any is an ellipse, and a column
-    `coating` if any has one.
-
-    Its numbers are exact, so that it gives the same cell again.  On one rank.
+    Fibres are in the order of their numbers.  Ellipses have the columns `a`, `b` and `angle`, coatings `coating`.
+    Numbers are exact, so that the table gives the same cell again.  On one rank.
 
     Raises:
         CaseError, MeshError: the source is faulty, or a fibre is neither round nor an ellipse, or voids are not known.
@@ -60,7 +58,7 @@ def table(source: Path) -> str:
 
 
 def _words(values: Float) -> list[str]:
-    """Return the exact numbers (N,), nothing where they are NaN."""
+    """Return exact numbers (N,) as text, empty for NaN."""
     return ["" if np.isnan(value) else repr(value) for value in values.tolist()]
 
 
@@ -71,12 +69,12 @@ class ListedFibres:
     Attributes:
         size: (2,) width and height.
         ellipses: N circles and ellipses about centres within the cell.
-        phases: their names; those of cells that the program meshes have the voids behind them.
+        phases: their names; cells that the program meshes have the voids behind the fibres.
         coatings: (N,) thickness of the coatings, 0 without one.
-        cores: (N,) radii of the voids within hollow fibres, 0 of others.
+        cores: (N,) radii of the voids within hollow fibres, else 0.
         lacks_voids: whether there are voids that are not listed.
-        others: columns (N,) of fibres that are neither discs nor ellipses, and have discs of the same areas among the
-            ellipses; NaN of others.
+        others: columns (N,) of fibres that are neither discs nor ellipses, else NaN; discs of the same areas stand for
+            them among the ellipses.
     """
 
     size: Float
@@ -94,29 +92,32 @@ class ListedFibres:
 
 
 def read(source: Path) -> ListedFibres:
-    """Return those of a case file or a folder of results.  On one rank.
+    """Return the fibres of a case file or a folder of results.  On one rank.
 
     Raises:
         CaseError, MeshError: the source is faulty, or a fibre is neither round nor an ellipse.
     """
-    found = _of_result(source) if source.is_dir() else _of_cell(cases.load(source).cell)
-    known = np.column_stack([found.ellipses.centres, found.radii, found.coatings])
-    lost = np.flatnonzero(~np.isfinite(known).all(axis=1)) + 1
+    fibres = _of_result(source) if source.is_dir() else _of_cell(cases.load(source).cell)
+    sizes = np.column_stack([fibres.ellipses.centres, fibres.radii, fibres.coatings])
+    lost = np.flatnonzero(~np.isfinite(sizes).all(axis=1)) + 1
     if len(lost):
         listed = ", ".join(map(str, lost[:10]))
         raise CaseError(f"{source}: fibres that are neither round nor ellipses have no radius: {listed}")
-    return found
+    return fibres
 
 
 def _of_result(directory: Path) -> ListedFibres:
+    """Return the fibres of a result, by its case if it lacks outlines: of voids, and of shapes other than ellipses."""
     document = stored_result.read(directory)
-    if document["case"]["cell"]["geometry"] != "mesh" and not _is_complete(document):
+    is_complete = all("radius" in fibre or "semi_axes" in fibre for fibre in document["fibres"])
+    is_complete = is_complete and not document["cell"].get("porosity")
+    if document["case"]["cell"]["geometry"] != "mesh" and not is_complete:
         return _of_cell(cases.parse(document["case"], directory).cell)
     return _of_records(document["fibres"], document["cell"])
 
 
 def _of_records(fibres: Sequence[Mapping[str, Any]], cell: Mapping[str, Any]) -> ListedFibres:
-    """Return those of `fibres` and `cell` of a result."""
+    """Return the fibres in `fibres` and `cell` of a result."""
     unknown = (np.nan, np.nan)
     centres = np.array([fibre.get("centre") or unknown for fibre in fibres], float).reshape(-1, 2)
     axes = [
@@ -131,15 +132,6 @@ def _of_records(fibres: Sequence[Mapping[str, Any]], cell: Mapping[str, Any]) ->
         np.zeros(len(fibres)),
         lacks_voids=bool(cell.get("porosity")),
     )
-
-
-def _is_complete(document: Mapping[str, Any]) -> bool:
-    """Return whether a result has all outlines.
-
-    It lacks those of voids, and those that are neither round nor elliptic.
-    """
-    are_known = all("radius" in fibre or "semi_axes" in fibre for fibre in document["fibres"])
-    return are_known and not document["cell"].get("porosity")
 
 
 def _of_cell(cell: Cell) -> ListedFibres:

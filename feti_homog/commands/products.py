@@ -1,4 +1,4 @@
-"""`feti-homog plot`, `report`, `fields`, `export`, `verify`: pictures, page, VTK files, material card, certificate.
+"""`feti-homog plot`, `report`, `fields`, `export`, `fibres`, `verify`: products of a result, and its certificate.
 
 `verify` checks a result from its files alone, without MPI and PETSc.
 """
@@ -27,6 +27,10 @@ from feti_homog.system.runtime.standard_streams import (
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
 
+FIBRES_HELP = (
+    'Print a row for each fibre, with centre, radius or semi-axes, and phase: the file of [cell] geometry = "table". '
+    "The table of a cell gives that cell again."
+)
 EXPORT_HELP = (
     'Print the effective constants of a stiffness or an envelope in plane = "generalized" as a card of a material. Its '
     "axis 1 is the fibre, x3 of the cell; axes 2 and 3 are x1 and x2 of the cell. No unit is converted."
@@ -67,6 +71,14 @@ def add(actions: argparse._SubParsersAction[Any]) -> None:
     verify.add_argument("--json", action="store_true", help="print the certificate as JSON")
 
 
+def add_fibres(actions: argparse._SubParsersAction[Any]) -> None:
+    """Add the command `fibres` to a parser."""
+    parser = actions.add_parser("fibres", help="print the fibres of a cell as a table", description=FIBRES_HELP)
+    parser.add_argument("source", type=folder, metavar="CASE.toml|DIR", help="a case file, or a folder of results")
+    parser.add_argument("--out", type=Path, metavar="FILE.csv", help="write the table to a file instead of printing it")
+    parser.set_defaults(action=_fibres)
+
+
 def _add(
     actions: argparse._SubParsersAction[Any],
     name: str,
@@ -85,7 +97,7 @@ def _add(
 def _result_folder(name: str) -> Path:
     """Return the folder of that name; CaseError for a file, and for the folder of a sweep, whose cases have results."""
     from feti_homog.results import result_json
-    from feti_homog.studies.sweep.store import INDEX_FILE
+    from feti_homog.studies.case_folders import INDEX_FILE
 
     directory = folder(name)
     if os.path.isfile(directory):
@@ -137,6 +149,17 @@ def _export(arguments: argparse.Namespace, comm: Intracomm) -> None:
     if arguments.out is not None:
         text = str(on_root(comm, output_folder.write_product, arguments.out, text))
     on_root_only(comm, print_product, text)
+
+
+def _fibres(arguments: argparse.Namespace, comm: Intracomm) -> None:
+    from feti_homog.commands import listed_fibres
+    from feti_homog.results import output_folder
+
+    text = on_root(comm, listed_fibres.table, arguments.source)
+    if arguments.out is None:
+        on_root_only(comm, print_product, text)
+    elif (path := on_root_only(comm, output_folder.write_product, arguments.out, text)) is not None:
+        say(str(path))
 
 
 def run_verify(parser: argparse.ArgumentParser, words: Sequence[str]) -> int:

@@ -1,4 +1,4 @@
-"""`feti-homog run`, `check`, `keys`, `schema`, `options`: run and check a case file; the reference of its keys."""
+"""`feti-homog run`, `check`, `keys`, `options`: run and check a case file; the reference of its keys."""
 
 from __future__ import annotations
 
@@ -45,14 +45,16 @@ def _run(arguments: argparse.Namespace, comm: Intracomm) -> None:
 def _check(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.case.document import read_document
     from feti_homog.case.sections import FIT_SECTIONS
-    from feti_homog.studies.fit import description as fits
-    from feti_homog.studies.sweep import description
-    from feti_homog.studies.uncertainty import scatter
+    from feti_homog.studies import description, fit_file, uncertainty
 
     document = on_root(comm, read_document, arguments.case)  # once: it may be a pipe
-    describe = scatter.of_document if on_root(comm, scatter.is_study, document) else description.of_document
-    describe = fits.of_document if document.keys() & {*FIT_SECTIONS} else describe
-    on_root_only(comm, print_product, describe(document, arguments.case.parent, comm))
+    if document.keys() & {*FIT_SECTIONS}:
+        text = on_root(comm, fit_file.parse, document, arguments.case.parent).describe(comm)
+    elif on_root(comm, uncertainty.is_study, document):
+        text = on_root(comm, uncertainty.parse, document, arguments.case.parent).describe(comm)
+    else:
+        text = description.of_document(document, arguments.case.parent, comm)
+    on_root_only(comm, print_product, text)
 
 
 def add_reference(actions: argparse._SubParsersAction[Any]) -> None:

@@ -85,14 +85,19 @@ def refuse_files_of_others(directory: Path) -> None:
             if kind:
                 raise CaseError(f"--out {directory}: {path.name} is {kind}, and a run writes a file of that name")
         checkpoint_file.refuse_others(directory)
-        foreign = _foreign(paths)
+        others = _foreign(paths)
     except OSError as error:
         raise CaseError(f"--out {directory}: its files cannot be read: {error.strerror}") from error
-    if foreign:
-        raise CaseError(
-            f"--out {directory}: no run of this program wrote {foreign[0].name}, and this one would replace it; "
-            "move it away or choose another folder"
-        )
+    if others:
+        raise foreign(directory, others[0].name, "run")
+
+
+def foreign(directory: Path, name: str, kind: str) -> CaseError:
+    """Return the error for a file of others under a name that a run or a study writes."""
+    return CaseError(
+        f"--out {directory}: no {kind} of this program wrote {name}, and this one would replace it; "
+        "move it away or choose another folder"
+    )
 
 
 def _foreign(paths: list[Path]) -> list[Path]:

@@ -1,4 +1,6 @@
-"""Many cases from one file: sweeps, fits of constants, and the scatter that uncertain inputs cause.
+"""Many cases from one file: sweeps, fits of constants to measured values, and the scatter by uncertain inputs.
 
-Main entries: `sweep.plan.load`, `fit.execute.run` and `uncertainty.scatter`.
+Imports `analysis`, `case`, `feti`, `homogenization`, `materials`, `mesh`, `microstructure`, `report`, `results`,
+`schema` and `system`.  Main entries: `sweep_cases.load`, `case_runs.run_all`, `collect.collect`, `fit_file.load`,
+`uncertainty.load` and `study.Study`.
 """

@@ -32,10 +32,9 @@ Case = dict[str, Any]
 def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
     """Check the values of all constants and parameters, and one derivative along a direction in which all change."""
     document, case = cell.files.document, cell.files.case
-    asked = {"sensitivities": case.get("output", {}).get("sensitivities"), "uncertainty": "uncertainty" in case}
-    missing = [name for name, is_asked in asked.items() if is_asked and name not in document]
-    findings.record("tables", [np.inf] * len(missing), lambda k: f"{missing[k]}, which the case asks for")
     if "sensitivities" not in document:
+        if case.get("output", {}).get("sensitivities"):
+            findings.record("tables", np.inf, "sensitivities, which the case asks for")
         return
     data = document["sensitivities"]
     names, values = data["parameters"], np.array(data["parameter_values"])
@@ -55,8 +54,6 @@ def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
         _check_energies(findings, cell, states, moved, direction)
     else:
         _check_constants(findings, cell, states, moved, direction)
-    if "uncertainty" in document:
-        _check_uncertainty(findings, document)
 
 
 def _required(cell: DiscreteCell) -> Iterator[str]:
@@ -76,31 +73,6 @@ def _places(numbers: Float) -> list[str]:
     if numbers.ndim > 1:
         return [f".C{i + 1}{j + 1}" for i, j in np.argwhere(np.triu(numbers))]
     return [f".{k + 1}" for k in range(len(numbers))] if numbers.ndim else [""]
-
-
-def _check_uncertainty(findings: Findings, document: Mapping[str, Any]) -> None:
-    """Check the scatter sqrt(a.R a) of constants, of changes a by one standard deviation of each, and its shares."""
-    data, known = document["uncertainty"], document["sensitivities"]
-    given = {name: float(std) for name, std in document["case"]["uncertainty"].items() if name != "correlation"}
-    names = data["parameters"]
-    if {*names} != given.keys() or [*data["constants"]] != [*known["constants"]]:
-        findings.record("tables", np.inf, "uncertainty, names")
-        return
-    R = np.eye(len(names))
-    for first, second, value in document["case"]["uncertainty"].get("correlation", []):
-        i, j = names.index(first), names.index(second)
-        R[i, j] = R[j, i] = value
-    own = np.array([given[name] for name in names])
-    findings.record("tables", relative(np.array(data["parameter_std"]) - own, own), lambda k: f"uncertain {names[k]}")
-    for k, name in enumerate(data["constants"]):
-        row = np.array(known["derivatives"][known["constants"].index(name)])
-        a = np.array([row[known["parameters"].index(each)] for each in names]) * own
-        variance, most = float(a @ R @ a), float(np.abs(a).max())
-        std = max(variance, 0.0) ** 0.5
-        findings.record("sensitivities", abs(data["std"][k] - std) / (most or 1.0), f"scatter of {name}")
-        if variance > NOISE**2 * most**2:
-            off = np.array(data["shares"][k]) - a * (R @ a) / variance
-            findings.record("sensitivities", float(np.abs(off).max()), f"shares of {name}")
 
 
 def _check_energies(

@@ -10,7 +10,7 @@ from feti_homog.analysis.result import schema_keys
 from feti_homog.analysis.result_records import AnglePoint, EnvelopePoint, LoadPoint, PathPoint
 from feti_homog.results.field_layout import Item, items, spatial_items
 from feti_homog.results.result_json import DescribedColumn, columns
-from feti_homog.studies.sweep.report.tables import COLUMNS, STATISTICS_COLUMNS
+from feti_homog.studies.outputs import COLUMNS, STATISTICS_COLUMNS
 
 INTRODUCTION = """\
 Any consistent units: the unit of stresses is that of the moduli in the case file, that of lengths the unit of the cell.

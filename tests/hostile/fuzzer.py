@@ -23,7 +23,7 @@ from feti_homog.microstructure.fibre_window import read_window
 from feti_homog.report.cards import export
 from feti_homog.report.text.summary import summary
 from feti_homog.results import seals
-from feti_homog.studies.sweep import plan, store
+from feti_homog.studies import case_folders, sweep_cases
 from feti_homog.verify.certificate import verify
 from hostile.attempts import LIMIT_S, PATIENCE_S
 from hostile.fibre_tables import CASE, HEAD
@@ -76,7 +76,7 @@ def _table(_: Path, folder: Path, rng: np.random.Generator) -> None:
 def _case(_: Path, folder: Path, rng: np.random.Generator) -> None:
     path = folder / "random.toml"
     path.write_bytes(damaged(DOCUMENTS[rng.integers(len(DOCUMENTS))].encode(), rng))
-    read = plan.load if b"[sweep]" in path.read_bytes() else case.load
+    read = sweep_cases.load if b"[sweep]" in path.read_bytes() else case.load
     read(path)
 
 
@@ -98,8 +98,8 @@ def _readers() -> tuple[Callable[[Path], object], ...]:
 
 def _sweep(prepared: Path, folder: Path, rng: np.random.Generator) -> None:
     _change(prepared / "sweep/sweep.json", folder / "sweep/sweep.json", rng)
-    for entry in store.read_index(folder / "sweep").entries:
-        store.case_state(folder / "sweep", entry)
+    for entry in case_folders.read_index(folder / "sweep").entries:
+        case_folders.case_state(folder / "sweep", entry)
 
 
 def _change(original: Path, path: Path, rng: np.random.Generator) -> None:

@@ -10,8 +10,8 @@ import pytest
 from support.fitted_composites import COMPOSITES, fit, model, truth
 
 from feti_homog import CaseError, ConvergenceError, run, run_fit
-from feti_homog.studies.fit import description, execute
-from feti_homog.studies.fit.predictions import exact_derivatives, predicted
+from feti_homog.studies import case_runs, fit_file
+from feti_homog.studies.predictions import exact_derivatives, predicted
 from feti_homog.system.parallel.mpi_errors import on_root
 
 pytestmark = pytest.mark.parallel
@@ -45,7 +45,7 @@ def test_data_without_noise_return_the_truth(comm, shared_path, name):
 
 def test_an_interrupted_fit_goes_on_with_what_it_has(comm, shared_path, glass, monkeypatch):
     """Only evaluations that were not finished are computed again."""
-    out, calls, compute = shared_path / "out", [], execute.execute.run_all
+    out, calls, compute = shared_path / "out", [], case_runs.run_all
 
     def counted(sweep, folder, *arguments, **named):
         calls.append(folder.name)
@@ -54,7 +54,7 @@ def test_an_interrupted_fit_goes_on_with_what_it_has(comm, shared_path, glass, m
         compute(sweep, folder, *arguments, **named)
 
     with monkeypatch.context() as patch:
-        patch.setattr(execute.execute, "run_all", counted)
+        patch.setattr(case_runs, "run_all", counted)
         with pytest.raises(ConvergenceError, match="the power is gone"):
             run_fit(glass, out, comm)
     before = stamps(out)
@@ -103,7 +103,7 @@ def test_tests_share_unknowns_and_fractions_are_fitted(comm, shared_path, glass)
     tests = [{"cell": {"geometry": geometry}} for geometry in ("square", "hexagonal")]
     anything = {name: {"value": 1.0, "std": 0.1} for name in ("E3", "E1", "G13")}
     document["test"] = [test | {"measured": anything} for test in tests]
-    asked = description.parse(document, Path())
+    asked = fit_file.parse(document, Path())
     sweep = asked.at([true[name] for name in asked.unknowns])
     for test, case in zip(document["test"], sweep.cases, strict=True):
         found = run(case, comm).sensitivities
@@ -148,7 +148,7 @@ def test_toughness_is_fitted_to_peaks_and_curves_without_differences(comm, share
         "onset_S11": {"value": 1.0, "std": 0.1},
         "curve": {"file": str(shared_path / "curve.csv"), "std": 0.5},
     }
-    asked = on_root(comm, description.parse, document, Path())
+    asked = on_root(comm, fit_file.parse, document, Path())
     below, found, above = (run(asked.at([G]).cases[0], comm).document for G in (1.9999, 2.0, 2.0001))
     difference = (predicted(above, asked.data) - predicted(below, asked.data)) / 2e-4
     assert exact_derivatives(found, asked.data, "interface.toughness") == pytest.approx(difference, rel=1e-4, abs=1e-4)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from feti_homog import CaseError
-from feti_homog.studies.uncertainty import scatter
+from feti_homog.studies import uncertainty
 from feti_homog.system.parallel.mpi_errors import on_root
 
 pytestmark = pytest.mark.parallel
@@ -39,8 +39,8 @@ def test_onsets_do_not_depend_on_the_unit_of_stress(comm, shared_path, temperatu
         case["analysis"]["plane"], case["envelope"]["temperature"] = "generalized", temperature
         case["material"] = {phase: own | {"expansion": 1e-5} for phase, own in MATERIAL.items()}
         case["material"]["matrix"]["expansion"] = 6e-5
-    study = scatter.parse(case, Path())
-    found = scatter.run(study, shared_path / "out", comm, comm.size, False, True)
+    study = uncertainty.parse(case, Path())
+    found = study.run(shared_path / "out", comm, comm.size, False, True)
     is_closed = temperature is None
     of_strength = "derivatives" if is_closed else "differences"
     assert [each["by"] for each in found["parameters"]] == ["differences"] * 4 + [of_strength]
@@ -52,7 +52,7 @@ def test_onsets_do_not_depend_on_the_unit_of_stress(comm, shared_path, temperatu
         assert each["std_inputs"] == pytest.approx(np.linalg.norm(terms * ([0.01] * 4 + [0.1])))
     stamps = {path: path.stat().st_mtime_ns for path in shared_path.glob("out/*/case-*/result.json")}
     assert len(stamps) == (9 if is_closed else 11)
-    assert scatter.run(study, shared_path / "out", comm, comm.size, False, True) == found
+    assert study.run(shared_path / "out", comm, comm.size, False, True) == found
     assert stamps == {path: path.stat().st_mtime_ns for path in stamps}
 
 
@@ -65,7 +65,7 @@ def test_random_cells_have_the_scatter_of_inputs_and_that_between_them(comm, sha
         "sweep": {"realisations": 2},
         "uncertainty": {"correlation": [["material.matrix.young", "material.fibre.young", 0.5]]},
     }
-    found = scatter.run(scatter.parse(case, Path()), shared_path / "out", comm, comm.size, False, True)
+    found = uncertainty.parse(case, Path()).run(shared_path / "out", comm, comm.size, False, True)
     assert not (shared_path / "out" / "differences").exists() and found["cells"] == 2
     texts = on_root(comm, lambda: [p.read_text() for p in sorted(shared_path.glob("out/means/case-*/result.json"))])
     cells = [json.loads(each)["sensitivities"] for each in texts]
@@ -80,13 +80,13 @@ def test_random_cells_have_the_scatter_of_inputs_and_that_between_them(comm, sha
         assert each["std"] == pytest.approx(np.hypot(inputs, between)) and sum(each["shares"]) == pytest.approx(1.0)
         errors = np.abs(np.diff([own["derivatives"][k] for own in cells], axis=0))[0, young] / 2
         assert each["derivative_errors"] == pytest.approx(errors, abs=1e-9) and each["mesh_error"] > 0
-    text = scatter.text(found)
+    text = uncertainty.text(found)
     assert "+- cells" in text and "Standard error" not in text
     found["results"][0]["derivative_errors"] = [0.51 * abs(each) for each in found["results"][0]["derivatives"]]
-    assert "half of the slope by material.fibre.young: C11" in scatter.text(found)
-    ours = scatter.parse(case | {"uncertainty": {"material.fibre.poisson": 0.01}}, Path())
+    assert "half of the slope by material.fibre.young: C11" in uncertainty.text(found)
+    ours = uncertainty.parse(case | {"uncertainty": {"material.fibre.poisson": 0.01}}, Path())
     with pytest.raises(CaseError, match="holds another study of scatter"):
-        scatter.run(ours, shared_path / "out", comm, comm.size, False, True)
+        ours.run(shared_path / "out", comm, comm.size, False, True)
 
 
 @pytest.mark.parametrize(
@@ -109,5 +109,5 @@ def test_faults_have_their_line(changes, line):
         "analysis": {"type": "stiffness", "plane": "strain"},
     }
     with pytest.raises(CaseError) as error:
-        scatter.parse(case | changes, Path())
+        uncertainty.parse(case | changes, Path())
     assert error.value.faults[0].startswith(line), error.value.faults

@@ -14,7 +14,7 @@ from support.sweep_files import BY_BODIES, CASE, RANDOM
 
 from feti_homog import run
 from feti_homog.errors import ConvergenceError
-from feti_homog.studies.sweep import collect, execute, plan, store
+from feti_homog.studies import case_folders, case_runs, collect, sweep_cases
 from feti_homog.system.parallel.mpi_errors import on_root
 
 pytestmark = pytest.mark.parallel
@@ -24,8 +24,8 @@ FRACTIONS = "'cell.fibre_fraction' = {from = 0.1, to = 0.6, step = 0.1}\n"
 
 def swept(comm, folder, table, case=CASE, ranks_per_case=None):
     """Return the collected table of a sweep, on every rank."""
-    sweep = plan.expand({"name": "sweep"} | tomllib.loads(f"{case}[sweep]\n{table}"), Path())
-    execute.run_all(sweep, folder / "out", comm, ranks_per_case or comm.size, retry=False, quiet=True)
+    sweep = sweep_cases.expand({"name": "sweep"} | tomllib.loads(f"{case}[sweep]\n{table}"), Path())
+    case_runs.run_all(sweep, folder / "out", comm, ranks_per_case or comm.size, retry=False, quiet=True)
     return on_root(comm, collect.read, folder / "out")
 
 
@@ -51,7 +51,7 @@ def test_the_same_seeds_give_the_same_numbers(comm, shared_path):
     names = [f"C{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3)]
     found = np.array([table.outputs[name] for name in names]).T
     for row, seed in enumerate(table.inputs["cell.seed"]):
-        case = plan.expand({"sweep": {"cell.seed": [seed]}} | tomllib.loads(RANDOM), Path()).cases[0]
+        case = sweep_cases.expand({"sweep": {"cell.seed": [seed]}} | tomllib.loads(RANDOM), Path()).cases[0]
         alone = run(case, MPI.COMM_SELF).effective_stiffness
         assert found[row] == pytest.approx(alone.ravel(), rel=1e-6, abs=1e-5)
     assert np.abs(found[0] - found[1]).max() > 0.1
@@ -87,5 +87,5 @@ def test_failed_cases_end_the_sweep_as_one_error(comm, shared_path):
         swept(comm, shared_path, "cell.fibre_fraction = [0.2, 0.3]\n", case, ranks_per_case=1)
     table = on_root(comm, collect.read, shared_path / "out")
     assert table.status == ["not converged"] * 2 and "no convergence" in table.reason[0]
-    entries = on_root(comm, store.read_index, shared_path / "out").entries
+    entries = on_root(comm, case_folders.read_index, shared_path / "out").entries
     assert [entry.folder for entry in entries] == table.folder

@@ -63,10 +63,6 @@ FLOORS = (
     ("report.cards",),
     ("report",),
     ("analysis",),
-    ("studies.sweep.report",),
-    ("studies.sweep",),
-    ("studies.fit",),
-    ("studies.uncertainty",),
     ("studies",),
     ("api",),
     ("commands",),
@@ -147,7 +143,7 @@ def test_results_are_verified_without_the_solver(tmp_path):
 
 
 def test_only_a_rank_that_draws_loads_matplotlib():
-    program = "import sys, feti_homog.analysis.runner, feti_homog.studies.sweep.execute; print(*sys.modules)"
+    program = "import sys, feti_homog.analysis.runner, feti_homog.studies.case_runs; print(*sys.modules)"
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert "matplotlib" not in run.stdout.split()
 

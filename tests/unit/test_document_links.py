@@ -17,7 +17,7 @@ from feti_homog.case.case import parse
 from feti_homog.case.sections import SWEEP
 from feti_homog.mesh.readers import msh_reader
 from feti_homog.mesh.tiles.filling import gmsh_session
-from feti_homog.studies.sweep import plan
+from feti_homog.studies import sweep_cases
 
 ROOT = Path(__file__).parents[2]
 PLACES = ("drivers", "feti_homog", "meshes", "scripts", "tests")
@@ -161,7 +161,7 @@ def test_case_files_are_valid(path):
         if "analysis" not in document:
             assert set(document) <= {"cell"}
         elif SWEEP in document:
-            assert len(plan.expand(document, path.parent).cases) > 1
+            assert len(sweep_cases.expand(document, path.parent).cases) > 1
         else:
             parse(document, path.parent if path.parent != ROOT else ROOT)
 

@@ -48,7 +48,6 @@ class EffectiveMaterial:
             positive definite.
         expansion: (6,) strains per unit of temperature in the same order, or None.
         errors: known mesh errors, by the names in `constants` and of expansions.
-        scatter: known standard deviations by uncertain constants of the case, by the same names.
     """
 
     name: str
@@ -58,7 +57,6 @@ class EffectiveMaterial:
     compliance: Float
     expansion: Float | None
     errors: Mapping[str, float]
-    scatter: Mapping[str, float]
 
     @property
     def is_orthotropic(self) -> bool:
@@ -115,7 +113,6 @@ def in_axes_of_the_cell(document: Document) -> EffectiveMaterial:
         compliance=(compliance + compliance.T) / 2.0,
         expansion=expansion,
         errors=constant_tables.in_material_axes(constant_tables.mesh_errors(document)),
-        scatter=constant_tables.in_material_axes(constant_tables.standard_deviations(document)),
     )
 
 
@@ -141,14 +138,12 @@ def nearest_transversely_isotropic(document: Document) -> EffectiveMaterial:
         expansion = np.array([axial, transverse, transverse, 0.0, 0.0, 0.0])
     symmetry = f"The nearest transversely isotropic material, at a relative distance of {computed['deviation']:.2g}."
     errors = (document.get("mesh_error") or {}).get("constants", {})
-    scatter = constant_tables.standard_deviations(document)
     return EffectiveMaterial(
         **_origin(document),
         symmetry=symmetry,
         compliance=compliance,
         expansion=expansion,
         errors=_on_card(errors),
-        scatter=_on_card(scatter),
     )
 
 
@@ -212,8 +207,6 @@ def comments(material: EffectiveMaterial, mark: str) -> list[str]:
         paragraphs.append("No thermal expansion: not every phase of the case gives one.")
     if material.errors:
         paragraphs.append(f"Estimated errors by the mesh: {_listed(material.errors)}.")
-    if material.scatter:
-        paragraphs.append(f"Standard deviations by uncertain constants of the phases: {_listed(material.scatter)}.")
     lines = (line for text in paragraphs for line in wrap(text.encode("ascii", "backslashreplace").decode(), 100))
     return [f"{mark} {line}" for line in lines]
 

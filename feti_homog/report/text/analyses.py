@@ -12,7 +12,7 @@ import numpy as np
 
 from feti_homog.materials.voigt import plane_state_of
 from feti_homog.report.text import point_tables
-from feti_homog.report.text.constant_tables import sensitivities, table, uncertainty
+from feti_homog.report.text.constant_tables import sensitivities, table
 from feti_homog.report.text.path_table import ROWS, path_table
 from feti_homog.report.text.stiffness_tables import bounds, constants, moduli, stiffnesses, thermal
 from feti_homog.report.text.table import Table
@@ -24,14 +24,9 @@ def _evenly(document: Document, limit: int, count: int) -> list[int]:
     return sorted({round(k) for k in np.linspace(0, count - 1, min(limit, count))})
 
 
-def _changes(document: Document) -> list[Table]:
-    """Return the tables of sensitivities and of scatter, if the case asks for them."""
-    return [*sensitivities(document), *uncertainty(document)]
-
-
 def _stiffness_tables(document: Document) -> list[Table]:
     """Return effective stiffness, constants and bounds."""
-    last = [*point_tables.tip_table(document, document.get("tips")), *_changes(document)]
+    last = [*point_tables.tip_table(document, document.get("tips")), *sensitivities(document)]
     if plane_state_of(document).is_spatial:
         first = [table(document)] if document.get("constants") else []
         return [*first, *stiffnesses(document), *thermal(document), *constants(document), *last]
@@ -87,7 +82,7 @@ LOAD = ReportedAnalysis(
     lambda document, limit: [
         point_tables.load_table(document),
         *point_tables.tip_table(document, document["load"].get("tips")),
-        *_changes(document),
+        *sensitivities(document),
     ],
     picture="load",
     is_load_given=lambda document: True,

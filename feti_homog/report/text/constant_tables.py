@@ -1,4 +1,4 @@
-"""Constants in the axes of the material, and derivatives and scatter of constants, as tables.
+"""Constants in the axes of the material, and derivatives of constants, as tables.
 
 Axes 1, 2, 3 of the material, as data sheets and cards have them, are x3, along the fibres, x1, x2 of the cell.
 """
@@ -34,12 +34,6 @@ def in_material_axes(numbers: Mapping[str, float]) -> dict[str, float]:
     places = {name: OF_THE_CELL[name] for name in ENGINEERING}
     places |= {name: name for name in MATERIAL_EXPANSIONS[:3]}
     return {name: numbers[constant] for name, constant in places.items() if constant in numbers}
-
-
-def standard_deviations(document: Document) -> dict[str, float]:
-    """Return standard deviations of the cell constants, in cell axes, by uncertain constants of the case."""
-    numbers = document.get("uncertainty") or {"constants": (), "std": ()}
-    return dict(zip(numbers["constants"], map(float, numbers["std"]), strict=True))
 
 
 def table(document: Document) -> Table:
@@ -84,30 +78,6 @@ def sensitivities(document: Document) -> list[Table]:
         Table(title, [Column("", -width), *(Column(*head, form) for head in heads)], rows)
         for title, form, rows in ((text, ".4f", shares), ("Derivatives by the same parameters", ".3g", slopes))
     ]
-
-
-def uncertainty(document: Document) -> list[Table]:
-    """Return constants with their scatter, mesh error and variance shares, if the case has uncertain constants."""
-    if (section := document.get("uncertainty")) is None:
-        return []
-    names, values = section["constants"], document["sensitivities"]["constant_values"]
-    errors = mesh_errors(document)
-    inputs = [name.removeprefix("material.") for name in section["parameters"]]
-    columns = [Column("", -24), Column("value"), Column("+- phases"), Column("+- mesh")]
-    columns += [Column(name, max(12, len(name) + 2), ".1f") for name in inputs]
-    rows = [
-        [
-            name,
-            values[k],
-            section["std"][k],
-            errors.get(name, UNKNOWN),
-            *(100 * share for share in section["shares"][k]),
-        ]
-        for k, name in ((names.index(name), name) for name in shown(names))
-        if section["std"][k] > 0
-    ]
-    label = stress_label(document)
-    return [Table(f"Scatter by uncertain constants{label}: std, and their shares of the variance (%)", columns, rows)]
 
 
 def mesh_errors(document: Document) -> dict[str, float]:

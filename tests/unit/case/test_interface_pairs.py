@@ -12,7 +12,7 @@ from feti_homog.case.interface_section import InterfaceSection
 from feti_homog.case.relations import COMMON
 from feti_homog.errors import CaseError
 from feti_homog.schema.keys import keys_of
-from feti_homog.studies.sweep.plan import case_documents
+from feti_homog.studies.sweep_cases import case_documents
 
 OUTER, INNER = ["coating", "matrix"], ["fibre", "coating"]
 STRONG = {"normal_strength": 1.0}
@@ -147,9 +147,9 @@ def test_what_is_read_of_the_first_section_is_common_to_all():
 def test_sweeps_vary_a_key_of_one_section():
     base = document([STRONG | {"between": OUTER}, STRONG | {"between": INNER}])
     faults: list[str] = []
-    (found,) = case_documents(base, [{("interface", "2", "normal_strength"): 5.0}], None, faults)
+    ((_, varied),) = case_documents(base, [{("interface", "2", "normal_strength"): 5.0}], None, faults)
     assert not faults
-    assert [interface["normal_strength"] for interface in found.document["interface"]] == [1.0, 5.0]
+    assert [interface["normal_strength"] for interface in varied["interface"]] == [1.0, 5.0]
 
 
 @pytest.mark.parametrize(

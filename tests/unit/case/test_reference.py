@@ -16,7 +16,7 @@ def rows(section: str) -> dict[str, reference.KeyRow]:
 
 def test_all_keys_of_all_tables_are_there():
     found = [(row.section, row.key) for row in reference.rows()]
-    assert {section for section, _ in found} == {*TOP_LEVEL, "sweep", "unknown", "measured"}
+    assert {section for section, _ in found} == {*TOP_LEVEL, "sweep", "uncertainty", "unknown", "measured"}
     for table in TABLES:
         assert {(table.section, name) for name in keys_of(table.contents)} <= set(found)
     assert {("sweep", name) for name in (*keys_of(SweepSection), *RANGE_KEYS)} <= set(found)

@@ -6,7 +6,7 @@ import argparse
 
 import pytest
 
-from feti_homog.commands import sweep
+from feti_homog.commands import studies
 
 
 @pytest.mark.parametrize(
@@ -15,7 +15,7 @@ from feti_homog.commands import sweep
 )  # fmt: skip
 def test_only_plain_numbers_are_taken(words, capsys):
     parser = argparse.ArgumentParser()
-    sweep.add(parser.add_subparsers())
+    studies.add(parser.add_subparsers())
     with pytest.raises(SystemExit):
         parser.parse_args(words.split())
     option = next(word for word in words.split() if word in ("--index", "--ranks-per-case"))

@@ -12,7 +12,7 @@ from unit.mesh.faulty_meshes import grid
 
 from feti_homog.case import case as cases
 from feti_homog.homogenization import process_zone
-from feti_homog.studies.sweep.description import describe
+from feti_homog.studies.description import describe
 
 # Glass and epoxy in MPa and micrometres, G_Ic = 2 J/m2, fibres of 7.5 micrometres: Tavara and others, Eng. Anal. Bound.
 # Elem. 35 (2011) 207. k_n = 2025 has the strength 90 MPa and the length 0.77 micrometres.

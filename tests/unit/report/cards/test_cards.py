@@ -149,21 +149,6 @@ def test_comments_have_the_errors_of_the_mesh_in_the_axes_of_the_card(form):
     assert listed(text, "by the mesh") == pytest.approx(expected, rel=0.05)
 
 
-@pytest.mark.parametrize("form", ["abaqus", "ansys", "moose"])
-def test_comments_have_the_scatter_by_uncertain_phases_in_the_axes_of_the_card(form):
-    """Sensitivities are of nu12, nu13, nu23 of the cell, of which a card has the first."""
-    names = ("E1", "E2", "E3", "nu12", "nu13", "nu23", "G12", "G13", "G23", *EXPANSIONS)
-    std = {name: 0.011 * (k + 1) for k, name in enumerate((*names, *dict.fromkeys(ABOUT_THE_FIBRE.values())))}
-    found = {"constants": [*std], "std": [*std.values()]}
-    words = "constants of the phases"
-    printed = listed(FORMATS[form](in_axes_of_the_cell(document(DISTINCT, uncertainty=found))), words)
-    expected = {name: std[own] for name in CONSTANTS.split() if (own := in_the_cell(name)) in std}
-    expected |= {name: std[name] for name in EXPANSIONS}
-    assert printed == pytest.approx(expected, rel=0.05) and len(printed) == 10
-    printed = listed(FORMATS[form](nearest_transversely_isotropic(document(DISTINCT, uncertainty=found))), words)
-    assert printed == pytest.approx({name: std[own] for name, own in ABOUT_THE_FIBRE.items()}, rel=0.05)
-
-
 @pytest.mark.parametrize(
     "value", [215.33468712345678, -1.0993681512345678e-05, 1e-300, 123456789012345678.0, 0.1, -0.0]
 )

@@ -10,8 +10,8 @@ from support.base_case import BASE
 
 from feti_homog.case.case import Case
 from feti_homog.errors import CaseError
-from feti_homog.studies.fit.description import parse
-from feti_homog.studies.uncertainty import scatter
+from feti_homog.studies import uncertainty
+from feti_homog.studies.fit_file import parse
 
 UNKNOWN = "[unknown]\nmaterial.fibre.young = {start = 150.0, lower = 50.0, upper = 500.0}\n"
 MEASURED = "[measured]\nC11 = {value = 150.0, std = 1.5}\n"
@@ -136,7 +136,7 @@ def test_a_fit_whose_output_asks_for_more_is_another():
     assert fits[0].digest() != fits[1].digest()
     text = BASE.replace("young = 88.0", "young = {mean = 88.0, cv = 0.1}")
     studies = [
-        scatter.parse(tomllib.loads(f"{text}[output]\n{words}\n"), Path()) for words in ("", "mesh_error = false")
+        uncertainty.parse(tomllib.loads(f"{text}[output]\n{words}\n"), Path()) for words in ("", "mesh_error = false")
     ]
     assert studies[0].digest() != studies[1].digest()
 

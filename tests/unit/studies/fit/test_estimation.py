@@ -7,7 +7,7 @@ from math import factorial
 import numpy as np
 import pytest
 
-from feti_homog.studies.fit.estimation import estimate, names_of
+from feti_homog.studies.estimation import estimate, names_of
 
 TIMES = np.linspace(0.0, 3.0, 12)
 TRUTH = np.array([2.0, 0.7])

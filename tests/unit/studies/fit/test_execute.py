@@ -10,8 +10,9 @@ import pytest
 from mpi4py import MPI
 
 from feti_homog.case.sections import Unknown
-from feti_homog.studies.fit.execute import DIFFERENCE, Answer, Evaluations
-from feti_homog.studies.fit.predictions import Datum
+from feti_homog.studies.fit import DIFFERENCE, Answer, Evaluations
+from feti_homog.studies.predictions import Datum
+from feti_homog.studies.study import Evaluator
 
 WITHOUT_DERIVATIVES = {"case": {"analysis": {"type": "stiffness"}}}
 DATA = [Datum(0, "first", 1.0, 0.1), Datum(0, "second", 2.0, 0.2)]
@@ -36,7 +37,7 @@ def closed(function, **unknowns):
         data_of=lambda test: DATA,
         rows_of=lambda test: slice(2),
     )
-    return Closed(fit, Path(), MPI.COMM_SELF, 1, False, True)
+    return Closed(fit, Evaluator(Path(), MPI.COMM_SELF, 1, False, True))
 
 
 def test_two_values_of_one_unknown_weigh_by_their_own_deviations():

@@ -7,7 +7,7 @@ import pytest
 from matplotlib.figure import Figure
 from scipy.stats import norm
 
-from feti_homog.studies.fit import picture
+from feti_homog.studies import pictures
 
 ROWS = [
     {"test": 1, "name": "E1", "value": 4.0, "std": 0.5, "computed": 5.0, "residual": 2.0, "strain": None},
@@ -18,7 +18,7 @@ ROWS = [
 
 def test_residuals_stand_in_the_rows_of_their_values_beside_the_band_of_95_percent():
     axes = Figure().subplots()
-    picture._ratios(axes, ROWS)
+    pictures._draw_residuals(axes, ROWS)
     (band,) = axes.patches
     assert band.get_extents().transformed(axes.transData.inverted()).intervalx == pytest.approx(
         norm.ppf([0.025, 0.975]), abs=5e-3
@@ -40,7 +40,7 @@ def test_curves_have_points_with_deviations_and_lines_through_what_is_computed()
     rows = [
         common | {"strain": 0.1 * k, "value": 5.0 * k, "std": 1.0 + k, "computed": 6.0 * k} for k in (1.0, 2.0, 3.0)
     ]
-    picture._curves(axes, rows)
+    pictures._draw_curves(axes, rows)
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("E11", "S22")
     named = dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
     np.testing.assert_allclose(named["test 3, computed"].get_xydata(), [[0.1, 6.0], [0.2, 12.0], [0.3, 18.0]])

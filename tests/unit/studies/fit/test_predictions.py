@@ -9,7 +9,7 @@ import pytest
 from feti_homog import run
 from feti_homog.case.case import Case
 from feti_homog.errors import CaseError
-from feti_homog.studies.fit.predictions import Datum, exact_derivatives, predicted, responses
+from feti_homog.studies.predictions import Datum, exact_derivatives, predicted, responses
 
 CASE = {
     "cell": {"geometry": "square", "fibre_fraction": 0.4, "mesh_size": 0.5, "order": 1},

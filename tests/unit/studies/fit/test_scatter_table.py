@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from feti_homog.studies.uncertainty.scatter_table import text
+from feti_homog.studies.uncertainty import text
 
 
 def test_stresses_have_their_unit_and_strains_none():

@@ -12,9 +12,9 @@ from scipy import stats
 
 from feti_homog.materials.voigt import SPATIAL_STRESSES
 from feti_homog.report.text.table import unit, with_unit
-from feti_homog.studies.sweep.report import figures, moduli, tables
-from feti_homog.studies.sweep.report.outputs import numbers, outputs
-from feti_homog.studies.sweep.report.sweep_table import Statistics, SweepTable, series_over
+from feti_homog.studies import collect, pictures
+from feti_homog.studies.outputs import numbers, outputs
+from feti_homog.studies.sweep_table import Statistics, SweepTable, series_over
 
 MATERIAL = {"matrix": {"young": 88.0, "poisson": 0.299}, "fibre": {"young": 200.0, "poisson": 0.222}}
 
@@ -90,7 +90,7 @@ def collected(inputs, documents, point, realisation):
 def test_curves_of_a_given_stress_have_six_components(tmp_path):
     documents = [sheared(fibres, e) for e in (0.1, 0.2) for fibres in (2, 4)]
     table = collected({"cell.fibres": [2, 4, 2, 4], "cell.seed": [0, 0, 1, 1]}, documents, [1, 2, 1, 2], [1, 1, 2, 2])
-    tables.write(tmp_path, table)
+    collect.write(tmp_path, table)
     assert table.outputs["onset_S13"].tolist() == [2.0] * 4 and table.outputs["work"].tolist() == [0.3] * 4
     assert table.outputs["end_gamma13"].tolist() == pytest.approx([0.8, 0.8, 1.6, 1.6])
     strain, stress = table.curves(1)
@@ -99,7 +99,6 @@ def test_curves_of_a_given_stress_have_six_components(tmp_path):
     # To the load 2 at the compliance 0.1, then a jump, then half as steep; of the other twice as soft.
     assert np.interp([0.1, 0.3, 0.6], strain, stresses[0]) == pytest.approx([1.0, 2.0, 3.0])
     assert np.interp([0.2, 0.6], strain, stresses[1]) == pytest.approx([1.0, 2.0])
-    assert_drawn(tmp_path, table, ["curves.png"])
 
 
 def test_columns_of_a_path_are_its_first_point_its_peaks_and_its_end():
@@ -134,7 +133,7 @@ def fractions():
 
 def test_tables_hold_cases_and_statistics_of_points(tmp_path):
     table = fractions()
-    assert [path.name for path in tables.write(tmp_path, table)] == ["cases.csv", "statistics.csv"]
+    assert [path.name for path in collect.write(tmp_path, table)] == ["cases.csv", "statistics.csv"]
     rows, statistics = (
         list(csv.DictReader((tmp_path / name).read_text().splitlines())) for name in ("cases.csv", "statistics.csv")
     )
@@ -174,7 +173,7 @@ def test_entries_beside_cases_in_space_have_the_names_of_space(tmp_path):
 def test_mean_curves_keep_the_bonded_branch(tmp_path):
     documents = [path_document(fibres, shift) for shift in (0.0, 1.0) for fibres in (2, 4)]
     table = collected({"cell.fibres": [2, 4, 2, 4], "cell.seed": [0, 0, 1, 1]}, documents, [1, 2, 1, 2], [1, 1, 2, 2])
-    tables.write(tmp_path, table)
+    collect.write(tmp_path, table)
     assert table.outputs["onset_S11"].tolist() == [4.0, 4.0, 5.0, 5.0]
     assert table.outputs["peak_S11"].tolist() == [4.0, 4.0, 5.0, 5.0]  # before the fall
     assert table.outputs["end_S11"].tolist() == [8.0, 8.0, 9.0, 9.0]
@@ -185,15 +184,14 @@ def test_mean_curves_keep_the_bonded_branch(tmp_path):
     # The bonded branch: from zero to the mean of the first breaks.
     assert np.interp(0.01, strain, found.mean) == pytest.approx(2.25)
     assert found.ci95[-1] == pytest.approx(stats.t.ppf(0.975, 1) * 0.5**0.5 / 2**0.5)
-    assert_drawn(tmp_path, table, ["curves.png"])
 
 
 @pytest.mark.slow
 def test_moduli_are_drawn(tmp_path):
     assert_drawn(tmp_path, fractions(), ["moduli.png"])
-    assert not figures.plot(tmp_path, collected({"cell.order": [1]}, [document(0.4, 8, 0)], [1], [1]))
+    assert not pictures.draw_moduli(tmp_path, collected({"cell.order": [1]}, [document(0.4, 8, 0)], [1], [1]))
     waiting = collected({"cell.fibre_fraction": [0.1, 0.2]}, [None] * 2, [1, 2], [1] * 2)
-    assert not figures.plot(tmp_path, waiting)
+    assert not pictures.draw_moduli(tmp_path, waiting)
 
 
 def test_bars_are_the_mean_errors_of_the_mesh():
@@ -202,7 +200,7 @@ def test_bars_are_the_mean_errors_of_the_mesh():
     documents = [each | {"mesh_error": error} for each, error in zip(documents, errors, strict=True)]
     table = collected({"cell.fibre_fraction": [0.2, 0.4] * 2}, documents, [1, 2] * 2, [1, 1, 2, 2])
     assert "nu31_mesh_error" not in table.outputs  # of a constant that has no column
-    panel = (figure := moduli.figure(table)).axes[moduli.PANELS.index("bulk")]
+    panel = (figure := pictures.moduli_figure(table)).axes[pictures.PANELS.index("bulk")]
     assert {"realisations", "95 % confidence of the mean"} <= {each.get_text() for each in figure.legends[0].texts}
     (bars,) = (each for each in panel.containers if each.get_label() == "estimated error of the mesh")
     (ends,) = (lines.get_segments() for lines in bars.lines[2])
@@ -210,7 +208,7 @@ def test_bars_are_the_mean_errors_of_the_mesh():
 
 
 def assert_drawn(folder, table, names):
-    paths = figures.plot(folder, table)
+    paths = pictures.draw_moduli(folder, table)
     assert [path.name for path in paths] == names
     for path in paths:
         picture = imread(path)
@@ -238,14 +236,14 @@ def test_stiffnesses_in_space_fill_columns_and_are_drawn(tmp_path):
     assert table.outputs["thermal_S33"].tolist() == [-1.0] * 4 and table.outputs["expansion_gamma12"][0] == 1e-5
     assert (table.outputs["E3"][0], table.outputs["G_axial"][0]) == (200.0, 50.0)
     assert "bulk" not in table.outputs
-    assert moduli.panels_of(table) == ("E_axial", "E_transverse", "G_axial", "G_transverse")
+    assert pictures.panels_of(table) == ("E_axial", "E_transverse", "G_axial", "G_transverse")
     assert_drawn(tmp_path, table, ["moduli.png"])
 
 
 def test_bounds_in_space_enclose_each_other_and_what_is_between():
     """At any fraction the tighter ones lie between Reuss and Voigt; all meet where there is one phase."""
     documents = [spatial_document(c, 0.0) for c in (0.2, 0.6)]
-    bounds = moduli._bounds(collected({"cell.fibre_fraction": [0.2, 0.6]}, documents, [1, 2], [1, 1]))
+    bounds = pictures.moduli_bounds(collected({"cell.fibre_fraction": [0.2, 0.6]}, documents, [1, 2], [1, 1]))
     assert bounds.tight == "Hill, Hashin" and bounds.fractions[0] == 0.0
     for rows in bounds.rows.values():
         assert (rows[1] >= rows[0] * (1 - 1e-12)).all() and np.ptp(rows[:, 0]) < 1e-9 * rows[0, 0]
@@ -260,8 +258,8 @@ def test_secants_in_space_are_drawn_without_bounds(tmp_path):
     for each in documents:
         del each["constants"], each["transversely_isotropic"]
     table = collected({"cell.fibre_fraction": [0.2, 0.4]}, documents, [1, 2], [1, 1])
-    assert moduli.panels_of(table) == ("C11", "C33", "C44", "C66")
-    assert moduli.figure(table).get_suptitle().endswith("plane generalized; no bounds, for faces may touch")
+    assert pictures.panels_of(table) == ("C11", "C33", "C44", "C66")
+    assert pictures.moduli_figure(table).get_suptitle().endswith("plane generalized; no bounds, for faces may touch")
     assert_drawn(tmp_path, table, ["moduli.png"])
 
 

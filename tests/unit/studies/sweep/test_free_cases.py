@@ -6,8 +6,8 @@ from types import SimpleNamespace
 
 from mpi4py import MPI
 
-from feti_homog.studies.sweep import execute
-from feti_homog.studies.sweep.execute import Outcome
+from feti_homog.studies import case_runs
+from feti_homog.studies.case_runs import Outcome
 from feti_homog.system.runtime.file_locks import LOCK_TIMEOUT_S
 
 
@@ -25,6 +25,6 @@ def test_cases_of_others_are_passed_over_at_once_and_tried_again_at_last():
         return Outcome.COMPUTED, ""
 
     sweep = SimpleNamespace(entries=(1, 2, 3), cases=(None,) * 3)
-    assert execute._run_free_cases(SimpleNamespace(run=run, comm=MPI.COMM_SELF), sweep) is None
+    assert case_runs._run_free_cases(SimpleNamespace(run=run, comm=MPI.COMM_SELF), sweep) is None
     assert done == {2, 3}
     assert calls == [(entry, timeout) for timeout in (0.0, 0.0, LOCK_TIMEOUT_S, LOCK_TIMEOUT_S) for entry in (1, 2, 3)]

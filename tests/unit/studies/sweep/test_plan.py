@@ -12,11 +12,11 @@ from support.base_case import FIBRE, SPATIAL, TRANSVERSE
 from support.sweep_files import CASE, RANDOM
 
 from feti_homog.errors import CaseError
-from feti_homog.studies.sweep import plan
+from feti_homog.studies import sweep_cases
 
 
 def expanded(table: str, case: str = CASE):
-    return plan.expand({"name": "s"} | tomllib.loads(f"{case}[sweep]\n{table}"), Path())
+    return sweep_cases.expand({"name": "s"} | tomllib.loads(f"{case}[sweep]\n{table}"), Path())
 
 
 def inputs(table: str, case: str = CASE):
@@ -194,7 +194,7 @@ def test_a_file_without_a_sweep_points_at_run(tmp_path):
     path = tmp_path / "case.toml"
     path.write_text(CASE)
     with pytest.raises(CaseError, match="feti-homog run"):
-        plan.load(path)
+        sweep_cases.load(path)
 
 
 def test_all_sampled_points_differ():
@@ -204,15 +204,15 @@ def test_all_sampled_points_differ():
 
 def test_values_may_be_numpys():
     base = tomllib.loads(CASE)
-    sweep = plan.expand(base | {"sweep": {"cell.fibre_fraction": np.linspace(0.1, 0.3, 3)}}, Path())
-    same = plan.expand(base | {"sweep": {"cell": {"fibre_fraction": np.linspace(0.1, 0.3, 3).tolist()}}}, Path())
+    sweep = sweep_cases.expand(base | {"sweep": {"cell.fibre_fraction": np.linspace(0.1, 0.3, 3)}}, Path())
+    same = sweep_cases.expand(base | {"sweep": {"cell": {"fibre_fraction": np.linspace(0.1, 0.3, 3).tolist()}}}, Path())
     assert sweep == same and len(sweep.cases) == 3
     assert all(type(entry.inputs["cell.fibre_fraction"]) is float for entry in sweep.entries)
 
 
 def test_a_base_that_is_no_section():
     with pytest.raises(CaseError, match=r"cell\.order: \"cell\" is no section"):
-        plan.expand({"cell": 3, "sweep": {"cell.order": [1]}}, Path())
+        sweep_cases.expand({"cell": 3, "sweep": {"cell.order": [1]}}, Path())
 
 
 def test_options_that_print_make_no_other_sweep():

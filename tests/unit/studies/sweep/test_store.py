@@ -13,7 +13,7 @@ from support.sweep_files import sweep_file
 
 from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.results import atomic
-from feti_homog.studies.sweep import plan, store
+from feti_homog.studies import case_folders, sweep_cases
 from feti_homog.system.runtime.file_locks import Lock, LockHeld, is_locked
 
 HOLDER = """
@@ -84,19 +84,19 @@ OWN = ["cases.csv", "lock", "statistics.csv", "moduli.png", "case-0001/notes.txt
 
 @pytest.mark.parametrize("name", OWN)
 def test_files_that_no_sweep_wrote_are_not_replaced(tmp_path, name):
-    sweep, out = plan.load(sweep_file(tmp_path, '"cell.order" = [1, 2]\n')), tmp_path / "out"
+    sweep, out = sweep_cases.load(sweep_file(tmp_path, '"cell.order" = [1, 2]\n')), tmp_path / "out"
     (out / name).parent.mkdir(parents=True)
     (out / name).write_text("mine")
     with pytest.raises(CaseError, match=f"no sweep of this program wrote {Path(name).parts[0]}, and this one would"):
-        store.prepare_folder(out, sweep)
+        case_folders.prepare_folder(out, sweep)
     assert [path.read_text() for path in out.rglob("*") if path.is_file()] == ["mine"]
 
 
 def test_the_folder_of_a_sweep_is_made_whole_again(tmp_path):
     """A sweep may be killed when it has written its list and not yet the table."""
     axes = '"cell.order" = [1, 2]\n"material.fibre.young" = [300.0, 400.0, 500.0]\n'
-    sweep, out = plan.load(sweep_file(tmp_path, axes)), tmp_path / "out"
-    store.prepare_folder(out, sweep)
+    sweep, out = sweep_cases.load(sweep_file(tmp_path, axes)), tmp_path / "out"
+    case_folders.prepare_folder(out, sweep)
     table = (out / "cases.csv").read_text()
     expected = [
         {"case": f"{k}", "folder": f"case-000{k}", "point": f"{k}", "realisation": "1", "cell.order": order,
@@ -107,29 +107,29 @@ def test_the_folder_of_a_sweep_is_made_whole_again(tmp_path):
     (out / "cases.csv").unlink()
     (out / "statistics.csv").write_text("collected")
     atomic.part_of(out / "cases.csv").write_text("half")
-    store.prepare_folder(out, sweep)
+    case_folders.prepare_folder(out, sweep)
     assert {path.name: path.read_text() for path in out.glob("*.csv*")} == {
         "cases.csv": table,
         "statistics.csv": "collected",
     }
-    assert store.read_index(out).entries == sweep.entries
+    assert case_folders.read_index(out).entries == sweep.entries
 
 
 def test_bonds_that_never_break_are_values_of_a_sweep(tmp_path):
     """JSON has no infinite numbers, and the list of cases is such a file."""
     axes = '"interface.debonded" = [[]]\n"interface.normal_stiffness" = [2.0, inf]\n'
-    sweep, out = plan.load(sweep_file(tmp_path, axes)), tmp_path / "out"
-    store.prepare_folder(out, sweep)
-    assert store.read_index(out).entries == sweep.entries
-    store.prepare_folder(out, sweep)
+    sweep, out = sweep_cases.load(sweep_file(tmp_path, axes)), tmp_path / "out"
+    case_folders.prepare_folder(out, sweep)
+    assert case_folders.read_index(out).entries == sweep.entries
+    case_folders.prepare_folder(out, sweep)
 
 
 @pytest.mark.parametrize("asked", ["sensitivities = true", "mesh_error = false", "fields = true"])
 def test_a_sweep_that_asks_for_more_is_another(tmp_path, asked):
     path, out = sweep_file(tmp_path, '"cell.order" = [1, 2]\n'), tmp_path / "out"
-    sweep = plan.load(path)
-    store.prepare_folder(out, sweep)
+    sweep = sweep_cases.load(path)
+    case_folders.prepare_folder(out, sweep)
     old = "fields = false\n" if "fields" in asked else "[output]\n"
     path.write_text(path.read_text().replace(old, f"{old.removeprefix('fields = false')}{asked}\n"))
     with pytest.raises(CaseError, match="its case-0001 differs from this file in keys that do not vary"):
-        store.prepare_folder(out, plan.load(path))
+        case_folders.prepare_folder(out, sweep_cases.load(path))

@@ -1,4 +1,4 @@
-"""Measured values, and what a result.json has in their place, with its derivatives where they are exact."""
+"""Measured values, and the values of a result.json in their place, with derivatives where they are exact."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from feti_homog.materials.voigt import PLANE_STATES, voigt_names
 from feti_homog.report.text.point_tables import STATES
 from feti_homog.results import path_curves
 from feti_homog.results.path_curves import Document
-from feti_homog.studies.sweep.report.outputs import outputs
+from feti_homog.studies.outputs import outputs
 from feti_homog.typing import Float
 
 TOUGHNESS = "toughness"
@@ -31,9 +31,9 @@ class Datum:
 
     Attributes:
         test: number of its test, from 0.
-        name: of the value; of a point of a curve that of the stress.
-        strain: of a point of a curve its strain, else None.
-        strain_name: of a point of a curve the component.
+        name: of the value, or of the stress of a curve.
+        strain: at a point of a curve, else None.
+        strain_name: component of that strain.
     """
 
     test: int
@@ -45,7 +45,7 @@ class Datum:
 
 
 def available(case: Case) -> list[str]:
-    """Return the names of values that a result of the case has; none of analyses that no fit takes."""
+    """Return the names of a result's values; none of analyses that no fit takes."""
     spatial = PLANE_STATES[case.analysis.plane].is_spatial
     size = 6 if spatial else 3
     if case.analysis.type == "stiffness":
@@ -59,12 +59,24 @@ def available(case: Case) -> list[str]:
 
 
 def responses(document: Document) -> dict[str, float]:
-    """Return the numbers of a result whose scatter is of interest: constants, or those of its loads and onsets."""
-    found, kind = _values(document), document["case"]["analysis"]["type"]
+    """Return the constants of a result, or its loads and onsets: the numbers whose scatter is of interest."""
+    values, kind = _values(document), document["case"]["analysis"]["type"]
     if kind == "stiffness" or "sensitivities" in document:
-        return found
+        return values
     starts = ("onset_", "peak_") if kind == "path" else (f"{kind}_",)
-    return {name: found[name] for name in found if name.startswith(starts) and not name.endswith(STATES)}
+    return {name: values[name] for name in values if name.startswith(starts) and not name.endswith(STATES)}
+
+
+def _values(document: Document) -> dict[str, float]:
+    """Return the numbers of a result by their names in a fit."""
+    if "sensitivities" in document:
+        sensitivities = document["sensitivities"]
+        return dict(zip(sensitivities["constants"], sensitivities["constant_values"], strict=True))
+    if document["case"]["analysis"]["type"] == "stiffness":
+        thermal = document.get("thermal_stress")
+        heat = None if thermal is None else np.array(thermal)
+        return {k: float(v) for k, v in constants(np.array(document["effective_stiffness"]), heat).items()}
+    return outputs(document)
 
 
 def predicted(document: Document, data: Sequence[Datum]) -> Float:
@@ -73,15 +85,13 @@ def predicted(document: Document, data: Sequence[Datum]) -> Float:
     Raises:
         CaseError: the result has no such value.
     """
-    found = _values(document)
-    missing = [datum for datum in data if datum.strain is None and datum.name not in found]
+    values = _values(document)
+    missing = [datum.name for datum in data if datum.strain is None and datum.name not in values]
     if missing:
-        raise CaseError(*(f"[measured] {each.name}: this result has no such value{_reason(each)}" for each in missing))
-    return np.array([found[each.name] if each.strain is None else _on_curve(document, each)[0] for each in data])
-
-
-def _reason(datum: Datum) -> str:
-    return "; no bond breaks" if datum.name.startswith("onset_") else ""
+        reasons = ("; no bond breaks" if name.startswith("onset_") else "" for name in missing)
+        lines = (f"[measured] {name}: this result has no such value" for name in missing)
+        raise CaseError(*(f"{line}{reason}" for line, reason in zip(lines, reasons, strict=True)))
+    return np.array([values[d.name] if d.strain is None else _on_curve(document, d)[0] for d in data])
 
 
 def exact_derivatives(document: Document, data: Sequence[Datum], name: str) -> Float | None:
@@ -91,68 +101,51 @@ def exact_derivatives(document: Document, data: Sequence[Datum], name: str) -> F
     if "sensitivities" in document:
         return _of_stiffness(document["sensitivities"], data, name)
     key = name.removeprefix("interface.")
-    exponent = _exponent(document, key) if name != key else None
+    exponent = _exponent(document, sections[0], key) if name != key and len(sections) == 1 else None
     return None if exponent is None else _by_scaling(document, data, exponent / float(sections[0][key]))
 
 
-def _exponent(document: Document, key: str) -> float | None:
-    """Return the degree in which loads at which bonds break are homogeneous in a key of the one interface.
-
-    It is 1/2 in the toughness of springs that it does not change, and 1 in the only strength; None of others.
-    """
-    sections = path_curves.interface_sections(document)
-    if len(sections) != 1 or not _is_homogeneous(document):
-        return None
-    law = LAWS[sections[0].get("criterion", DEFAULT)]
-    if key == TOUGHNESS and key in law.keys and not law.softens:
-        return 0.5
-    strengths = [each for each in law.limits if math.isfinite(float(sections[0].get(each) or "inf"))]
-    return 1.0 if strengths == [key] else None
-
-
-def _is_homogeneous(document: Document) -> bool:
-    """Return whether all loads up to the onset grow alike; a temperature that comes before them does not."""
-    case = document["case"]
-    if case["analysis"]["type"] == "envelope":
-        return case["envelope"].get("temperature") is None
-    return case["analysis"]["type"] == "path" and path_curves.is_proportional(document)
-
-
-def _values(document: Document) -> dict[str, float]:
-    if "sensitivities" in document:
-        own = document["sensitivities"]
-        return dict(zip(own["constants"], own["constant_values"], strict=True))
-    if document["case"]["analysis"]["type"] == "stiffness":
-        thermal = document.get("thermal_stress")
-        heat = None if thermal is None else np.array(thermal)
-        return {k: float(v) for k, v in constants(np.array(document["effective_stiffness"]), heat).items()}
-    return outputs(document)
-
-
-def _of_stiffness(own: Mapping[str, Any], data: Sequence[Datum], name: str) -> Float | None:
-    """Return the derivatives of constants: zero by strengths, and by expansions in a plane; None of what is unknown."""
-    if name in own["parameters"]:
-        values = np.array(own["derivatives"])[:, own["parameters"].index(name)]
-        column = dict(zip(own["constants"], values, strict=True))
-        return np.array([column[each.name] for each in data])
+def _of_stiffness(sensitivities: Document, data: Sequence[Datum], name: str) -> Float | None:
+    """Return derivatives of constants: zero by strengths, and by expansions in a plane; None by other unknowns."""
+    if name in sensitivities["parameters"]:
+        values = np.array(sensitivities["derivatives"])[:, sensitivities["parameters"].index(name)]
+        column = dict(zip(sensitivities["constants"], values, strict=True))
+        return np.array([column[datum.name] for datum in data])
     section, idle = name.partition(".")[0], ("strength", "toughness")
     is_idle = ".expansion" in name if section == "material" else section == "interface" and name.endswith(idle)
     return np.zeros(len(data)) if is_idle else None
 
 
+def _exponent(document: Document, section: Mapping[str, Any], key: str) -> float | None:
+    """Return the degree in which loads at which bonds break are homogeneous in a key of the one interface.
+
+    All loads up to the onset must grow alike; a temperature that comes before them does not.  The degree is 1/2 in the
+    toughness of springs that it does not change, and 1 in the only strength; None in other keys.
+    """
+    case = document["case"]
+    is_envelope = case["analysis"]["type"] == "envelope" and case["envelope"].get("temperature") is None
+    if not is_envelope and not (case["analysis"]["type"] == "path" and path_curves.is_proportional(document)):
+        return None
+    law = LAWS[section.get("criterion", DEFAULT)]
+    if key == TOUGHNESS and key in law.keys and not law.softens:
+        return 0.5
+    strengths = [name for name in law.limits if math.isfinite(float(section.get(name) or "inf"))]
+    return 1.0 if strengths == [key] else None
+
+
 def _by_scaling(document: Document, data: Sequence[Datum], share: float) -> Float | None:
-    """Return the derivatives along S(E; s R) = s S(E / s; R), of what does not depend on the end of the load."""
-    found, derivatives = _values(document), []
-    for each in data:
-        if each.strain is not None:
-            value, slope = _on_curve(document, each)
-            derivatives.append((value - abs(each.strain) * slope) * share)
+    """Return the derivatives along S(E; s R) = s S(E / s; R), unless a value depends on the end of the load."""
+    values, derivatives = _values(document), []
+    for datum in data:
+        if datum.strain is not None:
+            value, slope = _on_curve(document, datum)
+            derivatives.append((value - abs(datum.strain) * slope) * share)
             continue
-        place, _, component = each.name.partition("_")
-        is_peak = place == "peak" and found[each.name] != found[f"end_{component}"]
+        place, _, component = datum.name.partition("_")
+        is_peak = place == "peak" and values[datum.name] != values[f"end_{component}"]
         if not (place in ("onset", "envelope") or is_peak):
             return None
-        derivatives.append(found[each.name] * share)
+        derivatives.append(values[datum.name] * share)
     return np.array(derivatives)
 
 

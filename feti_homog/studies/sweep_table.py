@@ -53,7 +53,12 @@ class SweepTable:
     @cached_property
     def statistics(self) -> dict[str, Statistics]:
         """By output, over the realisations of each point."""
-        return {name: self._statistics(values) for name, values in self.outputs.items()}
+        parts = ("count", "mean", "std", "ci95")
+        statistics = {}
+        for name, values in self.outputs.items():
+            samples = [Statistics.of(values[self.rows(point)]) for point in self.points]
+            statistics[name] = Statistics(*(np.array([getattr(each, part) for each in samples]) for part in parts))
+        return statistics
 
     @property
     def finished(self) -> list[Document]:
@@ -68,18 +73,16 @@ class SweepTable:
         """result.json of the finished realisations of a point."""
         return [document for row in self.rows(point) if (document := self.documents[row]) is not None]
 
-    def _statistics(self, values: Float) -> Statistics:
-        found = [Statistics.of(values[self.rows(point)]) for point in self.points]
-        return Statistics(*(np.array([getattr(s, part) for s in found]) for part in ("count", "mean", "std", "ci95")))
-
     def label(self, point: int, without: Sequence[str] = ()) -> str:
-        """Return the inputs of a point in words, but for some keys and for what its realisations differ by."""
+        """Return the inputs of a point in words, but for some keys and for seeds."""
         keys = [name for name in self.inputs if name not in without and name != "cell.seed"]
         varied = [name for name in keys if len({repr(value) for value in self.inputs[name]}) > 1]
         values = [(name, self.input_of(point, name)) for name in varied]
-        known = [(name, value) for name, value in values if value is not None]
-        words = [(_in_words(_short(name), value), unit(name, self.stress_unit)) for name, value in known]
-        return ", ".join(f"{text} {own}".rstrip() for text, own in words)
+        return ", ".join(
+            f"{_in_words(name, value)} {unit(name, self.stress_unit)}".rstrip()
+            for name, value in values
+            if value is not None
+        )
 
     def curves(self, point: int) -> tuple[Float, Float]:
         """Strains (g,), g = CURVE_POINTS, and the c stresses of each finished realisation there, (n, g, c).
@@ -95,14 +98,11 @@ class SweepTable:
         return strain, found.swapaxes(1, 2)
 
 
-def _short(key: str) -> str:
-    """Return a dotted key without its section, but of a material with the phase and of an interface with its number."""
+def _in_words(key: str, value: Any) -> str:
+    """Return an input without its section, but of a material with the phase and of an interface with its number."""
     section, _, rest = key.partition(".")
-    words = rest if section == "material" else key.partition("interface.")[2] or key.rpartition(".")[2]
-    return words.replace(".", " ").replace("_", " ")
-
-
-def _in_words(name: str, value: Any) -> str:
+    name = rest if section == "material" else key.partition("interface.")[2] or key.rpartition(".")[2]
+    name = name.replace(".", " ").replace("_", " ")
     if name == "fibres":
         return f"{value} fibres"
     if isinstance(value, float | int) and not isinstance(value, bool):
@@ -146,20 +146,16 @@ class Series:
 def series_over(table: SweepTable, key: str) -> list[Series]:
     """Return the series over a key, of the points with finished cases.
 
-    What varies along with the key, one value to one, makes no other series.
+    A key that varies along with it, one value to one, makes no other series.
     """
     points = [p for p in table.points if table.results_of(p) and table.input_of(p, key) is not None]
     along = [name for name in table.inputs if _follows(table, points, name, key)]
     labels = {point: table.label(point, along) for point in points}
-    return [
-        _series(table, key, label, [point for point in points if labels[point] == label])
-        for label in dict.fromkeys(labels.values())
-    ]
-
-
-def _series(table: SweepTable, key: str, label: str, points: Sequence[int]) -> Series:
-    pairs = sorted((float(table.input_of(point, key)), point) for point in points)
-    return Series(label, [point for _, point in pairs], np.array([x for x, _ in pairs]))
+    series = []
+    for label in dict.fromkeys(labels.values()):
+        rising = sorted((float(table.input_of(point, key)), point) for point in points if labels[point] == label)
+        series.append(Series(label, [point for _, point in rising], np.array([x for x, _ in rising])))
+    return series
 
 
 def _follows(table: SweepTable, points: Sequence[int], name: str, key: str) -> bool:

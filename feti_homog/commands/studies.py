@@ -22,8 +22,8 @@ SWEEP_HELP = (
     "skipped: the same command resumes. Failed cases are kept and reported at the end, with exit code 3."
 )
 COLLECT_HELP = (
-    "Write cases.csv, the inputs and outputs of all cases, statistics.csv, those over realisations, and "
-    "pictures of the varied outputs. The sweep may still be running: finished cases are collected."
+    "Write cases.csv, the inputs and outputs of all cases, statistics.csv, those over realisations, and a "
+    "picture of moduli over the fibre fraction. The sweep may still be running: finished cases are collected."
 )
 
 FIT_HELP = (
@@ -41,9 +41,19 @@ SCATTER_HELP = (
 
 
 def add(actions: argparse._SubParsersAction[Any]) -> None:
-    """Add the commands to those of a parser."""
-    _add_sweep(actions)
-    _add_collect(actions)
+    """Add the commands to a parser."""
+    sweep = actions.add_parser("sweep", help="run the cases of a file with [sweep]", description=SWEEP_HELP)
+    sweep.add_argument("case", type=Path, metavar="CASE.toml", help="a case file with a section [sweep]")
+    sweep.add_argument("--out", type=folder, metavar="DIR", help="folder of the sweep, in which each case has its own")
+    one = sweep.add_mutually_exclusive_group()
+    one.add_argument("--list", action="store_true", help="print the cases, with --out also their status; run none")
+    one.add_argument("--index", type=integer, metavar="K", help="run case K alone, counted from 1, as a job array does")
+    _add_case_options(sweep, _sweep)
+    words = "make one table and a picture of the cases of a sweep's folder"
+    collect = actions.add_parser("collect", help=words, description=COLLECT_HELP)
+    collect.add_argument("directory", type=folder, metavar="DIR", help="--out of the sweep")
+    collect.add_argument("--no-pictures", action="store_true", help="make the tables alone")
+    collect.set_defaults(action=_collect)
     fit = actions.add_parser("fit", help="fit constants of cases to measured values", description=FIT_HELP)
     fit.add_argument("case", type=Path, metavar="FIT.toml", help="a case file with unknown and measured constants")
     fit.add_argument("--out", type=folder, metavar="DIR", required=True, help="folder of the fit")
@@ -55,14 +65,14 @@ def add(actions: argparse._SubParsersAction[Any]) -> None:
 
 
 def integer(word: str) -> int:
-    """Return the integer that a word is, without the underscores that Python allows. Raises ValueError."""
+    """Return the integer in a word without the underscores that Python allows. Raises ValueError."""
     if not re.fullmatch(r"[+-]?[0-9]{1,9}", word):
         raise ValueError
     return int(word)
 
 
 def _add_case_options(parser: argparse.ArgumentParser, action: Action) -> None:
-    """Give a command that runs many cases its action and the options of all of them."""
+    """Give a command that runs many cases its action and the options of all such commands."""
     parser.set_defaults(action=action)
     parser.add_argument("--retry", action="store_true", help="compute failed cases again")
     parser.add_argument(
@@ -74,63 +84,44 @@ def _add_case_options(parser: argparse.ArgumentParser, action: Action) -> None:
     parser.add_argument("--quiet", action="store_true", help="print errors and failed cases only")
 
 
-def _add_sweep(actions: argparse._SubParsersAction[Any]) -> None:
-    parser = actions.add_parser("sweep", help="run the cases of a file with [sweep]", description=SWEEP_HELP)
-    parser.add_argument("case", type=Path, metavar="CASE.toml", help="a case file with a section [sweep]")
-    parser.add_argument("--out", type=folder, metavar="DIR", help="folder of the sweep, in which each case has its own")
-    one = parser.add_mutually_exclusive_group()
-    one.add_argument("--list", action="store_true", help="print the cases, with --out also their status; run none")
-    one.add_argument("--index", type=integer, metavar="K", help="run case K alone, counted from 1, as a job array does")
-    _add_case_options(parser, _sweep)
+def _case_options(arguments: argparse.Namespace, comm: Intracomm) -> tuple[int, bool, bool]:
+    """Return the ranks of a case, by default all, and whether failed cases run again and nothing is printed."""
+    group = comm.size if arguments.ranks_per_case is None else arguments.ranks_per_case
+    return group, arguments.retry, arguments.quiet
 
 
 def _sweep(arguments: argparse.Namespace, comm: Intracomm) -> None:
     from feti_homog.results import output_folder
-    from feti_homog.studies.sweep import execute, plan
+    from feti_homog.studies import case_runs, sweep_cases
 
     if arguments.out is None and not arguments.list:
         raise CaseError("command line: the following arguments are required: --out (see --help)")
-    sweep = on_root(comm, plan.load, arguments.case)
+    sweep = on_root(comm, sweep_cases.load, arguments.case)
     if arguments.list:
-        lines = on_root_only(comm, execute.list_cases, sweep, arguments.out) or []
+        lines = on_root_only(comm, case_runs.list_cases, sweep, arguments.out) or []
         on_root_only(comm, print_product, "\n".join(lines))
         return
     on_root(comm, output_folder.usable, arguments.out)
     if arguments.index is None:
-        execute.run_all(sweep, arguments.out, comm, _group(arguments, comm), arguments.retry, arguments.quiet)
+        case_runs.run_all(sweep, arguments.out, comm, *_case_options(arguments, comm))
     else:
-        execute.run_one(sweep, arguments.index, arguments.out, comm, arguments.retry, arguments.quiet)
-
-
-def _add_collect(actions: argparse._SubParsersAction[Any]) -> None:
-    words = "make one table and pictures of the cases of a sweep's folder"
-    parser = actions.add_parser("collect", help=words, description=COLLECT_HELP)
-    parser.add_argument("directory", type=folder, metavar="DIR", help="--out of the sweep")
-    parser.add_argument("--no-pictures", action="store_true", help="make the tables alone")
-    parser.set_defaults(action=_collect)
+        case_runs.run_one(sweep, arguments.index, arguments.out, comm, arguments.retry, arguments.quiet)
 
 
 def _collect(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    from feti_homog.studies.sweep import collect
+    from feti_homog.studies import collect
 
     for line in on_root_only(comm, collect.collect, arguments.directory, not arguments.no_pictures) or []:
         say(line)
 
 
 def _fit(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    from feti_homog.studies.fit import description, execute
+    from feti_homog.studies import fit_file
 
-    fit = on_root(comm, description.load, arguments.case)
-    execute.run(fit, arguments.out, comm, _group(arguments, comm), arguments.retry, arguments.quiet)
+    on_root(comm, fit_file.load, arguments.case).run(arguments.out, comm, *_case_options(arguments, comm))
 
 
 def _uncertainty(arguments: argparse.Namespace, comm: Intracomm) -> None:
-    from feti_homog.studies.uncertainty import scatter
+    from feti_homog.studies import uncertainty
 
-    study = on_root(comm, scatter.load, arguments.case)
-    scatter.run(study, arguments.out, comm, _group(arguments, comm), arguments.retry, arguments.quiet)
-
-
-def _group(arguments: argparse.Namespace, comm: Intracomm) -> int:
-    """Return how many ranks run a case, by default all."""
-    return comm.size if arguments.ranks_per_case is None else arguments.ranks_per_case
+    on_root(comm, uncertainty.load, arguments.case).run(arguments.out, comm, *_case_options(arguments, comm))

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
+from enum import Enum, auto
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError
-from feti_homog.studies.sweep import store
-from feti_homog.studies.sweep.description import check_options
-from feti_homog.studies.sweep.plan import Sweep
-from feti_homog.studies.sweep.store import LOCK_FILE, Status
+from feti_homog.analysis.runner import run
+from feti_homog.case.case import Case
+from feti_homog.errors import CaseError, ConvergenceError, FetiHomogError, MeshError
+from feti_homog.studies import case_folders
+from feti_homog.studies.case_folders import LOCK_FILE, Status
+from feti_homog.studies.description import check_options
+from feti_homog.studies.sweep_cases import Sweep, SweepCase
 from feti_homog.system.parallel.mpi_errors import ARRIVAL_TIMEOUT_S, on_root, on_root_only, others_come
 from feti_homog.system.runtime.file_locks import LOCK_TIMEOUT_S, Lock, LockHeld
 from feti_homog.system.runtime.standard_streams import complain, say
@@ -20,23 +25,9 @@ if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
 
 
-import time
-from dataclasses import dataclass
-from enum import Enum, auto
-from typing import TYPE_CHECKING
-
-from feti_homog.analysis.runner import run
-from feti_homog.case.case import Case
-from feti_homog.errors import MeshError
-from feti_homog.studies.sweep.plan import SweepCase
-
-if TYPE_CHECKING:
-    from mpi4py.MPI import Intracomm
-
-
 def list_cases(sweep: Sweep, directory: Path | None) -> list[str]:
     """Return the cases in a table, with their status if a folder is given. On one rank."""
-    statuses = ["" if directory is None else store.case_state(directory, entry).status for entry in sweep.entries]
+    statuses = ["" if directory is None else case_folders.case_state(directory, e).status for e in sweep.entries]
     width = max(map(len, statuses))
     return [
         f"{entry.folder}  {status:<{width}}  {entry.describe(sweep.stress_unit)}".replace("    ", "  ").rstrip()
@@ -62,25 +53,16 @@ def run_all(sweep: Sweep, directory: Path, comm: Intracomm, ranks_per_case: int,
     check_groups(comm, ranks_per_case)
     check_options(sweep)
     with _sweep_lock(directory, comm, sweep, shared=False):
-        group = comm if ranks_per_case == comm.size else _group(comm, ranks_per_case)
+        is_split = ranks_per_case != comm.size
+        group: Any = comm.Split(comm.rank // ranks_per_case) if is_split else comm
         if retry:
             on_root_only(comm, _reset_failures, directory, sweep)
         fault = _run_free_cases(CaseRunner(group, directory, False, quiet), sweep)
-        _raise_together(comm, fault)
+        faults = [fault for fault in comm.allgather(fault) if fault is not None]
+        if faults:
+            remark = "finished cases are kept; the same command goes on with the others"
+            raise FetiHomogError(*dict.fromkeys(line for fault in faults for line in fault.faults), remark)
     _report(sweep, directory, comm, quiet)
-
-
-def _report(sweep: Sweep, directory: Path, comm: Intracomm, quiet: bool) -> None:
-    """Print how many cases are done; raises ConvergenceError if some failed.  Collective."""
-    states = on_root(comm, lambda: [store.case_state(directory, entry) for entry in sweep.entries])
-    if comm.rank == 0 and not quiet:
-        done = sum(state.status is Status.DONE for state in states)
-        say(f"{done} of {len(states)} cases done in {directory}")
-    failed = [(entry, state) for entry, state in zip(sweep.entries, states, strict=True) if state.status.is_failure]
-    if failed:
-        if comm.rank == 0:
-            say("\n".join(store.failure_lines(failed, sweep.stress_unit)))
-        raise ConvergenceError(f"{len(failed)} of {len(states)} cases failed; --retry computes them again")
 
 
 def run_one(sweep: Sweep, number: int, directory: Path, comm: Intracomm, retry: bool, quiet: bool) -> None:
@@ -101,21 +83,29 @@ def run_one(sweep: Sweep, number: int, directory: Path, comm: Intracomm, retry: 
         raise CaseError(f"--index {number}: {entry.folder} is being computed by {holder}")
     if outcome is Outcome.FINISHED_BEFORE and comm.rank == 0 and not quiet:
         say(f"{entry.folder} is finished: nothing to do")
-    state = on_root(comm, store.case_state, directory, entry)
+    state = on_root(comm, case_folders.case_state, directory, entry)
     if state.status.is_failure:
         hint = "; it failed before, --retry computes it again" if outcome is Outcome.FAILED_BEFORE else ""
         raise ConvergenceError(f"{entry.folder} ({entry.describe(sweep.stress_unit)}): {state.reason}{hint}")
 
 
-def _group(comm: Intracomm, ranks: int) -> Any:
-    """Return this rank's group of so many neighbours.  Collective."""
-    return comm.Split(comm.rank // ranks)
+def _report(sweep: Sweep, directory: Path, comm: Intracomm, quiet: bool) -> None:
+    """Print the number of finished cases; raises ConvergenceError if some failed.  Collective."""
+    states = on_root(comm, lambda: [case_folders.case_state(directory, entry) for entry in sweep.entries])
+    if comm.rank == 0 and not quiet:
+        done = sum(state.status is Status.DONE for state in states)
+        say(f"{done} of {len(states)} cases done in {directory}")
+    failed = [(entry, state) for entry, state in zip(sweep.entries, states, strict=True) if state.status.is_failure]
+    if failed:
+        if comm.rank == 0:
+            say("\n".join(case_folders.failure_lines(failed, sweep.stress_unit)))
+        raise ConvergenceError(f"{len(failed)} of {len(states)} cases failed; --retry computes them again")
 
 
 def _run_free_cases(runner: CaseRunner, sweep: Sweep) -> FetiHomogError | None:
-    """Run whatever case is free until none is; returns what made the group stop before.  Collective in the group.
+    """Run free cases until there are none; returns the error that stopped the group.  Collective in the group.
 
-    The group passes over cases that others have at once; in a last round it waits for each as `Lock` does.
+    The group passes over cases of others at once; in a last round it waits for each as `Lock` does.
     """
     timeouts = [0.0, LOCK_TIMEOUT_S]
     try:
@@ -134,19 +124,11 @@ def _run_free_cases(runner: CaseRunner, sweep: Sweep) -> FetiHomogError | None:
     return None
 
 
-def _raise_together(comm: Intracomm, fault: FetiHomogError | None) -> None:
-    """Raise on all ranks the faults that made any group stop. Collective."""
-    faults = [fault for fault in comm.allgather(fault) if fault is not None]
-    if faults:
-        kept = "finished cases are kept; the same command goes on with the others"
-        raise FetiHomogError(*dict.fromkeys(line for fault in faults for line in fault.faults), kept)
-
-
 def _reset_failures(directory: Path, sweep: Sweep) -> None:
     for entry in sweep.entries:
-        status = store.case_state(directory, entry).status
+        status = case_folders.case_state(directory, entry).status
         if status.is_failure:
-            store.reset(directory, entry, status)
+            case_folders.reset(directory, entry, status)
 
 
 @contextmanager
@@ -161,7 +143,7 @@ def _sweep_lock(directory: Path, comm: Intracomm, sweep: Sweep, shared: bool) ->
 
 
 def _prepare_and_lock(lock: Lock, directory: Path, sweep: Sweep) -> None:
-    store.prepare_folder(directory, sweep)
+    case_folders.prepare_folder(directory, sweep)
     try:
         lock.acquire()
     except LockHeld as holder:
@@ -190,20 +172,19 @@ class CaseRunner:
     def run(self, entry: SweepCase, case: Case, total: int, timeout: float = LOCK_TIMEOUT_S) -> tuple[Outcome, str]:
         """Run a case unless it is finished, failed before, or another has it for `timeout` seconds.  Collective.
 
-        Returns what came of it, and which process has the case if another one has.  Raises FetiHomogError if the
-        folder cannot be written.
+        Returns the outcome, and the other process that has the case, if any.  Raises FetiHomogError if the folder
+        cannot be written.
         """
         lock = Lock(self.directory / entry.folder / LOCK_FILE, timeout=timeout)
         try:
             outcome, holder = on_root(self.comm, self._claim, lock, entry, case)
-            if outcome is not Outcome.COMPUTED:
-                return outcome, holder
-            start = time.perf_counter()
-            status = self._compute(entry, case)
-            seconds = time.perf_counter() - start
-            inputs = entry.describe(case.output.stress_unit)
-            self._print(f"{entry.folder} of {total}: {status}, {seconds:.2f} s; {inputs}")
-            return Outcome.COMPUTED, ""
+            if outcome is Outcome.COMPUTED:
+                start = time.perf_counter()
+                status = self._compute(entry, case)
+                seconds = time.perf_counter() - start
+                inputs = entry.describe(case.output.stress_unit)
+                self._print(f"{entry.folder} of {total}: {status}, {seconds:.2f} s; {inputs}")
+            return outcome, holder
         finally:
             lock.release()
 
@@ -217,15 +198,15 @@ class CaseRunner:
             return Outcome.HELD_ELSEWHERE, str(holder)
         except OSError as error:
             raise FetiHomogError(f"cannot make {folder}: {error.strerror}") from error
-        state = store.stored_state(self.directory, entry)
+        state = case_folders.stored_state(self.directory, entry)
         if state.status is Status.DONE or (state.status.is_failure and not self.retry):
             lock.release()
             return Outcome.FAILED_BEFORE if state.status.is_failure else Outcome.FINISHED_BEFORE, ""
         if state.status is Status.DAMAGED:
             self._print(f"{entry.folder}: {state.reason}; set aside, the case is computed again")
         if state.status is not Status.WAITING:
-            store.reset(self.directory, entry, state.status)
-        store.write_case_file(self.directory, entry, case)
+            case_folders.reset(self.directory, entry, state.status)
+        case_folders.write_case_file(self.directory, entry, case)
         return Outcome.COMPUTED, ""
 
     def _compute(self, entry: SweepCase, case: Case) -> str:
@@ -236,11 +217,11 @@ class CaseRunner:
         except (CaseError, MeshError, ConvergenceError) as error:
             if not others_come(self.comm, ARRIVAL_TIMEOUT_S):
                 raise
-            on_root_only(self.comm, store.write_error, self.directory, entry, error)
+            on_root_only(self.comm, case_folders.write_error, self.directory, entry, error)
             return f"failed ({error.faults[0]})"
         except FetiHomogError:  # a file could not be written: the case is to be computed again
             if others_come(self.comm, ARRIVAL_TIMEOUT_S):
-                on_root_only(self.comm, store.set_aside, self.directory, entry, Status.DAMAGED)
+                on_root_only(self.comm, case_folders.set_aside, self.directory, entry, Status.DAMAGED)
             raise
 
     def _print(self, line: str) -> None:

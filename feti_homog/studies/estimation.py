@@ -60,17 +60,17 @@ class Estimates:
     @property
     def influence(self) -> Float:
         """(n, m) change of each estimate per standard deviation of each datum."""
-        size, kept = _sizes(self.x), self.directions[: self.rank]
-        pseudo = kept.T @ ((kept @ (self.jacobian * size).T) / self.singular_values[: self.rank, None] ** 2)
+        size, V = _sizes(self.x), self.directions[: self.rank]
+        pseudo = V.T @ ((V @ (self.jacobian * size).T) / self.singular_values[: self.rank, None] ** 2)
         return np.asarray(size[:, None] * pseudo)
 
     @property
     def covariance(self) -> Float:
         """(n, n); infinite variances of unknowns that the data do not determine."""
-        found = self.influence @ self.influence.T
+        covariance = self.influence @ self.influence.T
         for row in self.undetermined:
-            found[row, row] = np.inf
-        return np.asarray(found)
+            covariance[row, row] = np.inf
+        return np.asarray(covariance)
 
     @property
     def std(self) -> Float:
@@ -107,15 +107,15 @@ def estimate(
 ) -> Estimates:
     """Return the estimates from the values (m,) that `model` gives of unknowns (n,), and their derivatives (m, n).
 
-    `measured` are the data and their standard deviations.  Steps are those of a dogleg in the box of the bounds; where
-    no datum sees a direction, those of a trust region, which do not go along it.
+    `measured` are the data and their standard deviations.  The search is a dogleg in the box of the bounds; where no
+    datum sees a direction, by a trust region, whose steps do not go along it.
     """
     y, std = measured
     size = _sizes(start)
     singular = np.linalg.svd(jacobian(start) / std[:, None] * size, compute_uv=False)
     is_full = len(y) >= len(start) and singular.min() > RANK_TOLERANCE * singular.max()
     # Every unknown relative to its start, so that no unit decides where the search ends.
-    found = least_squares(
+    minimum = least_squares(
         lambda z: (model(z * size) - y) / std,
         start / size,
         lambda z: jacobian(z * size) * size / std[:, None],
@@ -126,9 +126,9 @@ def estimate(
         gtol=SLOPE,
         max_nfev=MOST_EVALUATIONS,
     )
-    x, derivatives = found.x * size, found.jac * std[:, None] / size
-    return summarize(x, found.fun * std + y, measured, derivatives, bounds,
-                     evaluations=found.nfev, converged=bool(found.success))  # fmt: skip
+    x, derivatives = minimum.x * size, minimum.jac * std[:, None] / size
+    return summarize(x, minimum.fun * std + y, measured, derivatives, bounds,
+                     evaluations=minimum.nfev, converged=bool(minimum.success))  # fmt: skip
 
 
 def summarize(
@@ -145,8 +145,8 @@ def summarize(
     J = derivatives / std[:, None]
     _, s, V = np.linalg.svd(J * _sizes(x), full_matrices=True)
     lower, upper = bounds
-    near = STEP * (upper - lower)
-    at_bound = np.where(x >= upper - near, 1, np.where(x <= lower + near, -1, 0))
+    margin = STEP * (upper - lower)
+    at_bound = np.where(x >= upper - margin, 1, np.where(x <= lower + margin, -1, 0))
     s = np.pad(s, (0, len(x) - len(s)))
     return Estimates(x=x, computed=computed, residuals=(computed - y) / std, jacobian=J, at_bound=at_bound,
                      singular_values=s, directions=V, evaluations=evaluations, converged=converged)  # fmt: skip
@@ -154,15 +154,8 @@ def summarize(
 
 def names_of(rows: Sequence[Sequence[int]], names: Sequence[str]) -> list[str]:
     """Return a line for each direction that the data do not determine, with its unknowns."""
-    lines = []
-    for row in rows:
-        own = ", ".join(names[k] for k in row)
-        lines.append(
-            f"[unknown] {own}: no measured value depends on it"
-            if len(row) == 1
-            else f"[unknown] {own}: the measured values do not determine them together"
-        )
-    return lines
+    reasons = {True: "no measured value depends on it", False: "the measured values do not determine them together"}
+    return [f"[unknown] {', '.join(names[k] for k in row)}: {reasons[len(row) == 1]}" for row in rows]
 
 
 def _sizes(x: Float) -> Float:

@@ -1,6 +1,6 @@
-"""The folder of a sweep: its list of cases, a folder for each, and how far each has come.
+"""The folder of a sweep: its list of cases, a folder for each, and their progress.
 
-DIR/sweep.json, cases.csv     what the cases are; collected, cases.csv has their results too
+DIR/sweep.json, cases.csv     the cases; collected, cases.csv has their results too
 DIR/case-0001/case.toml       the case with its defaults, which `feti-homog run` runs too
 DIR/case-0001/result.json     as of any run
 DIR/case-0001/error.txt       why it failed, if it did
@@ -24,7 +24,7 @@ from feti_homog.case.case import Case
 from feti_homog.errors import CaseError, FetiHomogError
 from feti_homog.results import atomic, checkpoint_file, output_folder, result_json, seals
 from feti_homog.schema.values import INF
-from feti_homog.studies.sweep.plan import Sweep, SweepCase, identity_of
+from feti_homog.studies.sweep_cases import Sweep, SweepCase, identity_of
 from feti_homog.system.runtime import input_files
 from feti_homog.system.runtime.file_locks import Lock, LockHeld, is_locked
 from feti_homog.version import __version__
@@ -32,8 +32,8 @@ from feti_homog.version import __version__
 INDEX_FILE, TABLE_FILE, ERROR_FILE, CASE_FILE, LOCK_FILE = (
     "sweep.json", "cases.csv", "error.txt", "case.toml", "lock",
 )  # fmt: skip
-# What a sweep, its collection and its report write beside sweep.json.
-SWEEP_ENTRY = re.compile(r"(cases|statistics)\.csv|lock|(moduli|curves)\.png|report\.html|case-\d{4,}")
+SWEEP_ENTRIES = re.compile(r"(cases|statistics)\.csv|lock|moduli\.png|report\.html|case-\d{4,}")
+"""Names of files and folders that a sweep and its collection write beside sweep.json."""
 INDEX_LOCK_FILE, INDEX_LOCK_TIMEOUT_S = "index.lock", 30.0
 
 
@@ -59,7 +59,7 @@ class Status(StrEnum):
 
 @dataclass(frozen=True)
 class CaseState:
-    """Progress of a case, why it did not come further, and its result.json if that is there."""
+    """Progress of a case, the reason of its failure, and its result.json if there is one."""
 
     status: Status
     reason: str = ""
@@ -75,27 +75,39 @@ class SweepIndex:
     entries: tuple[SweepCase, ...]
 
 
-def prepare_folder(directory: Path, sweep: Sweep) -> None:
-    """Make the folder of a sweep, or find that it is already that, perhaps with fewer cases.  On one rank.
+def refuse_files_of_others(directory: Path, entries: re.Pattern[str], kind: str) -> None:
+    """Check that nothing stands under names of a study in a folder without its document.  On one rank.
 
     Raises:
-        CaseError: the folder is that of another sweep, or holds what no sweep wrote under names of its files.
+        CaseError: a file that is not empty, or such a folder.
+        OSError: the folder cannot be read.
+    """
+    for path in sorted(directory.iterdir()):
+        if entries.fullmatch(path.name) and (any(path.iterdir()) if path.is_dir() else path.lstat().st_size):
+            raise output_folder.foreign(directory, path.name, kind)
+
+
+def prepare_folder(directory: Path, sweep: Sweep) -> None:
+    """Make the folder of a sweep, or check that it is, perhaps with fewer cases.  On one rank.
+
+    Raises:
+        CaseError: the folder has another sweep, or files of others under names of a sweep.
         FetiHomogError: it cannot be written.
     """
     try:
         directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise CaseError(f"--out {directory}: cannot be made: {error.strerror}") from error
-    if _existing_entries(directory) == sweep.entries and (directory / TABLE_FILE).exists():
+    if _stored_entries(directory) == sweep.entries and (directory / TABLE_FILE).exists():
         return
     try:
         with Lock(directory / INDEX_LOCK_FILE, timeout=INDEX_LOCK_TIMEOUT_S):
-            known = _existing_entries(directory)
-            _refuse_another(directory, known, sweep.entries)
-            if not known:
-                _refuse_files_of_others(directory)
+            stored = _stored_entries(directory)
+            _refuse_another(directory, stored, sweep.entries)
+            if not stored:
+                refuse_files_of_others(directory, SWEEP_ENTRIES, "sweep")
             atomic.remove_unfinished(directory, re.compile(rf"{INDEX_FILE}|{TABLE_FILE}"))
-            if known != sweep.entries:
+            if stored != sweep.entries:
                 document = {"version": __version__, "name": sweep.name, "stress_unit": sweep.stress_unit}
                 entries = [_replaced(asdict(entry), math.inf, INF) for entry in sweep.entries]
                 atomic.replace_text(directory / INDEX_FILE, seals.dumps(document | {"cases": entries}))
@@ -104,12 +116,37 @@ def prepare_folder(directory: Path, sweep: Sweep) -> None:
         raise CaseError(f"--out {directory}: {error} has been writing its list of cases for long") from error
 
 
-def _existing_entries(directory: Path) -> tuple[SweepCase, ...]:
+def _stored_entries(directory: Path) -> tuple[SweepCase, ...]:
     return read_index(directory).entries if (directory / INDEX_FILE).exists() else ()
 
 
+def _refuse_another(directory: Path, stored: Sequence[SweepCase], entries: Sequence[SweepCase]) -> None:
+    """Raise CaseError unless the stored cases are the first entries."""
+    reason = f"it has {len(stored)} cases, this file {len(entries)}" if len(stored) > len(entries) else ""
+    differing = [(old, new) for old, new in zip(stored, entries, strict=False) if old != new]
+    if differing:
+        old, new = differing[0]
+        reason = f"its {old.folder} ({old.describe('')}) differs from this file ({new.describe('')})"
+        if old.inputs == new.inputs:
+            reason = f"its {old.folder} differs from this file in keys that do not vary, or in the content of a mesh"
+    if reason:
+        raise CaseError(f"--out {directory} holds another sweep: {reason}; choose another folder")
+
+
+def _table(entries: Sequence[SweepCase]) -> str:
+    """Return cases.csv before any result."""
+    names = list(dict.fromkeys(name for entry in entries for name in entry.inputs))
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(["case", "folder", "point", "realisation", *names])
+    for entry in entries:
+        inputs = [entry.inputs.get(name, "") for name in names]
+        writer.writerow([entry.number, entry.folder, entry.point, entry.realisation, *inputs])
+    return stream.getvalue()
+
+
 def read_index(directory: Path) -> SweepIndex:
-    """Return the cases of a sweep's folder. Raises CaseError if it is none."""
+    """Return the cases of a sweep's folder.  Raises CaseError without a readable list of them."""
     path = directory / INDEX_FILE
     try:
         document = seals.loads(input_files.read(path).decode("utf-8"))
@@ -120,12 +157,12 @@ def read_index(directory: Path) -> SweepIndex:
     except OSError as error:
         raise CaseError(f"{path}: cannot be read: {error.strerror}; expected the folder of a sweep") from error
     except (ValueError, KeyError, TypeError) as error:
-        words = str(error).removeprefix("it is damaged: ")
-        raise CaseError(f"{path} is damaged: {words}; move it away and start the sweep again") from error
+        reason = str(error).removeprefix("it is damaged: ")
+        raise CaseError(f"{path} is damaged: {reason}; move it away and start the sweep again") from error
 
 
 def _replaced(value: Any, old: Any, new: Any) -> Any:
-    """Return the value with `new` in place of `old` in all its tables and lists: JSON has no infinite numbers."""
+    """Return the value with `new` in place of `old` in its tables and lists: JSON has no infinite numbers."""
     if isinstance(value, dict):
         return {key: _replaced(item, old, new) for key, item in value.items()}
     if isinstance(value, list):
@@ -134,41 +171,37 @@ def _replaced(value: Any, old: Any, new: Any) -> Any:
 
 
 def case_state(directory: Path, entry: SweepCase) -> CaseState:
-    """Return how far a case has come; RUNNING while another process holds its lock.  On one rank."""
+    """Return the progress of a case; RUNNING while another process holds its lock.  On one rank."""
     state = stored_state(directory, entry)
     is_open = state.status in (Status.WAITING, Status.FAILED)
     return CaseState(Status.RUNNING) if is_open and is_locked(directory / entry.folder / LOCK_FILE) else state
 
 
 def stored_state(directory: Path, entry: SweepCase) -> CaseState:
-    """Return how far a case has come by its files alone, as the holder of its lock needs it.  On one rank."""
+    """Return the progress of a case by its files alone, as the holder of its lock needs it.  On one rank."""
     folder = directory / entry.folder
+    path = folder / result_json.NAME
     try:
-        if (folder / result_json.NAME).exists():
-            return _result_state(folder, entry)
+        if path.exists():
+            document = result_json.read(folder)
+            if identity_of(document["digest"], document["case"]["petsc"]) != entry.identity:
+                return CaseState(Status.DAMAGED, f"{path} is of another case")
+            return CaseState(Status(document["status"]), "; ".join(document["faults"]), document)
     except (FetiHomogError, KeyError, TypeError, ValueError) as error:
-        return CaseState(Status.DAMAGED, f"{folder / result_json.NAME} is no readable result: {error}")
-    if (folder / ERROR_FILE).is_file():
-        try:
-            lines = input_files.read(folder / ERROR_FILE).decode("utf-8", "replace").splitlines()
-        except OSError as error:
-            lines = [f"{ERROR_FILE} cannot be read: {error.strerror}"]
-        return CaseState(Status.FAILED, "; ".join(lines))
-    return CaseState(Status.WAITING)
-
-
-def _result_state(folder: Path, entry: SweepCase) -> CaseState:
-    document = result_json.read(folder)
-    if identity_of(document["digest"], document["case"]["petsc"]) != entry.identity:
-        return CaseState(Status.DAMAGED, f"{folder / result_json.NAME} is of another case")
-    return CaseState(Status(document["status"]), "; ".join(document["faults"]), document)
+        return CaseState(Status.DAMAGED, f"{path} is no readable result: {error}")
+    if not (folder / ERROR_FILE).is_file():
+        return CaseState(Status.WAITING)
+    try:
+        lines = input_files.read(folder / ERROR_FILE).decode("utf-8", "replace").splitlines()
+    except OSError as error:
+        lines = [f"{ERROR_FILE} cannot be read: {error.strerror}"]
+    return CaseState(Status.FAILED, "; ".join(lines))
 
 
 def write_case_file(directory: Path, entry: SweepCase, case: Case) -> None:
-    """Write the file of a case that is to be computed.  On one rank.
+    """Write case.toml of a case that is to be computed.  On one rank.  Raises FetiHomogError if it cannot be written.
 
-    Raises:
-        FetiHomogError: the folder cannot be written.
+    Sections without keys are left out.
     """
     document = {name: table for name, table in case.resolved().items() if table != {}}
     folder = directory / entry.folder
@@ -177,22 +210,16 @@ def write_case_file(directory: Path, entry: SweepCase, case: Case) -> None:
 
 
 def reset(directory: Path, entry: SweepCase, status: Status) -> None:
-    """Make a case that failed or is damaged one that waits; an unusable result.json is set aside.  On one rank.
-
-    Raises:
-        FetiHomogError: the folder cannot be written.
-    """
+    """Make a failed or damaged case wait again, without its error and events.  On one rank.  Raises as `set_aside`."""
     folder = directory / entry.folder
-    try:
+    with atomic.write_errors(folder):
         (folder / ERROR_FILE).unlink(missing_ok=True)
-    except OSError as error:
-        raise FetiHomogError(f"cannot write {folder}: {error.strerror}") from error
     checkpoint_file.remove(folder)
     set_aside(directory, entry, status)
 
 
 def set_aside(directory: Path, entry: SweepCase, status: Status) -> None:
-    """Give the result.json of a case another name, so that the case waits, and remove its other files.  On one rank.
+    """Rename the result.json of a case, which then waits, and remove its other files.  On one rank.
 
     Raises:
         FetiHomogError: the folder cannot be written.
@@ -206,50 +233,14 @@ def set_aside(directory: Path, entry: SweepCase, status: Status) -> None:
 
 
 def write_error(directory: Path, entry: SweepCase, error: FetiHomogError) -> None:
-    """Keep why a case failed.  On one rank.  Raises FetiHomogError if it cannot be written."""
+    """Write error.txt of a failed case.  On one rank.  Raises FetiHomogError if it cannot be written."""
     lines = [f"{type(error).__name__}: {fault}" for fault in error.faults]
     atomic.replace_text(directory / entry.folder / ERROR_FILE, "\n".join(lines) + "\n")
 
 
 def failure_lines(cases: Sequence[tuple[SweepCase, CaseState]], stress_unit: str) -> list[str]:
-    """Folder, inputs and reason of cases that failed, after an empty line and their number; nothing without any."""
+    """Return the number of failed cases, then folder, inputs and reason of each; nothing without any."""
     lines = ["", f"{len(cases)} failed:"] if cases else []
     for entry, state in cases:
         lines += [f"  {entry.folder}  {entry.describe(stress_unit)}", f"    {state.reason}"]
     return lines
-
-
-def _refuse_another(directory: Path, known: Sequence[SweepCase], wanted: Sequence[SweepCase]) -> None:
-    """Raise CaseError unless the known cases are the first of those wanted."""
-    for old, new in zip(known, wanted, strict=False):
-        if old != new:
-            words = f"its {old.folder} ({old.describe('')}) differs from this file ({new.describe('')})"
-            if old.inputs == new.inputs:
-                words = f"its {old.folder} differs from this file in keys that do not vary, or in the content of a mesh"
-            raise CaseError(f"--out {directory} holds another sweep: {words}; choose another folder")
-    if len(known) > len(wanted):
-        raise CaseError(
-            f"--out {directory} holds another sweep: it has {len(known)} cases, this file {len(wanted)}; "
-            "choose another folder"
-        )
-
-
-def _refuse_files_of_others(directory: Path) -> None:
-    """Raise CaseError if something stands where a sweep would write its own, in a folder without a list of cases."""
-    for path in sorted(directory.iterdir()):
-        if SWEEP_ENTRY.fullmatch(path.name) and (any(path.iterdir()) if path.is_dir() else path.lstat().st_size):
-            raise CaseError(
-                f"--out {directory}: no sweep of this program wrote {path.name}, and this one would replace it; "
-                "move it away or choose another folder"
-            )
-
-
-def _table(entries: Sequence[SweepCase]) -> str:
-    names = list(dict.fromkeys(name for entry in entries for name in entry.inputs))
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(["case", "folder", "point", "realisation", *names])
-    for entry in entries:
-        inputs = [entry.inputs.get(name, "") for name in names]
-        writer.writerow([entry.number, entry.folder, entry.point, entry.realisation, *inputs])
-    return stream.getvalue()

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import copy
-import hashlib
 import json
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from feti_homog.case import case as cases
 from feti_homog.case.case import Case
-from feti_homog.case.document import read_document, to_document
+from feti_homog.case.document import read_document, short_digest, to_document
 from feti_homog.case.sections import SWEEP
 from feti_homog.errors import CaseError
 from feti_homog.report.text.table import unit
 from feti_homog.schema.wording import dotted_key, toml_value
-from feti_homog.studies.sweep.points import Assignment, read_points
+from feti_homog.studies.axes import Assignment, read_points
 from feti_homog.system.petsc.option_table import only_prints
 
 MAX_NAMED_CASES = 4  # in one fault
@@ -29,10 +28,10 @@ class SweepCase:
 
     Attributes:
         number: of the case, from 1.
-        point: which values, from 1: all realisations of a point have the same.
+        point: number of its values, from 1: all realisations of a point have the same.
         realisation: from 1.
-        inputs: what varies, by dotted key.
-        identity: short name of what the case computes.
+        inputs: the keys that vary, dotted, with their values.
+        identity: digest of the computation; empty before the case is checked.
     """
 
     number: int
@@ -48,12 +47,12 @@ class SweepCase:
     def describe(self, stress_unit: str) -> str:
         """Return the inputs in one line, with their units."""
         values = [(f"{name} = {toml_value(value)}", unit(name, stress_unit)) for name, value in self.inputs.items()]
-        return ", ".join(f"{text} {own}".rstrip() for text, own in values)
+        return ", ".join(f"{text} {label}".rstrip() for text, label in values)
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """The cases of a sweep file; `cases[k]` is that of `entries[k]`."""
+    """The cases of a sweep file; `cases[k]` belongs to `entries[k]`."""
 
     name: str
     entries: tuple[SweepCase, ...]
@@ -86,55 +85,61 @@ def expand(values: Mapping[str, Any], folder: Path) -> Sweep:
         raise CaseError(f"{SWEEP} = {toml_value(table)}: expected a section [{SWEEP}]")
     faults: list[str] = []
     points, settings = read_points(table, faults)
-    unchecked = case_documents(document, points, settings.realisations, faults)
-    if faults:
-        raise CaseError(*dict.fromkeys(faults))
-    return checked(str(document.get("name", "case")), unchecked, folder)
+    return cases_at(document, points, folder, settings.realisations, faults=faults)
 
 
-def checked(name: str, unchecked: Sequence[CaseDocument], folder: Path) -> Sweep:
-    """Return the sweep of its documents.
+def cases_at(
+    document: Mapping[str, Any],
+    points: Sequence[Assignment],
+    folder: Path,
+    realisations: int | None = None,
+    *,
+    section: str = SWEEP,
+    faults: Sequence[str] = (),
+    complete: Callable[[dict[str, Any]], None] | None = None,
+) -> Sweep:
+    """Return the cases of a document at some points, by which `section` names faults.
 
-    Raises CaseError with the faults of all cases, each with the cases that have it.
+    Args:
+        faults: faults of the points.
+        complete: sets keys of each case's document.
+
+    Raises:
+        CaseError: with the faults of the points, or else of all cases, each with the cases that have it.
     """
-    found, numbers_by_fault = [], dict[str, list[int]]()
-    for number, each in enumerate(unchecked, start=1):
+    lines = [*faults]
+    unchecked = case_documents(document, points, realisations, lines, section)
+    if lines:
+        raise CaseError(*dict.fromkeys(lines))
+    name, checked, numbers_by_fault = str(document.get("name", "case")), [], dict[str, list[int]]()
+    for entry, case_document in unchecked:
+        if complete is not None:
+            complete(case_document)
         try:
-            case = cases.parse(each.document | {"name": f"{name}-{number:04d}"}, folder)
-            identity = identity_of(case.digest(), case.petsc)
-            found.append((SweepCase(number, each.point, each.realisation, each.inputs, identity), case))
+            case = cases.parse(case_document | {"name": f"{name}-{entry.number:04d}"}, folder)
+            checked.append((replace(entry, identity=identity_of(case.digest(), case.petsc)), case))
         except CaseError as error:
             for fault in error.faults:
-                numbers_by_fault.setdefault(fault, []).append(number)
+                numbers_by_fault.setdefault(fault, []).append(entry.number)
     if numbers_by_fault:
         raise CaseError(*(f"{case_names(numbers)}: {fault}" for fault, numbers in numbers_by_fault.items()))
-    entries, checked = zip(*found, strict=True)
-    if len({case.output.stress_unit for case in checked}) > 1:
+    entries, parsed = zip(*checked, strict=True)
+    if len({case.output.stress_unit for case in parsed}) > 1:
         raise CaseError("[output] stress_unit: expected the same in all cases, for they share their tables")
-    return Sweep(name, entries, checked)
+    return Sweep(name, entries, parsed)
 
 
 def identity_of(digest: str, petsc: Mapping[str, Any]) -> str:
-    """Short name of what is computed, and with which options but those that only print."""
+    """Digest of a case and of its options, but for options that only print."""
     chosen = {name: value for name, value in petsc.items() if not only_prints(name)}
-    return hashlib.sha256((digest + json.dumps(chosen, sort_keys=True)).encode()).hexdigest()[:16]
+    return short_digest((digest + json.dumps(chosen, sort_keys=True)).encode())
 
 
 def case_names(numbers: list[int]) -> str:
-    """Return which cases, in words."""
+    """Return the names of some cases, in words."""
     names = ", ".join(f"case-{number:04d}" for number in numbers[:MAX_NAMED_CASES])
     rest = len(numbers) - MAX_NAMED_CASES
     return names if rest <= 0 else f"{names} and {rest} more"
-
-
-@dataclass(frozen=True)
-class CaseDocument:
-    """The document of a case that is not checked yet: its point and realisation, from 1, and what varies."""
-
-    point: int
-    realisation: int
-    inputs: dict[str, Any]
-    document: dict[str, Any]
 
 
 def case_documents(
@@ -143,36 +148,37 @@ def case_documents(
     realisations: int | None,
     faults: list[str],
     section: str = SWEEP,
-) -> list[CaseDocument]:
-    """Return the cases in their order: all points, then the next realisation of those with a random cell.
+) -> list[tuple[SweepCase, dict[str, Any]]]:
+    """Return the cases and their documents: all points, then the next realisation of points with a random cell.
 
-    What is wrong with the points, of a section, and their number of realisations is added to `faults`.
+    Faults of the points, in a section, and of their number of realisations are added to `faults`.
     """
     documents = [_with_values(base, point, faults, section) for point in points]
-    if realisations is not None:
-        faults += _realisation_faults(documents, points)
-    faults += _repeated(points[0], section) if points else []
-    return [] if faults else list(_ordered(points, documents, realisations))
+    if realisations is not None and not any(map(_is_random, documents)):
+        faults.append(f'[{SWEEP}] realisations: only cells with geometry = "random" have several')
+    keys = [key for path, value in next(iter(points), {}).items() for key in _inputs({path: value})]
+    if realisations is not None and "cell.seed" in keys:
+        faults.append(f"[{SWEEP}] realisations: excludes cell.seed, the first of which is that of [cell]")
+    faults += [f"[{section}] {key}: given twice" for key in dict.fromkeys(keys) if keys.count(key) > 1]
+    return [] if faults else _in_order(points, documents, realisations)
 
 
-def _ordered(
+def _in_order(
     points: Sequence[Assignment], documents: Sequence[dict[str, Any]], realisations: int | None
-) -> Iterator[CaseDocument]:
+) -> list[tuple[SweepCase, dict[str, Any]]]:
+    """Return the cases; seeds of realisations count up from the seed in [cell], unless it is faulty."""
+    ordered = list[tuple[SweepCase, dict[str, Any]]]()
     for realisation in range(1, (realisations or 1) + 1):
         for point, (assignment, document) in enumerate(zip(points, documents, strict=True), start=1):
-            inputs = _inputs(assignment)
+            inputs, varied = _inputs(assignment), document
             if realisations is not None and _is_random(document):
-                seed = _seed(document, realisation)
-                cell = document["cell"] | {"seed": seed}
-                yield CaseDocument(point, realisation, inputs | {"cell.seed": seed}, document | {"cell": cell})
-            elif realisation == 1:
-                yield CaseDocument(point, realisation, inputs, document)
-
-
-def _seed(document: Mapping[str, Any], realisation: int) -> Any:
-    """Return the seed of a realisation: that of [cell] and those after it; a faulty one stays as it is."""
-    first = document["cell"].get("seed", 0)
-    return first + realisation - 1 if isinstance(first, int) else first
+                first = document["cell"].get("seed", 0)
+                inputs["cell.seed"] = first + realisation - 1 if isinstance(first, int) else first
+                varied = document | {"cell": document["cell"] | {"seed": inputs["cell.seed"]}}
+            elif realisation > 1:
+                continue
+            ordered.append((SweepCase(len(ordered) + 1, point, realisation, inputs, ""), varied))
+    return ordered
 
 
 def _with_values(base: Mapping[str, Any], point: Assignment, faults: list[str], section: str) -> dict[str, Any]:
@@ -187,14 +193,13 @@ def _with_values(base: Mapping[str, Any], point: Assignment, faults: list[str], 
                 return document
         if isinstance(table, list) and len(table) == 1 and isinstance(table[0], dict):
             table = table[0]
+        place, last = dotted_key(path[:-1]), path[-1]
         if isinstance(table, list):
-            faults.append(f"[{section}] {dotted_key(path)}: {_several(path, table)}")
+            several = f"there are {len(table)} sections [[{place}]]; expected {place}.1.{last} or the like"
+            faults.append(f"[{section}] {dotted_key(path)}: {several}")
             return document
-        last = path[-1]
-        if isinstance(value, dict) and isinstance(table.get(last, {}), dict):
-            table[last] = table.get(last, {}) | value
-        else:
-            table[last] = value
+        is_merged = isinstance(value, dict) and isinstance(table.get(last, {}), dict)
+        table[last] = table.get(last, {}) | value if is_merged else value
     return document
 
 
@@ -205,32 +210,10 @@ def _entry(table: Any, name: str) -> Any:
     """
     if isinstance(table, list):
         is_one = name.isdecimal() and 0 < int(name) <= len(table)
-        found = table[int(name) - 1] if is_one else None
+        entry = table[int(name) - 1] if is_one else None
     else:
-        found = table.setdefault(name, {})
-    return found if isinstance(found, dict | list) else None
-
-
-def _several(path: Sequence[str], tables: Sequence[Any]) -> str:
-    """Return the fault of a key of several sections of one name."""
-    section, key = dotted_key(path[:-1]), path[-1]
-    return f"there are {len(tables)} sections [[{section}]]; expected {section}.1.{key} or the like"
-
-
-def _realisation_faults(documents: Sequence[dict[str, Any]], points: Sequence[Assignment]) -> list[str]:
-    line = f"[{SWEEP}] realisations: "
-    faults = []
-    if not any(map(_is_random, documents)):
-        faults.append(f'{line}only cells with geometry = "random" have several')
-    if any("cell.seed" in _inputs(point) for point in points):
-        faults.append(f"{line}excludes cell.seed, the first of which is that of [cell]")
-    return faults
-
-
-def _repeated(point: Assignment, section: str) -> list[str]:
-    """Faults of keys that vary by themselves and within a table too."""
-    given = [key for path, value in point.items() for key in _inputs({path: value})]
-    return [f"[{section}] {key}: given twice" for key in dict.fromkeys(given) if given.count(key) > 1]
+        entry = table.setdefault(name, {})
+    return entry if isinstance(entry, dict | list) else None
 
 
 def _is_random(document: Mapping[str, Any]) -> bool:

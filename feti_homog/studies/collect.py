@@ -1,0 +1,138 @@
+"""`feti-homog collect DIR`: cases.csv and statistics.csv of a sweep, finished or not, and its picture."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from feti_homog.report.text.point_tables import STATES
+from feti_homog.report.text.table import unit
+from feti_homog.results import atomic
+from feti_homog.studies import case_folders
+from feti_homog.studies.case_folders import CaseState, Status, SweepIndex
+from feti_homog.studies.outputs import numbers, outputs
+from feti_homog.studies.sweep_table import SweepTable
+
+PARTS = ("count", "mean", "std", "ci95")
+COUNTS = ("refine", "elements", "nodes", "ranks", "subdomains", "dofs", "multipliers", "iterations", "memory")
+CASE = ("folder", "point", "realisation", "status", "reason")
+
+
+def read(directory: Path) -> SweepTable:
+    """Return the table of a sweep's folder, of all its cases, finished or not. On one rank.
+
+    Raises:
+        CaseError: it is no folder of a sweep, or its list of cases is damaged.
+    """
+    return _table(*_index_and_states(directory))
+
+
+def collect(directory: Path, pictures: bool) -> list[str]:
+    """Write cases.csv, statistics.csv and the picture; returns the lines to print.  On one rank.
+
+    Raises:
+        CaseError: as `read`.
+        FetiHomogError: a file cannot be written.
+    """
+    index, states = _index_and_states(directory)
+    table = _table(index, states)
+    atomic.remove_abandoned(directory, re.compile(r"(cases|statistics)\.csv|moduli\.png"))
+    paths = write(directory, table)
+    if pictures:
+        from feti_homog.studies.pictures import draw_moduli  # only a rank that draws loads Matplotlib
+
+        paths += draw_moduli(directory, table)
+    counts = ", ".join(f"{count} {status}" for status, count in Counter(table.status).items())
+    failed = [
+        (entry, state)
+        for entry, state in zip(index.entries, states, strict=True)
+        if state.status.is_failure or state.status is Status.DAMAGED
+    ]
+    failures = case_folders.failure_lines(failed, index.stress_unit)
+    return [f"{len(table.status)} cases: {counts}", *failures, *map(str, paths)]
+
+
+def write(directory: Path, table: SweepTable) -> list[Path]:
+    """Write cases.csv and statistics.csv, each in one step; returns their paths.  On one rank.
+
+    Raises:
+        FetiHomogError: a file cannot be written.
+    """
+    rows = {"cases.csv": _case_rows(table), "statistics.csv": _statistics_rows(table)}
+    return [_write_csv(directory / name, table_rows) for name, table_rows in rows.items()]
+
+
+def _write_csv(path: Path, rows: Iterable[list[Any]]) -> Path:
+    def write_rows(part: Path) -> None:
+        with part.open("w", newline="", encoding="utf-8") as stream:
+            csv.writer(stream, lineterminator="\n").writerows(map(_cell, row) for row in rows)
+
+    return atomic.replace(path, write_rows)
+
+
+def _cell(value: Any) -> Any:
+    """Return a value as a cell: nothing for None and NaN, JSON for lists and tables."""
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return ""
+    return json.dumps(value) if isinstance(value, list | dict) else value
+
+
+def _case_rows(table: SweepTable) -> Iterator[list[Any]]:
+    """Yield the names of the columns, then a row for each case."""
+    yield ["case", *CASE, *table.inputs, *table.outputs]
+    columns = [*table.inputs.values()]
+    for name, values in table.outputs.items():
+        is_count = name in COUNTS or name.endswith(tuple(f"_{state}" for state in STATES))
+        columns.append([int(v) if is_count and np.isfinite(v) else v for v in values.tolist()])
+    for row, _ in enumerate(table.folder):
+        place = (getattr(table, name)[row] for name in CASE)
+        yield [row + 1, *place, *(values[row] for values in columns)]
+
+
+def _statistics_rows(table: SweepTable) -> Iterator[list[Any]]:
+    """Yield the names of the columns, then a row for each output of each point with a result."""
+    inputs = [name for name in table.inputs if name != "cell.seed"]
+    yield ["point", *inputs, "output", "unit", *PARTS]
+    for number, point in enumerate(table.points):
+        place = [point, *(table.input_of(point, name) for name in inputs)]
+        for name, statistics in table.statistics.items():
+            count, *moments = (float(getattr(statistics, part)[number]) for part in PARTS)
+            if count:
+                yield [*place, name, unit(name, table.stress_unit), int(count), *moments]
+
+
+def _index_and_states(directory: Path) -> tuple[SweepIndex, list[CaseState]]:
+    index = case_folders.read_index(directory)
+    return index, [case_folders.case_state(directory, entry) for entry in index.entries]
+
+
+def _table(index: SweepIndex, states: Sequence[CaseState]) -> SweepTable:
+    documents = [state.document if state.status is Status.DONE else None for state in states]
+    place = {name: [getattr(entry, name) for entry in index.entries] for name in ("folder", "point", "realisation")}
+    inputs = [entry.inputs for entry in index.entries]
+    in_names = numbers(row.get("analysis.plane") for row in inputs)
+    found = _columns([{} if document is None else outputs(document, in_names) for document in documents], np.nan)
+    return SweepTable(
+        name=index.name,
+        stress_unit=index.stress_unit,
+        **place,
+        status=[state.status for state in states],
+        reason=[state.reason for state in states],
+        inputs=_columns(inputs, None),
+        outputs={name: np.array(values) for name, values in found.items()},
+        documents=documents,
+    )
+
+
+def _columns(rows: Sequence[Mapping[str, Any]], missing: Any) -> dict[str, list[Any]]:
+    """Return the values of each name in all rows."""
+    return {name: [row.get(name, missing) for row in rows] for name in dict.fromkeys(chain.from_iterable(rows))}

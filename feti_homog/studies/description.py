@@ -1,0 +1,196 @@
+"""Text of `feti-homog check`: what a run of a case, or of the cases of a sweep, would do."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from mpi4py import MPI
+
+from feti_homog.case import case as cases
+from feti_homog.case.case import Case
+from feti_homog.case.sections import SWEEP
+from feti_homog.errors import CaseError
+from feti_homog.feti import solver_plan
+from feti_homog.feti.decomposition.shared_entities import share_entities
+from feti_homog.feti.factory import database_options
+from feti_homog.feti.solver_plan import ProblemSizes, SolverOptions, SolverPlan
+from feti_homog.homogenization import cost_model, phase_laws, process_zone
+from feti_homog.homogenization.bonds import teeth_of
+from feti_homog.homogenization.domain_partition import CellSummary
+from feti_homog.homogenization.partition_policy import BY_COST
+from feti_homog.homogenization.unit_cell import cut
+from feti_homog.mesh.refinement import ReferenceLattice
+from feti_homog.microstructure.phase_names import COATING
+from feti_homog.results import checkpoint
+from feti_homog.studies import sweep_cases
+from feti_homog.studies.sweep_cases import Sweep, case_names
+from feti_homog.system.parallel.mpi_errors import on_root, on_root_only
+from feti_homog.system.petsc.options import case_options
+
+if TYPE_CHECKING:
+    from mpi4py.MPI import Intracomm
+
+
+def describe(case: Case, comm: MPI.Intracomm) -> str:
+    """Describe a run of the case on these ranks, under its own options; empty except on rank 0.  Collective.
+
+    Raises as `tear`.
+    """
+    with case_options(case.petsc):
+        lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
+        part = cut(case, lattice, comm, BY_COST)
+        constraints = share_entities(comm, part.submeshes, part.table, part.pairs, lattice).constraints
+        loads = comm.gather((len(part.submeshes.index), len(part.submeshes.member))) or []
+        options = database_options()
+        return on_root_only(comm, _described, case, part.summary, lattice, 2 * constraints, loads, options) or ""
+
+
+def _described(
+    case: Case,
+    summary: CellSummary,
+    lattice: ReferenceLattice,
+    multipliers: int,
+    loads: Sequence[tuple[int, int]],
+    options: SolverOptions,
+) -> str:
+    """Return the text of `describe`; `loads` are the subdomains and the coarse triangles of each rank."""
+    subdomains = [count for count, _ in loads]
+    nodes = [triangles * lattice.intervals**2 // 2 for _, triangles in loads]
+    elements = summary.coarse_triangles * len(lattice.triangles)
+    plan = _plan(case, summary, multipliers, options, subdomains)
+    columns = multipliers if plan.preconditioner == "influence" else 0
+    problems = _applications(case, summary.across or columns > 0)
+    triangles, most_ranks = summary.coarse_triangles, summary.coarse_triangles if summary.across else summary.bodies
+    cost = cost_model.estimate(nodes, subdomains, triangles, most_ranks, problems, columns, cost_model.has_errors(case))
+    unresolved = process_zone.warnings(case, summary.width, summary.interface_edge)
+    solver = plan.in_words if multipliers else "one factor of the whole cell: no multipliers, no iterations"
+    lines = [
+        f"case       {case.name}: {case.analysis.type}, plane {case.analysis.plane}",
+        f"cell       {summary.width:g} x {summary.height:g}, phases {', '.join(summary.phases)}",
+        *([f"voids      {summary.voids}"] if summary.voids else []),
+        f"mesh       {triangles} coarse triangles, {elements} "
+        f"elements of order {case.cell.order}, about {2 * sum(nodes)} degrees of freedom",
+        *(
+            [f"sizes      mesh_size = {case.cell.mesh_size:g}, refine = {case.cell.refine}, as asked for by accuracy"]
+            if case.cell.accuracy is not None
+            else []
+        ),
+        *_fibre_lines(case, summary),
+        f"tearing    {summary.bodies} bodies, {_subdomains(summary.subdomains)}, {multipliers} multipliers",
+        f"solver     {solver}",
+        *(
+            f"rank {rank:<5} {_subdomains(count)}, about {2 * n} degrees of freedom"
+            for rank, (count, n) in enumerate(zip(subdomains, nodes, strict=True))
+        ),
+        *cost_model.estimate_lines(cost, len(loads), summary.across),
+        *_path_lines(case, summary, multipliers, nodes, cost, columns),
+        *_field_lines(case, sum(nodes), elements, multipliers // 2, len(loads)),
+        *(f"warning    {warning}" for warning in (*case.warnings(), *summary.warnings(), *unresolved)),
+        *(f"remark     {remark}" for remark in (*case.remarks(), *summary.remarks)),
+        "the case is valid",
+    ]
+    return "\n".join(lines)
+
+
+def _path_lines(
+    case: Case, summary: CellSummary, multipliers: int, nodes: Sequence[int], cost: cost_model.Estimate, columns: int
+) -> list[str]:
+    """Return the lines about the events of a path; none of another analysis, or of a cell without interfaces."""
+    teeth, memory = teeth_of(case), cost_model.memory_to_the_end(cost, columns, len(nodes))
+    lines = cost_model.events_lines(case, multipliers, summary.fibres, teeth, nodes, cost.seconds, memory)
+    if not lines or case.path is None:
+        return []
+    events = case.path.increments or multipliers // 2 * teeth
+    return [*lines, cost_model.checkpoint_line(checkpoint.bytes_at_most(case, multipliers, events))]
+
+
+def _field_lines(case: Case, nodes: int, elements: int, interface_nodes: int, ranks: int) -> list[str]:
+    return [cost_model.fields_line(case, nodes, elements, interface_nodes, ranks)] if case.output.fields else []
+
+
+def _applications(case: Case, easy: bool) -> dict[int, int]:
+    """Return the number of applications of each problem's dual operator, by its displacements of a node."""
+    return {p.components: cost_model.applications(case, p, easy) for p in phase_laws.problems(case)}
+
+
+def _subdomains(count: int) -> str:
+    return "1 subdomain" if count == 1 else f"{count} subdomains"
+
+
+def _plan(
+    case: Case, summary: CellSummary, multipliers: int, options: SolverOptions, subdomains: Sequence[int]
+) -> SolverPlan:
+    """Return the plan of the plane problem; pieces are dense by default, and `subdomains` are those of each rank.
+
+    Raises:
+        CaseError: as `solver_plan.choose`; or with friction there are no influence columns.
+    """
+    dense = options.operator != "implicit"
+    has_thin = COATING in case.materials and not summary.across
+    one_each = summary.across and len(subdomains) > 1 and set(subdomains) == {1}
+    applications = max(_applications(case, summary.across).values())
+    sizes = ProblemSizes(applications, summary.is_cut, dense, dense, multipliers, has_thin, one_each)
+    plan = solver_plan.choose(sizes, options)
+    if case.has_friction and plan.preconditioner != "influence":
+        raise CaseError(solver_plan.WITHOUT_INVERSE)
+    return plan
+
+
+def _fibre_lines(case: Case, summary: CellSummary) -> Iterator[str]:
+    """Yield numbers and sizes of fibres: of interfaces or a table, of the phases of a mix, of a match."""
+    if case.interface is not None or case.cell.table is not None:
+        frames, sizes = summary.frames[summary.fibre_bodies], ""
+        is_hollow = case.cell.table is not None and bool((case.cell.table.inner_radius > 0).any())
+        if len(frames) and np.isfinite(frames).all() and not is_hollow:  # polygons have none
+            radii = np.sqrt(np.abs(np.linalg.det(frames)))
+            fraction = np.pi * (radii**2).sum() / (summary.width * summary.height)
+            sizes = f", mean radius {radii.mean():.4g}, fraction {fraction:.4f}"
+        yield f"fibres     {summary.fibres}, numbered from 1{sizes}"
+    if case.cell.mix is not None:
+        phase, radii = summary.constituent_phase[summary.is_fibre], summary.radii[summary.is_fibre]
+        mixed = [(name, radii[phase == k]) for k, name in enumerate(summary.phases) if name in case.cell.mix]
+        yield f"mix        {', '.join(f'{len(r)} of {name}, mean radius {r.mean():.6g}' for name, r in mixed)}"
+    if case.cell.match is not None:
+        distance = "mean diameters, the distance of the distributions of nearest and second neighbours"
+        yield f"match      {case.cell.match.name}, to {summary.match_distance:.4f} {distance}"
+
+
+def of_document(document: dict[str, Any], folder: Path, comm: Intracomm) -> str:
+    """Describe the run: the case, or the cases of a sweep and the first one; empty except on rank 0.  Collective.
+
+    Raises:
+        CaseError, MeshError: the document is faulty, or the cell of its first case.
+    """
+    if SWEEP not in document:
+        return describe(on_root(comm, cases.parse, document, folder), comm)
+    sweep = on_root(comm, sweep_cases.expand, document, folder)
+    points = len({entry.point for entry in sweep.entries})
+    heading = f"sweep      {len(sweep.cases)} cases, {points} points, all of them valid; the first:"
+    return first_of(sweep, heading, comm)
+
+
+def first_of(sweep: Sweep, heading: str, comm: Intracomm) -> str:
+    """Return a heading and the description of the first case.  Collective.  Raises as `describe`."""
+    check_options(sweep)
+    text = describe(sweep.cases[0], comm)
+    return f"{heading}\n{text}" if comm.rank == 0 else ""
+
+
+def check_options(sweep: Sweep) -> None:
+    """Raise CaseError with the faults of the options of all cases, each with the cases that have it."""
+    numbers_by_options = dict[str, list[int]]()
+    for entry, case in zip(sweep.entries, sweep.cases, strict=True):
+        numbers_by_options.setdefault(json.dumps(case.petsc, sort_keys=True), []).append(entry.number)
+    faults = []
+    for options, numbers in numbers_by_options.items():
+        try:
+            with case_options(json.loads(options)):
+                pass
+        except CaseError as error:
+            faults += [f"{case_names(numbers)}: {fault}" for fault in error.faults]
+    if faults:
+        raise CaseError(*faults)

@@ -1,0 +1,221 @@
+"""A fit: unknown constants of cases by measured values; each evaluation is a sweep of its tests, in its own folder.
+
+DIR/evaluation-0001           as of a sweep: a case for each test
+DIR/differences-0001          cases at values beside an evaluation, where no derivative is exact
+DIR/fit.json, measured.csv, fit.png
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from feti_homog.case.document import TomlPath
+from feti_homog.case.sections import MEASURED, UNKNOWN, Unknown
+from feti_homog.materials.constants import axes_line
+from feti_homog.materials.voigt import PLANE_STATES
+from feti_homog.results import atomic
+from feti_homog.studies import estimation, fit_result
+from feti_homog.studies.axes import Assignment
+from feti_homog.studies.estimation import Estimates
+from feti_homog.studies.predictions import Datum, exact_derivatives, predicted
+from feti_homog.studies.study import SILENT, Evaluator, Study
+from feti_homog.studies.sweep_cases import Sweep, cases_at
+from feti_homog.system.parallel.mpi_errors import on_root, on_root_only
+from feti_homog.system.runtime.standard_streams import say
+from feti_homog.typing import Float
+
+DIGITS = 12  # of a value of an unknown, so that a repeated fit makes the same cases
+DIFFERENCE = 0.01  # of a value, or of the width of its bounds where it is 0: meshes differ on both sides
+Point = tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Fit(Study):
+    """A fit.
+
+    Attributes:
+        unknowns: by dotted key.
+        paths: keys of the unknowns.
+        tests: changes of the document by each test.
+        data: measured values, test after test.
+    """
+
+    KIND, FILE = "fit", "fit.json"
+    ENTRIES = re.compile(r"fit\.(json|png)|measured\.csv|(evaluation|differences)-\d{4,}")
+
+    unknowns: Mapping[str, Unknown]
+    paths: Sequence[TomlPath]
+    tests: Sequence[Assignment]
+    data: Sequence[Datum]
+
+    def at(self, x: Sequence[float]) -> Sweep:
+        """Return the cases of all tests where the unknowns are x (n,). Raises CaseError as `cases`."""
+        return self.cases([(test, x) for test in range(len(self.tests))])
+
+    def cases(self, places: Sequence[tuple[int, Sequence[float]]]) -> Sweep:
+        """Return the cases of tests at values of the unknowns.
+
+        Raises:
+            CaseError: with the faults of all of them.
+        """
+        points = [self.tests[test] | dict(zip(self.paths, _rounded(x), strict=True)) for test, x in places]
+        return cases_at(self.document, points, self.folder, section=UNKNOWN, complete=_set_output)
+
+    def first_cases(self) -> Sweep:
+        return self.at([unknown.start for unknown in self.unknowns.values()])
+
+    def data_of(self, test: int) -> list[Datum]:
+        """Return the data of a test."""
+        return [datum for datum in self.data if datum.test == test]
+
+    def rows_of(self, test: int) -> slice:
+        """Return the place of the data of a test among all."""
+        first = next(k for k, datum in enumerate(self.data) if datum.test == test)
+        return slice(first, first + len(self.data_of(test)))
+
+    def axes(self) -> str:
+        """Return the axes of measured values that could be of a ply, in a line; empty without any."""
+        cases = self.first_cases().cases
+        spatial = [datum for datum in self.data if PLANE_STATES[cases[datum.test].analysis.plane].is_spatial]
+        line = axes_line(name for datum in spatial for name in (datum.name, datum.strain_name))
+        return f"[{MEASURED}] {line}" if line else ""
+
+    def identity(self, cases: list[str]) -> Any:
+        unknowns = {name: asdict(unknown) for name, unknown in self.unknowns.items()}
+        return {"cases": cases, "unknowns": unknowns, "data": [asdict(datum) for datum in self.data]}
+
+    def heading(self) -> str:
+        remark = f"remark     {axes}\n" if (axes := self.axes()) else ""
+        counts = f"{len(self.unknowns)} unknowns, {len(self.data)} measured values of {len(self.tests)} tests"
+        return f"{remark}fit        {counts}; the first at the start:"
+
+    def answer(self, evaluator: Evaluator) -> dict[str, Any]:
+        if evaluator.comm.rank == 0 and not evaluator.quiet and (line := self.axes()):
+            say(f"remark: {line}")
+        estimates = Evaluations(self, evaluator).estimate()
+        return on_root(evaluator.comm, self._write, evaluator.directory, estimates)
+
+    def text(self, document: Mapping[str, Any]) -> str:
+        return fit_result.text(document)
+
+    def _write(self, directory: Path, estimates: Estimates) -> dict[str, Any]:
+        """Write measured.csv and fit.png, and return the content of fit.json.  On one rank."""
+        from feti_homog.studies import pictures  # only a rank that draws loads Matplotlib
+
+        document = {"name": self.name, **fit_result.content(self.unknowns, self.data, estimates)}
+        atomic.replace_text(directory / "measured.csv", fit_result.measured_csv(document))
+        pictures.draw_fit(directory / "fit.png", document)
+        return document
+
+
+def _set_output(document: dict[str, Any]) -> None:
+    """Let a case write its numbers alone, and a stiffness its derivatives unless debonded faces may touch."""
+    analysis, output = document.get("analysis"), document.get("output", {})
+    if isinstance(output, dict):
+        is_stiffness = isinstance(analysis, dict) and analysis.get("type") == "stiffness"
+        has_derivatives = is_stiffness and not _may_touch(document)
+        document["output"] = {"mesh_error": False} | output | SILENT | {"sensitivities": has_derivatives}
+
+
+def _may_touch(document: Mapping[str, Any]) -> bool:
+    """Return whether faces in contact may be debonded from the start: arcs, or lines of a user's mesh."""
+    cell, sections = document.get("cell"), document.get("interface", [])
+    is_mesh = isinstance(cell, dict) and cell.get("geometry") == "mesh"
+    tables = [table for table in (sections if isinstance(sections, list) else [sections]) if isinstance(table, dict)]
+    return any(table.get("contact") is not False for table in tables if is_mesh or table.get("debonded"))
+
+
+def _rounded(x: Sequence[float] | Float) -> Point:
+    """Return x to the digits of its cases."""
+    return tuple(float(f"{value:.{DIGITS}g}") for value in x)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The content of result.json of a test, and its values (m,) in place of the data of the test."""
+
+    document: Mapping[str, Any]
+    values: Float
+
+
+@dataclass
+class Evaluations:
+    """Values of the data and their derivatives at values of the unknowns; rank 0 asks, all ranks compute.
+
+    Attributes:
+        answers: on rank 0 the results of all tests by the values of the unknowns, in the order of the evaluations.
+    """
+
+    fit: Fit
+    evaluator: Evaluator
+    answers: dict[Point, list[Answer]] = field(default_factory=dict)
+
+    def estimate(self) -> Estimates | None:
+        """Return the estimates on rank 0.  Collective: the other ranks serve its questions."""
+        comm = self.evaluator.comm
+        if comm.rank:
+            while (question := comm.bcast(None)) is not None:
+                self._run(*question)
+            return None
+        unknowns = [*self.fit.unknowns.values()]
+        y, std = (np.array([getattr(datum, name) for datum in self.fit.data]) for name in ("value", "std"))
+        start, *bounds = (np.array([getattr(u, name) for u in unknowns]) for name in ("start", "lower", "upper"))
+        estimates = estimation.estimate(self.values, self.jacobian, (y, std), start, (bounds[0], bounds[1]))
+        comm.bcast(None)
+        return estimates
+
+    def values(self, x: Float) -> Float:
+        """(m,) values of the data where the unknowns are x (n,).  On rank 0."""
+        key = _rounded(x)
+        if key not in self.answers:
+            number = len(self.answers) + 1
+            self.answers[key] = self._ask(f"evaluation-{number:04d}", [(t, key) for t in range(len(self.fit.tests))])
+            if not self.evaluator.quiet:
+                pairs = zip(self.fit.unknowns, key, strict=True)
+                say(f"evaluation {number}: {', '.join(f'{name} = {value:.6g}' for name, value in pairs)}")
+        return np.concatenate([answer.values for answer in self.answers[key]])
+
+    def jacobian(self, x: Float) -> Float:
+        """(m, n) derivatives of the values: exact, or differences where a result has none.  On rank 0."""
+        key, names = _rounded(x), [*self.fit.unknowns]
+        J = np.zeros((len(self.values(x)), len(key)))
+        missing = list[tuple[int, int]]()
+        for (test, answer), (k, name) in product(enumerate(self.answers[key]), enumerate(names)):
+            column = exact_derivatives(answer.document, self.fit.data_of(test), name)
+            if column is None:
+                missing.append((test, k))
+            else:
+                J[self.fit.rows_of(test), k] = column
+        if missing:
+            places = [(test, side) for test, k in missing for side in self._sides(key, k)]
+            answers = self._ask(f"differences-{[*self.answers].index(key) + 1:04d}", places)
+            for n, (test, k) in enumerate(missing):
+                (below, above), ((_, low), (_, high)) = answers[2 * n : 2 * n + 2], places[2 * n : 2 * n + 2]
+                J[self.fit.rows_of(test), k] = (above.values - below.values) / (high[k] - low[k])
+        return J
+
+    def _sides(self, key: Point, k: int) -> list[Point]:
+        """Return x with its k-th value less and more, within its bounds."""
+        unknown = [*self.fit.unknowns.values()][k]
+        step = DIFFERENCE * (abs(key[k]) or unknown.upper - unknown.lower)
+        ends = max(key[k] - step, unknown.lower), min(key[k] + step, unknown.upper)
+        return [_rounded([*key[:k], end, *key[k + 1 :]]) for end in ends]
+
+    def _ask(self, name: str, places: Sequence[tuple[int, Point]]) -> list[Answer]:
+        self.evaluator.comm.bcast((name, places))
+        return self._run(name, places)
+
+    def _run(self, name: str, places: Sequence[tuple[int, Point]]) -> list[Answer]:
+        """Run the cases of tests at values of the unknowns; returns their results on rank 0.  Collective."""
+        comm = self.evaluator.comm
+        documents = self.evaluator.results(name, on_root(comm, self.fit.cases, places))
+        data = [self.fit.data_of(test) for test, _ in places]
+        pairs = zip(documents, data, strict=False)  # other ranks have no results
+        return on_root_only(comm, lambda: [Answer(result, predicted(result, y)) for result, y in pairs]) or []

@@ -1,0 +1,249 @@
+"""A fit file: cases with unknown constants, and measured values; all their faults."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from feti_homog.case.case import Case
+from feti_homog.case.document import TomlPath, leaves, read_document, to_document
+from feti_homog.case.loads import TEMPERATURE
+from feti_homog.case.sections import CURVE, MEASURED, SWEEP, TEST, UNKNOWN, Measured, MeasuredCurve, Unknown
+from feti_homog.errors import CaseError
+from feti_homog.materials.constants import FORMER
+from feti_homog.materials.voigt import PLANE_STATES, SPATIAL_STRAINS, SPATIAL_STRESSES, voigt_names
+from feti_homog.microstructure.table_columns import cells_of, delimiter_of, lines_of, number_of, row_fault
+from feti_homog.results.path_curves import SAME_LOAD
+from feti_homog.schema.keys import TableReader, keys_of
+from feti_homog.schema.values import is_number
+from feti_homog.schema.wording import dotted_key, suggestion, toml_key, toml_value
+from feti_homog.studies.axes import Assignment
+from feti_homog.studies.fit import Fit
+from feti_homog.studies.predictions import Datum, available
+
+MOST_ROWS = 10_000
+LEAST_STD = 1e-12  # of the value: below it are the roundings of what is computed
+
+
+def load(path: Path) -> Fit:
+    """Return the fit in a file. Raises CaseError with all faults of its tables, or else of its cases."""
+    return parse(read_document(path), path.parent)
+
+
+def parse(values: Mapping[str, Any], folder: Path) -> Fit:
+    """Return the fit of nested dictionaries; its files are relative to `folder`. Raises CaseError as `load`."""
+    document = {"name": "fit", **to_document(values)}
+    reader = FitReader(folder)
+    unknowns = reader.unknowns(document.pop(UNKNOWN, None))
+    measured, tests = document.pop(MEASURED, None), document.pop(TEST, None)
+    if SWEEP in document:
+        reader.faults.append(f"[{SWEEP}]: a fit has no sweep; expected [[{TEST}]] for each test")
+    assignments, data = reader.tests(measured, tests, {*unknowns})
+    if unknowns and len(data) < len(unknowns) and not reader.faults:
+        reader.faults.append(
+            f"[{UNKNOWN}]: {len(unknowns)} unknowns, {len(data)} measured values; expected at least as many values"
+        )
+    if reader.faults:
+        raise CaseError(*reader.faults)
+    named = {".".join(path): unknown for path, unknown in unknowns.items()}
+    fit = Fit(document, folder, named, [*unknowns], assignments, data)
+    faults = [*_case_faults(fit)]
+    if faults:
+        raise CaseError(*dict.fromkeys(faults))
+    return fit
+
+
+@dataclass
+class FitReader:
+    """Reads the tables of a fit and gathers their faults, a line each."""
+
+    folder: Path
+    faults: list[str] = field(default_factory=list)
+
+    def unknowns(self, table: object) -> dict[TomlPath, Unknown]:
+        """Return the unknowns by key."""
+        if not isinstance(table, dict) or not table:
+            self.faults.append(f"[{UNKNOWN}]: expected a table of SECTION.KEY = {{start, lower, upper}}")
+            return {}
+        unknowns = {}
+        for path, value in _entries(table, keys_of(Unknown)):
+            name = dotted_key(path)
+            unknown = self._read(Unknown, value, UNKNOWN, name, "{start, lower, upper}")
+            if unknown is not None:
+                unknowns[path] = unknown
+                if not unknown.lower < unknown.upper or not unknown.lower <= unknown.start <= unknown.upper:
+                    bounds = f"lower = {unknown.lower:g}, start = {unknown.start:g}, upper = {unknown.upper:g}"
+                    self.faults.append(f"[{UNKNOWN}] {name}: {bounds}: expected lower <= start <= upper, lower < upper")
+        return unknowns
+
+    def tests(self, measured: object, tests: object, unknowns: set[TomlPath]) -> tuple[list[Assignment], list[Datum]]:
+        """Return the changes of each test and the data of all."""
+        if (measured is None) == (tests is None):
+            self.faults.append(f"expected [{MEASURED}] for one test or [[{TEST}]] for each of several, with measured")
+            return [], []
+        rows = [{MEASURED: measured}] if tests is None else tests
+        if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
+            self.faults.append(f"{TEST} = {toml_value(rows)}: expected sections [[{TEST}]]")
+            return [], []
+        assignments, data = list[Assignment](), list[Datum]()
+        for number, row in enumerate(rows):
+            place = MEASURED if tests is None else f"[{TEST}]] {number + 1}, [{MEASURED}"
+            data += self._data(row.get(MEASURED), number, place)
+            changes = dict(leaves({name: value for name, value in row.items() if name != MEASURED}))
+            assignments.append(changes)
+            for path in changes.keys() & unknowns:
+                self.faults.append(f"[[{TEST}]] {number + 1}, {dotted_key(path)}: it is an unknown of [{UNKNOWN}]")
+        return assignments, data
+
+    def _data(self, table: object, test: int, place: str) -> list[Datum]:
+        """Return the data of one test."""
+        if not isinstance(table, dict) or not table:
+            self.faults.append(f"[{place}]: expected a table of NAME = {{value, std}}")
+            return []
+        data = list[Datum]()
+        for path, value in _entries(table, {*keys_of(Measured), *keys_of(MeasuredCurve)}):
+            name = ".".join(path)
+            if path == (CURVE,):
+                data += self._curve(value, test, place)
+            elif (measured := self._read(Measured, value, place, name, "{value, std}")) is not None:
+                data.append(Datum(test, name, measured.value, measured.std))
+                self._check_std(measured.std, measured.value, f"[{place}] {name}.std")
+        return data
+
+    def _check_std(self, std: float, value: float, place: str) -> None:
+        if std < LEAST_STD * abs(value):
+            self.faults.append(f"{place} = {toml_value(std)}: expected at least {LEAST_STD:g} of {value:g}")
+
+    def _curve(self, value: object, test: int, place: str) -> list[Datum]:
+        """Return the points of a measured curve."""
+        measured = self._read(MeasuredCurve, value, place, CURVE, "{file, std}")
+        if measured is None:
+            return []
+        path = self.folder / measured.file
+        try:
+            names, rows = _curve_rows(path)
+        except CaseError as error:
+            reason = error.__cause__.strerror if isinstance(error.__cause__, OSError) else error
+            self.faults.append(f"[{place}] {CURVE}.file = {toml_value(str(measured.file))}: {reason}")
+            return []
+        self._check_std(measured.std, max((stress for _, stress in rows), key=abs), f"[{place}] {CURVE}.std")
+        return [Datum(test, names[1], stress, measured.std, strain, names[0]) for strain, stress in rows]
+
+    def _read(self, kind: type[Any], value: object, section: str, name: str, form: str) -> Any:
+        """Return the dataclass of a table named `name`, None if it is faulty."""
+        if not isinstance(value, dict):
+            self.faults.append(f"[{section}] {name} = {toml_value(value)}: expected a table {form}")
+            return None
+        reader = TableReader()
+        contents = reader.read(kind, value, section, f"{name}.")
+        self.faults += reader.faults
+        return contents
+
+
+def _entries(table: Mapping[str, Any], keys: Collection[str]) -> Iterator[tuple[TomlPath, Any]]:
+    """Yield the paths and values of a nested table; a table with one of the keys is a value."""
+    return leaves(table, lambda path, value: bool(value.keys() & {*keys}))
+
+
+def _curve_rows(path: Path) -> tuple[tuple[str, str], list[tuple[float, float]]]:
+    """Return the names of strain and stress, and the rows, of a table of a curve. Raises CaseError."""
+    lines = [(number, line) for number, line, _ in lines_of(path) if line]
+    head = lines[0][1] if lines else ""
+    delimiter = delimiter_of(head)
+    heads = cells_of(head, delimiter)
+    names = SPATIAL_STRAINS, SPATIAL_STRESSES
+    strains, stresses = ([k for k, head in enumerate(heads) if head in kind] for kind in names)
+    if (len(strains), len(stresses)) != (1, 1):
+        raise CaseError(f"{path}: expected one column of a strain, as E11, and one of a stress, as S11")
+    if not 1 < len(lines) <= MOST_ROWS + 1:
+        raise CaseError(f"{path}: {len(lines) - 1} rows; expected at least one and at most {MOST_ROWS}")
+    rows = list[tuple[float, float]]()
+    for number, line in lines[1:]:
+        cells, place = cells_of(line, delimiter), f"{path}, line {number}"
+        if fault := row_fault(line, cells, len(heads)):
+            raise CaseError(f"{place}: {fault}")
+        strain, stress = (_number(cells[k], delimiter, f"{place}: {heads[k]}") for k in strains + stresses)
+        rows.append((strain, stress))
+    return (heads[strains[0]], heads[stresses[0]]), rows
+
+
+def _number(word: str, delimiter: str | None, place: str) -> float:
+    """Return the number in a cell. Raises CaseError."""
+    value = number_of(word, delimiter)
+    if value is None or not is_number(value):
+        raise CaseError(f"{place} = {toml_value(word)}: expected a number")
+    return value
+
+
+def _case_faults(fit: Fit) -> Iterator[str]:
+    """Yield faults of the cases at the start and at the bounds, and of the names of the data."""
+    start = [unknown.start for unknown in fit.unknowns.values()]
+    cases = fit.at(start).cases
+    for test, case in enumerate(cases):
+        place = f"[[{TEST}]] {test + 1}, {MEASURED}." if len(cases) > 1 else f"[{MEASURED}] "
+        yield from _name_faults(place, case, fit.data_of(test))
+    digests = [case.digest() for case in cases]
+    for k, (name, unknown) in enumerate(fit.unknowns.items()):
+        ends = {"lower": unknown.lower, "upper": unknown.upper}
+        lines, changes = list[str](), False
+        for side, end in ends.items():
+            try:
+                changes |= [case.digest() for case in fit.at([*start[:k], end, *start[k + 1 :]]).cases] != digests
+            except CaseError as error:
+                lines += [f"[{UNKNOWN}] {name}, {side} = {end}: {fault}" for fault in error.faults]
+        yield from lines if changes or lines else [f"[{UNKNOWN}] {name}: no measured value depends on it"]
+
+
+def _name_faults(place: str, case: Case, data: Sequence[Datum]) -> Iterator[str]:
+    """Yield names that the analysis of a test does not give."""
+    names = available(case)
+    if not names:
+        yield f'[analysis] type = "{case.analysis.type}": a fit takes "stiffness" and "path"'
+        return
+    yield from _curve_faults(f"{place}{CURVE}: ", case, [datum for datum in data if datum.strain is not None])
+    for name in dict.fromkeys(datum.name for datum in data if datum.strain is None):
+        if name in FORMER:
+            yield f"{place}{toml_key(name)}: its name is {FORMER[name]}"
+        elif name not in names:
+            yield f"{place}{toml_key(name)}: the analysis does not give it; {suggestion(name, names, {})}"
+
+
+def _curve_faults(place: str, case: Case, points: Sequence[Datum]) -> Iterator[str]:
+    """Yield faults of the points of a measured curve beside the analysis of its test."""
+    if not points:
+        return
+    state = PLANE_STATES[case.analysis.plane]
+    names = voigt_names(6 if state.is_spatial else 3)
+    unknown = sorted({name for datum in points for name in (datum.strain_name, datum.name)}.difference(*names))
+    for name in unknown:
+        yield f'{place}plane = "{case.analysis.plane}" has no {name}'
+    if case.analysis.type != "path" or len(case.targets) != 1:
+        yield f"{place}expected an analysis of type path, of one leg"
+    elif not unknown and (leading := _rising(case.targets[0], state.components)) is not None:
+        yield from (f"{place}{fault}" for fault in _strain_faults(points, *leading))
+
+
+def _strain_faults(points: Sequence[Datum], rising: str, end: float, is_strain: bool) -> Iterator[str]:
+    """Yield faults of a curve's strains beside the results of `_rising`."""
+    strains = [datum.strain or 0.0 for datum in points]
+    if rising != points[0].strain_name:
+        yield f"expected the strain that rises along the path, {rising}"
+    elif any(strain * end < 0 for strain in strains):
+        yield f"expected strains of the sign of the path, which ends at {end:g}"
+    elif is_strain and (largest := max(map(abs, strains))) > abs(end) * (1 + SAME_LOAD):
+        yield f"a strain of {largest:g} is beyond the end of the path at {abs(end):g}"
+
+
+def _rising(target: Mapping[str, float], components: Sequence[tuple[str, str]]) -> tuple[str, float, bool] | None:
+    """Return the strain that leads along one leg, the load of its component, and whether that load is the strain.
+
+    The load is 0 where a temperature beside it decides the sign; None if the strain follows from the answer alone.
+    """
+    loads = [(strain, name, target[name]) for strain, stress in components for name in (strain, stress)
+             if target.get(name)]  # fmt: skip
+    if loads and all(name == strain for strain, name, _ in loads):
+        strain, _, end = max(loads, key=lambda load: abs(load[2]))
+        return strain, end, True
+    return (loads[0][0], 0.0 if target.get(TEMPERATURE) else loads[0][2], False) if len(loads) == 1 else None

@@ -1,0 +1,227 @@
+"""Outputs of a case: numbers of its result.json by the columns of cases.csv; the meaning of all columns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from feti_homog.materials.constants import EngineeringConstants, Moduli, TransverseIsotropy
+from feti_homog.materials.voigt import (
+    EXPANSIONS,
+    GENERALIZED,
+    PLANE_STRAIN,
+    SPATIAL_STRESSES,
+    STRESSES,
+    THERMAL_STRESSES,
+    voigt_names,
+)
+from feti_homog.report.text import point_tables
+from feti_homog.results.landmarks import peak_of
+from feti_homog.results.result_json import DescribedColumn as Column
+from feti_homog.results.result_json import columns
+from feti_homog.system.runtime.records import STRESS
+from feti_homog.typing import Document
+
+PHASES_OF_ONE_FIBRE = 2
+
+
+def numbers(planes: Iterable[str | None]) -> tuple[int, ...]:
+    """Numbers i and j in the names Cij of a sweep over these plane states.
+
+    Where some cases are in space, Cij is the same entry of all.
+    """
+    return (GENERALIZED if GENERALIZED.name in planes else PLANE_STRAIN).numbers
+
+
+def outputs(document: Document, numbers: Sequence[int] = PLANE_STRAIN.numbers) -> dict[str, float]:
+    """Return the numbers of a result.json by the names of the table's columns.
+
+    `numbers` of strains in the plane, in names.
+    """
+    solver = document["solver"]
+    values = _cell(document["cell"])
+    values |= {name: solver[name] for name in ("ranks", "subdomains", "dofs", "multipliers")}
+    values |= {"iterations": sum(solver["iterations"])} | _constants(document, numbers)
+    for point in document.get("angle", ()):
+        entries = _entries(point["stiffness"], numbers) if "stiffness" in point else _named(STRESSES, point["stress"])
+        values |= {f"angle_{point['angle']:g}_{name}": value for name, value in entries.items()}
+    values |= _path(document) | _envelope(document)
+    if (load := document.get("load")) is not None:
+        values |= _at_point("load", load) | {f"load_{name}": load[name] for name in ("stored", *point_tables.STATES)}
+    values |= {f"check_{name}": error for name, error in document["checks"].items()}
+    values |= {f"seconds_{stage}": seconds for stage, seconds in document["timings"].items()}
+    return {name: float(value) for name, value in (values | {"memory": document["memory"]}).items()}
+
+
+def _cell(cell: Mapping[str, Any]) -> dict[str, float]:
+    """Return the numbers of the mesh."""
+    values = {"fraction_meshed": cell["fibre_fraction"], "elements": cell["elements"], "nodes": cell["nodes"]}
+    fractions = cell.get("fractions", {})
+    if len(fractions) > PHASES_OF_ONE_FIBRE:
+        values |= {f"fraction_{phase}": share for phase, share in fractions.items()}
+    if cell.get("porosity"):
+        values["porosity"] = cell["porosity"]
+    return values | {name: cell[name] for name in ("refine", "match_distance") if name in cell}
+
+
+def _constants(document: Document, numbers: Sequence[int]) -> dict[str, float]:
+    """Return stiffnesses and constants, their estimated errors, and bounds."""
+    values = _linear(document, numbers)
+    if (stiffness := document.get("effective_stiffness")) is not None:
+        C = np.asarray(stiffness)
+        values["anisotropy_normal"] = C[0, 0] - C[1, 1]
+        values["anisotropy_shear"] = C[-1, -1] - (C[0, 0] + C[1, 1] - 2 * C[0, 1]) / 4
+    for section in ("moduli", "constants", "transversely_isotropic"):
+        values |= {name: value for name, value in document.get(section, {}).items() if value is not None}
+    if errors := document.get("mesh_error", {}):
+        known = _linear(errors, numbers) | errors.get("constants", {})
+        values |= {f"{name}_mesh_error": error for name, error in known.items() if name in values}
+        values["energy_mesh_error"] = errors["energy"]
+    return values | _bounds(document.get("bounds") or {}, numbers)
+
+
+def _linear(section: Document, numbers: Sequence[int]) -> dict[str, float]:
+    """Return stiffness, thermal stress and expansion in a section, of a result or its mesh errors."""
+    values = _entries(section.get("effective_stiffness", ()), numbers)
+    values |= _entries(section.get("effective_stiffness_compression", ()), numbers, "_compression")
+    values |= _named(THERMAL_STRESSES, section.get("thermal_stress", ()))
+    return values | _named(EXPANSIONS, section.get("thermal_expansion", ()))
+
+
+def _named(names: Iterable[str], values: Iterable[float]) -> dict[str, float]:
+    return dict(zip(names, values, strict=False))
+
+
+def _entries(stiffness: Any, numbers: Sequence[int], suffix: str = "") -> dict[str, float]:
+    """C11, C12, ... of a stiffness (6, 6), or (3, 3) with the `numbers`; none of an empty one."""
+    rows = range(1, 7) if len(stiffness) == len(SPATIAL_STRESSES) else numbers
+    return _named((f"C{i}{j}{suffix}" for i in rows for j in rows), np.ravel(stiffness).tolist())
+
+
+def _bounds(bounds: Document, numbers: Sequence[int]) -> dict[str, float]:
+    sides = {
+        f"C{i}{i}_{side}": bounds[side][k][k] for side in ("reuss", "voigt") if bounds for k, i in enumerate(numbers)
+    }
+    for modulus, pair in (bounds.get("hashin_shtrikman") or {}).items():
+        sides |= {f"{modulus}_lower": pair[0], f"{modulus}_upper": pair[1]}
+    return sides
+
+
+def _path(document: Document) -> dict[str, float]:
+    """Return the first break or softening if any, the largest stresses, the leading strain at the peak, and the end."""
+    points = document.get("path")
+    if not points:
+        return {}
+    stress = np.array([point["stress"] for point in points])
+    stresses = voigt_names(stress.shape[1])[1]
+    peak = stress[np.abs(stress).argmax(axis=0), range(len(stresses))]
+    onset = next((point for point in points if point["broke"] or point.get("softened")), None)
+    values = {} if onset is None else {"onset_load_factor": onset["load_factor"]} | _at_point("onset", onset)
+    values |= _at_point("end", points[-1])
+    values |= {name: points[-1][name] for name in ("dissipated", "work")}
+    values |= {f"peak_{name}": value for name, value in zip(stresses, peak.tolist(), strict=True)}
+    summit = peak_of(document)
+    values |= {f"peak_{summit[f'{kind}_name']}": summit[kind] for kind in ("stress", "strain")}
+    return values | {f"end_{state}": points[-1][state] for state in point_tables.STATES}
+
+
+def _envelope(document: Document) -> dict[str, float]:
+    """Return loads at onset of an envelope: along its first axis, least, and largest if every direction has one."""
+    points = document.get("envelope")
+    if not points:
+        return {}
+    first, second = document["case"]["envelope"]["plane"]
+    factors = sorted(point["factor"] for point in points if "factor" in point)
+    values = {f"envelope_{first}": point["factor"] for point in points[:1] if "factor" in point}
+    values |= {f"envelope_least_{first}_{second}": factors[0]} if factors else {}
+    is_closed = len(factors) == len(points)
+    return values | ({f"envelope_largest_{first}_{second}": factors[-1]} if is_closed else {})
+
+
+def _at_point(place: str, point: Document) -> dict[str, float]:
+    names = zip(voigt_names(len(point["strain"])), (point["strain"], point["stress"]), strict=True)
+    return {f"{place}_{name}": value for keys, values in names for name, value in zip(keys, values, strict=True)}
+
+
+CASE_COLUMNS = (
+    Column("case", "", "number of the case, from 1"),
+    Column("folder", "", "folder of the case, below the folder of the sweep"),
+    Column("point", "", "number of the point, from 1"),
+    Column("realisation", "", "number of the realisation of the point, from 1"),
+    Column("status", "", "`done`, `not converged`, `failed`, `damaged`, `running` or `waiting`"),
+    Column("reason", "", "why there is no result"),
+)
+INPUT_COLUMNS = (Column("SECTION.KEY", "that of the key", "value of a key that varies"),)
+MODULI = {column.name for column in columns(Moduli)}
+OUTPUT_COLUMNS = (
+    Column("fraction_meshed", "", "share of all fibres in the meshed area"),
+    Column("fraction_PHASE", "", "share of a phase in the meshed area, if there are more than matrix and fibre"),
+    Column("porosity", "", "share of voids in the area of the cell, where there are some"),
+    Column("match_distance", "", "of cells with `match`: how far they are from the table, in mean diameters"),
+    Column("refine", "", "halvings of the mesh, of one that is solved once more those of its finer mesh"),
+    Column("elements", "", "triangles of the refined mesh"),
+    Column("nodes", "", "nodes of the refined mesh, once for each body in each subdomain: depends on ranks"),
+    Column("ranks", "", "MPI ranks"),
+    Column("subdomains", "", "subdomains that the bodies are cut into"),
+    Column("dofs", "", "degrees of freedom of all subdomains"),
+    Column("multipliers", "", "Lagrange multipliers of the dual problem"),
+    Column("iterations", "", "Krylov iterations of all states"),
+    Column("Cij", STRESS, "entry of L^ef; beside generalized plane strain C66 is the shear modulus of all"),
+    Column("Cij_compression", STRESS, "the same under minus the unit strains, with contact"),
+    Column("thermal_Sij", f"{STRESS} per unit of temperature", "stress per unit of temperature at no strain"),
+    Column("expansion_x1", "1 / temperature", "strain along x1 per unit of temperature at no stress; expansion_x2 too"),
+    Column("expansion_STRAIN", "1 / temperature", "the same of a shear strain"),
+    Column("anisotropy_normal", STRESS, "C11 - C22"),
+    Column("anisotropy_shear", STRESS, "C33 - (C11 + C22 - 2 C12) / 4; with generalized plane strain C66 - ..."),
+    *columns(Moduli),
+    *(column for column in columns(EngineeringConstants) if column.name not in MODULI),
+    *columns(TransverseIsotropy),
+    Column("NAME_mesh_error", "that of NAME", "estimated error of an entry or constant by its mesh"),
+    Column("energy_mesh_error", "", "estimated relative error of the strain energy, the largest under any strain"),
+    Column("Cii_reuss", STRESS, "lower bound of Cii"),
+    Column("Cii_voigt", STRESS, "upper bound of Cii"),
+    Column("bulk_lower", STRESS, "lower bound of bulk, by Hashin and Shtrikman"),
+    Column("bulk_upper", STRESS, "upper bound of bulk, by Hashin and Shtrikman"),
+    Column("shear_lower", STRESS, "lower bound of shear, by Hashin and Shtrikman"),
+    Column("shear_upper", STRESS, "upper bound of shear, by Hashin and Shtrikman"),
+    Column("angle_ANGLE_Cij", STRESS, "entry of L^ef at an opening of that many degrees"),
+    Column("angle_ANGLE_Sij", STRESS, "macroscopic stress at an opening of that many degrees"),
+    Column("onset_load_factor", "", "load factor at which the first bond of a path breaks or softens"),
+    Column("dissipated", STRESS, "energy lost to all breaks of a path, per area of the cell"),
+    Column("work", STRESS, "work of the loads along a path, per area of the cell"),
+    Column("onset_Sij", STRESS, "macroscopic stress where the first bond of a path breaks or softens"),
+    Column("onset_STRAIN", "", "macroscopic strain where the first bond of a path breaks or softens"),
+    Column(
+        "peak_Sij",
+        STRESS,
+        "largest in magnitude of a path, with its sign, also where it ends before it falls; of the leading strain as "
+        "`peak` has it",
+    ),
+    Column("peak_STRAIN", "", "strain at the peak of the stress of the component whose strain leads"),
+    Column("end_Sij", STRESS, "macroscopic stress at the end of a path"),
+    Column("end_STRAIN", "", "macroscopic strain at the end of a path"),
+    Column("end_STATUS", "", "interface nodes that are bonded, open or closed at the end of a path"),
+    Column("load_STRAIN", "", "macroscopic strain under the load of analysis `load`"),
+    Column("load_Sij", STRESS, "macroscopic stress under it"),
+    Column("load_stored", STRESS, "elastic energy stored under it, per area of the cell"),
+    Column("load_STATUS", "", "interface nodes that are bonded, open or closed under it"),
+    Column("envelope_AXIS", "that of the axis", "load at onset along the first axis of an envelope"),
+    Column("envelope_least_AXIS_AXIS", "that of the axes", "least load at onset of all directions"),
+    Column("envelope_largest_AXIS_AXIS", "that of the axes", "largest, if every direction has one"),
+    Column("check_LAW", "", "largest relative error of a law, as in result.json"),
+    Column("seconds_STAGE", "s", "wall time of a stage, the largest over ranks"),
+    Column("memory", "bytes", "peak resident memory, the largest over ranks"),
+)
+COLUMNS = (*CASE_COLUMNS, *INPUT_COLUMNS, *OUTPUT_COLUMNS)
+STATISTICS_COLUMNS = (
+    Column("point", "", "number of the point, from 1"),
+    *INPUT_COLUMNS,
+    Column("output", "", "name of a column of cases.csv"),
+    Column("unit", "", "its unit"),
+    Column("count", "", "finished realisations of the point that have it"),
+    Column("mean", "that of the output", "mean over them"),
+    Column("std", "that of the output", "standard deviation, from two on"),
+    Column("ci95", "that of the output", "half the width of the 95 % confidence interval of the mean"),
+)

@@ -1,0 +1,152 @@
+"""A study: cases that one file describes, their results in a folder, and the document that follows from them.
+
+DIR/NAME.json                 digest of the study from the start, its answer at the end
+DIR/EVALUATION                as of a sweep: a folder for each case
+
+Finished cases are kept, so that the same command resumes.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from feti_homog.case.document import short_digest
+from feti_homog.errors import CaseError, ConvergenceError
+from feti_homog.results import atomic, output_folder, seals
+from feti_homog.studies import case_folders, case_runs, description
+from feti_homog.studies.sweep_cases import Sweep
+from feti_homog.system.parallel.mpi_errors import on_root, on_root_only
+from feti_homog.system.runtime import input_files
+from feti_homog.system.runtime.standard_streams import complain, say
+from feti_homog.version import __version__
+
+if TYPE_CHECKING:
+    from mpi4py.MPI import Intracomm
+
+SILENT = {"fields": False, "pictures": False, "report": False}
+
+
+@dataclass(frozen=True)
+class Evaluator:
+    """Runs cases of a study in folders below its own, as many at once as there are groups of `ranks_per_case` ranks."""
+
+    directory: Path
+    comm: Intracomm
+    ranks_per_case: int
+    retry: bool
+    quiet: bool
+
+    def results(self, name: str, sweep: Sweep) -> list[dict[str, Any]]:
+        """Run the cases of a sweep in folder `name` and return their results on rank 0, none elsewhere.  Collective.
+
+        Raises:
+            ConvergenceError: cases failed.
+        """
+        folder = self.directory / name
+        case_runs.run_all(sweep, folder, self.comm, self.ranks_per_case, self.retry, quiet=True)
+        states = on_root_only(
+            self.comm, lambda: [case_folders.case_state(folder, entry).document or {} for entry in sweep.entries]
+        )
+        return states or []
+
+
+@dataclass(frozen=True)
+class Study(ABC):
+    """A study of a case document, whose files are relative to `folder`."""
+
+    document: Mapping[str, Any]
+    folder: Path
+
+    KIND: ClassVar[str]
+    """Name of such a study in messages."""
+    FILE: ClassVar[str]
+    """Name of its document."""
+    ENTRIES: ClassVar[re.Pattern[str]]
+    """Names of all its files and folders."""
+
+    @property
+    def name(self) -> str:
+        return str(self.document.get("name", self.KIND))
+
+    @abstractmethod
+    def first_cases(self) -> Sweep:
+        """Return the cases that any run of the study computes first."""
+
+    @abstractmethod
+    def identity(self, cases: list[str]) -> Any:
+        """Return the identities of the first cases with all other inputs of the study, in JSON's types."""
+
+    @abstractmethod
+    def heading(self) -> str:
+        """Return the lines of `check` that come before the first case."""
+
+    @abstractmethod
+    def answer(self, evaluator: Evaluator) -> dict[str, Any]:
+        """Compute the document of the study, without its digest, on every rank.  Collective."""
+
+    @abstractmethod
+    def text(self, document: Mapping[str, Any]) -> str:
+        """Return the tables of a finished study."""
+
+    def digest(self) -> str:
+        """Short name of the study: equal for equal cases and inputs."""
+        cases = [entry.identity for entry in self.first_cases().entries]
+        return short_digest(json.dumps(self.identity(cases)).encode())
+
+    def describe(self, comm: Intracomm) -> str:
+        """Describe the study and its first case; empty except on rank 0.  Collective.
+
+        Raises:
+            CaseError, MeshError: the cell of the first case is faulty.
+        """
+        heading = on_root(comm, self.heading)
+        return description.first_of(on_root(comm, self.first_cases), heading, comm)
+
+    def run(self, directory: Path, comm: Intracomm, ranks_per_case: int, retry: bool, quiet: bool) -> dict[str, Any]:
+        """Run the study, or resume it, and return its document on every rank.  Collective.
+
+        Raises:
+            CaseError: the folder has another study or files of others, another run writes there, or a result lacks a
+                value that the study asks for.
+            ConvergenceError: a case failed, or the study has no sound answer; then its files are written.
+        """
+        case_runs.check_groups(comm, ranks_per_case)
+        on_root(comm, output_folder.usable, directory)
+        head = {"version": __version__, "digest": on_root(comm, self.digest)}
+        with output_folder.held(directory, comm, lambda line: complain(line) if comm.rank == 0 else None):
+            on_root(comm, self._begin, directory, head)
+            document = head | self.answer(Evaluator(directory, comm, ranks_per_case, retry, quiet))
+            on_root_only(comm, atomic.replace_text, directory / self.FILE, seals.dumps(document))
+        if comm.rank == 0 and not quiet:
+            say(self.text(document))
+        if document.get("faults"):
+            raise ConvergenceError(*document["faults"])
+        return document
+
+    def _begin(self, directory: Path, head: Mapping[str, Any]) -> None:
+        """Write the study's document with its digest, unless it is there.  On one rank.
+
+        Raises:
+            CaseError: the folder has another study, or files of others under names of this one.
+            FetiHomogError: the document cannot be written.
+        """
+        path = directory / self.FILE
+        if is_new := not path.exists():
+            with atomic.write_errors(directory):
+                case_folders.refuse_files_of_others(directory, self.ENTRIES, self.KIND)
+        else:
+            try:
+                stored = seals.loads(input_files.read(path).decode("utf-8"))
+            except (OSError, ValueError) as error:
+                raise CaseError(f"{path} is no readable {self.KIND}: {error}; move it away") from error
+            if stored.get("digest") != head["digest"]:
+                raise CaseError(f"--out {directory} holds another {self.KIND}; choose another folder")
+        atomic.remove_unfinished(directory, self.ENTRIES)
+        if is_new:
+            atomic.replace_text(path, seals.dumps({**head, "status": "running"}))

@@ -1,0 +1,261 @@
+"""Scatter of a result by uncertain numbers of its case, beside the scatter of random cells and the mesh error.
+
+Derivatives are exact where results have them; else differences of whole runs, one standard deviation less and more.
+Random cells of one seed may have other arrangements then: their slopes have a standard error over the cells.
+
+DIR/means                     as of a sweep: the case, of random cells each realisation
+DIR/differences               the cases with each number without derivatives less and more
+DIR/uncertainty.json
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from feti_homog.case.document import TomlPath, read_document, to_document
+from feti_homog.case.sections import SWEEP
+from feti_homog.case.uncertainty import (
+    DIFFERENTIABLE,
+    SECTIONS,
+    UNCERTAINTY,
+    Uncertainty,
+    number_at,
+    read_uncertainty,
+    with_number,
+)
+from feti_homog.errors import CaseError
+from feti_homog.report.text.constant_tables import mesh_errors, shown
+from feti_homog.report.text.table import Column, Table, with_unit, without_noise
+from feti_homog.schema.wording import toml_value
+from feti_homog.studies.axes import Assignment, read_points
+from feti_homog.studies.predictions import Datum, exact_derivatives, responses
+from feti_homog.studies.study import SILENT, Evaluator, Study
+from feti_homog.studies.sweep_cases import Sweep, cases_at
+from feti_homog.system.parallel.mpi_errors import on_root
+from feti_homog.typing import Float
+
+if TYPE_CHECKING:
+    Documents = Sequence[Mapping[str, Any]]
+
+NOISY = 0.5  # of a slope: a larger standard error over random cells is worth a line
+
+
+@dataclass(frozen=True)
+class ScatterStudy(Study):
+    """A case at the means of its uncertain numbers, and its realisations if it is a random cell."""
+
+    KIND, FILE = "study of scatter", "uncertainty.json"
+    ENTRIES = re.compile(r"uncertainty\.json|means|differences")
+
+    uncertainty: Uncertainty
+    means: Mapping[str, float]
+    realisations: int | None
+
+    def cases(self, points: Sequence[Assignment], **output: bool) -> Sweep:
+        """Return the cases at some values, every realisation of each. Raises CaseError with their faults."""
+        document = {**self.document, "output": self.document["output"] | output}
+        return cases_at(document, points, self.folder, self.realisations, section=UNCERTAINTY)
+
+    def first_cases(self) -> Sweep:
+        return self.cases([{}])
+
+    def differing(self, names: Sequence[str]) -> Sweep:
+        """Return the cases with each of these numbers less and more by its standard deviation."""
+        ends = [(name, self.means[name] + sign * self.uncertainty.std[name]) for name in names for sign in (-1, 1)]
+        points = [dict([with_number(self.document, _path(name), end)]) for name, end in ends]
+        return self.cases(points, mesh_error=False)
+
+    def identity(self, cases: list[str]) -> Any:
+        return [cases, self.uncertainty.to_table()]
+
+    def heading(self) -> str:
+        numbers = f"{len(self.means)} uncertain numbers"
+        return f"scatter    {numbers}, for `feti-homog uncertainty`; the case at their means:"
+
+    def answer(self, evaluator: Evaluator) -> dict[str, Any]:
+        comm = evaluator.comm
+        means = evaluator.results("means", on_root(comm, self.first_cases))
+        inexact = on_root(comm, self._inexact, means)
+        ends = evaluator.results("differences", on_root(comm, self.differing, inexact)) if inexact else []
+        return on_root(comm, self._content, means, inexact, ends)
+
+    def text(self, document: Mapping[str, Any]) -> str:
+        return text(document)
+
+    def _inexact(self, means: Documents) -> list[str]:
+        """Return the uncertain numbers by which some result has no exact derivative."""
+        data = _data(means)
+        return [
+            name
+            for name in self.uncertainty.std
+            if any(exact_derivatives(document, data, name) is None for document in means)
+        ]
+
+    def _content(self, means: Documents, inexact: Sequence[str], ends: Documents) -> dict[str, Any]:
+        """Return the content of uncertainty.json behind its digest."""
+        data, uncertainty, count = _data([*means, *ends]), self.uncertainty, len(means)
+        values = _values(means, data)
+        sides = _values(ends, data).reshape(count, len(inexact), 2, len(data))
+        slopes = np.zeros((count, len(data), len(uncertainty.std)))
+        for k, (name, std) in enumerate(uncertainty.std.items()):
+            if name in inexact:
+                below, above = np.moveaxis(sides[:, inexact.index(name)], 1, 0)
+                slopes[:, :, k] = (above - below) / (2 * std)
+            else:
+                slopes[:, :, k] = [exact_derivatives(document, data, name) for document in means]
+        J = slopes.mean(axis=0)
+        errors = slopes.std(axis=0, ddof=1) / count**0.5 if count > 1 else None
+        deviations, shares = uncertainty.propagated(J)
+        of_cells = values.std(axis=0, ddof=1) if count > 1 else np.zeros(len(data))
+        return {
+            "status": "done",
+            "name": self.name,
+            "stress_unit": str(self.document["output"].get("stress_unit", "")),
+            "parameters": [
+                {"name": name, "mean": self.means[name], "std": std,
+                 "by": "differences" if name in inexact else "derivatives"}
+                for name, std in uncertainty.std.items()
+            ],
+            "correlation": uncertainty.matrix().tolist(),
+            "cells": count,
+            "results": [
+                {"name": datum.name, "value": float(values[:, k].mean()), "std_inputs": float(deviations[k]),
+                 "std_cells": float(of_cells[k]) if count > 1 else None,
+                 "std": float(np.hypot(deviations[k], of_cells[k])), "mesh_error": _mesh_error(means, datum.name),
+                 "derivatives": J[k].tolist(), "derivative_errors": None if errors is None else errors[k].tolist(),
+                 "shares": shares[k].tolist()}
+                for k, datum in enumerate(data)
+            ],
+        }  # fmt: skip
+
+
+def load(path: Path) -> ScatterStudy:
+    """Return the study of a file. Raises CaseError with its faults."""
+    return parse(read_document(path), path.parent)
+
+
+def parse(values: Mapping[str, Any], folder: Path) -> ScatterStudy:
+    """Return the study of nested dictionaries. Raises CaseError as `load`."""
+    document, faults = {"name": "case", **to_document(values)}, list[str]()
+    realisations = _realisations(document.pop(SWEEP, None), faults)
+    uncertainty = read_uncertainty(document, faults)
+    output = document.setdefault("output", {})
+    if not isinstance(output, dict):
+        faults.append(f"output = {toml_value(output)}: expected a section [output]")
+    if not uncertainty.std and not faults:
+        faults.append("expected KEY = {mean, std} in place of some number")
+    if faults:
+        raise CaseError(*faults)
+    output |= SILENT
+    case = cases_at(document, [{}], folder).cases[0]
+    places = {name.partition(".")[0] for name in uncertainty.std}
+    if case.analysis.type in DIFFERENTIABLE and (places & {*SECTIONS} or "cell.fibre_fraction" in uncertainty.std):
+        output["sensitivities"] = True
+    means = {name: number_at(document, _path(name)) or 0.0 for name in uncertainty.std}
+    study = ScatterStudy(document, folder, uncertainty, means, realisations)
+    if faults := [*_faults_of_ends(study)]:
+        raise CaseError(*faults)
+    return study
+
+
+def is_study(values: Mapping[str, Any]) -> bool:
+    """Return whether a document has uncertain numbers."""
+    document = to_document(values)
+    return UNCERTAINTY in document or bool(read_uncertainty(document, []).std)
+
+
+def _realisations(table: object, faults: list[str]) -> int | None:
+    """Return the realisations in a section [sweep], which may have nothing else."""
+    if not isinstance(table, dict):
+        faults += [] if table is None else [f"{SWEEP} = {toml_value(table)}: expected a section [{SWEEP}]"]
+        return None
+    points, settings = read_points(table, faults)
+    if not faults and any(points):
+        faults.append(f"[{SWEEP}]: expected realisations alone")
+    return settings.realisations
+
+
+def _faults_of_ends(study: ScatterStudy) -> Iterator[str]:
+    """Yield the faults of cases one standard deviation off the means."""
+    is_exact = bool(study.document["output"].get("sensitivities"))
+    for name, std in study.uncertainty.std.items():
+        if is_exact and name.partition(".")[0] in SECTIONS:
+            continue
+        try:
+            study.differing([name])
+        except CaseError as error:
+            place = f"[{UNCERTAINTY}] {name} = {study.means[name]:g} +- {std:g}"
+            yield from (f"{place}: {fault}" for fault in error.faults)
+
+
+def _path(name: str) -> TomlPath:
+    return tuple(name.split("."))
+
+
+def _data(documents: Documents) -> list[Datum]:
+    """Return the names common to all results, as data without values."""
+    named = [responses(document) for document in documents]
+    return [Datum(0, name, 0.0, 1.0) for name in named[0] if all(name in values for values in named)]
+
+
+def _values(documents: Documents, data: Sequence[Datum]) -> Float:
+    """(r, n) values of n data in r results."""
+    named = [responses(document) for document in documents]
+    return np.array([[values[datum.name] for datum in data] for values in named], float)
+
+
+def _mesh_error(documents: Documents, name: str) -> float | None:
+    """Return the mean estimated error of a constant; None without an estimate."""
+    errors = [mesh_errors(document).get(name) for document in documents]
+    return None if None in errors else float(np.mean(np.array(errors, float)))
+
+
+def text(document: Mapping[str, Any]) -> str:
+    """Return a table of results with their scatter and the share of each input, and remarks on noisy slopes."""
+    inputs, of_cells = document["parameters"], {"+- cells": "std_cells", "+- both": "std"}
+    heads = {"value": "value", "+- inputs": "std_inputs", **(of_cells if document["cells"] > 1 else {})}
+    heads["+- mesh"] = "mesh_error"
+    results, labels = _scattered(document), [each["name"].removeprefix("material.") for each in inputs]
+    rows = [_row(each, document.get("stress_unit", ""), [*heads.values()]) for each in results]
+    columns = [Column("", -max([18, *(len(row[0]) for row in rows)]) - 2), *map(Column, heads)]
+    columns += [Column(label, max(12, len(label) + 2), ".1f") for label in labels]
+    title = "Scatter by uncertain numbers (std), and their shares of its variance (%)"
+    lines = Table(title, columns, rows).lines if rows else ["No result depends on the uncertain numbers."]
+    differing = ", ".join(each["name"] for each in inputs if each["by"] == "differences")
+    lines = ["", *lines, f"By differences of runs: {differing or 'none'}"]
+    for k, each in enumerate(inputs):
+        if noisy := ", ".join(_noisy(results, k)):
+            lines.append(f"Standard error over the cells above half of the slope by {each['name']}: {noisy}")
+    return "\n".join(lines)
+
+
+def _row(result: Mapping[str, Any], stress_unit: str, keys: Sequence[str]) -> list[Any]:
+    numbers = ("-" if result[key] is None else result[key] for key in keys)
+    return [with_unit(result["name"], stress_unit), *numbers, *(100 * share for share in result["shares"])]
+
+
+def _noisy(results: Documents, k: int) -> Iterator[str]:
+    """Yield the results that random cells hardly give the slope by input k of."""
+    for each in results:
+        if each["derivative_errors"] and each["derivative_errors"][k] > NOISY * abs(each["derivatives"][k]):
+            yield each["name"]
+
+
+def _scattered(document: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """Return the results whose scatter is no noise of the solver beside the largest result of their kind."""
+    results = document["results"]
+    names = [each["name"] for each in results]
+    listed, sizes = {*(shown(names) if "C11" in names else names)}, dict[str, float]()
+    for each in results:
+        kind = each["name"].rstrip("0123456789")
+        sizes[kind] = max(sizes.get(kind, 0.0), abs(each["value"]), each["std"])
+    return [
+        each for each in results
+        if each["name"] in listed and without_noise(each["std"], sizes[each["name"].rstrip("0123456789")]) > 0
+    ]  # fmt: skip
