@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,7 +63,7 @@ class State:
     `angle` of result.json; displacements (n, c), and less those of the strain; means of stresses (m, v); traction and
     jump (k, c) normal, tangential and along the fibres; status (k,) 0 bonded, 1 closed, 2 open; damage (k,) 0 intact to
     1 broken; sliding (k,) the sign of the growing slip of closed nodes that slide; mesh_error (m,) shares of the
-    energy's estimated error, NaN of none; `derived` the tables that follow from these; a change of temperature.
+    energy's estimated error, NaN of none; stresses 33 (m,); a change of temperature.
     """
 
     name: str
@@ -81,7 +80,7 @@ class State:
     damage: Float
     sliding: AnyInt
     mesh_error: Float
-    derived: Mapping[str, Float]
+    stress_33: Float
     temperature: float = 0.0
 
     @property

@@ -16,12 +16,12 @@ from feti_homog.errors import CaseError
 from feti_homog.verify.check_fields import check_fields, check_step_heat
 from feti_homog.verify.check_loads import StateNumbers, States, check_load
 from feti_homog.verify.check_mesh import check_arcs, check_interface, check_mesh
-from feti_homog.verify.check_mesh_error import check_errors, check_mesh_error
+from feti_homog.verify.check_mesh_error import check_mesh_error
 from feti_homog.verify.check_path import check_envelope, check_path
 from feti_homog.verify.check_points import check_points
 from feti_homog.verify.check_record import check_record, checks_of
 from feti_homog.verify.check_sensitivities import check_sensitivities
-from feti_homog.verify.check_summary import check_spatial, check_summary, check_tables
+from feti_homog.verify.check_summary import check_spatial, check_summary
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.findings import Finding, Findings
 from feti_homog.verify.leaves import unchecked
@@ -114,13 +114,13 @@ def _of(directory: Path) -> Certificate:
     with opened(directory) as files:
         try:
             with np.errstate(all="ignore"):  # numbers that are not finite break the laws that they are in
-                return _verified(files, directory)
+                return _verified(files)
         except DAMAGE as error:
             words = f"{type(error).__name__} {error}"
             raise CaseError(f"{directory}: its files do not belong together or are incomplete: {words}") from error
 
 
-def _verified(files: ResultFiles, directory: Path) -> Certificate:
+def _verified(files: ResultFiles) -> Certificate:
     cell = DiscreteCell.of(files)
     findings = Findings(checks_of(cell))
     findings.record("files", len(files.altered), ", ".join(files.altered))
@@ -128,7 +128,6 @@ def _verified(files: ResultFiles, directory: Path) -> Certificate:
         files.document.covers(name)  # or they could not be read, or are altered
     states, faults = laws_of_fields(findings, cell), files.document.hint("faults", [])
     laws_of_numbers(findings, cell, states)
-    check_tables(findings, directory, files.document)
     kind, n, m = files.case["analysis"]["type"], len(files.mesh.points), len(files.mesh.triangles)
     title = f"{files.case['name']}: {kind}, {m} elements, {n} nodes, {len(states)} states"
     status = ": ".join(["the run reports", files.document.hint("status"), *(["; ".join(faults)] if faults else [])])
@@ -169,6 +168,4 @@ def laws_of_numbers(findings: Findings, cell: DiscreteCell, states: States) -> N
     if cell.files.is_spatial:
         check_spatial(findings, cell, states)
     check_sensitivities(findings, cell)
-    if "mesh_error" in document:
-        check_errors(findings, document)
     check_record(findings, cell)

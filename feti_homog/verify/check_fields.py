@@ -1,4 +1,4 @@
-"""Laws of one state: problem, stresses, equilibrium, averages, shown fields; jumps, bonds, contact."""
+"""Laws of one state: problem, stresses, equilibrium, averages; jumps, bonds, contact."""
 
 from __future__ import annotations
 
@@ -100,7 +100,8 @@ def check_fields(findings: Findings, cell: DiscreteCell, state: State, fields: E
     _check_copies(findings, cell, state)
     _check_equilibrium(findings, cell, state, fields)
     _check_averages(findings, cell, state, fields)
-    _check_derived(findings, cell, state)
+    if not cell.files.is_spatial:
+        _check_stress_33(findings, cell, state)
     _check_interface_state(findings, cell, state)
 
 
@@ -198,25 +199,10 @@ def _check_averages(findings: Findings, cell: DiscreteCell, state: State, fields
     findings.record("Hill", relative(np.array(fields.energy - work), scale), state.name)
 
 
-def _check_derived(findings: Findings, cell: DiscreteCell, state: State) -> None:
-    """Check stresses out of the plane, vectors, and the faces' displacements."""
-    if not cell.files.is_spatial:
-        rules = out_of_plane(cell.files.case, cell.files.phases)[cell.files.mesh.phase, 0]
-        S33, terms = (np.einsum("ei,ei->e", *pair) for pair in ((rules, state.stress), np.abs((rules, state.stress))))
-        same = np.isnan(S33) & np.isnan(state.derived["stress_33"])  # where the constants do not determine them
-        off = np.where(same, 0.0, state.derived["stress_33"] - S33)
-        off = np.where(same, 0.0, relative(off, np.where(same, 1.0, terms)))
-        findings.record("stress 33", off, f"{state.name}, element {{}}".format)
-    node = f"{state.name}, interface node {{}}".format
-    shown, opening = state.derived, in_axes(cell, state.jump)
-    fibre = state.displacement[cell.files.faces[:, 0]]
-    moved = largest_displacement(cell, state) + float(np.abs(fibre).max(initial=0.0))
-    pulled = float(np.abs(state.traction).max(initial=0.0))
-    for name, vectors, scale in (
-        ("traction_vector", in_axes(cell, state.traction), pulled),
-        ("jump_vector", opening, moved),
-        ("displacement_fibre", fibre, moved),
-        ("displacement_matrix", fibre + opening, moved),
-    ):
-        off = shown[name] - np.pad(vectors, [(0, 0), (0, 3 - vectors.shape[1])])
-        findings.record("vectors", relative(np.abs(off).max(axis=1), scale), node)
+def _check_stress_33(findings: Findings, cell: DiscreteCell, state: State) -> None:
+    """Check the stresses out of the plane by the materials."""
+    rules = out_of_plane(cell.files.case, cell.files.phases)[cell.files.mesh.phase, 0]
+    S33, terms = (np.einsum("ei,ei->e", *pair) for pair in ((rules, state.stress), np.abs((rules, state.stress))))
+    same = np.isnan(S33) & np.isnan(state.stress_33)  # where the constants do not determine them
+    off = np.where(same, 0.0, relative(np.where(same, 0.0, state.stress_33 - S33), np.where(same, 1.0, terms)))
+    findings.record("stress 33", off, f"{state.name}, element {{}}".format)

@@ -12,11 +12,9 @@ import numpy as np
 
 from feti_homog.typing import Float, Int
 from feti_homog.verify.cell_tables import State
-from feti_homog.verify.check_sensitivities import changed, constants_of
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.elements import PLACES
 from feti_homog.verify.findings import Findings
-from feti_homog.verify.leaves import Section
 
 # Relative errors of the energy below this are rounding, of fields that are uniform.
 LEAST = 1e-9
@@ -56,46 +54,6 @@ def _error_of(cell: DiscreteCell, state: State) -> float | None:
         name = f"effective_stiffness{'_compression' if state.strain[k] < 0 else ''}"
         found = document["mesh_error"].hint(name)[k][k] / abs(document.hint(name)[k][k])
     return None if found is None else float(found)
-
-
-def check_errors(findings: Findings, document: Section) -> None:
-    """Check that errors of entries A are symmetric, and bound those of the energy and of constants.
-
-    Under unit strains the energy errs by A_ii / C_ii, and nowhere by more than the norm of |C^-1/2| A |C^-1/2|.
-    """
-    given, C = document["mesh_error"], np.array(document["effective_stiffness"])
-    matrices = {name: np.array(given.hint(name)) for name in given if name.startswith("effective_stiffness")}
-    for name, A in matrices.items():
-        off = np.abs(A - A.T) / (SYMMETRY * np.sqrt(np.outer(np.diag(A), np.diag(A))) + 1e-300)
-        findings.record("mesh error", np.where((off < 1) & (A >= 0), 0.0, np.inf), f"mesh_error.{name}")
-    A, energy = matrices["effective_stiffness"], given.hint("energy")
-    least = float((np.diag(A) / np.abs(np.diag(C))).max())
-    findings.record("mesh error", (least + LEAST) / (energy + LEAST) - 1, "mesh_error.energy")
-    values, vectors = np.linalg.eigh((C + C.T) / 2)
-    if values[0] > 0:
-        root = np.abs(vectors / np.sqrt(values) @ vectors.T)
-        most = float(np.linalg.norm(root @ A @ root, 2))
-        findings.record("mesh error", (energy + LEAST) / (most + LEAST) - 1, "mesh_error.energy")
-    _check_constants(findings, document, C, A)
-
-
-def _check_constants(findings: Findings, document: Section, C: Float, A: Float) -> None:
-    """Check that a constant f(C) errs by sum |df / dC_ij| A_ij at most."""
-    given = document["mesh_error"]
-    heat, of_heat = (each.hint("thermal_stress") for each in (document, given))
-    heat, of_heat = (None if own is None else np.array(own) for own in (heat, of_heat))
-    here, most_of, n = constants_of(C, heat), dict[str, float](), len(C)
-    whole = np.column_stack([A, np.zeros(n) if of_heat is None else of_heat])
-    for i, j in np.argwhere(np.triu(whole)):
-        one: Float = np.zeros(whole.shape)
-        one[i, j] = whole[i, j]
-        one[:, :n] = np.maximum(one[:, :n], one[:, :n].T)
-        ends = [constants_of(*changed(C, heat, sign * one)) for sign in (1, -1)]
-        most_of = {name: most_of.get(name, 0.0) + max(abs(end[name] - here[name]) for end in ends) for name in here}
-    for name in given["constants"].keys() & here.keys():
-        least = LEAST * max(abs(here[name]), 1.0)
-        off = (given["constants"].hint(name) + least) / (most_of[name] + least) - 1
-        findings.record("mesh error", off, f"mesh_error.constants.{name}")
 
 
 def _averaged(cell: DiscreteCell, state: State) -> float:

@@ -20,7 +20,7 @@ from feti_homog.verify.check_mesh import check_first_step
 from feti_homog.verify.check_points import bond_directions, tip_shares
 from feti_homog.verify.discrete_cell import DiscreteCell
 from feti_homog.verify.findings import STRENGTH, Findings, relative, solver_limit
-from feti_homog.verify.leaves import Points, Section
+from feti_homog.verify.leaves import Points
 from feti_homog.verify.path_energies import check_path_energies
 from feti_homog.verify.prescribed import NAMES, SAME_SHARE, TEMPERATURE, damaged_at
 
@@ -28,8 +28,6 @@ from feti_homog.verify.prescribed import NAMES, SAME_SHARE, TEMPERATURE, damaged
 NOISE_PER_RTOL = 20.0
 # Directions of bonds are distinguished to so many degrees.
 SAME_DIRECTION = 1e-6
-# A largest stress is a peak if the path falls by this share of it afterwards.
-LEAST_FALL = 0.05
 Point = Mapping[str, Any]
 
 
@@ -124,7 +122,6 @@ def check_path(findings: Findings, cell: DiscreteCell, states: States) -> None:
         findings.record("breaks", abs(point["bonded"] - after["bonded"] - broke), f"path[{number + 1}].bonded")
     if by_events and points[-1]["load_factor"] == 1.0:
         findings.record("breaks", points[-1]["broke"], f"path[{len(points) - 1}], bonds that broke at the end")
-    _check_peak(findings, cell.files.document.get("peak"), points)
     _check_breaks(findings, states, points, by_events)
     # Signs are sure where a force or a gap is 20 rtol beyond zero.  While contact changes at one load, all else moves
     # by 115 rtol then, the median of 276 changes, and by 2100 rtol at most.
@@ -138,51 +135,6 @@ def check_path(findings: Findings, cell: DiscreteCell, states: States) -> None:
         in_full.append(replace(state, used=used))
     _check_strength(findings, in_full, points, by_events, near)
     check_path_energies(findings, cell, states, points)
-
-
-def _check_peak(findings: Findings, peak: Section | None, points: Points) -> None:
-    """Check that no stress before the peak is larger, and that its numbers are those of its points."""
-    if peak is None:
-        return
-    strains, stresses = NAMES[len(points[0]["stress"])]
-    component = stresses.index(peak["stress_name"])
-    findings.require("tables", strains.index(peak["strain_name"]) == component, "peak.strain_name")
-    strain, stress = (np.array([point[kind] for point in points])[:, component] for kind in ("strain", "stress"))
-    lost = np.array([point["dissipated"] for point in points])
-    event, broken = peak["event"], np.flatnonzero([point["broke"] for point in points]).tolist()
-    first = broken[0] if broken else None
-    expected = {"stress": (stress, event), "strain": (strain, event), "dissipated": (lost, event)}
-    expected |= {f"first_break_{kind}": (values, broken[0]) for kind, (values, _) in [*expected.items()][:2] if broken}
-    for name, (values, number) in expected.items():
-        findings.record("tables", relative(peak[name] - values[number], np.abs(values).max()), f"peak.{name}")
-    size, above = np.abs(stress), np.abs(stress[:event]).max(initial=0.0) - np.abs(stress[event])
-    findings.record("tables", relative(np.maximum(above, 0.0), size.max()), "peak.event")
-    findings.require("tables", peak.get("first_break_event") == first, "peak.first_break_event")
-    _check_landmarks(findings, peak, points, stress, first)
-
-
-def _check_landmarks(findings: Findings, peak: Section, points: Points, stress: Float, first: int | None) -> None:
-    """Check the valley, on the branch of its point at the load of that or of one before, and the marks of points."""
-    left, load = peak.get("event_left"), np.array([point["load_factor"] for point in points])
-    if left is not None:
-        branch = stress[left] * np.append(load[:left] / (load[left] or 1.0), 1.0)
-        off = np.abs(peak["stress_left"] - branch).min() / (np.abs(stress).max() or 1.0)
-        findings.record("tables", off if left >= peak["event"] else np.inf, "peak.stress_left")
-    cut = left is None and bool(load[-1] < 1.0 - SAME_SHARE)
-    findings.require("tables", peak.get("so_far", cut) == cut, "peak.so_far")
-    name = "largest so far" if cut else _name_of_largest(peak, stress)
-    marks = {"first break": first, name: peak["event"], f"after the {name}": left}
-    marks["end"] = len(points) - 1
-    for number, point in enumerate(points):
-        words = " and ".join(name for name, own in marks.items() if own == number)
-        findings.require("tables", point.get("mark", words) == words, f"path[{number}].mark")
-
-
-def _name_of_largest(peak: Section, stress: Float) -> str:
-    """Return what the largest stress of a whole path is: a peak, if the path falls afterwards."""
-    top = peak["stress"]
-    falls = bool(top) and 1.0 - min(stress[-1] / top, peak.get("stress_left", top) / top) >= LEAST_FALL
-    return "peak" if falls else "largest stress"
 
 
 def _check_breaks(findings: Findings, states: States, points: Points, by_events: bool) -> None:

@@ -36,7 +36,8 @@ def check_points(findings: Findings, cell: DiscreteCell, states: States) -> None
     for state in known:
         _check_state(findings, cell, state, points[state.point], scale)
     for number, point in enumerate(points):
-        _check_shares(findings, cell, point, f"point {number}")
+        count = sum(point[name] for name in COUNTS)
+        findings.record("tables", abs(count - len(cell.files.interface.points)), f"point {number}, {', '.join(COUNTS)}")
     if "path" in document:
         _check_path(findings, cell, known, points, scale)
         return
@@ -55,10 +56,6 @@ def _check_path(findings: Findings, cell: DiscreteCell, known: States, points: P
             findings.record("energy", relative(np.array(off), scale), f"path[{number}].stored")
     law = law_at(cell.files)
     if law.has_toughness:
-        for number, point in enumerate(points):
-            energy = point["fracture_energy"]
-            given, own = point.get("dissipation_ratio", 0.0), point["dissipated"] / energy if energy else 0.0
-            findings.record("tables", abs(given - own) / max(abs(own), 1.0), f"path[{number}].dissipation_ratio")
         _check_toughness(findings, cell, known, points, cell.files.case["path"]["method"] == "events")
         for state in known if law.has_tips else ():
             _check_tips(findings, cell, state, points[state.point]["tips"])
@@ -119,22 +116,6 @@ def _compare(findings: Findings, point: Point, name: str, value: Float, scale: f
     given = np.array(point.get(name, np.nan), float)
     off = given - value if given.shape == np.shape(value) else np.array(np.inf)
     findings.record("tables", relative(off, scale or 1.0), f"{where}, {name}")
-
-
-def _check_shares(findings: Findings, cell: DiscreteCell, point: Point, where: str) -> None:
-    """Check shares and angles of the debonded lengths of a point, and that its counts are those of all nodes."""
-    rows, fibres = cell.files.interface, cell.files.fibres
-    whole, debonded = _of_fibres(cell, np.ones(len(rows.length), bool)), np.array(point["debonded_length"], float)
-    if debonded.shape != whole.shape:
-        findings.record("tables", np.inf, f"{where}, debonded_length")
-        return
-    coated = np.bincount(rows.fibre - 1, rows.body != fibres.body[rows.fibre - 1], len(whole)) > 0
-    radius = np.where(coated, np.nan, fibres.radius)
-    of_whole, of_circle = 360.0 * debonded / np.where(whole > 0, whole, 1.0), np.degrees(debonded / radius)
-    _compare(findings, point, "debonding_angle", np.where(np.isnan(radius), of_whole, of_circle), 360.0, where)
-    _compare(findings, point, "debonded_share", debonded.sum() / (whole.sum() or 1.0), 1.0, where)
-    count = sum(point[name] for name in COUNTS)
-    findings.record("tables", abs(count - len(rows.length)), f"{where}, {', '.join(COUNTS)}")
 
 
 def _check_rates(findings: Findings, cell: DiscreteCell, given: Section | None, where: str) -> None:

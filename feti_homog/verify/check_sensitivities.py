@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -30,19 +30,13 @@ Case = dict[str, Any]
 
 
 def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
-    """Check the values of all constants and parameters, and one derivative along a direction in which all change."""
-    document, case = cell.files.document, cell.files.case
-    asked = {"sensitivities": case.get("output", {}).get("sensitivities"), "uncertainty": "uncertainty" in case}
-    missing = [name for name, is_asked in asked.items() if is_asked and name not in document]
-    findings.record("tables", [np.inf] * len(missing), lambda k: f"{missing[k]}, which the case asks for")
+    """Check the values of all constants, and one derivative along a direction in which all parameters change."""
+    document = cell.files.document
     if "sensitivities" not in document:
         return
     data = document["sensitivities"]
-    names, values = data["parameters"], np.array(data["parameter_values"])
-    untold = sorted({*_required(cell)}.difference(names))
-    findings.record("tables", [np.inf] * len(untold), lambda k: f"sensitivities, {untold[k]}")
+    names = data["parameters"]
     own = np.array([_place(dict(cell.files.case), name)[2] for name in names])
-    findings.record("tables", relative(values - own, np.abs(own)), lambda k: f"sensitivities, {names[k]}")
     # Changes over which the laws are nearly linear.
     ratios = np.array([name.endswith(".poisson") for name in names]) & (own < 0.5)
     sizes = np.where(ratios, 0.5 - own, np.where(own == 0.0, 1.0, np.abs(own)))
@@ -55,52 +49,6 @@ def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
         _check_energies(findings, cell, states, moved, direction)
     else:
         _check_constants(findings, cell, states, moved, direction)
-    if "uncertainty" in document:
-        _check_uncertainty(findings, document)
-
-
-def _required(cell: DiscreteCell) -> Iterator[str]:
-    """Yield the constants of the phases and springs by which there are derivatives."""
-    material, sections = cell.files.case["material"], cell.files.interfaces
-    for phase in {*cell.files.phases} & material.keys():
-        for key, value in material[phase].items():
-            if "thermal_stress" in cell.files.document or not key.startswith("expansion"):
-                yield from (f"material.{phase}.{key}{place}" for place in _places(np.array(value, float)))
-    for number, section in enumerate(sections, start=1):
-        name = f"interface.{number}" if len(sections) > 1 else "interface"
-        yield from (f"{name}.{key}" for key in SPRINGS if np.isfinite(float(section.get(key) or np.inf)))
-
-
-def _places(numbers: Float) -> list[str]:
-    """Return what follows the name of a key: nothing of one number, .k of several, .Cij of a stiffness."""
-    if numbers.ndim > 1:
-        return [f".C{i + 1}{j + 1}" for i, j in np.argwhere(np.triu(numbers))]
-    return [f".{k + 1}" for k in range(len(numbers))] if numbers.ndim else [""]
-
-
-def _check_uncertainty(findings: Findings, document: Mapping[str, Any]) -> None:
-    """Check the scatter sqrt(a.R a) of constants, of changes a by one standard deviation of each, and its shares."""
-    data, known = document["uncertainty"], document["sensitivities"]
-    given = {name: float(std) for name, std in document["case"]["uncertainty"].items() if name != "correlation"}
-    names = data["parameters"]
-    if {*names} != given.keys() or [*data["constants"]] != [*known["constants"]]:
-        findings.record("tables", np.inf, "uncertainty, names")
-        return
-    R = np.eye(len(names))
-    for first, second, value in document["case"]["uncertainty"].get("correlation", []):
-        i, j = names.index(first), names.index(second)
-        R[i, j] = R[j, i] = value
-    own = np.array([given[name] for name in names])
-    findings.record("tables", relative(np.array(data["parameter_std"]) - own, own), lambda k: f"uncertain {names[k]}")
-    for k, name in enumerate(data["constants"]):
-        row = np.array(known["derivatives"][known["constants"].index(name)])
-        a = np.array([row[known["parameters"].index(each)] for each in names]) * own
-        variance, most = float(a @ R @ a), float(np.abs(a).max())
-        std = max(variance, 0.0) ** 0.5
-        findings.record("sensitivities", abs(data["std"][k] - std) / (most or 1.0), f"scatter of {name}")
-        if variance > NOISE**2 * most**2:
-            off = np.array(data["shares"][k]) - a * (R @ a) / variance
-            findings.record("sensitivities", float(np.abs(off).max()), f"shares of {name}")
 
 
 def _check_energies(

@@ -1,16 +1,12 @@
-"""Laws of the numbers that result.json sums up: of the mesh, the constants, the bounds; and of the tables beside it."""
+"""Laws of the numbers that result.json sums up: of the mesh, the constants, the bounds."""
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 import numpy as np
 from scipy.special import gammaln
 
-from feti_homog.system.runtime import input_files
 from feti_homog.typing import Float
 from feti_homog.verify.bonds import COATING
 from feti_homog.verify.check_fields import BONDED
@@ -46,22 +42,8 @@ def check_summary(findings: Findings, cell: DiscreteCell) -> None:
 
 
 def _check_fibres(findings: Findings, cell: DiscreteCell, given: Sequence[Section]) -> None:
-    """Check that the list of fibres is that of result.h5, in the order of their numbers, and their shapes."""
-    fibres, phases, rows, size = cell.files.fibres, cell.files.phases, cell.files.interface, cell.files.size
-    numbers = np.arange(1, len(fibres.number) + 1)
-    findings.require("tables", np.array_equal(fibres.number, numbers), "/fibre/number")
-    listed = [(fibre["number"], fibre["phase"]) for fibre in given]
-    same = listed == [(number, phases[phase]) for number, phase in zip(numbers, fibres.phase, strict=True)]
-    findings.require("tables", same, "fibres")
-    if not same:
-        return
-    circles = np.array([[*fibre.get("centre", (None, None)), fibre.get("radius")] for fibre in given], float)
-    circles = circles.reshape(-1, 3)  # of a cell without fibres too
-    stored = np.column_stack([fibres.centre, fibres.radius])
-    off = np.where(np.isnan(circles) & np.isnan(stored), 0.0, circles - stored)
-    findings.record("tables", relative(off, size.max()).max(axis=1), lambda i: f"fibres[{i}]")
-    factors = np.array([fibre.get("strength", 1.0) for fibre in given]) - fibres.strength
-    findings.record("tables", np.abs(factors), lambda i: f"fibres[{i}].strength")
+    """Check the scatter of strengths, and semi-axes and coatings of result.json against the mesh."""
+    fibres, rows, size = cell.files.fibres, cell.files.interface, cell.files.size
     findings.record("tables", _unlike_scatter(cell), "/fibre/strength at fibre {}".format)
     thickness = _coatings(cell)
     for number, fibre in enumerate(given):
@@ -145,32 +127,6 @@ def _check_bounds(findings: Findings, cell: DiscreteCell, given: Section, stiffn
             pair = 1 / (cell.fractions @ (1 / (own[:, None] + added))) - added
             off = np.array(given["hashin_shtrikman"][name]) - pair
             findings.record("bounds", relative(off, pair[1]), f"bounds.hashin_shtrikman.{name}")
-
-
-# Of points, in the order of the columns of a table.
-VECTORS = ("stiffness", "thermal_stress", "strain", "stress")
-
-
-def check_tables(findings: Findings, directory: Path, document: Section) -> None:
-    """Check that angle.csv, path.csv, load.csv and envelope.csv have a row a point, with its numbers."""
-    for name in document.keys() & {"angle", "path", "load", "envelope"}:
-        path, points = directory / f"{name}.csv", document.hint(name)
-        points = points if isinstance(points, list) else [points]
-        if path.is_file():
-            text = input_files.read(path).decode("utf-8", "replace")
-            rows = list(csv.DictReader(io.StringIO(text, newline="")))
-            findings.require("CSV", len(rows) == len(points), f"{path.name}, the number of its rows")
-            for number, (row, point) in enumerate(zip(rows, points, strict=False)):
-                findings.require("CSV", _is_row_of(row, point), f"{path.name}, row {number}")
-
-
-def _is_row_of(row: Mapping[str, str], point: Section) -> bool:
-    """Return whether a row has the numbers of a point under their names, and its vectors in their order."""
-    single = ((key, value) for key, value in dict.items(point) if not isinstance(value, list | dict))
-    texts = {key: "" if value is None else str(value) for key, value in single}
-    rest = [*filter(None, (cell for column, cell in row.items() if column not in texts))]
-    vectors = [str(x) for key in VECTORS if key in point for x in np.ravel(point.hint(key)).tolist()]
-    return rest == vectors and texts == {key: row.get(key) for key in texts}
 
 
 def check_spatial(findings: Findings, cell: DiscreteCell, states: States) -> None:

@@ -15,13 +15,19 @@ REASONS = {
     "residuals of the solver, of which only the tolerance is checked": ("checks",),
     "texts, but for those that follow from numbers": ("warnings", "remarks", "faults"),
     "closed formulas, which no field bears witness to": ("estimates", "fibre_bounds"),
-    "estimates of the mesh's error, of which only bounds are checked": (
-        "mesh_error",
-    ),
+    "estimates of the mesh's error, but for those of energies": ("mesh_error",),
     "derivatives under contact or beside a temperature, but for those of energies": ("derivatives",),
     "what breaks at tips would release": ("G_I", "G_II"),
-    "of a table or a mesh that is not in the files": ("match_distance", "mesh_size", "refine"),
+    "of the mesher, or of a table that is not in the files": ("match_distance", "mesh_size", "refine"),
+    "copies of other numbers, for readers": (
+        "fibres", "peak", "mark", "debonding_angle", "debonded_share", "dissipation_ratio", "parameter_values",
+    ),
+    "scatter, which follows from derivatives and the case": ("uncertainty",),
 }  # fmt: skip
+# Files and tables of result.h5 that are written from others.
+COPIES = "tables for viewers and spreadsheets"
+COPIED = ("*.csv", "traction_vector", "jump_vector", "displacement_fibre", "displacement_matrix", "fibre_node",
+          "matrix_node", "fibre/number", "fibre/phase")  # fmt: skip
 NO_REASON, THINNED = "no law", "at points whose fields are not in the files"
 
 
@@ -76,13 +82,13 @@ Points = Sequence[Section]
 def unchecked(document: Section) -> dict[str, list[str]]:
     """Return the names of the numbers that no law has read by the reason for it, such as path[].iterations.
 
-    A table none of whose numbers is read has its own name.
+    A table none of whose numbers is read has its own name.  Copies of tables are always among them.
     """
     unread, known = (
         Counter(re.sub(r"\[\d+\]", "[]", place) for place in of) for of in (document.unread, document.places)
     )
     read = {name.partition(".")[0] for name in known if name not in unread}
-    found: dict[str, list[str]] = {}
+    found: dict[str, list[str]] = {COPIES: [*COPIED]}
     for name, count in unread.items():
         table, parts = name.partition(".")[0], {*name.replace("[]", "").split(".")}
         own = THINNED if count < known[name] else NO_REASON

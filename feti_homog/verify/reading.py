@@ -23,14 +23,6 @@ from feti_homog.verify.leaves import Section
 
 JSON, FIELDS = "result.json", "result.h5"
 SCHEMA = 1
-# Tables of a state that follow from others: rows of elements or of interface nodes, and columns.
-DERIVED: dict[str, tuple[Any, ...]] = {
-    "stress_33": ("m",),
-    "traction_vector": ("k", 3), "jump_vector": ("k", 3),
-    "displacement_fibre": ("k", 3), "displacement_matrix": ("k", 3),
-}  # fmt: skip
-# In generalized plane strain stresses 33 are among the stresses.
-SPATIAL_DERIVED = {name: shape for name, shape in DERIVED.items() if name != "stress_33"}
 ROWS = ("points", "normal", "length", "fibre_number", "fibre")
 MISSING_FIELDS = "only a run with `fields = true` in [output] can be verified"
 BLOCK = 1 << 26  # bytes
@@ -84,21 +76,14 @@ class ResultFiles:
     def _state(self, number: int) -> State:
         group = self.file[f"state/{number}"]
         n, m, k = len(self.mesh.points), len(self.mesh.triangles), len(self.interface.points)
-        basic = {"displacement": (n, 2), "stress": (m, 3), "traction": (k, 2), "jump": (k, 2), "status": (k,)}
-        shown = SPATIAL_DERIVED if self.is_spatial else DERIVED
-        derived = {name: (m if of == "m" else k, *columns) for name, (of, *columns) in shown.items()}
-        arrays, others = (
-            {name: self._table(number, name, shape) for name, shape in shapes.items()} for shapes in (basic, derived)
-        )
+        shapes = {"displacement": (n, 2), "stress": (m, 3), "stress_33": (m,), "mesh_error": (m,), "status": (k,)}
+        shapes |= {"traction": (k, 2), "jump": (k, 2), "damage": (k,), "sliding": (k,)}
+        arrays = {name: self._table(number, name, shape) for name, shape in shapes.items()}
         if self.is_spatial:  # with what is along the fibres
             for name, rows in (("displacement", n), ("traction", k), ("jump", k)):
                 arrays[name] = np.column_stack([arrays[name], self._table(number, f"axial_{name}", (rows,))])
-            S33, along = self._table(number, "stress_33", (m,)), self._table(number, "axial_stress", (m, 2))
-            arrays["stress"] = np.column_stack([arrays["stress"][:, :2], S33, along, arrays["stress"][:, 2]])
-        # Older results have no damage, nothing that slides, and no estimated errors.
-        missing = (arrays["status"] != 0).astype(float), np.zeros(k, np.int8), np.full(m, np.nan)
-        for name, old in zip(("damage", "sliding", "mesh_error"), missing, strict=True):
-            arrays[name] = self._table(number, name, old.shape) if name in group else old
+            plane, along = arrays["stress"], self._table(number, "axial_stress", (m, 2))
+            arrays["stress"] = np.column_stack([plane[:, :2], arrays["stress_33"], along, plane[:, 2]])
         strain, mean = (np.array(group.attrs[name], float) for name in ("strain", "stress"))
         v = 6 if self.is_spatial else 3
         _expect(
@@ -108,7 +93,7 @@ class ResultFiles:
         warmer = float(group.attrs.get("temperature", 0.0))
         arrays["fluctuation"] = arrays["displacement"] - self.mesh.points @ gradient(strain).T
         name = f"state {number} ({label})"
-        return State(name, strain, mean, factor, point, **arrays, derived=others, temperature=warmer)
+        return State(name, strain, mean, factor, point, **arrays, temperature=warmer)
 
     def _table(self, number: int, name: str, shape: tuple[int, ...]) -> Any:
         """Return a table of a state, of the shape that it must have."""
