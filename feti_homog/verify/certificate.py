@@ -13,19 +13,16 @@ from typing import Any, TypeVar
 import numpy as np
 
 from feti_homog.errors import CaseError
-from feti_homog.verify.check_fields import check_fields, check_step_heat
-from feti_homog.verify.check_loads import StateNumbers, States, check_load
-from feti_homog.verify.check_mesh import check_arcs, check_interface, check_mesh
-from feti_homog.verify.check_mesh_error import check_mesh_error
+from feti_homog.verify.check_constants import check_constants
+from feti_homog.verify.check_loads import StateNumbers, States, check_loads
+from feti_homog.verify.check_mesh import check_arcs, check_interface, check_mesh, check_mesh_error, check_rates
 from feti_homog.verify.check_path import check_envelope, check_path
-from feti_homog.verify.check_points import check_points
-from feti_homog.verify.check_record import check_record, checks_of
 from feti_homog.verify.check_sensitivities import check_sensitivities
-from feti_homog.verify.check_summary import check_spatial, check_summary
+from feti_homog.verify.check_state import check_state
 from feti_homog.verify.discrete_cell import DiscreteCell
-from feti_homog.verify.findings import Finding, Findings
-from feti_homog.verify.leaves import unchecked
-from feti_homog.verify.reading import ResultFiles, altered, opened
+from feti_homog.verify.findings import Check, Finding, Findings, checks, unchecked
+from feti_homog.verify.path_energies import check_step_heat
+from feti_homog.verify.reading import COATING, ResultFiles, altered, opened
 
 # What reading numbers of another kind or shape than expected raises.
 DAMAGE = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, MemoryError, RecursionError)
@@ -121,17 +118,23 @@ def _of(directory: Path) -> Certificate:
 
 
 def _verified(files: ResultFiles) -> Certificate:
-    cell = DiscreteCell.of(files)
+    cell, document = DiscreteCell.of(files), files.document
     findings = Findings(checks_of(cell))
     findings.record("files", len(files.altered), ", ".join(files.altered))
-    for name in ("schema", "checksum", "result_h5"):
-        files.document.covers(name)  # or they could not be read, or are altered
-    states, faults = laws_of_fields(findings, cell), files.document.hint("faults", [])
+    for name in ("schema", "checksum", "result_h5"):  # read before
+        document.get(name)
+    states, faults = laws_of_fields(findings, cell), document.hint("faults", [])
     laws_of_numbers(findings, cell, states)
     kind, n, m = files.case["analysis"]["type"], len(files.mesh.points), len(files.mesh.triangles)
     title = f"{files.case['name']}: {kind}, {m} elements, {n} nodes, {len(states)} states"
-    status = ": ".join(["the run reports", files.document.hint("status"), *(["; ".join(faults)] if faults else [])])
-    return Certificate(findings.worst(), title, status, unchecked(files.document))
+    status = ": ".join(["the run reports", document.hint("status"), *(["; ".join(faults)] if faults else [])])
+    return Certificate(findings.worst(), title, status, unchecked(document))
+
+
+def checks_of(cell: DiscreteCell) -> tuple[Check, ...]:
+    """List the laws of a result with their limits."""
+    case, rtol = cell.files.case, float(cell.files.document["solver"].hint("rtol"))
+    return checks(rtol, case["cell"]["geometry"] == "mesh", COATING in case["material"], cell.elements.contrasts)
 
 
 def laws_of_fields(findings: Findings, cell: DiscreteCell) -> list[StateNumbers]:
@@ -144,8 +147,8 @@ def laws_of_fields(findings: Findings, cell: DiscreteCell) -> list[StateNumbers]
         arrays = (state.displacement, state.fluctuation, state.stress, state.traction, state.jump, state.strain)
         findings.record("numbers", [np.count_nonzero(~np.isfinite(array)) for array in arrays], state.name)
         terms = np.abs(state.displacement) + np.abs(state.fluctuation)
-        fields = cell.elements.fields(state.displacement, terms, state.along, cell.free_strains(state))
-        check_fields(findings, cell, state, fields)
+        fields = cell.elements.fields(state.displacement, terms, state.along, cell.free_strains(state.temperature))
+        check_state(findings, cell, state, fields)
         check_mesh_error(findings, cell, state)
         if before is not None and "path" in files.document:
             check_step_heat(findings, cell, before, state)
@@ -155,17 +158,16 @@ def laws_of_fields(findings: Findings, cell: DiscreteCell) -> list[StateNumbers]
 
 
 def laws_of_numbers(findings: Findings, cell: DiscreteCell, states: States) -> None:
-    """Check the numbers of result.json against those of the states."""
+    """Check the numbers of result.json against the states."""
     document = cell.files.document
-    check_load(findings, cell, states)
+    check_loads(findings, cell, states)
     check_arcs(findings, cell, states)
-    check_points(findings, cell, states)
     if "path" in document:
         check_path(findings, cell, states)
+    else:
+        for number, table in enumerate([document, *cell.files.points], start=-1):
+            check_rates(findings, cell, table.get("tips"), f"point {number}")
     if "envelope" in document:
         check_envelope(findings, cell, states)
-    check_summary(findings, cell)
-    if cell.files.is_spatial:
-        check_spatial(findings, cell, states)
+    check_constants(findings, cell, states)
     check_sensitivities(findings, cell)
-    check_record(findings, cell)

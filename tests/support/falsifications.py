@@ -8,7 +8,7 @@ import numpy as np
 
 from feti_homog.results import seals
 from feti_homog.verify.certificate import verify
-from feti_homog.verify.leaves import NO_REASON, THINNED
+from feti_homog.verify.findings import NO_REASON, THINNED
 
 SMALL = 1e-6
 MATRIX = ("material", "matrix")
