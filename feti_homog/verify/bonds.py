@@ -1,4 +1,4 @@
-"""Bond laws by formulas of their own, the bonds of interface nodes by the case.
+"""Bond laws by independent formulas, and the bonds of interface nodes by the case.
 
 A law is a class with the name that `case/bond_laws.py` gives it, here or in `softening`.
 """
@@ -6,7 +6,7 @@ A law is a class with the name that `case/bond_laws.py` gives it, here or in `so
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from importlib import import_module
 from typing import Any, ClassVar
 
@@ -16,7 +16,7 @@ from feti_homog.case.bond_laws import DEFAULT, LAWS
 from feti_homog.typing import AnyInt, Bool, Float, Int
 from feti_homog.verify.reading import ResultFiles, State
 
-# Keys with a number for each section; a second one gives the default.
+# Keys with one number a section, and the keys of their defaults.
 NUMBERS = {
     "normal_stiffness": "", "tangential_stiffness": "", "axial_stiffness": "tangential_stiffness",
     "normal_strength": "", "tangential_strength": "", "axial_strength": "tangential_strength",
@@ -54,8 +54,8 @@ class BondLaw(ABC):
         return np.asarray(traction / self._components("stiffness", traction))
 
     def mode(self, traction: Float) -> Float:
-        """(k,) psi of tractions (k, c): 0 opens, pi/2 shears."""
-        pulls = pulled(traction)
+        """(k,) psi of tractions (k, c), 0 opens, pi/2 shears; with toughness tan^2 psi = G_II / G_I."""
+        pulls = np.sqrt(self.energies(traction)) if self.has_toughness else pulled(traction)
         return np.asarray(np.arctan2(np.sqrt(np.square(pulls[:, 1:]).sum(axis=1)), pulls[:, 0]))
 
     def lost(self, psi: Float) -> Float:
@@ -113,7 +113,7 @@ class QuadraticStrength(MaxStrength):
 
 
 class SpringEnergy(BondLaw):
-    """G_I + G_II = G_c = G_Ic [1 + tan^2((1 - lambda) psi)] breaks the bond, tan^2 psi = G_II / G_I.
+    """G_I + G_II = G_c = G_Ic [1 + tan^2((1 - lambda) psi)] breaks the bond.
 
     G_I = <t_n>^2 / (2 k_n) and G_II = t_t^2 / (2 k_t) + t_a^2 / (2 k_a) are the spring energies.
     """
@@ -124,11 +124,6 @@ class SpringEnergy(BondLaw):
     def utilisation(self, traction: Float) -> Float:
         """(k,) sqrt((G_I + G_II) / G_c)."""
         return np.asarray(np.sqrt(self.energies(traction).sum(axis=1) / self.lost(self.mode(traction))))
-
-    def mode(self, traction: Float) -> Float:
-        """(k,) psi of tractions (k, c)."""
-        first, second = np.sqrt(self.energies(traction)).T
-        return np.asarray(np.arctan2(second, first))
 
     def lost(self, psi: Float) -> Float:
         """(k,) G_c in the modes psi (k,)."""
@@ -174,20 +169,11 @@ def _number(section: Mapping[str, Any], name: str) -> float:
     return float(next((value for value in values if value is not None), np.inf))
 
 
-def friction_at(files: ResultFiles) -> Float:
-    """(k,) friction coefficients of the interface nodes."""
-    return _of_pairs(files, [float(section.get("friction", 0.0)) for section in files.interfaces or [{}]])
-
-
-def friction_of_damage_at(files: ResultFiles) -> Float:
-    """(k,) friction coefficients on the damaged share of bonds."""
-    acts = [float(section.get("friction_on_damage", False)) for section in files.interfaces or [{}]]
-    return _of_pairs(files, acts) * friction_at(files)
-
-
-def _of_pairs(files: ResultFiles, values: Sequence[float]) -> Float:
-    """(k,) values of sections at the interface nodes."""
-    return np.asarray(np.array(values, float)[np.minimum(files.interface.pair, len(values) - 1)])
+def friction_at(files: ResultFiles, on_damage: bool = False) -> Float:
+    """(k,) friction coefficients of debonded faces, or of the damaged share of bonds."""
+    key = "friction_on_damage" if on_damage else "friction"
+    mu = [float(section.get("friction", 0.0)) * bool(section.get(key)) for section in files.interfaces or [{}]]
+    return np.asarray(np.array(mu)[np.minimum(files.interface.pair, len(mu) - 1)])
 
 
 def rubbing_force(files: ResultFiles, state: State) -> Float:
@@ -197,7 +183,7 @@ def rubbing_force(files: ResultFiles, state: State) -> Float:
     """
     unit, intact_bonds = np.ones_like(state.traction), np.zeros(len(state.damage))
     intact, damaged = (law_at(files, damage=damage).jumps(unit)[:, 1] for damage in (intact_bonds, state.damage))
-    rubs = (state.status == 0) & (damaged > intact) & (friction_of_damage_at(files) > 0.0)
+    rubs = (state.status == 0) & (damaged > intact) & (friction_at(files, on_damage=True) > 0.0)
     g = state.jump[:, 1] - intact * state.traction[:, 1]
     return np.where(rubs, state.traction[:, 1] - g / np.where(rubs, damaged - intact, 1.0), 0.0)
 

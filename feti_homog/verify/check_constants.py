@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 from scipy.special import gammaln
 
@@ -16,6 +14,7 @@ from feti_homog.verify.reading import COATING
 
 RTOL = 1e-8  # of the dual problems, by default
 DIRECTIONS = 720  # across the fibres, in half a turn
+SECTIONS = {"moduli", "constants", "transversely_isotropic", "transverse_moduli"}
 # The scale of constants whose names begin so is 1 at least.
 RATIOS = ("eta", "anisotropy", "nu", "deviation")
 
@@ -25,33 +24,30 @@ def check_constants(findings: Findings, cell: DiscreteCell, states: States) -> N
     document = cell.files.document
     _check_status(findings, cell)
     _check_cell(findings, cell, document["cell"])
-    sections: dict[str, Mapping[str, float | None]] = {}
     if "effective_stiffness" in document:
-        C = np.array(document["effective_stiffness"])
-        if document.get("bounds") is not None:
-            _check_bounds(findings, cell, document["bounds"], C)
-        if cell.files.is_spatial:
-            strains = _check_inverse(findings, document, C)
-            sections = {"constants": engineering_constants(C), "transversely_isotropic": about_fibres(C, strains)}
-            sections["transverse_moduli"] = _across_fibres(C)
-        else:
-            sections = {"moduli": moduli(C)}
-    for section, values in sections.items():
-        if document.get(section) is not None:
-            _check_numbers(findings, document[section], values, section)
+        _check_stiffness(findings, cell, document)
     for number, table in enumerate([document, *document.get("angle", ())], start=-1):
         if "thermal_stress" in table and cell.expansions is not None:
             of_table = [state for state in states if number < 0 or state.point == number]
             _check_levin(findings, cell, table, of_table, f"angle[{number}].thermal_stress".removeprefix("angle[-1]."))
 
 
-def _check_numbers(findings: Findings, table: Section, values: Mapping[str, float | None], section: str) -> None:
-    for name, value in values.items():
-        if value is None or table[name] is None:
-            findings.require("moduli", value is table[name], f"{section}.{name}")
-        else:
-            scale = max(abs(value), float(name.startswith(RATIOS)))
-            findings.compare("moduli", table[name], value, scale, f"{section}.{name}")
+def _check_stiffness(findings: Findings, cell: DiscreteCell, document: Section) -> None:
+    """Check bounds, compliance and constants of the stiffness."""
+    C, heat = np.array(document["effective_stiffness"]), document.get("thermal_stress")
+    heat = None if heat is None else np.array(heat)
+    if document.get("bounds") is not None:
+        _check_bounds(findings, cell, document["bounds"], C)
+    if cell.files.is_spatial:
+        _check_inverse(findings, document, C, heat)
+    for section in SECTIONS & document.keys():
+        constants = {} if document.get(section) is None else constants_of(C, heat)
+        for name, value in (document.get(section) or {}).items():
+            expected, place = constants.get(name), f"{section}.{name}"
+            if value is None or expected is None:
+                findings.require("moduli", value is expected, place)
+            else:
+                findings.compare("moduli", value, expected, max(abs(expected), float(name.startswith(RATIOS))), place)
 
 
 def _check_status(findings: Findings, cell: DiscreteCell) -> None:
@@ -98,8 +94,8 @@ def _check_cell(findings: Findings, cell: DiscreteCell, section: Section) -> Non
         findings.compare("tables", strength, expected, expected, "/fibre/strength at fibre {}".format)
 
 
-def _check_inverse(findings: Findings, document: Section, C: Float) -> Float | None:
-    """Check compliance and thermal expansion; returns the expansion (6,), None if there is none."""
+def _check_inverse(findings: Findings, document: Section, C: Float, heat: Float | None) -> None:
+    """Check compliance and thermal expansion."""
     # Columns that are secants of one load each have no meaningful inverse.
     is_linear = "effective_stiffness_compression" not in document
     findings.require("compliance", is_linear is ("compliance" in document), "compliance")
@@ -107,12 +103,11 @@ def _check_inverse(findings: Findings, document: Section, C: Float) -> Float | N
         S = np.array(document["compliance"])
         terms = (np.abs(S) @ np.abs(C)).max(axis=1)[:, None]  # of cancelling sums
         findings.compare("compliance", S @ C, np.eye(6), terms, "compliance")
-    if "thermal_expansion" not in document:
-        return None
-    strains: Float = np.linalg.solve(C, -np.array(document["thermal_stress"], float))
-    scale = np.abs(strains).max()
-    findings.compare("compliance", document["thermal_expansion"], strains, scale, "thermal_expansion")
-    return strains
+    if "thermal_expansion" in document and heat is not None:
+        strains = -np.linalg.solve(C, heat)
+        findings.compare(
+            "compliance", document["thermal_expansion"], strains, np.abs(strains).max(), "thermal_expansion"
+        )
 
 
 def _check_levin(findings: Findings, cell: DiscreteCell, table: Section, states: States, place: str) -> None:
@@ -144,18 +139,32 @@ def _check_bounds(findings: Findings, cell: DiscreteCell, bounds: Section, stiff
             findings.compare("bounds", bounds["hashin_shtrikman"][name], pair, pair[1], f"hashin_shtrikman.{name}")
 
 
-def moduli(stiffness: Float) -> dict[str, float | None]:
-    """Engineering moduli of a stiffness (3, 3), from the strains under unit stresses."""
-    by_s11, by_s22, by_s12 = np.linalg.solve(stiffness, np.eye(3)).T
-    bulk, shear = _isotropic_part(stiffness)
-    nearest = np.array([[bulk + shear, bulk - shear, 0], [bulk - shear, bulk + shear, 0], [0, 0, shear]])
-    anisotropy, size = (np.linalg.norm(_tensor(C)) for C in (stiffness - nearest, stiffness))
-    return {
-        "E1": 1 / by_s11[0], "E2": 1 / by_s22[1], "G12": 1 / by_s12[2],
-        "nu12": -by_s11[1] / by_s11[0], "nu21": -by_s22[0] / by_s22[1],
-        "eta1": by_s11[2] / by_s11[0], "eta2": by_s22[2] / by_s22[1],
-        "bulk": bulk, "shear": shear, "anisotropy": float(anisotropy / size),
-    }  # fmt: skip
+def constants_of(C: Float, heat: Float | None) -> dict[str, float]:
+    """Map names to constants of a stiffness (3, 3) or (6, 6), and to expansions by a thermal stress (6,).
+
+    From the strains under unit stresses: E_i, nu_ij = -eps_j / eps_i and eta_i = gamma_12 / eps_i under stress along i,
+    G_ij.
+    """
+    S, n, voigt = np.linalg.inv(C), len(C), VOIGT[len(C)]
+    pairs, shears = [(0, 1), (1, 0)], {"G12": 2}
+    if n == 6:
+        pairs, shears = [(0, 1), (0, 2), (1, 2)], {"G23": 3, "G13": 4, "G12": 5}
+    table = {f"C{i + 1}{j + 1}": C[i, j] for i in range(n) for j in range(i, n)}
+    table |= {f"E{i + 1}": 1 / S[i, i] for i in range(len(voigt))}
+    table |= {f"nu{i + 1}{j + 1}": -S[j, i] / S[i, i] for i, j in pairs}
+    table |= {name: 1 / S[k, k] for name, k in shears.items()}
+    if n == 3:
+        bulk, shear = _isotropic_part(C)
+        nearest = np.array([[bulk + shear, bulk - shear, 0], [bulk - shear, bulk + shear, 0], [0, 0, shear]])
+        table |= {"eta1": S[2, 0] / S[0, 0], "eta2": S[2, 1] / S[1, 1], "bulk": bulk, "shear": shear}
+        table["anisotropy"] = _distance(C, nearest)
+    else:
+        table |= _about_fibres(C)
+    if heat is not None:
+        x1, x2, x3 = -np.linalg.solve(C, heat)[:3]
+        table |= {"expansion_x1": x1, "expansion_x2": x2, "expansion_axial": x3, "expansion_transverse": (x1 + x2) / 2}
+        table |= {f"thermal_S{k + 1}{k + 1}": heat[k] for k in range(3)}
+    return {name: float(value) for name, value in table.items()}
 
 
 def _isotropic_part(c: Float) -> tuple[float, float]:
@@ -164,40 +173,24 @@ def _isotropic_part(c: Float) -> tuple[float, float]:
     return float(spherical / 4), float((full - spherical / 2) / 4)
 
 
-def _tensor(C: Float) -> Float:
-    """C_ijkl of a stiffness (3, 3) or (6, 6)."""
+def _distance(C: Float, other: Float) -> float:
+    """||C - C'|| / ||C|| of the tensors C_ijkl."""
     voigt = VOIGT[len(C)]
-    return np.asarray(C[voigt[:, :, None, None], voigt[None, None]])
+    off, size = (np.linalg.norm(M[voigt[:, :, None, None], voigt[None, None]]) for M in (C - other, C))
+    return float(off / size)
 
 
-def engineering_constants(stiffness: Float) -> dict[str, float | None]:
-    """From the strains under unit stresses: E_i, nu_ij = -eps_j / eps_i under stress along i, G_ij."""
-    strain = np.linalg.solve(stiffness, np.eye(6)).T
-    constants: dict[str, float | None] = {f"E{i + 1}": float(1 / strain[i, i]) for i in range(3)}
-    constants |= {f"nu{i + 1}{j + 1}": float(-strain[i, j] / strain[i, i]) for i, j in ((0, 1), (0, 2), (1, 2))}
-    return constants | {f"G{name}": float(1 / strain[k, k]) for name, k in (("23", 3), ("13", 4), ("12", 5))}
-
-
-def about_fibres(stiffness: Float, strains: Float | None) -> dict[str, float | None]:
-    """Constants of the tensor's mean over turns about x3, and its distance from this mean."""
-    angles = np.arange(5) * 72.0  # exact: the turned tensor has no more than four waves in a turn
-    mean = np.mean([turned(stiffness, angle) for angle in angles], axis=0)
-    S = np.linalg.inv(mean)
-    deviation, size = (np.linalg.norm(_tensor(C)) for C in (stiffness - mean, stiffness))
-    return {
-        "E_axial": float(1 / S[2, 2]), "E_transverse": float(1 / S[0, 0]), "nu_transverse": float(-S[0, 1] / S[0, 0]),
-        "nu_axial": float(-S[0, 2] / S[2, 2]), "G_axial": float(1 / S[4, 4]), "G_transverse": float(1 / S[5, 5]),
-        "K_transverse": float(mean[0, 0] + mean[0, 1]) / 2, "deviation": float(deviation / size),
-        "expansion_axial": None if strains is None else float(strains[2]),
-        "expansion_transverse": None if strains is None else float(strains[:2].mean()),
-    }  # fmt: skip
-
-
-def _across_fibres(stiffness: Float) -> dict[str, float | None]:
-    """Return the ranges of E1 and G12 in axes turned about x3, from the energies of unit stresses."""
-    angle = np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+def _about_fibres(C: Float) -> dict[str, float]:
+    """Constants of the mean tensor over turns about x3, its distance, and the ranges of E1 and G12 in turned axes."""
+    # Exact: the turned tensor has no more than four waves in a turn.
+    mean = np.mean([turned(C, angle) for angle in np.arange(5) * 72.0], axis=0)
+    S, angle = np.linalg.inv(mean), np.pi * np.arange(DIRECTIONS) / DIRECTIONS
     c, s, none = np.cos(angle), np.sin(angle), np.zeros((3, DIRECTIONS))
     tension, shear = np.vstack([c**2, s**2, none, c * s]), np.vstack([-2 * c * s, 2 * c * s, none, c**2 - s**2])
-    E, G = (1 / np.einsum("ia,ij,ja->a", stress, np.linalg.inv(stiffness), stress) for stress in (tension, shear))
-    return {f"{name}_{end}": float(value) for name, modulus in (("E", E), ("G", G))
-            for end, value in (("least", modulus.min()), ("largest", modulus.max()))}  # fmt: skip
+    E, G = (1 / np.einsum("ia,ij,ja->a", stress, np.linalg.inv(C), stress) for stress in (tension, shear))
+    return {
+        "E_axial": 1 / S[2, 2], "E_transverse": 1 / S[0, 0], "nu_transverse": -S[0, 1] / S[0, 0],
+        "nu_axial": -S[0, 2] / S[2, 2], "G_axial": 1 / S[4, 4], "G_transverse": 1 / S[5, 5],
+        "K_transverse": (mean[0, 0] + mean[0, 1]) / 2, "deviation": _distance(C, mean),
+        "E_least": E.min(), "E_largest": E.max(), "G_least": G.min(), "G_largest": G.max(),
+    }  # fmt: skip

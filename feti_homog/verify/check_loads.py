@@ -1,7 +1,7 @@
 """Loads that the case prescribes, and the numbers of the states in result.json.
 
-Of every component a case prescribes its strain or its stress, and in generalized plane strain a temperature: a strain
-component that comes last.
+A case prescribes the strain or the stress of every component; in generalized plane strain the temperature is the last
+strain component.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ NAMES = {
 }
 TEMPERATURE, COUNTS = "temperature", {"bonded": BONDED, "closed": CLOSED, "open": OPEN}
 SAME_SHARE = 1e-12  # rounding of shares of a leg
+OF_ARCS = "debonded_length", "damaged_length", "debonded_shares"  # of an angle, in all unit loads
 LAST_OF_PLANE = 2  # place of gamma12 in the unit loads, whose state has the counts of an angle
 SPATIAL_ORDER = [0, 1, 5, 2, 4, 3]  # of unit strains in generalized plane strain; the fifth unit load is a temperature
 FIELDS = ("displacement", "fluctuation", "stress", "mesh_error", "stress_33")  # of a state on its mesh
@@ -99,12 +100,12 @@ def damaged_at(point: Document) -> int:
 
 @dataclass(frozen=True)
 class StateNumbers(State):
-    """A state without its fields on the mesh, which are kept of one state at a time; its cohesive tractions.
+    """A state without its mesh fields, which one state at a time has in memory; with cohesive tractions.
 
     Attributes:
-        stored, in_springs: <sigma : (eps - alpha T)> / 2 with the springs, and the springs alone, per area.
+        stored, in_springs: energy per area <sigma : (eps - alpha T)> / 2 with all springs, and in springs alone.
         released: (k,) True at tips that break by energy release.
-        used: (k,) used share of the strength of bonded nodes, NaN at these tips.
+        used: (k,) used strength share at bonded nodes, NaN at these tips.
         heat: conjugate of the temperature, - <alpha : sigma>.
         expanding: <alpha : L : strain>, 0 if unknown.
     """
@@ -162,59 +163,50 @@ def check_loads(findings: Findings, cell: DiscreteCell, states: States) -> None:
         points = np.arange(len(numbers)) // (len(rows) // len(document.get("angle", [None])))
         findings.compare("tables", numbers, points, 1.0, lambda k: f"{states[k].name}, point")
     findings.compare("load", len(states), count, 1.0, f"{len(states)} states, {count} asked for")
-    for state, (load, entries) in pairs:
-        _check_entries(findings, state, load, entries, scales)
-    _check_points(findings, cell, states)
+    _check_states(findings, cell, pairs, scales)
     for place, matrix in _linear_stiffnesses(document, cell.files.contact):
-        findings.compare("symmetry", matrix, matrix.T, float(np.abs(matrix).max()), place)
+        findings.compare("symmetry", matrix, matrix.T, np.abs(matrix).max(), place)
 
 
-def _check_entries(
-    findings: Findings, state: StateNumbers, load: Prescribed, entries: Document, scales: tuple[float, ...]
-) -> None:
-    """Check the numbers of a state against its load and in result.json."""
-    numbers: dict[str, Any] = {"strain": state.strain, "stress": state.mean_stress, TEMPERATURE: state.temperature}
-    _check_prescribed(findings, load, numbers, scales, state.name)
-    numbers |= {name: np.count_nonzero(state.status == status) for name, status in COUNTS.items()}
-    numbers["load_factor"] = state.load_factor
-    sizes = {"strain": scales[0], "stress": scales[1], TEMPERATURE: max(abs(state.temperature), 1.0)}
-    for name in numbers.keys() & entries.keys():
-        findings.compare("tables", entries[name], numbers[name], sizes.get(name, 1.0), f"{state.name}, {name}")
-
-
-def _check_points(findings: Findings, cell: DiscreteCell, states: States) -> None:
-    """Check energies, debonded and damaged lengths and counts of points."""
-    points, rows, sections = cell.files.points, cell.files.interface, len(cell.files.interfaces)
-    states = [state for state in states if 0 <= state.point < len(points)]
-    energy = max([state.stored for state in states], default=0.0) + cell.rounded_energy
+def _check_states(findings: Findings, cell: DiscreteCell, pairs: Sequence[Any], scales: tuple[float, ...]) -> None:
+    """Check states against their loads, and their numbers in result.json; `pairs` are (state, (load, entries))."""
+    rows, sections = cell.files.interface, len(cell.files.interfaces)
 
     def lengths(nodes: Bool) -> Float:
         return np.asarray(np.bincount(rows.fibre - 1, rows.length * nodes, len(cell.files.fibres.radius)), float)
 
     longest = float(lengths(np.ones(len(rows.length), bool)).max(initial=0.0)) or 1.0
     of_section = rows.length[:, None] * (rows.pair[:, None] == np.arange(sections))
-    for state in states:
+    energy = max([state.stored for state, _ in pairs], default=0.0) + cell.rounded_energy
+    for state, (load, entries) in pairs:
+        own = {"strain": state.strain, "stress": state.mean_stress, TEMPERATURE: state.temperature}
+        _check_prescribed(findings, load, own, scales, state.name)
         debonded, damaged = state.status != BONDED, (state.damage > 0.0) & (state.damage < 1.0)
-        expected: dict[str, tuple[str, Any, float]] = {
-            "stored": ("energy", state.stored, energy),
-            "stored_in_springs": ("energy", state.in_springs, energy),
-            "debonded_length": ("tables", lengths(debonded), longest),
-            "damaged_length": ("tables", lengths(damaged), longest),
-            "debonded_shares": ("tables", debonded @ of_section / of_section.sum(axis=0), 1.0),
+        numbers: dict[str, tuple[Any, float]] = {
+            "strain": (state.strain, scales[0]),
+            "stress": (state.mean_stress, scales[1]),
+            TEMPERATURE: (state.temperature, max(abs(state.temperature), 1.0)),
+            "load_factor": (state.load_factor, 1.0),
+            "stored": (state.stored, energy),
+            "stored_in_springs": (state.in_springs, energy),
+            "debonded_length": (lengths(debonded), longest),
+            "damaged_length": (lengths(damaged), longest),
+            "debonded_shares": (debonded @ of_section / of_section.sum(axis=0), 1.0),
         }
-        for name in expected.keys() & points[state.point].keys():
-            law, value, scale = expected[name]
-            findings.compare(law, points[state.point][name], value, scale, f"{state.name}, {name}")
-    for number, point in enumerate(points):
-        count = sum(point[name] for name in COUNTS)
-        findings.compare("tables", count, len(rows.length), 1.0, f"point {number}, {', '.join(COUNTS)}")
+        numbers |= {name: (np.count_nonzero(state.status == status), 1.0) for name, status in COUNTS.items()}
+        for name in numbers.keys() & entries.keys():
+            law, (value, scale) = "energy" if name.startswith("stored") else "tables", numbers[name]
+            findings.compare(law, entries[name], value, scale, f"{state.name}, {name}")
+    for number, point in enumerate(cell.files.points):
+        count, place = sum(point[name] for name in COUNTS), f"point {number}, {', '.join(COUNTS)}"
+        findings.compare("tables", count, len(rows.length), 1.0, place)
 
 
 def _scales(cell: DiscreteCell, states: States, loads: Sequence[Prescribed]) -> tuple[float, float, float]:
-    """Sizes of the strains and stresses of all states, and of stresses that the loads make in the bonded cell."""
+    """Largest strain and stress in all states, and largest stress by the loads in the bonded cell."""
     largest, imposed = max((float(np.abs(state.mean_stress).max()) for state in states), default=0.0), 0.0
     for state, load in product(states[:1], loads):
-        # Strains that came out are no scale of prescribed stresses.
+        # Computed strains are no scale for prescribed stresses.
         strains, v = np.where(load.by_stress, 0.0, load.values), len(state.strain)
         loaded = cell.loads(strains[:v], float(strains[v:].sum()))
         imposed = max(imposed, float(np.abs(cell.reuss @ loaded).max()))
@@ -235,7 +227,7 @@ def _check_prescribed(
 
 
 def _rows(cell: DiscreteCell) -> Iterator[tuple[Prescribed, Document]]:
-    """Yield the load and the entry of result.json of each point of a path, or of each state of another case."""
+    """Yield the load and the entry in result.json for each point on a path, or for each state without a path."""
     document, case = cell.files.document, cell.files.case
     if "path" in document:
         yield from zip(at_points(case, document["path"]), document["path"], strict=True)
@@ -264,12 +256,13 @@ def _columns(
     for number, load in enumerate(unit):
         matrix, is_thermal = np.array(table[f"{stiffness}{suffix}"]), load.values[v:].any()
         stress = np.array(table[f"thermal_stress{suffix}"]) if is_thermal else matrix @ load.values[:v]
-        counts = {name: table[name] for name in COUNTS if name in table and number == LAST_OF_PLANE}
-        yield replace(load, values=sign * load.values), {"stress": sign * stress} | counts
+        names = (*OF_ARCS, *COUNTS) if number == LAST_OF_PLANE else OF_ARCS
+        entries = {"stress": sign * stress} | {name: table[name] for name in names if name in table}
+        yield replace(load, values=sign * load.values), entries
 
 
 def _linear_stiffnesses(document: Document, contact: bool) -> Iterator[tuple[str, Float]]:
-    """Yield the stiffnesses in result.json of cells without one-sided contact, with their names."""
+    """Yield names and stiffnesses in result.json for cells without one-sided contact."""
     if "effective_stiffness" in document and "effective_stiffness_compression" not in document:
         yield "effective_stiffness", np.array(document["effective_stiffness"])
     for number, point in enumerate(document.get("angle", ())):

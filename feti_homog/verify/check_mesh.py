@@ -88,14 +88,21 @@ def _strangers(cell: DiscreteCell) -> Float:
 def _shape(cell: DiscreteCell) -> tuple[Float, Float, Bool]:
     """Return normals (k, 2) and tributary lengths (k,) by the mesh, and which (k,) are exact.
 
-    A round fibre has radial normals.  Ends of linear sides have halves of their lengths, nodes of quadratic ones
-    int N ds; a node has the mean normal of its sides, weighted by these parts.
+    Round fibres have radial normals.  Linear sides give half their length to each end, quadratic sides int N ds to
+    each node; a node has the mean normal of its sides, weighted by these parts.
     """
     files, rows, nodes = cell.files, cell.files.interface, cell.sides.nodes[cell.inner]
     row_of, k = np.full(len(files.mesh.points), -1), len(rows.length)
     row_of[cell.nodes.node] = cell.faces.row
     is_fibre = np.asarray(rows.body == files.fibres.body[rows.fibre - 1])
-    frames = _frames(cell, is_fibre)
+    # Frames F of the circles or ellipses c + F p, |p| = 1, NaN if unknown.
+    fibres = cell.files.document["fibres"]
+    axes = [fibre.hint("semi_axes", [fibre.hint("radius", np.nan)] * 2) for fibre in fibres]
+    angle = np.radians([fibre.hint("angle", 0.0) for fibre in fibres])
+    thickness = np.array([fibre.hint("coating", np.nan) for fibre in fibres], float)
+    turn = np.stack([np.cos(angle), -np.sin(angle), np.sin(angle), np.cos(angle)], axis=1).reshape(-1, 2, 2)
+    of, coats = rows.fibre - 1, np.where(is_fibre, 0.0, thickness[rows.fibre - 1])
+    frames = turn[of] * (np.array(axes, float).reshape(-1, 2)[of] + coats[:, None])[:, None]
     # A side whose nodes are no interface nodes belongs to none of them.
     row, is_quadratic = row_of[nodes], nodes.shape[1] == 3
     points, frame, (x, weights) = files.mesh.points[nodes], frames[row.max(axis=1)], roots_legendre(7)
@@ -115,22 +122,11 @@ def _shape(cell: DiscreteCell) -> tuple[Float, Float, Bool]:
     return np.where(is_round[:, None], radial, normal), np.asarray(length, float), np.asarray(is_known)
 
 
-def _frames(cell: DiscreteCell, is_fibre: Bool) -> Float:
-    """(k, 2, 2) frame F of each interface node's circle or ellipse c + F p, |p| = 1; NaN if unknown."""
-    rows, fibres = cell.files.interface, cell.files.document["fibres"]
-    axes = [fibre.hint("semi_axes", [fibre.hint("radius", np.nan)] * 2) for fibre in fibres]
-    angle = np.radians([fibre.hint("angle", 0.0) for fibre in fibres])
-    thickness = np.array([fibre.hint("coating", np.nan) for fibre in fibres], float)
-    turn = np.stack([np.cos(angle), -np.sin(angle), np.sin(angle), np.cos(angle)], axis=1).reshape(-1, 2, 2)
-    of, coats = rows.fibre - 1, np.where(is_fibre, 0.0, thickness[rows.fibre - 1])
-    return np.asarray(turn[of] * (np.array(axes, float).reshape(-1, 2)[of] + coats[:, None])[:, None])
-
-
 def _tangents(points: Float, frame: Float, places: Float) -> Float:
     """(s, q, 2) dx / ds, s in [0, 1], of sides with nodes (s, n, 2), ends first, at `places` (q,) in [-1, 1].
 
-    The chord of a side is the image of a chord of the unit circle under its frame (s, 2, 2); if the frame is NaN, the
-    side is the arc of a circle through its three nodes, or straight.
+    A chord is the image of a unit-circle chord under its frame (s, 2, 2); if the frame is NaN, a side is the circular
+    arc through its three nodes, or straight.
     """
     on_ellipse = np.isfinite(frame[:, 0, 0])
     frame = np.where(on_ellipse[:, None, None], frame, np.eye(2))
@@ -152,7 +148,7 @@ def check_arcs(findings: Findings, cell: DiscreteCell, states: States) -> None:
     off = [abs(point["angle"] - angle) for point, angle in zip(points, angles, strict=False)]
     findings.record("arcs", off, "the angle of a point")
     for state in states:
-        # A number that is wrong breaks the law of the tables.
+        # A wrong number of a point breaks the law of the tables.
         opening = points[min(max(state.point, 0), len(points) - 1)]["angle"] if points else None
         inside, outside = _sides(cell, opening)
         bonded = state.status == BONDED
@@ -164,7 +160,7 @@ def check_arcs(findings: Findings, cell: DiscreteCell, states: States) -> None:
 
 
 def check_first_step(findings: Findings, cell: DiscreteCell, first: Section) -> None:
-    """Check that the bonds before the first increment are those outside of the arcs of the case."""
+    """Check that all nodes outside of the case's arcs, and no others, have bonds before the first increment."""
     if cell.files.case["cell"]["geometry"] != "mesh" or "interface" not in cell.files.case:
         (inside, outside), count = _sides(cell, None), first["bonded"] + first["broke"]
         excess = max(np.count_nonzero(outside) - count, count - np.count_nonzero(~inside), 0)
@@ -196,12 +192,11 @@ def check_rates(findings: Findings, cell: DiscreteCell, tips: Section | None, wh
     findings.compare("rates", G, first + second, np.abs(G), at)
     findings.compare("rates", first * np.sin(turn) ** 2, second * np.cos(turn) ** 2, np.abs(G), at)
     findings.record("rates", np.where(np.isin(load, LOADS), 0.0, np.inf), at)
+    radii = np.hypot(*from_centre(rows.points, cell.files.fibres.centre[rows.fibre - 1], cell.files.size).T)
     for t in range(len(G)):
         on_curve = (rows.fibre == number[t]) & (rows.pair == pair[t] - 1)
         # A coating has the number of its fibre and another radius.
-        centres = cell.files.fibres.centre[rows.fibre[on_curve] - 1]
-        away = from_centre(rows.points[on_curve], centres, cell.files.size)
-        radius = float(np.median(np.hypot(*away.T))) if on_curve.any() else np.nan
+        radius = float(np.median(radii[on_curve])) if on_curve.any() else np.nan
         chords = 2 * radius * np.abs(np.sin(np.radians(cell.bond_directions[on_curve] - angle[t]) / 2))
         off = np.abs(np.append(chords, MODE_LENGTH * radius) - length[t]).min() / length[t]
         off += chords.min(initial=np.inf) > AT_NODE * radius

@@ -5,7 +5,8 @@ Fields may be kept at some points only; the others in result.json obey the same 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -43,8 +44,8 @@ def check_path(findings: Findings, cell: DiscreteCell, states: States) -> None:
     tolerance = max(STRENGTH, 10.0 * solver_limit(float(cell.files.document["solver"].hint("rtol"))))
     for state in states if law.has_tips else ():
         _check_tips(findings, cell, state, points[state.point]["tips"])
-    used = [_used(cell, state, points[state.point].get("tips")) for state in states]
-    _check_strength(findings, states, used, points, by_events, tolerance)
+    states = [replace(state, used=_used(cell, state, points[state.point].get("tips"))) for state in states]
+    _check_strength(findings, states, points, by_events, tolerance)
     if law.has_toughness:
         _check_toughness(findings, cell, states, points, by_events)
     check_path_energies(findings, cell, states, points)
@@ -76,29 +77,23 @@ def _check_breaks(findings: Findings, states: States, points: Points, by_events:
         findings.compare("breaks", broke, expected, 1.0, f"{state.name}, bonds that broke")
 
 
-def _check_strength(
-    findings: Findings, states: States, used: Sequence[Float], points: Points, by_events: bool, tolerance: float
-) -> None:
+def _check_strength(findings: Findings, states: States, points: Points, by_events: bool, tolerance: float) -> None:
     """Check that no bond exceeds its strength unless a jump at this load overloads it and it breaks at once.
 
-    Events break the worst bonds; `used` are (k,) utilisations.
+    Events break the worst bonds.
     """
-    for state, shares in zip(states, used, strict=True):
-        finite, where = np.nan_to_num(shares), f"{state.name}, interface node {{}}".format
-        excess = np.maximum(finite - 1.0, 0.0)
+    for number, state in enumerate(states):
+        used, where = np.nan_to_num(state.used), f"{state.name}, interface node {{}}".format
         overloaded = by_events & overloaded_by_jump(state, points, tolerance)
-        findings.record("strength", np.where(overloaded, 0.0, excess), where)
+        findings.record("strength", np.where(overloaded, 0.0, np.maximum(used - 1.0, 0.0)), where)
+        largest, after = used.max(initial=1.0), states[min(number + 1, len(states) - 1)]
         if by_events and (broke := damaged_at(points[state.point])):
             # The next point has the bonds that break; here so many are as near to their strength as the worst.
-            worst = np.sort(np.where(np.isnan(shares), np.inf, shares))[-broke:]
-            off = np.maximum(1.0 - worst / finite.max(initial=1.0), 0.0)
-            findings.record("strength", off, f"{state.name}, bonds that break")
-    for (state, shares), (after, _) in pairwise(zip(states, used, strict=True)):
+            worst = np.sort(np.where(np.isnan(state.used), np.inf, state.used))[-broke:]
+            findings.record("strength", np.maximum(1.0 - worst / largest, 0.0), f"{state.name}, bonds that break")
         if by_events and after.point == state.point + 1:
-            worst = np.nan_to_num(shares).max(initial=1.0)
-            broken = (after.damage > state.damage) & ~np.isnan(shares)
-            off = np.where(broken, 1.0 - shares / worst, 0.0)
-            findings.record("strength", off, f"{state.name}, interface node {{}}".format)
+            broken = (after.damage > state.damage) & ~np.isnan(state.used)
+            findings.record("strength", np.where(broken, 1.0 - state.used / largest, 0.0), where)
 
 
 def overloaded_by_jump(state: StateNumbers, points: Points, tolerance: float) -> Bool:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from feti_homog.typing import Float
-from feti_homog.verify.check_constants import about_fibres, engineering_constants, moduli
+from feti_homog.verify.check_constants import constants_of
 from feti_homog.verify.check_loads import NAMES, SPATIAL_ORDER
 from feti_homog.verify.constitutive_law import laws, mixed_phases
 from feti_homog.verify.discrete_cell import BONDED, CLOSED, DiscreteCell
@@ -29,7 +29,7 @@ Case = dict[str, Any]
 
 def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
     """Check the values of all constants, and one derivative along a direction in which all parameters change."""
-    document, states = cell.files.document, list(cell.files.states())
+    document = cell.files.document
     if "sensitivities" not in document:
         return
     names = document["sensitivities"]["parameters"]
@@ -39,6 +39,7 @@ def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
     sizes = np.where(ratios, 0.5 - values, np.where(values == 0.0, 1.0, np.abs(values)))
     direction = sizes * np.resize(WEIGHTS, len(values))
     cases = [_moved(cell, names, values + sign * STEP * direction) for sign in (1, -1)]
+    states = list(cell.files.states())
     if "load" in document:
         _check_load(findings, cell, states[0], cases, direction)
     elif document["sensitivities"].get("at_fixed_status"):
@@ -50,9 +51,9 @@ def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
 def _check_secants(
     findings: Findings, cell: DiscreteCell, states: list[State], cases: list[Case], direction: Float
 ) -> None:
-    """Check derivatives of energies of states with contact, which are stationary, too: the diagonal of the secants.
+    """Check derivatives of contact states' energies, which are stationary, too: the diagonal of the secants.
 
-    Other derivatives need fields of other loads at the same status, which no file has; only their values are checked.
+    Other derivatives need fields under other loads at the same status, which no file has; only values are checked.
     """
     document, data = cell.files.document, cell.files.document["sensitivities"]
     data.leaves_open("derivatives")
@@ -71,9 +72,9 @@ def _check_secants(
 
 
 def _check_load(findings: Findings, cell: DiscreteCell, state: State, cases: list[Case], direction: Float) -> None:
-    """Check strains x and stresses s of one load, its stored energy, and the derivatives of the answers.
+    """Check strains x and stresses s under one load, the stored energy, and the derivatives of all answers.
 
-    With prescribed strains g and stresses f, d(x_g.s_g - x_f.s_f) / 2 is the derivative of the energy of fixed fields.
+    With prescribed strains g and stresses f, d(x_g.s_g - x_f.s_f) / 2 is the energy derivative at fixed fields.
     With a temperature, whose conjugate no file has, only the values are checked.
     """
     data, point = cell.files.document["sensitivities"], cell.files.document["load"]
@@ -111,10 +112,10 @@ def _check_linear(
     slope = (above - below) / (2 * STEP)
     C, heat = np.array(document["effective_stiffness"]), document.get("thermal_stress")
     heat = None if heat is None else np.array(heat)
-    constants, n = _constants_of(C, heat), len(C)
+    constants, n = constants_of(C, heat), len(C)
     step = STIFFNESS_STEP * np.abs(C).max() / max(float(np.abs(slope).max()), TINY)
     ends = [
-        _constants_of(C + change[:, :n], None if heat is None else heat + change[:, n])
+        constants_of(C + change[:, :n], None if heat is None else heat + change[:, n])
         for change in (step * slope, -step * slope)
     ]
     for k, name in enumerate(data["constants"]):
@@ -212,15 +213,3 @@ def _springs(cell: DiscreteCell, case: Mapping[str, Any], first: State, second: 
                 acts = (rows.pair == number) & ((first.status == BONDED) | ((first.status == CLOSED) & (k == 0)))
                 energy += float(stiffness) * float((rows.length * first.jump[:, k] * second.jump[:, k])[acts].sum())
     return energy
-
-
-def _constants_of(C: Float, heat: Float | None) -> dict[str, float]:
-    """Map names to constants of a stiffness and a thermal stress."""
-    n = len(C)
-    constants: dict[str, float | None] = {f"C{i + 1}{j + 1}": float(C[i, j]) for i in range(n) for j in range(i, n)}
-    strains = None if heat is None else -np.linalg.solve(C, heat)
-    constants |= moduli(C) if n == 3 else engineering_constants(C) | about_fibres(C, strains)
-    if heat is not None and strains is not None:
-        constants |= {"expansion_x1": float(strains[0]), "expansion_x2": float(strains[1])}
-        constants |= {f"thermal_S{k + 1}{k + 1}": float(heat[k]) for k in range(3)}
-    return {name: value for name, value in constants.items() if value is not None}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from feti_homog.typing import Bool, Float, Int
-from feti_homog.verify.bonds import friction_at, friction_of_damage_at, law_at, rubbing_force
+from feti_homog.verify.bonds import friction_at, law_at, rubbing_force
 from feti_homog.verify.constitutive_law import out_of_plane
 from feti_homog.verify.discrete_cell import BONDED, CLOSED, OPEN, ROUNDED_TERMS, DiscreteCell
 from feti_homog.verify.elements import PLACES, ElementFields
@@ -18,7 +18,15 @@ def check_state(findings: Findings, cell: DiscreteCell, state: State, fields: El
     element = f"{state.name}, element {{}}".format
     stiffest = np.abs(cell.stiffnesses).max(axis=(1, 2))[cell.files.mesh.phase]
     findings.compare("stress", state.stress, fields.stress, (stiffest * fields.strain_size)[:, None], element)
-    _check_copies(findings, cell, state)
+    # Copies of a node have one fluctuation: by periodicity in a subdomain, by gluing elsewhere.
+    nodes, scale = cell.nodes, cell.largest_displacement(state)
+    values = state.fluctuation[nodes.node]
+    in_subdomain = nodes.place * (int(nodes.subdomain.max()) + 1) + nodes.subdomain
+    for law, group in (("periodicity", in_subdomain), ("continuity", _glued(cell))):
+        _, inverse, count = np.unique(group, return_inverse=True, return_counts=True)
+        copy = inverse.ravel()
+        means = np.stack([(np.bincount(copy, column) / count)[copy] for column in values.T], axis=1)
+        findings.compare(law, values, means, scale, lambda i: f"{state.name}, mesh node {nodes.node[i]}")
     _check_equilibrium(findings, cell, state, fields)
     _check_averages(findings, cell, state, fields)
     if not cell.files.is_spatial:
@@ -35,28 +43,15 @@ def interface_forces(cell: DiscreteCell, state: State) -> Float:
     return cell.in_axes(state.traction * cell.files.interface.length[:, None])
 
 
-def _check_copies(findings: Findings, cell: DiscreteCell, state: State) -> None:
-    """Check that copies of a node have one fluctuation: by periodicity in a subdomain, by gluing elsewhere."""
-    nodes, scale = cell.nodes, cell.largest_displacement(state)
-    values = state.fluctuation[nodes.node]
-    in_subdomain = nodes.place * (int(nodes.subdomain.max()) + 1) + nodes.subdomain
-    for law, group in (("periodicity", in_subdomain), ("continuity", _glued(cell))):
-        _, inverse, count = np.unique(group, return_inverse=True, return_counts=True)
-        copy = inverse.ravel()
-        means = np.stack([(np.bincount(copy, column) / count)[copy] for column in values.T], axis=1)
-        findings.compare(law, values, means, scale, lambda i: f"{state.name}, mesh node {nodes.node[i]}")
-
-
 def _glued(cell: DiscreteCell) -> Int:
     """(b,) equal numbers of glued torn nodes: one a place, two at interface nodes, the odd one on the fibre."""
     return np.asarray(2 * cell.nodes.place + ((cell.faces.row >= 0) & cell.faces.is_fibre))
 
 
 def _check_equilibrium(findings: Findings, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
-    """Check that forces on all copies of a node balance, on faces of interface nodes with the traction.
+    """Check that forces on all node copies balance, on interface faces with the traction.
 
-    The fixed place, where u* = 0, collects the rounding of all others, of independent signs: the root of the sum of
-    their squares.
+    The fixed place, where u* = 0, collects all rounding, with independent signs: the root of summed squares.
     """
     nodes, faces, traction = cell.nodes, cell.faces, interface_forces(cell, state)
     scale = max(fields.largest_force, float(np.abs(traction).max(initial=0.0)))
@@ -116,14 +111,17 @@ def _check_bonds(findings: Findings, cell: DiscreteCell, state: State) -> None:
     damage = state.damage.clip(np.where(bonded, 0.0, 1.0), np.where(bonded, np.nextafter(1.0, 0.0), 1.0))
     findings.record("bond", np.abs(damage - state.damage), f"{state.name}, damage of node {{}}".format)
     slack = state.jump - law_at(files, damage=state.damage).jumps(state.traction)
-    rubs = (friction_of_damage_at(files) > 0.0) & bonded & (state.damage > 0.0)
+    rubs = (friction_at(files, on_damage=True) > 0.0) & bonded & (state.damage > 0.0)
     gap = slack[:, 0].copy()
     slack[rubs, 1] = slack[~bonded, 1:] = slack[state.status == OPEN] = 0.0
     findings.record("bond", relative(slack, largest), at)
     if not bonded.all():
         _check_contact(findings, cell, state, rubs, gap)
     if rubs.any():
-        force, limit = rubbing_force(files, state), friction_of_damage_at(files) * np.maximum(-state.traction[:, 0], 0)
+        force, limit = (
+            rubbing_force(files, state),
+            friction_at(files, on_damage=True) * np.maximum(-state.traction[:, 0], 0),
+        )
         sticks, pull = np.maximum(np.abs(force) - limit, 0.0), float(np.abs(state.traction).max())
         off = np.where(state.sliding != 0, state.sliding * force - limit, sticks)
         findings.record("sliding", relative(np.where(rubs, off, 0.0), max(pull, cell.scales_of(state).stress)), at)

@@ -10,24 +10,16 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from feti_homog.typing import AnyInt, Bool, Float, Int
+from feti_homog.verify import torus
 from feti_homog.verify.bonds import friction_at, pairs_of
 from feti_homog.verify.constitutive_law import laws, mixed_phases
 from feti_homog.verify.elements import Elements
 from feti_homog.verify.reading import ResultFiles, State, gradient
-from feti_homog.verify.torus import (
-    TornNodes,
-    TornSides,
-    along_one_line,
-    constituents,
-    from_centre,
-    inwardness,
-    torn,
-    wrapped,
-)
+from feti_homog.verify.torus import TornNodes, TornSides
 
-# Scales of a state over the largest of the run, at least: a path may come back to zero strain.
+# Least scale of a state / largest scale in the run: a path may come back to zero strain.
 LEAST_SHARE = 1e-9
-# Share of its terms that counts in the scale of a sum: 1e-15 of the terms are rounding.
+# Share of the terms that adds to the scale of their sum: 1e-15 of the terms are rounding.
 ROUNDED_TERMS = 1e-5
 BONDED, CLOSED, OPEN = 0, 1, 2
 DIRECTION_DIGITS = 9  # to which directions of tips differ
@@ -43,13 +35,13 @@ class Scales(NamedTuple):
 
 @dataclass(frozen=True)
 class Faces:
-    """Torn nodes on the two faces of the k interface nodes.
+    """Torn nodes on the two faces at the k interface nodes.
 
     Attributes:
         row, is_fibre: (b,) interface node at each torn node, or -1, and True on the inner body.
-        copies: (b,) number of copies of a torn node in its subdomain, periodic images of each other.
-        distance, place: (k,) of each interface node from its place, and this place; infinite and -1 without one.
-        pair: (places,) section of the two bodies, where exactly two meet along one line; -1 where they never part.
+        copies: (b,) how often a torn node is in its subdomain, by periodic images.
+        distance, place: (k,) distance from an interface node to its place, and this place; infinite and -1 without one.
+        pair: (places,) section for the two bodies, where exactly two meet along one line; -1 where they never part.
     """
 
     row: Int
@@ -103,10 +95,10 @@ class DiscreteCell:
         mesh = files.mesh
         stiffnesses, free = laws(files.case, files.phases)
         elements = Elements(mesh, stiffnesses, mixed_phases(files.case, files.phases))
-        sides, nodes, radius = torn(mesh, files.size)
-        parts = constituents(mesh, sides)
-        inwards = inwardness(mesh, files.phases, sides, parts)
-        on_line = along_one_line(sides, nodes, parts[mesh.subdomain])
+        sides, nodes, radius = torus.torn(mesh, files.size)
+        parts = torus.constituents(mesh, sides)
+        inwards = torus.inwardness(mesh, files.phases, sides, parts)
+        on_line = torus.along_one_line(sides, nodes, parts[mesh.subdomain])
         faces = _faces(files, nodes, on_line, parts, inwards, radius)
         depth, other = inwards[parts[mesh.subdomain]], sides.element[sides.partner]
         may_part = (sides.partner >= 0) & (pairs_of(files)[mesh.phase[sides.element], mesh.phase[other]] >= 0)
@@ -151,7 +143,7 @@ class DiscreteCell:
     def directions(self) -> Float:
         """(k,) directions of the interface nodes from their fibres' centres, in degrees."""
         rows = self.files.interface
-        x, y = from_centre(rows.points, self.files.fibres.centre[rows.fibre - 1], self.files.size).T
+        x, y = torus.from_centre(rows.points, self.files.fibres.centre[rows.fibre - 1], self.files.size).T
         return np.asarray(np.degrees(np.arctan2(y, x)))
 
     @cached_property
@@ -199,7 +191,7 @@ class DiscreteCell:
         return strain if free is None else np.asarray(strain + np.abs(free).max(axis=0))
 
     def scales(self, strain: Float, temperature: float, slip: float = 0.0) -> Scales:
-        """Return the sizes under a load, and a slip that friction holds in an unloaded cell; at least a faint one's."""
+        """Return the sizes under a load, or a faint one, and under a slip that friction holds in an unloaded cell."""
         loads, longest, (width, height) = self.loads(strain, temperature), float(self.files.size.max()), self.files.size
         loads = np.asarray(loads + np.copysign(slip / longest, loads))
         corners = np.array([[width, 0.0], [0.0, height], [width, height]])
@@ -238,8 +230,8 @@ def _faces(files: ResultFiles, nodes: TornNodes, on_line: Bool, parts: Int, inwa
     points, size = files.interface.points, files.size
     place, distance = np.full(len(points), -1), np.full(len(points), np.inf)
     if len(points) and len(nodes.node):
-        tree = cKDTree(wrapped(files.mesh.points[nodes.node], size), boxsize=size)
-        away, nearest = tree.query(wrapped(points, size), distance_upper_bound=radius)
+        tree = cKDTree(torus.wrapped(files.mesh.points[nodes.node], size), boxsize=size)
+        away, nearest = tree.query(torus.wrapped(points, size), distance_upper_bound=radius)
         on_mesh = np.flatnonzero(np.isfinite(away))
         place[on_mesh], distance[on_mesh] = nodes.place[nearest[on_mesh]], away[on_mesh]
     row_of = np.full(nodes.places, -1)

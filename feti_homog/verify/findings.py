@@ -1,11 +1,11 @@
 """Laws of the certificate with their limits, their largest violations, and the numbers that no law reads.
 
-Rounding.  Sums over fields err by some units in the last place of their terms; quantities that the solver gets from
-factorizations by some hundred: forces of 119 000 elements by 1.3e-12 at most.  In a very stiff phase, whose strains are
-differences of nearly equal displacements, rounding is 1e-15 of the terms.  Limits are ten to a thousand times the
-measured errors.
+Rounding.  Sums over fields err by some units in the last place of their terms; quantities from factorizations in the
+solver by some hundred: forces in a mesh with 119 000 elements by 1.3e-12 at most.  In a very stiff phase, whose strains
+are differences between nearly equal displacements, rounding is 1e-15 of the terms.  Limits are ten to a thousand times
+the measured errors.
 
-Solver.  The Krylov method leaves jumps of `rtol`, relative; laws of closed faces hold to the tolerance of a run's
+Solver.  The Krylov method leaves jumps of `rtol`, relative; laws for closed faces hold to the tolerance of a run's
 checks, min(1000 rtol, 1e-4).  `rtol` is written in the result, so 1e-4 is the most that any result may claim.
 """
 

@@ -1,20 +1,20 @@
-"""Laws of the energies of a path: the work of the loads is stored, lost where bonds break, or heat of friction.
+"""Laws of the energies of a path: work by the loads is stored, lost where bonds break, or becomes heat by friction.
 
-Notation: E and Sigma are all strains of a point, a temperature among them, and their conjugates; W = E.Sigma / 2 is the
-stored energy.  For fixed bonds W is a convex function of E, homogeneous of degree two.  A load prescribes the strains
-E_s and the stresses Sigma_f; its potential is
+Notation: E and Sigma are all strains at a point, a temperature among them, and their conjugates; W = E.Sigma / 2 is the
+stored energy.  For fixed bonds W is a convex function of E, homogeneous with degree two.  A load prescribes strains E_s
+and stresses Sigma_f; its potential is
 
     P(E_s, Sigma_f) = min over E_f of W - Sigma_f.E_f = 1/2 (E_s.Sigma_s - Sigma_f.E_f),
 
-convex in E_s and concave in Sigma_f, so that the state ' of another load on the same bonds bounds it: for any t >= 0
+convex in E_s and concave in Sigma_f, so that the state ' under another load with equal bonds bounds it: for any t >= 0
 
     P >= t Sigma'_s.E_s - t^2 W'   if Sigma_f = t Sigma'_f,
     P <= t^2 W' - t E'_f.Sigma_f   if E_s = t E'_s.                                                         (P)
 
-Bonds break at constant load and lose P before - P after.  The files have the state of one of them; (P) bounds the other
-one by the state beyond, with equal bounds where the loads are in proportion: on the whole first leg, in a cascade, and
-where a later leg is on a ray.  There the loss obeys an equation; elsewhere it lies between bounds.
-Between points of events without breaks the response is straight, so the work is (Sigma + Sigma').(E' - E) / 2.
+Bonds break at constant load and lose P before - P after.  The files have one of these two states; (P) bounds the other
+potential by the state beyond, with equal bounds where the loads are in proportion: on the whole first leg, in a
+cascade, and where a later leg is on a ray.  There the loss obeys an equation; elsewhere it lies between bounds.
+Between event points without breaks the response is straight, so the work is (Sigma + Sigma').(E' - E) / 2.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from itertools import pairwise
 import numpy as np
 
 from feti_homog.typing import Float
-from feti_homog.verify.bonds import friction_at, friction_of_damage_at, law_at
+from feti_homog.verify.bonds import friction_at, law_at
 from feti_homog.verify.check_loads import SAME_SHARE, TEMPERATURE, Prescribed, States, at_points, damaged_at, targets
 from feti_homog.verify.discrete_cell import CLOSED, DiscreteCell
 from feti_homog.verify.findings import Findings, Points
@@ -56,19 +56,12 @@ class PointNumbers:
     @property
     def potential(self) -> float:
         """P of the load, per area."""
-        return _work(*self.by_strain) / 2 - _work(*self.by_stress) / 2
+        return _work(*self.pairs(by_stress=False)) / 2 - _work(*self.pairs(by_stress=True)) / 2
 
-    @property
-    def by_strain(self) -> tuple[Float, Float]:
-        """(s,) the prescribed strains, and their conjugates."""
-        by_strain = ~self.load.by_stress
-        return self.load.values[by_strain], self.stress[by_strain]
-
-    @property
-    def by_stress(self) -> tuple[Float, Float]:
-        """(f,) the prescribed stresses, and their conjugates."""
-        by_stress = self.load.by_stress
-        return self.load.values[by_stress], self.strain[by_stress]
+    def pairs(self, by_stress: bool) -> tuple[Float, Float]:
+        """Return the prescribed strains, or stresses, and their conjugates."""
+        kind = self.load.by_stress == by_stress
+        return self.load.values[kind], (self.strain if by_stress else self.stress)[kind]
 
 
 def check_path_energies(findings: Findings, cell: DiscreteCell, states: States, points: Points) -> None:
@@ -147,7 +140,7 @@ def check_step_heat(findings: Findings, cell: DiscreteCell, before: State, state
     points = files.document["path"]
     if at != before.point + 1 or "friction_heat" not in points[at] or damaged_at(points[at]):
         return
-    if files.case["path"]["method"] == "events" or friction_of_damage_at(files).any():
+    if files.case["path"]["method"] == "events" or friction_at(files, on_damage=True).any():
         return
     slips = [(s.jump - law_at(files, damage=s.damage).jumps(s.traction))[:, 1] for s in (before, state)]
     rubs = (state.status == CLOSED) & (friction_at(files) > 0.0)
@@ -201,7 +194,7 @@ def potentials(load: Prescribed, other: PointNumbers) -> tuple[float, float]:
     """Bound the potential of a load with the bonds of another state, by (P)."""
     if (load.by_stress != other.load.by_stress).any():
         return -np.inf, np.inf
-    (strains, stresses), (forces, answers) = other.by_strain, other.by_stress
+    (strains, stresses), (forces, answers) = other.pairs(by_stress=False), other.pairs(by_stress=True)
     own_strains, own_forces = load.values[~load.by_stress], load.values[load.by_stress]
     energy = other.stored if abs(other.stored) > NO_ENERGY * other.terms else 0.0
     least = _largest(_work(own_strains, stresses), energy, own_forces, forces)

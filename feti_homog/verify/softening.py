@@ -56,11 +56,6 @@ class Cohesive(BondLaw):
         energies = np.stack([self.absorbed(np.full(len(after), psi), before, after) for psi in MODES])
         return energies.min(axis=0) * (1 - BETWEEN_MODES), energies.max(axis=0) * (1 + BETWEEN_MODES)
 
-    def mode(self, traction: Float) -> Float:
-        """(k,) psi with tan^2 psi = G_II / G_I."""
-        first, second = np.sqrt(self.energies(traction)).T
-        return np.asarray(np.arctan2(second, first))
-
     def breaks(self, traction: Float) -> dict[str, float]:
         """Return the shares of the components at the onset of damage."""
         return dict(zip(("normal", "tangential", "axial"), self._onset_shares(traction)[0].tolist(), strict=False))
