@@ -149,7 +149,7 @@ def law_of(section: Mapping[str, Any]) -> BondLaw:
 
 
 def law_at(files: ResultFiles, nodes: AnyInt | Bool | slice = slice(None), damage: Float | None = None) -> BondLaw:
-    """Law of the bonds at some interface nodes, with the damage (k,) of all nodes if it is known.
+    """Law of the bonds at some interface nodes, with the damage (k,) at all nodes if it is known.
 
     If there are several sections or fibre strengths, numbers in its section are (p,), one a node.
     """
@@ -170,7 +170,7 @@ def _number(section: Mapping[str, Any], name: str) -> float:
 
 
 def friction_at(files: ResultFiles, on_damage: bool = False) -> Float:
-    """(k,) friction coefficients of debonded faces, or of the damaged share of bonds."""
+    """(k,) friction coefficients on debonded faces, or on the damaged share of bonds."""
     key = "friction_on_damage" if on_damage else "friction"
     mu = [float(section.get("friction", 0.0)) * bool(section.get(key)) for section in files.interfaces or [{}]]
     return np.asarray(np.array(mu)[np.minimum(files.interface.pair, len(mu) - 1)])
@@ -196,7 +196,7 @@ def cohesive_traction(files: ResultFiles, state: State) -> Float:
 
 
 def energy_of_springs(files: ResultFiles, state: State) -> float:
-    """Sum the energy of all springs; of rubbing bonds (1 - d) K s^2 / 2 + d f^2 / (2 K)."""
+    """Sum the energy of all springs; in rubbing bonds it is (1 - d) K s^2 / 2 + d f^2 / (2 K)."""
     traction, force = cohesive_traction(files, state), rubbing_force(files, state)
     law = law_at(files, damage=state.damage)
     intact = law_at(files, damage=np.zeros(len(force))).jumps(np.ones_like(traction))[:, 1]

@@ -51,7 +51,7 @@ def _check_stiffness(findings: Findings, cell: DiscreteCell, document: Section) 
 
 
 def _check_status(findings: Findings, cell: DiscreteCell) -> None:
-    """Tolerances follow from rtol, the status from checks, convergence and other faults."""
+    """Check tolerances by rtol, and the status by checks, convergence and other faults."""
     document, solver = cell.files.document, cell.files.document["solver"]
     # Options of the command line are in no file.
     is_of_case = solver.hint("rtol") == float(cell.files.case.get("petsc", {}).get("feti_ksp_rtol", RTOL))

@@ -49,9 +49,9 @@ class Prescribed:
 
 
 def targets(case: Document) -> list[Prescribed]:
-    """Return the loads that a case names, all components of each.
+    """Return the loads that a case names, each with all components.
 
-    A component that a load does not name stays; at first it is free of stress.
+    A component that a load does not name stays; at first it is stress-free.
     """
     v = 6 if case["analysis"]["plane"] == "generalized" else 3
     n = v + (v > 3)

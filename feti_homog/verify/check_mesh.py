@@ -168,7 +168,7 @@ def check_first_step(findings: Findings, cell: DiscreteCell, first: Section) -> 
 
 
 def _sides(cell: DiscreteCell, opening: float | None) -> tuple[Bool, Bool]:
-    """Return which interface nodes (k,) are inside of an arc, and which are outside of all arcs."""
+    """Return which interface nodes (k,) are inside an arc, and which are outside all arcs."""
     rows = cell.files.interface
     inside, outside = np.zeros(len(rows.pair), bool), np.ones(len(rows.pair), bool)
     arcs = [(n, arc) for n, section in enumerate(cell.files.interfaces) for arc in section.get("debonded", ())]

@@ -1,4 +1,4 @@
-"""Laws of paths and envelopes: breaking bonds and their loads, tips, the first bond of an envelope at its strength.
+"""Path and envelope laws: breaking bonds and their loads, tips, the first bond in an envelope at its strength.
 
 Fields may be kept at some points only; the others in result.json obey the same laws of counts.
 """

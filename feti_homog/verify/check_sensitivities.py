@@ -1,4 +1,4 @@
-"""Law of the sensitivities: field energies change as in the file where constants of the case change."""
+"""Sensitivity law: field energies change as in the file where constants of the case change."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ def _check_load(findings: Findings, cell: DiscreteCell, state: State, cases: lis
 def _check_linear(
     findings: Findings, cell: DiscreteCell, states: list[State], cases: list[Case], direction: Float
 ) -> None:
-    """Check the derivatives of all constants of a linear cell."""
+    """Check the derivatives of all constants in a linear cell."""
     document, data = cell.files.document, cell.files.document["sensitivities"]
     above, below = (_energies(cell, states, case) for case in cases)
     slope = (above - below) / (2 * STEP)
@@ -154,7 +154,7 @@ def _moved(cell: DiscreteCell, names: Sequence[str], values: Float) -> Case:
 
 
 def _energies(cell: DiscreteCell, states: list[State], case: Mapping[str, Any]) -> Float:
-    """(v, v) or (6, 7) energies of pairs of unit-load fields in this case; the first of a pair is under a strain."""
+    """(v, v) or (6, 7) energies of unit-load field pairs in this case; the first field in a pair is under a strain."""
     files, phases = cell.files, cell.files.phases
     growth = float(np.log(case["cell"].get("fibre_fraction", 1.0) / files.case["cell"].get("fibre_fraction", 1.0))) / 2
     mesh, states = _grown(cell, growth, states) if growth else (files.mesh, states)

@@ -81,7 +81,7 @@ def _check_equilibrium(findings: Findings, cell: DiscreteCell, state: State, fie
 
 
 def _check_averages(findings: Findings, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
-    """Check <sigma> = Sigma, <eps> = E with the opening of the faces and the strain of voids, and Hill's condition."""
+    """Check <sigma> = Sigma, <eps> = E with face openings and void strains, and Hill's condition."""
     area, weights, v, scales = cell.area, cell.elements.area[:, None], len(state.strain), cell.scales_of(state)
     mean = (weights * fields.stress).sum(axis=0) / area
     size = float(((weights * np.abs(fields.stress)).sum(axis=0) / area).max())

@@ -1,4 +1,4 @@
-"""The cell of a result: its elements, torn nodes, interface faces, and the scales of its states."""
+"""The cell in a result: its elements, torn nodes, interface faces, and scales for its states."""
 
 from __future__ import annotations
 
@@ -148,7 +148,7 @@ class DiscreteCell:
 
     @cached_property
     def bond_directions(self) -> Float:
-        """(k,) `directions` in (-180, 180], or directions of the normals of fibres without a centre."""
+        """(k,) `directions` in (-180, 180], or normal directions on fibres without a centre."""
         n1, n2 = self.files.interface.normal.T
         angle = np.where(np.isnan(self.directions), np.degrees(np.arctan2(n2, n1)), self.directions)
         return np.asarray(angle + 360.0 * (np.round(angle, DIRECTION_DIGITS) <= -180.0))

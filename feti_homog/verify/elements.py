@@ -31,7 +31,7 @@ NORMAL = {3: [0, 1], 6: [0, 1, 2]}
 
 @dataclass(frozen=True)
 class ElementFields:
-    """Fields that displacements (n, c) make.
+    """Fields from displacements (n, c).
 
     Attributes:
         strain, stress: (m, v) element means.

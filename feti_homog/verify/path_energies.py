@@ -1,4 +1,4 @@
-"""Laws of the energies of a path: work by the loads is stored, lost where bonds break, or becomes heat by friction.
+"""Path energy laws: work by the loads is stored, lost where bonds break, or becomes heat by friction.
 
 Notation: E and Sigma are all strains at a point, a temperature among them, and their conjugates; W = E.Sigma / 2 is the
 stored energy.  For fixed bonds W is a convex function of E, homogeneous with degree two.  A load prescribes strains E_s
@@ -41,9 +41,9 @@ NO_ENERGY, LEAST_STEP, LEAST_HEAT = 1e-9, 1e-6, 1e-4
 
 @dataclass(frozen=True)
 class PointNumbers:
-    """Strains and stresses (n,) of a point, the temperature and its conjugate last, NaN if unknown; its energy.
+    """Strains and stresses (n,) at a point, the temperature and its conjugate last, NaN if unknown; its energy.
 
-    `load` is prescribed; `terms` is the least scale of the terms of the stored energy, per area.
+    `load` is prescribed; `terms` is the least scale for terms in the stored energy, per area.
     """
 
     name: str
@@ -112,8 +112,8 @@ def _check_rising(findings: Findings, points: Points, first_leg: float) -> None:
 def _check_heat(findings: Findings, states: States, points: Points, by_events: bool) -> None:
     """Check that the work is stored, lost to breaks or heat, which never falls; only breaks change `dissipated`.
 
-    With friction the energy depends on the way, so nothing bounds the loss of breaks.  Bonds break after a point of
-    events, before a point of increments.
+    With friction the energy depends on the way, so nothing bounds the loss in breaks.  Bonds break after an event
+    point, before an increment point.
     """
     stored = {number: float(point["stored"]) for number, point in enumerate(points)}
     stored |= {state.point: state.stored for state in states}
@@ -131,7 +131,7 @@ def _check_heat(findings: Findings, states: States, points: Points, by_events: b
 
 
 def check_step_heat(findings: Findings, cell: DiscreteCell, before: State, state: State) -> None:
-    """Check that an increment without breaks makes the heat of its slips under the tractions at its end.
+    """Check that an increment without breaks makes the heat from its slips under the tractions at its end.
 
     It is relative to the tractions times the slips since the beginning, whose difference it is.  The work of increments
     is booked as stored, lost or heat, so it is no evidence of heat.
@@ -152,9 +152,9 @@ def check_step_heat(findings: Findings, cell: DiscreteCell, before: State, state
 
 
 def _numbers(cell: DiscreteCell, states: States, points: Points) -> list[PointNumbers]:
-    """Return the numbers of every point, with the energy of the fields, or without fields by Hill E.Sigma / 2.
+    """Return the numbers at every point, with the fields' energy, or without fields by Hill E.Sigma / 2.
 
-    The conjugate of a temperature follows from the stored energy.
+    The conjugate to a temperature follows from the stored energy.
     """
     of_state, numbers = {state.point: state for state in states}, []
     for number, (point, load) in enumerate(zip(points, at_points(cell.files.case, points), strict=True)):
@@ -191,7 +191,7 @@ def _check_events(findings: Findings, numbers: Sequence[PointNumbers], points: P
 
 
 def potentials(load: Prescribed, other: PointNumbers) -> tuple[float, float]:
-    """Bound the potential of a load with the bonds of another state, by (P)."""
+    """Bound the potential of a load on the bonds in another state, by (P)."""
     if (load.by_stress != other.load.by_stress).any():
         return -np.inf, np.inf
     (strains, stresses), (forces, answers) = other.pairs(by_stress=False), other.pairs(by_stress=True)

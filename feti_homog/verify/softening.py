@@ -57,7 +57,7 @@ class Cohesive(BondLaw):
         return energies.min(axis=0) * (1 - BETWEEN_MODES), energies.max(axis=0) * (1 + BETWEEN_MODES)
 
     def breaks(self, traction: Float) -> dict[str, float]:
-        """Return the shares of the components at the onset of damage."""
+        """Return the component shares at damage onset."""
         return dict(zip(("normal", "tangential", "axial"), self._onset_shares(traction)[0].tolist(), strict=False))
 
     def onset(self, traction: Float) -> Float:
