@@ -1,7 +1,7 @@
 """Registry of the laws of bonds: their names in a case, their keys, and how they are described.
 
 A law is implemented by two classes of the same name, `implementation`: in `interface/laws`, which runs use, and in
-`verify/bond_laws`, which checks results by its own formulas.
+`verify`, which checks results by its own formulas.
 """
 
 from __future__ import annotations

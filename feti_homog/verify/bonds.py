@@ -1,97 +1,211 @@
-"""Bonds of each interface node by the case, and the inner one of two bodies."""
+"""Bond laws by independent formulas, and the bonds of interface nodes by the case.
+
+A law is a class with the name that `case/bond_laws.py` gives it, here or in `softening`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from importlib import import_module
+from typing import Any, ClassVar
 
 import numpy as np
-from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import dijkstra
 
+from feti_homog.case.bond_laws import DEFAULT, LAWS
 from feti_homog.typing import AnyInt, Bool, Float, Int
-from feti_homog.verify.bond_laws.law import BondLaw, law_of
-from feti_homog.verify.cell_tables import Mesh, State
-from feti_homog.verify.reading import ResultFiles
-from feti_homog.verify.torus import TornSides
+from feti_homog.verify.reading import ResultFiles, State
 
-COATING = "coating"
-NUMBERS = ("normal_stiffness", "tangential_stiffness", "axial_stiffness", "normal_strength", "tangential_strength",
-           "axial_strength", "toughness", "mode_sensitivity", "normal_toughness", "tangential_toughness",
-           "mixing_exponent")  # fmt: skip
-DEFAULTS = {"axial_stiffness": "tangential_stiffness", "axial_strength": "tangential_strength"}
+# Keys with one number a section, and the keys of their defaults.
+NUMBERS = {
+    "normal_stiffness": "", "tangential_stiffness": "", "axial_stiffness": "tangential_stiffness",
+    "normal_strength": "", "tangential_strength": "", "axial_strength": "tangential_strength",
+    "toughness": "", "normal_toughness": "", "tangential_toughness": "", "mode_sensitivity": "", "mixing_exponent": "",
+}  # fmt: skip
+
+
+class BondLaw(ABC):
+    """Law of some bonds; its section [[interface]] has numbers for all bonds or (k,).
+
+    Laws with toughness take the energy `lost` in breaking; laws with tips have energies at crack tips in result.json.
+    """
+
+    has_toughness: ClassVar[bool] = False
+    has_tips: ClassVar[bool] = False
+
+    def __init__(self, section: Mapping[str, Any]) -> None:
+        self.section = section
+
+    @property
+    def grows_by_release(self) -> bool:
+        """Return True if bonds at tips break by energy release, which is not in the files."""
+        return bool(self.section.get("growth") == "released")
+
+    @abstractmethod
+    def utilisation(self, traction: Float) -> Float:
+        """(k,) used share of the strength by tractions (k, c); compression uses none."""
+
+    @abstractmethod
+    def breaks(self, traction: Float) -> dict[str, float]:
+        """Describe how a traction (1, c) breaks a bond, by the names in an envelope's points."""
+
+    def jumps(self, traction: Float) -> Float:
+        """(k, c) jumps of elastic bonds: traction / stiffness."""
+        return np.asarray(traction / self._components("stiffness", traction))
+
+    def mode(self, traction: Float) -> Float:
+        """(k,) psi of tractions (k, c), 0 opens, pi/2 shears; with toughness tan^2 psi = G_II / G_I."""
+        pulls = np.sqrt(self.energies(traction)) if self.has_toughness else pulled(traction)
+        return np.asarray(np.arctan2(np.sqrt(np.square(pulls[:, 1:]).sum(axis=1)), pulls[:, 0]))
+
+    def lost(self, psi: Float) -> Float:
+        """(k,) fracture energies per area in the modes psi (k,)."""
+        return np.zeros(len(psi))
+
+    def absorbed(self, psi: Float, before: Float, after: Float) -> Float:
+        """(k,) energies per area for damage from `before` to `after` in the modes psi (k,)."""
+        return self.lost(psi)
+
+    def absorbed_range(self, before: Float, after: Float) -> tuple[Float, Float]:
+        """(k,) lower and upper bound of `absorbed` over all modes."""
+        low, high = (self.lost(np.full(len(after), psi)) for psi in (0.0, np.pi / 2))
+        return low, high
+
+    def onset(self, traction: Float) -> Float:
+        """(k,) utilisation of intact bonds, 1 at break or first damage."""
+        return self.utilisation(traction)
+
+    def energies(self, traction: Float) -> Float:
+        """(k, 2) spring energies per area, opening and shear, of tractions (k, c)."""
+        energies = pulled(traction) ** 2 / (2 * self._components("stiffness", traction))
+        return np.column_stack([energies[:, 0], energies[:, 1:].sum(axis=1)])
+
+    def shares(self, traction: Float) -> Float:
+        """(k, c) traction components / strengths."""
+        return np.asarray(pulled(traction) / self._components("strength", traction))
+
+    def _components(self, kind: str, traction: Float) -> Float:
+        """(c,) or (k, c) normal, tangential and axial stiffness or strength; axial defaults to tangential."""
+        normal, tangential = (self.section.get(f"{name}_{kind}", np.inf) for name in ("normal", "tangential"))
+        components = normal, tangential, self.section.get(f"axial_{kind}", tangential)
+        stacked = np.stack(np.broadcast_arrays(*(np.asarray(value, float) for value in components)), axis=-1)
+        return np.asarray(stacked[..., : traction.shape[1]])
+
+
+class MaxStrength(BondLaw):
+    """The largest share of a component breaks the bond."""
+
+    def utilisation(self, traction: Float) -> Float:
+        """(k,) largest share of a component."""
+        return np.asarray(self.shares(traction).max(axis=1, initial=0.0))
+
+    def breaks(self, traction: Float) -> dict[str, float]:
+        """Return the shares of the components."""
+        return dict(zip(("normal", "tangential", "axial"), self.shares(traction)[0].tolist(), strict=False))
+
+
+class QuadraticStrength(MaxStrength):
+    """All components together break the bond."""
+
+    def utilisation(self, traction: Float) -> Float:
+        """(k,) root of the summed squared shares."""
+        return np.asarray(np.sqrt(np.square(self.shares(traction)).sum(axis=1)))
+
+
+class SpringEnergy(BondLaw):
+    """G_I + G_II = G_c = G_Ic [1 + tan^2((1 - lambda) psi)] breaks the bond.
+
+    G_I = <t_n>^2 / (2 k_n) and G_II = t_t^2 / (2 k_t) + t_a^2 / (2 k_a) are the spring energies.
+    """
+
+    has_toughness: ClassVar[bool] = True
+    has_tips: ClassVar[bool] = True
+
+    def utilisation(self, traction: Float) -> Float:
+        """(k,) sqrt((G_I + G_II) / G_c)."""
+        return np.asarray(np.sqrt(self.energies(traction).sum(axis=1) / self.lost(self.mode(traction))))
+
+    def lost(self, psi: Float) -> Float:
+        """(k,) G_c in the modes psi (k,)."""
+        turned = (1 - np.asarray(self.section["mode_sensitivity"], float)) * psi
+        return np.asarray(np.asarray(self.section["toughness"], float) * (1 + np.tan(turned) ** 2))
+
+    def breaks(self, traction: Float) -> dict[str, float]:
+        """Return the mode in degrees."""
+        return {"psi": float(np.degrees(self.mode(traction))[0])}
+
+
+def pulled(traction: Float) -> Float:
+    """(k, c) sizes of the components; compression has none."""
+    return np.column_stack([np.maximum(traction[:, 0], 0.0), np.abs(traction[:, 1:])])
+
+
+def law_of(section: Mapping[str, Any]) -> BondLaw:
+    """Law that a section [[interface]] names, or the default law."""
+    module, name = LAWS[section.get("criterion", DEFAULT)].implementation.split(".")
+    home = import_module(f"{__package__}.{module if module == 'softening' else 'bonds'}")
+    law: BondLaw = getattr(home, name)(section)
+    return law
 
 
 def law_at(files: ResultFiles, nodes: AnyInt | Bool | slice = slice(None), damage: Float | None = None) -> BondLaw:
-    """Law of the bonds at some interface nodes; those of a state with the damage (k,) of all nodes.
+    """Law of the bonds at some interface nodes, with the damage (k,) at all nodes if it is known.
 
-    Its section has, of several or of fibres of different strengths, numbers (p,) of each node in place of one.
+    If there are several sections or fibre strengths, numbers in its section are (p,), one a node.
     """
     sections, strength = files.interfaces, files.fibres.strength
     section = {**sections[0]} if sections else {}
     if sections and (len(sections) > 1 or (strength != 1).any()):
         pair, factor = files.interface.pair[nodes], strength[files.interface.fibre[nodes] - 1]
-        numbers = {name: np.array([_number(own, name) for own in sections])[pair] for name in NUMBERS}
-        section |= numbers
-        section |= {name: numbers[name] * factor for name in NUMBERS if name.endswith("strength")}
-        section |= {name: numbers[name] * factor**2 for name in NUMBERS if name.endswith("toughness")}
+        for name in NUMBERS:
+            power = 1 if name.endswith("strength") else 2 if name.endswith("toughness") else 0
+            section[name] = np.array([_number(own, name) for own in sections])[pair] * factor**power
     return law_of(section if damage is None else section | {"damage": damage[nodes]})
 
 
-def friction_at(files: ResultFiles) -> Float:
-    """(k,) coefficient of friction of the interface nodes."""
-    return _of_pairs(files, [float(section.get("friction", 0.0)) for section in files.interfaces or [{}]])
+def _number(section: Mapping[str, Any], name: str) -> float:
+    """Return a number of a section, or its default; inf if there is none."""
+    values = (section.get(key) for key in (name, NUMBERS[name]))
+    return float(next((value for value in values if value is not None), np.inf))
 
 
-def friction_of_damage_at(files: ResultFiles) -> Float:
-    """(k,) coefficient of friction of the damaged share of bonds that hold."""
-    on = [float(section.get("friction_on_damage", False)) for section in files.interfaces or [{}]]
-    return _of_pairs(files, on) * friction_at(files)
-
-
-def _of_pairs(files: ResultFiles, values: Sequence[float]) -> Float:
-    """(k,) the value of the section of each interface node."""
-    found: Float = np.array(values, float)[np.minimum(files.interface.pair, len(values) - 1)]
-    return found
+def friction_at(files: ResultFiles, on_damage: bool = False) -> Float:
+    """(k,) friction coefficients on debonded faces, or on the damaged share of bonds."""
+    key = "friction_on_damage" if on_damage else "friction"
+    mu = [float(section.get("friction", 0.0)) * bool(section.get(key)) for section in files.interfaces or [{}]]
+    return np.asarray(np.array(mu)[np.minimum(files.interface.pair, len(mu) - 1)])
 
 
 def rubbing_force(files: ResultFiles, state: State) -> Float:
-    """(k,) shear on the damaged share of bonds that hold, where friction acts on it; 0 of others.
+    """(k,) shear on the damaged share of unbroken bonds with friction, else 0.
 
     The slip is C_0 traction + g, the force is traction - g / (C - C_0).
     """
-    unit, none = np.ones_like(state.traction), np.zeros(len(state.damage))
-    intact, whole = (law_at(files, damage=own).jumps(unit)[:, 1] for own in (none, state.damage))
-    own = (state.status == 0) & (whole > intact) & (friction_of_damage_at(files) > 0.0)
+    unit, intact_bonds = np.ones_like(state.traction), np.zeros(len(state.damage))
+    intact, damaged = (law_at(files, damage=damage).jumps(unit)[:, 1] for damage in (intact_bonds, state.damage))
+    rubs = (state.status == 0) & (damaged > intact) & (friction_at(files, on_damage=True) > 0.0)
     g = state.jump[:, 1] - intact * state.traction[:, 1]
-    return np.where(own, state.traction[:, 1] - g / np.where(own, whole - intact, 1.0), 0.0)
+    return np.where(rubs, state.traction[:, 1] - g / np.where(rubs, damaged - intact, 1.0), 0.0)
 
 
-def held_traction(files: ResultFiles, state: State) -> Float:
-    """(k, c) tractions; of damaged bonds without that on their damaged share."""
-    held = state.traction.copy()
-    held[:, 1] -= state.damage * rubbing_force(files, state)
-    return held
+def cohesive_traction(files: ResultFiles, state: State) -> Float:
+    """(k, c) tractions without friction on the damaged share."""
+    traction = state.traction.copy()
+    traction[:, 1] -= state.damage * rubbing_force(files, state)
+    return traction
 
 
 def energy_of_springs(files: ResultFiles, state: State) -> float:
-    """Return what all springs store: of bonds that rub (1 - d) K s^2 / 2 and f^2 / (2 K) of the share d."""
-    held, force = held_traction(files, state), rubbing_force(files, state)
+    """Sum the energy of all springs; in rubbing bonds it is (1 - d) K s^2 / 2 + d f^2 / (2 K)."""
+    traction, force = cohesive_traction(files, state), rubbing_force(files, state)
     law = law_at(files, damage=state.damage)
-    intact = law_at(files, damage=np.zeros(len(force))).jumps(np.ones_like(held))[:, 1]
-    twice = (held * law.jumps(held)).sum(axis=1) + state.damage * intact * force**2
+    intact = law_at(files, damage=np.zeros(len(force))).jumps(np.ones_like(traction))[:, 1]
+    twice = (traction * law.jumps(traction)).sum(axis=1) + state.damage * intact * force**2
     return float(twice @ files.interface.length) / 2
 
 
-def _number(section: Mapping[str, Any], name: str) -> float:
-    """Return the value of a section, or of the key that it defaults to; inf if there is none."""
-    value = section.get(name)
-    value = section.get(DEFAULTS.get(name, name)) if value is None else value
-    return np.inf if value is None else float(value)
-
-
 def pairs_of(files: ResultFiles) -> Int:
-    """(phases, phases) place of the section of the interfaces between two phases, -1 where they never part."""
+    """(phases, phases) place of the section between two phases, -1 where bonds never part."""
     pairs = np.full((len(files.phases),) * 2, -1)
     for number, section in enumerate(files.interfaces or [{}]):
         if "between" not in section:
@@ -100,23 +214,3 @@ def pairs_of(files: ResultFiles) -> Int:
             first, second = (files.phases.index(name) for name in section["between"])
             pairs[first, second] = pairs[second, first] = number
     return pairs
-
-
-def inwardness(mesh: Mesh, phases: tuple[str, ...], sides: TornSides, part: Int) -> Int:
-    """(parts,) ranks of parts, the larger, the farther inwards.
-
-    They go by bodies between one and the matrix, then coatings before others, then by their labels; `part`
-    (subdomains,) is that of each.
-    """
-    paired = np.flatnonzero(sides.partner >= 0)
-    here, there = sides.element[paired], sides.element[sides.partner[paired]]
-    ends = part[mesh.subdomain[here]], part[mesh.subdomain[there]]
-    n = int(part.max()) + 1
-    phase, label = np.zeros(n, np.int64), np.zeros(n, np.int64)
-    phase[part[mesh.subdomain]], label[part[mesh.subdomain]] = mesh.phase, mesh.body
-    graph = csr_matrix((np.ones(len(paired)), ends), shape=(n, n))
-    steps = dijkstra(graph, directed=False, indices=np.flatnonzero(phase == 0), unweighted=True, min_only=True)
-    coats = np.array([name == COATING for name in phases])[phase]
-    place = np.empty(n, np.int64)
-    place[np.lexsort((label, ~coats, steps))] = np.arange(n)
-    return place

@@ -1,4 +1,4 @@
-"""All laws on all states of a folder of results, in a process of its own, and the text of the outcome."""
+"""All laws on a result folder, if need be in a separate process, and the certificate as text."""
 
 from __future__ import annotations
 
@@ -13,21 +13,18 @@ from typing import Any, TypeVar
 import numpy as np
 
 from feti_homog.errors import CaseError
-from feti_homog.verify.check_fields import check_fields, check_step_heat
-from feti_homog.verify.check_loads import StateNumbers, States, check_load
-from feti_homog.verify.check_mesh import check_arcs, check_interface, check_mesh
-from feti_homog.verify.check_mesh_error import check_errors, check_mesh_error
+from feti_homog.verify.check_constants import check_constants
+from feti_homog.verify.check_loads import StateNumbers, States, check_loads
+from feti_homog.verify.check_mesh import check_arcs, check_interface, check_mesh, check_mesh_error, check_rates
 from feti_homog.verify.check_path import check_envelope, check_path
-from feti_homog.verify.check_points import check_points
-from feti_homog.verify.check_record import check_record, checks_of
 from feti_homog.verify.check_sensitivities import check_sensitivities
-from feti_homog.verify.check_summary import check_spatial, check_summary, check_tables
+from feti_homog.verify.check_state import check_state
 from feti_homog.verify.discrete_cell import DiscreteCell
-from feti_homog.verify.findings import Finding, Findings
-from feti_homog.verify.leaves import unchecked
-from feti_homog.verify.reading import ResultFiles, altered, opened
+from feti_homog.verify.findings import Check, Finding, Findings, checks, unchecked
+from feti_homog.verify.path_energies import check_step_heat
+from feti_homog.verify.reading import COATING, altered, opened
 
-# What reading numbers of another kind or shape than expected raises.
+# Raised by numbers of unexpected kind or shape.
 DAMAGE = (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, MemoryError, RecursionError)
 
 T = TypeVar("T")
@@ -35,16 +32,16 @@ PATIENCE = 300.0  # seconds
 
 
 def in_own_process(directory: Path, function: Callable[[Path], T], patience: float = PATIENCE) -> T:
-    """function(directory). Raises CaseError: of the function, or its process crashed or took longer than `patience`."""
+    """function(directory). Raises CaseError: from the function, or if its process crashes or outlasts `patience`."""
     context = multiprocessing.get_context("fork")
-    ours, theirs = context.Pipe(duplex=False)
-    process = context.Process(target=_send, args=(theirs, function, directory), daemon=True)
+    receiver, sender = context.Pipe(duplex=False)
+    process = context.Process(target=_send, args=(sender, function, directory), daemon=True)
     process.start()
-    theirs.close()
+    sender.close()
     try:
-        if not ours.poll(patience):
+        if not receiver.poll(patience):
             raise CaseError(f"{directory}: its files are damaged: reading them does not come to an end")
-        answer = ours.recv()
+        answer = receiver.recv()
     except EOFError:
         raise CaseError(f"{directory}: its files are damaged: HDF5 crashes on them") from None
     finally:
@@ -52,12 +49,12 @@ def in_own_process(directory: Path, function: Callable[[Path], T], patience: flo
         process.join()
     if isinstance(answer, CaseError):
         raise answer
-    found: T = answer
-    return found
+    result: T = answer
+    return result
 
 
 def _send(end: Connection, function: Callable[[Path], T], directory: Path) -> None:
-    # The thread that listens for signals stays with the parent; Ctrl-C ends both.
+    # The parent's thread listens for signals; Ctrl-C ends both processes.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     # Handlers of PETSc, in a program that has started it, would not come to an end here.
     for crash in (signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGILL, signal.SIGABRT):
@@ -73,9 +70,9 @@ def _send(end: Connection, function: Callable[[Path], T], directory: Path) -> No
 
 @dataclass(frozen=True)
 class Certificate:
-    """Findings of every law that applies to a folder; case, mesh and states in words; the run's status and faults.
+    """Findings of all laws that apply; a title with case, mesh and states; the run's status and faults.
 
-    `unchecked` are names of numbers of result.json that no law reads, by the reason for it.
+    `unchecked` maps reasons to names of unchecked numbers.
     """
 
     findings: tuple[Finding, ...]
@@ -85,7 +82,7 @@ class Certificate:
 
     @property
     def holds(self) -> bool:
-        """Return whether every law does."""
+        """Return True if every law holds."""
         return all(finding.holds for finding in self.findings)
 
     @property
@@ -93,9 +90,9 @@ class Certificate:
         """A line for each law."""
         broken = sum(not finding.holds for finding in self.findings)
         verdict = f"{broken} of {len(self.findings)} laws are broken" if broken else "every law holds"
-        left = [f"  {', '.join(names)}: {reason}" for reason, names in self.unchecked.items()]
+        names = [f"  {', '.join(names)}: {reason}" for reason, names in self.unchecked.items()]
         lines = [finding.line() for finding in self.findings]
-        return "\n".join([self.title, self.status, *lines, verdict, *(["not checked:"] if left else []), *left])
+        return "\n".join([self.title, self.status, *lines, verdict, "not checked:", *names])
 
     @property
     def document(self) -> dict[str, Any]:
@@ -106,33 +103,33 @@ class Certificate:
 
 
 def verify(directory: Path) -> Certificate:
-    """Check the laws on all states of the result in a folder; CaseError, one line, if it has none to be read."""
-    return in_own_process(directory, _of) if altered(directory) else _of(directory)
+    """Check the laws on all states of a result folder. Raises CaseError, one line, if it is unreadable."""
+    return in_own_process(directory, _verified) if altered(directory) else _verified(directory)
 
 
-def _of(directory: Path) -> Certificate:
-    with opened(directory) as files:
-        try:
-            with np.errstate(all="ignore"):  # numbers that are not finite break the laws that they are in
-                return _verified(files, directory)
-        except DAMAGE as error:
-            words = f"{type(error).__name__} {error}"
-            raise CaseError(f"{directory}: its files do not belong together or are incomplete: {words}") from error
+def _verified(directory: Path) -> Certificate:
+    try:
+        with opened(directory) as files, np.errstate(all="ignore"):  # numbers that are not finite break their laws
+            cell, document = DiscreteCell.of(files), files.document
+            findings = Findings(checks_of(cell))
+            findings.record("files", len(files.altered), ", ".join(files.altered))
+            for name in ("schema", "checksum", "result_h5"):  # read before
+                document.get(name)
+            states, faults = laws_of_fields(findings, cell), document.hint("faults", [])
+            laws_of_numbers(findings, cell, states)
+            kind, n, m = files.case["analysis"]["type"], len(files.mesh.points), len(files.mesh.triangles)
+            title = f"{files.case['name']}: {kind}, {m} elements, {n} nodes, {len(states)} states"
+            status = ": ".join(["the run reports", document.hint("status"), *(["; ".join(faults)] if faults else [])])
+            return Certificate(findings.worst(), title, status, unchecked(document))
+    except DAMAGE as error:
+        fault = f"{type(error).__name__} {error}"
+        raise CaseError(f"{directory}: its files do not belong together or are incomplete: {fault}") from error
 
 
-def _verified(files: ResultFiles, directory: Path) -> Certificate:
-    cell = DiscreteCell.of(files)
-    findings = Findings(checks_of(cell))
-    findings.record("files", len(files.altered), ", ".join(files.altered))
-    for name in ("schema", "checksum", "result_h5"):
-        files.document.covers(name)  # or they could not be read, or are altered
-    states, faults = laws_of_fields(findings, cell), files.document.hint("faults", [])
-    laws_of_numbers(findings, cell, states)
-    check_tables(findings, directory, files.document)
-    kind, n, m = files.case["analysis"]["type"], len(files.mesh.points), len(files.mesh.triangles)
-    title = f"{files.case['name']}: {kind}, {m} elements, {n} nodes, {len(states)} states"
-    status = ": ".join(["the run reports", files.document.hint("status"), *(["; ".join(faults)] if faults else [])])
-    return Certificate(findings.worst(), title, status, unchecked(files.document))
+def checks_of(cell: DiscreteCell) -> tuple[Check, ...]:
+    """List the laws of a result with their limits."""
+    case, rtol = cell.files.case, float(cell.files.document["solver"].hint("rtol"))
+    return checks(rtol, case["cell"]["geometry"] == "mesh", COATING in case["material"], cell.elements.contrasts)
 
 
 def laws_of_fields(findings: Findings, cell: DiscreteCell) -> list[StateNumbers]:
@@ -145,8 +142,8 @@ def laws_of_fields(findings: Findings, cell: DiscreteCell) -> list[StateNumbers]
         arrays = (state.displacement, state.fluctuation, state.stress, state.traction, state.jump, state.strain)
         findings.record("numbers", [np.count_nonzero(~np.isfinite(array)) for array in arrays], state.name)
         terms = np.abs(state.displacement) + np.abs(state.fluctuation)
-        fields = cell.elements.fields(state.displacement, terms, state.along, cell.free_strains(state))
-        check_fields(findings, cell, state, fields)
+        fields = cell.elements.fields(state.displacement, terms, state.along, cell.free_strains(state.temperature))
+        check_state(findings, cell, state, fields)
         check_mesh_error(findings, cell, state)
         if before is not None and "path" in files.document:
             check_step_heat(findings, cell, before, state)
@@ -156,19 +153,16 @@ def laws_of_fields(findings: Findings, cell: DiscreteCell) -> list[StateNumbers]
 
 
 def laws_of_numbers(findings: Findings, cell: DiscreteCell, states: States) -> None:
-    """Check the numbers of result.json against those of the states."""
+    """Check the numbers of result.json against the states."""
     document = cell.files.document
-    check_load(findings, cell, states)
+    check_loads(findings, cell, states)
     check_arcs(findings, cell, states)
-    check_points(findings, cell, states)
     if "path" in document:
         check_path(findings, cell, states)
+    else:
+        for number, table in enumerate([document, *cell.files.points], start=-1):
+            check_rates(findings, cell, table.get("tips"), f"point {number}")
     if "envelope" in document:
         check_envelope(findings, cell, states)
-    check_summary(findings, cell)
-    if cell.files.is_spatial:
-        check_spatial(findings, cell, states)
+    check_constants(findings, cell, states)
     check_sensitivities(findings, cell)
-    if "mesh_error" in document:
-        check_errors(findings, document)
-    check_record(findings, cell)

@@ -1,205 +1,268 @@
-"""Laws of the states as a whole: their loads are those that the case asks for, their numbers those of result.json."""
+"""Loads that the case prescribes, and the numbers of the states in result.json.
+
+A case prescribes the strain or the stress of every component; in generalized plane strain the temperature is the last
+strain component.
+"""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise, product
+from itertools import product
 from typing import Any
 
 import numpy as np
 
-from feti_homog.typing import AnyInt, Bool, Float
-from feti_homog.verify.bonds import energy_of_springs, held_traction, law_at
-from feti_homog.verify.cell_tables import State
-from feti_homog.verify.check_fields import BONDED, CLOSED, OPEN
-from feti_homog.verify.discrete_cell import DiscreteCell
+from feti_homog.typing import Bool, Float
+from feti_homog.verify.bonds import cohesive_traction, energy_of_springs, law_at
+from feti_homog.verify.discrete_cell import BONDED, CLOSED, OPEN, DiscreteCell
 from feti_homog.verify.elements import ElementFields
-from feti_homog.verify.findings import Findings, relative
-from feti_homog.verify.prescribed import TEMPERATURE, Prescribed, at_points, targets
+from feti_homog.verify.findings import Findings
+from feti_homog.verify.reading import State
 
-COUNTS = {"bonded": BONDED, "closed": CLOSED, "open": OPEN}
-LAST_OF_PLANE = 2  # place of gamma12 among the unit loads: the state that the counts of an angle are of
-SPATIAL_ORDER = [0, 1, 5, 2, 4, 3]  # of the unit strains of generalized plane strain; the fifth load is a temperature
+NAMES = {
+    3: (("E11", "E22", "gamma12"), ("S11", "S22", "S12")),
+    6: (("E11", "E22", "E33", "gamma23", "gamma13", "gamma12"), ("S11", "S22", "S33", "S23", "S13", "S12")),
+}
+TEMPERATURE, COUNTS = "temperature", {"bonded": BONDED, "closed": CLOSED, "open": OPEN}
+SAME_SHARE = 1e-12  # rounding of shares of a leg
+OF_ARCS = "debonded_length", "damaged_length", "debonded_shares"  # of an angle, in all unit loads
+LAST_OF_PLANE = 2  # place of gamma12 in the unit loads, whose state has the counts of an angle
+SPATIAL_ORDER = [0, 1, 5, 2, 4, 3]  # of unit strains in generalized plane strain; the fifth unit load is a temperature
+FIELDS = ("displacement", "fluctuation", "stress", "mesh_error", "stress_33")  # of a state on its mesh
+Document = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
-class StateNumbers:
-    """Numbers of a state that the laws of paths and tables need; others as in `State`.
+class Prescribed:
+    """A load: the values (n,) of its components, and True (n,) for a stress."""
 
-    Energies per area `stored`, <sigma : (eps - alpha T)> / 2 and `in_springs`, from the fields; `released` (k,) tips
-    whose break counts by what it would release; `used` (k,) shares of the strength of bonded nodes, NaN at these tips;
-    `heat`, what works on the temperature, - <alpha : sigma>, and `expanding`, <alpha : L : strain>, 0 if not known.
+    values: Float
+    by_stress: Bool
+
+    @classmethod
+    def strain(cls, strain: Float, temperature: float) -> Prescribed:
+        """Return a strain (v,), with a temperature in generalized plane strain."""
+        values = np.array([*strain, temperature] if len(strain) > 3 else strain, float)
+        return cls(values, np.zeros(len(values), bool))
+
+
+def targets(case: Document) -> list[Prescribed]:
+    """Return the loads that a case names, each with all components.
+
+    A component that a load does not name stays; at first it is stress-free.
+    """
+    v = 6 if case["analysis"]["plane"] == "generalized" else 3
+    n = v + (v > 3)
+    strains, stresses = NAMES[v]
+    places = {name: (k, False) for k, name in enumerate([*strains, TEMPERATURE][:n])}
+    places |= {name: (k, True) for k, name in enumerate(stresses)}
+    values, by_stress, loads = np.zeros(n), np.arange(n) < v, []
+    path = case.get("path", {})
+    single = [path[name] for name in ("strain", "to") if path.get(name)]
+    for load in [case["load"]["to"]] if "load" in case else path.get("waypoints") or single:
+        values, by_stress = values.copy(), by_stress.copy()
+        for name, value in (load if isinstance(load, Mapping) else dict(zip(strains, load, strict=True))).items():
+            place, by_stress[places[name][0]] = places[name]
+            values[place] = value
+        loads.append(Prescribed(values, by_stress))
+    return loads
+
+
+def at_points(case: Document, points: Sequence[Document]) -> Iterator[Prescribed]:
+    """Yield the prescribed load at every point of a path.
+
+    The first leg has a share of its end. Later legs are straight from the last prescribed load to their end. A
+    component that changes its kind begins at its value in the last point.
+    """
+    ends, leg, ended = targets(case), 0, False
+    by_events = case["path"]["method"] == "events"
+    start, last = np.zeros(len(ends[0].values)), None
+    for point in points:
+        along = float(point["load_factor"]) * len(ends)
+        while leg < len(ends) - 1 and (ended or along > leg + 1 + SAME_SHARE):
+            before, end, leg, ended = ends[leg], ends[leg + 1], leg + 1, False
+            start = before.values
+            if last is not None:
+                pairs = ([*last[name], last.get(TEMPERATURE, 0.0)][: len(start)] for name in ("stress", "strain"))
+                start = np.where(before.by_stress == end.by_stress, start, np.where(end.by_stress, *pairs))
+        share = along - leg
+        yield Prescribed((1 - share) * start + share * ends[leg].values, ends[leg].by_stress)
+        # After the last break at a waypoint comes a point without breaks.
+        ended, last = abs(share - 1) <= SAME_SHARE and not (by_events and damaged_at(point)), point
+
+
+def damaged_at(point: Document) -> int:
+    """Count the bonds that break or soften at a point, or in the step to it."""
+    return int(point["broke"]) + int(point.get("softened") or 0)
+
+
+@dataclass(frozen=True)
+class StateNumbers(State):
+    """A state without its mesh fields, which one state at a time has in memory; with cohesive tractions.
+
+    Attributes:
+        stored, in_springs: energy per area <sigma : (eps - alpha T)> / 2 with all springs, and in springs alone.
+        released: (k,) True at tips that break by energy release.
+        used: (k,) used strength share at bonded nodes, NaN at these tips.
+        heat: conjugate of the temperature, - <alpha : sigma>.
+        expanding: <alpha : L : strain>, 0 if unknown.
     """
 
-    name: str
-    load_factor: float
-    point: int
-    strain: Float
-    stress: Float
     stored: float
     in_springs: float
-    traction: Float
-    status: AnyInt
-    damage: Float
     released: Bool
     used: Float
-    temperature: float
     heat: float
     expanding: float
 
     @classmethod
     def of(cls, cell: DiscreteCell, state: State, fields: ElementFields) -> StateNumbers:
-        """Return those of a state of a cell."""
+        """Return the numbers of a state."""
         law = law_at(cell.files, damage=state.damage)
-        released = tips(cell, state.status) & law.grows_by_release
-        held = held_traction(cell.files, state)
-        used = np.where(state.status == BONDED, law.utilisation(held), 0.0)
-        used[released] = np.nan
+        released = cell.tips(state.status) & law.grows_by_release
+        traction = cohesive_traction(cell.files, state)
+        used = np.where(released, np.nan, np.where(state.status == BONDED, law.utilisation(traction), 0.0))
         in_springs, heat, expanding = energy_of_springs(cell.files, state) / cell.area, 0.0, 0.0
         if cell.expansions is not None:
             weights, phase = cell.elements.area / cell.area, cell.files.mesh.phase
             heat = -float(weights @ (cell.expansions[phase] * state.stress).sum(axis=1))
             thermal = np.einsum("pij,pj->pi", cell.stiffnesses, cell.expansions)[phase]
             expanding = float(weights @ (thermal * fields.strain).sum(axis=1))
-        energies = fields.energy / (2 * cell.area) + state.temperature * heat / 2 + in_springs, in_springs
-        means = state.strain, state.mean_stress
-        return cls(
-            state.name, state.load_factor, state.point, *means, *energies, held, state.status,
-            state.damage, released, used, state.temperature, heat, expanding,
-        )  # fmt: skip
+        stored = fields.energy / (2 * cell.area) + state.temperature * heat / 2 + in_springs
+        numbers = dict(vars(state)) | dict.fromkeys(FIELDS, np.zeros(0)) | {"traction": traction}
+        return cls(**numbers, stored=stored, in_springs=in_springs, released=released, used=used, heat=heat,
+                   expanding=expanding)  # fmt: skip
 
 
 States = Sequence[StateNumbers]
 
 
-def tips(cell: DiscreteCell, status: AnyInt) -> Bool:
-    """(k,) which bonds lie beside a broken one."""
-    broken, beside = status != BONDED, cell.beside
-    tips = np.zeros(len(broken), bool)
-    for here, there in (beside.T, beside.T[::-1]):
-        tips[here[broken[there]]] = True
-    return np.asarray(tips & ~broken)
-
-
-def check_load(findings: Findings, cell: DiscreteCell, states: States) -> None:
+def check_loads(findings: Findings, cell: DiscreteCell, states: States) -> None:
     """Check loads against the case, and points or columns of result.json against the states.
 
-    States of a path are those of the points that result.json lists, in order, the first and the last among them, and as
-    many as the case asks for; of other analyses all.
+    A path keeps as many states as the case asks for, at points that result.json lists, the first and the last among
+    them; other analyses keep all.
     """
-    document, case = cell.files.document, cell.files.case
+    document, case, rows, numbers = cell.files.document, cell.files.case, list(_rows(cell)), [s.point for s in states]
     same = json.loads(str(cell.files.file.attrs["case"])) == case
     findings.require("tables", same, "the case, which differs between the two files")
-    rows, numbers = list(_rows(document, case, _unit_loads(cell))), [state.point for state in states]
     scales = _scales(cell, states, [load for load, _ in rows])
     if "path" in document:
-        _check_kept(findings, case["output"]["states"], numbers, list(document["states"]), len(rows))
+        findings.require("tables", list(document["states"]) == numbers, "states, which differ between the two files")
+        in_order = [*numbers[:1], *numbers[-1:]] == [0, len(rows) - 1] and numbers == sorted({*numbers})
+        findings.require("load", in_order, "states, which are not from the first point to the last")
+        key = case["output"]["states"]
+        count = len(rows) if key == "all" else min(key, len(rows)) if isinstance(key, int) else len(numbers)
         for number, (load, entries) in enumerate(rows):
             _check_prescribed(findings, load, entries, scales, f"path[{number}]")
         pairs = [(state, rows[state.point]) for state in states if 0 <= state.point < len(rows)]
     else:
-        pairs, each = list(zip(states, rows, strict=False)), len(rows) // len(document.get("angle", [None]))
-        off = [abs(number - k // each) for k, number in enumerate(numbers)]
-        findings.record("tables", off, lambda k: f"{states[k].name}, point")
-        findings.record("load", abs(len(rows) - len(states)), f"{len(states)} states, {len(rows)} asked for")
-    for state, row in pairs:
-        _check_entries(findings, state, *row, scales)
-    for place, matrix in linear_stiffnesses(document, cell.files.contact):
-        findings.record("symmetry", relative(matrix - matrix.T, float(np.abs(matrix).max())), place)
+        count, pairs = len(rows), list(zip(states, rows, strict=False))
+        points = np.arange(len(numbers)) // (len(rows) // len(document.get("angle", [None])))
+        findings.compare("tables", numbers, points, 1.0, lambda k: f"{states[k].name}, point")
+    findings.compare("load", len(states), count, 1.0, f"{len(states)} states, {count} asked for")
+    _check_states(findings, cell, pairs, scales)
+    for place, matrix in _linear_stiffnesses(document, cell.files.contact):
+        findings.compare("symmetry", matrix, matrix.T, np.abs(matrix).max(), place)
 
 
-def _unit_loads(cell: DiscreteCell) -> list[Prescribed]:
-    """Return the unit strains, and the unit of temperature, in the order of their states."""
-    order = np.eye(6)[SPATIAL_ORDER] if cell.files.is_spatial else np.eye(3)
-    unit = [Prescribed.strain(strain, 0.0) for strain in order]
-    unit[4:4] = [] if cell.expansions is None else [Prescribed.strain(np.zeros(6), 1.0)]
-    return unit
+def _check_states(findings: Findings, cell: DiscreteCell, pairs: Sequence[Any], scales: tuple[float, ...]) -> None:
+    """Check states against their loads, and their numbers in result.json; `pairs` are (state, (load, entries))."""
+    rows, sections = cell.files.interface, len(cell.files.interfaces)
+
+    def lengths(nodes: Bool) -> Float:
+        return np.asarray(np.bincount(rows.fibre - 1, rows.length * nodes, len(cell.files.fibres.radius)), float)
+
+    longest = float(lengths(np.ones(len(rows.length), bool)).max(initial=0.0)) or 1.0
+    of_section = rows.length[:, None] * (rows.pair[:, None] == np.arange(sections))
+    energy = max([state.stored for state, _ in pairs], default=0.0) + cell.rounded_energy
+    for state, (load, entries) in pairs:
+        own = {"strain": state.strain, "stress": state.mean_stress, TEMPERATURE: state.temperature}
+        _check_prescribed(findings, load, own, scales, state.name)
+        debonded, damaged = state.status != BONDED, (state.damage > 0.0) & (state.damage < 1.0)
+        numbers: dict[str, tuple[Any, float]] = {
+            "strain": (state.strain, scales[0]),
+            "stress": (state.mean_stress, scales[1]),
+            TEMPERATURE: (state.temperature, max(abs(state.temperature), 1.0)),
+            "load_factor": (state.load_factor, 1.0),
+            "stored": (state.stored, energy),
+            "stored_in_springs": (state.in_springs, energy),
+            "debonded_length": (lengths(debonded), longest),
+            "damaged_length": (lengths(damaged), longest),
+            "debonded_shares": (debonded @ of_section / of_section.sum(axis=0), 1.0),
+        }
+        numbers |= {name: (np.count_nonzero(state.status == status), 1.0) for name, status in COUNTS.items()}
+        for name in numbers.keys() & entries.keys():
+            law, (value, scale) = "energy" if name.startswith("stored") else "tables", numbers[name]
+            findings.compare(law, entries[name], value, scale, f"{state.name}, {name}")
+    for number, point in enumerate(cell.files.points):
+        count, place = sum(point[name] for name in COUNTS), f"point {number}, {', '.join(COUNTS)}"
+        findings.compare("tables", count, len(rows.length), 1.0, place)
 
 
 def _scales(cell: DiscreteCell, states: States, loads: Sequence[Prescribed]) -> tuple[float, float, float]:
-    """Sizes of the strains and stresses of all states, and of stresses that the loads make in the bonded cell."""
-    largest, imposed = max((float(np.abs(state.stress).max()) for state in states), default=0.0), 0.0
+    """Largest strain and stress in all states, and largest stress by the loads in the bonded cell."""
+    largest, imposed = max((float(np.abs(state.mean_stress).max()) for state in states), default=0.0), 0.0
     for state, load in product(states[:1], loads):
-        # Strains that came out are no scale of the stresses that are asked for.
-        given, n = np.where(load.by_stress, 0.0, load.values), len(state.strain)
-        asked = replace(state, strain=given[:n], temperature=float(given[n:].sum()))
-        imposed = max(imposed, float(np.abs(cell.reuss @ cell.loads(asked)).max()))
+        # Computed strains are no scale for prescribed stresses.
+        strains, v = np.where(load.by_stress, 0.0, load.values), len(state.strain)
+        loaded = cell.loads(strains[:v], float(strains[v:].sum()))
+        imposed = max(imposed, float(np.abs(cell.reuss @ loaded).max()))
     return cell.largest_strain or 1.0, largest or 1.0, max(largest, imposed) or 1.0
 
 
-def _check_kept(findings: Findings, asked: str | int, numbers: list[int], given: list[int], points: int) -> None:
-    """Check the numbers of the kept states of a path with so many points."""
-    findings.require("tables", given == numbers, "states, which differ between the two files")
-    ends, rises = numbers[:1] == [0] and numbers[-1:] == [points - 1], all(a < b for a, b in pairwise(numbers))
-    findings.require("load", ends and rises, "states, which are not from the first point to the last")
-    wanted = min(asked, points) if isinstance(asked, int) else points if asked == "all" else len(numbers)
-    findings.record("load", abs(wanted - len(numbers)), f"{len(numbers)} states, {wanted} asked for")
-
-
-def _check_entries(
-    findings: Findings, state: StateNumbers, load: Prescribed, entries: Mapping[str, Any], scales: tuple[float, ...]
-) -> None:
-    """Check the numbers of a state against its load and in result.json."""
-    own: dict[str, Any] = {"strain": state.strain, "stress": state.stress, TEMPERATURE: state.temperature}
-    _check_prescribed(findings, load, own, scales, state.name)
-    own |= {name: np.count_nonzero(state.status == status) for name, status in COUNTS.items()}
-    own |= {"load_factor": state.load_factor}
-    sizes = {"strain": scales[0], "stress": scales[1], TEMPERATURE: max(abs(state.temperature), 1.0)}
-    for name in own.keys() & entries.keys():
-        off = relative(np.array(entries[name]) - own[name], sizes.get(name, 1.0))
-        findings.record("tables", off, f"{state.name}, {name}")
-
-
 def _check_prescribed(
-    findings: Findings, load: Prescribed, own: Mapping[str, Any], scales: tuple[float, ...], place: str
+    findings: Findings, load: Prescribed, numbers: Document, scales: tuple[float, ...], place: str
 ) -> None:
-    """Strains, stresses and the temperature that a load prescribes."""
-    strain, stress, temperature = np.array(own["strain"]), np.array(own["stress"]), float(own.get(TEMPERATURE, 0.0))
-    given, by_stress = load.values[: len(strain)], load.by_stress[: len(strain)]
-    findings.record("load", np.abs(strain - given)[~by_stress] / scales[0], f"{place}, strain")
-    findings.record("stress load", np.abs(stress - given)[by_stress] / scales[2], f"{place}, stress")
-    warmer = float(load.values[-1]) if len(load.values) > len(given) else 0.0
-    findings.record("load", abs(temperature - warmer) / max(abs(warmer), 1.0), f"{place}, temperature")
+    """Check the strains, stresses and temperature that a load prescribes."""
+    strain, stress, v = np.array(numbers["strain"]), np.array(numbers["stress"]), len(numbers["strain"])
+    values, by_stress = load.values[:v], load.by_stress[:v]
+    findings.record("load", np.abs(strain - values)[~by_stress] / scales[0], f"{place}, strain")
+    findings.record("stress load", np.abs(stress - values)[by_stress] / scales[2], f"{place}, stress")
+    temperature = float(load.values[v:].sum())
+    off = float(numbers.get(TEMPERATURE, 0.0)) - temperature
+    findings.record("load", abs(off) / max(abs(temperature), 1.0), f"{place}, temperature")
 
 
-def _rows(
-    document: Mapping[str, Any], case: Mapping[str, Any], unit: Sequence[Prescribed]
-) -> Iterator[tuple[Prescribed, Mapping[str, Any]]]:
-    """Yield the load and the entry of result.json of each point of a path, or of each state of another case."""
+def _rows(cell: DiscreteCell) -> Iterator[tuple[Prescribed, Document]]:
+    """Yield the load and the entry in result.json for each point on a path, or for each state without a path."""
+    document, case = cell.files.document, cell.files.case
     if "path" in document:
         yield from zip(at_points(case, document["path"]), document["path"], strict=True)
     elif "load" in document:
         yield from ((load, document["load"]) for load in targets(case))
     elif "angle" in document:
-        given = case["angle"].get("strain")
+        strain = case["angle"].get("strain")
         for point in document["angle"]:
-            if given is not None:
-                yield Prescribed.strain(np.array(given), 0.0), point
-                continue
-            for number, (load, entry) in enumerate(_columns(point, "stiffness", "", 1.0, unit)):
-                yield load, entry | ({name: point[name] for name in COUNTS} if number == LAST_OF_PLANE else {})
+            if strain is None:
+                yield from _columns(cell, point, "stiffness", "", 1.0)
+            else:
+                yield Prescribed.strain(np.array(strain), 0.0), point
     else:
         for suffix, sign in (("", 1.0), ("_compression", -1.0)):
             if f"effective_stiffness{suffix}" in document:
-                yield from _columns(document, "effective_stiffness", suffix, sign, unit)
+                yield from _columns(cell, document, "effective_stiffness", suffix, sign)
 
 
 def _columns(
-    given: Mapping[str, Any], stiffness: str, suffix: str, sign: float, unit: Sequence[Prescribed]
-) -> Iterator[tuple[Prescribed, dict[str, Float]]]:
+    cell: DiscreteCell, table: Document, stiffness: str, suffix: str, sign: float
+) -> Iterator[tuple[Prescribed, Document]]:
     """Yield the unit loads, or minus them, with their stresses: columns of a stiffness, and `thermal_stress`."""
-    v = 6 if len(unit[0].values) > 3 else 3
-    for load in unit:
-        matrix = np.array(given[f"{stiffness}{suffix}"])
-        is_thermal = load.values[v:].any()
-        stress = np.array(given[f"thermal_stress{suffix}"]) if is_thermal else matrix @ load.values[:v]
-        yield replace(load, values=sign * load.values), {"stress": sign * stress}
+    order = np.eye(6)[SPATIAL_ORDER] if cell.files.is_spatial else np.eye(3)
+    unit, v = [Prescribed.strain(strain, 0.0) for strain in order], len(order)
+    unit[4:4] = [] if cell.expansions is None else [Prescribed.strain(np.zeros(6), 1.0)]
+    for number, load in enumerate(unit):
+        matrix, is_thermal = np.array(table[f"{stiffness}{suffix}"]), load.values[v:].any()
+        stress = np.array(table[f"thermal_stress{suffix}"]) if is_thermal else matrix @ load.values[:v]
+        names = (*OF_ARCS, *COUNTS) if number == LAST_OF_PLANE else OF_ARCS
+        entries = {"stress": sign * stress} | {name: table[name] for name in names if name in table}
+        yield replace(load, values=sign * load.values), entries
 
 
-def linear_stiffnesses(document: Mapping[str, Any], contact: bool) -> Iterator[tuple[str, Float]]:
-    """Yield the stiffnesses in result.json of cells without one-sided contact, and what they are called."""
+def _linear_stiffnesses(document: Document, contact: bool) -> Iterator[tuple[str, Float]]:
+    """Yield names and stiffnesses in result.json for cells without one-sided contact."""
     if "effective_stiffness" in document and "effective_stiffness_compression" not in document:
         yield "effective_stiffness", np.array(document["effective_stiffness"])
     for number, point in enumerate(document.get("angle", ())):

@@ -1,6 +1,6 @@
-"""Laws of paths and envelopes: breaking bonds and their loads; the first bond of an envelope at its strength.
+"""Path and envelope laws: breaking bonds and their loads, tips, the first bond in an envelope at its strength.
 
-Fields may be kept of some points only; the others in result.json obey the same laws of counts.
+Fields may be kept at some points only; the others in result.json obey the same laws of counts.
 """
 
 from __future__ import annotations
@@ -12,38 +12,167 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.typing import Bool, Float
+from feti_homog.typing import Bool, Float, Int
 from feti_homog.verify.bonds import law_at
-from feti_homog.verify.check_fields import BONDED
-from feti_homog.verify.check_loads import StateNumbers, States, tips
+from feti_homog.verify.check_loads import NAMES, SAME_SHARE, TEMPERATURE, StateNumbers, States, damaged_at
 from feti_homog.verify.check_mesh import check_first_step
-from feti_homog.verify.check_points import bond_directions, tip_shares
-from feti_homog.verify.discrete_cell import DiscreteCell
-from feti_homog.verify.findings import STRENGTH, Findings, relative, solver_limit
-from feti_homog.verify.leaves import Points, Section
+from feti_homog.verify.discrete_cell import BONDED, DIRECTION_DIGITS, DiscreteCell
+from feti_homog.verify.findings import STRENGTH, Findings, Points, Section, relative, solver_limit
 from feti_homog.verify.path_energies import check_path_energies
-from feti_homog.verify.prescribed import NAMES, SAME_SHARE, TEMPERATURE, damaged_at
 
 # Utilisations by tractions below 10 rtol of the stress are none to the program; twice as many are here.
 NOISE_PER_RTOL = 20.0
-# Directions of bonds are distinguished to so many degrees.
-SAME_DIRECTION = 1e-6
-# A largest stress is a peak if the path falls by this share of it afterwards.
-LEAST_FALL = 0.05
-Point = Mapping[str, Any]
+SAME_DIRECTION = 1e-6  # degrees
+
+
+def check_path(findings: Findings, cell: DiscreteCell, states: States) -> None:
+    """Check the points of a path in result.json, and its states."""
+    points = cell.files.document["path"]
+    if any(not 0 <= state.point < len(points) for state in states):  # which breaks the law of the load
+        return
+    by_events, law = cell.files.case["path"]["method"] == "events", law_at(cell.files)
+    if not by_events:
+        check_first_step(findings, cell, points[0])
+    for number, (point, after) in enumerate(pairwise(points)):
+        broke = (point if by_events else after)["broke"]
+        findings.compare("breaks", point["bonded"] - after["bonded"], broke, 1.0, f"path[{number + 1}].bonded")
+    if by_events and points[-1]["load_factor"] == 1.0:
+        findings.record("breaks", points[-1]["broke"], f"path[{len(points) - 1}], bonds that broke at the end")
+    _check_breaks(findings, states, points, by_events)
+    # Signs are sure where a force or a gap is 20 rtol beyond zero.  While contact changes at one load, all else moves
+    # by 115 rtol then, the median of 276 changes, and by 2100 rtol at most.
+    tolerance = max(STRENGTH, 10.0 * solver_limit(float(cell.files.document["solver"].hint("rtol"))))
+    for state in states if law.has_tips else ():
+        _check_tips(findings, cell, state, points[state.point]["tips"])
+    states = [replace(state, used=_used(cell, state, points[state.point].get("tips"))) for state in states]
+    _check_strength(findings, states, points, by_events, tolerance)
+    if law.has_toughness:
+        _check_toughness(findings, cell, states, points, by_events)
+    check_path_energies(findings, cell, states, points)
+
+
+def _used(cell: DiscreteCell, state: StateNumbers, tips: Section | None) -> Float:
+    """(k,) utilisations of a state, sqrt(G / G_c) at tips by the rates in the file."""
+    used, node = state.used.copy(), tips_in_order(cell, state)
+    if tips is not None and len(tips["G_I"]) == len(tips["G_II"]) == len(node):
+        energy, law = np.array(tips["G_I"]) + np.array(tips["G_II"]), law_at(cell.files, node)
+        by_rate = np.sqrt(energy / law.lost(law.mode(state.traction[node])))
+        used[node] = np.where(np.isnan(used[node]), by_rate, used[node])
+    return used
+
+
+def _check_breaks(findings: Findings, states: States, points: Points, by_events: bool) -> None:
+    """Check that bonds of consecutive states differ by the breaks between their points, and never heal."""
+    shift = 0 if by_events else 1
+    for state, after in pairwise(states):
+        bonded, still = state.status == BONDED, after.status == BONDED
+        between = points[state.point + shift : after.point + shift]
+        softened = np.count_nonzero(still & (after.damage > state.damage))
+        limit = sum(point.get("softened", 0) for point in between)
+        off = abs(softened - limit) if len(between) == 1 else max(softened - limit, 0)
+        findings.record("breaks", off, f"{state.name}, bonds that softened")
+        findings.record("breaks", np.count_nonzero(after.damage < state.damage), f"{after.name}, damage that healed")
+        findings.record("breaks", np.count_nonzero(still & ~bonded), f"{after.name}, bonds that healed")
+        broke, expected = np.count_nonzero(bonded & ~still), sum(point["broke"] for point in between)
+        findings.compare("breaks", broke, expected, 1.0, f"{state.name}, bonds that broke")
+
+
+def _check_strength(findings: Findings, states: States, points: Points, by_events: bool, tolerance: float) -> None:
+    """Check that no bond exceeds its strength unless a jump at this load overloads it and it breaks at once.
+
+    Events break the worst bonds.
+    """
+    for number, state in enumerate(states):
+        used, where = np.nan_to_num(state.used), f"{state.name}, interface node {{}}".format
+        overloaded = by_events & overloaded_by_jump(state, points, tolerance)
+        findings.record("strength", np.where(overloaded, 0.0, np.maximum(used - 1.0, 0.0)), where)
+        largest, after = used.max(initial=1.0), states[min(number + 1, len(states) - 1)]
+        if by_events and (broke := damaged_at(points[state.point])):
+            # The next point has the bonds that break; here so many are as near to their strength as the worst.
+            worst = np.sort(np.where(np.isnan(state.used), np.inf, state.used))[-broke:]
+            findings.record("strength", np.maximum(1.0 - worst / largest, 0.0), f"{state.name}, bonds that break")
+        if by_events and after.point == state.point + 1:
+            broken = (after.damage > state.damage) & ~np.isnan(state.used)
+            findings.record("strength", np.where(broken, 1.0 - state.used / largest, 0.0), where)
+
+
+def overloaded_by_jump(state: StateNumbers, points: Points, tolerance: float) -> Bool:
+    """(k,) bonds that may exceed their strength where some break.
+
+    In a cascade, where one break overloads others, all; where only the contact changed (strains and stresses up to
+    `tolerance`), tips, whose energy release jumps with it.
+    """
+    if state.point == 0 or damaged_at(points[state.point]) == 0:
+        return np.zeros(len(state.released), bool)
+    before, now = points[state.point - 1 : state.point + 1]
+    if damaged_at(before) > 0 and abs(before["load_factor"] - now["load_factor"]) <= SAME_SHARE:
+        return np.ones(len(state.released), bool)
+    same = damaged_at(before) == 0 and before["closed"] != now["closed"]
+    for name in ("strain", "stress", TEMPERATURE):
+        old, new = (np.atleast_1d(np.asarray(point.get(name) or 0.0, float)) for point in (before, now))
+        same &= float(np.abs(old - new).max()) <= tolerance * float(np.abs(new).max())
+    return np.asarray(state.released & same)
+
+
+def tips_in_order(cell: DiscreteCell, state: StateNumbers) -> Int:
+    """(t,) interface nodes of tips by fibre, section and direction."""
+    node, rows = np.flatnonzero(cell.tips(state.status)), cell.files.interface
+    turned = np.round(cell.bond_directions[node], DIRECTION_DIGITS)
+    return np.asarray(node[np.lexsort((turned, rows.pair[node], rows.fibre[node]))])
+
+
+def _check_tips(findings: Findings, cell: DiscreteCell, state: StateNumbers, tips: Section) -> None:
+    """Check that tips are the bonds next to broken ones, with the mode of their tractions and their spring energy."""
+    node = tips_in_order(cell, state)
+    law, rows, where = law_at(cell.files, node), cell.files.interface, f"{state.name}, tip {{}}".format
+    sections = (rows.pair[node] + 1).tolist() if len(cell.files.interfaces) > 1 else None
+    is_complete = (list(tips["fibre"]), tips.get("interface")) == (rows.fibre[node].tolist(), sections)
+    findings.require("tables", is_complete and {*map(len, tips.values())} == {len(node)}, f"{state.name}, tips")
+    if not is_complete or {*map(len, tips.values())} != {len(node)}:
+        return
+    psi, first, second = law.mode(state.traction[node]), np.array(tips["G_I"]), np.array(tips["G_II"])
+    away = (np.array(tips["angle"]) - cell.bond_directions[node] + 180.0) % 360.0 - 180.0
+    findings.record("tables", np.abs(away) / 360.0, where)
+    findings.compare("tables", tips["psi"], np.degrees(psi), 90.0, where)
+    findings.compare("tables", first * np.sin(psi) ** 2, second * np.cos(psi) ** 2, first + second, where)
+    if law.grows_by_release:
+        for name in ("G_I", "G_II"):
+            tips.leaves_open(name)
+    else:
+        energies = law.energies(state.traction[node])
+        total = energies.sum(axis=1)[:, None]
+        findings.compare("tables", np.stack([first, second], axis=1), energies, total, where)
+
+
+def _check_toughness(findings: Findings, cell: DiscreteCell, states: States, points: Points, by_events: bool) -> None:
+    """Check that the fracture energy grows with the broken length.
+
+    It grows by G_c in the mode of the state before, if the files have that state, else by the range over all modes.
+    """
+    length = cell.files.interface.length / cell.area
+    scale = max(points[-1]["fracture_energy"], 1e-300)
+    findings.record("energy", points[0]["fracture_energy"] * by_events / scale, "path[0].fracture_energy")
+    for state, after in pairwise(states):
+        grown = points[after.point]["fracture_energy"] - points[state.point]["fracture_energy"]
+        broken = after.damage > state.damage
+        law, damages = law_at(cell.files, broken), (state.damage[broken], after.damage[broken])
+        if by_events and after.point == state.point + 1:
+            bounds = (law.absorbed(law.mode(state.traction[broken]), *damages),) * 2
+        else:
+            bounds = law.absorbed_range(*damages)
+        low, high = (float(energies @ length[broken]) for energies in bounds)
+        findings.record("energy", max(low - grown, grown - high, 0.0) / scale, f"{after.name}, fracture_energy")
 
 
 class _Bonds:
     """Tractions and utilisations under any load, from the states of the unit loads."""
 
     def __init__(self, cell: DiscreteCell, states: States) -> None:
-        self.law = law_at(cell.files)
+        self.law, status = law_at(cell.files), states[0].status
         self._loads = np.array([[*state.strain, state.temperature] for state in states]).T
         self._unit = np.stack([state.traction for state in states])
-        status = states[0].status
-        self._bonded, self.released = status == BONDED, np.zeros(len(status), bool)
-        if self.law.grows_by_release:
-            self.released = tips(cell, status)
+        self.released = cell.tips(status) & self.law.grows_by_release
+        self._counts = (status == BONDED) & ~self.released
 
     def traction(self, strain: Float, temperature: float) -> Float:
         """(k, c) under a strain (v,) and a change of temperature."""
@@ -51,192 +180,58 @@ class _Bonds:
         return np.tensordot(share, self._unit, axes=1)
 
     def used(self, traction: Float) -> Float:
-        """(k,) 0 of debonded nodes, and of tips whose breaks release what is not in the files."""
-        return np.where(self._bonded & ~self.released, self.law.onset(traction), 0.0)
+        """(k,) utilisations, 0 at debonded nodes and at tips that break by energy release."""
+        return np.where(self._counts, self.law.onset(traction), 0.0)
 
 
 def check_envelope(findings: Findings, cell: DiscreteCell, states: States) -> None:
     """Check the points of `envelope` in result.json."""
-    document, asked = cell.files.document, cell.files.case["envelope"]
-    points, bonds = document["envelope"], _Bonds(cell, states)
-    findings.record("load", abs(len(points) - asked["directions"]), "envelope, which lacks directions or has too many")
-    stiffness, temperature = np.array(document["effective_stiffness"]), float(asked.get("temperature", 0.0))
+    document, keys = cell.files.document, cell.files.case["envelope"]
+    points, bonds, n = document["envelope"], _Bonds(cell, states), keys["directions"]
+    findings.compare("load", len(points), n, 1.0, "envelope, which lacks directions or has too many")
+    stiffness, temperature = np.array(document["effective_stiffness"]), float(keys.get("temperature", 0.0))
     thermal = temperature * np.array(document.get("thermal_stress", np.zeros(len(stiffness))))
-    of_strains = asked["plane"][0] in NAMES[len(stiffness)][0]
-    names = NAMES[len(stiffness)][0 if of_strains else 1]
+    strains, stresses = NAMES[len(stiffness)]
+    of_strains = keys["plane"][0] in strains
+    places = [(strains if of_strains else stresses).index(name) for name in keys["plane"]]
     for number, point in enumerate(points):
-        at = f"envelope[{number}]"
-        findings.record("load", abs(point["angle"] - 360.0 * number / len(points)) / 360.0, f"{at}.angle")
-        direction, unit = np.radians(360.0 * number / len(points)), np.zeros(len(stiffness))
-        unit[[names.index(name) for name in asked["plane"]]] = np.cos(direction), np.sin(direction)
+        at, angle, unit = f"envelope[{number}]", 360.0 * number / len(points), np.zeros(len(stiffness))
+        findings.compare("load", point["angle"], angle, 360.0, f"{at}.angle")
+        unit[places] = np.cos(np.radians(angle)), np.sin(np.radians(angle))
         if "factor" in point:  # others are zero, and stress follows from strain
             strain, stress, factor = np.array(point["strain"]), np.array(point["stress"]), float(point["factor"])
-            given = strain if of_strains else stress
-            off = relative(given - factor * unit, max(factor, float(np.abs(given).max())))
-            findings.record("load", off, f"{at}, {' and '.join(asked['plane'])}")
+            value = strain if of_strains else stress
+            scale = max(factor, float(np.abs(value).max()))
+            findings.compare("load", value, factor * unit, scale, f"{at}, {' and '.join(keys['plane'])}")
             terms = np.abs(stiffness) @ np.abs(strain) + np.abs(thermal)
-            findings.record("load", relative(stress - stiffness @ strain - thermal, terms.max()), f"{at}.stress")
-            _check_bonds(findings, cell, bonds, point, temperature, at)
+            findings.compare("load", stress, stiffness @ strain + thermal, terms.max(), f"{at}.stress")
+            _check_onset(findings, cell, bonds, point, temperature, at)
         else:
             strain = unit if of_strains else np.linalg.solve(stiffness, unit)
-            least = NOISE_PER_RTOL * float(document["solver"].hint("rtol")) * np.abs(stiffness @ strain).max()
+            noise = NOISE_PER_RTOL * float(document["solver"].hint("rtol")) * np.abs(stiffness @ strain).max()
             traction = bonds.traction(strain, 0.0)
-            over = bonds.used(traction) > bonds.law.onset(np.full_like(traction, least))
+            over = bonds.used(traction) > bonds.law.onset(np.full_like(traction, noise))
             findings.require("onset", not over.any(), f"{at}, where some load breaks a bond")
 
 
-def _check_bonds(
-    findings: Findings, cell: DiscreteCell, bonds: _Bonds, point: Point, temperature: float, at: str
+def _check_onset(
+    findings: Findings, cell: DiscreteCell, bonds: _Bonds, point: Mapping[str, Any], temperature: float, at: str
 ) -> None:
-    """No bond is over its strength, the one of the file is at it, and breaks as in the file."""
-    traction = bonds.traction(np.array(point["strain"]), temperature)
+    """Check that no bond exceeds its strength, and the bond in the file is at its strength and breaks as written."""
+    traction, rows = bonds.traction(np.array(point["strain"]), temperature), cell.files.interface
     used = bonds.used(traction)
-    largest = float(used.max(initial=0.0))
-    rows = cell.files.interface
-    away = bond_directions(cell) - point["bond_angle"]
-    here = (rows.fibre == point["fibre"]) & (rows.pair == point.get("interface", 1) - 1)
-    here &= np.abs((away + 180.0) % 360.0 - 180.0) < SAME_DIRECTION
-    findings.require("tables", here.any(), f"{at}, where no bond is")
-    if not here.any():
+    largest, away = float(used.max(initial=0.0)), cell.bond_directions - point["bond_angle"]
+    on_curve = (rows.fibre == point["fibre"]) & (rows.pair == point.get("interface", 1) - 1)
+    nodes = np.flatnonzero(on_curve & (np.abs((away + 180.0) % 360.0 - 180.0) < SAME_DIRECTION))
+    findings.require("tables", bool(len(nodes)), f"{at}, where no bond is")
+    if not len(nodes):
         return
-    is_tip = bool((here & bonds.released).any())
+    is_tip, node = bool(bonds.released[nodes].any()), int(nodes[np.argmax(used[nodes])])
     if point["factor"] == 0.0:
         findings.record("onset", max(1.0 - largest, 0.0) if not is_tip else 0.0, f"{at}, of the temperature alone")
     else:
         findings.record("onset", max(largest - 1.0, 0.0) if is_tip else abs(largest - 1.0), at)
-    node = int(np.flatnonzero(here)[np.argmax(used[here])])
     if not is_tip:
         findings.record("strength", (largest - used[node]) / largest, f"{at}, fibre and bond_angle")
     for name, value in law_at(cell.files, np.array([node])).breaks(traction[node : node + 1]).items():
-        findings.record("onset", abs(point[name] - value) / (90.0 if name == "psi" else 1.0), f"{at}.{name}")
-
-
-def check_path(findings: Findings, cell: DiscreteCell, states: States) -> None:
-    """All laws of a path on its points in result.json, and on the states of those whose fields are kept."""
-    points = cell.files.document["path"]
-    if any(not 0 <= state.point < len(points) for state in states):  # which breaks the law of the load
-        return
-    by_events = cell.files.case["path"]["method"] == "events"
-    if not by_events:
-        check_first_step(findings, cell, points[0])
-    for number, (point, after) in enumerate(pairwise(points)):
-        broke = (point if by_events else after)["broke"]
-        findings.record("breaks", abs(point["bonded"] - after["bonded"] - broke), f"path[{number + 1}].bonded")
-    if by_events and points[-1]["load_factor"] == 1.0:
-        findings.record("breaks", points[-1]["broke"], f"path[{len(points) - 1}], bonds that broke at the end")
-    _check_peak(findings, cell.files.document.get("peak"), points)
-    _check_breaks(findings, states, points, by_events)
-    # Signs are sure where a force or a gap is 20 rtol beyond zero.  While contact changes at one load, all else moves
-    # by 115 rtol then, the median of 276 changes, and by 2100 rtol at most.
-    near = max(STRENGTH, 10.0 * solver_limit(float(cell.files.document["solver"].hint("rtol"))))
-    in_full = list[StateNumbers]()
-    for state in states:
-        used = state.used.copy()
-        if "tips" in points[state.point]:  # of which the strength is not in the fields
-            node, shares = tip_shares(cell, state, points[state.point]["tips"])
-            used[node] = np.where(np.isnan(used[node]), shares, used[node])
-        in_full.append(replace(state, used=used))
-    _check_strength(findings, in_full, points, by_events, near)
-    check_path_energies(findings, cell, states, points)
-
-
-def _check_peak(findings: Findings, peak: Section | None, points: Points) -> None:
-    """Check that no stress before the peak is larger, and that its numbers are those of its points."""
-    if peak is None:
-        return
-    strains, stresses = NAMES[len(points[0]["stress"])]
-    component = stresses.index(peak["stress_name"])
-    findings.require("tables", strains.index(peak["strain_name"]) == component, "peak.strain_name")
-    strain, stress = (np.array([point[kind] for point in points])[:, component] for kind in ("strain", "stress"))
-    lost = np.array([point["dissipated"] for point in points])
-    event, broken = peak["event"], np.flatnonzero([point["broke"] for point in points]).tolist()
-    first = broken[0] if broken else None
-    expected = {"stress": (stress, event), "strain": (strain, event), "dissipated": (lost, event)}
-    expected |= {f"first_break_{kind}": (values, broken[0]) for kind, (values, _) in [*expected.items()][:2] if broken}
-    for name, (values, number) in expected.items():
-        findings.record("tables", relative(peak[name] - values[number], np.abs(values).max()), f"peak.{name}")
-    size, above = np.abs(stress), np.abs(stress[:event]).max(initial=0.0) - np.abs(stress[event])
-    findings.record("tables", relative(np.maximum(above, 0.0), size.max()), "peak.event")
-    findings.require("tables", peak.get("first_break_event") == first, "peak.first_break_event")
-    _check_landmarks(findings, peak, points, stress, first)
-
-
-def _check_landmarks(findings: Findings, peak: Section, points: Points, stress: Float, first: int | None) -> None:
-    """Check the valley, on the branch of its point at the load of that or of one before, and the marks of points."""
-    left, load = peak.get("event_left"), np.array([point["load_factor"] for point in points])
-    if left is not None:
-        branch = stress[left] * np.append(load[:left] / (load[left] or 1.0), 1.0)
-        off = np.abs(peak["stress_left"] - branch).min() / (np.abs(stress).max() or 1.0)
-        findings.record("tables", off if left >= peak["event"] else np.inf, "peak.stress_left")
-    cut = left is None and bool(load[-1] < 1.0 - SAME_SHARE)
-    findings.require("tables", peak.get("so_far", cut) == cut, "peak.so_far")
-    name = "largest so far" if cut else _name_of_largest(peak, stress)
-    marks = {"first break": first, name: peak["event"], f"after the {name}": left}
-    marks["end"] = len(points) - 1
-    for number, point in enumerate(points):
-        words = " and ".join(name for name, own in marks.items() if own == number)
-        findings.require("tables", point.get("mark", words) == words, f"path[{number}].mark")
-
-
-def _name_of_largest(peak: Section, stress: Float) -> str:
-    """Return what the largest stress of a whole path is: a peak, if the path falls afterwards."""
-    top = peak["stress"]
-    falls = bool(top) and 1.0 - min(stress[-1] / top, peak.get("stress_left", top) / top) >= LEAST_FALL
-    return "peak" if falls else "largest stress"
-
-
-def _check_breaks(findings: Findings, states: States, points: Points, by_events: bool) -> None:
-    """Check that the bonds of consecutive states differ by those that broke between their points."""
-    shift = 0 if by_events else 1
-    for state, after in pairwise(states):
-        bonded, still = state.status == BONDED, after.status == BONDED
-        between = points[state.point + shift : after.point + shift]
-        broke = sum(point["broke"] for point in between)
-        softened = np.count_nonzero(still & (after.damage > state.damage))
-        most = sum(point.get("softened", 0) for point in between)
-        off = abs(softened - most) if len(between) == 1 else max(softened - most, 0)
-        findings.record("breaks", off, f"{state.name}, bonds that softened")
-        findings.record("breaks", np.count_nonzero(after.damage < state.damage), f"{after.name}, damage that healed")
-        findings.record("breaks", np.count_nonzero(still & ~bonded), f"{after.name}, bonds that healed")
-        findings.record("breaks", abs(np.count_nonzero(bonded & ~still) - broke), f"{state.name}, bonds that broke")
-
-
-def _check_strength(findings: Findings, states: States, points: Points, by_events: bool, near: float) -> None:
-    """No bond is over its strength but where a jump at this load overloads it and it breaks at once.
-
-    Events break the worst bonds.
-    """
-    for state in states:
-        where = f"{state.name}, interface node {{}}".format
-        used = np.nan_to_num(state.used)
-        held = ~_overloaded_by_jump(state, points, near) if by_events else np.ones(len(used), bool)
-        findings.record("strength", np.where(held, np.maximum(used - 1.0, 0.0), 0.0), where)
-        if by_events and (broke := damaged_at(points[state.point])):
-            # The next point has the bonds that break; here so many are as near to their strength as the worst.
-            due = max(float(used.max(initial=0.0)), 1.0)
-            worst = np.sort(np.where(np.isnan(state.used), np.inf, state.used))[-broke:]
-            findings.record("strength", np.maximum(1.0 - worst / due, 0.0), f"{state.name}, bonds that break")
-    for state, after in pairwise(states):
-        if by_events and after.point == state.point + 1:
-            due = max(float(np.nan_to_num(state.used).max(initial=0.0)), 1.0)
-            broken = (after.damage > state.damage) & ~np.isnan(state.used)
-            off = np.where(broken, 1.0 - state.used / due, 0.0)
-            findings.record("strength", off, f"{state.name}, interface node {{}}".format)
-
-
-def _overloaded_by_jump(state: StateNumbers, points: Points, near: float) -> Bool:
-    """(k,) which bonds may be over their strength where some break: all in a cascade, where one break overloads others.
-
-    Tips where only the contact changed (strains and stresses up to `near`), with which the energy jumps that their
-    break releases.
-    """
-    if state.point == 0 or damaged_at(points[state.point]) == 0:
-        return np.zeros(len(state.used), bool)
-    before, now = points[state.point - 1 : state.point + 1]
-    if damaged_at(before) > 0 and abs(before["load_factor"] - now["load_factor"]) <= SAME_SHARE:
-        return np.ones(len(state.used), bool)
-    same = damaged_at(before) == 0 and before["closed"] != now["closed"]
-    for name in ("strain", "stress", TEMPERATURE):
-        here, there = (np.atleast_1d(np.asarray(point.get(name) or 0.0, float)) for point in (before, now))
-        same &= float(np.abs(here - there).max()) <= near * float(np.abs(there).max())
-    return np.asarray(state.released & same)
+        findings.record("onset", relative(point[name] - value, 90.0 if name == "psi" else 1.0), f"{at}.{name}")

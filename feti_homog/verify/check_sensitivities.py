@@ -1,158 +1,131 @@
-"""Law of the sensitivities: energies of the fields of unit loads change as written where constants of a case change."""
+"""Sensitivity law: field energies change as in the file where constants of the case change."""
 
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from feti_homog.typing import Float
-from feti_homog.verify.cell_tables import Mesh, State
-from feti_homog.verify.check_fields import BONDED, CLOSED
-from feti_homog.verify.check_loads import SPATIAL_ORDER
-from feti_homog.verify.check_summary import about_fibres, engineering_constants, moduli
+from feti_homog.verify.check_constants import constants_of
+from feti_homog.verify.check_loads import NAMES, SPATIAL_ORDER
 from feti_homog.verify.constitutive_law import laws, mixed_phases
-from feti_homog.verify.discrete_cell import DiscreteCell
+from feti_homog.verify.discrete_cell import BONDED, CLOSED, DiscreteCell
 from feti_homog.verify.elements import Elements
 from feti_homog.verify.findings import Findings, relative
-from feti_homog.verify.prescribed import NAMES
+from feti_homog.verify.reading import Mesh, State
 
-STEP = 1e-6
-# Constants beside the largest of their kind below which they are noise.
-NOISE = 1e-3
-SAME = 1e-8  # of a radius
-SPRINGS = ("normal_stiffness", "tangential_stiffness", "axial_stiffness")
+STEP = 1e-6  # relative, of parameters
+STIFFNESS_STEP = 1e-5  # relative
+NOISE = 1e-3  # share of the largest constant of a kind below which constants are noise
+SAME_RADIUS = 1e-8  # of a radius
+TINY = 1e-300
 WEIGHTS = (1.0, -0.7, 0.5, 0.9, -0.8)
 Case = dict[str, Any]
 
 
 def check_sensitivities(findings: Findings, cell: DiscreteCell) -> None:
-    """Check the values of all constants and parameters, and one derivative along a direction in which all change."""
-    document, case = cell.files.document, cell.files.case
+    """Check the values of all constants, and one derivative along a direction in which all parameters change."""
+    document = cell.files.document
     if "sensitivities" not in document:
-        if case.get("output", {}).get("sensitivities"):
+        if cell.files.case.get("output", {}).get("sensitivities"):
             findings.record("tables", np.inf, "sensitivities, which the case asks for")
         return
-    data = document["sensitivities"]
-    names, values = data["parameters"], np.array(data["parameter_values"])
-    untold = sorted({*_required(cell)}.difference(names))
-    findings.record("tables", [np.inf] * len(untold), lambda k: f"sensitivities, {untold[k]}")
-    own = np.array([_place(dict(cell.files.case), name)[2] for name in names])
-    findings.record("tables", relative(values - own, np.abs(own)), lambda k: f"sensitivities, {names[k]}")
+    names = document["sensitivities"]["parameters"]
+    values = np.array([_place(dict(cell.files.case), name)[2] for name in names])
     # Changes over which the laws are nearly linear.
-    ratios = np.array([name.endswith(".poisson") for name in names]) & (own < 0.5)
-    sizes = np.where(ratios, 0.5 - own, np.where(own == 0.0, 1.0, np.abs(own)))
-    direction = sizes * np.resize(WEIGHTS, len(own))
-    moved = [_moved(cell, names, own + sign * STEP * direction) for sign in (1, -1)]
+    ratios = np.array([name.endswith(".poisson") for name in names]) & (values < 0.5)
+    sizes = np.where(ratios, 0.5 - values, np.where(values == 0.0, 1.0, np.abs(values)))
+    direction = sizes * np.resize(WEIGHTS, len(values))
+    cases = [_moved(cell, names, values + sign * STEP * direction) for sign in (1, -1)]
     states = list(cell.files.states())
     if "load" in document:
-        _check_load(findings, cell, states[0], moved, direction)
-    elif data.get("at_fixed_status"):
-        _check_energies(findings, cell, states, moved, direction)
+        _check_load(findings, cell, states[0], cases, direction)
+    elif document["sensitivities"].get("at_fixed_status"):
+        _check_secants(findings, cell, states, cases, direction)
     else:
-        _check_constants(findings, cell, states, moved, direction)
+        _check_linear(findings, cell, states, cases, direction)
 
 
-def _required(cell: DiscreteCell) -> Iterator[str]:
-    """Yield the constants of the phases and springs by which there are derivatives."""
-    material, sections = cell.files.case["material"], cell.files.interfaces
-    for phase in {*cell.files.phases} & material.keys():
-        for key, value in material[phase].items():
-            if "thermal_stress" in cell.files.document or not key.startswith("expansion"):
-                yield from (f"material.{phase}.{key}{place}" for place in _places(np.array(value, float)))
-    for number, section in enumerate(sections, start=1):
-        name = f"interface.{number}" if len(sections) > 1 else "interface"
-        yield from (f"{name}.{key}" for key in SPRINGS if np.isfinite(float(section.get(key) or np.inf)))
-
-
-def _places(numbers: Float) -> list[str]:
-    """Return what follows the name of a key: nothing of one number, .k of several, .Cij of a stiffness."""
-    if numbers.ndim > 1:
-        return [f".C{i + 1}{j + 1}" for i, j in np.argwhere(np.triu(numbers))]
-    return [f".{k + 1}" for k in range(len(numbers))] if numbers.ndim else [""]
-
-
-def _check_energies(
+def _check_secants(
     findings: Findings, cell: DiscreteCell, states: list[State], cases: list[Case], direction: Float
 ) -> None:
-    """Check the derivatives of the energies of states with contact, which are stationary, too.
+    """Check derivatives of contact states' energies, which are stationary, too: the diagonal of the secants.
 
-    Those are the diagonal of the secants.  The others would need fields of other loads at the same status, which no
-    file has; of them the values are checked.
+    Other derivatives need fields under other loads at the same status, which no file has; only values are checked.
     """
-    document = cell.files.document
-    data = document["sensitivities"]
+    document, data = cell.files.document, cell.files.document["sensitivities"]
     data.leaves_open("derivatives")
-    known = {f"C{i + 1}{j + 1}": C for (i, j), C in np.ndenumerate(np.array(document["effective_stiffness"]))}
-    known |= {f"thermal_S{k + 1}{k + 1}": heat for k, heat in enumerate(document.get("thermal_stress", ()))}
+    entries = {f"C{i + 1}{j + 1}": C for (i, j), C in np.ndenumerate(np.array(document["effective_stiffness"]))}
+    entries |= {f"thermal_S{k + 1}{k + 1}": heat for k, heat in enumerate(document.get("thermal_stress", ()))}
     for name, value in zip(data["constants"], data["constant_values"], strict=True):
-        findings.record("constants", abs(value - known.get(name, np.inf)) / (abs(value) or 1e-300), name)
-    strains, _ = _in_order(states[: len(states) // 2])  # those under minus the unit loads follow
+        findings.compare("constants", value, entries.get(name, np.inf), abs(value) or TINY, name)
+    strains, _ = _in_order(states[: len(states) // 2])  # the second half is under minus the unit loads
     for number, state in enumerate(strains, start=1):
         k = data["constants"].index(name := f"C{number}{number}")
-        above, below = (float(_energies(cell, [state], case)[0, 0]) for case in cases)
+        above, below, energy = (float(_energies(cell, [state], case)[0, 0]) for case in (*cases, cell.files.case))
         terms, value = np.array(data["derivatives"][k]) * direction, data["constant_values"][k]
-        expected, scale = (above - below) / (2 * STEP), max(float(np.abs(terms).max()), abs(value))
-        findings.record("sensitivities", relative(np.array(terms.sum() - expected), scale), name)
-        here = float(_energies(cell, [state], cell.files.case)[0, 0])
-        findings.record("constants", abs(value - here) / max(abs(here), 1e-300), name)
+        scale = max(float(np.abs(terms).max()), abs(value))
+        findings.compare("sensitivities", terms.sum(), (above - below) / (2 * STEP), scale, name)
+        findings.compare("constants", value, energy, max(abs(energy), TINY), name)
 
 
 def _check_load(findings: Findings, cell: DiscreteCell, state: State, cases: list[Case], direction: Float) -> None:
-    """Check strains x and stresses s of one load, what is stored, and the derivatives of those that follow from it.
+    """Check strains x and stresses s under one load, the stored energy, and the derivatives of all answers.
 
-    With given strains g and given stresses f, d(x_g.s_g - x_f.s_f) / 2 is that of the energy of the fields at rest.
-    Beside a temperature, whose conjugate no file has, the values are checked alone.
+    With prescribed strains g and stresses f, d(x_g.s_g - x_f.s_f) / 2 is the energy derivative at fixed fields.
+    With a temperature, whose conjugate no file has, only the values are checked.
     """
     data, point = cell.files.document["sensitivities"], cell.files.document["load"]
     pairs = [*zip(*NAMES[len(point["strain"])], strict=True)]
-    known = dict(zip(data["constants"], zip(data["constant_values"], data["derivatives"], strict=True), strict=True))
-    follows = [[name for name in pair if name in known] for pair in pairs]
-    if any(len(names) != 1 for names in follows) or "stored" not in known:
-        findings.record("tables", np.inf, "sensitivities, constants of the load")
+    rows = dict(zip(data["constants"], zip(data["constant_values"], data["derivatives"], strict=True), strict=True))
+    answers = [[name for name in pair if name in rows] for pair in pairs]
+    is_complete = all(len(names) == 1 for names in answers) and "stored" in rows
+    findings.require("tables", is_complete, "sensitivities, constants of the load")
+    if not is_complete:
         return
-    of_stored = np.array(known["stored"][1]) * direction
+    of_stored = np.array(rows["stored"][1]) * direction
     terms, rest = np.zeros_like(direction), of_stored.copy()
-    for (name,), strain, stress, (other, _) in zip(follows, point["strain"], point["stress"], pairs, strict=True):
-        value, conjugate, sign = (strain, stress, -1) if name == other else (stress, strain, 1)
-        size = max(map(abs, point["strain" if name == other else "stress"]))
-        findings.record("constants", relative(np.array(known[name][0] - value), size), name)
-        change = conjugate / 2 * np.array(known[name][1]) * direction
+    for (name,), strain, stress, (strain_name, _) in zip(answers, point["strain"], point["stress"], pairs, strict=True):
+        value, conjugate, sign = (strain, stress, -1) if name == strain_name else (stress, strain, 1)
+        size = max(map(abs, point["strain" if name == strain_name else "stress"]))
+        findings.compare("constants", rows[name][0], value, size, name)
+        change = conjugate / 2 * np.array(rows[name][1]) * direction
         terms, rest = terms + sign * change, rest - change
     if state.temperature:
         data.leaves_open("derivatives")
         return
-    here, *ends = (0.5 * float(_energies(cell, [state], case)[0, 0]) for case in (cell.files.case, *cases))
-    findings.record("constants", abs(known["stored"][0] - here) / max(abs(here), 1e-300), "stored")
-    scale = max(float(np.abs(terms).max()), float(np.abs(of_stored).max()), abs(here))
-    off = [terms.sum() - (ends[0] - ends[1]) / (2 * STEP), rest.sum()]
-    findings.record("sensitivities", relative(np.array(off), scale), lambda k: ("the load", "stored")[k])
+    energy, above, below = (_energies(cell, [state], case)[0, 0] / 2 for case in (cell.files.case, *cases))
+    findings.compare("constants", rows["stored"][0], energy, max(abs(energy), TINY), "stored")
+    scale = max(float(np.abs(terms).max()), float(np.abs(of_stored).max()), abs(energy))
+    off = [terms.sum() - (above - below) / (2 * STEP), rest.sum()]
+    findings.record("sensitivities", relative(off, scale), lambda k: ("the load", "stored")[k])
 
 
-def _check_constants(
+def _check_linear(
     findings: Findings, cell: DiscreteCell, states: list[State], cases: list[Case], direction: Float
 ) -> None:
-    """Check the derivatives of all constants of a linear cell."""
-    data = cell.files.document["sensitivities"]
-    ends = [_energies(cell, states, case) for case in cases]
-    slope = (ends[0] - ends[1]) / (2 * STEP)
-    document = cell.files.document
+    """Check the derivatives of all constants in a linear cell."""
+    document, data = cell.files.document, cell.files.document["sensitivities"]
+    above, below = (_energies(cell, states, case) for case in cases)
+    slope = (above - below) / (2 * STEP)
     C, heat = np.array(document["effective_stiffness"]), document.get("thermal_stress")
     heat = None if heat is None else np.array(heat)
-    here = constants_of(C, heat)
-    step = 1e-5 * np.abs(C).max() / max(float(np.abs(slope).max()), 1e-300)
-    moved = [constants_of(*changed(C, heat, sign * step * slope)) for sign in (1, -1)]
+    constants, n = constants_of(C, heat), len(C)
+    step = STIFFNESS_STEP * np.abs(C).max() / max(float(np.abs(slope).max()), TINY)
+    ends = [
+        constants_of(C + change[:, :n], None if heat is None else heat + change[:, n])
+        for change in (step * slope, -step * slope)
+    ]
     for k, name in enumerate(data["constants"]):
-        kind = max(abs(value) for other, value in here.items() if other[0] == name[0])
-        terms = np.array(data["derivatives"][k]) * direction
-        expected = (moved[0][name] - moved[1][name]) / (2 * step)
-        scale = max(float(np.abs(terms).max()), abs(here[name]), NOISE * kind)
-        findings.record("sensitivities", relative(np.array(terms.sum() - expected), scale), name)
-        findings.record("moduli", abs(data["constant_values"][k] - here[name]) / max(abs(here[name]), NOISE * kind),
-                        f"sensitivities, {name}")  # fmt: skip
+        kind = NOISE * max(abs(value) for other, value in constants.items() if other[0] == name[0])
+        terms, size = np.array(data["derivatives"][k]) * direction, max(abs(constants[name]), kind)
+        expected, scale = (ends[0][name] - ends[1][name]) / (2 * step), max(float(np.abs(terms).max()), size)
+        findings.compare("sensitivities", terms.sum(), expected, scale, name)
+        findings.compare("moduli", data["constant_values"][k], constants[name], size, f"sensitivities, {name}")
 
 
 def _place(case: Case, name: str) -> tuple[Any, Any, float]:
@@ -165,8 +138,7 @@ def _place(case: Case, name: str) -> tuple[Any, Any, float]:
     if len(keys) == 1:
         return table, keys[0], float(table[keys[0]])
     place = tuple(int(digit) - 1 for digit in keys[1] if digit.isdigit())
-    numbers = np.array(table[keys[0]], float)
-    return table, (keys[0], place), float(numbers[place])
+    return table, (keys[0], place), float(np.array(table[keys[0]], float)[place])
 
 
 def _moved(cell: DiscreteCell, names: Sequence[str], values: Float) -> Case:
@@ -184,18 +156,18 @@ def _moved(cell: DiscreteCell, names: Sequence[str], values: Float) -> Case:
 
 
 def _energies(cell: DiscreteCell, states: list[State], case: Mapping[str, Any]) -> Float:
-    """(v, v) or (6, 7) energies of pairs of the fields of unit loads, of which the first is a strain, in this case."""
+    """(v, v) or (6, 7) energies of unit-load field pairs in this case; the first field in a pair is under a strain."""
     files, phases = cell.files, cell.files.phases
     growth = float(np.log(case["cell"].get("fibre_fraction", 1.0) / files.case["cell"].get("fibre_fraction", 1.0))) / 2
     mesh, states = _grown(cell, growth, states) if growth else (files.mesh, states)
     stiffnesses, free = laws(case, phases)
-    # Elements stay what they are where constants that are alike change apart.
+    # Elements keep their kind where equal constants change apart.
     elements = Elements(mesh, stiffnesses, mixed_phases(files.case, phases))
     strains, heated = _in_order(states)
     columns = []
     for state in (*strains, *heated):
-        own = None if free is None else state.temperature * free
-        fields = elements.fields(state.displacement, np.abs(state.displacement), state.along, own)
+        free_strain = None if free is None else state.temperature * free
+        fields = elements.fields(state.displacement, np.abs(state.displacement), state.along, free_strain)
         out = float(elements.area @ fields.stress[:, 2]) if files.is_spatial else 0.0
         column = [float((other.displacement * fields.force).sum()) + other.along * out for other in strains]
         columns.append(np.array(column) + [_springs(cell, case, other, state) for other in strains])
@@ -203,66 +175,43 @@ def _energies(cell: DiscreteCell, states: list[State], case: Mapping[str, Any]) 
 
 
 def _grown(cell: DiscreteCell, growth: float, states: list[State]) -> tuple[Mesh, list[State]]:
-    """Return the mesh where all radii have grown by this share, and the states at the same u - E x.
+    """Return the mesh with all radii grown by this share, and the states at the same u - E x.
 
-    Nodes around a fibre move as its circle does, less and less to nothing halfway to the next fibre.
+    Nodes around a fibre move with its circle, less and less to nothing halfway to the next fibre.
     """
     files, x = cell.files, cell.files.mesh.points
     fibres, images = files.fibres, np.array([[i, j] for i in (-1, 0, 1) for j in (-1, 0, 1)]) * files.size
     V = np.zeros_like(x)
     for c, R in zip(fibres.centre, fibres.radius, strict=True):
         gaps = np.linalg.norm(fibres.centre[:, None] + images - c, axis=2) - fibres.radius[:, None] - R
-        half = np.partition(gaps.ravel(), 1)[1] / 2  # the least is that to itself, -2 R
+        half = np.partition(gaps.ravel(), 1)[1] / 2  # the least is to the fibre itself, -2 R
         d = (x - c + files.size / 2) % files.size - files.size / 2
         r = np.hypot(*d.T)
-        V += d * np.where(r < R * (1 + SAME), 1.0, R / np.maximum(r, R) * np.maximum(1 - (r - R) / half, 0.0))[:, None]
-    terms = np.column_stack([x, np.ones(len(x))])
-    found = []
+        outside = R / np.maximum(r, R) * np.maximum(1 - (r - R) / half, 0.0)
+        V += d * np.where(r < R * (1 + SAME_RADIUS), 1.0, outside)[:, None]
+    terms, grown = np.column_stack([x, np.ones(len(x))]), []
     for state in states:
         H = np.linalg.lstsq(terms, state.displacement - state.fluctuation, rcond=None)[0][:2]
-        found.append(replace(state, displacement=state.displacement + growth * V @ H))
-    return replace(files.mesh, points=x + growth * V), found
+        grown.append(replace(state, displacement=state.displacement + growth * V @ H))
+    return replace(files.mesh, points=x + growth * V), grown
 
 
 def _in_order(states: list[State]) -> tuple[list[State], list[State]]:
-    """Return those under unit strains in the order of their components, and that under a temperature."""
+    """Return the states under unit strains, in the order of components, and the state under a temperature."""
     strains = [state for state in states if not state.temperature]
     ordered = [strains[SPATIAL_ORDER.index(k)] for k in range(6)] if len(strains) == 6 else strains
     return ordered, [state for state in states if state.temperature]
 
 
 def _springs(cell: DiscreteCell, case: Mapping[str, Any], first: State, second: State) -> float:
-    """Sum of [u] k l [u] over the bonds that are no glue."""
-    sections, rows = case.get("interface") or [], cell.files.interface
-    found = 0.0
+    """Sum [u] k l [u] over the bonds with springs."""
+    sections, rows, energy = case.get("interface") or [], cell.files.interface, 0.0
     for number, section in enumerate(sections if isinstance(sections, list) else [sections]):
-        around = section.get("tangential_stiffness")
-        stiffnesses = section.get("normal_stiffness"), around, section.get("axial_stiffness") or around
+        tangential = section.get("tangential_stiffness")
+        stiffnesses = section.get("normal_stiffness"), tangential, section.get("axial_stiffness") or tangential
         for k, stiffness in zip(range(first.jump.shape[1]), stiffnesses, strict=False):
             if stiffness is not None and np.isfinite(float(stiffness)):
-                # Closed faces press on what is left of their springs.
-                holds = (rows.pair == number) & ((first.status == BONDED) | ((first.status == CLOSED) & (k == 0)))
-                own = rows.length * first.jump[:, k] * second.jump[:, k]
-                found += float(stiffness) * float(own[holds].sum())
-    return found
-
-
-def changed(C: Float, heat: Float | None, change: Float) -> tuple[Float, Float | None]:
-    """Return a stiffness and a thermal stress, if any, after a change (n, n) or (n, n + 1) of both."""
-    n = len(C)
-    return C + change[:, :n], None if heat is None else heat + change[:, n]
-
-
-def constants_of(C: Float, heat: Float | None) -> dict[str, float]:
-    """Return every constant by its name."""
-    n = len(C)
-    found = {f"C{i + 1}{j + 1}": float(C[i, j]) for i in range(n) for j in range(i, n)}
-    if n == 3:
-        return found | moduli(C)
-    strains = None if heat is None else -np.linalg.solve(C, heat)
-    about = about_fibres(C, strains)
-    found |= engineering_constants(C) | {name: value for name, value in about.items() if value is not None}
-    if heat is None or strains is None:
-        return found
-    found |= {"expansion_x1": float(strains[0]), "expansion_x2": float(strains[1])}
-    return found | {f"thermal_S{k + 1}{k + 1}": float(heat[k]) for k in range(3)}
+                # Closed faces press on the rest of their springs.
+                acts = (rows.pair == number) & ((first.status == BONDED) | ((first.status == CLOSED) & (k == 0)))
+                energy += float(stiffness) * float((rows.length * first.jump[:, k] * second.jump[:, k])[acts].sum())
+    return energy

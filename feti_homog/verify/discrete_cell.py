@@ -1,48 +1,47 @@
-"""The cell of a result as the laws see it: its elements, its torn nodes, and the faces of its interfaces."""
+"""The cell in a result: its elements, torn nodes, interface faces, and scales for its states."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from feti_homog.typing import Bool, Float, Int
-from feti_homog.verify.bonds import friction_at, inwardness, pairs_of
-from feti_homog.verify.cell_tables import State, gradient
+from feti_homog.typing import AnyInt, Bool, Float, Int
+from feti_homog.verify import torus
+from feti_homog.verify.bonds import friction_at, pairs_of
 from feti_homog.verify.constitutive_law import laws, mixed_phases
 from feti_homog.verify.elements import Elements
-from feti_homog.verify.reading import ResultFiles
-from feti_homog.verify.torus import TornNodes, TornSides, along_one_line, constituents, torn, wrapped
+from feti_homog.verify.reading import ResultFiles, State, gradient
+from feti_homog.verify.torus import TornNodes, TornSides
 
-# Scales of a state are no less than this share of those of the run: a path may come back to zero strain.
+# Least scale of a state / largest scale in the run: a path may come back to zero strain.
 LEAST_SHARE = 1e-9
-# So much of the terms that a number is summed of counts as its scale: 1e-15 of the terms are rounding.
+# Share of the terms that adds to the scale of their sum: 1e-15 of the terms are rounding.
 ROUNDED_TERMS = 1e-5
+BONDED, CLOSED, OPEN = 0, 1, 2
+DIRECTION_DIGITS = 9  # to which directions of tips differ
 
 
-class Loaded(Protocol):
-    """Object with a macroscopic strain (v,) and a change of temperature."""
+class Scales(NamedTuple):
+    """Sizes of a loaded cell, as if it were bonded: strain, stress, and displacement E x across the cell."""
 
-    @property
-    def strain(self) -> Float: ...
-
-    @property
-    def temperature(self) -> float: ...
+    strain: float
+    stress: float
+    displacement: float
 
 
 @dataclass(frozen=True)
 class Faces:
-    """Torn nodes that make up the two faces at each of the k interface nodes.
+    """Torn nodes on the two faces at the k interface nodes.
 
     Attributes:
-        row, is_fibre: (b,) the interface node at each torn node, or -1, and whether it is of the inner of two bodies.
-        copies: (b,) how many copies of the torn node its subdomain has, periodic images of each other.
-        distance, place: (k,) of each interface node from its place, and that; infinite and -1 if there is none.
-        pair: (places,) place of the section of the two bodies that meet there alone and along one line; -1 where they
-            never part.
+        row, is_fibre: (b,) interface node at each torn node, or -1, and True on the inner body.
+        copies: (b,) how often a torn node is in its subdomain, by periodic images.
+        distance, place: (k,) distance from an interface node to its place, and this place; infinite and -1 without one.
+        pair: (places,) section for the two bodies, where exactly two meet along one line; -1 where they never part.
     """
 
     row: Int
@@ -53,13 +52,13 @@ class Faces:
     place: Int
 
     def sums(self, values: Float, of_fibre: bool) -> Float:
-        """(k, c) sums of values (b, c) over the copies on one of the faces."""
-        own = (self.row >= 0) & (self.is_fibre == of_fibre)
+        """(k, c) sums of values (b, c) over the copies on one face."""
+        on_face = (self.row >= 0) & (self.is_fibre == of_fibre)
         k = len(self.place)
-        return np.stack([np.bincount(self.row[own], column, k) for column in values[own].T], axis=1)
+        return np.stack([np.bincount(self.row[on_face], column, k) for column in values[on_face].T], axis=1)
 
     def means(self, values: Float, of_fibre: bool) -> Float:
-        """(k, c) means of values (b, c) over the subdomains on one of the faces; NaN where there is none."""
+        """(k, c) means of values (b, c) over the subdomains on one face; NaN without any."""
         share = 1.0 / self.copies[:, None]
         with np.errstate(invalid="ignore"):
             return self.sums(values * share, of_fibre) / self.sums(np.ones_like(values) * share, of_fibre)
@@ -69,9 +68,13 @@ class Faces:
 class DiscreteCell:
     """Mesh, materials and interface of a result.
 
-    Stiffnesses (phases, v, v), v = 3 or in generalized plane strain 6; expansions (phases, v), None if not known; parts
-    of phases that subdomains belong to (subdomains,); which torn sides are inner faces of bonds that may break (s,);
-    shares of phases (phases,); how near copies of a node are; the largest component of the strains of all states.
+    Attributes:
+        stiffnesses: (phases, v, v), v = 3, or 6 in generalized plane strain.
+        expansions: (phases, v), None if unknown.
+        constituent: (subdomains,) connected parts of phases.
+        inner: (s,) True for torn sides on the inner face of bonds that may break.
+        fractions: (phases,) area fractions.
+        largest_strain: largest component of all states.
     """
 
     files: ResultFiles
@@ -84,7 +87,6 @@ class DiscreteCell:
     inner: Bool
     faces: Faces
     fractions: Float
-    radius: float
     largest_strain: float
 
     @classmethod
@@ -93,36 +95,69 @@ class DiscreteCell:
         mesh = files.mesh
         stiffnesses, free = laws(files.case, files.phases)
         elements = Elements(mesh, stiffnesses, mixed_phases(files.case, files.phases))
-        sides, nodes, radius = torn(mesh, files.size)
-        parts = constituents(mesh, sides)
-        inwards = inwardness(mesh, files.phases, sides, parts)
-        on_line = along_one_line(sides, nodes, parts[mesh.subdomain])
+        sides, nodes, radius = torus.torn(mesh, files.size)
+        parts = torus.constituents(mesh, sides)
+        inwards = torus.inwardness(mesh, files.phases, sides, parts)
+        on_line = torus.along_one_line(sides, nodes, parts[mesh.subdomain])
         faces = _faces(files, nodes, on_line, parts, inwards, radius)
         depth, other = inwards[parts[mesh.subdomain]], sides.element[sides.partner]
         may_part = (sides.partner >= 0) & (pairs_of(files)[mesh.phase[sides.element], mesh.phase[other]] >= 0)
         inner = may_part & (depth[sides.element] > depth[other])
-        areas = np.bincount(mesh.phase, elements.area, len(files.phases))
+        fractions = np.bincount(mesh.phase, elements.area, len(files.phases)) / files.size.prod()
         strains = [np.abs(state.attrs["strain"]).max() for state in files.file.get("state", {}).values()]
         largest = float(np.max(strains, initial=0.0))
-        return cls(
-            files, stiffnesses, free, elements, sides, nodes, parts, inner, faces, areas / files.size.prod(), radius,
-            largest,
-        )  # fmt: skip
+        return cls(files, stiffnesses, free, elements, sides, nodes, parts, inner, faces, fractions, largest)
 
-    @cached_property
-    def beside(self) -> Int:
-        """(e, 2) interface nodes that lie beside each other."""
-        row_of = np.full(len(self.files.mesh.points), -1)
-        row_of[self.nodes.node] = self.faces.row
-        rows = row_of[self.sides.nodes[self.inner]]
-        along = rows[:, [0, 2, 2, 1]] if rows.shape[1] == 3 else rows
-        pairs = along.reshape(-1, 2)
-        return np.asarray(pairs[(pairs >= 0).all(axis=1)])
+    @property
+    def area(self) -> float:
+        """Area of the rectangle."""
+        return float(self.files.size.prod())
 
     @property
     def porosity(self) -> float:
-        """Share of the voids, 0 where no side is without a partner."""
+        """Area fraction of voids, 0 unless some side has no partner."""
         return 1.0 - float(self.fractions.sum()) if self.sides.at_void.any() else 0.0
+
+    @cached_property
+    def reuss(self) -> Float:
+        """(v, v) <L^-1>^-1, the least stiffness of the bonded cell."""
+        return np.asarray(np.linalg.inv(np.einsum("p,pij->ij", self.fractions, np.linalg.inv(self.stiffnesses))))
+
+    @cached_property
+    def neighbours(self) -> Int:
+        """(e, 2) pairs of adjacent interface nodes."""
+        row_of = np.full(len(self.files.mesh.points), -1)
+        row_of[self.nodes.node] = self.faces.row
+        rows = row_of[self.sides.nodes[self.inner]]
+        pairs = (rows[:, [0, 2, 2, 1]] if rows.shape[1] == 3 else rows).reshape(-1, 2)
+        return np.asarray(pairs[(pairs >= 0).all(axis=1)])
+
+    def tips(self, status: AnyInt) -> Bool:
+        """(k,) bonds next to a broken one."""
+        broken, near_break = status != BONDED, np.zeros(len(status), bool)
+        for node, neighbour in (self.neighbours.T, self.neighbours.T[::-1]):
+            near_break[node[broken[neighbour]]] = True
+        return np.asarray(near_break & ~broken)
+
+    @cached_property
+    def directions(self) -> Float:
+        """(k,) directions of the interface nodes from their fibres' centres, in degrees."""
+        rows = self.files.interface
+        x, y = torus.from_centre(rows.points, self.files.fibres.centre[rows.fibre - 1], self.files.size).T
+        return np.asarray(np.degrees(np.arctan2(y, x)))
+
+    @cached_property
+    def bond_directions(self) -> Float:
+        """(k,) `directions` in (-180, 180], or normal directions on fibres without a centre."""
+        n1, n2 = self.files.interface.normal.T
+        angle = np.where(np.isnan(self.directions), np.degrees(np.arctan2(n2, n1)), self.directions)
+        return np.asarray(angle + 360.0 * (np.round(angle, DIRECTION_DIGITS) <= -180.0))
+
+    def in_axes(self, vectors: Float) -> Float:
+        """(k, c) x1, x2 and x3 components of normal, tangential and axial ones; the tangent is (-n2, n1)."""
+        n1, n2 = self.files.interface.normal.T
+        normal, tangential, *axial = vectors.T
+        return np.stack([n1 * normal - n2 * tangential, n2 * normal + n1 * tangential, *axial], axis=1)
 
     @cached_property
     def node_integrals(self) -> Float:
@@ -146,59 +181,43 @@ class DiscreteCell:
                 sums[:, column] += np.bincount(nodes.ravel(), terms.ravel(), len(sums))
         return sums
 
-    @property
-    def area(self) -> float:
-        """Area of the rectangle."""
-        return float(self.files.size.prod())
+    def free_strains(self, temperature: float) -> Float | None:
+        """(phases, v) strains of stress-free phases at a temperature."""
+        return None if self.expansions is None else self.expansions * temperature
 
-    @property
-    def reuss(self) -> Float:
-        """(v, v) <L^-1>^-1, the least stiffness of the bonded cell."""
-        return np.asarray(np.linalg.inv(np.einsum("p,pij->ij", self.fractions, np.linalg.inv(self.stiffnesses))))
+    def loads(self, strain: Float, temperature: float) -> Float:
+        """(v,) strain plus the largest thermal strain of a phase."""
+        free = self.free_strains(temperature)
+        return strain if free is None else np.asarray(strain + np.abs(free).max(axis=0))
 
-    def free_strains(self, state: Loaded) -> Float | None:
-        """(phases, v) strains of the phases without stress at the temperature of a state."""
-        return None if self.expansions is None else self.expansions * state.temperature
+    def scales(self, strain: Float, temperature: float, slip: float = 0.0) -> Scales:
+        """Return the sizes under a load, or a faint one, and under a slip that friction holds in an unloaded cell."""
+        loads, longest, (width, height) = self.loads(strain, temperature), float(self.files.size.max()), self.files.size
+        loads = np.asarray(loads + np.copysign(slip / longest, loads))
+        corners = np.array([[width, 0.0], [0.0, height], [width, height]])
+        displacement = float(np.abs(corners @ gradient(loads).T).max())
+        displacement += abs(float(loads[2])) * longest if len(loads) > 3 else 0.0  # as much as E33 may contract
+        sizes = float(np.abs(loads).max()), float(np.abs(self.reuss @ loads).max()), displacement
+        least = LEAST_SHARE * self.largest_strain
+        return Scales(*map(max, sizes, (least, least * float(np.abs(self.reuss).max()), least * longest)))
 
-    def loads(self, state: Loaded) -> Float:
-        """(v,) strains that the loads of a state make, for scales: E, and the largest that temperature makes."""
-        free = self.free_strains(state)
-        own = state.strain if free is None else np.asarray(state.strain + np.abs(free).max(axis=0))
-        slip = 0.0  # those that friction holds load an unloaded cell
-        if isinstance(state, State) and friction_at(self.files).any():
-            slip = float(np.abs(state.jump).max(initial=0.0))
-        return np.asarray(own + np.copysign(slip / float(self.files.size.max()), own))
+    def scales_of(self, state: State) -> Scales:
+        """Return the sizes of a state."""
+        slip = float(np.abs(state.jump).max(initial=0.0)) if friction_at(self.files).any() else 0.0
+        return self.scales(state.strain, state.temperature, slip)
 
-    def imposed(self, state: Loaded) -> float:
-        """Largest displacement E x that a state imposes across the cell, at least that of a faint strain."""
-        width, height = self.files.size
-        corners, loads = np.array([[width, 0.0], [0.0, height], [width, height]]), self.loads(state)
-        own = float(np.abs(corners @ gradient(loads).T).max())
-        if len(loads) > 3:  # as much as E33 may contract
-            own += abs(float(loads[2])) * float(self.files.size.max())
-        return max(own, LEAST_SHARE * self.largest_strain * float(self.files.size.max()))
-
-    def least_stress(self, state: Loaded) -> float:
-        """Return a stress that a state makes in the bonded cell at least: a scale that debonding keeps."""
-        own, most = np.abs(self.reuss @ self.loads(state)).max(), np.abs(self.reuss).max() * self.largest_strain
-        return float(max(own, LEAST_SHARE * most))
+    def largest_displacement(self, state: State) -> float:
+        """Return a scale of displacements that does not vanish with the fluctuation."""
+        return float(np.abs(state.fluctuation).max()) + self.scales_of(state).displacement
 
     @property
     def rounded_energy(self) -> float:
-        """Energy per area to add to the largest, for scales: where all has parted what is stored is rounding."""
+        """Energy per area to add to energy scales: where all has parted the stored energy is rounding."""
         return ROUNDED_TERMS * float(np.abs(self.reuss).max()) * self.largest_strain**2
-
-    def energy_terms(self, state: Loaded) -> float:
-        """Energy per area of which what is stored is summed at least, be it none: that of the bonded cell."""
-        return self.least_stress(state) * self.strain_size(state)
-
-    def strain_size(self, state: Loaded) -> float:
-        """Return the largest of the strains that the loads of a state make."""
-        return max(float(np.abs(self.loads(state)).max()), LEAST_SHARE * self.largest_strain)
 
 
 def _faces(files: ResultFiles, nodes: TornNodes, on_line: Bool, parts: Int, inwards: Int, radius: float) -> Faces:
-    """Return where interface nodes are on the mesh, with `inwardness` (parts,) and `along_one_line` (places,)."""
+    """Find the interface nodes on the mesh by `inwardness` (parts,) and `along_one_line` (places,)."""
     depth = inwards[parts[nodes.subdomain]]
     members = np.unique(np.column_stack([nodes.place, depth, nodes.phase]), axis=0)
     two = np.flatnonzero((np.bincount(members[:, 0], minlength=nodes.places) == 2) & on_line)
@@ -211,14 +230,12 @@ def _faces(files: ResultFiles, nodes: TornNodes, on_line: Bool, parts: Int, inwa
     points, size = files.interface.points, files.size
     place, distance = np.full(len(points), -1), np.full(len(points), np.inf)
     if len(points) and len(nodes.node):
-        tree = cKDTree(wrapped(files.mesh.points[nodes.node], size), boxsize=size)
-        away, nearest = tree.query(wrapped(points, size), distance_upper_bound=radius)
-        found = np.flatnonzero(np.isfinite(away))
-        place[found], distance[found] = nodes.place[nearest[found]], away[found]
+        tree = cKDTree(torus.wrapped(files.mesh.points[nodes.node], size), boxsize=size)
+        away, nearest = tree.query(torus.wrapped(points, size), distance_upper_bound=radius)
+        on_mesh = np.flatnonzero(np.isfinite(away))
+        place[on_mesh], distance[on_mesh] = nodes.place[nearest[on_mesh]], away[on_mesh]
     row_of = np.full(nodes.places, -1)
     row_of[place[place >= 0]] = np.flatnonzero(place >= 0)
-    _, which, count = np.unique(
-        nodes.place * (int(nodes.subdomain.max(initial=0)) + 1) + nodes.subdomain,
-        return_inverse=True, return_counts=True,
-    )  # fmt: skip
+    labels = nodes.place * (int(nodes.subdomain.max(initial=0)) + 1) + nodes.subdomain
+    _, which, count = np.unique(labels, return_inverse=True, return_counts=True)
     return Faces(row_of[nodes.place], is_fibre, count[which.ravel()], distance, pair, place)

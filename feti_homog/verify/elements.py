@@ -1,7 +1,7 @@
-"""Plane triangles of three and six nodes: strains, stresses, nodal forces and energies of given displacements.
+"""Plane triangles with three and six nodes: strains, stresses, nodal forces and energies of displacements.
 
-Displacements have two components, or in generalized plane strain three, c of them; strains and stresses have three or
-six, v, in the orders [11, 22, 12] and [11, 22, 33, 23, 13, 12].
+Displacements have c = 2 components, or 3 in generalized plane strain; strains and stresses have v = 3 or 6, in the
+orders [11, 22, 12] and [11, 22, 33, 23, 13, 12].
 
 Written for the certificate alone, from barycentric coordinates r: N_a = r_a, or r_a (2 r_a - 1) and 4 r_a r_b on curved
 (isoparametric) sides.
@@ -15,27 +15,31 @@ from functools import cache, cached_property
 
 import numpy as np
 
-from feti_homog.typing import Bool, Float, Int
-from feti_homog.verify.cell_tables import Mesh
+from feti_homog.typing import AnyInt, Bool, Float, Int
+from feti_homog.verify.reading import Mesh
 
 ELEMENTS_AT_ONCE = 1 << 15
-# Gradients of so many numbers are kept from state to state: 400 MB.
-MOST_KEPT = 50_000_000
+MOST_KEPT = 50_000_000  # numbers of gradients that stay from state to state: 400 MB
 SIDES = ((0, 1), (1, 2), (2, 0))
-# (c, 2) for each number of strains: du_i/dx_d is part of which.
+# (c, 2) place of du_i/dx_d in the strains, by the number of strains.
 PLACES = {3: np.array([[0, 2], [2, 1]]), 6: np.array([[0, 5], [5, 1], [4, 3]])}
 # r_a = N_a + half of the functions of the two sides at vertex a.
 OF_NODES = np.array([[2, 0, 0, 1, 0, 1], [0, 2, 0, 1, 1, 0], [0, 0, 2, 0, 1, 1]]) / 2
-# Components of normal stresses, by the number of all.
+# Components of normal stresses, by the number of stresses.
 NORMAL = {3: [0, 1], 6: [0, 1, 2]}
 
 
 @dataclass(frozen=True)
 class ElementFields:
-    """Means of strains and stresses (m, v) that displacements (n, c) make in the elements, and int sigma : eps.
+    """Fields from displacements (n, c).
 
-    Forces (n, c) are int B^T sigma, with the largest that a single element exerts; strain_size (m,) and force_size (n,)
-    are sizes of the terms of which strains and forces are summed, with whose rounding they err.
+    Attributes:
+        strain, stress: (m, v) element means.
+        strain_size: (m,) size of the summed terms, with whose rounding strains err.
+        force: (n, c) int B^T sigma.
+        force_size: (n,) size of the summed terms.
+        largest_force: of a single element.
+        energy: int sigma : eps.
     """
 
     strain: Float
@@ -56,7 +60,7 @@ class Elements:
 
     @property
     def contrasts(self) -> tuple[float, float]:
-        """Largest lambda / mu of elements that have a pressure, and largest mu over the least of theirs, or 0."""
+        """Largest lambda / mu of elements with a pressure, and largest mu over their least, or 0."""
         L, mu = self._stiffnesses[self.mixed], self._stiffnesses[:, -1, -1]
         ratio, contrast = L[:, 0, 1] / L[:, -1, -1], mu.max() / mu[self.mixed]
         return float(ratio.max(initial=0.0)), float(contrast.max(initial=0.0))
@@ -68,7 +72,7 @@ class Elements:
 
     @cached_property
     def least_jacobian(self) -> Float:
-        """(m,) least determinant at the quadrature points, relative to the mean one of the element."""
+        """(m,) least determinant at the quadrature points / mean determinant of the element."""
         parts = [weights / np.abs(weights.mean(axis=1))[:, None] for _, _, weights in self._parts()]
         return np.concatenate([part.min(axis=1) for part in parts])
 
@@ -83,77 +87,68 @@ class Elements:
     def fields(
         self, displacement: Float, terms_of_u: Float, along: float = 0.0, free: Float | None = None
     ) -> ElementFields:
-        """Strains, stresses, forces and energy of the displacements (n, c), sums of terms of these sizes (n, c).
+        """Return the fields of displacements (n, c), sums of terms with these sizes (n, c).
 
-        `along` is E33, and `free` are the strains (phases, v) that the phases have without stress.
+        `along` is E33, `free` are the strains (phases, v) of stress-free phases.
         """
         m, v = len(self._mesh.triangles), self._stiffnesses.shape[1]
         strain, stress, size = np.empty((m, v)), np.empty((m, v)), np.empty(m)
         force, terms, largest, energy = np.zeros_like(displacement), np.zeros_like(self._mesh.points), 0.0, 0.0
-        free = self._free(free)
         for part, gradients, weights, slope, local, answer in self._responses(displacement, along, free):
-            nodes, share = self._mesh.triangles[part], weights / weights.sum(axis=1)[:, None]
-            own_free = free[self._mesh.phase[part]]
+            nodes, phase = self._mesh.triangles[part], self._mesh.phase[part]
+            share = weights / weights.sum(axis=1)[:, None]
             strain[part], stress[part] = (np.einsum("eqi,eq->ei", field, share) for field in (local, answer))
             size[part] = np.einsum("eqad,eai->eq", np.abs(gradients), terms_of_u[nodes]).max(axis=1)
             # |du/dx| sum |x_a| |dN_a/dx|: gradients are off by the rounding of places, in small elements most.
             lengths = np.einsum("eqad,ead->eq", np.abs(gradients), np.abs(self._mesh.points)[nodes])
-            size[part] += (np.abs(slope).max(axis=(2, 3)) * lengths).max(axis=1)
-            size[part] += abs(along) + np.abs(own_free).max(axis=1)
-            tensor = answer[..., PLACES[v]]
-            own = np.einsum("eqad,eqid,eq->eai", gradients, tensor, weights, optimize=True)
-            _add(force, nodes, own)
-            rounded = np.abs(self._stiffnesses).max(axis=(1, 2))[self._mesh.phase[part]] * size[part]
+            size[part] += (np.abs(slope).max(axis=(2, 3)) * lengths).max(axis=1) + abs(along)
+            size[part] += 0.0 if free is None else np.abs(free[phase]).max(axis=1)
+            forces = np.einsum("eqad,eqid,eq->eai", gradients, answer[..., PLACES[v]], weights, optimize=True)
+            _add(force, nodes, forces)
+            rounded = np.abs(self._stiffnesses).max(axis=(1, 2))[phase] * size[part]
             _add(terms, nodes, np.einsum("eqad,eq,e->ead", np.abs(gradients), weights, rounded, optimize=True))
-            largest = max(largest, float(np.abs(own).max()))
+            largest = max(largest, float(np.abs(forces).max()))
             energy += float(np.einsum("eqi,eqi,eq->", answer, local, weights, optimize=True))
         return ElementFields(strain, stress, size, force, terms.max(axis=1), largest, energy)
 
     def point_stresses(
         self, displacement: Float, along: float, free: Float | None
     ) -> Iterator[tuple[slice, Float, Float, Float]]:
-        """Quadratic elements in portions: places (q, 3), weights (e, q) and stresses (e, q, v); else as `fields`."""
-        for part, _, weights, _, _, answer in self._responses(displacement, along, self._free(free)):
+        """Yield quadratic elements in portions: places (q, 3), weights (e, q), stresses (e, q, v); else as `fields`."""
+        for part, _, weights, _, _, answer in self._responses(displacement, along, free):
             yield part, _places(), weights, answer
 
-    def _free(self, free: Float | None) -> Float:
-        return np.zeros(self._stiffnesses.shape[:2]) if free is None else free
-
     def _responses(
-        self, displacement: Float, along: float, free: Float
+        self, displacement: Float, along: float, free: Float | None
     ) -> Iterator[tuple[slice, Float, Float, Float, Float, Float]]:
-        """Elements in portions: gradients, weights, du/dx of the nodes (e, q, c, 2), strains and stresses (e, q, v)."""
-        v = self._stiffnesses.shape[1]
+        """Yield elements in portions: gradients, weights, du/dx of nodes (e, q, c, 2), strains, stresses (e, q, v)."""
+        v, none = self._stiffnesses.shape[1], np.zeros(self._stiffnesses.shape[:2])
         for part, gradients, weights in self._parts():
             phase = self._mesh.phase[part]
             slope = np.einsum("eqad,eai->eqid", gradients, displacement[self._mesh.triangles[part]])
-            local, own_free = _strains(slope, v, along), free[phase]
-            excess = self._add_bubbles(part, gradients, weights, local, own_free)
+            local, own_free = _strains(slope, v, along), (none if free is None else free)[phase]
+            excess = self._add_bubbles(phase, gradients, weights, local, own_free)
             answer = np.einsum("eij,eqj->eqi", self._stiffnesses[phase], local - own_free[:, None])
             answer[..., NORMAL[v]] += excess[..., None]
             yield part, gradients, weights, slope, local, answer
 
-    def _add_bubbles(self, part: slice, gradients: Float, weights: Float, local: Float, free: Float) -> Float:
+    def _add_bubbles(self, phase: AnyInt, gradients: Float, weights: Float, local: Float, free: Float) -> Float:
         """(e, q) pressure of mixed elements less lambda tr eps, 0 in others; adds the bubbles' strains to `local`."""
-        excess, phase = np.zeros(local.shape[:2]), self._mesh.phase[part]
-        own = np.flatnonzero(self.mixed[phase])
-        if not len(own):
+        excess, mixed, v = np.zeros(local.shape[:2]), np.flatnonzero(self.mixed[phase]), local.shape[2]
+        if not len(mixed):
             return excess
-        v, lame = (
-            local.shape[2],
-            np.stack([self._stiffnesses[phase[own], 0, 1], self._stiffnesses[phase[own], -1, -1]], 1),
-        )
-        elastic = local[own] - free[own, None]
-        slope, pressure = inner_fields(_places(), gradients[own], weights[own], elastic, lame)
+        lame = np.stack([self._stiffnesses[phase[mixed], 0, 1], self._stiffnesses[phase[mixed], -1, -1]], 1)
+        elastic = local[mixed] - free[mixed, None]
+        slope, pressure = inner_fields(_places(), gradients[mixed], weights[mixed], elastic, lame)
         if v == 6:
             slope = np.concatenate([slope, np.zeros((*slope.shape[:2], 1, 2))], axis=2)
         bubble = _strains(slope, v, 0.0)
-        local[own] += bubble
-        excess[own] = pressure - lame[:, :1] * (elastic + bubble)[..., NORMAL[v]].sum(axis=2)
+        local[mixed] += bubble
+        excess[mixed] = pressure - lame[:, :1] * (elastic + bubble)[..., NORMAL[v]].sum(axis=2)
         return excess
 
     def _parts(self) -> Iterator[tuple[slice, Float, Float]]:
-        """Elements in portions, with gradients (e, q, a, 2) and weights (e, q) at their quadrature points."""
+        """Yield elements in portions, with gradients (e, q, a, 2) and weights (e, q) at their quadrature points."""
         return iter(self._kept) if self._kept else self._computed()
 
     @cached_property
@@ -163,31 +158,29 @@ class Elements:
 
     def _computed(self) -> Iterator[tuple[slice, Float, Float]]:
         slopes, shares = _rule(self._mesh.triangles.shape[1])
+        # r_0 = 1 - r_1 - r_2, so the columns of the Jacobian are dx/dr_1 - dx/dr_0 and dx/dr_2 - dx/dr_0.
+        free = slopes[:, :, 1:] - slopes[:, :, :1]
         for first in range(0, len(self._mesh.triangles), ELEMENTS_AT_ONCE):
             part = slice(first, first + ELEMENTS_AT_ONCE)
-            corners = self._mesh.points[self._mesh.triangles[part]]
-            # r_0 = 1 - r_1 - r_2, so the columns of the Jacobian are dx/dr_1 - dx/dr_0 and dx/dr_2 - dx/dr_0.
-            free = slopes[:, :, 1:] - slopes[:, :, :1]
-            jacobian = np.einsum("qas,ead->eqds", free, corners)
+            jacobian = np.einsum("qas,ead->eqds", free, self._mesh.points[self._mesh.triangles[part]])
             (a, b), (c, d) = np.moveaxis(jacobian, (2, 3), (0, 1))
             determinant = a * d - b * c
             adjugate = np.moveaxis(np.array([[d, -b], [-c, a]]), (0, 1), (2, 3))
             # Of an element without area nothing is finite, and every law fails.
-            inverse = adjugate / determinant[..., None, None]
-            gradients = np.einsum("qas,eqsd->eqad", free, inverse)
+            gradients = np.einsum("qas,eqsd->eqad", free, adjugate / determinant[..., None, None])
             yield part, gradients, determinant * shares / 2
 
 
 @cache
 def _rule(nodes: int) -> tuple[Float, Float]:
-    """dN_a/dr_b (q, a, 3) and the weights (q,), their sum 1, of a rule exact for constants or for degree 4.
+    """dN_a/dr_b (q, a, 3) and weights (q,), their sum 1, of a rule exact for constants or for degree 4.
 
     The six points are Dunavant's (1985), `_places`.
     """
     if nodes == 3:
         return np.eye(3)[None], np.ones(1)
-    more = np.sqrt(213125 - 53320 * np.sqrt(10.0))
-    weights, r = [(620 + sign * more) / 3720 for sign in (1, 1, 1, -1, -1, -1)], _places()
+    root = np.sqrt(213125 - 53320 * np.sqrt(10.0))
+    weights, r = [(620 + sign * root) / 3720 for sign in (1, 1, 1, -1, -1, -1)], _places()
     slopes = np.zeros((6, 6, 3))
     for a in range(3):
         slopes[:, a, a] = 4 * r[:, a] - 1
@@ -225,10 +218,10 @@ def _add(sums: Float, nodes: Int, values: Float) -> None:
 def inner_fields(
     places: Float, gradients: Float, weights: Float, strain: Float, lame: Float
 ) -> tuple[Float, Float]:  # fmt: skip
-    """Return (e, q, 2, 2) du_i/dx_d of the bubble, and (e, q) the pressure.
+    """Return du_i/dx_d (e, q, 2, 2) of the bubble, and the pressure (e, q).
 
-    Of places (q, 3), barycentric, gradients of the nodes' functions (e, q, 6, 2), weights (e, q), elastic strains of
-    their displacements (e, q, v), and lambda and mu (e, 2).
+    Barycentric places (q, 3), gradients of the nodes' functions (e, q, 6, 2), weights (e, q), elastic strains of nodal
+    displacements (e, q, v), lambda and mu (e, 2).
     """
     first, shear = lame.T
     slopes = np.einsum("ab,eqbd->eqad", OF_NODES, gradients)
@@ -246,5 +239,5 @@ def inner_fields(
     right[:, :2, 0] = -np.einsum("eq,eqi->ei", weights, pulled)
     trace = strain[..., NORMAL[strain.shape[2]]].sum(axis=2)
     right[:, 2:, 0] = -(first / shear)[:, None] * np.einsum("eq,qm,eq->em", weights, places, trace)
-    found = np.linalg.solve(matrix, right)[..., 0]
-    return np.einsum("ei,eqd->eqid", found[:, :2], of_bubble), shear[:, None] * (found[:, 2:] @ places.T)
+    solution = np.linalg.solve(matrix, right)[..., 0]
+    return np.einsum("ei,eqd->eqid", solution[:, :2], of_bubble), shear[:, None] * (solution[:, 2:] @ places.T)

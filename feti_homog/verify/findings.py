@@ -1,18 +1,19 @@
-"""Checks of the certificate with the largest violation that rounding or the solver explains, and what was found.
+"""Laws of the certificate with their limits, their largest violations, and the numbers that no law reads.
 
-Rounding.  What is computed from the fields by sums of a few terms is off by some units in the last place of the terms;
-what the solver gets from factorizations, by some hundred: forces of 119 000 elements by 1.3e-12 at most.  Where a phase
-is so stiff that its strains are differences of nearly equal displacements, 1e-15 of the terms are rounding too.
-The limits are ten to a thousand times what was measured.
+Rounding.  Sums over fields err by some units in the last place of their terms; quantities from factorizations in the
+solver by some hundred: forces in a mesh with 119 000 elements by 1.3e-12 at most.  In a very stiff phase, whose strains
+are differences between nearly equal displacements, rounding is 1e-15 of the terms.  Limits are ten to a thousand times
+the measured errors.
 
-Solver.  The Krylov method ends with jumps of `rtol`, relative; laws that need glued faces to be closed hold as far as
-the checks of a run demand, min(1000 rtol, 1e-4).  `rtol` is written in the result, so the second number is the most
-that any result may claim.
+Solver.  The Krylov method leaves jumps of `rtol`, relative; laws for closed faces hold to the tolerance of a run's
+checks, min(1000 rtol, 1e-4).  `rtol` is written in the result, so 1e-4 is the most that any result may claim.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+import re
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,37 +23,36 @@ from numpy.typing import ArrayLike
 from feti_homog.typing import Float
 
 CHECK_PER_RTOL, LARGEST_CHECK, KKT = 1e3, 1e-4, 1e-6
-# Signs of forces and gaps are the solver's error below 10 rtol of the largest; the check of contact allows 1e-6.
+# Signs of forces and gaps are solver error below 10 rtol of the largest; the solver's contact check allows 1e-6.
 CONTACT_PER_RTOL, LEAST_CONTACT = 100.0, 1e-6
 # Bonds whose utilisation differs by 1e-6 break together.
 STRENGTH = 2e-6
-# Differences of energies over a step of 1e-6.
+# Differences of energies over a relative step of 1e-6.
 SLOPE = 1e-6
-# Utilisations at onset, from the same tractions as the onset.
-ONSET = 1e-9
 # Coordinates of a user's mesh are rounded: sides match to 1e-7 of the cell, circles are round to 1e-6 of their radius.
-OWN_MESH, USERS_MESH = 1e-9, 1e-5
+GENERATED_MESH, USERS_MESH = 1e-9, 1e-5
 # Thin coatings bend by the rounding of the forces on their two faces: measured 4e-9 at a hundredth of the radius.
-WHOLE_BODIES, COATINGS = 1e-11, 1e-7
-# Nearly incompressible phases lose digits with lambda / mu beyond this, and stresses, which stiff phases beside them
-# raise, with the contrast of mu beyond the others: at 1e5 to 5e8, with contrasts of 1e-3 to 1e6, violations are a
-# quarter of the limits at most, 0.9 of that of jumps.
+BODIES, COATINGS = 1e-11, 1e-7
+# Nearly incompressible phases lose digits with lambda / mu beyond this, and stresses, which stiff phases around them
+# raise, with the contrast of mu beyond the next two: at 1e5 to 5e8, with contrasts of 1e-3 to 1e6, violations are a
+# quarter of the limits at most, 0.9 of the limit of jumps.
 LARGE_RATIO, LARGE_CONTRAST, LARGE_OF_PRESSURE, PRESSURE = 1e5, 50.0, 250.0, 50.0
-Pair = tuple[float, float]
+
+Place = str | Callable[[int], str]
 
 
 @dataclass(frozen=True)
 class Check:
-    """Condition that a result meets, described in words, and the largest relative violation that is none."""
+    """A law with its description and largest admissible relative violation."""
 
     name: str
-    words: str
+    description: str
     limit: float
 
 
 @dataclass(frozen=True)
 class Finding:
-    """Largest violation of a check and its place."""
+    """Largest violation of a law and its place."""
 
     check: Check
     violation: float
@@ -68,65 +68,78 @@ class Finding:
         verdict = "holds" if self.holds else "BROKEN"
         where = f", at {self.where}" if self.where and self.violation > 0 else ""
         numbers = f"{self.violation:9.1e} of {self.check.limit:7.1e}"
-        return f"{self.check.name:<13} {verdict:<7} {numbers}  {self.check.words}{where}"
+        return f"{self.check.name:<13} {verdict:<7} {numbers}  {self.check.description}{where}"
 
     @property
     def document(self) -> Mapping[str, Any]:
-        """The finding as it is written in JSON; a violation without bound is null."""
+        """The finding for JSON; an infinite violation is null."""
         violation = self.violation if np.isfinite(self.violation) else None
-        check = {"law": self.check.name, "words": self.check.words, "limit": self.check.limit}
+        check = {"law": self.check.name, "words": self.check.description, "limit": self.check.limit}
         return check | {"violation": violation, "where": self.where, "holds": self.holds}
 
 
 class Findings:
-    """Largest violation of each check so far."""
+    """Largest violation of each law so far."""
 
     def __init__(self, checks: Iterable[Check]) -> None:
         self._checks = {check.name: check for check in checks}
         self._worst: dict[str, tuple[float, str]] = {}
 
-    def record(self, name: str, violations: ArrayLike, where: Callable[[int], str] | str = "") -> None:
-        """Record violations of a check, each relative to its scale; `where` names the place of the i-th.
+    def record(self, law: str, violations: ArrayLike, where: Place = "") -> None:
+        """Record relative violations, a number or one or several a row; `where` names the place of row i.
 
-        Checks of which nothing is recorded do not apply to the result.
+        Laws without any record do not apply to the result.
         """
-        values = np.atleast_1d(np.asarray(violations, float)).ravel()
-        if not len(values):
+        values = np.atleast_1d(np.asarray(violations, float))
+        if not values.size:
             return
-        values = np.where(np.isnan(values), np.inf, values)
+        values = np.where(np.isnan(values), np.inf, values).reshape(len(values), -1).max(axis=1)
         worst = int(np.argmax(values))
         value = float(values[worst])
-        if name not in self._worst or value > self._worst[name][0]:
-            self._worst[name] = value, where if isinstance(where, str) else where(worst)
+        if law not in self._worst or value > self._worst[law][0]:
+            self._worst[law] = value, where if isinstance(where, str) else where(worst)
 
-    def require(self, name: str, holds: bool | np.bool_, where: str) -> None:
-        """Record that a check holds, or does not at all."""
-        self.record(name, 0.0 if holds else np.inf, where)
+    def compare(self, law: str, value: Any, expected: Any, scale: ArrayLike, where: Place) -> None:
+        """Record |value - expected| / scale; infinite if their shapes differ."""
+        value, expected = np.asarray(value, float), np.asarray(expected, float)
+        self.record(law, relative(value - expected, scale) if value.shape == expected.shape else np.inf, where)
+
+    def require(self, law: str, holds: bool | np.bool_, where: str) -> None:
+        """Record no violation or an infinite one."""
+        self.record(law, 0.0 if holds else np.inf, where)
 
     def worst(self) -> tuple[Finding, ...]:
-        """Return the findings of all checks that apply, in their order."""
+        """Return the findings of all laws that apply, in order."""
         return tuple(Finding(check, *self._worst[name]) for name, check in self._checks.items() if name in self._worst)
 
 
+def relative(errors: ArrayLike, scale: ArrayLike) -> Float:
+    """|errors| / scale; over a scale of zero 0 if there is no error, else infinite."""
+    errors, scale = np.broadcast_arrays(np.abs(np.asarray(errors, float)), np.asarray(scale, float))
+    return np.asarray(np.divide(errors, scale, out=np.where(errors == 0.0, 0.0, np.inf), where=scale > 0))
+
+
 def solver_limit(rtol: float) -> float:
-    """Limit of the checks that hold as far as the dual problems were solved."""
+    """Limit of laws that hold as far as the dual problems are solved."""
     return min(CHECK_PER_RTOL * rtol, LARGEST_CHECK)
 
 
-def checks(rtol: float, users_mesh: bool, has_coatings: bool, mixed: Pair = (0.0, 0.0)) -> tuple[Check, ...]:
-    """List the checks of a result whose dual problems were solved to `rtol`.
+def checks(
+    rtol: float, users_mesh: bool, has_coatings: bool, mixed: tuple[float, float] = (0.0, 0.0)
+) -> tuple[Check, ...]:
+    """List the laws with their limits for dual problems solved to `rtol`.
 
-    `mixed` is the largest lambda / mu of elements that have a pressure, and the largest mu over theirs.
+    `mixed` is the largest lambda / mu of elements with a pressure, and the largest mu / mu of these elements.
     """
     ratio, contrast = mixed[0] / LARGE_RATIO, mixed[1]
     lost, of_balance = max(1.0, ratio), max(1.0, min(ratio, contrast / LARGE_CONTRAST))
     of_pressure = max(1.0, min(PRESSURE * ratio, contrast / LARGE_OF_PRESSURE))
-    sums, balance, rounding = 1e-10 * lost, 1e-10 * of_balance, max(COATINGS * has_coatings, WHOLE_BODIES * lost)
-    shape, solver = USERS_MESH if users_mesh else OWN_MESH, solver_limit(rtol)
+    sums, balance, rounding = 1e-10 * lost, 1e-10 * of_balance, max(COATINGS * has_coatings, BODIES * lost)
+    shape, solver = USERS_MESH if users_mesh else GENERATED_MESH, solver_limit(rtol)
     contact = min(max(CONTACT_PER_RTOL * rtol, LEAST_CONTACT), LARGEST_CHECK)
     rows = (
         ("files", "the files are unchanged since the run, by their checksums", 0.0),
-        ("status", "status, faults and remarks follow from the checks and the mesh, tolerances from rtol", 1e-9),
+        ("status", "the status follows from the checks, tolerances from rtol", 1e-9),
         ("numbers", "all numbers are finite", 0.0),
         ("mesh", "elements have positive areas and fill the cell; torn sides meet in pairs", shape),
         ("interface", "interface nodes are where one fibre meets the matrix, with its normals and lengths", shape),
@@ -134,7 +147,6 @@ def checks(rtol: float, users_mesh: bool, has_coatings: bool, mixed: Pair = (0.0
         ("stress", "stresses of the elements follow from u and the case's materials", 1e-13 * of_pressure),
         ("stress 33", "stresses out of the plane follow from those in it and the case's materials", 1e-13),
         ("mesh error", "errors of the elements add up to those of averaged stresses, by a factor less 1", 1.5),
-        ("vectors", "vectors and the faces' displacements follow from tractions, jumps and displacements", 1e-13),
         ("periodicity", "u* is the same at the copies of a node in its subdomain, relative to the largest u", 1e-13),
         ("continuity", "u* is the same where subdomains are glued, relative to the largest u", solver),
         ("equilibrium", "forces of the elements and tractions balance at every node, relative to the largest", balance),
@@ -151,12 +163,11 @@ def checks(rtol: float, users_mesh: bool, has_coatings: bool, mixed: Pair = (0.0
         ("load", "the states have the strains and temperatures that the case asks for, relative to the largest", 1e-12),
         ("stress load", "the states have the stresses that the case asks for, relative to the largest", solver),
         ("tables", "points and columns in result.json are the states in result.h5, relative to the largest", 1e-12),
-        ("CSV", "the tables of points agree with result.json", 0.0),
         ("rates", "release rates at tips of arcs agree with their modes, and tips with the mesh, relative to G", 1e-9),
         ("symmetry", "stiffnesses of bonded or free faces are symmetric, relative to the largest entry", solver),
         ("breaks", "bonds break as the points report and never heal, in numbers of bonds", 0.0),
         ("strength", "bonds that hold are within their strength, those that break are at it", STRENGTH),
-        ("onset", "the load of every direction of an envelope is that at which the first bond breaks", ONSET),
+        ("onset", "the load of every direction of an envelope is that at which the first bond breaks", 1e-9),
         ("energy", "work = stored + dissipated along the path, relative to the largest energy", solver),
         ("heat", "work = stored + dissipated + heat of friction, which grows, relative to the energies so far", 1e-8),
         ("cell", "areas, fractions and counts in result.json are those of the mesh", 1e-10),
@@ -164,18 +175,91 @@ def checks(rtol: float, users_mesh: bool, has_coatings: bool, mixed: Pair = (0.0
         ("compliance", "compliance and expansion follow from stiffness and thermal stress, relative to each", sums),
         ("Levin", "thermal stress = - mean of expansion : stiffness : strain under unit strains, relative", solver),
         ("constants", "constants at fixed status are those of the fields, relative to each", solver),
-        (
-            "sensitivities",
-            "constants change with those of the case as in the file, relative to each",
-            max(SLOPE, solver),
-        ),
+        ("sensitivities", "constants change with those of the case as in the file, relative", max(SLOPE, solver)),
         ("bounds", "bounds follow from fractions and materials, and the stiffness is between them", sums),
     )
     return tuple(Check(*row) for row in rows)
 
 
-def relative(errors: Float, scale: Float | float) -> Float:
-    """errors / scale; where the scale is zero only an error of zero is none."""
-    errors, scale = np.broadcast_arrays(np.abs(np.asarray(errors, float)), np.asarray(scale, float))
-    absolute = np.where(errors == 0.0, 0.0, np.inf)
-    return np.asarray(np.divide(errors, scale, out=absolute, where=scale > 0))
+# Why laws leave numbers alone, by a part of their names; the first that fits.
+REASONS = {
+    "names of the program and the case, and how the run went": (
+        "version", "digest", "resumed", "solver", "timings", "memory", "iterations", "free_motions",
+    ),
+    "residuals of the solver, of which only the tolerance is checked": ("checks",),
+    "texts": ("warnings", "remarks", "faults"),
+    "closed formulas, which no field bears witness to": ("estimates", "fibre_bounds"),
+    "estimates of the mesh's error, but for energies": ("mesh_error",),
+    "derivatives under contact or with a temperature, but for energies": ("derivatives",),
+    "what breaks at tips would release": ("G_I", "G_II"),
+    "of the mesher, or of a table that is not in the files": ("match_distance", "mesh_size", "refine"),
+    "copies of other numbers, for readers": (
+        "fibres", "peak", "mark", "debonding_angle", "debonded_share", "dissipation_ratio", "parameter_values",
+    ),
+    "scatter, which follows from derivatives and the case": ("uncertainty",),
+}  # fmt: skip
+ATOMS = ("case", "result_h5")
+NO_REASON, THINNED = "no law", "at points whose fields are not in the files"
+# Files and tables of result.h5 that repeat others.
+COPIES = "tables for viewers and spreadsheets"
+COPIED = ("*.csv", "traction_vector", "jump_vector", "displacement_fibre", "displacement_matrix", "fibre_node",
+          "matrix_node", "fibre/number", "fibre/phase")  # fmt: skip
+
+
+class Section(dict[str, Any]):
+    """A table of result.json that counts which entries laws have read.  ATOMS count as one number."""
+
+    def __init__(self, content: Mapping[str, Any], unread: dict[str, bool] | None = None, place: str = "") -> None:
+        self.unread = {} if unread is None else unread
+        self._places = {key: f"{place}.{key}" if place else key for key in content}
+        super().__init__({key: self._inner(self._places[key], value) for key, value in content.items()})
+        self.places = tuple(self.unread)
+
+    def _inner(self, place: str, value: Any) -> Any:
+        if isinstance(value, dict) and place not in ATOMS:
+            return Section(value, self.unread, place)
+        if isinstance(value, list) and value and all(isinstance(entry, dict) for entry in value):
+            return [Section(entry, self.unread, f"{place}[{k}]") for k, entry in enumerate(value)]
+        self.unread[place] = False
+        return value
+
+    def __getitem__(self, key: str) -> Any:
+        if self.unread.get(self._places[key]) is False:
+            del self.unread[self._places[key]]
+        return super().__getitem__(key)
+
+    def get(self, key: str, default: Any = None) -> Any:
+        """Return an entry, which counts as read."""
+        return self[key] if key in self else default  # noqa: SIM401, which would be this again
+
+    def items(self) -> Iterator[tuple[str, Any]]:  # type: ignore[override]
+        """Yield all entries, which count as read."""
+        return ((key, self[key]) for key in self)
+
+    def hint(self, key: str, default: Any = None) -> Any:
+        """Return an entry that a law uses without checking it."""
+        return super().get(key, default)
+
+    def leaves_open(self, key: str) -> None:
+        """Count an entry as unread for good, which laws use but do not determine."""
+        self.unread[self._places[key]] = True
+
+
+Points = Sequence[Section]
+
+
+def unchecked(document: Section) -> dict[str, list[str]]:
+    """Map reasons to names of numbers that no law has read, such as path[].iterations.
+
+    A table without any read number goes by its name.  Copies of tables are always in the list.
+    """
+    names = (document.unread, document.places)
+    unread, total = (Counter(re.sub(r"\[\d+\]", "[]", place) for place in places) for places in names)
+    read = {re.split(r"[.\[]", name)[0] for name in total if name not in unread}
+    names_of: dict[str, list[str]] = {COPIES: [*COPIED]}
+    for name, count in unread.items():
+        table, parts = re.split(r"[.\[]", name)[0], {*name.replace("[]", "").split(".")}
+        default = THINNED if count < total[name] else NO_REASON
+        reason = next((text for text, names in REASONS.items() if parts & {*names}), default)
+        names_of.setdefault(reason, []).append(name if table in read else table)
+    return {reason: [*dict.fromkeys(names)] for reason, names in names_of.items()}

@@ -1,60 +1,49 @@
-"""Laws of the energies of a path: the work of the loads is stored, or lost where bonds break.
+"""Path energy laws: work by the loads is stored, lost where bonds break, or becomes heat by friction.
 
-Notation: E and Sigma are all strains of a point, a temperature among them, and what works on each; W = E.Sigma / 2 is
-the stored energy.  With the bonds as they are W is a convex function of E, homogeneous of degree two.  A load gives the
-strains E_s and the stresses Sigma_f; its potential is
+Notation: E and Sigma are all strains at a point, a temperature among them, and their conjugates; W = E.Sigma / 2 is the
+stored energy.  For fixed bonds W is a convex function of E, homogeneous with degree two.  A load prescribes strains E_s
+and stresses Sigma_f; its potential is
 
     P(E_s, Sigma_f) = min over E_f of W - Sigma_f.E_f = 1/2 (E_s.Sigma_s - Sigma_f.E_f),
 
-convex in E_s and concave in Sigma_f, so that the state ' of another load on the same bonds bounds it: for any t >= 0
+convex in E_s and concave in Sigma_f, so that the state ' under another load with equal bonds bounds it: for any t >= 0
 
     P >= t Sigma'_s.E_s - t^2 W'   if Sigma_f = t Sigma'_f,
     P <= t^2 W' - t E'_f.Sigma_f   if E_s = t E'_s.                                                         (P)
 
-Bonds break at constant load and lose P before - P after.  Of these one is that of a state in the files; (P) bounds the
-other one by the state beyond, on both sides the same where the loads are in proportion: on the whole first leg, in a
-cascade, and where a later leg is on a ray.  There what is lost is an equation; elsewhere it lies between bounds.
-Between points of events at which nothing breaks the response is straight, so the work is (Sigma + Sigma').(E' - E) / 2.
+Bonds break at constant load and lose P before - P after.  The files have one of these two states; (P) bounds the other
+potential by the state beyond, with equal bounds where the loads are in proportion: on the whole first leg, in a
+cascade, and where a later leg is on a ray.  There the loss obeys an equation; elsewhere it lies between bounds.
+Between event points without breaks the response is straight, so the work is (Sigma + Sigma').(E' - E) / 2.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, NamedTuple
 
 import numpy as np
 
 from feti_homog.typing import Float
-from feti_homog.verify.check_loads import States
-from feti_homog.verify.discrete_cell import DiscreteCell
-from feti_homog.verify.findings import Findings, relative
-from feti_homog.verify.leaves import Points
-from feti_homog.verify.prescribed import SAME_SHARE, TEMPERATURE, Prescribed, at_points, damaged_at, targets
+from feti_homog.verify.bonds import friction_at, law_at
+from feti_homog.verify.check_loads import SAME_SHARE, TEMPERATURE, Prescribed, States, at_points, damaged_at, targets
+from feti_homog.verify.discrete_cell import CLOSED, DiscreteCell
+from feti_homog.verify.findings import Findings, Points
+from feti_homog.verify.reading import State
 
 # Loads whose components differ by so much, relatively, are in proportion.
 SAME_RATIO = 1e-9
-# A share of the energy of the bonded cell below which what a parted one stores is rounding.
-NO_ENERGY = 1e-9
-# A share of the energies of a path up to a point below which those of a step are rounding.
-LEAST_STEP = 1e-6
-Point = Mapping[str, Any]
-UNLOADED = {"friction_heat": 0.0, "dissipated": 0.0, "broke": 0}
-
-
-class Loads(NamedTuple):
-    """Strains (v,) and a change of temperature."""
-
-    strain: Float
-    temperature: float
+# Below these shares energies are rounding: of the bonded cell's, what a parted cell stores; of the energies of a path
+# so far, those of a step; of the stored energy, the heat of an increment.
+NO_ENERGY, LEAST_STEP, LEAST_HEAT = 1e-9, 1e-6, 1e-4
 
 
 @dataclass(frozen=True)
 class PointNumbers:
-    """Strains and stresses (n,), with the temperature and what works on it, NaN where no file has it; energies.
+    """Strains and stresses (n,) at a point, the temperature and its conjugate last, NaN if unknown; its energy.
 
-    `load` is what is prescribed, `terms` the energy per area of which the stored one is summed at least.
+    `load` is prescribed; `terms` is the least scale for terms in the stored energy, per area.
     """
 
     name: str
@@ -66,24 +55,18 @@ class PointNumbers:
 
     @property
     def potential(self) -> float:
-        """Per area, of the load."""
-        return _work(*self.given) / 2 - _work(*self.answered) / 2
+        """P of the load, per area."""
+        return _work(*self.pairs(by_stress=False)) / 2 - _work(*self.pairs(by_stress=True)) / 2
 
-    @property
-    def given(self) -> tuple[Float, Float]:
-        """(s,) the strains that are given, and what works on them."""
-        own = ~self.load.by_stress
-        return self.load.values[own], self.stress[own]
-
-    @property
-    def answered(self) -> tuple[Float, Float]:
-        """(f,) the stresses that are given, and the strains on which they work."""
-        own = self.load.by_stress
-        return self.load.values[own], self.strain[own]
+    def pairs(self, by_stress: bool) -> tuple[Float, Float]:
+        """Return the prescribed strains, or stresses, and their conjugates."""
+        kind = self.load.by_stress == by_stress
+        return self.load.values[kind], (self.strain if by_stress else self.stress)[kind]
 
 
 def check_path_energies(findings: Findings, cell: DiscreteCell, states: States, points: Points) -> None:
-    """`work`, `stored` and what was dissipated at all points; fields are kept of those of `states`."""
+    """Check work, stored and dissipated energy at all points."""
+    _check_stored(findings, cell, states, points)
     by_events = cell.files.case["path"]["method"] == "events"
     _check_rising(findings, points, 1.0 / len(targets(cell.files.case)) if by_events else 0.0)
     if "friction_heat" in points[0]:
@@ -92,24 +75,30 @@ def check_path_energies(findings: Findings, cell: DiscreteCell, states: States, 
     numbers = _numbers(cell, states, points)
     scale = max(each.stored for each in numbers) + cell.rounded_energy or 1e-300
     for each, point in zip(numbers, points, strict=True):
-        off = point["work"] - each.stored - point["dissipated"]
-        findings.record("energy", abs(off) / scale, f"{each.name}, work less stored and dissipated")
+        place = f"{each.name}, work less stored and dissipated"
+        findings.compare("energy", point["work"], each.stored + point["dissipated"], scale, place)
     if by_events:
         _check_events(findings, numbers, points, scale)
     else:
-        C: Float = np.einsum("p,pij->ij", cell.fractions, cell.stiffnesses)  # Voigt's, of strains and temperature
-        if cell.files.is_spatial:
-            alpha = np.zeros(cell.stiffnesses.shape[:2]) if cell.expansions is None else cell.expansions
-            thermal = np.einsum("p,pij,pj->i", cell.fractions, cell.stiffnesses, alpha)
-            square = np.einsum("p,pi,pij,pj->", cell.fractions, alpha, cell.stiffnesses, alpha)
-            C = np.block([[C, -thermal[:, None]], [-thermal[None], square]])
-        _check_increments(findings, C, numbers, points, scale)
+        _check_increments(findings, cell, numbers, points, scale)
+
+
+def _check_stored(findings: Findings, cell: DiscreteCell, states: States, points: Points) -> None:
+    """Check the stored energy E.Sigma / 2 of points without temperature and friction."""
+    with_fields = {state.point for state in states}
+    scale = max([state.stored for state in states], default=0.0) + cell.rounded_energy
+    for number, point in enumerate(points):
+        if number not in with_fields and not all(point["strain"]):
+            point.leaves_open("stress")  # the conjugate of no strain stores nothing
+        if not point.get(TEMPERATURE) and "friction_heat" not in point:
+            work = float(np.dot(point["strain"], point["stress"])) / 2
+            findings.compare("energy", point["stored"], work, scale, f"path[{number}].stored")
 
 
 def _check_rising(findings: Findings, points: Points, first_leg: float) -> None:
-    """Check what is lost if the load only rises on the first leg of events, which ends at the load factor `first_leg`.
+    """Check the loss under a load that only rises on the first leg of events, up to the load factor `first_leg`.
 
-    Breaks at a load below the largest so far lose as much more as energies grow up to that.
+    Breaks at a load below the largest so far lose as much more as energies grow up to it.
     """
     names = "dissipated", "dissipated_strain_controlled", "load_factor"
     lost, rising, load = np.array([[point[name] for name in names] for point in points]).T
@@ -117,62 +106,82 @@ def _check_rising(findings: Findings, points: Points, first_leg: float) -> None:
     rise = np.where(falls, np.maximum.accumulate(load) / np.where(falls, load, 1.0), 1.0)
     expected = lost[0] + np.cumsum(np.r_[0.0, rise[:-1] ** 2 * np.diff(lost)])
     scale = max(float(np.abs(expected).max()), *(abs(point["stored"]) for point in points))
-    findings.record("energy", relative(rising - expected, scale), "path[{}].dissipated_strain_controlled".format)
+    findings.compare("energy", rising, expected, scale, "path[{}].dissipated_strain_controlled".format)
 
 
 def _check_heat(findings: Findings, states: States, points: Points, by_events: bool) -> None:
-    """Check that the work is stored, lost to breaks or heat, which never falls; breaks alone lose what is `dissipated`.
+    """Check that the work is stored, lost to breaks or heat, which never falls; only breaks change `dissipated`.
 
-    With friction the energy depends on the way, so nothing bounds what breaks lose.  Bonds break behind a point of
-    events, before one of increments.
+    With friction the energy depends on the way, so nothing bounds the loss in breaks.  Bonds break after an event
+    point, before an increment point.
     """
     stored = {number: float(point["stored"]) for number, point in enumerate(points)}
     stored |= {state.point: state.stored for state in states}
     terms = np.array([[p["work"], stored[n], p["dissipated"], p["friction_heat"]] for n, p in enumerate(points)])
-    # Sums along the path have the rounding of what they were; its share in an increment is far less.
+    # Sums along the path have the rounding of their largest terms; its share in an increment is far less.
     scale = np.maximum.accumulate(np.abs(terms).max(axis=1)) + np.finfo(float).tiny
-    of_step = np.abs(np.diff(terms, axis=0, prepend=0.0)).max(axis=1) + LEAST_STEP * scale
-    off = np.abs(terms @ [1.0, -1.0, -1.0, -1.0]) / scale
-    findings.record("heat", off, "path[{}].work".format)
-    for number, (before, after) in enumerate(pairwise([UNLOADED, *points])):
-        cooled = before["friction_heat"] - after["friction_heat"]
-        findings.record("heat", max(cooled, 0.0) / of_step[number], f"path[{number}].friction_heat")
-        lost = after["dissipated"] - before["dissipated"]
-        left = 0.0 if damaged_at(before if by_events else after) else abs(lost)
-        findings.record("heat", left / of_step[number], f"path[{number}].dissipated")
+    steps = np.diff(terms, axis=0, prepend=0.0)
+    of_step = np.abs(steps).max(axis=1) + LEAST_STEP * scale
+    findings.record("heat", np.abs(terms @ [1.0, -1.0, -1.0, -1.0]) / scale, "path[{}].work".format)
+    findings.record("heat", np.maximum(-steps[:, 3], 0.0) / of_step, "path[{}].friction_heat".format)
+    breaks = np.array([damaged_at(point) for point in points])
+    breaks = np.r_[0, breaks[:-1]] if by_events else breaks
+    lost = np.where(breaks > 0, 0.0, np.abs(steps[:, 2]))
+    findings.record("heat", lost / of_step, "path[{}].dissipated".format)
+
+
+def check_step_heat(findings: Findings, cell: DiscreteCell, before: State, state: State) -> None:
+    """Check that an increment without breaks makes the heat from its slips under the tractions at its end.
+
+    It is relative to the tractions times the slips since the beginning, whose difference it is.  The work of increments
+    is booked as stored, lost or heat, so it is no evidence of heat.
+    """
+    files, at = cell.files, state.point
+    points = files.document["path"]
+    if at != before.point + 1 or "friction_heat" not in points[at] or damaged_at(points[at]):
+        return
+    if files.case["path"]["method"] == "events" or friction_at(files, on_damage=True).any():
+        return
+    slips = [(s.jump - law_at(files, damage=s.damage).jumps(s.traction))[:, 1] for s in (before, state)]
+    rubs = (state.status == CLOSED) & (friction_at(files) > 0.0)
+    force = np.where(rubs, state.traction[:, 1], 0.0) * files.interface.length / cell.area
+    heat = points[at]["friction_heat"] - points[before.point]["friction_heat"]
+    scale = np.abs(force) @ (np.abs(slips[0]) + np.abs(slips[1]))
+    scale += LEAST_HEAT * max(abs(points[number]["stored"]) for number in (before.point, at))
+    findings.compare("heat", force @ (slips[1] - slips[0]), heat, scale or 1e-300, f"path[{at}].friction_heat")
 
 
 def _numbers(cell: DiscreteCell, states: States, points: Points) -> list[PointNumbers]:
-    """Return those of every point, the energy from the fields where they are kept, else by Hill E.Sigma / 2.
+    """Return the numbers at every point, with the fields' energy, or without fields by Hill E.Sigma / 2.
 
-    What works on a temperature follows from what is stored.
+    The conjugate to a temperature follows from the stored energy.
     """
-    kept, found = {state.point: state for state in states}, []
+    of_state, numbers = {state.point: state for state in states}, []
     for number, (point, load) in enumerate(zip(points, at_points(cell.files.case, points), strict=True)):
         strain, stress = np.array(point["strain"]), np.array(point["stress"])
-        warmer, name = float(point.get(TEMPERATURE, 0.0)), f"path[{number}]"
-        if (state := kept.get(number)) is not None:
-            name, strain, stress, warmer = state.name, state.strain, state.stress, state.temperature
+        temperature, name = float(point.get(TEMPERATURE, 0.0)), f"path[{number}]"
+        if (state := of_state.get(number)) is not None:
+            name, strain, stress, temperature = state.name, state.strain, state.mean_stress, state.temperature
             stored, heat = state.stored, state.heat
-        elif warmer:
+        elif temperature:
             stored = float(point["stored"])
-            heat = (2 * stored - float(strain @ stress)) / warmer
+            heat = (2 * stored - float(strain @ stress)) / temperature
         else:
             stored, heat = float(strain @ stress) / 2, 0.0 if cell.expansions is None else np.nan
-        n, terms = len(load.values), cell.energy_terms(Loads(strain, warmer))
-        pairs = np.array([*strain, warmer][:n]), np.array([*stress, heat][:n])
-        found.append(PointNumbers(name, *pairs, stored, load, terms))
-    return found
+        n, scales = len(load.values), cell.scales(strain, temperature)
+        pairs = np.array([*strain, temperature][:n]), np.array([*stress, heat][:n])
+        numbers.append(PointNumbers(name, *pairs, stored, load, scales.stress * scales.strain))
+    return numbers
 
 
 def _check_events(findings: Findings, numbers: Sequence[PointNumbers], points: Points, scale: float) -> None:
-    """Check that the energy lost between two points is lost by the bonds that break at the first of them."""
+    """Check that the bonds breaking at a point lose the energy up to the next."""
     findings.record("energy", abs(points[0]["dissipated"]) / scale, f"{numbers[0].name}, dissipated")
     for (state, before), (after, now) in pairwise(zip(numbers, points, strict=True)):
         low, high = 0.0, 0.0
         if damaged_at(before):
-            least, most = potentials(state.load, after)
-            low, high = max(state.potential - most, 0.0), state.potential - least
+            least, largest = potentials(state.load, after)
+            low, high = max(state.potential - largest, 0.0), state.potential - least
         lost = now["dissipated"] - before["dissipated"]
         findings.record("energy", max(low - lost, lost - high, 0.0) / scale, f"{after.name}, dissipated")
         if damaged_at(before) == 0:
@@ -182,10 +191,10 @@ def _check_events(findings: Findings, numbers: Sequence[PointNumbers], points: P
 
 
 def potentials(load: Prescribed, other: PointNumbers) -> tuple[float, float]:
-    """Return the least and the largest potential at a load with the bonds of another state, by (P)."""
+    """Bound the potential of a load on the bonds in another state, by (P)."""
     if (load.by_stress != other.load.by_stress).any():
         return -np.inf, np.inf
-    (strains, stresses), (forces, answers) = other.given, other.answered
+    (strains, stresses), (forces, answers) = other.pairs(by_stress=False), other.pairs(by_stress=True)
     own_strains, own_forces = load.values[~load.by_stress], load.values[load.by_stress]
     energy = other.stored if abs(other.stored) > NO_ENERGY * other.terms else 0.0
     least = _largest(_work(own_strains, stresses), energy, own_forces, forces)
@@ -193,7 +202,7 @@ def potentials(load: Prescribed, other: PointNumbers) -> tuple[float, float]:
 
 
 def _largest(power: float, energy: float, one: Float, other: Float) -> float:
-    """max t power - t^2 energy over the t >= 0 with one = t other; -inf if there is none, or power is not known."""
+    """max t power - t^2 energy over t >= 0 with one = t other; -inf without any t, or if the power is unknown."""
     if not (one.any() or other.any()):
         t = max(power / (2 * energy), 0.0) if energy > 0 else 0.0
     else:
@@ -206,24 +215,30 @@ def _largest(power: float, energy: float, one: Float, other: Float) -> float:
 
 
 def _work(one: Float, other: Float) -> float:
-    """one.other, where what is not known counts only if it works."""
+    """one.other; unknown entries of `other` count only if they work."""
     return float(one[one != 0.0] @ other[one != 0.0])
 
 
 def _check_increments(
-    findings: Findings, stiffest: Float, numbers: Sequence[PointNumbers], points: Points, scale: float
+    findings: Findings, cell: DiscreteCell, numbers: Sequence[PointNumbers], points: Points, scale: float
 ) -> None:
-    """Check the energy lost at the load of each step: the potential of the old bonds, by (P), less that of the new.
+    """Check the loss at the load of each step: the old bonds' potential, by (P), less the new bonds'.
 
-    The strain of the new ones in bonded phases stores no less than the old bonds would have.
+    Bonded phases at the strain of the new bonds store no less than the old bonds would.
     """
+    C: Float = np.einsum("p,pij->ij", cell.fractions, cell.stiffnesses)  # Voigt's, of strains and temperature
+    if cell.files.is_spatial:
+        alpha = np.zeros(cell.stiffnesses.shape[:2]) if cell.expansions is None else cell.expansions
+        thermal = np.einsum("p,pij,pj->i", cell.fractions, cell.stiffnesses, alpha)
+        square = np.einsum("p,pi,pij,pj->", cell.fractions, alpha, cell.stiffnesses, alpha)
+        C = np.block([[C, -thermal[:, None]], [-thermal[None], square]])
     total = 0.0
     for number, (point, now) in enumerate(zip(points, numbers, strict=True)):
         lost, low, high = point["dissipated"] - total, 0.0, 0.0
         if damaged_at(point):
             n = len(now.strain)
-            high = float(now.strain @ stiffest[:n, :n] @ now.strain) / 2 - now.stored
-            least, most = potentials(now.load, numbers[number - 1]) if number else (-np.inf, np.inf)
-            low, high = max(least - now.potential, 0.0), min(high, most - now.potential)
+            high = float(now.strain @ C[:n, :n] @ now.strain) / 2 - now.stored
+            least, largest = potentials(now.load, numbers[number - 1]) if number else (-np.inf, np.inf)
+            low, high = max(least - now.potential, 0.0), min(high, largest - now.potential)
         findings.record("energy", max(low - lost, lost - high, 0.0) / scale, f"{now.name}, dissipated")
         total = point["dissipated"]

@@ -17,32 +17,109 @@ import numpy as np
 
 from feti_homog.errors import CaseError
 from feti_homog.system.runtime import input_files
-from feti_homog.typing import Float, Int
-from feti_homog.verify.cell_tables import Fibres, InterfaceRows, Mesh, State, gradient
-from feti_homog.verify.leaves import Section
+from feti_homog.typing import AnyInt, Float, Int
+from feti_homog.verify.findings import Points, Section
 
-JSON, FIELDS = "result.json", "result.h5"
-SCHEMA = 1
-# Tables of a state that follow from others: rows of elements or of interface nodes, and columns.
-DERIVED: dict[str, tuple[Any, ...]] = {
-    "stress_33": ("m",),
-    "traction_vector": ("k", 3), "jump_vector": ("k", 3),
-    "displacement_fibre": ("k", 3), "displacement_matrix": ("k", 3),
-}  # fmt: skip
-# In generalized plane strain stresses 33 are among the stresses.
-SPATIAL_DERIVED = {name: shape for name, shape in DERIVED.items() if name != "stress_33"}
-ROWS = ("points", "normal", "length", "fibre_number", "fibre")
+JSON, FIELDS, SCHEMA = "result.json", "result.h5", 1
 MISSING_FIELDS = "only a run with `fields = true` in [output] can be verified"
-BLOCK = 1 << 26  # bytes
+CHECKSUM_BLOCK = 1 << 26  # bytes
+COATING = "coating"  # phase
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Nodes (n, 2) and elements (m, 3 or 6): vertices, then the nodes on the sides 01, 12, 20.
+
+    Each subdomain has its nodes to itself. Phase 0 is the matrix.
+    """
+
+    points: Float
+    triangles: Int
+    subdomain: AnyInt
+    phase: AnyInt
+    body: AnyInt
+
+
+@dataclass(frozen=True)
+class InterfaceRows:
+    """The k interface nodes: points and normals from fibre to matrix (k, 2), tributary lengths (k,).
+
+    Fibre numbers from 1, bodies on the fibre side, places of sections [[interface]] (k,).
+    """
+
+    points: Float
+    normal: Float
+    length: Float
+    fibre: AnyInt
+    body: AnyInt
+    pair: AnyInt
+
+
+@dataclass(frozen=True)
+class Fibres:
+    """The f fibres by number: bodies (f,), centres (f, 2), radii (f,), NaN without one.
+
+    `strength` (f,) is bond strength / strength in the case.
+    """
+
+    body: AnyInt
+    centre: Float
+    radius: Float
+    strength: Float
+
+
+@dataclass(frozen=True)
+class State:
+    """The group /state/K.
+
+    Vectors have c = 2 and tensors v = 3 components [11, 22, 12]; in generalized plane strain 3 and 6, in the order
+    [11, 22, 33, 23, 13, 12].
+
+    Attributes:
+        strain, mean_stress: (v,) macroscopic.
+        point: number in `path` or `angle` of result.json.
+        displacement, fluctuation: (n, c) u and u - E x.
+        stress, stress_33: (m, v) and (m,) element means.
+        traction, jump: (k, c) normal, tangential and axial.
+        status: (k,) 0 bonded, 1 closed, 2 open.
+        damage: (k,) from 0, intact, to 1, broken.
+        sliding: (k,) slip direction -1 or 1 of sliding nodes, else 0.
+        mesh_error: (m,) element shares of the estimated energy error, NaN without an estimate.
+    """
+
+    name: str
+    strain: Float
+    mean_stress: Float
+    load_factor: float
+    point: int
+    displacement: Float
+    fluctuation: Float
+    stress: Float
+    traction: Float
+    jump: Float
+    status: AnyInt
+    damage: Float
+    sliding: AnyInt
+    mesh_error: Float
+    stress_33: Float
+    temperature: float
+
+    @property
+    def along(self) -> float:
+        """E33, 0 unless in generalized plane strain."""
+        return float(self.strain[2]) if len(self.strain) > 3 else 0.0
+
+
+def gradient(strain: Float) -> Float:
+    """(c, 2) displacement gradient H, symmetric in the plane, of a strain (v,)."""
+    E11, E22, gamma12 = strain[[0, 1, -1]]
+    plane = [[E11, gamma12 / 2], [gamma12 / 2, E22]]
+    return np.array(plane if len(strain) == 3 else [*plane, strain[[4, 3]]])
 
 
 @dataclass(frozen=True)
 class ResultFiles:
-    """A folder of results, opened: result.json, which notes what laws read; the size (2,) of the cell; names of phases.
-
-    `faces` (k, 2) is a node of the mesh on each face of the interface nodes, fibre and matrix; `altered` are the names
-    of the files that are not as the run wrote them.
-    """
+    """An open result folder; `size` (2,) is the cell's, `altered` names files changed since the run."""
 
     document: Section
     size: Float
@@ -50,7 +127,6 @@ class ResultFiles:
     mesh: Mesh
     interface: InterfaceRows
     fibres: Fibres
-    faces: Int
     file: h5py.File
     altered: tuple[str, ...]
 
@@ -62,76 +138,81 @@ class ResultFiles:
 
     @property
     def is_spatial(self) -> bool:
-        """Return whether it is one of generalized plane strain."""
+        """Return True in generalized plane strain."""
         return bool(self.case["analysis"]["plane"] == "generalized")
 
     @property
     def contact(self) -> bool:
-        """Return whether debonded faces must not overlap."""
+        """Return True if debonded faces must not overlap."""
         return any(section.get("contact", False) for section in self.interfaces)
 
     @property
     def interfaces(self) -> Sequence[Mapping[str, Any]]:
-        """The sections of interfaces; none of perfect bonding."""
+        """The sections [[interface]]; none if all bonds are perfect."""
         return _interfaces(self.case)
 
+    @property
+    def points(self) -> Points:
+        """The points of a path or an angle, or the load."""
+        document = self.document
+        points: Points = document.get("path") or document.get("angle") or []
+        return points or ([document["load"]] if "load" in document else [])
+
     def states(self) -> Iterator[State]:
-        """Yield the states in their order, one in memory at a time."""
+        """Yield the states in order, one in memory at a time."""
         for number in sorted(map(int, self.file.get("state", ()))):
             with _reading(Path(self.file.filename)):
                 yield self._state(number)
 
     def _state(self, number: int) -> State:
-        group = self.file[f"state/{number}"]
-        n, m, k = len(self.mesh.points), len(self.mesh.triangles), len(self.interface.points)
-        basic = {"displacement": (n, 2), "stress": (m, 3), "traction": (k, 2), "jump": (k, 2), "status": (k,)}
-        shown = SPATIAL_DERIVED if self.is_spatial else DERIVED
-        derived = {name: (m if of == "m" else k, *columns) for name, (of, *columns) in shown.items()}
-        arrays, others = (
-            {name: self._table(number, name, shape) for name, shape in shapes.items()} for shapes in (basic, derived)
-        )
-        if self.is_spatial:  # with what is along the fibres
+        group, n, m = self.file[f"state/{number}"], len(self.mesh.points), len(self.mesh.triangles)
+        k = len(self.interface.points)
+        table = partial(_table, self.file, f"state/{number}")
+        status = table("status", (k,))
+        # Older results have no damage, nothing that slides and no estimated errors.
+        older = {"damage": (status != 0).astype(float), "sliding": np.zeros(k, int), "mesh_error": np.full(m, np.nan)}
+        arrays = {name: table(name, value.shape, value) for name, value in older.items()}
+        shapes = {"displacement": (n, 2), "stress": (m, 3), "stress_33": (m,), "traction": (k, 2), "jump": (k, 2)}
+        arrays |= {name: table(name, shape) for name, shape in shapes.items()}
+        if self.is_spatial:
             for name, rows in (("displacement", n), ("traction", k), ("jump", k)):
-                arrays[name] = np.column_stack([arrays[name], self._table(number, f"axial_{name}", (rows,))])
-            S33, along = self._table(number, "stress_33", (m,)), self._table(number, "axial_stress", (m, 2))
-            arrays["stress"] = np.column_stack([arrays["stress"][:, :2], S33, along, arrays["stress"][:, 2]])
-        # Older results have no damage, nothing that slides, and no estimated errors.
-        missing = (arrays["status"] != 0).astype(float), np.zeros(k, np.int8), np.full(m, np.nan)
-        for name, old in zip(("damage", "sliding", "mesh_error"), missing, strict=True):
-            arrays[name] = self._table(number, name, old.shape) if name in group else old
+                arrays[name] = np.column_stack([arrays[name], table(f"axial_{name}", (rows,))])
+            plane, axial = arrays["stress"], table("axial_stress", (m, 2))
+            arrays["stress"] = np.column_stack([plane[:, :2], arrays["stress_33"], axial, plane[:, 2]])
         strain, mean = (np.array(group.attrs[name], float) for name in ("strain", "stress"))
         v = 6 if self.is_spatial else 3
         _expect(
             strain.shape == mean.shape == (v,), f"/state/{number} has a strain or a stress of another size than {v}"
         )
         label, factor, point = str(group.attrs["label"]), float(group.attrs["load_factor"]), int(group.attrs["point"])
-        warmer = float(group.attrs.get("temperature", 0.0))
         arrays["fluctuation"] = arrays["displacement"] - self.mesh.points @ gradient(strain).T
+        temperature = float(group.attrs.get("temperature", 0.0))
         name = f"state {number} ({label})"
-        return State(name, strain, mean, factor, point, **arrays, derived=others, temperature=warmer)
-
-    def _table(self, number: int, name: str, shape: tuple[int, ...]) -> Any:
-        """Return a table of a state, of the shape that it must have."""
-        array = _rows(self.file[f"state/{number}/{name}"])
-        _expect(array.shape == shape, f"/state/{number}/{name} has shape {array.shape}, expected {shape}")
-        return array
+        return State(name, strain, mean, factor, point, status=status, temperature=temperature, **arrays)
 
 
 def altered(directory: Path) -> tuple[str, ...]:
-    """Names of the files that are not as the run wrote them; CaseError, one line, if one cannot be read."""
+    """Names of files changed since the run. Raises CaseError, one line, if one is unreadable."""
     document, path = _document(directory / JSON), directory / FIELDS
     if not path.is_file():
-        asked = document["case"].get("output", {}).get("fields", False)
-        reason = "it is missing; run the case again" if asked else MISSING_FIELDS
-        raise CaseError(f"{path}: {reason}")
-    with _reading(path):
-        holds = {JSON: is_as_written(document), FIELDS: has_seal(path, document.get("result_h5"))}
-    return tuple(name for name, as_written in holds.items() if not as_written)
+        has_fields = document["case"].get("output", {}).get("fields", False)
+        raise CaseError(f"{path}: {'it is missing; run the case again' if has_fields else MISSING_FIELDS}")
+    # `checksum` is the CRC-32 of all other keys in the layout of the writer.
+    content = {key: value for key, value in document.items() if key != "checksum"}
+    text = json.dumps(content, indent=1, ensure_ascii=False)
+    unchanged = {JSON: document.get("checksum") == f"{zlib.crc32(text.encode('utf-8', 'surrogatepass')):08x}"}
+    with _reading(path), input_files.opened(path) as stream:  # the CRC-32 of its blocks' CRC-32s
+        size, seal = os.fstat(stream.fileno()).st_size, document.get("result_h5")
+        has_size = isinstance(seal, dict) and seal.get("bytes") == size
+        blocks = iter(partial(stream.read, CHECKSUM_BLOCK), b"") if has_size else ()
+        checksum = zlib.crc32(np.array([zlib.crc32(block) for block in blocks], "<u4").tobytes())
+    unchanged[FIELDS] = seal == {"bytes": size, "checksum": f"{checksum:08x}"}
+    return tuple(name for name, is_unchanged in unchanged.items() if not is_unchanged)
 
 
 @contextmanager
 def opened(directory: Path) -> Iterator[ResultFiles]:
-    """Provide the results in a folder, while the block lasts; CaseError, one line, if they cannot be read."""
+    """Open the results in a folder. Raises CaseError, one line, if they are unreadable."""
     changed, path = altered(directory), directory / FIELDS
     with _reading(path):
         file = h5py.File(path, "r")
@@ -154,44 +235,33 @@ def _document(path: Path) -> Mapping[str, Any]:
 
 
 def _contents(document: Mapping[str, Any], file: h5py.File, altered: tuple[str, ...]) -> ResultFiles:
-    """Return the whole of both files but the states."""
-    mesh = Mesh(*(_rows(file[f"mesh/{name}"]) for name in ("points", "triangles", "subdomain", "phase", "body")))
-    own, of_fibre = file["interface"], file["fibre"]
-    # Results of before there were several sections have no pairs, of before bonds could scatter no strengths.
-    pair = _rows(own["pair"]) if "pair" in own else np.zeros(len(own["points"]), np.int32)
-    rows = InterfaceRows(*[*(_rows(own[name]) for name in ROWS), pair])
-    strength = _rows(of_fibre["strength"]) if "strength" in of_fibre else np.ones(len(of_fibre["number"]))
-    fibres = Fibres(*[*(_rows(of_fibre[name]) for name in ("number", "body", "phase", "centre", "radius")), strength])
-    faces = np.stack([_rows(own[name]) for name in ("fibre_node", "matrix_node")], axis=1)
+    """Read both files except the states."""
+    n, m = len(file["mesh/points"]), len(file["mesh/triangles"])
+    k, f = len(file["interface/points"]), len(file["fibre/radius"])
+    columns = 6 if file["mesh/triangles"].shape[1:] == (6,) else 3
+    _expect(n > 0 and m > 0, "/mesh has no nodes or no elements")
+    mesh_shapes = {"points": (n, 2), "triangles": (m, columns), "subdomain": (m,), "phase": (m,), "body": (m,)}
+    mesh = Mesh(**{name: _table(file, "mesh", name, shape) for name, shape in mesh_shapes.items()})
+    row_shapes = {"points": (k, 2), "normal": (k, 2), "length": (k,), "fibre_number": (k,), "fibre": (k,)}
+    rows = [_table(file, "interface", name, shape) for name, shape in row_shapes.items()]
+    # Older results have one section [interface] and bonds of one strength.
+    rows.append(_table(file, "interface", "pair", (k,), np.zeros(k, np.int32)))
+    interface = InterfaceRows(*rows)
+    fibre_shapes = {"body": (f,), "centre": (f, 2), "radius": (f,)}
+    fibres = [_table(file, "fibre", name, shape) for name, shape in fibre_shapes.items()]
+    fibres.append(_table(file, "fibre", "strength", (f,), np.ones(f)))
     size = np.array([file.attrs["width"], file.attrs["height"]], float)
     phases, sections = tuple(map(str, file.attrs["phases"])), _interfaces(document["case"])
-    _expect_shapes(mesh, rows, fibres, faces)
     for name, table, low, high in (
-        ("/mesh/triangles names unknown nodes", mesh.triangles, 0, len(mesh.points)),
+        ("/mesh/triangles names unknown nodes", mesh.triangles, 0, n),
         ("/mesh/phase names unknown phases", mesh.phase, 0, len(phases)),
-        ("/interface/pair names unknown interfaces", rows.pair, 0, max(len(sections), 1)),
-        ("/interface names unknown nodes", faces, 0, len(mesh.points)),
-        ("/interface/fibre_number names unknown fibres", rows.fibre, 1, len(fibres.radius) + 1),
+        ("/interface/pair names unknown interfaces", interface.pair, 0, max(len(sections), 1)),
+        ("/interface/fibre_number names unknown fibres", interface.fibre, 1, f + 1),
     ):
         _expect(bool(((table >= low) & (table < high)).all()), name)
-    named = {name for section in sections for name in section.get("between", ())}
-    _expect(named <= set(phases), "the case has interfaces between unknown phases")
-    return ResultFiles(Section(document), size, phases, mesh, rows, fibres, faces, file, altered)
-
-
-def _expect_shapes(mesh: Mesh, rows: InterfaceRows, fibres: Fibres, faces: Int) -> None:
-    n, m, k, f = len(mesh.points), len(mesh.triangles), len(rows.points), len(fibres.radius)
-    columns = 6 if mesh.triangles.shape[1:] == (6,) else 3
-    tables = {
-        "/mesh/points": (mesh.points, (n, 2)), "/mesh/triangles": (mesh.triangles, (m, columns)),
-        **{f"/mesh/{name}": (getattr(mesh, name), (m,)) for name in ("subdomain", "phase", "body")},
-        "/interface/points": (rows.points, (k, 2)), "/interface/normal": (rows.normal, (k, 2)),
-        **{f"/interface/{name}": (getattr(rows, name), (k,)) for name in ("length", "fibre", "body", "pair")},
-        "/interface/fibre_node": (faces, (k, 2)), "/fibre/centre": (fibres.centre, (f, 2)),
-        **{f"/fibre/{name}": (getattr(fibres, name), (f,)) for name in ("body", "phase", "strength")},
-    }  # fmt: skip
-    for name, (table, shape) in tables.items():
-        _expect(table.shape == shape and n > 0 and m > 0, f"{name} has shape {table.shape}, expected {shape}")
+    pairs = {name for section in sections for name in section.get("between", ())}
+    _expect(pairs <= set(phases), "the case has interfaces between unknown phases")
+    return ResultFiles(Section(document), size, phases, mesh, interface, Fibres(*fibres), file, altered)
 
 
 def _interfaces(case: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
@@ -199,8 +269,13 @@ def _interfaces(case: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
     return sections if isinstance(sections, list) else [sections]
 
 
-def _rows(table: h5py.Dataset) -> Any:
-    return np.asarray(table[()])
+def _table(file: h5py.File, group: str, name: str, shape: tuple[int, ...], default: Any = None) -> Any:
+    """Read a table of this shape, or return the default, if there is one, where it is missing."""
+    if default is not None and name not in file[group]:
+        return default
+    array = np.asarray(file[f"{group}/{name}"][()])
+    _expect(array.shape == shape, f"/{group}/{name} has shape {array.shape}, expected {shape}")
+    return array
 
 
 def _expect(holds: bool, fault: str) -> None:
@@ -210,33 +285,11 @@ def _expect(holds: bool, fault: str) -> None:
 
 @contextmanager
 def _reading(path: Path) -> Iterator[None]:
-    """Convert errors of reading a damaged or foreign file into one line."""
+    """Convert errors from damaged or foreign files into one line."""
     try:
         yield
     except OSError as error:
         raise input_files.unreadable(path, error) from error
     except (AttributeError, RuntimeError, KeyError, ValueError, TypeError) as error:
-        words = error.args[0] if error.args else error
-        raise CaseError(f"cannot read {path}: {' '.join(str(words).split())}") from error
-
-
-def is_as_written(document: Mapping[str, Any]) -> bool:
-    """Return whether `checksum` in result.json is the CRC-32 of the rest, in the layout in which it is written."""
-    content = {key: value for key, value in document.items() if key != "checksum"}
-    text = json.dumps(content, indent=1, ensure_ascii=False)
-    return bool(document.get("checksum") == f"{zlib.crc32(text.encode('utf-8', 'surrogatepass')):08x}")
-
-
-def has_seal(path: Path, seal: object) -> bool:
-    """Return whether a file has its size and the CRC-32 of the CRC-32s of its blocks, `result_h5` of result.json.
-
-    Raises:
-        OSError: it cannot be read.
-    """
-    with input_files.opened(path) as stream:
-        size = os.fstat(stream.fileno()).st_size
-        if not isinstance(seal, dict) or seal.get("bytes") != size:
-            return False
-        checksums = [zlib.crc32(block) for block in iter(partial(stream.read, BLOCK), b"")]
-    whole = zlib.crc32(np.array(checksums, "<u4").tobytes())
-    return seal == {"bytes": size, "checksum": f"{whole:08x}"}
+        message = error.args[0] if error.args else error
+        raise CaseError(f"cannot read {path}: {' '.join(str(message).split())}") from error

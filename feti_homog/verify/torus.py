@@ -1,28 +1,32 @@
-"""Nodes and sides of a torn mesh that are the same place of the periodic cell."""
+"""Places of a torn mesh on the periodic cell: nodes and sides at one place, and the bodies that meet there."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse import coo_matrix, csr_matrix
+from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 
 from feti_homog.typing import Bool, Float, Int
-from feti_homog.verify.cell_tables import Mesh
 from feti_homog.verify.elements import SIDES
+from feti_homog.verify.reading import COATING, Mesh
 
-# Places nearer than this share of the shortest side are one.
+# Points nearer than this share of the shortest side are at one place.
 SAME_PLACE = 1e-2
 
 
 @dataclass(frozen=True)
 class TornSides:
-    """The s sides that only one element of its subdomain has: on cuts, interfaces and the boundary of the cell.
+    """The s sides with one element in their subdomain: on cuts, interfaces and the cell boundary.
 
-    Elements (s,), ends and middle nodes (s, 2 or 3), outward normals times the length of the chord (s, 2), the side at
-    the same place of the torus, -1 if there is not exactly one (s,), and whether there is none (s,).
+    Attributes:
+        element: (s,) elements.
+        nodes: (s, 2 or 3) ends and middle nodes.
+        normal: (s, 2) outward normals times chord lengths.
+        partner: (s,) the side at the same place of the torus, -1 unless there is exactly one.
+        at_void: (s,) True where there is none.
     """
 
     element: Int
@@ -40,7 +44,7 @@ class TornSides:
 
 @dataclass(frozen=True)
 class TornNodes:
-    """The b nodes on torn sides: numbers in the mesh and of their places on the torus, subdomains and phases (b,)."""
+    """The b nodes on torn sides: mesh numbers, numbers of places on the torus, subdomains, phases (b,)."""
 
     node: Int
     place: Int
@@ -54,7 +58,7 @@ class TornNodes:
 
 
 def torn(mesh: Mesh, size: Float) -> tuple[TornSides, TornNodes, float]:
-    """Return the torn sides and nodes of a mesh on the torus of a size (2,), and how near the same places are."""
+    """Return torn sides and nodes on the torus of a size (2,), and the radius of a place."""
     m, columns = mesh.triangles.shape
     local = [(*side, 3 + number)[: columns // 3 + 1] for number, side in enumerate(SIDES)]
     every = mesh.triangles[:, local].reshape(3 * m, -1)
@@ -84,8 +88,14 @@ def wrapped(points: Float, size: Float) -> Float:
     return np.asarray(np.where(inside >= size, 0.0, inside))
 
 
+def from_centre(points: Float, centres: Float, size: Float) -> Float:
+    """(k, 2) vectors from the nearest images of centres to points."""
+    away = points - centres
+    return np.asarray(away - np.round(away / size) * size)
+
+
 def same_places(points: Float, size: Float, radius: float) -> Int:
-    """(k,) numbers of the places of points (k, 2): those within `radius` of each other on the torus have the same."""
+    """(k,) place numbers of points (k, 2), equal within `radius` on the torus."""
     if not len(points):
         return np.zeros(0, np.int64)
     pairs = cKDTree(wrapped(points, size), boxsize=size).query_pairs(radius, output_type="ndarray")
@@ -94,22 +104,22 @@ def same_places(points: Float, size: Float, radius: float) -> Int:
 
 
 def along_one_line(sides: TornSides, nodes: TornNodes, part: Int) -> Bool:
-    """(places,) whether two bodies meet there along one line, if two do; `part` (m,) is the body of each element.
+    """(places,) whether two bodies, if two, meet there along one line; `part` (m,) is each element's body.
 
-    Then either body ends there at two sides, and not all of these are at voids.  A middle node is on one line.
+    Then each body ends there at two sides, not all at voids.  A middle node is on one line.
     """
     apart = ~sides.at_void & (part[sides.element] != part[sides.element[sides.partner]])
     place = np.full(int(nodes.node.max(initial=-1)) + 1, -1)
     place[nodes.node] = nodes.place
     facing, at_void, middle = (
-        np.bincount(place[own].ravel(), minlength=nodes.places)
-        for own in (sides.nodes[apart, :2], sides.nodes[sides.at_void, :2], sides.nodes[:, 2:])
+        np.bincount(place[side_nodes].ravel(), minlength=nodes.places)
+        for side_nodes in (sides.nodes[apart, :2], sides.nodes[sides.at_void, :2], sides.nodes[:, 2:])
     )
     return np.asarray((middle > 0) | ((facing + at_void == 4) & (facing > 0)))
 
 
 def constituents(mesh: Mesh, sides: TornSides) -> Int:
-    """(subdomains,) number of the connected part of a phase on the torus that each subdomain lies in."""
+    """(subdomains,) number of each subdomain's part: a connected region of one phase on the torus."""
     paired = np.flatnonzero(sides.partner >= 0)
     a, b = sides.element[paired], sides.element[sides.partner[paired]]
     joined = mesh.phase[a] == mesh.phase[b]
@@ -117,3 +127,21 @@ def constituents(mesh: Mesh, sides: TornSides) -> Int:
     links = (mesh.subdomain[a[joined]], mesh.subdomain[b[joined]])
     graph = coo_matrix((np.ones(len(links[0])), links), shape=(n, n))
     return np.asarray(connected_components(graph, directed=False)[1], np.int64)
+
+
+def inwardness(mesh: Mesh, phases: tuple[str, ...], sides: TornSides, part: Int) -> Int:
+    """(parts,) ranks of parts, larger inwards; `part` (subdomains,) is the part of each subdomain.
+
+    Ranks go by the bodies between a part and the matrix, then coatings before others, then labels.
+    """
+    paired = np.flatnonzero(sides.partner >= 0)
+    ends = (part[mesh.subdomain[sides.element[side]]] for side in (paired, sides.partner[paired]))
+    n = int(part.max()) + 1
+    phase, label = np.zeros(n, np.int64), np.zeros(n, np.int64)
+    phase[part[mesh.subdomain]], label[part[mesh.subdomain]] = mesh.phase, mesh.body
+    graph = csr_matrix((np.ones(len(paired)), tuple(ends)), shape=(n, n))
+    steps = dijkstra(graph, directed=False, indices=np.flatnonzero(phase == 0), unweighted=True, min_only=True)
+    coats = np.array([name == COATING for name in phases])[phase]
+    rank = np.empty(n, np.int64)
+    rank[np.lexsort((label, ~coats, steps))] = np.arange(n)
+    return rank

@@ -136,6 +136,6 @@ class Teeth(MixedPath):
         law = law_at(self.files, which)
         psi = law.mode(event.state.force[which] / self.cell.lengths[which, None])
         before, after = damage[self.level[which]], damage[self.level[which] + 1]
-        self.taken += float(law.taken(psi, before, after) @ self.cell.lengths[which]) / self.cell.area
+        self.taken += float(law.absorbed(psi, before, after) @ self.cell.lengths[which]) / self.cell.area
         self.level[which] += 1
         self.bonded = 1.0 - self.levels[self.level]

@@ -11,7 +11,7 @@ import numpy as np
 
 from differential.comparison import DIFFERENT, apart
 from differential.transforms import sections, waypoints
-from feti_homog.verify.bonds import held_traction, law_at
+from feti_homog.verify.bonds import cohesive_traction, law_at
 from feti_homog.verify.reading import opened
 
 # Bonds break together up to UTILISATION_TIE; between these shares of it the solver's error decides.
@@ -78,7 +78,7 @@ def ties(document: Any, folder: Path, number: int) -> bool:
         return False
     with opened(folder) as files:
         state = next(state for k, state in enumerate(files.states()) if k == states.index(number))
-        used = law_at(files, damage=state.damage).utilisation(held_traction(files, state))[state.status == 0]
+        used = law_at(files, damage=state.damage).utilisation(cohesive_traction(files, state))[state.status == 0]
     point = document["path"][number]
     close = np.abs(np.concatenate([used, _used_by_tips(document["case"], point)]) - 1) < TIE
     return bool(np.count_nonzero(close) > changed(point))

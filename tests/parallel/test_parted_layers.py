@@ -13,7 +13,7 @@ from support.verified_results import falsified
 from feti_homog import Case, run
 from feti_homog.errors import ConvergenceError
 from feti_homog.verify.certificate import verify
-from feti_homog.verify.prescribed import at_points
+from feti_homog.verify.check_loads import at_points
 
 pytestmark = [pytest.mark.parallel, pytest.mark.few_ranks]
 

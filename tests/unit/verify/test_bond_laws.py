@@ -8,7 +8,7 @@ import pytest
 from feti_homog.case.bond_laws import LAWS
 from feti_homog.interface.contact.states import BondState
 from feti_homog.interface.laws.bond_law import law_class
-from feti_homog.verify.bond_laws.law import law_of
+from feti_homog.verify.bonds import law_of
 
 SECTION = {
     "normal_stiffness": 5.0,
@@ -73,9 +73,9 @@ def test_both_agree_on_damaged_bonds(name, components):
     every = np.ones(k, bool)
     history, _ = run.after(bonds, every, traction)
     after = run.damage(BondState(bonds.status, history, bonds.pressed))
-    taken = check.taken(check.mode(traction), damage, after)
+    taken = check.absorbed(check.mode(traction), damage, after)
     np.testing.assert_allclose(run.fracture(bonds, every, traction), taken, rtol=1e-10)
-    low, high = check.taken_between(damage, after)
+    low, high = check.absorbed_range(damage, after)
     assert ((low <= taken) & (taken <= high)).all()
 
 

@@ -59,5 +59,5 @@ def test_only_tips_may_be_overloaded_by_contact_and_all_bonds_by_breaks(before, 
     now = {"load_factor": 0.7, "broke": 1, "closed": 4, "strain": [1.0], "stress": [1.0, 2.0], "temperature": -50.0}
     state = SimpleNamespace(point=1, used=np.array([1.1, 1.1]), released=np.array([True, False]))
     points = [now | {"load_factor": 0.69999, "broke": 0, "closed": 5} | before, now]
-    assert check_path._overloaded_by_jump(state, points, 1e-5).tolist() == may
-    assert not check_path._overloaded_by_jump(state, [points[0], now | {"broke": 0}], 1e-5).any()
+    assert check_path.overloaded_by_jump(state, points, 1e-5).tolist() == may
+    assert not check_path.overloaded_by_jump(state, [points[0], now | {"broke": 0}], 1e-5).any()

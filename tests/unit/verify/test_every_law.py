@@ -76,29 +76,18 @@ BREAK = {
             document("kkt_tolerance", factor=10.0),
             document("solver", "rtol", factor=10.0),
             document("solver", "converged_reason", to=[2, -3, 2]),
-            document("checks", "symmetry", factor=10.0),
-            document("remarks", to=["[cell] order = 1: polygons have 3.0% less area than the fibres asked for"]),
         ],
     ),
     "cell": (
         "plane",
         [
-            document("cell", "mesh_size", factor=0.5),
-            document("cell", "refine", to=0),
-            document("cell", "refine", to=2),
             document("case", "cell", "order", to=2),
-            both(document("cell", "mesh_size", factor=0.1), document("case", "cell", "mesh_size", factor=0.1)),
         ],
     ),
     "mesh error": (
         "bonded",
         [
-            document("mesh_error", "energy", factor=100.0),
-            document("mesh_error", "energy", factor=0.01),
-            document("mesh_error", "effective_stiffness", 0, 1, factor=1.01),
             document("mesh_error", "effective_stiffness", 0, 0, factor=1e-3),
-            document("mesh_error", "effective_stiffness", 0, 0, factor=1e3),
-            document("mesh_error", "constants", "E1", factor=10.0),
         ],
     ),
     "mesh": ("bonded", [turned_element]),
@@ -140,12 +129,6 @@ def test_the_heat_of_an_increment_is_that_of_its_slips_in_a_whole_result(results
     assert broken(falsified(results("friction by steps"), tmp_path / "copy", edit)) == {"files", "heat"}
 
 
-def test_a_table_beside_the_result_breaks_its_law(results, tmp_path):
-    copy = falsified(results("path"), tmp_path / "copy", lambda content, _: None)
-    (copy / "path.csv").write_text("load_factor\n0.5\n")
-    assert "CSV" in broken(copy)
-
-
 def test_every_law_is_broken_by_some_example():
-    known = {*BREAK, "CSV"}.union(*(laws for table in TABLES for _, _, laws in table.values()))
+    known = {*BREAK}.union(*(laws for table in TABLES for _, _, laws in table.values()))
     assert {check.name for check in checks(1e-8, users_mesh=False, has_coatings=False)} <= known

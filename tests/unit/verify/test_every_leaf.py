@@ -13,11 +13,9 @@ import pytest
 from support.falsifications import broken, resealed
 
 from feti_homog.errors import CaseError
-from feti_homog.verify.certificate import DAMAGE, laws_of_fields, laws_of_numbers, verify
-from feti_homog.verify.check_record import checks_of
+from feti_homog.verify.certificate import DAMAGE, checks_of, laws_of_fields, laws_of_numbers, verify
 from feti_homog.verify.discrete_cell import DiscreteCell
-from feti_homog.verify.findings import Findings
-from feti_homog.verify.leaves import Section
+from feti_homog.verify.findings import Findings, Section
 from feti_homog.verify.reading import opened
 
 pytestmark = pytest.mark.slow

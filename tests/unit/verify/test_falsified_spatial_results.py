@@ -23,13 +23,12 @@ FALSE = {
         "spatial", shift("axial_displacement", state=5),
         {"stress", "periodicity", "jump", "equilibrium", "mean stress"},
     ),
-    "an axial traction": ("spatial", scale("axial_traction", state=6), {"equilibrium", "vectors"}),
-    "an axial traction of springs": ("spatial springs", scale("axial_traction", state=5), {"equilibrium", "vectors"}),
+    "an axial traction": ("spatial", scale("axial_traction", state=6), {"equilibrium"}),
+    "an axial traction of springs": ("spatial springs", scale("axial_traction", state=5), {"equilibrium"}),
     "an axial traction on a free face": (
-        "spatial contact", free_axial_traction(5), {"equilibrium", "vectors", "free faces", "Hill"},
+        "spatial contact", free_axial_traction(5), {"equilibrium", "free faces", "Hill"},
     ),
-    "an axial jump": ("spatial contact", scale("axial_jump", state=5), {"jump", "vectors"}),
-    "a third component": ("spatial springs", scale("displacement_fibre", state=5), {"vectors"}),
+    "an axial jump": ("spatial contact", scale("axial_jump", state=5), {"jump"}),
     "an expansion": (
         "spatial", document("case", *MATRIX, "expansion", factor=1.01),
         {"stress", "equilibrium", "mean stress", "Hill", "Levin"},

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from feti_homog.verify.check_loads import Prescribed
 from feti_homog.verify.path_energies import PointNumbers, potentials
-from feti_homog.verify.prescribed import Prescribed
 
 ROUNDING = 1e-12
 

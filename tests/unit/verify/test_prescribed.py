@@ -7,7 +7,7 @@ import pytest
 from support.verified_results import LOADS, MIXED_PATHS, document
 
 from feti_homog import Case
-from feti_homog.verify.prescribed import NAMES, at_points, targets
+from feti_homog.verify.check_loads import NAMES, at_points, targets
 
 TWO_LEGS = {"path": {"waypoints": [{"E11": 0.4, "S22": 2.0}, {"S11": 3.0, "S22": 6.0}]}}
 

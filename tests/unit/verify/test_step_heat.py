@@ -7,8 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from feti_homog.verify.check_fields import BONDED, CLOSED, OPEN, check_step_heat
+from feti_homog.verify.discrete_cell import BONDED, CLOSED, OPEN
 from feti_homog.verify.findings import Findings, checks
+from feti_homog.verify.path_energies import check_step_heat
 
 
 def state(point, status):

@@ -1,6 +1,6 @@
 """Cohesive laws in openings: delta, from its onset delta_0 to the branch t(delta), damage 1 - t / (K delta).
 
-K is that of a mode, K (delta_n^2 + delta_s^2) = k_n delta_n^2 + k_t delta_s^2, and b^2 = delta_s^2 / delta_n^2.
+K is the stiffness of a mode: K (delta_n^2 + delta_s^2) = k_n delta_n^2 + k_t delta_s^2.
 """
 
 from __future__ import annotations
@@ -13,60 +13,51 @@ from typing import ClassVar
 import numpy as np
 
 from feti_homog.typing import Float
-from feti_homog.verify.bond_laws.law import BondLaw, pulled
+from feti_homog.verify.bonds import BondLaw, pulled
 
 HALVINGS = 80
-# The traction at which the last exponential tooth begins, over the peak.
-TAIL = 0.01
+TAIL = 0.01  # traction / peak at which the last exponential tooth begins
 MODES = np.linspace(0.0, np.pi / 2, 33)
-# By how much the energy of bonds whose mode changed may leave what the law takes in any one mode.
+# Relative excess of the energy that bonds with changing modes absorb over the range of single modes.
 BETWEEN_MODES = 0.25
 
 
 class Cohesive(BondLaw):
-    """delta = sqrt(<delta_n>^2 + delta_s^2) reaches that of the next tooth."""
+    """delta = sqrt(<delta_n>^2 + delta_s^2) reaches the next tooth."""
 
     has_toughness: ClassVar[bool] = True
 
     @property
     def damage(self) -> Float:
-        """(k,) or () of the bonds."""
+        """(k,) or ()."""
         return np.asarray(self.section.get("damage", 0.0), float)
 
     def jumps(self, traction: Float) -> Float:
-        """(k, c) traction / stiffness, which damage lowers but for compression."""
-        holds = np.broadcast_to(np.where(self.damage < 1.0, 1.0 - self.damage, 1.0), len(traction))[:, None]
-        kept = np.repeat(holds, traction.shape[1], axis=1)
-        kept[:, 0] = np.where(traction[:, 0] > 0.0, kept[:, 0], 1.0)
-        return np.asarray(super().jumps(traction) / kept)
+        """(k, c) traction / stiffness, which damage lowers except in compression."""
+        share = np.broadcast_to(np.where(self.damage < 1.0, 1.0 - self.damage, 1.0), len(traction))[:, None]
+        shares = np.repeat(share, traction.shape[1], axis=1)
+        shares[:, 0] = np.where(traction[:, 0] > 0.0, shares[:, 0], 1.0)
+        return np.asarray(super().jumps(traction) / shares)
 
     def utilisation(self, traction: Float) -> Float:
-        """(k,) delta over that of the next tooth."""
+        """(k,) delta / delta of the next tooth."""
         level = np.abs(np.subtract.outer(np.broadcast_to(self.damage, len(traction)), self.levels)).argmin(axis=1)
         level = np.minimum(level, len(self.levels) - 2)
         low, high = self.levels[level], self.levels[level + 1]
-        K, first, stretch = self._mode(self.mode(traction))
-        taken = self._taken(high, K, first, stretch) - self._taken(low, K, first, stretch)
         energy = self.energies(traction).sum(axis=1) / (1.0 - low) ** 2
-        return np.asarray(np.sqrt(energy * (high - low) / taken))
+        return np.asarray(np.sqrt(energy * (high - low) / self.absorbed(self.mode(traction), low, high)))
 
-    def taken(self, psi: Float, before: Float, after: Float) -> Float:
-        """(k,) energies per area that the law takes in the modes psi (k,) from the damage `before` to `after`."""
-        K, first, stretch = self._mode(psi)
-        return self._taken(after, K, first, stretch) - self._taken(before, K, first, stretch)
+    def absorbed(self, psi: Float, before: Float, after: Float) -> Float:
+        """(k,) energies per area for damage from `before` to `after` in the modes psi (k,)."""
+        return self._area(after, *self._mode(psi)) - self._area(before, *self._mode(psi))
 
-    def taken_between(self, before: Float, after: Float) -> tuple[Float, Float]:
-        """(k,) the least and the most, whatever the modes."""
-        every = np.stack([self.taken(np.full(len(after), psi), before, after) for psi in MODES])
-        return every.min(axis=0) * (1 - BETWEEN_MODES), every.max(axis=0) * (1 + BETWEEN_MODES)
-
-    def mode(self, traction: Float) -> Float:
-        """(k,) psi with tan^2 psi = G_II / G_I."""
-        first, second = np.sqrt(self.energies(traction)).T
-        return np.asarray(np.arctan2(second, first))
+    def absorbed_range(self, before: Float, after: Float) -> tuple[Float, Float]:
+        """(k,) lower and upper bound of `absorbed` over all modes."""
+        energies = np.stack([self.absorbed(np.full(len(after), psi), before, after) for psi in MODES])
+        return energies.min(axis=0) * (1 - BETWEEN_MODES), energies.max(axis=0) * (1 + BETWEEN_MODES)
 
     def breaks(self, traction: Float) -> dict[str, float]:
-        """Shares of the components in the onset of damage."""
+        """Return the component shares at damage onset."""
         return dict(zip(("normal", "tangential", "axial"), self._onset_shares(traction)[0].tolist(), strict=False))
 
     def onset(self, traction: Float) -> Float:
@@ -74,7 +65,7 @@ class Cohesive(BondLaw):
         return np.asarray(np.sqrt(np.square(self._onset_shares(traction)).sum(axis=1)))
 
     def _onset_shares(self, traction: Float) -> Float:
-        """(k, c) of the strengths; along the fibre by the energy of the slip."""
+        """(k, c) traction / strength, along the fibre by the energy of the slip."""
         shares = pulled(traction)
         shares[:, 0] /= self._number("normal_strength")
         stiffness = self._components("stiffness", traction)[..., 1:]
@@ -84,23 +75,22 @@ class Cohesive(BondLaw):
 
     @cached_property
     def levels(self) -> Float:
-        """(n + 1,) damage between the teeth: openings in constant quotients in the pure mode with most of them."""
+        """(n + 1,) damage between n teeth: openings in constant quotients in the pure mode with more teeth."""
         ends = []
         for psi in (0.0, np.pi / 2):
             K, first, stretch = self._mode(np.full(np.size(self.section["normal_stiffness"]), psi))
             ends.append(np.stack([K * first**2 / 2, first, first + self.last * stretch]))
         energy, first, end = np.concatenate(ends, axis=1)
-        most = int(np.argmax(end / first))
-        delta0, delta1, peak = first[most], end[most], 2 * energy[most] / first[most]
-        teeth = self.section.get("teeth")
+        worst = int(np.argmax(end / first))
+        delta0, delta1, peak = first[worst], end[worst], 2 * energy[worst] / first[worst]
+        stretch, teeth = (delta1 - delta0) / self.last, self.section.get("teeth")
         for n in [teeth] if teeth else count(1):
             delta = delta0 * (delta1 / delta0) ** (np.arange(n) / n)
-            u = (delta - delta0) / max((delta1 - delta0) / self.last, 1e-300)
+            u = (delta - delta0) / max(stretch, 1e-300)
             d = 1.0 - self.branch(u) * delta0 / delta if delta1 > delta0 * (1 + 1e-12) else np.arange(n) / n
-            levels = np.append(d, 1.0)
-            size = np.array([(delta1 - delta0) / self.last])
-            each = np.array([2 * energy[most] / delta0**2]), np.array([delta0]), size
-            first_tooth = np.sqrt(self._taken(levels[1:2], *each)[0] / levels[1] * 2 * each[0][0])
+            levels, K = np.append(d, 1.0), np.array([2 * energy[worst] / delta0**2])
+            area = self._area(levels[1:2], K, np.array([delta0]), np.array([stretch]))[0]
+            first_tooth = np.sqrt(area / levels[1] * 2 * K[0])
             if teeth or first_tooth <= peak * (1 + self.section["softening_tolerance"]):
                 break
         return levels
@@ -112,7 +102,7 @@ class Cohesive(BondLaw):
 
     @abstractmethod
     def branch(self, u: Float) -> Float:
-        """Traction over the peak."""
+        """Traction / peak."""
 
     @abstractmethod
     def under(self, u: Float) -> Float:
@@ -122,7 +112,7 @@ class Cohesive(BondLaw):
         return np.asarray(self.section[name], float)
 
     def _mode(self, psi: Float) -> tuple[Float, Float, Float]:
-        """(k,) K, delta_0, and the opening that is one of u, of the modes psi (k,)."""
+        """(k,) K, delta_0, and the opening of u = 1, in the modes psi (k,)."""
         kn, kt = self._number("normal_stiffness"), self._number("tangential_stiffness")
         # delta_n : delta_s = cos / sqrt(k_n) : sin / sqrt(k_t)
         opens, slips = np.cos(psi) ** 2 / kn, np.sin(psi) ** 2 / kt
@@ -132,10 +122,10 @@ class Cohesive(BondLaw):
         first = 1.0 / np.sqrt(shares[0] / strengths[0] ** 2 + shares[1] / strengths[1] ** 2)
         low, high = self._number("normal_toughness"), self._number("tangential_toughness")
         toughness = low + (high - low) * (np.sin(psi) ** 2) ** self._number("mixing_exponent")
-        left = np.maximum(toughness - K * first**2 / 2, 0.0)
-        return K, first, left / (K * first * self.under(np.asarray(np.inf)))
+        rest = np.maximum(toughness - K * first**2 / 2, 0.0)
+        return K, first, rest / (K * first * self.under(np.asarray(np.inf)))
 
-    def _taken(self, d: Float, K: Float, first: Float, stretch: Float) -> Float:
+    def _area(self, d: Float, K: Float, first: Float, stretch: Float) -> Float:
         """(k,) area under the law up to the opening of damage d (k,), less the triangle of unloading."""
         low = np.zeros(np.broadcast_shapes(np.shape(d), np.shape(first)))
         high = low + 1.0
@@ -150,19 +140,37 @@ class Cohesive(BondLaw):
         return np.asarray(area - np.where(d < 1.0, K * (1.0 - d) * (first + stretch * high) ** 2 / 2, 0.0))
 
 
-class Bilinear(Cohesive):
-    """A straight branch."""
+class Table(Cohesive):
+    """Straight pieces."""
 
-    last = 1.0
+    @property
+    def _points(self) -> tuple[Float, Float]:
+        """(m,) u and tractions / peak."""
+        openings, tractions = (np.asarray(self.section[name], float) for name in ("openings", "tractions"))
+        return (openings - openings[0]) / openings[0], tractions / tractions[0]
+
+    @property
+    def last(self) -> float:
+        """The first u without traction."""
+        places, heights = self._points
+        return float(places[heights == 0.0][0])
 
     def branch(self, u: Float) -> Float:
-        """1 - u."""
-        return np.maximum(1.0 - u, 0.0)
+        """Interpolate the table."""
+        return np.interp(u, *self._points)
 
     def under(self, u: Float) -> Float:
-        """u - u^2 / 2."""
-        u = np.minimum(u, 1.0)
-        return np.asarray(u - u * u / 2)
+        """Sum up the trapezia up to u."""
+        places, heights = self._points
+        ends = np.clip(np.minimum(u, self.last)[..., None], places[:-1], places[1:])
+        means = (heights[:-1] + np.interp(ends, places, heights)) / 2
+        return np.asarray((means * (ends - places[:-1])).sum(axis=-1))
+
+
+class Bilinear(Table):
+    """One straight piece."""
+
+    _points = np.array([0.0, 1.0]), np.array([1.0, 0.0])
 
 
 class Exponential(Cohesive):
@@ -177,31 +185,3 @@ class Exponential(Cohesive):
     def under(self, u: Float) -> Float:
         """1 - exp(-u)."""
         return np.asarray(1.0 - np.exp(-u))
-
-
-class Table(Cohesive):
-    """Straight pieces."""
-
-    @property
-    def _points(self) -> tuple[Float, Float]:
-        """(m,) u and tractions over the peak."""
-        openings, tractions = (np.asarray(self.section[name], float) for name in ("openings", "tractions"))
-        return (openings - openings[0]) / openings[0], tractions / tractions[0]
-
-    @property
-    def last(self) -> float:
-        """Return where the traction is none at first."""
-        places, heights = self._points
-        return float(places[heights == 0.0][0])
-
-    def branch(self, u: Float) -> Float:
-        """Interpolate the table."""
-        return np.interp(u, *self._points)
-
-    def under(self, u: Float) -> Float:
-        """Sum up the trapezia up to u."""
-        places, heights = self._points
-        u = np.minimum(u, self.last)
-        ends = np.clip(u[..., None], places[:-1], places[1:])
-        means = (heights[:-1] + np.interp(ends, places, heights)) / 2
-        return np.asarray((means * (ends - places[:-1])).sum(axis=-1))

@@ -1,0 +1,196 @@
+"""Laws of the summary in result.json: status, mesh counts, moduli, engineering constants, expansion, bounds."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.special import gammaln
+
+from feti_homog.typing import Float
+from feti_homog.verify.check_loads import States
+from feti_homog.verify.constitutive_law import VOIGT, turned
+from feti_homog.verify.discrete_cell import BONDED, DiscreteCell
+from feti_homog.verify.findings import KKT, Findings, Section, relative, solver_limit
+from feti_homog.verify.reading import COATING
+
+RTOL = 1e-8  # of the dual problems, by default
+DIRECTIONS = 720  # across the fibres, in half a turn
+SECTIONS = {"moduli", "constants", "transversely_isotropic", "transverse_moduli"}
+# The scale of constants whose names begin so is 1 at least.
+RATIOS = ("eta", "anisotropy", "nu", "deviation")
+
+
+def check_constants(findings: Findings, cell: DiscreteCell, states: States) -> None:
+    """Check the numbers of result.json that sum up a run."""
+    document = cell.files.document
+    _check_status(findings, cell)
+    _check_cell(findings, cell, document["cell"])
+    if "effective_stiffness" in document:
+        _check_stiffness(findings, cell, document)
+    for number, table in enumerate([document, *document.get("angle", ())], start=-1):
+        if "thermal_stress" in table and cell.expansions is not None:
+            of_table = [state for state in states if number < 0 or state.point == number]
+            _check_levin(findings, cell, table, of_table, f"angle[{number}].thermal_stress".removeprefix("angle[-1]."))
+
+
+def _check_stiffness(findings: Findings, cell: DiscreteCell, document: Section) -> None:
+    """Check bounds, compliance and constants of the stiffness."""
+    C, heat = np.array(document["effective_stiffness"]), document.get("thermal_stress")
+    heat = None if heat is None else np.array(heat)
+    if document.get("bounds") is not None:
+        _check_bounds(findings, cell, document["bounds"], C)
+    if cell.files.is_spatial:
+        _check_inverse(findings, document, C, heat)
+    for section in SECTIONS & document.keys():
+        constants = {} if document.get(section) is None else constants_of(C, heat)
+        for name, value in (document.get(section) or {}).items():
+            expected, place = constants.get(name), f"{section}.{name}"
+            if value is None or expected is None:
+                findings.require("moduli", value is expected, place)
+            else:
+                findings.compare("moduli", value, expected, max(abs(expected), float(name.startswith(RATIOS))), place)
+
+
+def _check_status(findings: Findings, cell: DiscreteCell) -> None:
+    """Check tolerances by rtol, and the status by checks, convergence and other faults."""
+    document, solver = cell.files.document, cell.files.document["solver"]
+    # Options of the command line are in no file.
+    is_of_case = solver.hint("rtol") == float(cell.files.case.get("petsc", {}).get("feti_ksp_rtol", RTOL))
+    rtol = float(solver["rtol"] if is_of_case else solver.hint("rtol"))
+    tolerance, of_contact = document["check_tolerance"], document["kkt_tolerance"]
+    findings.record("status", abs(tolerance / solver_limit(rtol) - 1.0), "check_tolerance")
+    findings.record("status", abs(of_contact / KKT - 1.0), "kkt_tolerance")
+    checks, faults = document["checks"], document.hint("faults", [])
+    failed = [name for name in checks if not checks.hint(name) <= (of_contact if "kkt_" in name else tolerance)]
+    failed += [reason for reason in solver.hint("converged_reason") if reason < 0]
+    failed += [fault for fault in faults if "check " not in fault and "no convergence" not in fault]
+    findings.require("status", document["status"] == ("not converged" if failed else "done"), "status")
+
+
+def _check_cell(findings: Findings, cell: DiscreteCell, section: Section) -> None:
+    """Check sizes, counts and area fractions against the mesh, and the scatter of strengths against the case."""
+    mesh, (width, height), phases = cell.files.mesh, cell.files.size, cell.files.phases
+    fibres = [number for number, name in enumerate(phases) if name not in ("matrix", COATING)]
+    counts = {"width": width, "height": height, "area": width * height}
+    counts |= {"elements": len(mesh.triangles), "nodes": len(mesh.points)}
+    for name, value in counts.items():
+        findings.compare("cell", section[name], value, value, f"cell.{name}")
+    shares = {"fibre_fraction": cell.fractions[fibres].sum(), "porosity": cell.porosity}
+    for name, value in shares.items():
+        findings.compare("cell", section.get(name, 0.0), value, 1.0, f"cell.{name}")
+    for name, value in zip(phases, cell.fractions, strict=True):
+        findings.compare("cell", section["fractions"][name], value, 1.0, f"cell.fractions.{name}")
+    bonds, rows = cell.files.document["solver"]["interface_nodes"], len(cell.files.interface.points)
+    findings.compare("cell", bonds, rows, 1.0, "solver.interface_nodes")
+    order = 1 + mesh.triangles.shape[1] // 6
+    findings.compare("cell", cell.files.case["cell"].get("order", order), order, 1.0, "case.cell.order")
+    # Strengths scatter by Weibull's distribution with mean 1; a table may have others.
+    strength, scatter = cell.files.fibres.strength, next(iter(cell.files.interfaces), {}).get("scatter")
+    if cell.files.case["cell"]["geometry"] != "table":
+        expected = np.ones_like(strength)
+        if scatter is not None:
+            stream = np.random.default_rng(np.random.SeedSequence(scatter["seed"], spawn_key=(1,)))
+            m = scatter["shape"]
+            expected = np.exp(np.log(-np.log(1.0 - stream.random(len(strength)))) / m - gammaln(1.0 + 1.0 / m))
+        findings.compare("tables", strength, expected, expected, "/fibre/strength at fibre {}".format)
+
+
+def _check_inverse(findings: Findings, document: Section, C: Float, heat: Float | None) -> None:
+    """Check compliance and thermal expansion."""
+    # Columns that are secants of one load each have no meaningful inverse.
+    is_linear = "effective_stiffness_compression" not in document
+    findings.require("compliance", is_linear is ("compliance" in document), "compliance")
+    if "compliance" in document:
+        S = np.array(document["compliance"])
+        terms = (np.abs(S) @ np.abs(C)).max(axis=1)[:, None]  # of cancelling sums
+        findings.compare("compliance", S @ C, np.eye(6), terms, "compliance")
+    if "thermal_expansion" in document and heat is not None:
+        strains = -np.linalg.solve(C, heat)
+        findings.compare(
+            "compliance", document["thermal_expansion"], strains, np.abs(strains).max(), "thermal_expansion"
+        )
+
+
+def _check_levin(findings: Findings, cell: DiscreteCell, table: Section, states: States, place: str) -> None:
+    """Check a thermal stress by reciprocity, which contact without tension breaks."""
+    if cell.files.contact and any((state.status != BONDED).any() for state in states):
+        return
+    thermal = np.array(table["thermal_stress"])
+    for state in states:
+        if not state.temperature:
+            error = thermal @ state.strain + state.expanding
+            findings.record("Levin", relative(error, np.abs(thermal).max()), f"{place}, {state.name}")
+
+
+def _check_bounds(findings: Findings, cell: DiscreteCell, bounds: Section, stiffness: Float) -> None:
+    """Check Voigt's and Reuss' bounds, Hashin and Shtrikman's, and their order."""
+    upper, lower = np.einsum("p,pij->ij", cell.fractions, cell.stiffnesses), cell.reuss
+    size = float(np.abs(upper).max())
+    for name, bound in (("voigt", upper), ("reuss", lower)):
+        findings.compare("bounds", bounds[name], bound, size, f"bounds.{name}")
+    for place, gap in (("Voigt - L", upper - stiffness), ("L - Reuss", stiffness - lower)):
+        least = float(np.linalg.eigvalsh((gap + gap.T) / 2).min())
+        findings.record("bounds", max(-least, 0.0) / size, f"the least eigenvalue of {place}")
+    if bounds["hashin_shtrikman"] is not None:
+        # 1 / <1 / (m + m*)> - m* with m* = mu0 for m = k, k0 mu0 / (k0 + 2 mu0) for m = mu (Walpole 1969).
+        bulk, shear = np.array([_isotropic_part(c) for c in cell.stiffnesses]).T
+        k0, mu0 = (np.array([phases.min(), phases.max()]) for phases in (bulk, shear))
+        for name, phases, added in (("bulk", bulk, mu0), ("shear", shear, k0 * mu0 / (k0 + 2 * mu0))):
+            pair = 1 / (cell.fractions @ (1 / (phases[:, None] + added))) - added
+            findings.compare("bounds", bounds["hashin_shtrikman"][name], pair, pair[1], f"hashin_shtrikman.{name}")
+
+
+def constants_of(C: Float, heat: Float | None) -> dict[str, float]:
+    """Map names to constants of a stiffness (3, 3) or (6, 6), and to expansions by a thermal stress (6,).
+
+    From the strains under unit stresses: E_i, nu_ij = -eps_j / eps_i and eta_i = gamma_12 / eps_i under stress along i,
+    G_ij.
+    """
+    S, n, voigt = np.linalg.inv(C), len(C), VOIGT[len(C)]
+    pairs, shears = [(0, 1), (1, 0)], {"G12": 2}
+    if n == 6:
+        pairs, shears = [(0, 1), (0, 2), (1, 2)], {"G23": 3, "G13": 4, "G12": 5}
+    table = {f"C{i + 1}{j + 1}": C[i, j] for i in range(n) for j in range(i, n)}
+    table |= {f"E{i + 1}": 1 / S[i, i] for i in range(len(voigt))}
+    table |= {f"nu{i + 1}{j + 1}": -S[j, i] / S[i, i] for i, j in pairs}
+    table |= {name: 1 / S[k, k] for name, k in shears.items()}
+    if n == 3:
+        bulk, shear = _isotropic_part(C)
+        nearest = np.array([[bulk + shear, bulk - shear, 0], [bulk - shear, bulk + shear, 0], [0, 0, shear]])
+        table |= {"eta1": S[2, 0] / S[0, 0], "eta2": S[2, 1] / S[1, 1], "bulk": bulk, "shear": shear}
+        table["anisotropy"] = _distance(C, nearest)
+    else:
+        table |= _about_fibres(C)
+    if heat is not None:
+        x1, x2, x3 = -np.linalg.solve(C, heat)[:3]
+        table |= {"expansion_x1": x1, "expansion_x2": x2, "expansion_axial": x3, "expansion_transverse": (x1 + x2) / 2}
+        table |= {f"thermal_S{k + 1}{k + 1}": heat[k] for k in range(3)}
+    return {name: float(value) for name, value in table.items()}
+
+
+def _isotropic_part(c: Float) -> tuple[float, float]:
+    """Moduli k, mu of the nearest isotropic stiffness: its invariants C_iijj / 4 and (C_ijij - C_iijj / 2) / 4."""
+    spherical, full = c[:2, :2].sum(), c[0, 0] + c[1, 1] + 2 * c[2, 2]
+    return float(spherical / 4), float((full - spherical / 2) / 4)
+
+
+def _distance(C: Float, other: Float) -> float:
+    """||C - C'|| / ||C|| of the tensors C_ijkl."""
+    voigt = VOIGT[len(C)]
+    off, size = (np.linalg.norm(M[voigt[:, :, None, None], voigt[None, None]]) for M in (C - other, C))
+    return float(off / size)
+
+
+def _about_fibres(C: Float) -> dict[str, float]:
+    """Constants of the mean tensor over turns about x3, its distance, and the ranges of E1 and G12 in turned axes."""
+    # Exact: the turned tensor has no more than four waves in a turn.
+    mean = np.mean([turned(C, angle) for angle in np.arange(5) * 72.0], axis=0)
+    S, angle = np.linalg.inv(mean), np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    c, s, none = np.cos(angle), np.sin(angle), np.zeros((3, DIRECTIONS))
+    tension, shear = np.vstack([c**2, s**2, none, c * s]), np.vstack([-2 * c * s, 2 * c * s, none, c**2 - s**2])
+    E, G = (1 / np.einsum("ia,ij,ja->a", stress, np.linalg.inv(C), stress) for stress in (tension, shear))
+    return {
+        "E_axial": 1 / S[2, 2], "E_transverse": 1 / S[0, 0], "nu_transverse": -S[0, 1] / S[0, 0],
+        "nu_axial": -S[0, 2] / S[2, 2], "G_axial": 1 / S[4, 4], "G_transverse": 1 / S[5, 5],
+        "K_transverse": (mean[0, 0] + mean[0, 1]) / 2, "deviation": _distance(C, mean),
+        "E_least": E.min(), "E_largest": E.max(), "G_least": G.min(), "G_largest": G.max(),
+    }  # fmt: skip

@@ -1,0 +1,150 @@
+"""Laws of one state: stresses, periodicity, equilibrium, averages; jumps, bonds, contact, friction."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from feti_homog.typing import Bool, Float, Int
+from feti_homog.verify.bonds import friction_at, law_at, rubbing_force
+from feti_homog.verify.constitutive_law import out_of_plane
+from feti_homog.verify.discrete_cell import BONDED, CLOSED, OPEN, ROUNDED_TERMS, DiscreteCell
+from feti_homog.verify.elements import PLACES, ElementFields
+from feti_homog.verify.findings import Findings, relative
+from feti_homog.verify.reading import State
+
+
+def check_state(findings: Findings, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
+    """Check all laws of a single state; `fields` follow from its displacements."""
+    element = f"{state.name}, element {{}}".format
+    stiffest = np.abs(cell.stiffnesses).max(axis=(1, 2))[cell.files.mesh.phase]
+    findings.compare("stress", state.stress, fields.stress, (stiffest * fields.strain_size)[:, None], element)
+    # Copies of a node have one fluctuation: by periodicity in a subdomain, by gluing elsewhere.
+    nodes, scale = cell.nodes, cell.largest_displacement(state)
+    values = state.fluctuation[nodes.node]
+    in_subdomain = nodes.place * (int(nodes.subdomain.max()) + 1) + nodes.subdomain
+    for law, group in (("periodicity", in_subdomain), ("continuity", _glued(cell))):
+        _, inverse, count = np.unique(group, return_inverse=True, return_counts=True)
+        copy = inverse.ravel()
+        means = np.stack([(np.bincount(copy, column) / count)[copy] for column in values.T], axis=1)
+        findings.compare(law, values, means, scale, lambda i: f"{state.name}, mesh node {nodes.node[i]}")
+    _check_equilibrium(findings, cell, state, fields)
+    _check_averages(findings, cell, state, fields)
+    if not cell.files.is_spatial:
+        rules = out_of_plane(cell.files.case, cell.files.phases)[cell.files.mesh.phase, 0]
+        S33, terms = (np.einsum("ei,ei->e", *pair) for pair in ((rules, state.stress), np.abs((rules, state.stress))))
+        undetermined = np.isnan(S33) & np.isnan(state.stress_33)  # by the constants
+        off = np.where(undetermined, 0.0, state.stress_33 - S33)
+        findings.record("stress 33", relative(off, np.where(undetermined, 1.0, terms)), element)
+    _check_bonds(findings, cell, state)
+
+
+def interface_forces(cell: DiscreteCell, state: State) -> Float:
+    """(k, c) forces on the fibre in x1, x2 and x3: traction times tributary length."""
+    return cell.in_axes(state.traction * cell.files.interface.length[:, None])
+
+
+def _glued(cell: DiscreteCell) -> Int:
+    """(b,) equal numbers of glued torn nodes: one a place, two at interface nodes, the odd one on the fibre."""
+    return np.asarray(2 * cell.nodes.place + ((cell.faces.row >= 0) & cell.faces.is_fibre))
+
+
+def _check_equilibrium(findings: Findings, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
+    """Check that forces on all node copies balance, on interface faces with the traction.
+
+    The fixed place, where u* = 0, collects all rounding, with independent signs: the root of summed squares.
+    """
+    nodes, faces, traction = cell.nodes, cell.faces, interface_forces(cell, state)
+    scale = max(fields.largest_force, float(np.abs(traction).max(initial=0.0)))
+    scale = max(scale, cell.scales_of(state).stress * float(np.sqrt(cell.elements.area.min())) * 1e-3)
+    is_fixed = (state.fluctuation == 0.0).all(axis=1)
+    rounding = ROUNDED_TERMS * fields.force_size.max()
+    rounding_of_all = ROUNDED_TERMS * np.linalg.norm(fields.force_size)
+    inner = fields.force.copy()
+    inner[nodes.node] = 0.0
+    scales = scale + np.where(is_fixed, rounding_of_all, rounding)
+    findings.record("equilibrium", relative(inner, scales[:, None]), f"{state.name}, mesh node {{}}".format)
+    side, first, inverse = np.unique(_glued(cell), return_index=True, return_inverse=True)
+    inverse, row = inverse.ravel(), np.full(nodes.places, -1)
+    sums = np.stack([np.bincount(inverse, column, len(side)) for column in fields.force[nodes.node].T], axis=1)
+    row[nodes.place] = faces.row
+    at = row[side // 2]
+    # The traction pulls the fibre, its reaction the matrix.
+    on_face = at >= 0
+    sums[on_face] -= np.where(side % 2 == 1, 1.0, -1.0)[on_face, None] * traction[at[on_face]]
+
+    def name(i: int) -> str:
+        return f"{state.name}, mesh node {nodes.node[first[i]]}" + f" (interface node {at[i]})" * bool(at[i] >= 0)
+
+    has_fixed = np.bincount(inverse, is_fixed[nodes.node], len(side)) > 0
+    scales = scale + np.where(has_fixed, rounding_of_all, rounding)
+    findings.record("equilibrium", relative(sums, scales[:, None]), name)
+
+
+def _check_averages(findings: Findings, cell: DiscreteCell, state: State, fields: ElementFields) -> None:
+    """Check <sigma> = Sigma, <eps> = E with face openings and void strains, and Hill's condition."""
+    area, weights, v, scales = cell.area, cell.elements.area[:, None], len(state.strain), cell.scales_of(state)
+    mean = (weights * fields.stress).sum(axis=0) / area
+    size = float(((weights * np.abs(fields.stress)).sum(axis=0) / area).max())
+    stiffest = np.abs(cell.stiffnesses).max(axis=(1, 2))[cell.files.mesh.phase]
+    size += ROUNDED_TERMS * float((weights[:, 0] * stiffest * fields.strain_size).sum() / area)
+    findings.compare("mean stress", mean, state.mean_stress, max(size, scales.stress), state.name)
+    jump = cell.in_axes(state.jump)
+    opening = np.einsum("ki,kj->ij", jump, cell.faces.sums(cell.node_integrals[cell.nodes.node], of_fibre=False))
+    opened = np.bincount(PLACES[v].ravel(), opening.ravel(), v) / area
+    # Voids have their share of E, and int sym(u* (x) n) ds along them; this closes where the boundary cuts one.
+    slope = np.einsum("ni,nd->id", state.fluctuation, cell.void_integrals)
+    of_voids = np.bincount(PLACES[v].ravel(), slope.ravel(), v) / area + cell.porosity * state.strain
+    strain = (weights * fields.strain).sum(axis=0) / area + of_voids - opened
+    findings.compare("mean strain", strain, state.strain, scales.strain, state.name)
+    work = area * float(state.mean_stress @ state.strain) - float((interface_forces(cell, state) * jump).sum())
+    scale = max(abs(fields.energy), area * scales.stress * scales.strain)
+    findings.compare("Hill", fields.energy, work, scale, state.name)
+
+
+def _check_bonds(findings: Findings, cell: DiscreteCell, state: State) -> None:
+    """Check jumps by displacements, bonds by their springs, friction on damage by mu p."""
+    files, at = cell.files, f"{state.name}, interface node {{}}".format
+    values, bonded = state.fluctuation[cell.nodes.node], state.status == BONDED
+    parted = cell.faces.means(values, of_fibre=False) - cell.faces.means(values, of_fibre=True)
+    largest = cell.largest_displacement(state)
+    findings.compare("jump", cell.in_axes(state.jump), parted, largest, at)
+    damage = state.damage.clip(np.where(bonded, 0.0, 1.0), np.where(bonded, np.nextafter(1.0, 0.0), 1.0))
+    findings.record("bond", np.abs(damage - state.damage), f"{state.name}, damage of node {{}}".format)
+    slack = state.jump - law_at(files, damage=state.damage).jumps(state.traction)
+    rubs = (friction_at(files, on_damage=True) > 0.0) & bonded & (state.damage > 0.0)
+    gap = slack[:, 0].copy()
+    slack[rubs, 1] = slack[~bonded, 1:] = slack[state.status == OPEN] = 0.0
+    findings.record("bond", relative(slack, largest), at)
+    if not bonded.all():
+        _check_contact(findings, cell, state, rubs, gap)
+    if rubs.any():
+        force, limit = (
+            rubbing_force(files, state),
+            friction_at(files, on_damage=True) * np.maximum(-state.traction[:, 0], 0),
+        )
+        sticks, pull = np.maximum(np.abs(force) - limit, 0.0), float(np.abs(state.traction).max())
+        off = np.where(state.sliding != 0, state.sliding * force - limit, sticks)
+        findings.record("sliding", relative(np.where(rubs, off, 0.0), max(pull, cell.scales_of(state).stress)), at)
+
+
+def _check_contact(findings: Findings, cell: DiscreteCell, state: State, rubs: Bool, gap: Float) -> None:
+    """Check gap >= 0, traction <= 0, gap traction = 0, and that only friction acts along debonded faces."""
+    at = f"{state.name}, interface node {{}}".format
+    debonded, closed = state.status != BONDED, state.status == CLOSED
+    normal, shear = state.traction[:, 0], np.abs(state.traction[:, 1:]).max(axis=1)
+    friction = friction_at(cell.files) * np.maximum(-normal, 0.0)
+    length, (_, least, imposed) = cell.files.interface.length, cell.scales_of(state)
+    pull, force = max(float(np.abs(state.traction).max()), least), np.abs(normal) * length
+    push = max(float(force.max()), least * float(length.max()))
+    excess = np.where(debonded, np.maximum(shear - friction, 0.0), 0.0)
+    laws = [("free faces", excess + np.where(state.status == OPEN, np.abs(normal), 0.0), pull)]
+    if friction.any():
+        slides = (state.sliding != 0) & closed
+        laws.append(("sliding", np.where(slides, state.sliding * state.traction[:, 1] - friction, 0.0), pull))
+        laws.append(("sliding", np.where(closed | rubs, 0.0, np.abs(state.sliding)), 1.0))
+    if cell.files.contact:
+        laws.append(("penetration", np.where(debonded, np.maximum(-gap, 0.0), 0.0), imposed))
+        laws.append(("tension", np.where(closed, np.maximum(normal, 0.0), 0.0), pull))
+        laws.append(("complementarity", np.where(debonded, force * gap, 0.0), push * imposed))
+    for law, violation, scale in laws:
+        findings.record(law, relative(violation, scale), at)
