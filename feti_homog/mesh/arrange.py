@@ -18,14 +18,14 @@ JAMMED = 0.84
 
 
 def arrange(cell: Cell) -> Arrangement:
-    """Return the arrangement that a case asks for in a cell of width 1, its fractions `cell.fractions` to rounding.
+    """Arrange fibres in a cell of width 1, with the fractions `cell.fractions` to rounding.
 
     square: one disc in the middle of a 1 x 1 cell. hexagonal: 1 x sqrt(3), a disc in the middle and one at
     the corner. random: discs in a 1 x 1 cell, see `random_arrangement`, with
     `cell.match` see `matched_arrangement`. table: see `periodic_table.table_arrangement`.
 
     Raises:
-        MeshError: discs of that fraction touch, no arrangement is found, or the table is faulty.
+        MeshError: discs touch, no arrangement is found, or the table is faulty.
     """
     if cell.geometry == "random":
         return random_arrangement(cell) if cell.match is None else matched_arrangement(cell)
@@ -39,7 +39,7 @@ def arrange(cell: Cell) -> Arrangement:
 
 
 def listed_arrangement(cell: Cell) -> Arrangement | None:
-    """Return the arrangement of a table; None of other cells, which may be too large to be arranged.
+    """Arrange a table; None for other cells, which may be too large to be arranged.
 
     Raises as `arrange`.
     """
@@ -47,7 +47,7 @@ def listed_arrangement(cell: Cell) -> Arrangement | None:
 
 
 def _lattice(cell: Cell, height: float, centres: Float, limit: float) -> Arrangement:
-    """Equal discs at the centres (N, 2) of a 1 x height cell, which touch at the fraction `limit` if they are bare."""
+    """Place equal discs at centres (N, 2) in a 1 x height cell; bare ones touch at the fraction `limit`."""
     fraction = cell.fibre_fraction
     limit /= (1 + (cell.coating or 0.0)) ** 2
     assert fraction is not None
@@ -62,10 +62,10 @@ def _lattice(cell: Cell, height: float, centres: Float, limit: float) -> Arrange
 
 
 def random_arrangement(cell: Cell, max_steps: int | None = None, max_attempts: int | None = None) -> Arrangement:
-    """Discs at random in the unit square, periodic, the same for the same case on every machine.
+    """Place discs at random on the unit torus, alike on every machine for one case.
 
-    Radii are uniform in mean * (1 - s, 1 + s), s = `radius_spread`, and scaled to the fraction of each phase; those of
-    voids are all alike. Any two discs, coatings and images included, are at least `min_gap` mean diameters of fibres
+    Radii are uniform in mean * (1 - s, 1 + s), s = `radius_spread`, and scaled to the phase fractions; voids
+    are all alike. Any two discs, coatings and images included, are at least `min_gap` mean fibre diameters
     apart. Random centres are moved down the gradient of the overlap energy 1/2 sum max(0, R_i + R_j - |x_i - x_j|)^2 of
     the discs grown by half the gap until it is zero; when that has not come after `max_steps`, it starts again from
     other centres, up to `max_attempts` times (default: 10 for few fibres, 3 for many). Last, all is shifted
@@ -76,13 +76,13 @@ def random_arrangement(cell: Cell, max_steps: int | None = None, max_attempts: i
     """
     from feti_homog.microstructure.hard_core import MAX_STEPS, relax  # other cells do without
 
-    phase = tuple(name for name, own in fibre_counts(cell).items() for _ in range(own))
+    phase = tuple(name for name, members in fibre_counts(cell).items() for _ in range(members))
     fibres, gap, fraction = len(phase), cell.min_gap, fsum(cell.fractions.values())
     generator = np.random.default_rng(cell.seed)
     radii = 1 + cell.radius_spread * generator.uniform(-1, 1, fibres)
     for name, share in cell.fractions.items():
-        own = np.array(phase) == name
-        radii[own] *= sqrt(share / (pi * fsum(radii[own] ** 2)))
+        members = np.array(phase) == name
+        radii[members] *= sqrt(share / (pi * fsum(radii[members] ** 2)))
     coating, clear = (cell.coating or 0.0) * radii, gap * fsum(radii) / fibres
     radii, coating = _with_voids(cell, radii, coating)
     count, phase = len(radii), phase + (VOID,) * (len(radii) - fibres)
@@ -107,7 +107,7 @@ def random_arrangement(cell: Cell, max_steps: int | None = None, max_attempts: i
 
 
 def _with_voids(cell: Cell, radii: Float, coating: Float) -> tuple[Float, Float]:
-    """Radii and coatings of the fibres, and after them those of the voids."""
+    """Append the voids to radii and coatings."""
     count = void_count(cell, float(radii.mean()))
     if not count:
         return radii, coating
@@ -116,17 +116,17 @@ def _with_voids(cell: Cell, radii: Float, coating: Float) -> tuple[Float, Float]
             f"[cell] {fractions_in_words(cell)}: makes {count:.2g} voids; expected at most {MOST_FIBRES}; make "
             "void_radius larger"
         )
-    own = np.full(count, sqrt((cell.voids or 0.0) / (pi * count)))
-    return np.append(radii, own), np.append(coating, np.zeros(count))
+    void_radii = np.full(count, sqrt((cell.voids or 0.0) / (pi * count)))
+    return np.append(radii, void_radii), np.append(coating, np.zeros(count))
 
 
 def matched_arrangement(cell: Cell) -> Arrangement:
-    """Discs at random in the unit square, periodic, the same for the same case on every machine.
+    """Place discs at random on the unit torus, with the neighbours in a measured window.
 
-    The radii are quantiles of the window `cell.matched`, dealt at random and scaled to the fraction. The centres
-    are placed as those of other random cells, `min_gap` mean diameters apart, and then moved one by one until the
-    distances of the nearest and the second neighbours are distributed as in the table (`neighbour_match.matched`). Of
-    coated fibres the gap is that of the coatings.
+    The radii are quantiles of the window `cell.matched`, dealt at random and scaled to the fraction. Centres
+    are placed as in other random cells, `min_gap` mean diameters apart, and then moved one by one until the
+    distances of the nearest and the second neighbours are distributed as in the table (`neighbour_match.matched`). The
+    gap is between coatings, if there are any.
 
     Raises:
         MeshError: no arrangement is found.

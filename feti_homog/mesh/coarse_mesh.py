@@ -1,4 +1,4 @@
-"""The coarse periodic mesh of a rectangular cell, as it is made on rank 0, and its edges that are interfaces."""
+"""The coarse periodic mesh of a rectangular cell, as rank 0 makes it, and its interface edges."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from feti_homog.typing import Bool, Float, Index, Int, Int32
 
 
 def paired_sides(points: Float, period: Float) -> Iterator[tuple[int, Int, Int]]:
-    """Yield the pairs of points that differ by a period; of sides that match, these are the i-th along each.
+    """Yield the pairs of points that differ by a period: on matching sides the i-th along each.
 
     Args:
-        points: (n, 2) nodes, or middles of edges; those on sides are exactly at 0 or at the period.
+        points: (n, 2) nodes or edge middles; on sides they are exactly at 0 or at the period.
         period: (2,) width and height.
 
     Yields:
@@ -32,25 +32,25 @@ def paired_sides(points: Float, period: Float) -> Iterator[tuple[int, Int, Int]]
 
 @dataclass(frozen=True)
 class CoarseMesh:
-    """Conforming periodic mesh of straight triangles on the cell [0, width] x [0, height]; on rank 0 only.
+    """Conforming periodic mesh: straight triangles on the cell [0, width] x [0, height]; on rank 0 only.
 
     Attributes:
-        width, height: periods of the cell.
+        width, height: cell periods.
         points: (n, 2) nodes in the plane.
         triangles: (m, 3) counter-clockwise; none has two edges on the same circle.
         phase: (m,) index into `phases`, whose first name is "matrix".
-        precedence: (m,) in whose order the constituents of the triangles are numbered, 0 in the matrix: the fibre's
-            number, or the phase where fibres have none.
-        representative: (n,) node that stands for the class of a node on the torus: x = width -> x = 0,
+        precedence: (m,) order in which constituents are numbered, 0 in the matrix: the fibre's number, or the
+            phase where fibres have none.
+        representative: (n,) node that stands for a node class on the torus: x = width -> x = 0,
             y = height -> y = 0; idempotent.
         ellipses: k circles and ellipses in the plane; periodic images are listed separately.
-        arc_edges: (a, 2) edges of the mesh whose ends lie on one of them, to rounding.
-        arc_circle: (a,) that one.
+        arc_edges: (a, 2) edges whose ends lie on an ellipse, to rounding.
+        arc_circle: (a,) that ellipse.
         debonded_edges: (d, 2) edges between a fibre and the matrix that are debonded from the start.
-        snapped: how far a node of a user's mesh was moved to make sides match, at most.
-        remarks: how a cell differs from its table, and the curves of a user's mesh that nothing uses, a line each.
-        centres: (fibres, 2) of fibres whose precedence is their number from 1, where they are known, else None; those
-            of their coatings are behind them in the same order.
+        snapped: how far nodes in a user's mesh were moved to make sides match, at most.
+        remarks: how a cell differs from its table, and unused curves in a user's mesh, a line each.
+        centres: (fibres, 2) fibre centres, if precedence is the fibre number from 1, coatings behind in the same
+            order; else None.
     """
 
     width: float
@@ -88,7 +88,7 @@ def areas(points: Float, triangles: Int32) -> Float:
 
 
 def edges(triangles: Int32) -> Int32:
-    """Directed edges (3m, 2): edge i of triangle t, opposite to its corner i, is row 3 t + i."""
+    """Directed edges (3m, 2): row 3 t + i is edge i in triangle t, opposite to corner i."""
     return triangles[:, [1, 2, 2, 0, 0, 1]].reshape(-1, 2)
 
 
@@ -106,10 +106,10 @@ def twins(keys: Int) -> tuple[Int, Int]:
 
 
 def representatives(points: Float, width: float, height: float) -> Int32:
-    """Class representative (n,) of each node, for a mesh whose opposite sides match exactly.
+    """Return the class representative (n,) for each node in a mesh whose sides match exactly.
 
-    A node at x = width has the class of its partner at x = 0, one at y = height that of its partner at y = 0,
-    and the four corners that of the origin.
+    Nodes at x = width are represented by their partners at x = 0, at y = height by partners at y = 0, and all four
+    corners by the origin.
     """
     result = np.arange(len(points), dtype=np.int32)
     for _, low, high in paired_sides(points, np.array([width, height])):
@@ -118,10 +118,10 @@ def representatives(points: Float, width: float, height: float) -> Int32:
 
 
 def flip_double_arcs(triangles: Int32, phase: Int32, arc_edges: Int32, arc_circle: Int32, nodes: int) -> Int32:
-    """Triangles (m, 3) after edge flips, such that as few as possible have two edges on the same circle.
+    """Flip edges until as few triangles (m, 3) as possible have two edges on one circle.
 
     Such a triangle would have an angle of 180 degrees once its edges follow the circle. Its third edge, a
-    chord, is exchanged for the other diagonal of the two triangles beside the chord, in a few rounds.
+    chord, is exchanged for the other diagonal between the two triangles beside it, in a few rounds.
     """
     triangles = triangles.copy()
     for _ in range(8):
@@ -162,17 +162,14 @@ def double_arcs(triangles: Int32, arc_edges: Int32, arc_circle: Int32, nodes: in
 
 
 def interface_edges(mesh: CoarseMesh) -> Int32:
-    """Edges (k, 2) between triangles of different phases, or beside a void, on the torus.
-
-    Of those on sides the low copy.
-    """
+    """Return the edges (k, 2) between phases or beside voids on the torus; on sides the low copy."""
     pairs, order = _neighbours(mesh)
     between = mesh.phase[order[:, 0] // 3] != mesh.phase[order[:, 1] // 3]
     return np.concatenate([pairs[order[between, 0]], pairs[_alone(pairs, order)]])
 
 
 def void_edges(mesh: CoarseMesh) -> Int32:
-    """Edges (k, 2) that one triangle has on the torus: a void is on the other side; of those on sides the low copy."""
+    """Return the edges (k, 2) beside voids, with one triangle on the torus; on sides the low copy."""
     pairs, order = _neighbours(mesh)
     return np.asarray(pairs[_alone(pairs, order)])
 
@@ -188,15 +185,15 @@ def voids(mesh: CoarseMesh) -> int:
 
 def can_debond(mesh: CoarseMesh, pairs: Int32) -> Bool:
     """Return whether edges (k, 2) are between a fibre and the matrix on the torus; either copy on sides."""
-    own, order = _neighbours(mesh)
+    low_copies, order = _neighbours(mesh)
     in_matrix = mesh.phase[order // 3] == 0
-    between = own[order[in_matrix[:, 0] != in_matrix[:, 1], 0]]
+    between = low_copies[order[in_matrix[:, 0] != in_matrix[:, 1], 0]]
     n = len(mesh.points)
     return np.isin(edge_keys(_low_copies(mesh, pairs), n), edge_keys(between, n))
 
 
 def _neighbours(mesh: CoarseMesh) -> tuple[Int32, Index]:
-    """Return the triangles' edges (3m, 2), low copies on sides, and the two places (e, 2) of those that have two."""
+    """Return triangle edges (3m, 2), low copies on sides, and the two places (e, 2) where an edge is shared."""
     pairs = _low_copies(mesh, edges(mesh.triangles))
     return pairs, np.stack(twins(edge_keys(pairs, len(mesh.points))), axis=1)
 
@@ -209,7 +206,7 @@ def _alone(pairs: Int32, order: Index) -> Bool:
 
 
 def _low_copies(mesh: CoarseMesh, pairs: Int32) -> Int32:
-    """Edges (k, 2), those on the right or upper side moved to the opposite one."""
+    """Move edges (k, 2) on the right or upper side to the opposite one."""
     for axis, low, high in paired_sides(mesh.points, mesh.period):
         partner = np.zeros(len(mesh.points), dtype=np.int32)
         partner[high] = low

@@ -1,8 +1,8 @@
-"""Order in which a factorization eliminates the nodes of a mesh: nested dissection by straight cuts.
+"""Elimination order for a factorization: nested dissection by straight cuts.
 
-George (SIAM J. Numer. Anal. 10 (1973) 345): nodes on a cut follow those of both sides, so that fill stays within them.
+George (SIAM J. Numer. Anal. 10 (1973) 345): nodes on a cut follow the nodes on both sides, so that fill stays within.
 Coarse triangles are halved again and again along x or y, each time about the middle where the cut crosses fewest sides;
-their refined nodes follow.  The fill is less than that of minimum degree.
+their refined nodes follow.  The fill is less than by minimum degree.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ MANY_INTERVALS = 8
 
 
 def elimination_order(mesh: FineMesh) -> Int:
-    """(c,) the classes of a mesh in their order of elimination."""
+    """(c,) node classes in elimination order."""
     lattice = mesh.lattice
     inside = np.arange(len(lattice.nodes))
     if lattice.intervals >= MANY_INTERVALS:
@@ -31,9 +31,9 @@ def elimination_order(mesh: FineMesh) -> Int:
 
 
 def _dissected(centres: Float, nodes: Int | Int32, inside: Int) -> Int:
-    """(n,) the n nodes in order; of triangles with `centres` (t, 2) and `nodes` (t, q), corners first.
+    """(n,) nodes in order, for triangles with `centres` (t, 2) and `nodes` (t, q), corners first.
 
-    Nodes of one triangle alone are ordered by their places `inside` (q,).
+    Nodes in a single triangle are ordered by their places `inside` (q,).
     """
     size, leaf = (
         int(nodes.max()) + 1,
@@ -49,7 +49,7 @@ def _dissected(centres: Float, nodes: Int | Int32, inside: Int) -> Int:
 
 
 def _halved(centres: Float, neighbours: tuple[Int, Int]) -> Int:
-    """(t,) numbers of triangles, alone in the leaves of a binary tree of parts that are halved; some have none."""
+    """(t,) leaf number for each triangle in a binary tree whose parts are halved; some leaves are empty."""
     t, first = len(centres), np.array([0, len(centres)])
     order = np.arange(t)
     by_coordinate = [np.argsort(x, kind="stable") for x in centres.T]
@@ -70,21 +70,21 @@ def _halved(centres: Float, neighbours: tuple[Int, Int]) -> Int:
 
 
 def _cut(order: Int, part: Int, first: Int, neighbours: tuple[Int, Int]) -> tuple[Int, Int, Float]:
-    """Return the order of the triangles, where it cuts each part, and how many sides are crossed.
+    """Return the triangle order, the place where it cuts each part, and how many sides are crossed.
 
     `order` (t,) has one `part` after the other, which begin at `first`.
     """
     t, size = len(order), np.diff(first)
     place = np.empty(t, np.int64)
     place[order] = np.arange(t)
-    one, other = (place[each] for each in neighbours)
+    one, other = (place[side] for side in neighbours)
     within = part[neighbours[0]] == part[neighbours[1]]
     begin, end = np.minimum(one, other)[within] + 1, np.maximum(one, other)[within] + 1
     crossed = np.cumsum(np.bincount(begin, minlength=t + 1) - np.bincount(end, minlength=t + 1))[:t]
-    off = np.abs(np.arange(t) - np.repeat((first[:-1] + first[1:]) / 2, size))
-    near = np.flatnonzero(off <= np.repeat(np.maximum(OFF_THE_MIDDLE * size, 0.5), size))
-    cost = crossed[near] + off[near] / t
-    sought = np.lexsort((cost, part[order[near]]))
-    best = sought[np.minimum(np.searchsorted(part[order[near]], np.arange(len(size))), len(sought) - 1)]
+    offset = np.abs(np.arange(t) - np.repeat((first[:-1] + first[1:]) / 2, size))
+    middle = np.flatnonzero(offset <= np.repeat(np.maximum(OFF_THE_MIDDLE * size, 0.5), size))
+    cost = crossed[middle] + offset[middle] / t
+    sought = np.lexsort((cost, part[order[middle]]))
+    best = sought[np.minimum(np.searchsorted(part[order[middle]], np.arange(len(size))), len(sought) - 1)]
     alone = size < 2
-    return order, np.where(alone, first[1:], near[best]), np.where(alone, 0.0, cost[best])
+    return order, np.where(alone, first[1:], middle[best]), np.where(alone, 0.0, cost[best])

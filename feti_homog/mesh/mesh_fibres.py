@@ -67,16 +67,16 @@ def _part_shifts(submesh: Submesh, part: Int) -> Float:
 
 
 def fibre_circles(torus: Torus) -> Float:
-    """(constituents, 3) centre and radius of each fibre's circle, of a coating the outer one; any image of it.
+    """(constituents, 3) centre and radius of each fibre's circle, for coatings the outer one; any image.
 
-    The centre of a fibre that is not round is that of its area, or the one that the mesh has, and its radius NaN.
+    A fibre that is not round has its area's centre, or the one that the mesh has, and the radius NaN.
     NaN for the matrix, and for a fibre that winds around the torus, which has no centre.
     """
     bodies, edge, is_round = _outer_edges(torus)
     circles = np.full((len(torus.constituent_phase), 3), np.nan)
     circles[bodies[is_round]] = torus.edge_circles[edge[is_round]]
-    others = np.isnan(circles[torus.constituent, 2]) & (torus.constituent_phase[torus.constituent] > 0)
-    for submesh in cut_bodies(torus, np.flatnonzero(others)):
+    not_round = np.isnan(circles[torus.constituent, 2]) & (torus.constituent_phase[torus.constituent] > 0)
+    for submesh in cut_bodies(torus, np.flatnonzero(not_round)):
         shift, closes = unwrap(submesh)
         if closes:
             middles = submesh.points[submesh.triangles].mean(axis=1) + shift
@@ -91,7 +91,7 @@ def fibre_circles(torus: Torus) -> Float:
 
 
 def fibre_frames(torus: Torus) -> Float:
-    """(constituents, 2, 2) frame F of the ellipse c + F p, |p| = 1, around each fibre, of a coating the outer one.
+    """(constituents, 2, 2) frame F of the ellipse c + F p, |p| = 1, around each fibre, for coatings the outer one.
 
     NaN for the matrix, and for fibres whose boundary is not on ellipses about one centre.
     """
@@ -102,10 +102,10 @@ def fibre_frames(torus: Torus) -> Float:
 
 
 def _outer_edges(torus: Torus) -> tuple[Int, Int, Bool]:
-    """Find fibres (k,) whose boundary is on ellipses about one centre, an edge (k,) on the largest; all round (k,)?"""
-    left, right, between = torus.sides
+    """Find fibres (k,) with ellipses about one centre, an edge (k,) on the largest, and whether all are round (k,)."""
+    one, other, between = torus.sides
     border = torus.at_void.copy()
-    border[between] = torus.constituent[left] != torus.constituent[right]
+    border[between] = torus.constituent[one] != torus.constituent[other]
     triangle, k = np.nonzero(border[torus.triangle_torus_edges])
     edge, body, ellipses = torus.triangle_edges[triangle, k], torus.constituent[triangle], torus.edge_ellipses
     area = np.abs(np.linalg.det(ellipses.frames))
@@ -121,11 +121,9 @@ def _outer_edges(torus: Torus) -> tuple[Int, Int, Bool]:
 
 
 def fibre_numbers(torus: Torus) -> tuple[Int, Bool]:
-    """(constituents,) the number of the fibre that each is, from 1, or that it coats, 0 of the matrix.
+    """(constituents,) the fibre number, from 1, for coatings of the coated fibre, 0 in the matrix; which are fibres.
 
-    And which of them (constituents,) are fibres.
-
-    A coating of several fibres has the lowest of their numbers; one that coats none is a fibre itself.
+    A coating around several fibres has their lowest number; one that coats none is a fibre itself.
     """
     phase, n = torus.constituent_phase, len(torus.constituent_phase)
     coats = np.array([name == COATING for name in torus.mesh.phases])[phase]

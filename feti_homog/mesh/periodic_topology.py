@@ -1,7 +1,7 @@
 """The coarse cell as a torus: node classes, torus edges and constituents.
 
 Two plane nodes that differ by a period are one class, two boundary edges that differ by a period one
-torus edge.  A constituent is a connected component of equal phase on the torus, so a fibre that the
+torus edge.  A constituent is a connected part with one phase on the torus, so a fibre that the
 cell's boundary cuts is one constituent.
 """
 
@@ -25,18 +25,18 @@ FEW = 1 / 16
 
 @dataclass(frozen=True)
 class Torus:
-    """Identities on the torus of a `CoarseMesh` with m triangles, or of some tiles of a larger one.
+    """Identities on the torus, for a `CoarseMesh` with m triangles or some tiles in a larger one.
 
     Attributes:
         mesh: the plane mesh.
-        node_class: (n,) class of each plane node.
+        node_class: (n,) by plane node.
         edges: (e, 2) plane edges, each from its lexicographically lower to its upper end.
         triangle_edges: (m, 3) plane edge from vertex k to vertex k + 1 (mod 3).
-        torus_edge: (e,) torus edge of each plane edge.
-        constituent: (m,) constituent of each triangle; those of the matrix come first.
-        class_keys, edge_keys: ascending numbers in the whole cell of the classes and of the torus edges.
-        at_void: (torus edges,) whether one triangle of the whole cell has it, and a void is beside it.
-        is_whole: whether it has all triangles of the cell.
+        torus_edge: (e,) by plane edge.
+        constituent: (m,) by triangle; matrix constituents come first.
+        class_keys, edge_keys: ascending numbers in the whole cell, for classes and torus edges.
+        at_void: (torus edges,) whether only one triangle in the whole cell has it, beside a void.
+        is_whole: whether no triangle in the cell is missing.
     """
 
     mesh: CoarseMesh
@@ -59,9 +59,9 @@ class Torus:
         for _, low, high in paired_sides(mesh.points[edges].mean(axis=1), mesh.period):
             same[high] = low
         torus_edge = np.unique(same, return_inverse=True)[1]
-        left, right = edge_pairs(torus_edge[triangle_edges])
-        same = mesh.phase[left] == mesh.phase[right]
-        label = components(len(mesh.triangles), left[same], right[same])
+        one, other = edge_pairs(torus_edge[triangle_edges])
+        same = mesh.phase[one] == mesh.phase[other]
+        label = components(len(mesh.triangles), one[same], other[same])
         keys = np.arange(node_class.max() + 1), np.arange(torus_edge.max() + 1)
         at_void = np.bincount(torus_edge[triangle_edges].ravel()) == 1
         torus = cls(mesh, node_class, edges, triangle_edges, torus_edge, label, *keys, at_void)
@@ -80,7 +80,7 @@ class Torus:
 
     @cached_property
     def sides(self) -> tuple[Int, Int, Int]:
-        """The triangles (e,) and (e,) on either side of each torus edge that two share, and that edge (e,)."""
+        """The two triangles (e,) and (e,) beside each shared torus edge, and the edge (e,)."""
         one, other = twins(self.triangle_torus_edges.ravel())
         return one // 3, other // 3, self.triangle_torus_edges.ravel()[one]
 
@@ -93,16 +93,16 @@ class Torus:
 
     @cached_property
     def edge_ellipses(self) -> Ellipses:
-        """The e ellipses that the plane edges lie on; those of straight edges are points."""
+        """The e ellipses that the plane edges lie on; points for straight edges."""
         n = len(self.edges)
         centres, frames = np.zeros((n, 2)), np.zeros((n, 2, 2))
-        own = self.mesh.ellipses[self.mesh.arc_circle]
-        centres[self.arcs], frames[self.arcs] = own.centres, own.frames
+        curves = self.mesh.ellipses[self.mesh.arc_circle]
+        centres[self.arcs], frames[self.arcs] = curves.centres, curves.frames
         return Ellipses(centres, frames)
 
     @cached_property
     def edge_circles(self) -> Float:
-        """(e, 3) centre and radius of these ellipses: NaN where they are not round, 0 where the edge is straight."""
+        """(e, 3) centre and radius by plane edge: radius NaN on ellipses, 0 where the edge is straight."""
         circles = np.zeros((len(self.edges), 3))
         circles[self.arcs] = self.mesh.circles[self.mesh.arc_circle]
         return circles
@@ -110,8 +110,8 @@ class Torus:
     @cached_property
     def edge_turns(self) -> Float:
         """(e,) how far the parameter turns on its ellipse along each plane edge, at most pi; 0 where it is straight."""
-        turns, own = np.zeros(len(self.edges)), self.mesh.ellipses[self.mesh.arc_circle]
-        start, stop = (own.unit(self.mesh.points[self.edges[self.arcs, end]] - own.centres) for end in (0, 1))
+        turns, curves = np.zeros(len(self.edges)), self.mesh.ellipses[self.mesh.arc_circle]
+        start, stop = (curves.unit(self.mesh.points[self.edges[self.arcs, end]] - curves.centres) for end in (0, 1))
         sine = start[:, 0] * stop[:, 1] - start[:, 1] * stop[:, 0]
         turns[self.arcs] = np.arctan2(np.abs(sine), (start * stop).sum(axis=1))
         return turns
@@ -133,12 +133,13 @@ class Torus:
     def touching(self) -> Bool:
         """(classes,) where two constituents meet, but not along one line: more than once, or without an edge.
 
-        On a line each has one sector of the triangles around.  Round fibres, all that is torn by tiles, touch nowhere.
+        On a line each has one sector among the triangles around.  Round fibres, which alone are torn by tiles, touch
+        nowhere.
         """
         if not self.is_whole:
             return np.zeros(len(self.class_keys), bool)
-        left, right, edge = self.sides
-        between = edge[self.constituent[left] != self.constituent[right]]
+        one, other, edge = self.sides
+        between = edge[self.constituent[one] != self.constituent[other]]
         shared, free = (
             np.bincount(self.edge_ends[some].ravel(), minlength=len(self.class_keys))
             for some in (between, np.flatnonzero(self.at_void))
@@ -170,8 +171,8 @@ class Torus:
         n = len(self.mesh.points)
         key = np.sort(self.edges, axis=1) @ [n, 1]
         order = np.argsort(key)
-        found = np.searchsorted(key[order], np.sort(pairs.astype(np.int64), axis=1) @ [n, 1])
-        return np.asarray(order[found])
+        place = np.searchsorted(key[order], np.sort(pairs.astype(np.int64), axis=1) @ [n, 1])
+        return np.asarray(order[place])
 
     @cached_property
     def constituent_phase(self) -> Int:
@@ -183,11 +184,10 @@ class Torus:
     def nesting(self) -> Int:
         """(constituents,) places from the outermost to the innermost.
 
-        By the number of others between a constituent and the matrix, a coating before what it coats, and then by
-        number.
+        By the number of constituents between it and the matrix, a coating before the fibre within, and then by number.
         """
-        left, right, _ = self.sides
-        a, b = self.constituent[left], self.constituent[right]
+        one, other, _ = self.sides
+        a, b = self.constituent[one], self.constituent[other]
         phase, n = self.constituent_phase, len(self.constituent_phase)
         touching = csr_matrix((np.ones(len(a)), (a, b)), shape=(n, n))
         depth = dijkstra(touching, False, np.flatnonzero(phase == 0), unweighted=True, min_only=True)
@@ -195,44 +195,44 @@ class Torus:
 
     def plane_parts(self) -> Int:
         """(m,) constituents cut by the cell's boundary, as the paper's Fig. 2a does (`bodies = "plane"`)."""
-        left, right = edge_pairs(self.triangle_edges)
-        same = self.constituent[left] == self.constituent[right]
-        label = components(len(self.constituent), left[same], right[same])
+        one, other = edge_pairs(self.triangle_edges)
+        same = self.constituent[one] == self.constituent[other]
+        label = components(len(self.constituent), one[same], other[same])
         return renumber(label, np.argsort(self.constituent, kind="stable"))
 
 
 def places_by_depth(depth: Float | Int, phase: Int, phases: tuple[str, ...]) -> Int:
-    """(n,) places from the outermost to the innermost of constituents of these depths (n,) in the matrix.
+    """(n,) places from the outermost to the innermost constituent, by depths (n,) in the matrix.
 
-    A coating is before what it coats, and then they go by number; `phase` (n,) is the number of the phase of each.
+    A coating is before the fibre within, and then they go by number; `phase` (n,) are phase numbers.
     """
     coats = np.array([name == COATING for name in phases])[phase]
     return np.argsort(np.lexsort((~coats, depth)))
 
 
 def edge_pairs(triangle_edges: Int) -> tuple[Int, Int]:
-    """Return the triangles on either side of each edge that two of them share: two arrays, in the edges' order."""
+    """Return the two triangles beside each shared edge: two arrays, in the edges' order."""
     one, other = twins(triangle_edges.ravel())
     return one // 3, other // 3
 
 
-def components(n: int, left: Int, right: Int) -> Int:
+def components(n: int, one: Int, other: Int) -> Int:
     """Return connected components of the graph on n vertices with edges (left, right): (n,) labels."""
-    graph = coo_matrix((np.ones(len(left), np.int8), (left, right)), shape=(n, n))
+    graph = coo_matrix((np.ones(len(one), np.int8), (one, other)), shape=(n, n))
     return np.asarray(connected_components(graph, directed=False)[1], np.int64)
 
 
 def present(numbers: Int | Int32, size: int) -> tuple[Int, Int]:
     """(k,) the numbers, below `size`, that are present, ascending, and the place of each among them."""
     if numbers.size < FEW * size:
-        kept, place = np.unique(numbers, return_inverse=True)
-        return np.asarray(kept), np.asarray(place.reshape(numbers.shape))
+        members, place = np.unique(numbers, return_inverse=True)
+        return np.asarray(members), np.asarray(place.reshape(numbers.shape))
     is_present = np.zeros(size, bool)
     is_present[numbers] = True
-    kept = np.flatnonzero(is_present)
+    members = np.flatnonzero(is_present)
     place = np.empty(size, np.int64)
-    place[kept] = np.arange(len(kept))
-    return kept, place[numbers]
+    place[members] = np.arange(len(members))
+    return members, place[numbers]
 
 
 def renumber(label: Int, order: Int) -> Int:
@@ -244,7 +244,7 @@ def renumber(label: Int, order: Int) -> Int:
 
 
 def plane_edges_of(mesh: CoarseMesh) -> tuple[Int, Int]:
-    """Edges (e, 2) and those of each triangle (m, 3), as in `Torus`."""
+    """Return `edges` (e, 2) and `triangle_edges` (m, 3), as in `Torus`."""
     triangles = mesh.triangles.astype(np.int64)
     ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
     n = len(mesh.points)

@@ -70,7 +70,7 @@ class ReferenceLattice:
         return ReferenceLattice.of(self.halvings - fewer, self.order)
 
     def within(self, finer: ReferenceLattice) -> Int:
-        """(q,) its nodes among those of a lattice of more halvings."""
+        """(q,) place of its nodes in a lattice with more halvings."""
         number = np.empty((finer.intervals + 1,) * 2, np.int64)
         number[finer.nodes[:, 1], finer.nodes[:, 2]] = np.arange(len(finer.nodes))
         _, i, j = (finer.intervals // self.intervals * self.nodes).T
@@ -89,16 +89,15 @@ class ReferenceLattice:
 
 @dataclass(frozen=True)
 class FineMesh:
-    """The refined subdomain: n plane nodes of c classes, t coarse triangles of m elements in all.
+    """The refined subdomain: n plane nodes in c classes, t coarse triangles with m elements in all.
 
     Attributes:
         points: (n, 2) plane positions.
-        nodes: (t, q) plane node of each lattice node of each coarse triangle.
-        curved: (t,) whether an edge of the coarse triangle lies on an ellipse; the others are affine images of
-            the lattice.
-        node_class: (n,) class of each plane node; a class is what the degrees of freedom belong to.
+        nodes: (t, q) plane nodes by coarse triangle and lattice node.
+        curved: (t,) whether an edge of the coarse triangle lies on an ellipse; other triangles are affine images.
+        node_class: (n,) class of each plane node; degrees of freedom belong to classes.
         n_classes: c.
-        lattice: of every coarse triangle.
+        lattice: in every coarse triangle.
     """
 
     points: Float

@@ -13,32 +13,31 @@ from feti_homog.typing import Array, Bool, Float, Int
 
 @dataclass(frozen=True)
 class Submesh:
-    """One subdomain of the coarse mesh: v plane vertices, e plane edges, t triangles.
+    """One subdomain: v plane vertices, e plane edges, t coarse triangles.
 
     A plane vertex belongs to a class, a plane edge to a torus edge; both are numbered locally, in
     ascending order of their global numbers `class_keys` and `edge_keys`.
 
     Attributes:
-        index: number of the subdomain.
-        body: constituent that it is a piece of; 0 of a piece across materials.
-        phase: name of the material phase; empty of a piece across materials.
+        index: the subdomain's number.
+        body: constituent that it is a piece of; 0 for a piece across materials.
+        phase: name of its material phase; empty for a piece across materials.
         constituent: (t,) that each triangle is in.
         points: (v, 2) vertices, in plane position.
         triangles: (t, 3) vertices, counter-clockwise.
         triangle_edges: (t, 3) edge from vertex k to vertex k + 1 (mod 3).
         backwards: (t, 3) true where the triangle runs along the edge against its direction.
         edges: (e, 2) vertices from start to end.
-        circles: (e, 3) centre and radius of the circle that the edge lies on; the radius is NaN if that is an ellipse,
-            0 where the edge is straight.
+        circles: (e, 3) centre and radius of the circle that the edge lies on; radius NaN on ellipses, 0 if straight.
         turns: (e,) how far the parameter turns on it along the edge; 0 where the edge is straight.
-        vertex_class: (v,) class of each vertex.
-        edge_class: (e,) torus edge of each edge.
-        at_void: (torus edges,) whether one triangle of the whole cell has the torus edge, and a void is beside it.
+        vertex_class: (v,) class by vertex.
+        edge_class: (e,) torus edge by edge.
+        at_void: (torus edges,) whether only one triangle in the whole cell has it, beside a void.
         debonded: (torus edges,) whether it is from the start.
         touching: (classes,) as `Torus.touching`.
-        class_keys, edge_keys: global numbers of the classes and torus edges.
-        period: (2,) width and height of the cell.
-        pinned: local class that is pinned against translation of the whole cell, Eq. (15), or -1.
+        class_keys, edge_keys: global numbers for classes and torus edges.
+        period: (2,) width and height.
+        pinned: local class that is pinned against translating the whole cell, Eq. (15), or -1.
     """
 
     index: int
@@ -65,13 +64,13 @@ class Submesh:
 
 @dataclass(frozen=True)
 class SubdomainTable:
-    """Data of the s subdomains of all, known to every rank.
+    """All s subdomains, known to every rank.
 
     Attributes:
-        body: (s,) constituent that each is a piece of; 0 of pieces across materials.
+        body: (s,) constituent that each is a piece of; 0 for pieces across materials.
         rank: (s,) that has it.
         nesting: (constituents,) places from the outermost to the innermost, as `Torus.nesting`.
-        phase: (constituents,) number of the material phase of each.
+        phase: (constituents,) number of its material phase.
         across: whether pieces are across materials.
     """
 
@@ -83,7 +82,7 @@ class SubdomainTable:
 
     @classmethod
     def of(cls, torus: Torus, subdomain: Int, rank: Int, across: bool = False) -> SubdomainTable:
-        """Make the table of a whole cell whose triangles are in these subdomains (m,), numbered from 0 without gaps."""
+        """Make the table for a whole cell whose triangles are in subdomains (m,), numbered from 0 without gaps."""
         first = np.unique(subdomain, return_index=True)[1]
         body = np.zeros(len(first), np.int64) if across else torus.constituent[first]
         return cls(body, rank, torus.nesting, torus.constituent_phase, across)
@@ -92,18 +91,18 @@ class SubdomainTable:
 def cut(torus: Torus, subdomain: Int) -> Iterator[Submesh]:
     """Cut the coarse cell into its subdomains; `subdomain` (m,) numbers each triangle's, from 0 without gaps."""
     table = SubdomainTable.of(torus, subdomain, np.zeros(subdomain.max() + 1, np.int64))
-    for own in cut_for_ranks(torus, subdomain, table, 1, pinned_class(torus)):
-        yield from own.cut()
+    for rank in cut_for_ranks(torus, subdomain, table, 1, pinned_class(torus)):
+        yield from rank.cut()
 
 
 @dataclass(frozen=True)
 class SubmeshesOfRank:
-    """The subdomains of one rank before it cuts them apart.
+    """One rank's subdomains before it cuts them apart.
 
     Attributes:
-        whole: all of their triangles as one submesh.
-        member: (t,) which of the subdomains each triangle is of.
-        index, body, phase: of each subdomain, as in `Submesh`.
+        whole: all their triangles as one submesh.
+        member: (t,) subdomain that each triangle is in.
+        index, body, phase: by subdomain, as in `Submesh`.
     """
 
     whole: Submesh
@@ -121,9 +120,9 @@ class SubmeshesOfRank:
         """Return the subdomains."""
         order = np.argsort(self.member, kind="stable")
         members = np.split(order, np.cumsum(self.loads))[:-1]
-        pieces = [part(self.whole, those) for those in members]
-        own = zip(pieces, self.index.tolist(), self.body.tolist(), self.phase, strict=True)
-        return [replace(piece, index=index, body=body, phase=phase) for piece, index, body, phase in own]
+        pieces = [part(self.whole, triangles) for triangles in members]
+        rank = zip(pieces, self.index.tolist(), self.body.tolist(), self.phase, strict=True)
+        return [replace(piece, index=index, body=body, phase=phase) for piece, index, body, phase in rank]
 
 
 def cut_for_ranks(
@@ -133,13 +132,13 @@ def cut_for_ranks(
 
     `pinned` is the key of the pinned class.
     """
-    whole = _whole(torus, pinned)
+    everything = _whole(torus, pinned)
     for r in range(n_ranks):
         members = np.flatnonzero(table.rank[subdomain] == r)
         index, member = np.unique(subdomain[members], return_inverse=True)
         body = table.body[index]
         yield SubmeshesOfRank(
-            whole=part(whole, members),
+            whole=part(everything, members),
             member=member,
             index=index,
             body=body,
@@ -151,9 +150,9 @@ def cut_bodies(torus: Torus, members: Int) -> Iterator[Submesh]:
     """Yield the triangles `members` (m,) as a submesh for each constituent that has some; none is pinned."""
     order = members[np.argsort(torus.constituent[members], kind="stable")]
     ends = np.flatnonzero(np.diff(torus.constituent[order])) + 1
-    whole = _whole(torus, -1)
-    for own in np.split(order, ends) if len(order) else ():
-        yield replace(part(whole, own), body=int(torus.constituent[own[0]]))
+    everything = _whole(torus, -1)
+    for some in np.split(order, ends) if len(order) else ():
+        yield replace(part(everything, some), body=int(torus.constituent[some[0]]))
 
 
 def part(submesh: Submesh, members: Int) -> Submesh:
@@ -185,9 +184,7 @@ def part(submesh: Submesh, members: Int) -> Submesh:
 
 
 def pinned_class(torus: Torus) -> int:
-    """Return the class of a whole cell that is pinned, Eq.
-
-    (15): the one inside the matrix nearest to the cell's corner.
+    """Return the pinned class, Eq. (15): inside the matrix, nearest to the cell's corner.
 
     A pinned class on an interface would hold faces together that must be able to part, and one in a fibre would keep
     that from moving when all of its bonds are broken.  u* is the same up to a constant.
@@ -200,10 +197,9 @@ def pinned_class(torus: Torus) -> int:
 
 
 def pinning(torus: Torus, unfit: Int) -> list[tuple[int, float, int]]:
-    """Find the class that is best pinned, the least of several.
+    """Find the class that is best pinned: its unfitness, its distance from the cell's corner, its key.
 
-    They are compared by how unfit each is, its distance from the cell's corner, its key; `unfit` (classes,) is the
-    larger, the less fit each is. Nothing of no classes.
+    The least triple is best; `unfit` (classes,) is larger for classes that are less fit. Nothing without classes.
     """
     mesh = torus.mesh
     away = mesh.points - np.round(mesh.points / mesh.period) * mesh.period
@@ -214,7 +210,7 @@ def pinning(torus: Torus, unfit: Int) -> list[tuple[int, float, int]]:
 
 
 def _whole(torus: Torus, pinned: int) -> Submesh:
-    """Return all triangles as one submesh, of no body and phase; `pinned` is the key of the pinned class."""
+    """Return all triangles as one submesh, without body and phase; `pinned` is the pinned class key."""
     mesh = torus.mesh
     pinned_here = np.flatnonzero(torus.class_keys == pinned)
     return Submesh(
@@ -242,7 +238,7 @@ def _whole(torus: Torus, pinned: int) -> Submesh:
 
 
 def joined(parts: Sequence[SubmeshesOfRank]) -> SubmeshesOfRank:
-    """Return the subdomains of all of these, each of which is in one of them."""
+    """Join subdomains, each of which is in one part."""
     index = _all(parts, "index")
     order = np.argsort(index)
     phase = [name for part in parts for name in part.phase]
@@ -256,7 +252,7 @@ def joined(parts: Sequence[SubmeshesOfRank]) -> SubmeshesOfRank:
 
 
 def joined_meshes(meshes: list[Submesh]) -> Submesh:
-    """All triangles of these; plane vertices and edges are not identified, classes and torus edges are."""
+    """Join all triangles; classes and torus edges are identified, plane vertices and edges are not."""
     class_keys, first_class, class_of = np.unique(_all(meshes, "class_keys"), return_index=True, return_inverse=True)
     edge_keys, first, edge_of = np.unique(_all(meshes, "edge_keys"), return_index=True, return_inverse=True)
     pinned = [np.searchsorted(class_keys, mesh.class_keys[mesh.pinned]) for mesh in meshes if mesh.pinned >= 0]

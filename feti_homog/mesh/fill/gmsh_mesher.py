@@ -1,4 +1,4 @@
-"""The coarse periodic mesh of a cell that the program meshes: bare lines, nodes on them, tiles; filled."""
+"""The coarse periodic mesh of a generated cell: bare lines, nodes on them, tiles; filled."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ def generate(
     cell: Cell, marks: Mapping[int, Sequence[float]] = NO_MARKS, policy: TilePolicy = DEFAULT_TILES
 ) -> CoarseMesh:
     """Return the mesh that `begin` begins, all of it made here."""
-    found = begin(cell, listed_arrangement(cell), marks, policy)
-    noded = found.with_nodes() if isinstance(found, UnmeshedCell) else found
+    begun = begin(cell, listed_arrangement(cell), marks, policy)
+    noded = begun.with_nodes() if isinstance(begun, UnmeshedCell) else begun
     return noded if isinstance(noded, CoarseMesh) else noded.filled()
 
 
@@ -52,19 +52,18 @@ def begin(
     marks: Mapping[int, Sequence[float]] = NO_MARKS,
     policy: TilePolicy = DEFAULT_TILES,
 ) -> UnmeshedCell | NodedCell | CoarseMesh:
-    """Return the periodic coarse mesh of a square, hexagonal or random cell, or of a table.
+    """Begin the periodic coarse mesh for a square, hexagonal or random cell, or a table.
 
-    It is, of round fibres, the bare lines, of ellipses all but the triangles, of polygons all.
+    Round fibres give the bare lines, ellipses all but the triangles, polygons the whole mesh.
 
-    Elements have about the size mesh_size * width, on circles interface_size * width.
-
-    It is made at the width 1 and then scaled, so that cells of one shape have one mesh at all sizes.
+    Elements have about the size mesh_size * width, on circles interface_size * width. All is made at the width 1 and
+    then scaled, so that cells alike in shape have one mesh at all sizes.
 
     Args:
-        listed: the arrangement of a table, see `listed_arrangement`.
+        listed: a table's arrangement, see `listed_arrangement`.
         marks: maps a curve (`BareOutline.of`) to angles in degrees, measured at its centre, where the mesh gets nodes:
-            tips of debonded arcs. A mark within MERGED of where the circle crosses the cell's boundary, or of another
-            mark, is moved there.
+            debond tips. A mark within MERGED from another mark, or from where the circle crosses the cell's boundary,
+            is moved there.
 
     Raises:
         MeshError: the fibres cannot be arranged, or there would be too many elements.
@@ -72,8 +71,8 @@ def begin(
     sizes = MeshSizes.of(cell, len(marks) > 0)
     estimate = ElementEstimate.of(cell, listed)
     tiled = estimate.fibres >= policy.least_discs if listed is None else is_tiled(listed, policy)
-    most = MAX_TRIANGLES_OF_TILES if tiled else MAX_TRIANGLES
-    _refuse_extremes(estimate, sizes, sum(map(len, marks.values())), most)
+    limit = MAX_TRIANGLES_OF_TILES if tiled else MAX_TRIANGLES
+    _refuse_extremes(estimate, sizes, sum(map(len, marks.values())), limit)
     arrangement = arrange(cell) if listed is None else listed
     smallest = int(arrangement.radii.argmin())
     if arrangement.radii[smallest] < SMALLEST_RADIUS * arrangement.width:
@@ -86,7 +85,7 @@ def begin(
     if isinstance(arrangement.outlines, Discs):
         cell_of_discs = UnmeshedCell.of(arrangement, sizes, marks, scale, policy)
         field = cell_of_discs.bare.field
-        refuse_many(field.at, field.least, arrangement.size, most)
+        refuse_many(field.at, field.least, arrangement.size, limit)
         return cell_of_discs
     if isinstance(arrangement.outlines, Ellipses):
         from feti_homog.mesh.outline import elliptic_outline  # discs, the common case, do without
@@ -99,37 +98,37 @@ def begin(
 
 
 def arrangement_scale(cell: Cell, arrangement: Arrangement) -> float:
-    """Lengths of the cell / those of the arrangement."""
+    """Return lengths in the cell / lengths in the arrangement."""
     if cell.fibre_radius is not None:
         return float(cell.fibre_radius / arrangement.radii[: arrangement.fibres].mean())
     width = mixed_width(cell) if cell.table is None else cell.table.width
     return width or 1.0
 
 
-def _refuse_extremes(estimate: ElementEstimate, sizes: MeshSizes, tips: int, most: int) -> None:
+def _refuse_extremes(estimate: ElementEstimate, sizes: MeshSizes, tips: int, limit: int) -> None:
     """Raise MeshError for a cell that would take hours to mesh, before it is begun."""
     cell, around = estimate.cell, min(sizes.interface, estimate.interface_size)
     at_tips = tips * triangles_of_a_tip(max(1.0, around / sizes.tip))
     count = estimate.triangles + at_tips
-    if count > most:
+    if count > limit:
         keys = ("mesh_size", "interface_size", "tip_size") if at_tips else ("mesh_size", "interface_size")
-        given = [f"{name} = {value:.3g}" for name in keys if (value := getattr(cell, name)) is not None]
-        given += [] if cell.fibres is None else [f"fibres = {cell.fibres}"]
+        asked = [f"{name} = {value:.3g}" for name in keys if (value := getattr(cell, name)) is not None]
+        asked += [] if cell.fibres is None else [f"fibres = {cell.fibres}"]
         raise MeshError(
-            f"[cell] {', '.join(given)}: about {count:.2g} elements before refine; expected at most {most}; "
+            f"[cell] {', '.join(asked)}: about {count:.2g} elements before refine; expected at most {limit}; "
             "refine splits them on the ranks"
         )
 
 
 @dataclass(frozen=True)
 class UnmeshedCell:
-    """A cell of round fibres before its lines have nodes.
+    """A cell with round fibres before its lines have nodes.
 
     Attributes:
-        arrangement: of the discs.
+        arrangement: where discs are.
         bare: its lines.
-        sizes: of elements.
-        tiles: those that it will be cut into; None if it is filled at once.
+        sizes: element sizes.
+        tiles: the tiling that will cut it; None if it is filled at once.
         scale: as in `NodedCell`.
     """
 
@@ -158,7 +157,7 @@ class UnmeshedCell:
 
     @property
     def phases(self) -> tuple[str, ...]:
-        """Return those of the mesh."""
+        """Return the phase names, the matrix first."""
         return self.arrangement.phases
 
     def with_nodes(self, stations: LineStations | None = None) -> NodedCell:
@@ -176,10 +175,10 @@ class NodedCell:
     """A cell with nodes on its lines, before triangles are made.
 
     Attributes:
-        arrangement: of the discs.
+        arrangement: where discs are.
         lines: its outline.
-        parts: tiles to fill, each with the numbers (n,) of its nodes in the outline.
-        scale: lengths of the mesh / those of the arrangement.
+        parts: tiles to fill, each with its node numbers (n,) in the outline.
+        scale: lengths in the mesh / lengths in the arrangement.
     """
 
     arrangement: Arrangement
@@ -192,12 +191,12 @@ class NodedCell:
         cls, arrangement: Arrangement, lines: Outline, sizes: MeshSizes, tiles: Tiling | None, scale: float
     ) -> NodedCell:
         """Return the cell of an arrangement with this outline, cut into tiles."""
-        whole = Tile(lines.points, lines.curves, sizes.largest, sizes.are_graded(arrangement))
-        return cls(arrangement, lines, tuple(cut(lines, whole, tiles)), scale)
+        cell = Tile(lines.points, lines.curves, sizes.largest, sizes.are_graded(arrangement))
+        return cls(arrangement, lines, tuple(cut(lines, cell, tiles)), scale)
 
     @property
     def phases(self) -> tuple[str, ...]:
-        """Return those of the mesh."""
+        """Return the phase names, the matrix first."""
         return self.arrangement.phases
 
     def filled(self) -> CoarseMesh:
@@ -240,7 +239,7 @@ class NodedCell:
     def _within(self) -> tuple[Int32, Int32]:
         """(k + 1,) the phase next within each circle, and the precedence, as in `CoarseMesh`.
 
-        The phase of a void is a number behind all; last are those of the matrix.
+        Voids have a phase number behind all others; the last entry is the matrix.
         """
         arrangement, lines = self.arrangement, self.lines
         in_disc, in_ring = arrangement.within
@@ -252,7 +251,7 @@ class NodedCell:
 
     @cached_property
     def regions(self) -> Regions:
-        """Regions of the cell.  The matrix of round fibres is one: the plane without discs that do not touch."""
+        """The cell's regions.  The matrix around round fibres is one: the plane without discs, which do not touch."""
         phase, precedence = self._within
         solid = phase < len(self.phases)
         _, first, constituent = np.unique(precedence[solid], return_index=True, return_inverse=True)
@@ -275,17 +274,17 @@ def _without_voids(mesh: CoarseMesh, void: int) -> CoarseMesh:
 
     The phase has no name in it; nodes that no other triangle has are left out.
     """
-    kept = mesh.phase != void
+    solid = mesh.phase != void
     used = np.zeros(len(mesh.points), bool)
-    used[mesh.triangles[kept]] = True
+    used[mesh.triangles[solid]] = True
     number = (np.cumsum(used) - 1).astype(np.int32)
     points = mesh.points[used]
     return replace(
         mesh,
         points=points,
-        triangles=number[mesh.triangles[kept]],
-        phase=mesh.phase[kept],
-        precedence=mesh.precedence[kept],
+        triangles=number[mesh.triangles[solid]],
+        phase=mesh.phase[solid],
+        precedence=mesh.precedence[solid],
         representative=representatives(points, mesh.width, mesh.height),
         arc_edges=number[mesh.arc_edges],
     )

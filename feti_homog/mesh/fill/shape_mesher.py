@@ -1,6 +1,6 @@
-"""The coarse periodic mesh of a cell with outlines of any convex shape: gmsh cuts them and fills them.
+"""The coarse periodic mesh of a cell with any convex outlines: gmsh cuts them and fills them.
 
-The middle nodes of its second-order edges define the curves, as in users' meshes.
+Middle nodes on second-order edges define the curves, as in users' meshes.
 """
 
 from __future__ import annotations
@@ -47,26 +47,26 @@ SizeAt = Callable[[Float], Float]
 
 
 def mesh_outlines(arrangement: Arrangement, sizes: MeshSizes, scale: float) -> CoarseMesh:
-    """Return the mesh that `gmsh_mesher.begin` begins, of fibres with outlines of any convex shape.
+    """Return the mesh that `gmsh_mesher.begin` begins, for fibres with any convex outlines.
 
     Raises:
         MeshError: it would have too many elements.
     """
-    least, size_at = _sizes_at(arrangement, sizes)
-    refuse_many(size_at, least, arrangement.size)
+    smallest, size_at = _sizes_at(arrangement, sizes)
+    refuse_many(size_at, smallest, arrangement.size)
     with gmsh_session() as gmsh:
         number = _add_surfaces(gmsh, arrangement)
         _match_sides(gmsh, arrangement)
         for option in ("MeshSizeFromPoints", "MeshSizeExtendFromBoundary"):
             gmsh.option.setNumber(f"Mesh.{option}", 0)
         with TemporaryDirectory() as folder:
-            _set_sizes(gmsh, Path(folder) / "sizes", arrangement, least, size_at)
+            _set_sizes(gmsh, Path(folder) / "sizes", arrangement, smallest, size_at)
             gmsh.model.mesh.generate(2)
             gmsh.model.mesh.setOrder(2)
             gmsh.option.setNumber("Mesh.Binary", 1)  # to the last bit
             gmsh.write(f"{folder}/cell.msh")
             raw = load(Path(folder) / "cell.msh")
-        own = np.array([number[tag] for _, tag in gmsh.model.getEntities(2)], np.int32)
+        precedence = np.array([number[tag] for _, tag in gmsh.model.getEntities(2)], np.int32)
     mesh = made(raw, "table")
     return replace(
         mesh,
@@ -74,13 +74,13 @@ def mesh_outlines(arrangement: Arrangement, sizes: MeshSizes, scale: float) -> C
         height=scale * mesh.height,
         points=scale * mesh.points,
         ellipses=mesh.ellipses.scaled(scale),
-        precedence=own[raw.group],
+        precedence=precedence[raw.group],
         centres=scale * arrangement.centres[: arrangement.fibres],
     )
 
 
 def _add_surfaces(gmsh: ModuleType, arrangement: Arrangement) -> dict[int, int]:
-    """Add the surfaces within the cell in physical groups of their phases; the precedence of each, 0 of the matrix."""
+    """Add the surfaces within the cell to physical groups by phase; return their precedence, 0 in the matrix."""
     occ = gmsh.model.occ
     rectangle = (2, occ.addRectangle(0.0, 0.0, 0.0, arrangement.width, arrangement.height))
     added, disc, ring = _add_outlines(gmsh, arrangement)
@@ -88,21 +88,21 @@ def _add_surfaces(gmsh: ModuleType, arrangement: Arrangement) -> dict[int, int]:
     occ.synchronize()
     number, phase = dict.fromkeys(parts[0], 0), dict.fromkeys(parts[0], MATRIX)
     numbers = arrangement.precedence(np.array(disc), np.array(ring))
-    for pieces, own, is_ring, precedence in zip(parts[1:], disc, ring, numbers, strict=True):
+    for pieces, entry, is_ring, precedence in zip(parts[1:], disc, ring, numbers, strict=True):
         inside = set(pieces) & set(number)
         number |= dict.fromkeys(inside, int(precedence))
-        phase |= dict.fromkeys(inside, arrangement.within[is_ring][own])
+        phase |= dict.fromkeys(inside, arrangement.within[is_ring][entry])
     outside = {piece for pieces in parts for piece in pieces} - set(number)
     voids = {piece for piece, name in phase.items() if name == VOID}
     occ.remove(sorted(outside | voids), recursive=True)
     occ.synchronize()
     for name in sorted(set(phase.values()) - {VOID}):
-        gmsh.model.addPhysicalGroup(2, sorted(tag for (_, tag), own in phase.items() if own == name), name=name)
-    return {tag: own for (_, tag), own in number.items()}
+        gmsh.model.addPhysicalGroup(2, sorted(tag for (_, tag), entry in phase.items() if entry == name), name=name)
+    return {tag: entry for (_, tag), entry in number.items()}
 
 
 def _add_outlines(gmsh: ModuleType, arrangement: Arrangement) -> tuple[list[Surface], list[int], list[bool]]:
-    """Surfaces of all images that reach into the cell, their discs, and which have another within: outer ones first."""
+    """Add surfaces for images that reach into the cell, outer ones first; their discs, and whether one is within."""
     size, outer, inner = arrangement.size, _sums(arrangement.outer), _sums(arrangement.outlines)
     order = range(len(outer)) if arrangement.mesh_order is None else arrangement.mesh_order.tolist()
     low, high = (outer.centres + sign * outer.extents[:, :, side] for side, sign in ((0, -1), (1, 1)))
@@ -166,7 +166,7 @@ def _rounded_lines(occ: ModuleType, corners: Float, rounding: float) -> list[int
 
 
 def _match_sides(gmsh: ModuleType, arrangement: Arrangement) -> None:
-    """Let the curves on the right and upper side have the nodes of those on the left and lower one."""
+    """Copy the nodes on curves from the left to the right, from the lower to the upper side."""
     size = arrangement.size
     curves = [tag for _, tag in gmsh.model.getEntities(1)]
     boxes = np.array([gmsh.model.getBoundingBox(1, tag) for tag in curves]).reshape(-1, 2, 3)[:, :, :2]
@@ -180,10 +180,10 @@ def _match_sides(gmsh: ModuleType, arrangement: Arrangement) -> None:
         gmsh.model.mesh.setPeriodic(1, sides[1], sides[0], moved.ravel().tolist())
 
 
-def _set_sizes(gmsh: ModuleType, path: Path, arrangement: Arrangement, least: float, size_at: SizeAt) -> None:
-    """Let gmsh interpolate the sizes at positions (n, 2), of which the least is given, on a grid, by way of a file."""
+def _set_sizes(gmsh: ModuleType, path: Path, arrangement: Arrangement, smallest: float, size_at: SizeAt) -> None:
+    """Let gmsh interpolate sizes, none below `smallest`, on a grid, by way of a file."""
     size = arrangement.size
-    counts = np.clip(np.ceil(size / least), FEWEST_CELLS, MOST_CELLS).astype(np.int32) + 1
+    counts = np.clip(np.ceil(size / smallest), FEWEST_CELLS, MOST_CELLS).astype(np.int32) + 1
     x, y = (np.linspace(0.0, width, count) for width, count in zip(size, counts, strict=True))
     values = size_at(np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2))
     spacing = np.append(size / (counts - 1), 1.0)
@@ -198,10 +198,10 @@ def _set_sizes(gmsh: ModuleType, path: Path, arrangement: Arrangement, least: fl
 def _sizes_at(arrangement: Arrangement, sizes: MeshSizes) -> tuple[float, SizeAt]:
     """Return the least size of elements, and the sizes at positions (n, 2).
 
-    h = min_k h_k + g |x - x_k| over points x_k of all outlines.
+    h = min_k h_k + g |x - x_k| over points x_k on all outlines.
 
-    h_k is at most that of interfaces, that of the curvature, and PASSAGE_EDGE times the distance of the next outline or
-    of a side of the cell that the outline faces there.
+    h_k is at most the interface size, the size that suits the curvature, and PASSAGE_EDGE times the distance to the
+    next outline or to a cell side that the outline faces there.
     """
     size, shapes = arrangement.size, _sums(arrangement.outer)
     places, normal, shape = shapes.boundary(POINTS)
@@ -225,14 +225,14 @@ def _sizes_at(arrangement: Arrangement, sizes: MeshSizes) -> tuple[float, SizeAt
 
 
 def _distance_of_others(places: Float, shape: Int, size: Float) -> Float:
-    """(n,) distances of points (n, 2) from the nearest ones of other shapes (n,) or of an image of their own."""
+    """(n,) distances from points (n, 2) to the nearest points on other shapes (n,) or on images."""
     distance = np.full(len(places), np.inf)
     steps = np.array(list(product((-1, 0, 1), repeat=2))) * size
-    for own in np.unique(shape):
-        mine = places[shape == own]
-        others = places[shape != own]
-        if len(others):
-            distance[shape == own] = cKDTree(wrap(others, size), boxsize=size).query(wrap(mine, size))[0]
+    for label in np.unique(shape):
+        mine = places[shape == label]
+        rest = places[shape != label]
+        if len(rest):
+            distance[shape == label] = cKDTree(wrap(rest, size), boxsize=size).query(wrap(mine, size))[0]
         images = np.concatenate([mine + step for step in steps if step.any()])
-        distance[shape == own] = np.minimum(distance[shape == own], cKDTree(images).query(mine)[0])
+        distance[shape == label] = np.minimum(distance[shape == label], cKDTree(images).query(mine)[0])
     return distance

@@ -1,4 +1,4 @@
-"""The lines of a cell of round fibres, cut where they meet; their nodes are placed afterwards, by all ranks."""
+"""The lines of a cell with round fibres, cut where they meet; all ranks place their nodes afterwards."""
 
 from __future__ import annotations
 
@@ -51,8 +51,8 @@ class SizedLines:
         """Divide the lines, in order, into `count` parts of equal numbers."""
         arcs, bridges = (pairwise(even(len(lines), count)) for lines in (self.arcs, self.bridges))
         return [
-            SizedLines(self.arcs.chosen(slice(*own)), self.bridges.chosen(slice(*other)), self.sampling)
-            for own, other in zip(arcs, bridges, strict=True)
+            SizedLines(self.arcs.chosen(slice(*arcs_part)), self.bridges.chosen(slice(*bridges_part)), self.sampling)
+            for arcs_part, bridges_part in zip(arcs, bridges, strict=True)
         ]
 
     def stations(self, field: SizeField) -> LineStations:
@@ -61,9 +61,9 @@ class SizedLines:
         Raises:
             MeshError: there would be more than the sampling allows.
         """
-        most, ones = self.sampling.most_nodes, np.ones(len(self.arcs) + len(self.bridges), np.int64)
-        arcs = EdgeSamples.of(field, self.arcs, self.sampling.arc).stations(ones[: len(self.arcs)], most)
-        bridges = EdgeSamples.of(field, self.bridges, self.sampling.bridge).stations(ones[len(self.arcs) :], most)
+        limit, ones = self.sampling.most_nodes, np.ones(len(self.arcs) + len(self.bridges), np.int64)
+        arcs = EdgeSamples.of(field, self.arcs, self.sampling.arc).stations(ones[: len(self.arcs)], limit)
+        bridges = EdgeSamples.of(field, self.bridges, self.sampling.bridge).stations(ones[len(self.arcs) :], limit)
         return arcs, bridges
 
     def joined(self, parts: Sequence[LineStations]) -> LineStations:
@@ -72,7 +72,7 @@ class SizedLines:
         Raises:
             MeshError: they are more than the sampling allows.
         """
-        arcs, bridges = (Stations.joined(own, self.sampling.most_nodes) for own in zip(*parts, strict=True))
+        arcs, bridges = (Stations.joined(stations, self.sampling.most_nodes) for stations in zip(*parts, strict=True))
         return arcs, bridges
 
 
@@ -81,10 +81,10 @@ class BareOutline:
     """The lines of a cell without nodes but for their ends.
 
     Attributes:
-        size: (2,) of the cell.
+        size: (2,) width and height.
         circles, disc, around: (k, 3), (k,), (k,) as `outline.images` finds them.
         places: along each axis the vertices on the sides.
-        vertices: (v, 2) ends of lines.
+        vertices: (v, 2) line ends.
         circle: (a,) that each arc is on.
         lines: arcs, then bridges.
         field: the size of edges.
@@ -175,15 +175,15 @@ class BareOutline:
 def _arcs(
     circles: Float, border: Float, vertices: OnCircles, size: Float, chosen: Bool
 ) -> tuple[tuple[Int, Float, Float], Float]:
-    """Return the arcs of `arcs_within`, and the points (v, 2) at which those of the `chosen` (k,) circles begin.
+    """Return the arcs by `arcs_within`, and the points (v, 2) at which arcs on `chosen` (k,) circles begin.
 
     Points on the border, near its points (b, 2), are left out.
     """
     arcs = arcs_within(len(circles), *vertices, lambda of, angle: on_circle(circles[of], angle), size)
     ends, same = on_circle(circles[arcs[0]], arcs[1]), SAME_PLACE * size.max()
     away = np.all((ends > same) & (ends < size - same), axis=1)
-    beside = np.flatnonzero(~away)
-    away[beside] = cKDTree(border).query(ends[beside])[0] > same
+    close = np.flatnonzero(~away)
+    away[close] = cKDTree(border).query(ends[close])[0] > same
     return arcs, ends[away & chosen[arcs[0]]]
 
 

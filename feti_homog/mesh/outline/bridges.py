@@ -39,21 +39,21 @@ class Bridges:
         """Return where all of them begin, and then where all end."""
         return self.ends.T.ravel(), np.concatenate([self.angle, self.angle + np.pi]) % TURN
 
-    def chosen(self, those: Bool) -> Bridges:
-        """Return those where the mask (b,) is true."""
-        return Bridges(self.ends[those], self.angle[those])
+    def chosen(self, some: Bool) -> Bridges:
+        """Return the bridges where the mask (b,) is true."""
+        return Bridges(self.ends[some], self.angle[some])
 
 
 @dataclass(frozen=True)
 class CentreLines:
-    """Edges of Delaunay's triangulation of the centres of discs.
+    """Edges in Delaunay's triangulation between disc centres.
 
     Attributes:
         ends: (e, 2) discs.
         angle: (e,) direction from the first to the second.
-        gap: (e,) distance of the discs.
-        facing: (e, 2, 2) the point of each end's circle that faces the other.
-        clearance: (e,) least distance of the line from the centre of a third disc / its radius.
+        gap: (e,) between the discs.
+        facing: (e, 2, 2) the point on each end's circle that faces the other.
+        clearance: (e,) least distance between the line and a third disc's centre / its radius.
     """
 
     ends: Int
@@ -64,7 +64,7 @@ class CentreLines:
 
 
 def centre_lines(circles: Float, which: Int) -> CentreLines:
-    """Return those of the discs `which` (n,) of circles (k, 3)."""
+    """Connect the centres of discs `which` (n,) among circles (k, 3)."""
     centres, radii = circles[which, :2], circles[which, 2]
     corners = Delaunay(centres).simplices
     pairs = np.sort(np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]]), axis=1)
@@ -82,21 +82,21 @@ def centre_lines(circles: Float, which: Int) -> CentreLines:
     )
 
 
-def _clearance(centres: Float, radii: Float, ends: Int, most: float) -> Float:
-    """(e,) least distance / radius of third discs from the lines between the `ends` (e, 2), if below `most`."""
+def _clearance(centres: Float, radii: Float, ends: Int, limit: float) -> Float:
+    """(e,) least distance / radius between third discs and the lines between `ends` (e, 2), if below `limit`."""
     clearance = np.full(len(ends), np.inf)
     # Discs of about one radius at a time: small ones far from a line need not be looked at.
     classes = np.floor(np.log2(radii / radii.min())).astype(int)
     for members in (np.flatnonzero(classes == level) for level in np.unique(classes)):
-        tree, reach = cKDTree(centres[members]), most * radii[members].max()
+        tree, reach = cKDTree(centres[members]), limit * radii[members].max()
         for begin in range(0, len(ends), CHUNK):
-            own = ends[begin : begin + CHUNK]
-            start, vector = centres[own[:, 0]], centres[own[:, 1]] - centres[own[:, 0]]
+            pairs = ends[begin : begin + CHUNK]
+            start, vector = centres[pairs[:, 0]], centres[pairs[:, 1]] - centres[pairs[:, 0]]
             length = np.linalg.norm(vector, axis=1)
-            near = tree.query_ball_point(start + vector / 2, length / 2 + reach)
-            line = np.repeat(np.arange(len(own)), [len(found) for found in near])
-            disc = members[np.concatenate([np.zeros(0, np.int64), *filter(len, near)]).astype(int)]
-            third = (disc[:, None] != own[line]).all(axis=1)
+            close = tree.query_ball_point(start + vector / 2, length / 2 + reach)
+            line = np.repeat(np.arange(len(pairs)), [len(candidates) for candidates in close])
+            disc = members[np.concatenate([np.zeros(0, np.int64), *filter(len, close)]).astype(int)]
+            third = (disc[:, None] != pairs[line]).all(axis=1)
             line, disc = line[third], disc[third]
             offset = centres[disc] - start[line]
             share = np.clip((offset * vector[line]).sum(axis=1) / length[line] ** 2, 0, 1)
@@ -106,32 +106,32 @@ def _clearance(centres: Float, radii: Float, ends: Int, most: float) -> Float:
 
 
 def bridges(lines: CentreLines, size: Float, margin: float, largest: float, vertices: OnCircles) -> Bridges:
-    """Bridges on these lines, clear of third discs and of the sides of the cell.
+    """Choose bridges on centre lines, clear of third discs and cell sides.
 
-    They are LEAST_ANGLE from each other and from the `vertices` that circles have; of two that are too near the shorter
-    one.
+    They are LEAST_ANGLE from each other and from the `vertices` that circles have; if two are too near, the shorter one
+    stays.
 
-    Their ends are `margin` away from the sides, and their middles one of the `largest` edges there, or as long as they
-    are: beside a side there would be no room for good triangles.
+    Their ends are `margin` away from the sides, and their middles one `largest` edge, or their length: beside a side
+    there would be no room for good triangles.
     """
     middle = lines.facing.mean(axis=1)
     away, ends_away = (np.minimum(points, size - points) for points in (middle, lines.facing))
     inside = (ends_away.min(axis=(1, 2)) > margin) & (away.min(axis=1) > np.minimum(largest, lines.gap))
     clear = np.flatnonzero(inside & (lines.clearance > 1 + CLEAR))
     order = np.lexsort((clear, (lines.gap[clear] / size.max()).round(GAP_DECIMALS)))
-    found = Bridges(lines.ends[clear[order]], lines.angle[clear[order]])
-    circle, angle = (np.concatenate(parts) for parts in zip(found.on_circles, vertices, strict=True))
+    candidates = Bridges(lines.ends[clear[order]], lines.angle[clear[order]])
+    circle, angle = (np.concatenate(parts) for parts in zip(candidates.on_circles, vertices, strict=True))
     # Vertices come before all bridges.
     first, count = len(vertices[0]), len(order)
     rank = np.concatenate([first + np.arange(count), first + np.arange(count), np.arange(first)])
     better, worse = _too_near(circle, angle % TURN, rank)
     # All vertices stay, however near each other.
     is_bridge = worse >= first
-    return found.chosen(_best(first + count, better[is_bridge], worse[is_bridge])[first:])
+    return candidates.chosen(_best(first + count, better[is_bridge], worse[is_bridge])[first:])
 
 
 def _too_near(circle: Int, angle: Float, rank: Int) -> tuple[Int, Int]:
-    """Ranks of points on the same circle within LEAST_ANGLE of each other: two arrays, the better rank first."""
+    """Find points on one circle within LEAST_ANGLE: two arrays with their ranks, the better one first."""
     order = np.lexsort((angle, circle))
     circle, angle, rank = circle[order], angle[order], rank[order]
     first = np.flatnonzero(np.diff(circle, prepend=-1) != 0)
@@ -140,11 +140,11 @@ def _too_near(circle: Int, angle: Float, rank: Int) -> tuple[Int, Int]:
     better, worse = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
     for step in range(1, int(counts.max(initial=0))):
         after = begin + (np.arange(len(circle)) - begin + step) % count
-        near = ((angle[after] - angle) % TURN < LEAST_ANGLE) & (step < count)
-        if not near.any():
+        close = ((angle[after] - angle) % TURN < LEAST_ANGLE) & (step < count)
+        if not close.any():
             break
-        better.append(np.minimum(rank[near], rank[after][near]))
-        worse.append(np.maximum(rank[near], rank[after][near]))
+        better.append(np.minimum(rank[close], rank[after][close]))
+        worse.append(np.maximum(rank[close], rank[after][close]))
     return np.concatenate(better), np.concatenate(worse)
 
 

@@ -1,4 +1,4 @@
-"""The lines of a cell with ellipses: its sides and arcs, cut where they meet, the size of edges, and their nodes."""
+"""The lines of a cell with ellipses: sides and arcs, cut where they meet, edge sizes and nodes."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ LONGEST = 10.0
 def outline(
     arrangement: Arrangement, inner: Ellipses, sizes: MeshSizes, marks: Mapping[int, Sequence[float]]
 ) -> Outline:
-    """Lines as `BareOutline.of`, of an arrangement with the ellipses `inner` as outlines, with the nodes on them."""
+    """Make lines as `BareOutline.of` for an arrangement with outlines `inner`, with nodes on them."""
     size = arrangement.size
     ellipses, fibre, around = _images(arrangement, inner, size)
     places = [_crossings(ellipses, axis, size) for axis in (0, 1)]
@@ -68,8 +68,8 @@ def outline(
     outer = np.concatenate([border, ends[away & ~sparse[which]]])
 
     def at(fibre: Int, within: Bool, angle: Float) -> Float:
-        own = inner[fibre].grown(np.where(within, 0.0, arrangement.coating[fibre]))
-        return own.points(own.parameter(directions(angle)))
+        curves = inner[fibre].grown(np.where(within, 0.0, arrangement.coating[fibre]))
+        return curves.points(curves.parameter(directions(angle)))
 
     tips = tip_vertices(arrangement, marks, numbering.vertices, at)
     field = _size_field(arrangement, inner, sizes, outer, sharp, tips)
@@ -83,25 +83,25 @@ def outline(
     return Outline(numbering.points(), Curves.joined(curves), ellipses, fibre, around)
 
 
-def _images(arrangement: Arrangement, own: Ellipses, size: Float) -> tuple[Ellipses, Int, Int]:
+def _images(arrangement: Arrangement, outlines: Ellipses, size: Float) -> tuple[Ellipses, Int, Int]:
     """Periodic images that may reach into the cell, their fibres (k,), and the ellipses around them (k,).
 
-    Fibre by fibre, the ellipses of each image one after the other, from without.
+    They go fibre by fibre and image by image, each from without.
     """
     steps = np.array(list(product((-1, 0, 1), repeat=2)))
     order = arrangement.mesh_order
-    fibre = np.repeat(np.arange(len(own)) if order is None else order, len(steps))
-    shift = np.tile(steps, (len(own), 1)) * size
-    inner = own[fibre].at(own.centres[fibre] + shift)
+    fibre = np.repeat(np.arange(len(outlines)) if order is None else order, len(steps))
+    shift = np.tile(steps, (len(outlines), 1)) * size
+    inner = outlines[fibre].at(outlines.centres[fibre] + shift)
     outer = inner.grown(arrangement.coating[fibre])
-    near = np.all((outer.centres + outer.reach > 0) & (outer.centres - outer.reach < size), axis=1)
-    coated = arrangement.coated[fibre[near]]
-    order, owner, around = nested(fibre[near], coated)
-    return outer[near].joined(inner[near][coated])[order], owner, around
+    inside = np.all((outer.centres + outer.reach > 0) & (outer.centres - outer.reach < size), axis=1)
+    coated = arrangement.coated[fibre[inside]]
+    order, owner, around = nested(fibre[inside], coated)
+    return outer[inside].joined(inner[inside][coated])[order], owner, around
 
 
 def _crossings(ellipses: Ellipses, axis: int, size: Float) -> Float:
-    """Sorted coordinates along `axis` of the vertices on the side at 0: corners and crossings of ellipses.
+    """Sorted coordinates along `axis` on the side at 0: corners and crossings with ellipses.
 
     d = x - c with the known component v obeys d . (F F^T)^-1 d = 1.
     """
@@ -117,29 +117,29 @@ def _crossings(ellipses: Ellipses, axis: int, size: Float) -> Float:
 def _vertex_angles(
     ellipses: Ellipses, curve: Int, border: Float, size: Float, marks: Mapping[int, Sequence[float]]
 ) -> tuple[tuple[Int, Float], tuple[Float, Float]]:
-    """Ellipse (v,) and parameter (v,) in [0, 2 pi) of the vertices of ellipses: crossings of the sides, and the marks.
+    """Ellipse (v,) and parameter (v,) in [0, 2 pi) of all vertices: crossings with sides, and marks.
 
-    Also the crossings (c, 2), and R phi (c,) of the angle between side and ellipse there, whose radius is R.
+    Also the crossings (c, 2), and R phi (c,) there, with the angle phi between side and ellipse, whose radius is R.
     """
     angles, where, lengths = [np.zeros(0)], [np.zeros((0, 2))], [np.zeros(0)]
-    near = cKDTree(border).query_ball_point(ellipses.centres, ellipses.longest * (1 + SAME_PLACE))
-    for number, (owner, candidates) in enumerate(zip(curve.tolist(), near, strict=True)):
+    close = cKDTree(border).query_ball_point(ellipses.centres, ellipses.longest * (1 + SAME_PLACE))
+    for number, (owner, candidates) in enumerate(zip(curve.tolist(), close, strict=True)):
         places = border[candidates]
         one = ellipses[np.full(len(places), number)]
         on_it = np.abs(np.linalg.norm(one.unit(places - one.centres), axis=1) - 1) < SAME_PLACE
         places, one = places[on_it], one[on_it]
-        own = one.parameter(places - one.centres) % TURN
-        normal = one.normal(own)
+        crossing = one.parameter(places - one.centres) % TURN
+        normal = one.normal(crossing)
         is_upright = np.isin(places[:, 0], (0.0, size[0]))
         along = np.where(is_upright, normal[:, 0], normal[:, 1])
         where.append(places)
         lengths.append(one.bend(normal) * np.arccos(np.minimum(np.abs(along), 1.0)))
-        wanted, offsets = np.radians(marks.get(owner, ())), places - ellipses.centres[number]
-        away = np.abs((wanted[:, None] - np.arctan2(offsets[:, 1], offsets[:, 0]) + np.pi) % TURN - np.pi)
-        wanted = wanted[(away > MERGED).all(axis=1)]
-        mine = ellipses[np.full(len(wanted), number)]
-        angles.append(np.append(own, mine.parameter(directions(wanted)) % TURN))
-    whose = np.repeat(np.arange(len(curve)), [len(own) for own in angles[1:]])
+        mark, offsets = np.radians(marks.get(owner, ())), places - ellipses.centres[number]
+        away = np.abs((mark[:, None] - np.arctan2(offsets[:, 1], offsets[:, 0]) + np.pi) % TURN - np.pi)
+        mark = mark[(away > MERGED).all(axis=1)]
+        mine = ellipses[np.full(len(mark), number)]
+        angles.append(np.append(crossing, mine.parameter(directions(mark)) % TURN))
+    whose = np.repeat(np.arange(len(curve)), [len(crossing) for crossing in angles[1:]])
     return (whose, np.concatenate(angles)), (np.concatenate(where), np.concatenate(lengths))
 
 
@@ -200,10 +200,10 @@ def _size_field(
     crossings: tuple[Float, Float],
     tips: Float,
 ) -> SizeField:
-    """Field of sizes as `graded_size.size_field`, for the ellipses `inner`.
+    """Return the size field as `graded_size.size_field`, for the ellipses `inner`.
 
-    `crossings` are where sides of the cell meet ellipses (c, 2), and the length (c,) R phi of the angle phi between
-    them where the radius of curvature is R.
+    `crossings` are where cell sides meet ellipses (c, 2), and the length (c,) R phi there: they meet at the angle phi,
+    and the radius of curvature is R.
     """
     size, largest = arrangement.size, sizes.largest
     shells, disc = arrangement.shells
@@ -232,28 +232,28 @@ def _size_field(
     base = SourcedSize(sources, size, largest)
     if not sizes.are_graded(arrangement):
         return SizeField(base)
-    on_curves, beside = cKDTree(wrap(points, size), boxsize=size), np.minimum(sizes.interface, thin)
+    on_curves, sizes_there = cKDTree(wrap(points, size), boxsize=size), np.minimum(sizes.interface, thin)
     tree = cKDTree(wrap(tips.reshape(-1, 2), size), boxsize=size)
 
     def graded(positions: Float) -> Float:
         places = wrap(positions, size)
         at_tips = sizes.tip + MAX_GROWTH * np.maximum(0.0, tree.query(places)[0] - sizes.tip)
         distance, nearest = on_curves.query(places)
-        return np.asarray(np.minimum(beside[nearest] + MAX_GROWTH * distance, at_tips))
+        return np.asarray(np.minimum(sizes_there[nearest] + MAX_GROWTH * distance, at_tips))
 
-    return SizeField(base, graded, min(sizes.tip, float(beside.min())))
+    return SizeField(base, graded, min(sizes.tip, float(sizes_there.min())))
 
 
 def _coating_size(arrangement: Arrangement, inner: Ellipses, disc: Int, normal: Float) -> Float:
-    """Largest edge length (k,) on either side of the coatings of discs (k,) where their normals are n (k, 2).
+    """Largest edge length (k,) on either side of coatings around discs (k,) where normals are n (k, 2).
 
-    As of circles, sqrt(t R), with the thickness and the radius of curvature there, but not longer than in the thinnest
-    coatings of circles, LONGEST t; infinite without a coating.
+    As on circles, sqrt(t R), with the thickness and the radius of curvature there, but not longer than in the thinnest
+    coatings around circles, LONGEST t; infinite without a coating.
     """
-    own = inner[disc]
-    thickness = own.grown(arrangement.coating[disc]).support(normal) - own.support(normal)
+    ellipse = inner[disc]
+    thickness = ellipse.grown(arrangement.coating[disc]).support(normal) - ellipse.support(normal)
     return np.where(
-        arrangement.coated[disc], np.minimum(np.sqrt(thickness * own.bend(normal)), LONGEST * thickness), np.inf
+        arrangement.coated[disc], np.minimum(np.sqrt(thickness * ellipse.bend(normal)), LONGEST * thickness), np.inf
     )
 
 
@@ -266,13 +266,13 @@ def _between(ellipses: Ellipses, size: Float, largest: float) -> Source:
     normal = directions(direction)
     length = PASSAGE_EDGE * gap
     growth = passage_growth(gap, 1 / one.bend(normal) + 1 / other.bend(-normal))
-    near = length < largest
-    places = np.concatenate([one.facing(normal)[near], other.facing(-normal)[near]])
-    return places, np.tile(length[near], 2), np.tile(growth[near], 2)
+    narrow = length < largest
+    places = np.concatenate([one.facing(normal)[narrow], other.facing(-normal)[narrow]])
+    return places, np.tile(length[narrow], 2), np.tile(growth[narrow], 2)
 
 
 def _beside_sides(ellipses: Ellipses, size: Float, largest: float) -> Source:
-    """Points where an ellipse comes near a side or hardly crosses it: its extreme point, its foot on the side."""
+    """Points where an ellipse comes near a side or hardly crosses it: extreme point and foot on the side."""
     sources: list[Source] = []
     for axis, sign in product((0, 1), (-1.0, 1.0)):
         normal = np.zeros((len(ellipses), 2))
@@ -282,8 +282,8 @@ def _beside_sides(ellipses: Ellipses, size: Float, largest: float) -> Source:
         foot[:, axis] = np.round(extreme[:, axis] / size[axis]) * size[axis]
         width = np.abs(extreme - foot)[:, axis]
         length = PASSAGE_EDGE * width
-        near = length < largest
+        narrow = length < largest
         growth = passage_growth(width, 1 / ellipses.bend(normal))
-        sources += [(place[near], length[near], growth[near]) for place in (extreme, foot)]
+        sources += [(place[narrow], length[narrow], growth[narrow]) for place in (extreme, foot)]
     places, lengths, growths = (np.concatenate(parts) for parts in zip(*sources, strict=True))
     return places, lengths, growths

@@ -1,4 +1,4 @@
-"""The lines of a cell: pieces of sides, arcs and bridges, and their nodes, whose distances follow the size of edges."""
+"""The lines of a cell: pieces of sides, arcs, bridges, and nodes at distances that follow edge sizes."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ MATRIX, OUTSIDE = -1, -2
 
 @dataclass(frozen=True)
 class Curve:
-    """A bridge, or a piece of a side or a circle from vertex to vertex, counter-clockwise around the cell or the disc.
+    """A bridge, or a piece of a side or circle from vertex to vertex, counter-clockwise around cell or disc.
 
     Attributes:
-        nodes: (k,) numbers of its nodes, from end to end.
+        nodes: (k,) node numbers, from end to end.
         circle: the circle it lies on; MATRIX for a straight line.
         inside: the region on its left: the disc, or the coating, within that circle, or MATRIX, or OUTSIDE.
         outside: the region on its right: the coating within the circle around it, or MATRIX, or OUTSIDE.
@@ -58,18 +58,18 @@ class Curves:
     def pieces(self) -> list[Curve]:
         """One after the other."""
         nodes = np.split(self.node, self.first[1:-1])
-        beside = (self.circle.tolist(), self.inside.tolist(), self.outside.tolist())
-        return [Curve(*parts) for parts in zip(nodes, *beside, strict=True)]
+        regions = (self.circle.tolist(), self.inside.tolist(), self.outside.tolist())
+        return [Curve(*parts) for parts in zip(nodes, *regions, strict=True)]
 
-    def chosen(self, those: Int) -> Curves:
-        """Return the curves `those` (k,)."""
-        counts = np.diff(self.first)[those]
-        node, first = self.node[ranges(self.first[those], counts)], np.concatenate([[0], np.cumsum(counts)])
-        return Curves(node, first, self.circle[those], self.inside[those], self.outside[those])
+    def chosen(self, some: Int) -> Curves:
+        """Return the curves `some` (k,)."""
+        counts = np.diff(self.first)[some]
+        node, first = self.node[ranges(self.first[some], counts)], np.concatenate([[0], np.cumsum(counts)])
+        return Curves(node, first, self.circle[some], self.inside[some], self.outside[some])
 
     @classmethod
     def joined(cls, parts: Sequence[Curves]) -> Curves:
-        """All of these, one after the other."""
+        """Join curves, one part after the other."""
         counts = np.concatenate([np.diff(part.first) for part in parts])
         return cls(
             np.concatenate([part.node for part in parts]),
@@ -180,11 +180,11 @@ WHOLE, IN_TILES = Sampling(65, 513, 17, 120_000), Sampling(17, 129, 17, 3_000_00
 
 @dataclass(frozen=True)
 class Stations:
-    """Nodes of c lines.
+    """Nodes on c lines.
 
     Attributes:
-        share: (n,) of the lengths of the lines, from 0 to 1.
-        first: (c + 1,) those of line k are from first[k] up to first[k + 1].
+        share: (n,) part of the line's length, from 0 to 1.
+        first: (c + 1,) line k has the nodes from first[k] up to first[k + 1].
         edges: int ds / h over all lines.
     """
 
@@ -198,34 +198,32 @@ class Stations:
         return np.repeat(np.arange(len(self.first) - 1), np.diff(self.first))
 
     @classmethod
-    def joined(cls, parts: Sequence[Stations], most: int) -> Stations:
+    def joined(cls, parts: Sequence[Stations], limit: int) -> Stations:
         """Return the nodes of all lines, part after part.
 
         Raises:
-            MeshError: they have more than `most` edges together.
+            MeshError: they have more than `limit` edges together.
         """
         edges = sum(part.edges for part in parts)
-        _refuse_many(edges, most)
+        _refuse_many(edges, limit)
         counts = np.concatenate([np.diff(part.first) for part in parts])
         return cls(np.concatenate([part.share for part in parts]), np.concatenate([[0], np.cumsum(counts)]), edges)
 
 
-def _refuse_many(edges: float, most: int) -> None:
-    if edges > most:
+def _refuse_many(edges: float, limit: int) -> None:
+    if edges > limit:
         raise MeshError(
             f"[cell] the lines of the cell need about {edges:.2g} nodes; expected at most "
-            f"{most}: make mesh_size and interface_size larger, or fibre_fraction or fibres smaller"
+            f"{limit}: make mesh_size and interface_size larger, or fibre_fraction or fibres smaller"
         )
 
 
 @dataclass(frozen=True)
 class EdgeSamples:
-    """The size of edges h sampled along c lines.
-
-    Samples of a line depend on it and on the sizes alone.
+    """The edge size h sampled along c lines, each by itself.
 
     Attributes:
-        share: (n,) of the lengths of the lines; samples of line k are from first[k] up to first[k + 1].
+        share: (n,) part of the line's length; line k has the samples from first[k] up to first[k + 1].
         density: (n,) ds / h.
         first: (c + 1,)
     """
@@ -235,12 +233,12 @@ class EdgeSamples:
     first: Int
 
     @classmethod
-    def of(cls, field: SizeField, lines: Lines, least: int) -> EdgeSamples:
-        """Return samples at `least` equidistant positions, and between them as far as the field asks for more."""
+    def of(cls, field: SizeField, lines: Lines, fewest: int) -> EdgeSamples:
+        """Take samples at `fewest` equidistant positions, and between them where the field asks for more."""
         lengths = lines.lengths
         count = len(lengths)
-        line, share = np.repeat(np.arange(count), least), np.tile(np.linspace(0, 1, least), count)
-        along = lines.points(line, share).reshape(count, least, 2)
+        line, share = np.repeat(np.arange(count), fewest), np.tile(np.linspace(0, 1, fewest), count)
+        along = lines.points(line, share).reshape(count, fewest, 2)
         sizes = np.minimum(field.on_lines(along).ravel(), lines.caps(line, share))
         while True:
             way = np.diff(share) * lengths[line[:-1]]
@@ -248,16 +246,16 @@ class EdgeSamples:
             if not wide.any():
                 break
             at = np.flatnonzero(wide) + 1
-            between, own = (share[at - 1] + share[at]) / 2, line[at]
-            more = np.minimum(field.at(lines.points(own, between)), lines.caps(own, between))
-            line, share, sizes = (np.insert(*x) for x in ((line, at, own), (share, at, between), (sizes, at, more)))
+            between, middle = (share[at - 1] + share[at]) / 2, line[at]
+            more = np.minimum(field.at(lines.points(middle, between)), lines.caps(middle, between))
+            line, share, sizes = (np.insert(*x) for x in ((line, at, middle), (share, at, between), (sizes, at, more)))
         return cls(share, lengths[line] / sizes, np.searchsorted(line, np.arange(count + 1)))
 
-    def stations(self, least: Int, most: int) -> Stations:
-        """Nodes equidistant in ds / h, so that lines have `least` (c,) edges or more.
+    def stations(self, fewest: Int, limit: int) -> Stations:
+        """Nodes equidistant in ds / h, so that lines have `fewest` (c,) edges or more.
 
         Raises:
-            MeshError: there would be more than `most`.
+            MeshError: there would be more than `limit`.
         """
         # int ds / h from the beginning of each line, by the trapezoidal rule.
         measure, counts, last = np.zeros(len(self.share)), np.diff(self.first), self.first[1:] - 1
@@ -266,8 +264,8 @@ class EdgeSamples:
             d, s = self.density[rows], self.share[rows]
             measure[rows[:, 1:]] = np.cumsum((d[:, 1:] + d[:, :-1]) / 2 * np.diff(s, axis=1), axis=1)
         total = measure[last]
-        _refuse_many(float(total.sum()), most)
-        edges = np.maximum(np.ceil(total - 1e-6).astype(int), least)
+        _refuse_many(float(total.sum()), limit)
+        edges = np.maximum(np.ceil(total - 1e-6).astype(int), fewest)
         first = np.concatenate([[0], np.cumsum(edges + 1)])
         line = np.repeat(np.arange(len(edges)), edges + 1)
         target = (np.arange(first[-1]) - first[line]) * (total / edges)[line]

@@ -1,4 +1,4 @@
-"""The lines of a cell with nodes on them, and what of them is found before: images, vertices, arcs, pieces of sides."""
+"""The lines of a cell with nodes on them, and before: images, vertices, arcs, pieces of sides."""
 
 from __future__ import annotations
 
@@ -30,9 +30,8 @@ class Outline:
     Attributes:
         points: (n, 2) nodes on all lines, exactly in place.
         curves: through the nodes.
-        ellipses: k circles and ellipses in the plane, the images of one disc after the other, that of a coating before
-            the one within.
-        disc: (k,) the disc of the arrangement that each circle is an image of.
+        ellipses: k circles and ellipses in the plane, disc by disc and image by image, each from without.
+        disc: (k,) whose image each circle is.
         around: (k,) the circle around each; MATRIX if there is none.
     """
 
@@ -75,9 +74,9 @@ class Numbering:
 
 
 def images(arrangement: Arrangement) -> tuple[Float, Int, Int]:
-    """Circles (k, 3) of the periodic images that reach into the cell, their fibres (k,), the circles around them (k,).
+    """Circles (k, 3) of periodic images that reach into the cell, their fibres (k,), the circles around them (k,).
 
-    Fibre by fibre, the circles of each image one after the other, from without.
+    They go fibre by fibre and image by image, each from without.
     """
     size, radii = arrangement.size, arrangement.outer_radii
     rank = np.arange(len(radii))
@@ -100,7 +99,7 @@ def images(arrangement: Arrangement) -> tuple[Float, Int, Int]:
 
 
 def nested(fibre: Int, coated: Bool) -> tuple[Int, Int, Int]:
-    """Return the order (k,) of outer curves, all (n,) before those within the coated (n,), from without one by one.
+    """Order outer curves (n,), and behind them the curves within coatings, fibre by fibre from without: (k,).
 
     Also, in this order, their fibres (k,), and the curves around them (k,).
     """
@@ -111,7 +110,7 @@ def nested(fibre: Int, coated: Bool) -> tuple[Int, Int, Int]:
 
 
 def crossings(circles: Float, axis: int, size: Float) -> Float:
-    """Sorted coordinates along `axis` of the vertices on the side at 0: corners and crossings of circles."""
+    """Sorted coordinates along `axis` on the side at 0: corners and crossings with circles."""
     depth, centre, radius = circles[:, 1 - axis], circles[:, axis], circles[:, 2]
     half = np.sqrt(np.maximum(radius**2 - depth**2, 0.0))
     crossing = np.concatenate([centre - half, centre + half])[np.tile(half > 0, 2)]
@@ -135,7 +134,7 @@ def side_curves(
     numbering: Numbering,
     sampling: Sampling,
 ) -> Curves:
-    """Return the pieces of the two sides along `axis`, with the same nodes on both.
+    """Return the pieces of both sides along `axis`, with the same nodes.
 
     `disc_at` returns the smallest closed curve around points, which is a number of `around` or MATRIX.
     """
@@ -152,8 +151,8 @@ def side_curves(
         crosses = np.zeros(len(inside), bool)
         crosses[:-1] |= into[1:] == inside[:-1]
         crosses[1:] |= into[:-1] == inside[1:]
-        least = np.where((inside == MATRIX) | crosses, 1, 2)
-        stations = samples.stations(least, sampling.most_nodes)
+        fewest = np.where((inside == MATRIX) | crosses, 1, 2)
+        stations = samples.stations(fewest, sampling.most_nodes)
         piece, first = stations.line, stations.first
         along = begin[piece] + span[piece] * stations.share
         along[first[:-1]], along[first[1:] - 1] = begin, places[1:]
@@ -169,33 +168,33 @@ def side_curves(
 def disc_at(circles: Float, points: Float) -> Int:
     """Return the smallest circle (k,) around each point on a line, or MATRIX."""
     beyond = circles[:, :2] - np.clip(circles[:, :2], points.min(axis=0), points.max(axis=0))
-    near = np.flatnonzero(np.linalg.norm(beyond, axis=1) < circles[:, 2])
-    if not len(near):
+    close = np.flatnonzero(np.linalg.norm(beyond, axis=1) < circles[:, 2])
+    if not len(close):
         return np.full(len(points), MATRIX)
-    own = circles[near]
-    holds = np.linalg.norm(points[:, None] - own[:, :2], axis=2) < own[:, 2]
-    return np.where(holds.any(axis=1), near[np.where(holds, own[:, 2], np.inf).argmin(axis=1)], MATRIX)
+    candidates = circles[close]
+    holds = np.linalg.norm(points[:, None] - candidates[:, :2], axis=2) < candidates[:, 2]
+    return np.where(holds.any(axis=1), close[np.where(holds, candidates[:, 2], np.inf).argmin(axis=1)], MATRIX)
 
 
 def vertex_angles(circles: Float, curve: Int, border: Float, marks: Mapping[int, Sequence[float]]) -> OnCircles:
-    """Circle (v,) and angle (v,) in [0, 2 pi) of the vertices of circles: crossings of the sides, and the marks."""
-    near = cKDTree(border).query_ball_point(circles[:, :2], circles[:, 2] * (1 + SAME_PLACE))
-    number = np.repeat(np.arange(len(circles)), [len(candidates) for candidates in near])
-    offset = border[np.concatenate([np.zeros(0, np.int64), *filter(len, near)]).astype(int)] - circles[number, :2]
+    """Circle (v,) and angle (v,) in [0, 2 pi) of all vertices: crossings with sides, and marks."""
+    close = cKDTree(border).query_ball_point(circles[:, :2], circles[:, 2] * (1 + SAME_PLACE))
+    number = np.repeat(np.arange(len(circles)), [len(candidates) for candidates in close])
+    offset = border[np.concatenate([np.zeros(0, np.int64), *filter(len, close)]).astype(int)] - circles[number, :2]
     on_it = np.linalg.norm(offset, axis=1) > circles[number, 2] * (1 - SAME_PLACE)
     number, offset = number[on_it], offset[on_it]
     angle = np.arctan2(offset[:, 1], offset[:, 0]) % TURN
-    for own in np.flatnonzero(np.isin(curve, list(marks))).tolist():
-        for mark in np.radians(marks[int(curve[own])]) % TURN:
-            if all(abs((mark - other + np.pi) % TURN - np.pi) > MERGED for other in angle[number == own]):
-                number, angle = np.append(number, own), np.append(angle, mark)
+    for circle in np.flatnonzero(np.isin(curve, list(marks))).tolist():
+        for mark in np.radians(marks[int(curve[circle])]) % TURN:
+            if all(abs((mark - other + np.pi) % TURN - np.pi) > MERGED for other in angle[number == circle]):
+                number, angle = np.append(number, circle), np.append(angle, mark)
     return number, angle
 
 
 def arcs_within(
     n_curves: int, curve: Int, angle: Float, at: Callable[[Int, Float], Float], size: Float
 ) -> tuple[Int, Float, Float]:
-    """Curve, start and stop angle (a,) of the arcs within the cell, each at most a quarter turn.
+    """Divide curves into arcs within the cell, at most a quarter turn each: curve, start and stop angle (a,).
 
     Closed curve curve[v] has a vertex at angle[v]; one without any gets one at 0. at(curves, angles) are the points
     (a, 2) there.
@@ -229,7 +228,7 @@ def tip_vertices(
     places (t, 2) of marks on fibres (t,), within coatings (t,) or not.
     """
     curves = {*range(len(arrangement.radii)), *(~np.flatnonzero(arrangement.coated)).tolist()}
-    pairs = [(curve, mark) for curve, own in marks.items() if curve in curves for mark in own]
+    pairs = [(curve, mark) for curve, angles in marks.items() if curve in curves for mark in angles]
     curve, mark = np.array([k for k, _ in pairs], np.int64), np.array([mark for _, mark in pairs])
     places = at(np.where(curve < 0, ~curve, curve), curve < 0, np.radians(mark))
     size = arrangement.size

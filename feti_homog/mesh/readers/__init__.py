@@ -1,4 +1,4 @@
-"""Meshes of users: gmsh, Abaqus, VTK and Medit files, their checks, and the curves that their interfaces follow.
+"""Users' meshes: gmsh, Abaqus, VTK and Medit files, their checks, and curves along interfaces.
 
 Imports `case`, `mesh`, `mesh.tiles`, `microstructure`, `schema` and `system`.  Main entry: `msh_reader.read`.
 """

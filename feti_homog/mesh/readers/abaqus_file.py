@@ -32,10 +32,10 @@ BY_SECTION, BY_SET, BY_ELEMENTS = range(3)
 
 
 def load(path: Path) -> RawMesh:
-    """Read the triangles of three or six nodes, and the lines of two or three, of an input file with one part.
+    """Read triangles with three or six nodes, and lines with two or three, from an input file with one part.
 
-    The phase of a triangle and the curve of a line is its set that a *SOLID SECTION names, else that of an *ELSET, else
-    the ELSET of *ELEMENT; names are in lower case unless quoted.
+    A triangle's phase and a line's curve is its set that a *SOLID SECTION names, else its *ELSET, else the ELSET on
+    *ELEMENT; names are in lower case unless quoted.
 
     Raises:
         OSError: the file cannot be read.
@@ -55,7 +55,7 @@ def load(path: Path) -> RawMesh:
 
 @dataclass
 class _Content:
-    """Nodes, triangles and lines (each with its nodes) of a file, and its sets with their elements.
+    """Nodes, triangles and lines (each with its nodes) in a file, and its sets with their elements.
 
     Attributes:
         budget: how many members sets may still get from ranges and from other sets.
@@ -138,7 +138,7 @@ class _Content:
                 members.update(part)
 
     def _range(self, row: list[str]) -> Iterator[range]:
-        """Yield the numbers from the first to the last, in steps of the third or of one."""
+        """Yield the numbers from the first to the last, in steps by the third or one."""
         first, last, step = [*map(_integer, row), 1][:3] if len(row) in (2, 3) else (0, 0, 0)
         if step < 1 or last < first:
             raise ValueError(f"{', '.join(row)}: expected the first element, the last and a step of at least 1")
@@ -158,7 +158,7 @@ class _Content:
         """Return the names of the sets from which each element has its phase."""
         labels: dict[int, tuple[str, ...]] = {}
         for level in (BY_ELEMENTS, BY_SET, BY_SECTION):
-            labels |= _names_of((name, members) for (own, name), members in self.sets.items() if own == level)
+            labels |= _names_of((name, members) for (priority, name), members in self.sets.items() if priority == level)
         return labels
 
     def curves(self) -> dict[str, Int]:
@@ -170,7 +170,7 @@ class _Content:
             for name in labels.get(tag, ()):
                 if name not in with_triangles:
                     ends.setdefault(name, []).append([nodes[0], nodes[-1]])
-        return {name: np.array(own, np.int64) for name, own in ends.items()}
+        return {name: np.array(pairs, np.int64) for name, pairs in ends.items()}
 
     def faults(self) -> list[str]:
         """List the lack of triangles, unknown nodes, sections of unknown sets."""
@@ -190,8 +190,8 @@ def _raw(content: _Content) -> RawMesh:
     for name, (material, members) in zip(content.materials, made_of, strict=True):
         content.sets.setdefault((BY_SECTION, material if by_material else name), set()).update(members)
     labels = content.labels()
-    others = _names_of(made_of + [(name, members) for (_, name), members in content.sets.items()])
-    names_of = {tag: (labels.get(tag, ()), others.get(tag, ())) for tag in content.triangles}
+    all_names = _names_of(made_of + [(name, members) for (_, name), members in content.sets.items()])
+    names_of = {tag: (labels.get(tag, ()), all_names.get(tag, ())) for tag in content.triangles}
     place = {names: k for k, names in enumerate(dict.fromkeys(names_of.values()))}
     groups, aliases = zip(*place, strict=True)
     parts = []
@@ -209,7 +209,7 @@ def _names_of(sets: Iterable[tuple[str, set[int]]]) -> dict[int, tuple[str, ...]
     for name, members in sets:
         for tag in members:
             names.setdefault(tag, {})[name] = None
-    return {tag: tuple(own) for tag, own in names.items()}
+    return {tag: tuple(unique) for tag, unique in names.items()}
 
 
 def _integer(word: str) -> int:

@@ -131,11 +131,11 @@ def resolved(word: str) -> str:
     return keywords.pop()
 
 
-def _parameters(keyword: str, words: Iterable[str]) -> dict[str, str]:
-    """Return the parameters of a keyword by their full names; ValueError if one that is not read may matter."""
+def _parameters(keyword: str, parts: Iterable[str]) -> dict[str, str]:
+    """Return a keyword's parameters by their full names; ValueError if an unread one may matter."""
     names = OF_SECTIONS if keyword.endswith("SECTION") else READ.get(keyword) or ()
     values = {}
-    for word in words:
+    for word in parts:
         name, _, value = word.partition("=")
         name = name.strip().upper()
         longer = [full for full in names if full.startswith(name)]

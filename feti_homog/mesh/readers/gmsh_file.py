@@ -45,7 +45,7 @@ def load(path: Path) -> RawMesh:
         raise MeshError(*faults)
     triangles, groups = _triangles(content, elements)
     names, aliases = (
-        [tuple(map(name, own)) for own in groups] for name in (partial(content.name, 2), "number {}".format)
+        [tuple(map(name, group)) for group in groups] for name in (partial(content.name, 2), "number {}".format)
     )
     return assembled(tags, points, triangles, names, curves, aliases=aliases)
 
@@ -64,7 +64,7 @@ def _triangles(content: MshContent, elements: Mapping[int, Elements]) -> tuple[l
 
 def _misnumbered(tags: Int, elements: Mapping[int, Elements]) -> list[str]:
     """List numbers that are there twice, or else, of each type, the first element with a lost node."""
-    numbers = np.concatenate([np.zeros(0, np.int64), *(own for own, _, _ in elements.values())])
+    numbers = np.concatenate([np.zeros(0, np.int64), *(tag for tag, _, _ in elements.values())])
     faults = []
     for name, ordered in (("node", np.sort(tags)), ("element", np.sort(numbers))):
         twice = np.unique(ordered[1:][ordered[1:] == ordered[:-1]])
@@ -106,14 +106,14 @@ def _without_lines(content: MshContent, curves: Mapping[str, Int]) -> list[str]:
 def _curves(content: MshContent, elements: Mapping[int, Elements]) -> dict[str, Int]:
     """Return the nodes (d, 2) at the ends of the lines in each physical curve."""
     entities = [
-        (group, entity) for (dimension, entity), own in content.groups.items() if dimension == 1 for group in own
+        (group, entity) for (dimension, entity), groups in content.groups.items() if dimension == 1 for group in groups
     ]
     curves: dict[str, Int] = {}
     for group, entity in sorted(set(entities)):
         name = content.name(1, group)
         curves.setdefault(name, np.zeros((0, 2), np.int64))
         for kind in (kind for kind in LINES if kind in elements):
-            _, nodes, own = elements[kind]
-            ends = nodes[slice(*np.searchsorted(own, (entity, entity + 1))), :2]
+            _, nodes, groups = elements[kind]
+            ends = nodes[slice(*np.searchsorted(groups, (entity, entity + 1))), :2]
             curves[name] = np.concatenate([curves[name], ends])
     return curves

@@ -1,4 +1,4 @@
-"""The checks of a user's mesh: each function finds one kind of fault and names the first offenders."""
+"""Checks for users' meshes: each function finds one kind of fault and names the first offenders."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ ROUNDING = 1e-6
 
 
 def _listed(before: str, items: Sequence[Any] | Int | Int32, name: Callable[..., str], after: str = "") -> list[str]:
-    """Return one fault about all items, of which the first few are named; none if there are no items."""
+    """Return one fault that names the first few items; no fault without items."""
     return [f"{before}{first_of(map(name, items), len(items))}{after}"] if len(items) else []
 
 
@@ -141,7 +141,7 @@ def overlapping(mesh: RawMesh) -> list[str]:
 
 
 def hanging_nodes(mesh: RawMesh, plane: Float, size: Float) -> list[str]:
-    """List nodes within edges of one triangle only that are not on the boundary of the cell.
+    """List nodes within edges that one triangle has and that are not on the cell's boundary.
 
     `plane` (n, 2) are positions with the lower left corner at the origin, nodes on sides exactly there.
     """
@@ -231,14 +231,16 @@ def _no_partner(axis: int, side: int) -> str:
 
 
 def unmatched_sides(raw: RawMesh, mesh: CoarseMesh) -> list[str]:
-    """List edges on a side of the cell whose image on the opposite side is no edge: a void lies along the side."""
+    """List edges on a side whose image on the opposite side is no edge: a void lies along the side."""
     pairs, faults = edges(mesh.triangles), []
     for axis, side in SIDES:
         levels = (k * mesh.period[axis] for k in (side, 1 - side))
-        here, there = (pairs[np.all(mesh.points[pairs, axis] == level, axis=1)] for level in levels)
-        keys, images = (edge_keys(mesh.representative[own].astype(np.int32), len(mesh.points)) for own in (here, there))
+        sides, opposite = (pairs[np.all(mesh.points[pairs, axis] == level, axis=1)] for level in levels)
+        keys, images = (
+            edge_keys(mesh.representative[some].astype(np.int32), len(mesh.points)) for some in (sides, opposite)
+        )
         faults += _listed(
-            f"not periodic, edges of the {_no_partner(axis, side)}", here[~np.isin(keys, images)], raw.edge
+            f"not periodic, edges of the {_no_partner(axis, side)}", sides[~np.isin(keys, images)], raw.edge
         )
     return faults
 

@@ -100,39 +100,39 @@ def read(content: bytes) -> MshContent:
 
 
 def _section(content: bytes, place: int) -> tuple[str, int]:
-    """Return the name of the section that begins at a place, and the place of its first line."""
+    """Return the name of the section that begins at a place, and where its first line begins."""
     header = HEADER.match(content, place)
     name = "" if header is None else header[1].decode(errors="replace")
     if header is None or (name not in READERS and name not in OTHERS):
-        line, words = content.count(b"\n", 0, place) + 1, content[place : place + 80].partition(b"\n")[0]
-        text = toml_value(words.decode(errors="replace").strip())
+        line, start = content.count(b"\n", 0, place) + 1, content[place : place + 80].partition(b"\n")[0]
+        text = toml_value(start.decode(errors="replace").strip())
         raise MeshError(f"line {line}: {text}: expected a section of a mesh, such as $Nodes, or $Comments")
     return name, header.end() + 1
 
 
 def _format(content: bytes, start: int) -> tuple[str, str]:
     """Version of the file and the byte order, none if it is text."""
-    version, *words = content[start : start + 80].partition(b"\n")[0].decode(errors="replace").split() or [""]
+    version, *rest = content[start : start + 80].partition(b"\n")[0].decode(errors="replace").split() or [""]
     number = float(version) if re.fullmatch(r"[0-9]\.?[0-9]{0,9}", version) else 0.0
     if number not in VERSIONS:
         raise MeshError(f"format {toml_value(version)} of gmsh: expected 2.2, 4.0 or 4.1")
-    if words not in (["0", "8"], ["1", "8"]):
-        raise MeshError(f"$MeshFormat: {toml_value(' '.join(words))}: expected 0 8 of text and 1 8 of binary files")
+    if rest not in (["0", "8"], ["1", "8"]):
+        raise MeshError(f"$MeshFormat: {toml_value(' '.join(rest))}: expected 0 8 of text and 1 8 of binary files")
     one = content.find(b"\n", start) + 1
     order = {b"\1\0\0\0": "<", b"\0\0\0\1": ">"}.get(content[one : one + 4], "")
-    if words[0] == "1" and not order:
+    if rest[0] == "1" and not order:
         raise MeshError("$MeshFormat: there is no number one that gives the byte order")
-    return VERSIONS[number], order if words[0] == "1" else ""
+    return VERSIONS[number], order if rest[0] == "1" else ""
 
 
 def _names(content: bytes, start: int) -> dict[tuple[int, int], str]:
     text = content[start : end_of("PhysicalNames", content, start)]
-    found = NAME.findall(text)
+    entries = NAME.findall(text)
     count = text.split(maxsplit=1)[:1]
-    if count != [str(len(found)).encode()]:
-        raise MeshError(f"$PhysicalNames: {len(found)} names, and not as many as its first line announces")
-    names = {(int(dimension), int(number)): name.decode(errors="replace") for dimension, number, name in found}
-    if len(names) < len(found):
+    if count != [str(len(entries)).encode()]:
+        raise MeshError(f"$PhysicalNames: {len(entries)} names, and not as many as its first line announces")
+    names = {(int(dimension), int(number)): name.decode(errors="replace") for dimension, number, name in entries}
+    if len(names) < len(entries):
         raise MeshError("$PhysicalNames: one of the numbers has two names")
     return names
 
@@ -176,20 +176,20 @@ def _nodes(section: Section, version: str, result: MshContent) -> None:
 
 
 def _parametric_nodes(section: Section, version: str, result: MshContent) -> None:
-    """Read the nodes of version 2 whose parameters, one or two on curves and surfaces, come after their entity."""
-    count, words = section.line(), section.rest()
+    """Read nodes in version 2 whose parameters, one or two on curves and surfaces, follow their entity."""
+    count, values = section.line(), section.rest()
     width = 2 if section.order else 1  # of a real number
-    place = np.arange(max(len(words) - 3 * width - 2, 0))
-    dimension = words[place + 1 + 3 * width]
+    place = np.arange(max(len(values) - 3 * width - 2, 0))
+    dimension = values[place + 1 + 3 * width]
     is_known = np.isin(dimension, (0, 1, 2, 3))
     after = place + 3 + width * (3 + PARAMETERS[np.where(is_known, dimension, 0).astype(int)])
-    rows = chain(np.where(is_known, after, len(words) + 1))[:count]
-    if count == 0 or len(rows) < count or after[rows[-1]] > len(words):
+    rows = chain(np.where(is_known, after, len(values) + 1))[:count]
+    if count == 0 or len(rows) < count or after[rows[-1]] > len(values):
         section.refuse(f"{count} nodes should follow, and do not")
-    points = words[rows[:, None] + 1 + np.arange(3 * width)]
+    points = values[rows[:, None] + 1 + np.arange(3 * width)]
     if section.order:
         points = points.astype(f"{section.order}i4").view(f"{section.order}f8").astype(float)
-    result.nodes.append((section.checked(words[rows]), points))
+    result.nodes.append((section.checked(values[rows]), points))
     section.skip(int(after[rows[-1]]))
 
 
@@ -212,70 +212,70 @@ def _elements(section: Section, version: str, result: MshContent) -> None:
         width = 1 + KINDS[kind][3]
         rows = section.whole(count * width, size).reshape(-1, width)
         result.elements[kind].append((rows[:, 0], rows[:, 1:], np.full(count, entity)))
-    found = sum(len(numbers) for own in result.elements.values() for numbers, *_ in own)
-    if found != total:
-        section.refuse(f"{total} elements are announced, and {found} are there")
+    count_read = sum(len(numbers) for blocks_read in result.elements.values() for numbers, *_ in blocks_read)
+    if count_read != total:
+        section.refuse(f"{total} elements are announced, and {count_read} are there")
 
 
 def _elements_of_version_2(section: Section, result: MshContent) -> None:
-    """Read elements: number, type, count of tags, tags, nodes.
+    """Read elements: number, type, tag count, tags, nodes.
 
-    In binary files type, count of elements and count of tags stand before several of them.
+    In binary files type, element count and tag count stand before several elements.
     """
-    count, words = section.line(), section.rest()
+    count, values = section.line(), section.rest()
     if count == 0:
         return
-    starts = _row_starts(section, words, count)
+    starts = _row_starts(section, values, count)
     if not section.order:
-        _add_rows(result, words, starts, words[starts + 1], starts + 3, words[starts + 2])
-        section.skip(len(words))
+        _add_rows(result, values, starts, values[starts + 1], starts + 3, values[starts + 2])
+        section.skip(len(values))
         return
-    kind, several, tags = words[starts[:, None] + np.arange(3)].T
+    kind, several, tags = values[starts[:, None] + np.arange(3)].T
     width = 1 + tags + NODES[kind]
     block, first = np.repeat(np.arange(len(starts)), several), np.cumsum(several) - several
     row = starts[block] + 3 + (np.arange(count) - first[block]) * width[block]
-    _add_rows(result, words, row, kind[block], row + 1, tags[block])
+    _add_rows(result, values, row, kind[block], row + 1, tags[block])
     section.skip(int(starts[-1] + 3 + several[-1] * width[-1]))
 
 
-def _row_starts(section: Section, words: Int, count: int) -> Int:
-    """Places where the rows of elements begin, or several of them in binary files: a row's beginning gives its end."""
-    heads = max(len(words) - 2, 0)
-    kind, tags = words[0 if section.order else 1 :][:heads], words[2:]
-    several = words[1:][:heads] if section.order else np.ones(heads, np.int64)
+def _row_starts(section: Section, values: Int, count: int) -> Int:
+    """Find where element rows begin, or several rows in binary files: a row's beginning gives its end."""
+    heads = max(len(values) - 2, 0)
+    kind, tags = values[0 if section.order else 1 :][:heads], values[2:]
+    several = values[1:][:heads] if section.order else np.ones(heads, np.int64)
     corners = NODES[np.clip(kind, 0, len(NODES) - 1)]
     length = (3 if section.order else 2) + several * (1 + tags + corners)
     is_row = (corners > 0) & (tags >= 0) & (several > 0)
-    after = np.where(is_row, np.arange(heads) + length, len(words) + 1)
+    after = np.where(is_row, np.arange(heads) + length, len(values) + 1)
     starts = chain(after)
     total = np.cumsum(several[starts])
     starts = starts[total - several[starts] < count] if section.order else starts
     last = starts[-1] if len(starts) else 0
     if len(starts) and corners[last] == 0:
         section.refuse(f"elements of type {kind[last]}: only triangles of three or six nodes can be used")
-    if len(starts) and after[last] > len(words):
+    if len(starts) and after[last] > len(values):
         section.refuse("the file is damaged or broken off in its elements")
     if several[starts].sum() != count:
         section.refuse(f"{count} elements are announced, and {several[starts].sum()} are there")
     return starts
 
 
-def _add_rows(result: MshContent, words: Int, row: Int, kind: Int, tag: Int, tags: Int) -> None:
-    """Add the elements with their numbers at `row`, the first of their tags at `tag` and the nodes behind the tags."""
-    group, entity = (np.where(tags > k, words[np.minimum(tag + k, len(words) - 1)], 0) for k in (0, 1))
+def _add_rows(result: MshContent, values: Int, row: Int, kind: Int, tag: Int, tags: Int) -> None:
+    """Add elements with their numbers at `row`, their first tags at `tag` and nodes behind the tags."""
+    group, entity = (np.where(tags > k, values[np.minimum(tag + k, len(values) - 1)], 0) for k in (0, 1))
     # Other programs write physical groups alone: each stands for an entity.
     entity = np.where(entity == 0, -np.abs(group), entity)
-    found = defaultdict[tuple[int, int], set[int]](set)
-    for each in np.unique(kind).tolist():
-        _, dimension, _, corners = KINDS[each]
-        own = np.flatnonzero(kind == each)
-        nodes = words[(tag + tags)[own, None] + np.arange(corners)]
-        result.elements[each].append((words[row[own]], nodes, entity[own]))
-        pairs = np.column_stack([entity[own], np.abs(group[own])])
+    physical_groups = defaultdict[tuple[int, int], set[int]](set)
+    for code in np.unique(kind).tolist():
+        _, dimension, _, corners = KINDS[code]
+        members = np.flatnonzero(kind == code)
+        nodes = values[(tag + tags)[members, None] + np.arange(corners)]
+        result.elements[code].append((values[row[members]], nodes, entity[members]))
+        pairs = np.column_stack([entity[members], np.abs(group[members])])
         changes = np.append(True, (pairs[1:] != pairs[:-1]).any(axis=1))
         for number, physical in np.unique(pairs[changes], axis=0).tolist():
-            found[dimension, number] |= {physical} - {0}
-    result.groups |= {entity: tuple(sorted(groups)) for entity, groups in found.items()}
+            physical_groups[dimension, number] |= {physical} - {0}
+    result.groups |= {entity: tuple(sorted(groups)) for entity, groups in physical_groups.items()}
 
 
 READERS: dict[str, Callable[[Section, str, MshContent], None]] = {

@@ -1,4 +1,4 @@
-"""A user's mesh: read from a file, moved onto a rectangle, checked, and made into the coarse mesh of the cell."""
+"""A user's mesh: read from a file, moved onto a rectangle, checked, and made into a coarse mesh."""
 
 from __future__ import annotations
 
@@ -47,13 +47,13 @@ def read_cell(cell: Cell) -> CoarseMesh:
 def read(
     path: Path, snap: float | None = None, phases: Selectors = MappingProxyType({}), has_voids: bool = False
 ) -> CoarseMesh:
-    """Return the coarse mesh in a file of one of the LOADERS, moved to [0, width] x [0, height].
+    """Read the coarse mesh from a file that one of the LOADERS reads, moved to [0, width] x [0, height].
 
-    It consists of triangles of three or six nodes, in either sense, in physical surfaces "matrix", "fibre", "glass",
+    It consists of triangles with three or six nodes, in either sense, in physical surfaces "matrix", "fibre", "glass",
     ..., fills a rectangle but for voids, if it `has_voids`, and has matching nodes on opposite sides. Lines in curve
     "debonded" are edges between a fibre and the matrix that are debonded. Round interfaces become circles
     (`with_circles`), elliptic ones ellipses (`with_ellipses`); others follow their middle nodes (`with_bent_edges`).
-    `phases` are names and numbers in the file of the phases, if these are not their names (`with_phases`).
+    `phases` maps phases to their names and numbers in the file, where these differ (`with_phases`).
     With `snap`, nodes on sides are first moved by up to that / width to where they should be (`snapped`).
 
     Raises:
@@ -137,12 +137,12 @@ def _coarse_mesh(raw: RawMesh, plane: Float, size: Float) -> CoarseMesh:
 
 
 def snapped(raw: RawMesh, tolerance: float) -> tuple[RawMesh, float]:
-    """Move the outer nodes onto the sides of a rectangle, opposite each other; also how far, at most.
+    """Move the outer nodes onto a rectangle's sides, opposite each other; also how far, at most.
 
-    A side lies at the median of the nodes within `tolerance`, relative to the width, of the outermost. Partners, each
-    other's nearest within the tolerance along the side, both move to the middle between them. Middle nodes of
-    second-order triangles are then midway between the ends of their edges on sides. Nodes that are farther stay where
-    they are, for the checks to report.
+    A side lies at the median among nodes within `tolerance`, relative to the width, from the outermost. Partners, each
+    other's nearest within the tolerance along the side, both move to the middle between them. On sides, middle nodes
+    in second-order triangles are then midway between the ends of their edges. Nodes that are farther stay where they
+    are, for the checks to report.
     """
     plane = raw.points[:, :2].copy()
     pairs = edges(raw.triangles)
@@ -179,7 +179,7 @@ def _match(plane: Float, low: Int, high: Int, along: int, reach: float) -> None:
 
 
 def _lattice(plane: Float, triangles: Int32) -> list[str]:
-    """Return the fault of triangles that fill a parallelogram or a hexagon, with the rectangle of the same lattice."""
+    """Return the fault if triangles fill a parallelogram or a hexagon, with a rectangle for the same lattice."""
     hull = ConvexHull(plane)
     corners = plane[hull.vertices]
     before, after = corners - np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0) - corners
@@ -201,7 +201,7 @@ def _lattice(plane: Float, triangles: Int32) -> list[str]:
 
 
 def _rectangle(first: Float, second: Float) -> str:
-    """Return the smallest rectangle of the lattice of two vectors in words, and how to make it."""
+    """Describe the smallest rectangle in the lattice of two vectors, and how to make it."""
     numbers = range(-LARGEST_MULTIPLE, LARGEST_MULTIPLE + 1)
     vectors = np.array([m * first + n * second for m, n in product(numbers, numbers) if (m, n) != (0, 0)])
     right = vectors[(vectors[:, 0] > 0) | ((vectors[:, 0] == 0) & (vectors[:, 1] > 0))]
@@ -212,12 +212,12 @@ def _rectangle(first: Float, second: Float) -> str:
     if not np.isfinite(area).any():
         return 'shear its lattice to a ratio of integers, see "Lattices that are no rectangle" in meshes/README.md'
     slope = np.minimum(*np.abs(right.T)) / length
-    least = area.min()
+    smallest = area.min()
     # Of equal ones the rectangle along the axes.
-    pairs = np.argwhere(area < least * (1 + RIGHT))
+    pairs = np.argwhere(area < smallest * (1 + RIGHT))
     i, j = min(pairs.tolist(), key=lambda pair: (round(float(slope[pair[0]]), 6), float(length[pair[0]])))
     u, v = sorted((right[i], vectors[j]), key=lambda w: abs(w[1]))
-    count = round(float(least / abs(np.cross(first, second))))
+    count = round(float(smallest / abs(np.cross(first, second))))
     sizes = " x ".join(f"{np.linalg.norm(w):.6g}" for w in (u, v))
     turned = "" if abs(u[1]) <= RIGHT * abs(u[0]) else f", along {at(u)}: turn the lattice first"
     copies = f"copies of the cell moved by {at(first)} and {at(second)}"
@@ -226,7 +226,7 @@ def _rectangle(first: Float, second: Float) -> str:
 
 
 def _shift(plane: Float, triangles: Int32, size: Float) -> str:
-    """Return the shift of a cell that puts its corners into material, in words; empty if none is found."""
+    """Describe a shift that puts the cell's corners into material; empty if none is found."""
     a, b, c = np.moveaxis(plane[triangles], 1, 0)
     for fractions in product(SHIFTS, SHIFTS):
         place = np.array(fractions) * size

@@ -1,4 +1,4 @@
-"""Phases of a user's mesh by the names and numbers that its file has, as [cell.phases] maps them."""
+"""Phases in a user's mesh by names and numbers in its file, as [cell.phases] maps them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Selectors = Mapping[str, tuple[str | int, ...]]
 
 
 def with_phases(mesh: RawMesh, phases: Selectors) -> RawMesh:
-    """Return the mesh whose groups have the phases that select one of their names, or else of their aliases.
+    """Give groups the phases that select one of their names, or else of their aliases.
 
     Other groups keep their names. `debonded` selects curves.
 
@@ -59,7 +59,7 @@ def _selecting(names: tuple[str, ...], phase_of: Mapping[str, str]) -> tuple[str
 
 
 def _key(name: str | int) -> str:
-    """Return a name, or the number of a group without one, such that capitals do not matter."""
+    """Return a name, or the number of a nameless group, such that capitals do not matter."""
     return (f"number {name}" if isinstance(name, int) else name).casefold()
 
 
@@ -107,7 +107,7 @@ def _surrounding(mesh: RawMesh) -> str:
     It is connected around the periodic cell along both axes: on a torus of 3 x 3 cells all copies of an element of it
     are in one connected part.
     """
-    names = [own[0] if own else "" for own in mesh.groups]
+    names = [group[0] if group else "" for group in mesh.groups]
     number = np.unique(names, return_inverse=True)[1][mesh.group]
     low, size = mesh.points[:, :2].min(axis=0), np.ptp(mesh.points[:, :2], axis=0)
     middles = (mesh.points[edges(mesh.triangles), :2].mean(axis=1) - low) / size
@@ -120,21 +120,21 @@ def _surrounding(mesh: RawMesh) -> str:
     step = np.rint(middles[one] - middles[other]).astype(np.int64)
     copies = np.indices((3, 3)).reshape(2, -1, 1)
     i, j = (copies[axis] + step[:, axis] for axis in (0, 1))
-    left = one // 3 + count * (3 * copies[0] + copies[1])
-    right = other // 3 + count * (3 * (i % 3) + j % 3)
-    parts = components(9 * count, left.ravel(), right.ravel()).reshape(9, count)
+    first = one // 3 + count * (3 * copies[0] + copies[1])
+    second = other // 3 + count * (3 * (i % 3) + j % 3)
+    parts = components(9 * count, first.ravel(), second.ravel()).reshape(9, count)
     around = np.flatnonzero((parts == parts[0]).all(axis=0))
     return names[mesh.group[around[0]]] if len(around) else ""
 
 
 def known_names(mesh: RawMesh, of_curves: bool = False) -> str:
-    """Return the names of the groups, or of the curves, in words; numbers stand for those without a name."""
+    """List the names of groups, or of curves; numbers stand for nameless ones."""
     names = _names(mesh, of_curves)
     return f"the file has {first_of(map(_as_selected, names), len(names), 20) or 'none'}"
 
 
 def _names(mesh: RawMesh, of_curves: bool) -> list[str]:
-    named = list(mesh.curves) if of_curves else [name for own in (*mesh.groups, *mesh.aliases) for name in own]
+    named = list(mesh.curves) if of_curves else [name for group in (*mesh.groups, *mesh.aliases) for name in group]
     return list(dict.fromkeys(named))
 
 

@@ -22,11 +22,11 @@ MUCH_LARGER = 2.0
 
 @dataclass(frozen=True)
 class MiddleNodes:
-    """Middle nodes of k sides of triangles; a side of two triangles is listed twice.
+    """Middle nodes on k triangle sides; a side that two triangles share is listed twice.
 
     Attributes:
-        edges: (k, 2) corner nodes at the ends of each side, numbered from 0.
-        tags: (k,) the file's numbers of the middle nodes.
+        edges: (k, 2) corner nodes at the ends, numbered from 0.
+        tags: (k,) their numbers in the file.
         points: (k, 3) their positions.
     """
 
@@ -40,7 +40,7 @@ class MiddleNodes:
         return cls(np.zeros((0, 2), np.int32), np.zeros(0, np.int64), np.zeros((0, 3)))
 
     def between(self, pairs: Int32) -> Float:
-        """(p, 2) the middle node between each pair (p, 2) of corner nodes; NaN where there is none."""
+        """(p, 2) the middle node between each pair (p, 2) of corners; NaN where there is none."""
         nodes = int(max(self.edges.max(initial=0), pairs.max(initial=0))) + 1
         keys, first = np.unique(edge_keys(self.edges, nodes), return_index=True)
         sought = edge_keys(pairs, nodes)
@@ -54,18 +54,18 @@ class MiddleNodes:
 
 @dataclass(frozen=True)
 class RawMesh:
-    """Triangles of a mesh file: nodes in use with their tags, elements with their tags and group.
+    """Triangles in a mesh file: nodes in use with their tags, elements with their tags and group.
 
     Attributes:
-        node_tags: (n,) the file's numbers of the nodes.
+        node_tags: (n,) node numbers in the file.
         points: (n, 3) their positions.
-        element_tags: (m,) the file's numbers of the elements.
+        element_tags: (m,) element numbers in the file.
         triangles: (m, 3) nodes, numbered from 0.
-        group: (m,) index into `groups`, the names of the physical surfaces or sets that the elements belong to.
-        curves: (d, 2) node tags of the ends of the lines in each physical curve or set of lines, by its name.
-        middles: the middle nodes of second-order triangles.
-        aliases: other names of each group, by which a case may select it; may be empty.
-        container, curve_container: what the file calls a group, and an entry of `curves`.
+        group: (m,) index into `groups`, names of the physical surfaces or sets that elements belong to.
+        curves: (d, 2) node tags at the line ends in each physical curve or line set, by its name.
+        middles: the middle nodes in second-order triangles.
+        aliases: other names for each group, by which a case may select it; may be empty.
+        container, curve_container: the file's words for a group, and for an entry in `curves`.
     """
 
     node_tags: Int
@@ -112,13 +112,13 @@ def first_of(names: Iterable[str], total: int, shown: int = 3) -> str:
 
 @dataclass(frozen=True)
 class Block:
-    """m triangles or quadrilaterals of a file.
+    """m triangles or quadrilaterals in a file.
 
     Attributes:
         tags: (m,) their numbers.
-        nodes: (m, 3), (m, 6), (m, 4), (m, 8) or (m, 9) the numbers of their nodes: corners, then middles of the edges
-            01, 12, ... of second-order ones, then inner ones.
-        group: (m,) of each.
+        nodes: (m, 3), (m, 6), (m, 4), (m, 8) or (m, 9) their node numbers: corners, then, in second-order ones,
+            middles on the edges 01, 12, ..., then inner ones.
+        group: (m,) by element.
     """
 
     tags: Int

@@ -1,4 +1,4 @@
-"""Curves of a user's interfaces: circles and ellipses, closed on the torus, and arcs through middle nodes."""
+"""Curves along users' interfaces: circles and ellipses, closed on the torus, and arcs through middle nodes."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ def with_circles(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
     Others stay polygons.
     """
     pairs, has_middles = interface_edges(mesh), len(middles.tags) > 0
-    least, longest = (MIN_BENT_EDGES, LONGEST_BENT_EDGE) if has_middles else (MIN_CIRCLE_EDGES, 1.0)
+    fewest, longest = (MIN_BENT_EDGES, LONGEST_BENT_EDGE) if has_middles else (MIN_CIRCLE_EDGES, 1.0)
     bends = middles.between(pairs)
     points, circles, arcs = mesh.points.copy(), [], []
-    for loop in _closed_loops(mesh, pairs, least):
+    for loop in _closed_loops(mesh, pairs, fewest):
         circle = _fit_circle(loop.places, longest)
         moved = None if circle is None else _moved(mesh.points[loop.classes], loop.places, circle, mesh.period)
         if circle is None or moved is None:
@@ -63,18 +63,18 @@ def with_circles(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
     bad, _ = double_arcs(triangles, mesh.arc_edges, mesh.arc_circle, nodes)
     faulty = np.isin(edge_keys(mesh.arc_edges, nodes), edge_keys(edges(triangles[bad]), nodes))
     remain = ~np.isin(mesh.arc_circle, mesh.arc_circle[faulty])
-    kept = np.setdiff1d(np.arange(len(mesh.ellipses)), mesh.arc_circle[faulty])
+    remaining = np.setdiff1d(np.arange(len(mesh.ellipses)), mesh.arc_circle[faulty])
     return replace(
         mesh,
         triangles=triangles,
-        ellipses=mesh.ellipses[kept],
+        ellipses=mesh.ellipses[remaining],
         arc_edges=mesh.arc_edges[remain],
-        arc_circle=np.searchsorted(kept, mesh.arc_circle[remain]).astype(np.int32),
+        arc_circle=np.searchsorted(remaining, mesh.arc_circle[remain]).astype(np.int32),
     )
 
 
 def with_ellipses(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
-    """Return the mesh whose elliptic interfaces that are no circles follow their ellipses.
+    """Return the mesh whose elliptic interfaces follow their ellipses, where they are no circles.
 
     A closed interface between two phases is an ellipse if all its nodes are within ROUNDNESS_TOLERANCE of one, and it
     has at least MIN_ELLIPSE_EDGES edges, none on a side of the cell, none that spans more than one radian of its
@@ -94,16 +94,16 @@ def with_ellipses(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
             arcs += [pairs[edges] for _, edges in images]
     if not arcs:
         return mesh
-    frames = np.concatenate([own.frames for own in ellipses])
-    added = _with_arcs(mesh, Ellipses(np.concatenate([own.centres for own in ellipses]), frames), arcs)
-    ends, number = (own[len(mesh.arc_edges) :] for own in (added.arc_edges, added.arc_circle))
+    frames = np.concatenate([curve.frames for curve in ellipses])
+    added = _with_arcs(mesh, Ellipses(np.concatenate([curve.centres for curve in ellipses]), frames), arcs)
+    ends, number = (curve[len(mesh.arc_edges) :] for curve in (added.arc_edges, added.arc_circle))
     return replace(added, triangles=flip_double_arcs(mesh.triangles, mesh.phase, ends, number, nodes))
 
 
 def with_bent_edges(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
     """Return the mesh whose interface edges follow the circle through their ends and their middle node.
 
-    Those already on circles stay there, and so do straight ones, whose middle node is within STRAIGHT of the chord.
+    Edges on circles stay there, and so do straight ones, whose middle node is within STRAIGHT of the chord.
     Edges are flipped where a triangle has two on one curve, which has no corner there.
     """
     pairs, nodes = interface_edges(mesh), len(mesh.points)
@@ -128,7 +128,7 @@ def with_bent_edges(mesh: CoarseMesh, middles: MiddleNodes) -> CoarseMesh:
 
 def _with_arcs(mesh: CoarseMesh, ellipses: Ellipses, arcs: list[Int32]) -> CoarseMesh:
     """Return the mesh with more ellipses, and the edges (a, 2) on each."""
-    number = np.repeat(np.arange(len(arcs)), np.array([len(own) for own in arcs], np.intp))
+    number = np.repeat(np.arange(len(arcs)), np.array([len(pairs) for pairs in arcs], np.intp))
     return replace(
         mesh,
         ellipses=mesh.ellipses.joined(ellipses),
@@ -151,8 +151,8 @@ class Loop:
     images: list[tuple[Float, Int]]
 
 
-def _closed_loops(mesh: CoarseMesh, pairs: Int32, least: int) -> list[Loop]:
-    """Return the interfaces that are simple closed curves of `least` edges or more, none on a side of the cell."""
+def _closed_loops(mesh: CoarseMesh, pairs: Int32, fewest: int) -> list[Loop]:
+    """Find interfaces that are simple closed curves with `fewest` edges or more, none on a side."""
     if len(pairs) == 0:
         return []
     size = mesh.period
@@ -169,16 +169,16 @@ def _closed_loops(mesh: CoarseMesh, pairs: Int32, least: int) -> list[Loop]:
     branching |= np.bincount(part[ends[:, 0]], on_side, len(branching)) > 0
     _, first, number = np.unique(part, return_index=True, return_counts=True)
     loops = []
-    for start in first[~branching & (number >= least)].tolist():
+    for start in first[~branching & (number >= fewest)].tolist():
         order, _ = depth_first_order(graph, start, directed=False)
         hops = np.stack([np.asarray(step[order, np.roll(order, -1)]).ravel() for step in steps], axis=1)
         if np.all(np.abs(hops.sum(axis=0)) < size / 2):
             places = mesh.points[classes[order[0]]] + np.cumsum(hops, axis=0) - hops
-            own = np.flatnonzero(part[ends[:, 0]] == part[start])
-            place = np.argsort(order)[np.searchsorted(np.sort(order), ends[own, 0])]
-            away = np.round((places[place] - mesh.points[pairs[own, 0]]) / size)
+            members = np.flatnonzero(part[ends[:, 0]] == part[start])
+            place = np.argsort(order)[np.searchsorted(np.sort(order), ends[members, 0])]
+            away = np.round((places[place] - mesh.points[pairs[members, 0]]) / size)
             distinct, which = np.unique(away, axis=0, return_inverse=True)
-            images = [(step * size, own[which.ravel() == k]) for k, step in enumerate(distinct)]
+            images = [(step * size, members[which.ravel() == k]) for k, step in enumerate(distinct)]
             loops.append(Loop(classes[order], places, images))
     return loops
 
@@ -204,7 +204,7 @@ def _fit_circle(places: Float, longest: float) -> Float | None:
 
 
 def _moved(points: Float, places: Float, circle: Float, size: Float) -> Float | None:
-    """Points (k, 2) of the plane moved onto the circle, along the side they are on; None if impossible."""
+    """Move points (k, 2) onto the circle, along the side they are on; None if impossible."""
     centres = circle[:2] - np.round((places - points) / size) * size
     spokes = points - centres
     moved: Float = centres + circle[2] * spokes / np.linalg.norm(spokes, axis=1)[:, None]
@@ -230,9 +230,10 @@ def _follow(ellipse: Ellipses, ends: Float, bends: Float) -> bool:
     """
     many, middle = ellipse[np.zeros(len(ends), int)], ends.mean(axis=1)
     bulge = np.hypot(*(many.points(many.parameter(middle - many.centres)) - middle).T)
-    off = np.abs(np.hypot(*many.unit(bends - many.centres).T) - 1)
+    distance = np.abs(np.hypot(*many.unit(bends - many.centres).T) - 1)
     return bool(
-        np.all(bulge <= MOST_BENT * np.hypot(*(ends[:, 1] - ends[:, 0]).T)) and not np.any(off > ROUNDNESS_TOLERANCE)
+        np.all(bulge <= MOST_BENT * np.hypot(*(ends[:, 1] - ends[:, 0]).T))
+        and not np.any(distance > ROUNDNESS_TOLERANCE)
     )
 
 

@@ -67,7 +67,7 @@ class Scanner:
         self.content, self.place, self.is_binary = content.removeprefix(codecs.BOM_UTF8), 0, False
 
     def line(self) -> list[str]:
-        """Take the words of the next line that has any; none at the end of the file."""
+        """Take the words in the next line that has any; none at the file's end."""
         words, start = list[str](), self.place
         while not words and start < len(self.content):
             stop = self.content.find(b"\n", start)
@@ -121,7 +121,7 @@ class Scanner:
 
 
 class Section:
-    """Take the numbers of a section `$name` of a .msh file, which begin at `start` in its content.
+    """Take the numbers in section `$name` of a .msh file, which begin at `start`.
 
     Text is read at once, as whole (`i8`) or real numbers (`f8`). A binary file has the byte order `<` or `>`; its
     numbers are read as they are taken.
@@ -184,7 +184,7 @@ class Section:
         return int(text)
 
     def rest(self) -> Numbers:
-        """Return all numbers that follow, as C's int in a binary file, where they go on to the end of the file."""
+        """Return all numbers that follow, as C's int in a binary file, where they go on to its end."""
         if not self.order:
             return self.values[self.place :]
         count = (len(self.content) - self.place) // 4
@@ -207,9 +207,9 @@ class Section:
     def checked(self, values: Numbers) -> Int:
         """Convert numbers into whole ones."""
         if len(values) == 0 or (np.abs(values.max()) < LARGEST and np.abs(values.min()) < LARGEST):
-            whole = values.astype(np.int64)
-            if np.array_equal(whole, values):
-                return whole
+            integers = values.astype(np.int64)
+            if np.array_equal(integers, values):
+                return integers
         bad = next(value for value in values.tolist() if not (abs(value) < LARGEST and value == int(value)))
         self.refuse(f"{bad:g}: expected a whole number of at most 15 digits")
 
@@ -225,7 +225,7 @@ def end_of(name: str, content: bytes, start: int) -> int:
 def chain(following: Int) -> Int:
     """Return the indices met from 0 on, in order.
 
-    following[i] comes after i; that of the last is out of range.
+    following[i] comes after i; behind the last it is out of range.
     """
     size = len(following)
     onward = np.clip(following, 0, size)

@@ -1,4 +1,4 @@
-"""Points and cells of VTK's types, with numbers of each cell, as files of VTK and of Medit have them."""
+"""Points and cells with VTK's types and cell data, as VTK and Medit files have them."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ class Grid:
 
     Attributes:
         points: (n, 3) their coordinates.
-        types: (m,) VTK's types of the cells.
+        types: (m,) VTK's cell types.
         nodes: their nodes, cell after cell, numbered from 0.
         counts: (m,) how many nodes each has.
-        data: numbers of the cells, (m,) or (m, k), by their names.
-        first: the file's number of the first node and of the first cell.
+        data: cell data, (m,) or (m, k), by their names.
+        first: the file's number for the first node and the first cell.
     """
 
     points: Float
@@ -89,11 +89,13 @@ def mesh_of(grid: Grid) -> RawMesh:
 
 
 def _numbers_name(data: Mapping[str, Numbers]) -> str:
-    """Return the name of the cell data with the phase of an element; empty if there are none."""
+    """Return the name of the cell data with element phases; empty if there are none."""
     if named := [name for name in (PHASE, *NUMBERS) if name in data]:
         return named[0]
-    whole = [name for name, own in data.items() if name != DEBONDED and own.ndim == 1 and own.dtype.kind in "iu"]
-    return whole[0] if len(whole) == 1 else ""
+    integer = [
+        name for name, values in data.items() if name != DEBONDED and values.ndim == 1 and values.dtype.kind in "iu"
+    ]
+    return integer[0] if len(integer) == 1 else ""
 
 
 def _misfits(grid: Grid) -> list[str]:
@@ -123,7 +125,7 @@ def _in_common_types(grid: Grid) -> Grid:
 
 
 def _other_cells(grid: Grid) -> list[str]:
-    """List cells of types that cannot be used, cells with a wrong number of nodes, and the lack of triangles."""
+    """List cells with other types, cells with a wrong node count, and the lack of triangles."""
     usable, counts, faults = TRIANGLES | LINES, grid.counts, []
     for kind in np.unique(grid.types).tolist():
         cells = np.flatnonzero(grid.types == kind)
@@ -141,7 +143,7 @@ def _other_cells(grid: Grid) -> list[str]:
 
 
 def _unnumbered(grid: Grid, name: str) -> list[str]:
-    """List the lack of phases, and values of the cell data `name` that are no numbers of phases."""
+    """List the lack of phases, and values in the cell data `name` that are no phase numbers."""
     if not name:
         expected = "expected 0 in the matrix, 1 in phase fibre, 2 in fibre:2, ..."
         return [f"no cell data named {PHASE}, but {', '.join(grid.data) or 'none'}: {expected}"]

@@ -1,4 +1,4 @@
-"""Legacy files of VTK (.vtk), of text or binary, up to version 5.1, and mesh files of Medit (.mesh).
+"""Legacy VTK files (.vtk), text or binary, up to version 5.1, and Medit's mesh files (.mesh).
 
 FreeFEM, Netgen, Gmsh and MMG write the latter.
 """
@@ -39,7 +39,7 @@ VECTORS, VERTICES = ("NORMALS", "TANGENTS"), "VERTICES"
 
 
 def load(path: Path) -> RawMesh:
-    """Read the triangles and the lines of a VTK file; nodes and cells have its numbers, from 0.
+    """Read triangles and lines from a VTK file; nodes and cells have its numbers, from 0.
 
     Raises:
         OSError: the file cannot be read.
@@ -154,7 +154,7 @@ class _Legacy:
 
 
 def load_medit(path: Path) -> RawMesh:
-    """Read the triangles and the lines of a Medit file; nodes have numbers from 1, and cells section by section.
+    """Read triangles and lines from a Medit file; nodes have numbers from 1, cells section by section.
 
     Raises:
         OSError: the file cannot be read.

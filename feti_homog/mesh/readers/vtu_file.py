@@ -1,4 +1,4 @@
-"""Read the triangles and the lines of an XML file of VTK (.vtu): text, base64 or raw, compressed or not."""
+"""Read triangles and lines from VTK's XML files (.vtu): text, base64 or raw, compressed or not."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ SEGMENT = re.compile(rb"[^=]+={0,2}")
 
 
 def load(path: Path) -> RawMesh:
-    """Read the triangles and the lines; nodes and cells have the numbers of the file, from 0, piece after piece.
+    """Read triangles and lines; nodes and cells have the file's numbers, from 0, piece after piece.
 
     Raises:
         OSError: the file cannot be read.
@@ -73,31 +73,31 @@ def _joined_data(data: Sequence[Mapping[str, Numbers]]) -> dict[str, Numbers]:
     return {name: np.concatenate([piece[name] for piece in data]) for name in data[0]} if data else {}
 
 
-def _children(element: ElementTree.Element, name: str, known: Mapping[str, int]) -> dict[str, list[Any]]:
-    """Return the children of an element by their tags; MeshError if others are there or required ones missing."""
-    found: dict[str, list[Any]] = {tag: element.findall(tag) for tag in known}
-    other = [child.tag for child in element if child.tag not in known]
-    expected = f"expected {' and '.join(known)}"
+def _children(element: ElementTree.Element, name: str, tags: Mapping[str, int]) -> dict[str, list[Any]]:
+    """Return an element's children by their tags; MeshError if others are there or required ones missing."""
+    children: dict[str, list[Any]] = {tag: element.findall(tag) for tag in tags}
+    other = [child.tag for child in element if child.tag not in tags]
+    expected = f"expected {' and '.join(tags)}"
     if other:
         raise MeshError(f"<{other[0]}> in <{name}>: {expected}")
-    if missing := [tag for tag, least in known.items() if len(found[tag]) < least]:
+    if missing := [tag for tag, fewest in tags.items() if len(children[tag]) < fewest]:
         raise MeshError(f"no <{missing[0]}> in <{name}>: {expected}")
-    if name != "UnstructuredGrid" and (several := [tag for tag in known if len(found[tag]) > 1]):
+    if name != "UnstructuredGrid" and (several := [tag for tag in tags if len(children[tag]) > 1]):
         raise MeshError(f"<{several[0]}> is there twice in <{name}>: expected it once")
-    return found
+    return children
 
 
 def _piece(piece: ElementTree.Element, arrays: _Arrays) -> Grid:
     """Return the points, cells and cell data of a piece."""
-    found = _children(piece, "Piece", {"Points": 1, "Cells": 1, "CellData": 0, "PointData": 0})
+    children = _children(piece, "Piece", {"Points": 1, "Cells": 1, "CellData": 0, "PointData": 0})
     counts = []
     for name in ("NumberOfPoints", "NumberOfCells"):
         word = piece.get(name, "").strip()
         if not re.fullmatch("[0-9]{1,15}", word):
             raise MeshError(f"{name} is {toml_value(word)}: expected a whole number")
         counts.append(int(word))
-    points = next(iter(arrays.of(found["Points"][0]).values()), np.zeros(0))
-    cells = arrays.of(found["Cells"][0])
+    points = next(iter(arrays.of(children["Points"][0]).values()), np.zeros(0))
+    cells = arrays.of(children["Cells"][0])
     lost = [name for name in ARRAYS if name not in cells]
     if lost and counts[1]:
         raise MeshError(f"no array {lost[0]} of the cells")
@@ -106,7 +106,7 @@ def _piece(piece: ElementTree.Element, arrays: _Arrays) -> Grid:
         raise MeshError(f"{np.size(points)} coordinates of points: expected {3 * counts[0]}")
     if len(types) != counts[1]:
         raise MeshError(f"{len(types)} types of cells: expected {counts[1]}")
-    data = arrays.of(found["CellData"][0]) if found["CellData"] else {}
+    data = arrays.of(children["CellData"][0]) if children["CellData"] else {}
     return Grid(points.reshape(-1, 3).astype(float), types, nodes, np.diff(ends, prepend=0), data)
 
 
@@ -122,10 +122,10 @@ class _Arrays:
             "byte_order": (order, (*ORDERS,)),
             "compressor": (compressor, ("", *COMPRESSORS)),
         }
-        for name, (value, known) in expected.items():
-            if value not in known:
-                words = " or ".join(filter(None, known))
-                raise MeshError(f"{name} is {toml_value(value or '')}: expected {words}")
+        for name, (value, choices) in expected.items():
+            if value not in choices:
+                choice = " or ".join(filter(None, choices))
+                raise MeshError(f"{name} is {toml_value(value or '')}: expected {choice}")
         self.order, self.budget = ORDERS[order], budget
         self.header = np.dtype(f"{self.order}{TYPES[header]}")
         self.decompressor: Any = COMPRESSORS.get(compressor)
@@ -135,20 +135,20 @@ class _Arrays:
         self.starts = [*sorted(starts), len(appended)]
 
     def of(self, section: ElementTree.Element) -> dict[str, Numbers]:
-        """Return the arrays of numbers in a section by their names: (k,), or a row for each tuple."""
-        found = {}
+        """Return the number arrays in a section by their names: (k,), or a row for each tuple."""
+        arrays = {}
         for array in section.iter("DataArray"):
             name, kind = array.get("Name") or "Points", TYPES.get(array.get("type", ""))
             if kind is None:
                 continue  # texts and bits
             try:
                 values, width = self._values(array, kind), int(array.get("NumberOfComponents") or 1)
-                found[name] = values if width == 1 else values.reshape(-1, width)
+                arrays[name] = values if width == 1 else values.reshape(-1, width)
             except NotANumber as error:
                 raise MeshError(f"array {toml_value(name)}: {error}") from None
             except (ValueError, zlib.error, lzma.LZMAError, binascii.Error):
                 raise MeshError(f"array {toml_value(name)}: its data are damaged or broken off") from None
-        return found
+        return arrays
 
     def _values(self, array: ElementTree.Element, kind: str) -> Numbers:
         form, text = array.get("format", "ascii"), (array.text or "").encode()

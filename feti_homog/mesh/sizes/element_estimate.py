@@ -32,15 +32,15 @@ POSITIONS = 200
 
 @dataclass(frozen=True)
 class ElementEstimate:
-    """A cell of width 1 before it is meshed, and but for tables before its fibres are arranged.
+    """A cell with width 1 before it is meshed and, but for tables, before its fibres are arranged.
 
     Attributes:
-        cell: with the sizes of its elements.
-        fibres: number of fibres.
-        mean_radius: of the fibres, of a table of the voids too.
-        height: of the cell.
-        interfaces: their length.
-        ovals: the fibres that are ellipses.
+        cell: with its element sizes.
+        fibres: how many.
+        mean_radius: of fibres, in tables also of voids.
+        height: relative to the width.
+        interfaces: total length.
+        ovals: fibres that are ellipses.
     """
 
     cell: Cell
@@ -71,9 +71,9 @@ class ElementEstimate:
 
     @property
     def triangles(self) -> float:
-        """Number of them without debonded arcs: of one size, about fibres, at ends of ellipses, beside fine interfaces.
+        """Count triangles without debonded arcs: alike, about fibres, at ends of ellipses, beside fine interfaces.
 
-        On both sides of interfaces of the length P there are 2 P int dx / (A (h + g x)^2) = 2 P / (A g h) triangles.
+        On both sides of interfaces with length P there are 2 P int dx / (A (h + g x)^2) = 2 P / (A g h) triangles.
         """
         cell = self.cell
         irregular = 0 if cell.geometry in FIBRES_OF else self.fibres
@@ -87,37 +87,37 @@ class ElementEstimate:
         return count + 2 * self.interfaces / (TRIANGLE_AREA * MAX_GROWTH * cell.interface_size)
 
 
-def refuse_many(size_at: Callable[[Float], Float], least: float, period: Float, most: int = MAX_TRIANGLES) -> None:
-    """Refuse a cell of the periods (2,) with elements of the sizes h at positions (n, 2), int dA / (A h^2) of them.
+def refuse_many(size_at: Callable[[Float], Float], smallest: float, period: Float, limit: int = MAX_TRIANGLES) -> None:
+    """Refuse a cell of the periods (2,) with too many elements int dA / (A h^2), by sizes h at positions (n, 2).
 
-    The sizes contain narrow gaps and thin coatings, where `ElementEstimate` has the numbers of the case alone. Where
-    `least`, which no h is below, bounds the number by `most`, they are not summed.
+    Sizes know narrow gaps and thin coatings, `ElementEstimate` only the numbers in the case. They are not summed where
+    `smallest`, which no h is below, bounds the number by `limit`.
 
     Raises:
-        MeshError: they are more than `most`.
+        MeshError: they are more than `limit`.
     """
-    if period.prod() <= most * TRIANGLE_AREA * least**2:
+    if period.prod() <= limit * TRIANGLE_AREA * smallest**2:
         return
     share = (np.arange(POSITIONS) + 0.5) / POSITIONS
     places = np.stack(np.meshgrid(share, share), axis=-1).reshape(-1, 2) * period
     count = float((1 / size_at(places) ** 2).mean() * period.prod() / TRIANGLE_AREA)
-    if count > most:
+    if count > limit:
         raise MeshError(
             f"[cell] narrow gaps, thin coatings or small fibres need about {count:.2g} elements before refine; "
-            f"expected at most {most}"
+            f"expected at most {limit}"
         )
 
 
 def triangles_of_a_tip(ratio: np.float64 | float) -> float:
-    """Return those that a tip adds where elements are smaller by `ratio` than around.
+    """Return how many triangles a tip adds where elements are smaller by `ratio` than around.
 
-    int 2 pi r dr / (A (h + g r)^2) up to the radius at which h + g r is the size of the others, less those of this.
+    int 2 pi r dr / (A (h + g r)^2) up to the radius where h + g r is the size around, less as many as it has anyway.
     """
     within = 2 * (np.log(ratio) + 1 / ratio - 1) - (1 - 1 / ratio) ** 2
     return float(math.pi / (TRIANGLE_AREA * MAX_GROWTH**2) * within)
 
 
 def ratio_at_a_tip(count: float) -> float:
-    """Return how much smaller elements at a tip may be than around, if it is to add no more triangles than `count`."""
+    """Return how much smaller elements at a tip may be than around, to add no more triangles than `count`."""
     counts = [triangles_of_a_tip(ratio) for ratio in RATIOS]
     return float(np.interp(count, counts, RATIOS))

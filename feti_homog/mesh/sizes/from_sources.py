@@ -21,9 +21,9 @@ Source = tuple[Float, Float, Float]
 
 
 class SourcedSize:
-    """The function h(x) = min(largest, min_k (h_k + g_k |x - x_k|)) of positions x on the torus.
+    """The size h(x) = min(largest, min_k (h_k + g_k |x - x_k|)) at positions x on the torus.
 
-    A source k counts within the distance at which one of length 0 that grows by MAX_GROWTH is at the largest.
+    A source k counts within the distance at which a length 0 that grows by MAX_GROWTH reaches the largest.
 
     Attributes:
         largest: size anywhere.
@@ -31,7 +31,7 @@ class SourcedSize:
     """
 
     def __init__(self, sources: Sequence[Source], size: Float, largest: float, chunk: int = CHUNK) -> None:
-        """`size` (2,) are the periods of the torus, and so many positions are looked at at once."""
+        """Prepare sources on the torus with periods `size` (2,); `chunk` positions are looked at together."""
         self.largest = largest
         self._size, self._bound, self._chunk = size, largest / MAX_GROWTH, chunk
         places, lengths, growths = (np.concatenate(parts) for parts in zip(*sources, strict=True))
@@ -72,15 +72,15 @@ class SourcedSize:
         """(c, m) on short lines whose points are at most `half` (c,) from their `middle` (c, 2)."""
         count = min(NEAREST_OF_LINE, len(self._places))
         reach = self._bound + float(half.max(initial=0.0))
-        distance, near = self._tree.query(wrap(middle, self._size), k=count, distance_upper_bound=reach)
-        distance, near = distance.reshape(len(middle), count), near.reshape(len(middle), count)
-        length, growth = self._lengths[near], self._growths[near]
+        distance, close = self._tree.query(wrap(middle, self._size), k=count, distance_upper_bound=reach)
+        distance, close = distance.reshape(len(middle), count), close.reshape(len(middle), count)
+        length, growth = self._lengths[close], self._growths[close]
         # What counts at all points of a line bounds it from above; sources that are above everywhere do not matter.
         everywhere = distance + half[:, None] < self._bound
         above = np.where(everywhere, length + growth * (distance + half[:, None]), self.largest).min(axis=1)
         below = length + growth * np.maximum(0.0, distance - half[:, None])
         line, which = np.nonzero(below < np.minimum(above, self.largest)[:, None])
-        source = near[line, which]
+        source = close[line, which]
         squares = np.zeros((len(line), points.shape[1]))
         for axis, period in enumerate(self._size):
             way = points[line, :, axis] - self._places[source, axis][:, None]
@@ -88,12 +88,12 @@ class SourcedSize:
             way *= way
             squares += way
         away = np.sqrt(squares)
-        found = self._lengths[source][:, None] + self._growths[source][:, None] * away
-        found[away >= self._bound] = self.largest
+        candidates = self._lengths[source][:, None] + self._growths[source][:, None] * away
+        candidates[away >= self._bound] = self.largest
         sizes = np.full(points.shape[:2], self.largest)
         first = np.flatnonzero(np.diff(line, prepend=-1))
         if len(first):
-            sizes[line[first]] = np.minimum(self.largest, np.minimum.reduceat(found, first, axis=0))
+            sizes[line[first]] = np.minimum(self.largest, np.minimum.reduceat(candidates, first, axis=0))
         # What a line's own sources are does not depend on the lines that it is looked at with.
         full = distance[:, -1] < self._bound + half
         sizes[full] = self(points[full].reshape(-1, 2)).reshape(-1, points.shape[1])

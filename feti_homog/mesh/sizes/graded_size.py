@@ -1,4 +1,4 @@
-"""Fineness of the coarse mesh: the size of edges on lines of the cell, smaller on circles and at tips of debonds."""
+"""Edge sizes on the cell's lines, smaller on circles and at debond tips."""
 
 from __future__ import annotations
 
@@ -43,9 +43,9 @@ def line_size(arrangement: Arrangement, largest: float, vertices: Float) -> Sour
 
 
 def circle_size(arrangement: Arrangement, largest: float) -> Float:
-    """Largest edge length (k,) on the circles of an arrangement, such that each has at least MIN_EDGES_AROUND edges.
+    """Largest edge length (k,) on an arrangement's circles, such that each has MIN_EDGES_AROUND edges or more.
 
-    Those on a coating of the thickness t on the radius a have at most sqrt(t a): then they are t / 8 away from their
+    Edges on a coating with thickness t on the radius a have at most sqrt(t a): then they are t / 8 away from their
     arcs, and elements across the coating do not turn over when their edges are bent.
     """
     shells, disc = arrangement.shells
@@ -54,12 +54,12 @@ def circle_size(arrangement: Arrangement, largest: float) -> Float:
 
 
 def coating_size(arrangement: Arrangement) -> Float:
-    """sqrt(t a) (N,) of the coating of the thickness t on each disc of the radius a."""
+    """sqrt(t a) (N,) for a coating with thickness t on a disc with radius a."""
     return np.asarray(np.sqrt(arrangement.coating * arrangement.radii))
 
 
 def _between_fibres(circles: Float, size: Float, caps: Float, largest: float) -> Source:
-    """Facing points of near fibres; the edges at either suit the gap and those of the other fibre."""
+    """Facing points on neighbouring fibres; edges there suit the gap and the other fibre's edges."""
     centres, radii = circles[:, :2], circles[:, 2]
     first, second, vector = neighbours(centres, size, 2 * radii.max() + largest)
     distance = np.linalg.norm(vector, axis=1)
@@ -67,22 +67,22 @@ def _between_fibres(circles: Float, size: Float, caps: Float, largest: float) ->
     normal = vector / distance[:, None]
     growth = passage_growth(gap, 1 / radii[first] + 1 / radii[second])
     places, lengths, growths = [], [], []
-    for here, there, sign in ((first, second, 1.0), (second, first, -1.0)):
-        length = np.minimum(PASSAGE_EDGE * gap, caps[there] + MAX_GROWTH * gap)
-        near = length < caps[here]
-        places.append((centres[here] + sign * radii[here, None] * normal)[near])
-        lengths.append(length[near])
-        growths.append(growth[near])
+    for one, other, sign in ((first, second, 1.0), (second, first, -1.0)):
+        length = np.minimum(PASSAGE_EDGE * gap, caps[other] + MAX_GROWTH * gap)
+        narrow = length < caps[one]
+        places.append((centres[one] + sign * radii[one, None] * normal)[narrow])
+        lengths.append(length[narrow])
+        growths.append(growth[narrow])
     return np.concatenate(places), np.concatenate(lengths), np.concatenate(growths)
 
 
 def passage_growth(width: Float, curvature: Float) -> Float:
-    """Growth with which edges stay below twice the width w + c s^2 / 2 of a passage of curvature c."""
+    """Growth with which edges stay below twice the width w + c s^2 / 2 in a passage with curvature c."""
     return np.asarray(np.minimum(MAX_GROWTH, np.sqrt((4 - 2 * PASSAGE_EDGE) * 2 * width * curvature)))
 
 
 def _at_sides(circles: Float, size: Float, caps: Float, largest: float) -> Source:
-    """Return where a circle comes near a side or hardly crosses it: extreme point, foot on the side, crossings."""
+    """Find where a circle comes near a side or hardly crosses it: extreme point, foot on the side, crossings."""
     centres, radii = circles[:, :2] % size, circles[:, 2]
     sources: list[Source] = []
     for axis, sign in product((0, 1), (-1.0, 1.0)):
@@ -115,14 +115,14 @@ def _where(chosen: Bool, *source: Float) -> Source:
 
 
 def _at_corners(circles: Float, size: Float, caps: Float) -> Source:
-    """Return where a circle passes near the corner: the corner and the nearest point of the circle."""
+    """Find where a circle passes near the corner: the corner and the nearest point on the circle."""
     offset = (circles[:, :2] + size / 2) % size - size / 2
     distance = np.linalg.norm(offset, axis=1)
     length = PASSAGE_EDGE * np.abs(distance - circles[:, 2])
-    near = length < caps
-    facing = offset[near] * (1 - circles[near, 2] / distance[near])[:, None]
+    close = length < caps
+    facing = offset[close] * (1 - circles[close, 2] / distance[close])[:, None]
     places = np.concatenate([facing, np.zeros_like(facing)])
-    return places, np.tile(length[near], 2), np.full(len(places), MAX_GROWTH)
+    return places, np.tile(length[close], 2), np.full(len(places), MAX_GROWTH)
 
 
 def at_vertices(vertices: Float, size: Float, largest: float) -> Source:
@@ -151,7 +151,7 @@ class MeshSizes:
     Attributes:
         largest: anywhere.
         interface: on the circles.
-        tip: at the tips of debonded arcs.
+        tip: at debond tips.
     """
 
     largest: float
@@ -165,7 +165,7 @@ class MeshSizes:
 
     @classmethod
     def of(cls, cell: Cell, has_tips: bool) -> MeshSizes:
-        """Return those that a cell of width 1 is asked for."""
+        """Return the sizes that a cell with width 1 is asked for."""
         interface = cell.mesh_size if cell.interface_size is None else cell.interface_size
         return cls(cell.mesh_size, interface, interface if cell.tip_size is None or not has_tips else cell.tip_size)
 
@@ -185,7 +185,7 @@ class MeshSizes:
 
 @dataclass(frozen=True)
 class SizeField:
-    """The size of edges on the lines of a cell: the smaller of two sizes, of which the second grows along lines.
+    """The edge size on a cell's lines: the smaller one among two sizes, the second of which grows along lines.
 
     Attributes:
         base, graded: these sizes.
@@ -212,7 +212,7 @@ class SizeField:
         return sizes if self.graded is None else np.minimum(sizes, self.graded(points))
 
     def on_lines(self, points: Float) -> Float:
-        """Sizes (c, m) at positions (c, m, 2) along c lines: the same."""
+        """Sizes (c, m) at positions (c, m, 2) along c lines, as by `at`."""
         sizes = self.base.on_lines(points)
         if self.graded is None:
             return sizes
@@ -239,8 +239,8 @@ class _FromLines:
     Points h_i apart on the circles find the nearest disc.
 
     Attributes:
-        size: (2,) of the cell.
-        circles: (N, 3) the outer circle of each disc.
+        size: (2,) width and height.
+        circles: (N, 3) outer circle by disc.
         caps: (N,) h_i.
         tip: h_t.
         near_tips: tree of the tips.

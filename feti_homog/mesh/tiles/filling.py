@@ -33,13 +33,13 @@ Signed = tuple[int, Curve]
 
 @dataclass(frozen=True)
 class Tile:
-    """Regions of an outline that are filled at once.
+    """Regions in an outline that are filled at once.
 
     Attributes:
         points: (n, 2) nodes on the lines.
-        curves: through the nodes; beyond one that bounds the tile it is OUTSIDE.
-        largest: size of elements.
-        is_graded: whether they grow from the sizes on the lines; else those are interpolated.
+        curves: through the nodes; beyond a curve that bounds the tile is OUTSIDE.
+        largest: element size.
+        is_graded: whether elements grow from the sizes on lines, which else are interpolated.
     """
 
     points: Float
@@ -50,10 +50,10 @@ class Tile:
 
 @dataclass(frozen=True)
 class Filling:
-    """The triangles of a tile.
+    """The triangles in a tile.
 
     Attributes:
-        inner: (k, 2) nodes that are not on lines, numbered after those that are.
+        inner: (k, 2) nodes off the lines, numbered after the nodes on lines.
         triangles: (m, 3) counter-clockwise.
         circle: (m,) the smallest circle around each, or MATRIX.
     """
@@ -116,8 +116,8 @@ def fill(tile: Tile) -> Filling:
         raise _unfilled(tile, "triangles are missing")
     triangles[area < 0] = triangles[area < 0][:, ::-1]
     circle_of = np.repeat(circle, [len(nodes) // 3 for nodes in elements])
-    arcs, own = arc_edges(tile.curves)
-    triangles = flip_double_arcs(triangles, circle_of.astype(np.int32), arcs, own, len(points))
+    arcs, circles = arc_edges(tile.curves)
+    triangles = flip_double_arcs(triangles, circle_of.astype(np.int32), arcs, circles, len(points))
     return Filling(points[len(tile.points) :], triangles, circle_of)
 
 
@@ -141,7 +141,7 @@ def arc_edges(curves: Curves) -> tuple[Int32, Int32]:
 
 
 def _grow_from_lines(gmsh: ModuleType, surfaces: list[int], largest: float) -> None:
-    """Let elements be as large as the nearest edge of the outline, h, h + g d at the distance d from it.
+    """Let elements have the nearest outline edge's size h, h + g d at the distance d from it.
 
     Without this, gmsh interpolates between the lines: a disc would be as fine within as on its circle.
     """
@@ -157,9 +157,9 @@ def _grow_from_lines(gmsh: ModuleType, surfaces: list[int], largest: float) -> N
 
 
 def _add_surfaces(gmsh: ModuleType, tile: Tile) -> tuple[list[int], list[int]]:
-    """Add the plane surfaces of fibres, coatings and matrix; their tags, and the circle next around each or MATRIX.
+    """Add plane surfaces for fibres, coatings and matrix; their tags, and the circle next around each or MATRIX.
 
-    Each edge of the outline is a line of one element, and its node n is point n + 1.
+    Each outline edge is a line with one element, and node n is point n + 1.
     """
     curves, geo = tile.curves.pieces(), gmsh.model.geo
     for tag, (x, y) in enumerate(tile.points.round(DECIMALS).tolist(), 1):
@@ -186,13 +186,13 @@ def _add_surfaces(gmsh: ModuleType, tile: Tile) -> tuple[list[int], list[int]]:
 
 
 def _loops(curves: list[Curve]) -> list[list[Signed]]:
-    """Return closed chains of curves that have one region on their left; each vertex of a region starts one curve.
+    """Chain curves that have one region on their left to loops; at each vertex one curve of a region starts.
 
     Curves run forwards, then backwards with a negative tag.
     """
     lines = list(enumerate(curves, 1))
-    lines += [(-tag, Curve(own.nodes[::-1], own.circle, own.outside, own.inside)) for tag, own in lines]
-    after = {(own.inside, int(own.nodes[0])): (tag, own) for tag, own in lines if own.inside != OUTSIDE}
+    lines += [(-tag, Curve(curve.nodes[::-1], curve.circle, curve.outside, curve.inside)) for tag, curve in lines]
+    after = {(curve.inside, int(curve.nodes[0])): (tag, curve) for tag, curve in lines if curve.inside != OUTSIDE}
     loops = []
     while after:
         loop = [after.pop(next(iter(after)))]
@@ -203,7 +203,7 @@ def _loops(curves: list[Curve]) -> list[list[Signed]]:
 
 
 def _with_holes(loops: list[list[Signed]], points: Float) -> list[list[list[Signed]]]:
-    """Return groups of loops, each an outer one followed by the holes, which run clockwise, within it."""
+    """Group loops: each outer one is followed by the holes within it, which run clockwise."""
     polygons = [points[np.concatenate([curve.nodes[:-1] for _, curve in loop])] for loop in loops]
     is_hole = [_area(polygon) < 0 for polygon in polygons]
     groups = {k: [loop] for k, loop in enumerate(loops) if not is_hole[k]}

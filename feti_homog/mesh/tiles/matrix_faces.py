@@ -1,7 +1,7 @@
-"""The matrix between discs as faces of a planar graph, whose lines are bridges and the sides of the cell.
+"""The matrix between discs as faces in a planar graph, whose lines are bridges and cell sides.
 
-Its nodes are the discs and those corners of the cell that are in none; a disc is left by its lines in the directions in
-which they begin on its circle. Lines are listed twice, once from either end.
+Its nodes are the discs and the cell corners outside discs; lines leave a disc in the directions in which they begin on
+its circle. Lines are listed twice, once from either end.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class HalfLines:
 
     @classmethod
     def of(cls, nodes: Int, centres: Float, starts: Float) -> HalfLines:
-        """Return the halves of lines between `nodes` (l, 2), from starts[:, 0] to starts[:, 1] (l, 2, 2).
+        """Halve lines between `nodes` (l, 2), from starts[:, 0] to starts[:, 1] (l, 2, 2).
 
         The nodes have these centres (n, 2); halves from the second node come last.
         """
@@ -49,14 +49,14 @@ class HalfLines:
         angle = np.arctan2(offset[:, 1], offset[:, 0]) % TURN
         return cls(node, angle, start, (np.arange(len(node)) + len(nodes)) % len(node))
 
-    def chosen(self, those: Int) -> HalfLines:
-        """Return the half-lines `those` (k,), which are both halves of lines."""
+    def chosen(self, some: Int) -> HalfLines:
+        """Return the half-lines `some` (k,), both halves of each line."""
         place = np.full(len(self.node), NOWHERE)
-        place[those] = np.arange(len(those))
-        return HalfLines(self.node[those], self.angle[those], self.start[those], place[self.twin[those]])
+        place[some] = np.arange(len(some))
+        return HalfLines(self.node[some], self.angle[some], self.start[some], place[self.twin[some]])
 
     def faces(self) -> tuple[Int, Int]:
-        """Return the half-line (h,) after each around the face on its left, and the number of that face (h,)."""
+        """Return the half-line (h,) that follows each around the face on its left, and the face number (h,)."""
         order = np.lexsort((self.angle, self.node))
         place = np.empty_like(order)
         place[order] = np.arange(len(order))
@@ -70,12 +70,12 @@ class HalfLines:
 
 @dataclass(frozen=True)
 class MatrixTiles:
-    """The tile of the matrix next to discs.
+    """Tiles in the matrix next to discs.
 
     Attributes:
-        lines: half-lines that divide the matrix: of the pieces of sides, then of the bridges.
+        lines: half-lines that divide the matrix: side pieces, then bridges.
         tile: (h,) on the left of each.
-        alone: (n,) of the matrix around a disc without such lines; NOWHERE where there are some.
+        alone: (n,) tile around a disc without such lines; NOWHERE where there are some.
     """
 
     lines: HalfLines
@@ -84,16 +84,16 @@ class MatrixTiles:
 
 
 def beside(lines: HalfLines, label: Int, alone: Int, disc: Int, angle: Float) -> Int:
-    """Return the label (k,) of the matrix beside discs (k,) at these angles.
+    """Return the matrix label (k,) beside discs (k,) at angles (k,).
 
-    It is that of the half-line clockwise from there, of labels (h,), or that of discs that are alone (n,).
+    The half-line clockwise from there has it among the labels (h,), or the disc if it is `alone` (n,).
     """
     order = np.lexsort((lines.angle, lines.node))
     node, at = lines.node[order], lines.angle[order]
     # Twice a turn apart, so that those of one disc stay together.
-    found = np.searchsorted(node * 2 * TURN + at, disc * 2 * TURN + angle % TURN, side="right") - 1
+    place = np.searchsorted(node * 2 * TURN + at, disc * 2 * TURN + angle % TURN, side="right") - 1
     first, last = np.searchsorted(node, disc), np.searchsorted(node, disc, side="right") - 1
-    around = label[order[np.where(found < first, last, found)]]
+    around = label[order[np.where(place < first, last, place)]]
     return np.where(alone[disc] == NOWHERE, around, alone[disc])
 
 
@@ -106,14 +106,14 @@ def matrix_tiles(
     size: Float,
     grid: Int,
 ) -> MatrixTiles | None:
-    """Return the faces dealt to the cells of a grid (2,) by their centroids.
+    """Deal the faces to the cells of a grid (2,) by their centroids.
+
+    None if some disc or group that bridges do not join to the sides has no face.
 
     Args:
         circles: (k, 3).
-        outer: (n,) those that bound the matrix.
-        sides: nodes (s, 2) and ends (s, 2, 2) of the pieces of sides in the matrix, counter-clockwise around the cell.
-
-    None if it is not found in which face some disc or group of discs is that bridges do not join to the sides.
+        outer: (n,) circles that bound the matrix.
+        sides: nodes (s, 2) and ends (s, 2, 2) of side pieces in the matrix, counter-clockwise around the cell.
     """
     nodes, starts = sides
     corners = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]) * size
@@ -142,7 +142,7 @@ def matrix_tiles(
 
 
 def grid_cell(points: Float, size: Float, grid: Int) -> Int:
-    """Return the number (k,) of the cell of a grid (2,) over [0, size] that contains each point."""
+    """Return the grid cell (k,) that contains each point, for a grid (2,) over [0, size]."""
     share = (points / size).round(PLACE_DECIMALS)
     column, row = np.clip((share * grid).astype(np.int64), 0, grid - 1).T
     return np.asarray(column * grid[1] + row)
@@ -161,7 +161,7 @@ def _areas_and_moments(half: HalfLines, after: Int, loop: Int) -> tuple[Float, F
 def _faces_of_loops(half: HalfLines, loop: Int, alone: Int, lines: CentreLines, count: int, size: Float) -> Int:
     """(count,) the face of each loop, and of each lone disc.
 
-    A line of centres crosses no bridge, for both are edges of one triangulation. So, in the cell and away from third
+    A centre line crosses no bridge, for both are edges in one triangulation. So, in the cell and away from third
     discs, there is one face along it.
     """
     free = (lines.clearance > 1) & np.all((lines.facing > 0) & (lines.facing < size), axis=(1, 2))

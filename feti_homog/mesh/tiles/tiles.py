@@ -1,7 +1,7 @@
-"""Tiles of a large cell: parts of its outline that ranks fill by themselves, with the same nodes on common borders.
+"""Tiles in a large cell: parts of its outline that ranks fill by themselves, with the same nodes on common borders.
 
-They depend on the cell alone, so that its mesh is the same on any number of ranks.  Of those that it has filled a rank
-has the torus: nodes on lines have the numbers of the outline, those within tiles the numbers behind these, one tile
+They depend on the cell alone, so that its mesh is the same on any number of ranks.  A rank has the torus for the tiles
+that it has filled: nodes on lines have their numbers in the outline, nodes within tiles the numbers behind, one tile
 after the other; a torus edge has the number that its two classes make.
 """
 
@@ -28,11 +28,11 @@ from feti_homog.typing import Array, Float, Int, Int32
 
 @dataclass(frozen=True)
 class TilePolicy:
-    """Choice of the cells that are cut into tiles, and of the number of tiles.
+    """Which cells are cut into tiles, and into how many.
 
     Attributes:
         least_discs: cells with fewer are filled at once.
-        discs: of a tile. Smaller tiles put more nodes on borders, where bridges fix their places; larger ones leave too
+        discs: in a tile. Smaller tiles put more nodes on borders, where bridges fix their places; larger ones leave too
             few tiles for many ranks.
     """
 
@@ -45,14 +45,14 @@ DEFAULT_TILES = TilePolicy()
 
 @dataclass(frozen=True)
 class Tiling:
-    """Tiles of the parts of a cell.
+    """Tiles for all parts of a cell.
 
     Attributes:
-        bridges: those on borders of tiles.
-        beside: (b, 2) the tiles on the left and on the right of each.
-        matrix: the faces of the matrix, with the tile of each.
-        sides: (s,) the tile beside each piece of a side in the matrix, in the order of the outline's.
-        within: (k,) the tile of what is in each circle; all images of a disc are in one.
+        bridges: on tile borders.
+        beside: (b, 2) the tiles to the left and right of each bridge.
+        matrix: its faces with their tiles.
+        sides: (s,) the tile beside each side piece in the matrix, in the outline's order.
+        within: (k,) the tile within each circle; all images of a disc are in one.
     """
 
     bridges: Bridges
@@ -70,9 +70,9 @@ def is_tiled(arrangement: Arrangement, policy: TilePolicy) -> bool:
 def tiling(
     arrangement: Arrangement, largest: float, marks: Mapping[int, Sequence[float]], policy: TilePolicy
 ) -> Tiling | None:
-    """Return the tiling of a large cell of round fibres; None for others, and where there is no room for bridges.
+    """Tile a large cell with round fibres; None for others, and where there is no room for bridges.
 
-    `largest` is the size of elements, and `marks` are as in `BareOutline.of`.
+    `largest` is the element size, and `marks` are as in `BareOutline.of`.
     """
     if not is_tiled(arrangement, policy):
         return None
@@ -85,10 +85,10 @@ def tiling(
         return None
     marked = [(k, np.radians(angle)) for k in outer.tolist() for angle in marks.get(int(disc[k]), ())]
     vertices = np.array([k for k, _ in marked], np.int64), np.array([angle for _, angle in marked])
-    found = bridges(lines, size, CLEAR * arrangement.outer_radii.mean(), largest, vertices)
+    candidates = bridges(lines, size, CLEAR * arrangement.outer_radii.mean(), largest, vertices)
     sides = _side_pieces(circles, outer, size)
     grid = np.maximum(1, np.round(size * np.sqrt(len(arrangement.radii) / policy.discs / size.prod()))).astype(int)
-    matrix = matrix_tiles(circles, outer, sides, found, lines, size, grid)
+    matrix = matrix_tiles(circles, outer, sides, candidates, lines, size, grid)
     if matrix is None:
         return None
     half, n_sides = matrix.lines, len(sides[0])
@@ -104,7 +104,7 @@ def tiling(
 
 
 def _side_pieces(circles: Float, outer: Int, size: Float) -> tuple[Int, Float]:
-    """Return the pieces of sides in the matrix, as `matrix_tiles` takes them.
+    """Return the side pieces in the matrix, as `matrix_tiles` takes them.
 
     `outer` (n,) are the circles that bound it.
     """
@@ -112,10 +112,10 @@ def _side_pieces(circles: Float, outer: Int, size: Float) -> tuple[Int, Float]:
     for axis, (level, low) in product((0, 1), ((0.0, True), (1.0, False))):
         places = crossings(circles[outer], axis, size)
         points = on_side(places, axis, level * size[1 - axis])
-        found = disc_at(circles[outer], on_side((places[:-1] + places[1:]) / 2, axis, level * size[1 - axis]))
-        node = np.where(found == MATRIX, MATRIX, outer[found])
+        circle = disc_at(circles[outer], on_side((places[:-1] + places[1:]) / 2, axis, level * size[1 - axis]))
+        node = np.where(circle == MATRIX, MATRIX, outer[circle])
         corner = len(circles) + (points[[0, -1]] > 0) @ [1, 2]
-        piece = np.flatnonzero(found == MATRIX)
+        piece = np.flatnonzero(circle == MATRIX)
         around = np.concatenate([corner[:1], node, corner[1:]])
         both, where = np.stack([around[piece], around[piece + 2]], axis=1), points[piece[:, None] + [0, 1]]
         forward = low == (axis == 0)
@@ -125,7 +125,7 @@ def _side_pieces(circles: Float, outer: Int, size: Float) -> tuple[Int, Float]:
 
 
 def cut(lines: Outline, cell: Tile, tiles: Tiling | None) -> list[tuple[Int, Tile]]:
-    """Return the tiles of a cell whose outline is `lines`, each with the numbers (n,) of its nodes.
+    """Cut a cell with the outline `lines` into tiles, each with its node numbers (n,).
 
     The cell as it is without a tiling.
     """
@@ -139,18 +139,18 @@ def cut(lines: Outline, cell: Tile, tiles: Tiling | None) -> list[tuple[Int, Til
     tile, curve = tile[order], curve[order]
     parts = []
     for name in np.unique(tile[tile != OUTSIDE]).tolist():
-        own = curve[np.searchsorted(tile, name) : np.searchsorted(tile, name, side="right")]
-        mine = curves.chosen(own)
+        some = curve[np.searchsorted(tile, name) : np.searchsorted(tile, name, side="right")]
+        mine = curves.chosen(some)
         nodes, node = np.unique(mine.node, return_inverse=True)
-        inside = np.where(left[own] == name, mine.inside, OUTSIDE)
-        outside = np.where(right[own] == name, mine.outside, OUTSIDE)
+        inside = np.where(left[some] == name, mine.inside, OUTSIDE)
+        outside = np.where(right[some] == name, mine.outside, OUTSIDE)
         bounded = replace(mine, node=node, inside=inside, outside=outside)
         parts.append((nodes, replace(cell, points=cell.points[nodes], curves=bounded)))
     return parts
 
 
 def _tiles_beside(lines: Outline, tiles: Tiling) -> tuple[Int, Int]:
-    """Return the tiles (c,) on the left and on the right of curves, OUTSIDE beyond the sides."""
+    """Return the tiles (c,) to the left and right of curves, OUTSIDE beyond the sides."""
     curves = lines.curves
     left, right = tiles.within[curves.inside], tiles.within[curves.outside]
     is_side = curves.outside == OUTSIDE
@@ -169,14 +169,14 @@ def _tiles_beside(lines: Outline, tiles: Tiling) -> tuple[Int, Int]:
 
 @dataclass(frozen=True)
 class Regions:
-    """Regions of a cell that is drawn, known to every rank.
+    """Regions in a generated cell, known to every rank.
 
     Attributes:
-        width, height, scale: of the mesh, and its lengths / those of its tiles.
+        width, height, scale: of the mesh, and its lengths / lengths in tiles.
         phases: names, the matrix first.
         ellipses: the k circles, as in `CoarseMesh`.
-        constituent: (k + 1,) the constituent next within each circle, -1 in a void; the last is that of the matrix.
-        phase: (constituents,) number of the phase of each.
+        constituent: (k + 1,) the constituent next within each circle, -1 in a void; the last is the matrix.
+        phase: (constituents,) phase number of each.
         nodes: on the lines.
     """
 
@@ -192,7 +192,7 @@ class Regions:
 
 @dataclass(frozen=True)
 class NumberedTile:
-    """A tile with the numbers (n,) of its nodes, and those (n,) of the nodes that stand for their classes."""
+    """A tile with its node numbers (n,), and numbers (n,) of the nodes that stand for their classes."""
 
     nodes: Int
     classes: Int
@@ -205,8 +205,8 @@ class FilledTile:
 
     Attributes:
         number: among all tiles.
-        lines, filling: what is on its lines, and within.
-        first: number of its first node that is not on a line.
+        lines, filling: on its lines, and within.
+        first: number of its first node off the lines.
     """
 
     number: int
@@ -221,16 +221,16 @@ class FilledTile:
 
 
 def tile_torus(regions: Regions, tiles: Sequence[FilledTile], all_nodes: int) -> tuple[Torus, Int]:
-    """Return the torus of the triangles of these tiles, without voids, and the number (m,) of the tile of each.
+    """Return the torus for the triangles in `tiles`, without voids, and the tile number (m,) of each.
 
-    `all_nodes` is how many there are in the cell.
+    `all_nodes` counts the nodes in the cell.
     """
-    numbers = [np.concatenate([own.lines.nodes, own.inner]) for own in tiles]
-    classes = [np.concatenate([own.lines.classes, own.inner]) for own in tiles]
-    points = [np.concatenate([own.lines.tile.points, own.filling.inner]) for own in tiles]
-    constituent = _all([regions.constituent[own.filling.circle] for own in tiles])
+    numbers = [np.concatenate([filled.lines.nodes, filled.inner]) for filled in tiles]
+    classes = [np.concatenate([filled.lines.classes, filled.inner]) for filled in tiles]
+    points = [np.concatenate([filled.lines.tile.points, filled.filling.inner]) for filled in tiles]
+    constituent = _all([regions.constituent[filled.filling.circle] for filled in tiles])
     solid = constituent >= 0
-    triangles = _all([n[own.filling.triangles] for n, own in zip(numbers, tiles, strict=True)], 3)[solid]
+    triangles = _all([n[filled.filling.triangles] for n, filled in zip(numbers, tiles, strict=True)], 3)[solid]
     number, triangles = np.unique(triangles, return_inverse=True)
     everywhere, first = np.unique(_all(numbers), return_index=True)
     place = first[np.searchsorted(everywhere, number)]
@@ -258,24 +258,24 @@ def tile_torus(regions: Regions, tiles: Sequence[FilledTile], all_nodes: int) ->
     torus = Torus(mesh, node_class, plane, triangle_edges, torus_edge, constituent, class_keys, keys, np.zeros(0, bool))
     at_void = np.zeros(len(keys), bool)
     at_void[torus_edge[torus.plane_edges(mesh.arc_edges[regions.constituent[arc_circle] < 0])]] = True
-    tile = np.repeat([own.number for own in tiles], [len(own.filling.triangles) for own in tiles])
+    tile = np.repeat([filled.number for filled in tiles], [len(filled.filling.triangles) for filled in tiles])
     return replace(torus, at_void=at_void, is_whole=False), tile[solid]
 
 
 def _arcs(tiles: Sequence[FilledTile], number: Int, triangles: Int32) -> tuple[Int32, Int]:
-    """Edges (a, 2) of these triangles that are on circles, and the circles (a,); node k is that of number[k]."""
-    found = [arc_edges(own.lines.tile.curves) for own in tiles]
-    circle = _all([circles for _, circles in found])
-    ends = _all([own.lines.nodes[pairs] for own, (pairs, _) in zip(tiles, found, strict=True)], 2)
+    """Find edges (a, 2) of triangles on circles, and the circles (a,); node k has the number number[k]."""
+    arcs = [arc_edges(filled.lines.tile.curves) for filled in tiles]
+    circle = _all([circles for _, circles in arcs])
+    ends = _all([filled.lines.nodes[pairs] for filled, (pairs, _) in zip(tiles, arcs, strict=True)], 2)
     n = max(len(number), 1)
     pairs = np.searchsorted(number, ends).clip(max=n - 1).astype(np.int32)
     # A tile has arcs of its voids, too; an arc between two tiles is in both.
     keys = edge_keys(pairs, n)
-    known = (number[pairs] == ends).all(axis=1) & np.isin(keys, edge_keys(edges(triangles), n))
-    first = np.flatnonzero(known)[np.unique(keys[known], return_index=True)[1]]
+    exists = (number[pairs] == ends).all(axis=1) & np.isin(keys, edge_keys(edges(triangles), n))
+    first = np.flatnonzero(exists)[np.unique(keys[exists], return_index=True)[1]]
     return pairs[first], circle[first]
 
 
 def _all(parts: Sequence[Array], width: int | None = None, kind: type = int) -> Array:
-    """Their rows, one after the other; of no parts none of `width` numbers."""
+    """Concatenate rows; without parts, no rows of `width` numbers."""
     return np.concatenate([np.zeros((0,) if width is None else (0, width), kind), *parts])
