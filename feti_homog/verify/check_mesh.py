@@ -14,7 +14,7 @@ from feti_homog.typing import AnyInt, Bool, Float, Int
 from feti_homog.verify.check_loads import NAMES, States
 from feti_homog.verify.discrete_cell import BONDED, DiscreteCell
 from feti_homog.verify.elements import PLACES
-from feti_homog.verify.findings import Findings, Section
+from feti_homog.verify.findings import ROUNDING, Findings, Section
 from feti_homog.verify.reading import State
 from feti_homog.verify.torus import from_centre
 
@@ -22,8 +22,6 @@ from feti_homog.verify.torus import from_centre
 AT_TIP = 0.06
 # Errors of lengths and normals of straight sides, in place of unknown curves that turn by half a turn at most.
 LENGTH_ERROR, NORMAL_ERROR = np.pi / 2 - 1, np.sqrt(2.0)
-# Relative energy errors below this are rounding in uniform fields.
-LEAST_ERROR = 1e-9
 # Errors by fits to several elements over errors by averages: 1.5 to 1.9 of quadratic elements without a bubble, else
 # 0.76 to 1.6, of hexagonal and random cells with contrasts of 1e-3 and 1e3, refined up to twice; of elements as large
 # as a fibre, up to a quarter more.
@@ -213,11 +211,11 @@ def check_mesh_error(findings: Findings, cell: DiscreteCell, state: State) -> No
         name = f"effective_stiffness{'_compression' if state.strain[k] < 0 else ''}"
         error = document["mesh_error"].hint(name)[k][k] / abs(document.hint(name)[k][k])
     if error is not None and not np.isnan(total):
-        ratio = (LEAST_SHARE * total + LEAST_ERROR) / (error + LEAST_ERROR)
+        ratio = (LEAST_SHARE * total + ROUNDING) / (error + ROUNDING)
         findings.record("mesh error", ratio - 1, f"{state.name}, the error of its energy")
     energy = float(state.strain @ state.mean_stress) * cell.area
     if cell.files.case["analysis"]["type"] == "stiffness" and energy > 0 and not np.isnan(state.mesh_error).all():
-        ratio = (total + LEAST_ERROR) / (_averaged(cell, state) / energy + LEAST_ERROR)
+        ratio = (total + ROUNDING) / (_averaged(cell, state) / energy + ROUNDING)
         findings.record("mesh error", max(ratio, 1 / ratio) - 1, state.name)
 
 

@@ -15,10 +15,9 @@ from feti_homog.verify.check_loads import NAMES, SPATIAL_ORDER
 from feti_homog.verify.constitutive_law import laws, mixed_phases
 from feti_homog.verify.discrete_cell import BONDED, CLOSED, DiscreteCell
 from feti_homog.verify.elements import Elements
-from feti_homog.verify.findings import Findings, relative
+from feti_homog.verify.findings import STEP, Findings, relative
 from feti_homog.verify.reading import Mesh, State
 
-STEP = 1e-6  # relative, of parameters
 STIFFNESS_STEP = 1e-5  # relative
 NOISE = 1e-3  # share of the largest constant of a kind below which constants are noise
 SAME_RADIUS = 1e-8  # of a radius

@@ -14,11 +14,10 @@ from feti_homog.verify import torus
 from feti_homog.verify.bonds import friction_at, pairs_of
 from feti_homog.verify.constitutive_law import laws, mixed_phases
 from feti_homog.verify.elements import Elements
+from feti_homog.verify.findings import ROUNDING
 from feti_homog.verify.reading import ResultFiles, State, gradient
 from feti_homog.verify.torus import TornNodes, TornSides
 
-# Least scale of a state / largest scale in the run: a path may come back to zero strain.
-LEAST_SHARE = 1e-9
 # Share of the terms that adds to the scale of their sum: 1e-15 of the terms are rounding.
 ROUNDED_TERMS = 1e-5
 BONDED, CLOSED, OPEN = 0, 1, 2
@@ -198,7 +197,7 @@ class DiscreteCell:
         displacement = float(np.abs(corners @ gradient(loads).T).max())
         displacement += abs(float(loads[2])) * longest if len(loads) > 3 else 0.0  # as much as E33 may contract
         sizes = float(np.abs(loads).max()), float(np.abs(self.reuss @ loads).max()), displacement
-        least = LEAST_SHARE * self.largest_strain
+        least = ROUNDING * self.largest_strain  # a path may come back to zero strain
         return Scales(*map(max, sizes, (least, least * float(np.abs(self.reuss).max()), least * longest)))
 
     def scales_of(self, state: State) -> Scales:

@@ -24,11 +24,13 @@ from feti_homog.typing import Float
 
 CHECK_PER_RTOL, LARGEST_CHECK, KKT = 1e3, 1e-4, 1e-6
 # Signs of forces and gaps are solver error below 10 rtol of the largest; the solver's contact check allows 1e-6.
-CONTACT_PER_RTOL, LEAST_CONTACT = 100.0, 1e-6
+CONTACT_PER_RTOL = 100.0
 # Bonds whose utilisation differs by 1e-6 break together.
 STRENGTH = 2e-6
-# Differences of energies over a relative step of 1e-6.
-SLOPE = 1e-6
+# Relative step of finite differences of energies, and their error.
+STEP = 1e-6
+# Relative differences below this are rounding: of loads in proportion, of energies and strains next to their scale.
+ROUNDING = 1e-9
 # Coordinates of a user's mesh are rounded: sides match to 1e-7 of the cell, circles are round to 1e-6 of their radius.
 GENERATED_MESH, USERS_MESH = 1e-9, 1e-5
 # Thin coatings bend by the rounding of the forces on their two faces: measured 4e-9 at a hundredth of the radius.
@@ -136,7 +138,7 @@ def checks(
     of_pressure = max(1.0, min(PRESSURE * ratio, contrast / LARGE_OF_PRESSURE))
     sums, balance, rounding = 1e-10 * lost, 1e-10 * of_balance, max(COATINGS * has_coatings, BODIES * lost)
     shape, solver = USERS_MESH if users_mesh else GENERATED_MESH, solver_limit(rtol)
-    contact = min(max(CONTACT_PER_RTOL * rtol, LEAST_CONTACT), LARGEST_CHECK)
+    contact = min(max(CONTACT_PER_RTOL * rtol, KKT), LARGEST_CHECK)
     rows = (
         ("files", "the files are unchanged since the run, by their checksums", 0.0),
         ("status", "the status follows from the checks, tolerances from rtol", 1e-9),
@@ -175,7 +177,7 @@ def checks(
         ("compliance", "compliance and expansion follow from stiffness and thermal stress, relative to each", sums),
         ("Levin", "thermal stress = - mean of expansion : stiffness : strain under unit strains, relative", solver),
         ("constants", "constants at fixed status are those of the fields, relative to each", solver),
-        ("sensitivities", "constants change with those of the case as in the file, relative", max(SLOPE, solver)),
+        ("sensitivities", "constants change with those of the case as in the file, relative", max(STEP, solver)),
         ("bounds", "bounds follow from fractions and materials, and the stiffness is between them", sums),
     )
     return tuple(Check(*row) for row in rows)

@@ -29,14 +29,12 @@ from feti_homog.typing import Float
 from feti_homog.verify.bonds import friction_at, law_at
 from feti_homog.verify.check_loads import SAME_SHARE, TEMPERATURE, Prescribed, States, at_points, damaged_at, targets
 from feti_homog.verify.discrete_cell import CLOSED, DiscreteCell
-from feti_homog.verify.findings import Findings, Points
+from feti_homog.verify.findings import ROUNDING, Findings, Points
 from feti_homog.verify.reading import State
 
-# Loads whose components differ by so much, relatively, are in proportion.
-SAME_RATIO = 1e-9
-# Below these shares energies are rounding: of the bonded cell's, what a parted cell stores; of the energies of a path
-# so far, those of a step; of the stored energy, the heat of an increment.
-NO_ENERGY, LEAST_STEP, LEAST_HEAT = 1e-9, 1e-6, 1e-4
+# Shares below which energies are rounding: a step's in the path energies so far, an increment's heat in the stored
+# energy.
+LEAST_STEP, LEAST_HEAT = 1e-6, 1e-4
 
 
 @dataclass(frozen=True)
@@ -196,7 +194,8 @@ def potentials(load: Prescribed, other: PointNumbers) -> tuple[float, float]:
         return -np.inf, np.inf
     (strains, stresses), (forces, answers) = other.pairs(by_stress=False), other.pairs(by_stress=True)
     own_strains, own_forces = load.values[~load.by_stress], load.values[load.by_stress]
-    energy = other.stored if abs(other.stored) > NO_ENERGY * other.terms else 0.0
+    # A parted cell stores rounding.
+    energy = other.stored if abs(other.stored) > ROUNDING * other.terms else 0.0
     least = _largest(_work(own_strains, stresses), energy, own_forces, forces)
     return least, -_largest(_work(own_forces, answers), energy, own_strains, strains)
 
@@ -208,7 +207,7 @@ def _largest(power: float, energy: float, one: Float, other: Float) -> float:
     else:
         k = int(np.abs(other).argmax())
         t = float(one[k] / other[k]) if other[k] else -1.0
-        if t < 0 or not np.allclose(one, t * other, rtol=SAME_RATIO, atol=0.0):
+        if t < 0 or not np.allclose(one, t * other, rtol=ROUNDING, atol=0.0):
             return -np.inf
     value = t * power - t**2 * energy
     return -np.inf if np.isnan(value) else value
