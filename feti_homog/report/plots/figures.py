@@ -25,7 +25,7 @@ from feti_homog.report.plots import (
     response_curves,
     traction_plots,
 )
-from feti_homog.report.text.analyses import reported
+from feti_homog.report.text.summary import reported
 from feti_homog.results import atomic, field_file, output_folder, result_json
 from feti_homog.typing import Array, Document
 
