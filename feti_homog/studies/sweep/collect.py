@@ -38,7 +38,7 @@ def collect(directory: Path, pictures: bool) -> list[str]:
     """
     index, states = _index_and_states(directory)
     table = _table(index, states)
-    atomic.remove_abandoned(directory, re.compile(r"(cases|statistics)\.csv|(moduli|curves)\.png"))
+    atomic.remove_unfinished(directory, re.compile(r"(cases|statistics)\.csv|(moduli|curves)\.png"), alone=False)
     paths = tables.write(directory, table)
     if pictures:
         paths += figures.plot(directory, table)
