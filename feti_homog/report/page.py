@@ -51,7 +51,7 @@ def write(directory: Path) -> Path:
     if (directory / SWEEP).exists():
         raise CaseError(f"cannot report {directory}: it is the folder of a sweep; name the folder of one of its cases")
     document = result_json.read(directory)
-    atomic.remove_abandoned(directory, output_folder.RESULT_FILE)
+    atomic.remove_unfinished(directory, output_folder.RESULT_FILE, alone=False)
     try:
         html = page(document, directory)
     except (OSError, KeyError) as error:

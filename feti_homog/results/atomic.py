@@ -78,20 +78,11 @@ def rename(old: Path, new: Path) -> None:
         _synchronise(new.parent)
 
 
-def remove_unfinished(folder: Path, names: re.Pattern[str]) -> None:
-    """Remove unfinished files from killed writers; for the only process that may write in the folder."""
-    unfinished = re.compile(rf"({names.pattern})\..+\.\d+\.part")
+def remove_unfinished(folder: Path, names: re.Pattern[str], alone: bool = True) -> None:
+    """Remove unfinished files from killed writers, on any machine if this process may write there `alone`."""
+    part = re.compile(rf"({names.pattern})\.(?P<tag>.+\.\d+)\.part")
     for path in folder.glob("*.part"):
-        if unfinished.fullmatch(path.name):
-            with contextlib.suppress(OSError):
-                path.unlink()
-
-
-def remove_abandoned(folder: Path, names: re.Pattern[str]) -> None:
-    """Remove unfinished files from killed writers on this machine; other processes may write in the folder."""
-    part = re.compile(rf"({names.pattern})\.(?P<tag>.+)\.part")
-    for path in folder.glob("*.part"):
-        if (match := part.fullmatch(path.name)) and file_locks.has_ended(match["tag"]):
+        if (match := part.fullmatch(path.name)) and (alone or file_locks.has_ended(match["tag"])):
             with contextlib.suppress(OSError):
                 path.unlink()
 

@@ -66,7 +66,7 @@ class NoCheckpoint:
         Args:
             shared: numbers that are the same on all ranks.
             distributed: arrays, each with this rank's part.
-            light: the event is found again at once, and may be lost with the power.
+            light: the event is found again at once, and may be lost if the power fails.
 
         Raises:
             FetiHomogError: the file cannot be written.
@@ -84,6 +84,7 @@ class EventsInMemory(NoCheckpoint):
     def __init__(self, comm: MPI.Intracomm, room: int | None = WHOLE_BYTES) -> None:
         super().__init__(comm, room)
         self._events: list[bytes] = []
+        self._bytes = 0
 
     def count(self) -> int:
         return len(self._events)
@@ -93,7 +94,9 @@ class EventsInMemory(NoCheckpoint):
 
     def write(self, number: int, shared: Mapping[str, Any], distributed: Arrays, light: bool = False) -> None:
         event = {name: np.asarray(value) for name, value in {**shared, **distributed}.items()}
-        self._events.append(packed(self._kept(event, self.comm.allreduce(sum(map(len, self._events))))))
+        del self._events[number:]
+        self._events.append(packed(self._kept(event, self.comm.allreduce(self._bytes))))
+        self._bytes += len(self._events[-1])
 
 
 class Checkpoint(NoCheckpoint):

@@ -170,7 +170,7 @@ def write_product(path: Path, text: str) -> Path:
         raise CaseError(f"--out {path}: expected a file in a folder that there is")
     if RESULT_FILE.fullmatch(path.name) or RESULT_FILE.fullmatch(target.name):
         raise CaseError(f"--out {path}: expected another name; results have files of that name")
-    atomic.remove_abandoned(target.parent, re.compile(re.escape(target.name)))
+    atomic.remove_unfinished(target.parent, re.compile(re.escape(target.name)), alone=False)
     atomic.replace_text(target, f"{text}\n")
     return path
 

@@ -45,7 +45,7 @@ def collect(directory: Path, pictures: bool) -> list[str]:
     """
     index, states = _index_and_states(directory)
     table = _table(index, states)
-    atomic.remove_abandoned(directory, re.compile(r"(cases|statistics)\.csv|moduli\.png"))
+    atomic.remove_unfinished(directory, re.compile(r"(cases|statistics)\.csv|moduli\.png"), alone=False)
     paths = write(directory, table)
     if pictures:
         from feti_homog.studies.pictures import draw_moduli  # only a rank that draws loads Matplotlib

@@ -18,7 +18,7 @@ from PIL import Image
 
 from feti_homog.errors import FetiHomogError
 from feti_homog.report.plots import decimation, drawn_cell, plot_helpers
-from feti_homog.report.text.analyses import reported
+from feti_homog.report.text.summary import reported
 from feti_homog.results import atomic, field_file, landmarks
 from feti_homog.results.landmarks import marks
 from feti_homog.typing import Array, Document

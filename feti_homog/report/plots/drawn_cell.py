@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from feti_homog.materials.voigt import voigt_names
 from feti_homog.report.plots.decimation import TRIANGLE_LIMIT, DrawnMesh, drawn_mesh, outline_edges
 from feti_homog.report.plots.plot_helpers import SYMBOLS, draw_segments, unit_label
-from feti_homog.report.text.analyses import reported
+from feti_homog.report.text.summary import reported
 from feti_homog.results.path_curves import FAINT, ZERO, components_above, leading_component
 from feti_homog.typing import Array, Document
 

@@ -25,7 +25,7 @@ from feti_homog.report.plots import (
     response_curves,
     traction_plots,
 )
-from feti_homog.report.text.analyses import reported
+from feti_homog.report.text.summary import reported
 from feti_homog.results import atomic, field_file, output_folder, result_json
 from feti_homog.typing import Array, Document
 
@@ -52,7 +52,7 @@ def plot(directory: Path) -> list[Path]:
         FetiHomogError: result.h5 cannot be read, or a picture cannot be written.
     """
     directory = Path(directory)
-    atomic.remove_abandoned(directory, output_folder.RESULT_FILE)
+    atomic.remove_unfinished(directory, output_folder.RESULT_FILE, alone=False)
     document = result_json.read(directory) if (directory / result_json.NAME).exists() else {}
     with mpl.rc_context(plot_helpers.STYLE):
         try:

@@ -15,8 +15,8 @@ from matplotlib.ticker import MaxNLocator, MultipleLocator
 from feti_homog.materials.voigt import STRESSES
 from feti_homog.report.plots import path_picture, plot_helpers
 from feti_homog.report.text import constant_tables
-from feti_homog.report.text.analyses import reported
 from feti_homog.report.text.point_tables import shown_entries
+from feti_homog.report.text.summary import reported
 from feti_homog.results.path_curves import interface_sections
 from feti_homog.typing import Array, Document
 

@@ -16,7 +16,7 @@ from scipy.sparse.csgraph import connected_components, depth_first_order
 from scipy.spatial import cKDTree
 
 from feti_homog.report.plots import drawn_cell, plot_helpers
-from feti_homog.report.text.analyses import reported
+from feti_homog.report.text.summary import reported
 from feti_homog.results.landmarks import peak_of
 from feti_homog.typing import Array, Document
 

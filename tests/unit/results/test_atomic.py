@@ -25,7 +25,7 @@ def test_only_what_dead_writers_left_is_removed_beside_others(tmp_path):
     for name in (*(words % dead for words in names), names[0] % file_locks.tag(), names[0] % f"else.{dead}"):
         (tmp_path / name).write_text("")
     before = set(tmp_path.iterdir())
-    atomic.remove_abandoned(tmp_path, output_folder.RESULT_FILE)
+    atomic.remove_unfinished(tmp_path, output_folder.RESULT_FILE, alone=False)
     assert before - set(tmp_path.iterdir()) == {tmp_path / (names[0] % dead)}
 
 
