@@ -41,18 +41,18 @@ def run(
     """Return the result of a case on every rank of `comm` (default: all ranks).
 
     Collective over `comm`; ranks outside of it need not call it, nor wait.  If the program has not started PETSc,
-    this does, without options: those of the case are in its `petsc`.
+    this does, without options: the case's own are in its `petsc`.
 
     Args:
         out: a folder for the files that `feti-homog run` writes; without it none is written.
         fields: whether `result.fields` has mesh, interface and states in memory, each rank its part.
         resume: with `out`, go on from where a path to the same folder was ended.
-        quiet: print nothing; else what the command line prints.
+        quiet: print nothing; else as the command line.
 
     Raises:
         TypeError: `case` is not a Case.
         CaseError, MeshError: the case cannot be run, or `out` cannot be used.
-        ConvergenceError: a solve did not converge or a check failed; what was computed is in `out`.
+        ConvergenceError: a solve did not converge or a check failed; the computed part is in `out`.
         LibraryError: mpi4py, petsc4py or h5py is missing or does not fit.
     """
     if not isinstance(case, Case):
@@ -75,7 +75,7 @@ def run_sweep(
     retry: bool = False,
     quiet: bool = True,
 ) -> SweepTable:
-    """Run the cases of a file with [sweep], or of such a document, and return their table on every rank.  Collective.
+    """Run the cases in a file or document with [sweep]; returns their table on every rank.  Collective.
 
     Finished cases in `out` are kept, so that the same call goes on after an interruption.
 
@@ -101,7 +101,7 @@ def run_sweep(
 
 
 def collect_sweep(out: str | Path, comm: Intracomm | None = None, *, pictures: bool = True) -> list[str]:
-    """Write cases.csv, statistics.csv and pictures of a sweep's folder; returns lines to print.
+    """Write cases.csv, statistics.csv and the picture of a sweep; returns lines to print.
 
     Collective; the sweep may still be running.
 
@@ -123,10 +123,9 @@ def run_fit(
     retry: bool = False,
     quiet: bool = True,
 ) -> dict[str, Any]:
-    """Fit the unknowns of a file, or of such a document, and return the content of fit.json on every rank.  Collective.
+    """Fit the unknowns in a file or document; returns the content of fit.json on every rank.  Collective.
 
-    Every evaluation is kept in `out`, so that the same call goes on after an interruption.  Arguments are those of
-    `run_sweep`.
+    Every evaluation is kept in `out`, so that the same call goes on after an interruption.  Arguments as `run_sweep`.
 
     Raises:
         CaseError: the fit is faulty, or `out` cannot be used.
@@ -143,9 +142,9 @@ def run_fit(
 
 
 def draw_state(axes: Axes, out: str | Path, number: int = 0, **choices: Any) -> str:
-    """Draw the deformed cell of a state of `out`/result.h5 into Matplotlib's axes; returns what is drawn, in words.
+    """Draw the deformed cell in a state of `out`/result.h5 into Matplotlib's axes; returns the title.
 
-    `choices`: `stress` ("S11", "S22" or "S12"; by default that of the largest strain), `scale` of the displacements
+    `choices`: `stress` ("S11", "S22" or "S12"; by default along the largest strain), `scale` of the displacements
     (default 1) and `most`, the largest stress of the colours, for pictures beside each other.  Call it on one rank.
     """
     from feti_homog.report.plots import deformed_panels
@@ -154,7 +153,7 @@ def draw_state(axes: Axes, out: str | Path, number: int = 0, **choices: Any) -> 
 
 
 def read_state(out: str | Path, number: int = 0) -> ViewedState:
-    """Return a state of `out`/result.h5 as arrays: the mesh, displacements, stresses and what follows from them.
+    """Return a state in `out`/result.h5 as arrays: mesh, displacements, stresses and derived fields.
 
     `nodes` and `elements` are dictionaries: displacement, stress, strain, von_mises, ...; see `ViewedState`.  Call it
     on one rank.

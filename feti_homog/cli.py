@@ -28,7 +28,7 @@ COMMANDS = (run.add, products.add, products.add_fibres, studies.add, run.add_ref
 
 
 class Parser(argparse.ArgumentParser):
-    """Whose errors are reported once and give exit code 2, like those of the case."""
+    """A parser whose errors are reported once, with exit code 2, as errors of the case."""
 
     def error(self, message: str) -> NoReturn:
         raise CaseError(f"command line: {message} (see --help)")
@@ -56,10 +56,12 @@ def _refuse_single_dashes(parser: Parser) -> None:
     from petsc4py import PETSc
 
     commands = next(action.choices for action in parser._actions if isinstance(action, argparse._SubParsersAction))
-    ours = {word[2:] for each in commands.values() for word in each._option_string_actions if word.startswith("--")}
-    given = sorted(ours & PETSc.Options().getAll().keys() - {"help"})
-    if given:
-        raise CaseError(*(f"command line: -{name} is no option of PETSc; did you mean --{name}?" for name in given))
+    ours = {
+        word[2:] for command in commands.values() for word in command._option_string_actions if word.startswith("--")
+    }
+    misplaced = sorted(ours & PETSc.Options().getAll().keys() - {"help"})
+    if misplaced:
+        raise CaseError(*(f"command line: -{name} is no option of PETSc; did you mean --{name}?" for name in misplaced))
 
 
 def command_parser() -> Parser:

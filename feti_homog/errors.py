@@ -1,4 +1,4 @@
-"""Errors that a user can cause or must hear of, and the exit codes of the program."""
+"""Errors that a user can cause or must hear of, and the exit codes."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ EXIT_DONE, EXIT_DEFECT, EXIT_INPUT, EXIT_UNCONVERGED = 0, 1, 2, 3
 LONGEST_LINE, KEPT_END, MOST_FAULTS = 1000, 200, 30
 
 
-def escaped(text: str, kept: str = "") -> str:
-    """Escape the characters that are not printable, but for those `kept`: a terminal would obey those of a file."""
-    return re.sub(r"[^ -~]", lambda c: c[0] if c[0].isprintable() or c[0] in kept else ascii(c[0])[1:-1], text)
+def escaped(text: str, allowed: str = "") -> str:
+    """Escape characters that are not printable, but for `allowed`: a terminal would obey a file's."""
+    return re.sub(r"[^ -~]", lambda c: c[0] if c[0].isprintable() or c[0] in allowed else ascii(c[0])[1:-1], text)
 
 
 class FetiHomogError(Exception):
@@ -44,7 +44,7 @@ class CaseError(FetiHomogError):
 
 
 class CheckpointError(CaseError):
-    """Events of a checkpoint are missing, unreadable or of another run."""
+    """Checkpoint events are missing, unreadable or from another run."""
 
 
 class MeshError(FetiHomogError):
@@ -54,7 +54,7 @@ class MeshError(FetiHomogError):
 
 
 class ConvergenceError(FetiHomogError):
-    """A solve did not converge or a check failed; what was computed is written and marked."""
+    """A solve did not converge or a check failed; the computed part is written and marked."""
 
     exit_code = EXIT_UNCONVERGED
 

@@ -1,4 +1,4 @@
-"""Aliases of NumPy's array types, whose shapes stand in docstrings, and of documents such as result.json."""
+"""Aliases for NumPy's array types, whose shapes stand in docstrings, and for documents such as result.json."""
 
 from __future__ import annotations
 

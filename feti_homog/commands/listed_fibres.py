@@ -1,4 +1,4 @@
-"""Fibres of a case or of a result, and the table of them that [cell] geometry = "table" reads."""
+"""Fibres of a case or result, as the table that [cell] geometry = "table" reads."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from feti_homog.typing import Float
 
 
 def table(source: Path) -> str:
-    """Return the table of a case file or a folder of results, with a row for each fibre and for each void.
+    """Return the fibre table of a case file or result folder, with a row for each fibre and void.
 
     Fibres are in the order of their numbers.  Ellipses have the columns `a`, `b` and `angle`, coatings `coating`.
     Numbers are exact, so that the table gives the same cell again.  On one rank.
@@ -87,12 +87,12 @@ class ListedFibres:
 
     @property
     def radii(self) -> Float:
-        """(N,) of circles, and of discs of the same area as the ellipses."""
+        """(N,) of circles, and of discs with the ellipses' areas."""
         return np.asarray(np.sqrt(self.ellipses.semi_axes.prod(axis=1)))
 
 
 def read(source: Path) -> ListedFibres:
-    """Return the fibres of a case file or a folder of results.  On one rank.
+    """Return the fibres of a case file or result folder.  On one rank.
 
     Raises:
         CaseError, MeshError: the source is faulty, or a fibre is neither round nor an ellipse.
@@ -107,7 +107,7 @@ def read(source: Path) -> ListedFibres:
 
 
 def _of_result(directory: Path) -> ListedFibres:
-    """Return the fibres of a result, by its case if it lacks outlines: of voids, and of shapes other than ellipses."""
+    """Return the fibres of a result, by its case if outlines are missing: voids, and shapes other than ellipses."""
     document = stored_result.read(directory)
     is_complete = all("radius" in fibre or "semi_axes" in fibre for fibre in document["fibres"])
     is_complete = is_complete and not document["cell"].get("porosity")

@@ -43,7 +43,7 @@ VERIFY_HELP = (
 
 
 def add(actions: argparse._SubParsersAction[Any]) -> None:
-    """Add the commands to those of a parser."""
+    """Add the commands for results to a parser."""
     _add(actions, "plot", _plot, "make the pictures of a results folder again")
     _add(actions, "report", _report, "write report.html of a results folder: one page with all there is")
     words = "write the states of a result, with strains, von Mises and principal stresses, for VTK"
@@ -86,7 +86,7 @@ def _add(
     words: str,
     description: str | None = None,
 ) -> argparse.ArgumentParser:
-    """Return the new parser of a command of a results folder."""
+    """Return the new parser for a command on a result folder."""
     parser: argparse.ArgumentParser = actions.add_parser(name, help=words, description=description)
     # Without an action it is `verify`, which loads no module of the results that it checks.
     parser.add_argument("directory", type=_result_folder if action else folder, metavar="DIR")
@@ -95,7 +95,7 @@ def _add(
 
 
 def _result_folder(name: str) -> Path:
-    """Return the folder of that name; CaseError for a file, and for the folder of a sweep, whose cases have results."""
+    """Return a result folder by name; CaseError for a file, or a sweep's folder, whose cases have results."""
     from feti_homog.results import result_json
     from feti_homog.studies.case_folders import INDEX_FILE
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def add(actions: argparse._SubParsersAction[Any]) -> None:
-    """Add the commands that run and check to those of a parser."""
+    """Add the commands `run` and `check` to a parser."""
     parser = actions.add_parser("run", help="run a case file and write its results to a folder")
     parser.add_argument("case", type=Path, metavar="CASE.toml")
     parser.add_argument("--out", type=folder, required=True, metavar="DIR", help="folder of the results")
@@ -58,7 +58,7 @@ def _check(arguments: argparse.Namespace, comm: Intracomm) -> None:
 
 
 def add_reference(actions: argparse._SubParsersAction[Any]) -> None:
-    """Add the commands that print references to those of a parser."""
+    """Add the commands that print references to a parser."""
     keys = actions.add_parser("keys", help="print the keys of a case file and their meaning")
     keys.add_argument("section", nargs="?", metavar="SECTION", help="cell, material, ...; by default all of them")
     keys.set_defaults(action=_keys)

@@ -1,4 +1,4 @@
-"""The points of a sweep: the values of its axes, combined to a grid, row by row, or sampled."""
+"""Points of a sweep: axis values combined to a grid, row by row, or sampled."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def read_points(table: Mapping[str, Any], faults: list[str]) -> tuple[list[Assig
 
 
 def _axis_faults(axes: Sequence[Axis], settings: SweepSection) -> list[str]:
-    """Faults of the axes together: nothing to sample, or a key twice."""
+    """Faults between axes: nothing to sample, or a key twice."""
     faults = []
     if settings.samples is not None and all(axis.values for axis in axes):
         faults.append(f"[{SWEEP}] samples = {settings.samples}: no key is to be sampled; expected a range {{from, to}}")
@@ -71,7 +71,7 @@ def _axis_faults(axes: Sequence[Axis], settings: SweepSection) -> list[str]:
 
 
 def _count_faults(axes: Sequence[Axis], settings: SweepSection) -> list[str]:
-    """Faults of the numbers of values: unequal ones in rows, or too many cases."""
+    """Faults in value counts: unequal ones in rows, or too many cases."""
     faults, lengths = [], _lengths(axes, settings)
     counts = [length for _, length in lengths]
     if settings.mode == "zip" and len({*counts}) > 1:
@@ -82,16 +82,16 @@ def _count_faults(axes: Sequence[Axis], settings: SweepSection) -> list[str]:
 
 
 def _lengths(axes: Sequence[Axis], settings: SweepSection) -> list[tuple[str, int]]:
-    """Return the keys of each axis in words, and its number of values; sampled keys are one axis."""
+    """Return the keys of each axis in words, and its value count; sampled keys are one axis."""
     lengths = [(dotted_key(axis.path), len(axis.values)) for axis in axes if axis.values]
     sampled = [dotted_key(axis.path) for axis in axes if not axis.values]
     return [*lengths, (" and ".join(sampled), settings.samples)] if sampled and settings.samples else lengths
 
 
 def _combined(axes: Sequence[Axis], settings: SweepSection) -> list[Assignment]:
-    """Return the points of axes without fault.
+    """Return the points on axes without fault.
 
-    In a grid the last key in the file runs fastest; sampled keys are one axis of points, the last.
+    In a grid the last key in the file runs fastest; sampled keys are one axis, the last.
     """
     lists = [[{axis.path: value} for value in axis.values] for axis in axes if axis.values]
     lists += _samples([axis for axis in axes if not axis.values], settings)
@@ -100,7 +100,7 @@ def _combined(axes: Sequence[Axis], settings: SweepSection) -> list[Assignment]:
 
 
 def _samples(axes: Sequence[Axis], settings: SweepSection) -> list[list[Assignment]]:
-    """Return one list of points in the box of the sampled axes, a Latin hypercube or independent; none without axes."""
+    """Return one list of sampled points, a Latin hypercube or independent; none without axes."""
     if not axes or settings.samples is None:
         return []
     if settings.sampling == "latin":
@@ -149,7 +149,7 @@ def _range_fault(value: Mapping[str, Any], is_sampled: bool) -> str:
 
 
 def _spacing_fault(table: Mapping[str, Any], is_sampled: bool) -> str:
-    """Return the fault of the step or count of a range with valid ends."""
+    """Return the fault in step or count, of a range with valid ends."""
     step, count = table.get("step"), table.get("count")
     if step is not None and count is not None:
         return "step, count: exclude each other; give one"

@@ -1,4 +1,4 @@
-"""The folder of a sweep: its list of cases, a folder for each, and their progress.
+"""The folder of a sweep: its case list, a folder for each case, and their progress.
 
 DIR/sweep.json, cases.csv     the cases; collected, cases.csv has their results too
 DIR/case-0001/case.toml       the case with its defaults, which `feti-homog run` runs too
@@ -33,7 +33,7 @@ INDEX_FILE, TABLE_FILE, ERROR_FILE, CASE_FILE, LOCK_FILE = (
     "sweep.json", "cases.csv", "error.txt", "case.toml", "lock",
 )  # fmt: skip
 SWEEP_ENTRIES = re.compile(r"(cases|statistics)\.csv|lock|moduli\.png|report\.html|case-\d{4,}")
-"""Names of files and folders that a sweep and its collection write beside sweep.json."""
+"""Files and folders that a sweep and its collection write beside sweep.json."""
 INDEX_LOCK_FILE, INDEX_LOCK_TIMEOUT_S = "index.lock", 30.0
 
 
@@ -41,7 +41,7 @@ class Status(StrEnum):
     """Progress of a case.
 
     UNCONVERGED has a result that its checks refuse, FAILED an error instead; DAMAGED has a result that cannot be
-    read or is of another case; WAITING has neither.
+    read or belongs to another case; WAITING has neither.
     """
 
     DONE = "done"
@@ -59,7 +59,7 @@ class Status(StrEnum):
 
 @dataclass(frozen=True)
 class CaseState:
-    """Progress of a case, the reason of its failure, and its result.json if there is one."""
+    """Case progress, the reason for a failure, and result.json if there is one."""
 
     status: Status
     reason: str = ""
@@ -91,7 +91,7 @@ def prepare_folder(directory: Path, sweep: Sweep) -> None:
     """Make the folder of a sweep, or check that it is, perhaps with fewer cases.  On one rank.
 
     Raises:
-        CaseError: the folder has another sweep, or files of others under names of a sweep.
+        CaseError: the folder has another sweep, or foreign files under a sweep's names.
         FetiHomogError: it cannot be written.
     """
     try:
@@ -146,7 +146,7 @@ def _table(entries: Sequence[SweepCase]) -> str:
 
 
 def read_index(directory: Path) -> SweepIndex:
-    """Return the cases of a sweep's folder.  Raises CaseError without a readable list of them."""
+    """Return the cases in a sweep's folder.  Raises CaseError without a readable case list."""
     path = directory / INDEX_FILE
     try:
         document = seals.loads(input_files.read(path).decode("utf-8"))
@@ -171,14 +171,14 @@ def _replaced(value: Any, old: Any, new: Any) -> Any:
 
 
 def case_state(directory: Path, entry: SweepCase) -> CaseState:
-    """Return the progress of a case; RUNNING while another process holds its lock.  On one rank."""
+    """Return case progress; RUNNING while another process holds the case's lock.  On one rank."""
     state = stored_state(directory, entry)
     is_open = state.status in (Status.WAITING, Status.FAILED)
     return CaseState(Status.RUNNING) if is_open and is_locked(directory / entry.folder / LOCK_FILE) else state
 
 
 def stored_state(directory: Path, entry: SweepCase) -> CaseState:
-    """Return the progress of a case by its files alone, as the holder of its lock needs it.  On one rank."""
+    """Return case progress by files alone, as the lock's holder needs it.  On one rank."""
     folder = directory / entry.folder
     path = folder / result_json.NAME
     try:
@@ -239,7 +239,7 @@ def write_error(directory: Path, entry: SweepCase, error: FetiHomogError) -> Non
 
 
 def failure_lines(cases: Sequence[tuple[SweepCase, CaseState]], stress_unit: str) -> list[str]:
-    """Return the number of failed cases, then folder, inputs and reason of each; nothing without any."""
+    """Return the count, then folder, inputs and reason for each failed case; nothing without any."""
     lines = ["", f"{len(cases)} failed:"] if cases else []
     for entry, state in cases:
         lines += [f"  {entry.folder}  {entry.describe(stress_unit)}", f"    {state.reason}"]

@@ -1,4 +1,4 @@
-"""Running the cases of a sweep: all of them, by groups of ranks, or one of a job array."""
+"""Running a sweep: all cases by rank groups, or one case in a job array."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def run_all(sweep: Sweep, directory: Path, comm: Intracomm, ranks_per_case: int,
     """Run all cases, each on so many ranks; as many at once as there are such groups.  Collective.
 
     Raises:
-        CaseError: options of PETSc are faulty, `ranks_per_case` does not divide the number of ranks, or the folder
+        CaseError: PETSc options are faulty, `ranks_per_case` does not divide the rank count, or the folder
             cannot be used: it holds another sweep, or another process runs this one.
         ConvergenceError: cases failed; they are printed.
         FetiHomogError: a result could not be written; the finished ones are kept.
@@ -162,7 +162,7 @@ class Outcome(Enum):
 
 @dataclass(frozen=True)
 class CaseRunner:
-    """Runs cases of one sweep on the ranks of `comm`; `retry` takes up failed ones, `quiet` prints nothing."""
+    """Runs one sweep's cases on the ranks in `comm`; `retry` takes up failed ones, `quiet` prints nothing."""
 
     comm: Intracomm
     directory: Path

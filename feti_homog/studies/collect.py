@@ -1,4 +1,4 @@
-"""`feti-homog collect DIR`: cases.csv and statistics.csv of a sweep, finished or not, and its picture."""
+"""`feti-homog collect DIR`: tables of a sweep, finished or not, and its picture."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ CASE = ("folder", "point", "realisation", "status", "reason")
 
 
 def read(directory: Path) -> SweepTable:
-    """Return the table of a sweep's folder, of all its cases, finished or not. On one rank.
+    """Return the table of a sweep's folder, with all cases, finished or not. On one rank.
 
     Raises:
         CaseError: it is no folder of a sweep, or its list of cases is damaged.
@@ -87,7 +87,7 @@ def _cell(value: Any) -> Any:
 
 
 def _case_rows(table: SweepTable) -> Iterator[list[Any]]:
-    """Yield the names of the columns, then a row for each case."""
+    """Yield the column names, then a row for each case."""
     yield ["case", *CASE, *table.inputs, *table.outputs]
     columns = [*table.inputs.values()]
     for name, values in table.outputs.items():
@@ -99,7 +99,7 @@ def _case_rows(table: SweepTable) -> Iterator[list[Any]]:
 
 
 def _statistics_rows(table: SweepTable) -> Iterator[list[Any]]:
-    """Yield the names of the columns, then a row for each output of each point with a result."""
+    """Yield the column names, then a row for each point and output with a result."""
     inputs = [name for name in table.inputs if name != "cell.seed"]
     yield ["point", *inputs, "output", "unit", *PARTS]
     for number, point in enumerate(table.points):
@@ -120,7 +120,7 @@ def _table(index: SweepIndex, states: Sequence[CaseState]) -> SweepTable:
     place = {name: [getattr(entry, name) for entry in index.entries] for name in ("folder", "point", "realisation")}
     inputs = [entry.inputs for entry in index.entries]
     in_names = numbers(row.get("analysis.plane") for row in inputs)
-    found = _columns([{} if document is None else outputs(document, in_names) for document in documents], np.nan)
+    columns = _columns([{} if document is None else outputs(document, in_names) for document in documents], np.nan)
     return SweepTable(
         name=index.name,
         stress_unit=index.stress_unit,
@@ -128,7 +128,7 @@ def _table(index: SweepIndex, states: Sequence[CaseState]) -> SweepTable:
         status=[state.status for state in states],
         reason=[state.reason for state in states],
         inputs=_columns(inputs, None),
-        outputs={name: np.array(values) for name, values in found.items()},
+        outputs={name: np.array(values) for name, values in columns.items()},
         documents=documents,
     )
 

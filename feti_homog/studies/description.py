@@ -1,4 +1,4 @@
-"""Text of `feti-homog check`: what a run of a case, or of the cases of a sweep, would do."""
+"""Text for `feti-homog check`: the run of a case, or of a sweep's first case, with its cost."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def _described(
     loads: Sequence[tuple[int, int]],
     options: SolverOptions,
 ) -> str:
-    """Return the text of `describe`; `loads` are the subdomains and the coarse triangles of each rank."""
+    """Return the text for `describe`; `loads` has subdomains and coarse triangles of each rank."""
     subdomains = [count for count, _ in loads]
     nodes = [triangles * lattice.intervals**2 // 2 for _, triangles in loads]
     elements = summary.coarse_triangles * len(lattice.triangles)
@@ -99,7 +99,7 @@ def _described(
 def _path_lines(
     case: Case, summary: CellSummary, multipliers: int, nodes: Sequence[int], cost: cost_model.Estimate, columns: int
 ) -> list[str]:
-    """Return the lines about the events of a path; none of another analysis, or of a cell without interfaces."""
+    """Return lines about a path's events; none for other analyses or without interfaces."""
     teeth, memory = teeth_of(case), cost_model.memory_to_the_end(cost, columns, len(nodes))
     lines = cost_model.events_lines(case, multipliers, summary.fibres, teeth, nodes, cost.seconds, memory)
     if not lines or case.path is None:
@@ -113,7 +113,7 @@ def _field_lines(case: Case, nodes: int, elements: int, interface_nodes: int, ra
 
 
 def _applications(case: Case, easy: bool) -> dict[int, int]:
-    """Return the number of applications of each problem's dual operator, by its displacements of a node."""
+    """Return dual operator applications of each problem, by displacements a node."""
     return {p.components: cost_model.applications(case, p, easy) for p in phase_laws.problems(case)}
 
 
@@ -124,7 +124,7 @@ def _subdomains(count: int) -> str:
 def _plan(
     case: Case, summary: CellSummary, multipliers: int, options: SolverOptions, subdomains: Sequence[int]
 ) -> SolverPlan:
-    """Return the plan of the plane problem; pieces are dense by default, and `subdomains` are those of each rank.
+    """Plan the plane problem, with `subdomains` counted on each rank; pieces are dense by default.
 
     Raises:
         CaseError: as `solver_plan.choose`; or with friction there are no influence columns.
@@ -141,7 +141,7 @@ def _plan(
 
 
 def _fibre_lines(case: Case, summary: CellSummary) -> Iterator[str]:
-    """Yield numbers and sizes of fibres: of interfaces or a table, of the phases of a mix, of a match."""
+    """Yield fibre counts and sizes: with interfaces or a table, by mixed phases, of a match."""
     if case.interface is not None or case.cell.table is not None:
         frames, sizes = summary.frames[summary.fibre_bodies], ""
         is_hollow = case.cell.table is not None and bool((case.cell.table.inner_radius > 0).any())
@@ -160,7 +160,7 @@ def _fibre_lines(case: Case, summary: CellSummary) -> Iterator[str]:
 
 
 def of_document(document: dict[str, Any], folder: Path, comm: Intracomm) -> str:
-    """Describe the run: the case, or the cases of a sweep and the first one; empty except on rank 0.  Collective.
+    """Describe a case, or a sweep with its first case; empty except on rank 0.  Collective.
 
     Raises:
         CaseError, MeshError: the document is faulty, or the cell of its first case.
@@ -181,7 +181,7 @@ def first_of(sweep: Sweep, heading: str, comm: Intracomm) -> str:
 
 
 def check_options(sweep: Sweep) -> None:
-    """Raise CaseError with the faults of the options of all cases, each with the cases that have it."""
+    """Raise CaseError with all faulty PETSc options, each with its cases."""
     numbers_by_options = dict[str, list[int]]()
     for entry, case in zip(sweep.entries, sweep.cases, strict=True):
         numbers_by_options.setdefault(json.dumps(case.petsc, sort_keys=True), []).append(entry.number)

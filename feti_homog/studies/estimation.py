@@ -1,7 +1,7 @@
 """Weighted least squares: estimates, their covariance, and unknowns that the data do not determine.
 
-With residuals r_i = (f_i(x) - y_i) / s_i of data y of independent errors of standard deviations s, and J = dr/dx, the
-estimate is the minimum of r^T r within bounds, and its covariance (J^T J)^-1.
+Data y have independent errors with standard deviations s, so that residuals are r_i = (f_i(x) - y_i) / s_i.  With
+J = dr/dx the estimate is the minimum of r^T r within bounds, and its covariance (J^T J)^-1.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ Model = Callable[[Float], Float]
 
 @dataclass(frozen=True, kw_only=True)
 class Estimates:
-    """Estimates of n unknowns from m data.
+    """Estimates for n unknowns from m data.
 
     Attributes:
         x: (n,) estimates.
         computed, residuals: (m,) f(x) and (f(x) - y) / s.
         jacobian: (m, n) of the residuals.
         at_bound: (n,) -1 at the lower bound, 1 at the upper one, else 0.
-        singular_values: of the Jacobian with every unknown relative to its estimate.
-        directions: (n, n) in rows, of these the right singular vectors.
-        evaluations: number of evaluations of f.
+        singular_values: of the Jacobian for unknowns relative to their estimates.
+        directions: (n, n) its right singular vectors in rows.
+        evaluations: how often f was evaluated.
         converged: whether the minimum is found.
     """
 
@@ -59,7 +59,7 @@ class Estimates:
 
     @property
     def influence(self) -> Float:
-        """(n, m) change of each estimate per standard deviation of each datum."""
+        """(n, m) change in each estimate per standard deviation in each datum."""
         size, V = _sizes(self.x), self.directions[: self.rank]
         pseudo = V.T @ ((V @ (self.jacobian * size).T) / self.singular_values[: self.rank, None] ** 2)
         return np.asarray(size[:, None] * pseudo)
@@ -90,14 +90,14 @@ class Estimates:
 
     @property
     def shares(self) -> Float:
-        """(n, m) share of each datum in the variance of each estimate."""
+        """(n, m) share of each datum in each estimate's variance."""
         squares = self.influence**2
         total = squares.sum(axis=1, keepdims=True)
         return np.asarray(np.divide(squares, total, out=np.zeros_like(squares), where=total > 0))
 
     @property
     def chance(self) -> float | None:
-        """Probability of residuals as large as these, if the model is right; None without a degree of freedom."""
+        """Probability that a right model has residuals as large; None without a degree of freedom."""
         freedom = len(self.residuals) - self.rank
         return float(chi2.sf(self.residuals @ self.residuals, freedom)) if freedom else None
 
@@ -105,7 +105,7 @@ class Estimates:
 def estimate(
     model: Model, jacobian: Model, measured: tuple[Float, Float], start: Float, bounds: tuple[Float, Float]
 ) -> Estimates:
-    """Return the estimates from the values (m,) that `model` gives of unknowns (n,), and their derivatives (m, n).
+    """Return the estimates from the values (m,) that `model` gives for unknowns (n,), and their derivatives (m, n).
 
     `measured` are the data and their standard deviations.  The search is a dogleg in the box of the bounds; where no
     datum sees a direction, by a trust region, whose steps do not go along it.
@@ -159,5 +159,5 @@ def names_of(rows: Sequence[Sequence[int]], names: Sequence[str]) -> list[str]:
 
 
 def _sizes(x: Float) -> Float:
-    """(n,) magnitudes of unknowns; 1 of zeros."""
+    """(n,) magnitudes of unknowns; 1 for zeros."""
     return np.where(x == 0.0, 1.0, np.abs(x))

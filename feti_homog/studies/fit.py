@@ -1,4 +1,4 @@
-"""A fit: unknown constants of cases by measured values; each evaluation is a sweep of its tests, in its own folder.
+"""A fit: unknown constants by measured values; each evaluation is a sweep over its tests, in its own folder.
 
 DIR/evaluation-0001           as of a sweep: a case for each test
 DIR/differences-0001          cases at values beside an evaluation, where no derivative is exact
@@ -43,7 +43,7 @@ class Fit(Study):
     Attributes:
         unknowns: by dotted key.
         paths: keys of the unknowns.
-        tests: changes of the document by each test.
+        tests: document changes by each test.
         data: measured values, test after test.
     """
 
@@ -56,14 +56,14 @@ class Fit(Study):
     data: Sequence[Datum]
 
     def at(self, x: Sequence[float]) -> Sweep:
-        """Return the cases of all tests where the unknowns are x (n,). Raises CaseError as `cases`."""
+        """Return the cases of all tests at unknowns x (n,). Raises CaseError as `cases`."""
         return self.cases([(test, x) for test in range(len(self.tests))])
 
     def cases(self, places: Sequence[tuple[int, Sequence[float]]]) -> Sweep:
-        """Return the cases of tests at values of the unknowns.
+        """Return the cases for pairs of a test and unknowns (n,).
 
         Raises:
-            CaseError: with the faults of all of them.
+            CaseError: with the faults of all cases.
         """
         points = [self.tests[test] | dict(zip(self.paths, _rounded(x), strict=True)) for test, x in places]
         return cases_at(self.document, points, self.folder, section=UNKNOWN, complete=_set_output)
@@ -76,12 +76,12 @@ class Fit(Study):
         return [datum for datum in self.data if datum.test == test]
 
     def rows_of(self, test: int) -> slice:
-        """Return the place of the data of a test among all."""
+        """Return the place of a test's data among all."""
         first = next(k for k, datum in enumerate(self.data) if datum.test == test)
         return slice(first, first + len(self.data_of(test)))
 
     def axes(self) -> str:
-        """Return the axes of measured values that could be of a ply, in a line; empty without any."""
+        """Return a line on the axes that measured values may mistake for a ply's; empty without any."""
         cases = self.first_cases().cases
         spatial = [datum for datum in self.data if PLANE_STATES[cases[datum.test].analysis.plane].is_spatial]
         line = axes_line(name for datum in spatial for name in (datum.name, datum.strain_name))
@@ -139,7 +139,7 @@ def _rounded(x: Sequence[float] | Float) -> Point:
 
 @dataclass(frozen=True)
 class Answer:
-    """The content of result.json of a test, and its values (m,) in place of the data of the test."""
+    """A test's result.json, and its values (m,) in place of the test's data."""
 
     document: Mapping[str, Any]
     values: Float
@@ -147,10 +147,10 @@ class Answer:
 
 @dataclass
 class Evaluations:
-    """Values of the data and their derivatives at values of the unknowns; rank 0 asks, all ranks compute.
+    """Data and their derivatives as computed at given unknowns; rank 0 asks, all ranks compute.
 
     Attributes:
-        answers: on rank 0 the results of all tests by the values of the unknowns, in the order of the evaluations.
+        answers: on rank 0 all test results by unknowns, in evaluation order.
     """
 
     fit: Fit
@@ -172,7 +172,7 @@ class Evaluations:
         return estimates
 
     def values(self, x: Float) -> Float:
-        """(m,) values of the data where the unknowns are x (n,).  On rank 0."""
+        """(m,) computed data at unknowns x (n,).  On rank 0."""
         key = _rounded(x)
         if key not in self.answers:
             number = len(self.answers) + 1
@@ -213,7 +213,7 @@ class Evaluations:
         return self._run(name, places)
 
     def _run(self, name: str, places: Sequence[tuple[int, Point]]) -> list[Answer]:
-        """Run the cases of tests at values of the unknowns; returns their results on rank 0.  Collective."""
+        """Run the cases at `places`; returns their results on rank 0.  Collective."""
         comm = self.evaluator.comm
         documents = self.evaluator.results(name, on_root(comm, self.fit.cases, places))
         data = [self.fit.data_of(test) for test, _ in places]

@@ -28,7 +28,7 @@ LEAST_STD = 1e-12  # of the value: below it are the roundings of what is compute
 
 
 def load(path: Path) -> Fit:
-    """Return the fit in a file. Raises CaseError with all faults of its tables, or else of its cases."""
+    """Return the fit in a file. Raises CaseError with all faults in its tables, or else in its cases."""
     return parse(read_document(path), path.parent)
 
 
@@ -79,7 +79,7 @@ class FitReader:
         return unknowns
 
     def tests(self, measured: object, tests: object, unknowns: set[TomlPath]) -> tuple[list[Assignment], list[Datum]]:
-        """Return the changes of each test and the data of all."""
+        """Return each test's changes, and all data."""
         if (measured is None) == (tests is None):
             self.faults.append(f"expected [{MEASURED}] for one test or [[{TEST}]] for each of several, with measured")
             return [], []
@@ -143,12 +143,12 @@ class FitReader:
 
 
 def _entries(table: Mapping[str, Any], keys: Collection[str]) -> Iterator[tuple[TomlPath, Any]]:
-    """Yield the paths and values of a nested table; a table with one of the keys is a value."""
+    """Yield paths and values in a nested table; a table with one of the keys is a value."""
     return leaves(table, lambda path, value: bool(value.keys() & {*keys}))
 
 
 def _curve_rows(path: Path) -> tuple[tuple[str, str], list[tuple[float, float]]]:
-    """Return the names of strain and stress, and the rows, of a table of a curve. Raises CaseError."""
+    """Return the strain's and stress's names, and the rows, of a measured curve. Raises CaseError."""
     lines = [(number, line) for number, line, _ in lines_of(path) if line]
     head = lines[0][1] if lines else ""
     delimiter = delimiter_of(head)
@@ -178,7 +178,7 @@ def _number(word: str, delimiter: str | None, place: str) -> float:
 
 
 def _case_faults(fit: Fit) -> Iterator[str]:
-    """Yield faults of the cases at the start and at the bounds, and of the names of the data."""
+    """Yield faults of cases at the start and at the bounds, and faulty data names."""
     start = [unknown.start for unknown in fit.unknowns.values()]
     cases = fit.at(start).cases
     for test, case in enumerate(cases):
@@ -197,7 +197,7 @@ def _case_faults(fit: Fit) -> Iterator[str]:
 
 
 def _name_faults(place: str, case: Case, data: Sequence[Datum]) -> Iterator[str]:
-    """Yield names that the analysis of a test does not give."""
+    """Yield data names that a test's analysis does not give."""
     names = available(case)
     if not names:
         yield f'[analysis] type = "{case.analysis.type}": a fit takes "stiffness" and "path"'
@@ -211,7 +211,7 @@ def _name_faults(place: str, case: Case, data: Sequence[Datum]) -> Iterator[str]
 
 
 def _curve_faults(place: str, case: Case, points: Sequence[Datum]) -> Iterator[str]:
-    """Yield faults of the points of a measured curve beside the analysis of its test."""
+    """Yield faults of a measured curve beside its test's analysis."""
     if not points:
         return
     state = PLANE_STATES[case.analysis.plane]
@@ -226,7 +226,7 @@ def _curve_faults(place: str, case: Case, points: Sequence[Datum]) -> Iterator[s
 
 
 def _strain_faults(points: Sequence[Datum], rising: str, end: float, is_strain: bool) -> Iterator[str]:
-    """Yield faults of a curve's strains beside the results of `_rising`."""
+    """Yield faults of a curve's strains beside the leading strain, as `_rising` returns it."""
     strains = [datum.strain or 0.0 for datum in points]
     if rising != points[0].strain_name:
         yield f"expected the strain that rises along the path, {rising}"

@@ -1,4 +1,4 @@
-"""Result of a fit: the content of fit.json, its table of measured values, and its text."""
+"""A fit's result: the content of fit.json, the table of measured values, and the text."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def text(document: Mapping[str, Any]) -> str:
     columns = [FIRST, *(Column(str(k + 1), 8, ".3f") for k in range(len(rows)))]
     tables += [Table("Correlation", columns, rows, title_in_head=True)] if len(rows) > 1 else []
     columns = [FIRST, *(Column(name) for name in HEAD[3:6]), Column("in std", 10, ".2f")]
-    rows = [[label, *(each[n] for n in HEAD[3:])] for label, each in zip(data, document["measured"], strict=True)]
+    rows = [[label, *(datum[n] for n in HEAD[3:])] for label, datum in zip(data, document["measured"], strict=True)]
     tables.append(Table("Measured", columns, rows, title_in_head=True))
     chance = "" if document["chance"] is None else f", as large or larger with a chance of {document['chance']:.2g}"
     squares = document["sum_of_squares"]

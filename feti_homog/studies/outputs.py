@@ -1,4 +1,4 @@
-"""Outputs of a case: numbers of its result.json by the columns of cases.csv; the meaning of all columns."""
+"""Case outputs: numbers in result.json by their column in cases.csv; the meaning of all columns."""
 
 from __future__ import annotations
 
@@ -28,18 +28,15 @@ PHASES_OF_ONE_FIBRE = 2
 
 
 def numbers(planes: Iterable[str | None]) -> tuple[int, ...]:
-    """Numbers i and j in the names Cij of a sweep over these plane states.
+    """Numbers i and j in a sweep's names Cij, for its plane states.
 
-    Where some cases are in space, Cij is the same entry of all.
+    Where some cases are in space, Cij is the same entry in all.
     """
     return (GENERALIZED if GENERALIZED.name in planes else PLANE_STRAIN).numbers
 
 
 def outputs(document: Document, numbers: Sequence[int] = PLANE_STRAIN.numbers) -> dict[str, float]:
-    """Return the numbers of a result.json by the names of the table's columns.
-
-    `numbers` of strains in the plane, in names.
-    """
+    """Return the numbers in a result.json by column name; `numbers` as in Cij for strains in the plane."""
     solver = document["solver"]
     values = _cell(document["cell"])
     values |= {name: solver[name] for name in ("ranks", "subdomains", "dofs", "multipliers")}
@@ -76,8 +73,8 @@ def _constants(document: Document, numbers: Sequence[int]) -> dict[str, float]:
     for section in ("moduli", "constants", "transversely_isotropic"):
         values |= {name: value for name, value in document.get(section, {}).items() if value is not None}
     if errors := document.get("mesh_error", {}):
-        known = _linear(errors, numbers) | errors.get("constants", {})
-        values |= {f"{name}_mesh_error": error for name, error in known.items() if name in values}
+        estimates = _linear(errors, numbers) | errors.get("constants", {})
+        values |= {f"{name}_mesh_error": error for name, error in estimates.items() if name in values}
         values["energy_mesh_error"] = errors["energy"]
     return values | _bounds(document.get("bounds") or {}, numbers)
 
@@ -95,7 +92,7 @@ def _named(names: Iterable[str], values: Iterable[float]) -> dict[str, float]:
 
 
 def _entries(stiffness: Any, numbers: Sequence[int], suffix: str = "") -> dict[str, float]:
-    """C11, C12, ... of a stiffness (6, 6), or (3, 3) with the `numbers`; none of an empty one."""
+    """C11, C12, ... for a stiffness (6, 6), or (3, 3) with the `numbers`; none without entries."""
     rows = range(1, 7) if len(stiffness) == len(SPATIAL_STRESSES) else numbers
     return _named((f"C{i}{j}{suffix}" for i in rows for j in rows), np.ravel(stiffness).tolist())
 

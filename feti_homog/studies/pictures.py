@@ -51,8 +51,8 @@ LEGEND_HANDLE, LEGEND_CHARACTER = 0.7, 0.085  # inches of an entry: its line wit
 NAMES = {
     **{name: f"$C_{{{name[1:]}}}$" for name in ("C11", "C33", "C44", "C66")},
     **{
-        name: f"{each.symbol} {each.way} the fibres{' (1 / temperature)' * name.startswith('expansion')}"
-        for name, each in ABOUT_FIBRES.items()
+        name: f"{constant.symbol} {constant.way} the fibres{' (1 / temperature)' * name.startswith('expansion')}"
+        for name, constant in ABOUT_FIBRES.items()
     },
     "bulk": "plane bulk modulus $k$",
     "shear": "shear modulus $\\mu$",
@@ -104,8 +104,8 @@ def moduli_figure(table: SweepTable) -> Figure:
     for axes, name in zip(panels, names, strict=False):
         if bounds is not None and name in bounds.rows:
             _draw_bounds(axes, bounds, name)
-        for style, each in enumerate(series):
-            _plot_series(axes, table, each, name, style)
+        for style, one_series in enumerate(series):
+            _plot_series(axes, table, one_series, name, style)
         unit = "" if name.startswith(("nu_", "expansion_")) else stress_label(table.stress_unit)
         axes.set(xlabel="fibre fraction", ylabel=f"{NAMES[name]} {unit}".rstrip())
         faint_grid(axes)
@@ -128,8 +128,8 @@ def moduli_bounds(table: SweepTable) -> PanelBounds | None:
     materials = read_materials(case, plane, TableReader({GEOMETRY: case["cell"]["geometry"]}))
     phases = [stiffness_of(materials[phase], plane) for phase in ("matrix", "fibre")]
     meshed = [float(document["cell"]["fibre_fraction"]) for document in table.finished]
-    least, largest = min(meshed), max(meshed)
-    first = 0.0 if least <= largest / 2 else least - BEFORE * (largest - least or least)
+    smallest, largest = min(meshed), max(meshed)
+    first = 0.0 if smallest <= largest / 2 else smallest - BEFORE * (largest - smallest or smallest)
     fractions = np.linspace(first, min(1.0, MARGIN * largest), FRACTIONS)
     spatial = PLANE_STATES[plane].is_spatial
     bounds_at, tight = (_spatial_bounds, "Hill, Hashin") if spatial else (_plane_bounds, "Hashin-Shtrikman")

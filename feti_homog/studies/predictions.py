@@ -45,7 +45,7 @@ class Datum:
 
 
 def available(case: Case) -> list[str]:
-    """Return the names of a result's values; none of analyses that no fit takes."""
+    """Return the value names in a result; none for analyses that no fit takes."""
     spatial = PLANE_STATES[case.analysis.plane].is_spatial
     size = 6 if spatial else 3
     if case.analysis.type == "stiffness":
@@ -59,7 +59,7 @@ def available(case: Case) -> list[str]:
 
 
 def responses(document: Document) -> dict[str, float]:
-    """Return the constants of a result, or its loads and onsets: the numbers whose scatter is of interest."""
+    """Return a result's constants, or its loads and onsets: the numbers whose scatter matters."""
     values, kind = _values(document), document["case"]["analysis"]["type"]
     if kind == "stiffness" or "sensitivities" in document:
         return values
@@ -68,7 +68,7 @@ def responses(document: Document) -> dict[str, float]:
 
 
 def _values(document: Document) -> dict[str, float]:
-    """Return the numbers of a result by their names in a fit."""
+    """Return the numbers in a result by their names in a fit."""
     if "sensitivities" in document:
         sensitivities = document["sensitivities"]
         return dict(zip(sensitivities["constants"], sensitivities["constant_values"], strict=True))
@@ -80,7 +80,7 @@ def _values(document: Document) -> dict[str, float]:
 
 
 def predicted(document: Document, data: Sequence[Datum]) -> Float:
-    """(m,) values of a result in place of the data.
+    """(m,) result values in place of the data.
 
     Raises:
         CaseError: the result has no such value.
@@ -117,7 +117,7 @@ def _of_stiffness(sensitivities: Document, data: Sequence[Datum], name: str) -> 
 
 
 def _exponent(document: Document, section: Mapping[str, Any], key: str) -> float | None:
-    """Return the degree in which loads at which bonds break are homogeneous in a key of the one interface.
+    """Return the degree to which loads at breaks are homogeneous in a key of the only interface.
 
     All loads up to the onset must grow alike; a temperature that comes before them does not.  The degree is 1/2 in the
     toughness of springs that it does not change, and 1 in the only strength; None in other keys.

@@ -1,4 +1,4 @@
-"""A study: cases that one file describes, their results in a folder, and the document that follows from them.
+"""A study: cases that one file describes, a folder with their results, and the document that follows.
 
 DIR/NAME.json                 digest of the study from the start, its answer at the end
 DIR/EVALUATION                as of a sweep: a folder for each case
@@ -34,7 +34,7 @@ SILENT = {"fields": False, "pictures": False, "report": False}
 
 @dataclass(frozen=True)
 class Evaluator:
-    """Runs cases of a study in folders below its own, as many at once as there are groups of `ranks_per_case` ranks."""
+    """Runs a study's cases in folders below its own, in groups of `ranks_per_case` ranks at once."""
 
     directory: Path
     comm: Intracomm
@@ -80,7 +80,7 @@ class Study(ABC):
 
     @abstractmethod
     def identity(self, cases: list[str]) -> Any:
-        """Return the identities of the first cases with all other inputs of the study, in JSON's types."""
+        """Return the first cases' identities with all other inputs to the study, in JSON's types."""
 
     @abstractmethod
     def heading(self) -> str:
@@ -133,7 +133,7 @@ class Study(ABC):
         """Write the study's document with its digest, unless it is there.  On one rank.
 
         Raises:
-            CaseError: the folder has another study, or files of others under names of this one.
+            CaseError: the folder has another study, or foreign files under this study's names.
             FetiHomogError: the document cannot be written.
         """
         path = directory / self.FILE

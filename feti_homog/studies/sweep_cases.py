@@ -27,8 +27,8 @@ class SweepCase:
     """Place of a case in a sweep.
 
     Attributes:
-        number: of the case, from 1.
-        point: number of its values, from 1: all realisations of a point have the same.
+        number: from 1.
+        point: number of its point, from 1: realisations share the point's values.
         realisation: from 1.
         inputs: the keys that vary, dotted, with their values.
         identity: digest of the computation; empty before the case is checked.
@@ -64,7 +64,7 @@ class Sweep:
 
 
 def load(path: str | Path) -> Sweep:
-    """Return the sweep in a file. Raises CaseError with all faults of the table [sweep], or else of all its cases."""
+    """Return the sweep in a file. Raises CaseError with all faults in [sweep], or else in all cases."""
     document = read_document(path)
     if SWEEP not in document:
         raise CaseError(f"{path}: [{SWEEP}]: missing section; `feti-homog run` runs a single case")
@@ -98,14 +98,14 @@ def cases_at(
     faults: Sequence[str] = (),
     complete: Callable[[dict[str, Any]], None] | None = None,
 ) -> Sweep:
-    """Return the cases of a document at some points, by which `section` names faults.
+    """Return the cases of a document at some points, which `section` gives.
 
     Args:
         faults: faults of the points.
         complete: sets keys of each case's document.
 
     Raises:
-        CaseError: with the faults of the points, or else of all cases, each with the cases that have it.
+        CaseError: with faults of the points, or else of all cases, each with the cases that have it.
     """
     lines = [*faults]
     unchecked = case_documents(document, points, realisations, lines, section)
@@ -130,7 +130,7 @@ def cases_at(
 
 
 def identity_of(digest: str, petsc: Mapping[str, Any]) -> str:
-    """Digest of a case and of its options, but for options that only print."""
+    """Digest of a case with its options, but for options that only print."""
     chosen = {name: value for name, value in petsc.items() if not only_prints(name)}
     return short_digest((digest + json.dumps(chosen, sort_keys=True)).encode())
 
@@ -151,7 +151,7 @@ def case_documents(
 ) -> list[tuple[SweepCase, dict[str, Any]]]:
     """Return the cases and their documents: all points, then the next realisation of points with a random cell.
 
-    Faults of the points, in a section, and of their number of realisations are added to `faults`.
+    Faults of the points in a section, and of their realisations, are added to `faults`.
     """
     documents = [_with_values(base, point, faults, section) for point in points]
     if realisations is not None and not any(map(_is_random, documents)):
@@ -182,7 +182,7 @@ def _in_order(
 
 
 def _with_values(base: Mapping[str, Any], point: Assignment, faults: list[str], section: str) -> dict[str, Any]:
-    """Return the base with the values of a point; a table is merged into the section that it is a value of."""
+    """Return the base with a point's values; a table is merged into its section."""
     document = copy.deepcopy(dict(base))
     for path, value in point.items():
         table = document
@@ -204,7 +204,7 @@ def _with_values(base: Mapping[str, Any], point: Assignment, faults: list[str], 
 
 
 def _entry(table: Any, name: str) -> Any:
-    """Return the table or the list of tables of this name, or of a list the table of this number, from 1.
+    """Return the table or table list of a name; in a list the table of a number, from 1.
 
     A new one is made if there is none; None if there is something else.
     """
@@ -222,7 +222,7 @@ def _is_random(document: Mapping[str, Any]) -> bool:
 
 
 def _inputs(point: Assignment) -> dict[str, Any]:
-    """Return the values of a point by dotted key, tables taken apart."""
+    """Return a point's values by dotted key, tables taken apart."""
     inputs: dict[str, Any] = {}
     for path, value in point.items():
         parts = {(*path, name): part for name, part in value.items()} if isinstance(value, dict) else {path: value}

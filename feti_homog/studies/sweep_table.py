@@ -1,4 +1,4 @@
-"""The table of a sweep: inputs, outputs and results of all cases, and what they are over realisations."""
+"""The table of a sweep: inputs, outputs and results of all cases, and statistics over realisations."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ class SweepTable:
     """The table of a sweep, with a row for each case.
 
     Attributes:
-        name, stress_unit: of the sweep.
-        folder, point, realisation, status, reason: of each case; `reason` is why it failed.
-        inputs: by dotted key, of each case its value, None where the key does not vary.
+        name, stress_unit: as in the sweep.
+        folder, point, realisation, status, reason: for each case; `reason` of a failure.
+        inputs: by dotted key each case's value, None where the key does not vary.
         outputs: by name (cases,), NaN where there is none.
-        documents: result.json of each finished case, else None.
+        documents: result.json for finished cases, else None.
     """
 
     name: str
@@ -47,7 +47,7 @@ class SweepTable:
         return sorted(set(self.point))
 
     def rows(self, point: int) -> list[int]:
-        """Return the rows of the realisations of a point."""
+        """Return the rows with a point's realisations."""
         return [row for row, number in enumerate(self.point) if number == point]
 
     @cached_property
@@ -70,7 +70,7 @@ class SweepTable:
         return self.inputs[name][self.rows(point)[0]]
 
     def results_of(self, point: int) -> list[Document]:
-        """result.json of the finished realisations of a point."""
+        """Return result.json for a point's finished realisations."""
         return [document for row in self.rows(point) if (document := self.documents[row]) is not None]
 
     def label(self, point: int, without: Sequence[str] = ()) -> str:
@@ -94,12 +94,12 @@ class SweepTable:
             return np.zeros(0), np.zeros((0, 0, 3))
         strain = np.linspace(0.0, min(path[-1, -1] for path in paths), CURVE_POINTS)
         stresses = range(paths[0].shape[1] - 1)
-        found = np.array([[np.interp(strain, p[:, -1], p[:, k]) for k in stresses] for p in paths])
-        return strain, found.swapaxes(1, 2)
+        curves = np.array([[np.interp(strain, p[:, -1], p[:, k]) for k in stresses] for p in paths])
+        return strain, curves.swapaxes(1, 2)
 
 
 def _in_words(key: str, value: Any) -> str:
-    """Return an input without its section, but of a material with the phase and of an interface with its number."""
+    """Return an input without its section, but with a material's phase and an interface's number."""
     section, _, rest = key.partition(".")
     name = rest if section == "material" else key.partition("interface.")[2] or key.rpartition(".")[2]
     name = name.replace(".", " ").replace("_", " ")
@@ -112,10 +112,9 @@ def _in_words(key: str, value: Any) -> str:
 
 @dataclass(frozen=True)
 class Statistics:
-    """Statistics over the realisations that are done, (points, ...).
+    """Statistics over finished realisations, (points, ...).
 
-    `ci95` is half the width of the 95 % confidence interval of the mean by Student's t; it and `std` are NaN of fewer
-    than two.
+    `ci95` is the mean's half 95 % confidence interval by Student's t; it and `std` are NaN for fewer than two.
     """
 
     count: Float
@@ -125,12 +124,12 @@ class Statistics:
 
     @classmethod
     def of(cls, samples: Float) -> Statistics:
-        """Over the first axis of samples (n, ...), without those that are NaN."""
-        known = np.isfinite(samples)
-        count = known.sum(axis=0)
+        """Return statistics over the first axis of samples (n, ...), without NaN."""
+        is_known = np.isfinite(samples)
+        count = is_known.sum(axis=0)
         several = np.where(count > 1, count, np.nan)
-        mean = np.where(known, samples, 0.0).sum(axis=0) / np.where(count > 0, count, np.nan)
-        std = np.sqrt(np.where(known, (samples - mean) ** 2, 0.0).sum(axis=0) / (several - 1))
+        mean = np.where(is_known, samples, 0.0).sum(axis=0) / np.where(count > 0, count, np.nan)
+        std = np.sqrt(np.where(is_known, (samples - mean) ** 2, 0.0).sum(axis=0) / (several - 1))
         return cls(count.astype(float), mean, std, student.ppf(0.5 + CONFIDENCE / 2, several - 1) * std / several**0.5)
 
 

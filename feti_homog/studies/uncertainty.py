@@ -1,9 +1,9 @@
-"""Scatter of a result by uncertain numbers of its case, beside the scatter of random cells and the mesh error.
+"""Scatter in results by uncertain inputs, beside the scatter of random cells and the mesh error.
 
 Derivatives are exact where results have them; else differences of whole runs, one standard deviation less and more.
 Random cells of one seed may have other arrangements then: their slopes have a standard error over the cells.
 
-DIR/means                     as of a sweep: the case, of random cells each realisation
+DIR/means                     as of a sweep: the case, or each realisation of a random cell
 DIR/differences               the cases with each number without derivatives less and more
 DIR/uncertainty.json
 """
@@ -182,7 +182,7 @@ def _realisations(table: object, faults: list[str]) -> int | None:
 
 
 def _faults_of_ends(study: ScatterStudy) -> Iterator[str]:
-    """Yield the faults of cases one standard deviation off the means."""
+    """Yield faults of cases one standard deviation from the means."""
     is_exact = bool(study.document["output"].get("sensitivities"))
     for name, std in study.uncertainty.std.items():
         if is_exact and name.partition(".")[0] in SECTIONS:
@@ -217,21 +217,21 @@ def _mesh_error(documents: Documents, name: str) -> float | None:
 
 
 def text(document: Mapping[str, Any]) -> str:
-    """Return a table of results with their scatter and the share of each input, and remarks on noisy slopes."""
+    """Return the table with results, their scatter and each input's share, and remarks on noisy slopes."""
     inputs, of_cells = document["parameters"], {"+- cells": "std_cells", "+- both": "std"}
     heads = {"value": "value", "+- inputs": "std_inputs", **(of_cells if document["cells"] > 1 else {})}
     heads["+- mesh"] = "mesh_error"
-    results, labels = _scattered(document), [each["name"].removeprefix("material.") for each in inputs]
-    rows = [_row(each, document.get("stress_unit", ""), [*heads.values()]) for each in results]
+    results, labels = _scattered(document), [number["name"].removeprefix("material.") for number in inputs]
+    rows = [_row(result, document.get("stress_unit", ""), [*heads.values()]) for result in results]
     columns = [Column("", -max([18, *(len(row[0]) for row in rows)]) - 2), *map(Column, heads)]
     columns += [Column(label, max(12, len(label) + 2), ".1f") for label in labels]
     title = "Scatter by uncertain numbers (std), and their shares of its variance (%)"
     lines = Table(title, columns, rows).lines if rows else ["No result depends on the uncertain numbers."]
-    differing = ", ".join(each["name"] for each in inputs if each["by"] == "differences")
+    differing = ", ".join(number["name"] for number in inputs if number["by"] == "differences")
     lines = ["", *lines, f"By differences of runs: {differing or 'none'}"]
-    for k, each in enumerate(inputs):
+    for k, number in enumerate(inputs):
         if noisy := ", ".join(_noisy(results, k)):
-            lines.append(f"Standard error over the cells above half of the slope by {each['name']}: {noisy}")
+            lines.append(f"Standard error over the cells above half of the slope by {number['name']}: {noisy}")
     return "\n".join(lines)
 
 
@@ -241,21 +241,21 @@ def _row(result: Mapping[str, Any], stress_unit: str, keys: Sequence[str]) -> li
 
 
 def _noisy(results: Documents, k: int) -> Iterator[str]:
-    """Yield the results that random cells hardly give the slope by input k of."""
-    for each in results:
-        if each["derivative_errors"] and each["derivative_errors"][k] > NOISY * abs(each["derivatives"][k]):
-            yield each["name"]
+    """Yield results whose slope by input k random cells hardly determine."""
+    for result in results:
+        if result["derivative_errors"] and result["derivative_errors"][k] > NOISY * abs(result["derivatives"][k]):
+            yield result["name"]
 
 
 def _scattered(document: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """Return the results whose scatter is no noise of the solver beside the largest result of their kind."""
+    """Return results with more scatter than solver noise beside the largest of their kind."""
     results = document["results"]
-    names = [each["name"] for each in results]
+    names = [result["name"] for result in results]
     listed, sizes = {*(shown(names) if "C11" in names else names)}, dict[str, float]()
-    for each in results:
-        kind = each["name"].rstrip("0123456789")
-        sizes[kind] = max(sizes.get(kind, 0.0), abs(each["value"]), each["std"])
+    for result in results:
+        kind = result["name"].rstrip("0123456789")
+        sizes[kind] = max(sizes.get(kind, 0.0), abs(result["value"]), result["std"])
     return [
-        each for each in results
-        if each["name"] in listed and without_noise(each["std"], sizes[each["name"].rstrip("0123456789")]) > 0
+        result for result in results
+        if result["name"] in listed and without_noise(result["std"], sizes[result["name"].rstrip("0123456789")]) > 0
     ]  # fmt: skip
