@@ -91,7 +91,7 @@ def closing_work(length: float, before: Float, force: Float, behind: Float, jump
 
 
 def tips(arcs: Sequence[Arc], values: Sequence[float], fibres: int) -> dict[int, list[float]]:
-    """Return directions in [0, 360) of the tips of arcs, by fibre number from 0.
+    """Return tip directions in [0, 360), by fibre number from 0.
 
     An arc without an angle takes all of `values`.  Openings of 0 and 360 degrees have no tips.
     """
@@ -148,7 +148,7 @@ def debonded(
 
 
 def _end(arc: Arc, half: float) -> float:
-    """Return the direction in [0, 360) of the tip of an arc, `half` away from its centre."""
+    """Return the direction in [0, 360) of an arc's tip, `half` away from its centre."""
     return round(arc.centre + half, 9) % 360.0
 
 
@@ -162,7 +162,7 @@ def _ends(arc: Arc, half: float, fibre: Int, moved: MovedTips) -> Float:
 
 
 def faults(arcs: Sequence[Arc], centres: Float, label: str = "interface") -> list[str]:
-    """List the faults of the arcs of interface `label`, on fibres with centres (fibres, 2), NaN without one."""
+    """List faults in the arcs of interface `label`, on fibres with centres (fibres, 2), NaN without one."""
     messages = []
     for place, arc in enumerate(arcs):
         chosen = range(1, len(centres) + 1) if isinstance(arc.fibre, str) else arc.fibre

@@ -40,7 +40,7 @@ class Macroscopic:
         return Macroscopic(factor * self.strain, factor * self.stress)
 
     def load(self, by_stress: Bool) -> Load:
-        """Return the load of the state, with (n,) components `by_stress`."""
+        """Return the state's load, with (n,) components `by_stress`."""
         return Load(np.where(by_stress, self.stress, self.strain), by_stress)
 
     def released_to(self, after: Macroscopic) -> float:
@@ -53,7 +53,7 @@ class Macroscopic:
 
 @dataclass(frozen=True)
 class Load:
-    """Values of n macroscopic strains, a temperature change among them, or of their stresses.
+    """Values of n macroscopic strains, a temperature change among them, or stresses.
 
     Attributes:
         values: (n,) strains and stresses.
@@ -65,7 +65,7 @@ class Load:
 
     @classmethod
     def strain(cls, values: Float) -> Load:
-        """Return the load of strains (n,)."""
+        """Return a load by strains (n,)."""
         return cls(values, np.zeros(len(values), bool))
 
     def parts(self, sizes: Sequence[int]) -> list[Load]:

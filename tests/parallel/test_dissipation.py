@@ -79,7 +79,7 @@ def stored(cell, point):
 def stress_under(interface, cell, strain, point):
     """Sigma under a strain with the bonds that a point leaves."""
     return torn_cells.stress(
-        cell, interface.equilibrium(Load.strain(strain), point.after.bonds, point.after.lam.plane).solution
+        cell, interface.equilibrium(Load.strain(strain), point.after.bonds, point.after.lam[0]).solution
     )
 
 

@@ -154,7 +154,7 @@ def test_onset_of_one_fibre_in_much_matrix(comm, strength, radius):
     )
     interface = torn_cells.interface(cell, True)
     begin = unloaded(CoupledInterfaces(interface), torn_cells.bonds(np.full(len(interface.nodes.row), BONDED, np.int8)))
-    responses = interface.equilibria(np.eye(3), begin.bonds, [begin.lam.plane] * 3)
+    responses = interface.equilibria(np.eye(3), begin.bonds, [begin.lam[0]] * 3)
     L = np.array([interface.stress(response.solution) for response in responses]).T
     matrix, fibre = (
         SimpleNamespace(K_transverse=K, G_transverse=G)

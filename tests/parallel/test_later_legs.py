@@ -54,7 +54,7 @@ def largest_bend(interface, points, legs):
         if before.load_factor * legs < 1 - 1e-12 or before.scale != 1.0:
             continue
         bonds, last = now.state.bonds, now.state.solution
-        first = interface.equilibrium(Load.strain(before.state.solution.strain), bonds, before.after.lam.plane).solution
+        first = interface.equilibrium(Load.strain(before.state.solution.strain), bonds, before.after.lam[0]).solution
         for share in (0.1, 0.5, 0.8):
             strain, lam = ((1 - share) * a + share * b for a, b in ((first.strain, last.strain), (first.lam, last.lam)))
             # Where the path is straight the guess is the solution: only to confirm it costs little.

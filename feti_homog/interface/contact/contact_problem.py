@@ -13,7 +13,7 @@ infinite.  So one search finds both.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -27,17 +27,7 @@ from feti_homog.feti.solver import FetiSolver
 from feti_homog.interface.contact import mixed_load
 from feti_homog.interface.contact.floating_bodies import FloatingBodies
 from feti_homog.interface.contact.load_scales import LoadScales
-from feti_homog.interface.contact.states import (
-    BONDED,
-    CLOSED,
-    OPEN,
-    BondState,
-    Equilibrium,
-    Softening,
-    Status,
-    kkt_errors,
-    never_softens,
-)
+from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN, BondState, Equilibrium, Status, kkt_errors
 from feti_homog.interface.loads import Load
 from feti_homog.typing import Bool, Float, Int
 
@@ -54,10 +44,10 @@ class ContactProblem:
     """All interfaces of the torn cell.
 
     Attributes:
-        solver: solver of the dual problem.
+        solver: dual solver.
         contact: false lets debonded faces overlap; damaged bonds are stiff under pressure all the same.
         size: (2,) cell size, a scale of displacements.
-        softening: softening of the bond law.
+        softening: maps bonds, and (k,) True for tension, to C / C_0 (k, 3) of springs, or None if all are 1.
         block_pivots: number of block pivots, from the last progress on, before single nodes change; 0 begins with
             single nodes.
     """
@@ -65,7 +55,7 @@ class ContactProblem:
     solver: FetiSolver
     contact: bool
     size: Float
-    softening: Softening = never_softens
+    softening: Callable[[BondState, Bool], Float | None] | None = None
     block_pivots: int = BLOCK_PIVOTS
     _kept: list[tuple[BondState, tuple[Float, Float] | None]] = field(default_factory=list, compare=False, repr=False)
 
@@ -83,11 +73,11 @@ class ContactProblem:
         return mask
 
     def prepare(self, bonds: BondState) -> None:
-        """Adapt the dual problem to a state of the bonds.  Collective."""
+        """Adapt the dual problem to these bonds.  Collective."""
         self.solver.set_state(self.active(bonds.status), self.compliance(bonds))
 
     def compliance(self, bonds: BondState) -> Float:
-        """(owned rows,) compliance C of springs in a state of the bonds."""
+        """(owned rows,) spring compliance C with these bonds."""
         C, factors = self.solver.intact_compliance, self._factors(bonds)
         if factors is None:
             return C
@@ -100,8 +90,9 @@ class ContactProblem:
     def _factors(self, bonds: BondState) -> tuple[Float, Float] | None:
         """(k, 3) C / C_0 of pulled and of pressed bonds; None without softening.  The last are stored."""
         if not (self._kept and self._kept[0][0] is bonds):
-            pulled = np.ones(len(bonds.status), bool)
-            soft, stiff = self.softening(bonds, pulled), self.softening(bonds, ~pulled)
+            pulled, soft, stiff = np.ones(len(bonds.status), bool), None, None
+            if self.softening is not None:
+                soft, stiff = self.softening(bonds, pulled), self.softening(bonds, ~pulled)
             self._kept[:] = [(bonds, None if soft is None or stiff is None else (soft, stiff))]
         return self._kept[0][1]
 
@@ -137,7 +128,7 @@ class ContactProblem:
 
     @cached_property
     def scales(self) -> LoadScales:
-        """Scales of the effects of loads.  Its properties, when first used, and methods are collective."""
+        """Scales of load effects.  Its properties, when first used, and methods are collective."""
         return LoadScales(self.solver, self.size)
 
     @cached_property
@@ -149,7 +140,7 @@ class ContactProblem:
         """Solve the dual problem with fixed states, from multipliers `start` (owned rows,).  Collective.
 
         Raises:
-            NotCarriedError: nothing carries the stresses of the load.
+            NotCarriedError: nothing carries the load's stresses.
         """
         self.prepare(bonds)
         return mixed_load.solve(self.scales, load, start)
@@ -239,7 +230,7 @@ class ContactProblem:
     def _equilibrium(
         self, load: Load, bonds: BondState, solution: DualSolution, iterations: int, solves: int
     ) -> Equilibrium:
-        """Return the final state of a search with its certificate and its number of free rigid motions.  Collective.
+        """Return the final state with its certificate and free rigid motions.  Collective.
 
         Bonds and faces under compression resist motions.  Nodes of a fibre that touch its hole without a force count as
         open if the fibre moves without them, for they do not fix it; otherwise they stay closed.
@@ -261,22 +252,15 @@ class ContactProblem:
         return Equilibrium(load, bonds, solution, iterations, solves, free, certificate, asked)
 
     def certificate(self, bonds: BondState, solution: DualSolution, asked: Float) -> dict[str, float]:
-        """Return the errors of the KKT conditions; `asked` as in `Equilibrium`.  Collective."""
+        """Return errors by `kkt_errors`; `asked` as in `Equilibrium`.  Collective."""
         status, gained, acting = bonds.status, self._gained(bonds), self.acting(bonds, solution.strain, asked)
         damaged = gained > 0.0
         # A pulled bond opens by its damage; under pressure it overlaps.
         overlap = np.minimum(gained * solution.lam[self.nodes.row], 0.0)
-        return kkt_errors(
-            self.solver.comm,
-            self.traction(solution),
-            self.nodes.length,
-            np.where(damaged & ~bonds.pressed, overlap, solution.jump[self.nodes.row]),
-            ((status != BONDED) & self.contact) | damaged,
-            (status == CLOSED) | (damaged & bonds.pressed),
-            self.scales.imposed(acting),
-            self.scales.bond_stress(acting),
-            self.scales.over_interface,
-        )
+        gap = np.where(damaged & ~bonds.pressed, overlap, solution.jump[self.nodes.row])
+        debonded = ((status != BONDED) & self.contact) | damaged
+        closed = (status == CLOSED) | (damaged & bonds.pressed)
+        return kkt_errors(self.scales, self.traction(solution), gap, debonded, closed, acting)
 
     def acting(self, bonds: BondState, strain: Float, asked: Float) -> Float:
         """(v,) `LoadScales.acting` for the strain and, with friction, residual jumps.  Collective."""

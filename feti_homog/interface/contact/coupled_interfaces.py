@@ -26,9 +26,9 @@ from feti_homog.typing import Float
 
 
 class CoupledInterfaces:
-    """The interfaces of a cell in its problems.
+    """The cell's interfaces in its problems.
 
-    Strains and stresses (n,) of the plane problem precede the axial ones.
+    Plane strains and stresses (n,) precede axial ones.
 
     Attributes:
         plane: plane problem, with contact.

@@ -46,7 +46,7 @@ class LoadScales:
 
     @cached_property
     def _phases(self) -> tuple[Float, Float]:
-        """Area shares (n,) and stiffnesses (n, v, v) of all subdomains.  Collective."""
+        """Area shares (n,) and stiffnesses (n, v, v), one a subdomain.  Collective."""
         parts = self.solver.comm.allgather([(s.areas, s.laws) for s in self.solver.subdomains])
         columns = zip(*(pair for pairs in parts for pair in pairs), strict=True)
         areas, stiffnesses = map(np.concatenate, columns)
@@ -71,7 +71,7 @@ class LoadScales:
 
     @cached_property
     def _bond_stiffness(self) -> Float:
-        """(k,) stress at each bond of this rank per cell strain: by its softer body and its springs in a row.
+        """(k,) stress at this rank's bonds per cell strain: by the softer body and springs in a row.
 
         Collective.
         """
@@ -103,7 +103,7 @@ class LoadScales:
         return self.over_interface(self.solver.jump_operator.nodes.length)
 
     def bond_stress(self, loads: Float) -> Float:
-        """(k,) or (k, n) stress at each bond of this rank, if it bore the loads (v,) or (v, n) alone.  Collective."""
+        """(k,) or (k, n) stress at this rank's bonds, if each bore the loads (v,) or (v, n) alone.  Collective."""
         largest: Float = np.multiply.outer(self._bond_stiffness, self.imposed_strain(loads).max(axis=0))
         return largest
 
@@ -141,7 +141,7 @@ class LoadScales:
         return self.sign_noise * self.stress_scale(strain)
 
     def force_noise(self, solution: DualSolution) -> Float:
-        """(k,) nodal force at each node of this rank that may be the solver's error.  Collective.
+        """(k,) nodal force at this rank's nodes that may be the solver's error.  Collective.
 
         It is relative to the largest force on the interface, or to the force by the imposed strain: an error of the
         jumps changes forces by the stiffness of the softer side.  Forces on other interfaces, or between the pieces of

@@ -92,20 +92,14 @@ def superposed(solver: FetiSolver, solutions: Sequence[DualSolution], factors: F
     """Return the sum of solutions with equal active rows, times factors.  Collective."""
     triples = zip(*((solution.strain, solution.lam, solution.jump) for solution in solutions), strict=True)
     strain, lam, jump = (np.stack(arrays, axis=1) @ factors for arrays in triples)
+    total = replace(solutions[0], strain=strain, lam=lam, jump=jump, alpha=None)
     amplitudes = [solution.alpha for solution in solutions if solution.alpha is not None]
     if len(amplitudes) < len(solutions):
-        return replace(solutions[0], strain=strain, lam=lam, jump=jump, alpha=None)
+        return total
     alpha = np.stack(amplitudes, axis=1) @ factors
     torn = solver.natural.project(solver.active.restrict(solver.d @ strain))
     pairs = np.stack([torn, solver.active.restrict(jump)])
     scale, residual = np.sqrt(allreduce_sum(solver.comm, np.einsum("ij,ij->i", pairs, pairs)))
-    return DualSolution(
-        strain,
-        lam,
-        jump,
-        alpha,
-        max(solution.iterations for solution in solutions),
-        min(solution.reason for solution in solutions),
-        float(residual / (scale or 1.0)),
-        solutions[0].compliance,
-    )
+    iterations, reason = max(s.iterations for s in solutions), min(s.reason for s in solutions)
+    residual = float(residual / (scale or 1.0))
+    return replace(total, alpha=alpha, iterations=iterations, reason=reason, residual=residual)

@@ -1,11 +1,10 @@
-"""States of the interface: bonds with their memory, the equilibrium under one load, and its certificate.
+"""Interface states: bonds with their memory, the equilibrium under one load, and its certificate.
 
 The certificate measures errors of the KKT conditions, independent of the search.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,6 +12,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 
 from feti_homog.feti.dual_solution import DualSolution
+from feti_homog.interface.contact.load_scales import LoadScales
 from feti_homog.interface.loads import Load, Multipliers
 from feti_homog.typing import Bool, Float
 
@@ -23,7 +23,7 @@ BONDED, CLOSED, OPEN = 0, 1, 2
 
 @dataclass(frozen=True)
 class BondState:
-    """State of the k interface nodes that this rank owns.
+    """State at this rank's k interface nodes.
 
     Attributes:
         status: (k,) BONDED, CLOSED or OPEN.
@@ -42,7 +42,7 @@ class BondState:
 
     @classmethod
     def without_memory(cls, status: Status) -> BondState:
-        """Return the state of bonds without internal variables."""
+        """Return the state for bonds without internal variables."""
         return cls(status, np.zeros((len(status), 0)), np.zeros(len(status), bool))
 
     @property
@@ -65,14 +65,6 @@ class BondState:
         return np.asarray((self.status != other.status) | (self.pressed != other.pressed))
 
 
-Softening = Callable[[BondState, Bool], Float | None]
-"""Maps a state, and bonds (k,) that are pulled, not pressed, to C / C_0 (k, 3) of springs; None if all are 1."""
-
-
-def never_softens(bonds: BondState, pulled: Bool) -> None:
-    """Softening of springs with constant compliance."""
-
-
 @dataclass(frozen=True)
 class Equilibrium:
     """The cell under one load, with its contact states.
@@ -80,7 +72,7 @@ class Equilibrium:
     Attributes:
         load: prescribed load.
         bonds: states at this rank's interface nodes.
-        solution: solution of the last dual problem.
+        solution: last dual solution.
         iterations, solves: numbers of Krylov iterations and dual problems.
         free_motions: number of rigid motions that no interface force resists; touching without a force resists none.
         certificate: errors by `kkt_errors`.
@@ -125,15 +117,7 @@ class Equilibrium:
 
 
 def kkt_errors(
-    comm: MPI.Intracomm,
-    traction: Float,
-    length: Float,
-    gap: Float,
-    debonded: Bool,
-    closed: Bool,
-    displacement: float,
-    stress: Float,
-    over_interface: Callable[[Float], Float],
+    scales: LoadScales, traction: Float, gap: Float, debonded: Bool, closed: Bool, acting: Float
 ) -> dict[str, float]:
     """Return the largest relative errors of gap >= 0, force <= 0, force gap = 0 on debonded faces.  Collective.
 
@@ -143,13 +127,12 @@ def kkt_errors(
     faces the tractions are rounding.
 
     Args:
-        traction: (k, 2) normal and tangential traction of this rank's interface nodes, tension positive.
-        length, gap: (k,) tributary interface length, force = traction length, and opening.
+        traction, gap: (k, 2) normal and tangential traction at this rank's nodes, tension positive, and (k,) opening.
         debonded, closed: (k,) nodes with these conditions, and nodes that touch.
-        displacement: largest displacement that the strain imposes on the cell.
-        stress: (k,) stress that the strain causes at each node.
-        over_interface: from values (k,) to the largest on the interface of each node.
+        acting: (v,) sizes of loads, whose displacement and stress are imposed.
     """
+    comm, length = scales.solver.comm, scales.solver.jump_operator.nodes.length
+    displacement, stress, over_interface = scales.imposed(acting), scales.bond_stress(acting), scales.over_interface
     force = traction[:, 0] * length
     largest_traction = np.maximum(over_interface(np.abs(traction).max(axis=1, initial=0.0)), stress)
     largest_force = np.maximum(over_interface(np.abs(force)), stress * over_interface(length))

@@ -27,11 +27,9 @@ from feti_homog.errors import NotCarriedError
 from feti_homog.interface.contact.contact_problem import BLOCK_PIVOTS
 from feti_homog.interface.contact.states import Status
 from feti_homog.interface.friction.face_system import FaceSystem, Prescribed
-from feti_homog.interface.friction.status_system import BACKWARD, FORWARD, OPEN_FACE, STICK, largest_share, residual
+from feti_homog.interface.friction.status_system import BACKWARD, FORWARD, OPEN_FACE, STICK
 from feti_homog.typing import Bool, Float
 
-# Force on a free motion, relative to the forces of the loads, that counts as none.
-UNBALANCED = 1e-7
 # Pivots, and pivots a node, after which other searches take over; a continuation step has as many as the former.
 SOLVES, SOLVES_PER_NODE = 50, 4
 # Largest number of sets to try, smallest step of mu.
@@ -94,7 +92,7 @@ class StatusSearch:
             better = self._improved(status, x)
             wrong = np.flatnonzero(better != status)
             if not len(wrong):
-                return (status, x), balanced and self._is_balanced(status, x)
+                return (status, x), balanced and self.faces.is_balanced(status, self.load, x)
             pivots -= 1
             if len(wrong) < fewest:
                 fewest, pivots = len(wrong), BLOCK_PIVOTS
@@ -147,22 +145,8 @@ class StatusSearch:
     def _checked(self, status: Status) -> Found:
         """Return the statuses with x if they are admissible."""
         x, balanced = self.faces.linear(status, self.load, self.start)
-        balanced = balanced and self._is_balanced(status, x)
+        balanced = balanced and self.faces.is_balanced(status, self.load, x)
         return (status, x) if balanced and (self._improved(status, x) == status).all() else None
-
-    def _is_balanced(self, status: Status, x: Float) -> bool:
-        """Return False if a force drives a free motion, such as a fibre that turns in its hole."""
-        faces, load, terms = self.faces, self.load, self.faces.terms
-        fixed = np.zeros(len(x))
-        # Prescribed entries alone: a free motion is as large as its force over the stiffness HELD.
-        fixed[faces.loads] = np.where(load.by_stress, 0.0, load.values)
-        fixed[1 : 2 * faces.nodes : 2] = np.where(status == STICK, load.slip, 0.0)
-        rows = faces.prescribed(status, load, self.start)[1]
-        free = faces.free(status, load.by_stress)
-        unbalanced = np.abs(residual(faces.product(x), rows, *free))
-        unbalanced = np.maximum(unbalanced - np.finfo(float).eps * np.abs(x).max(initial=0.0), 0.0)
-        # Relative to forces of prescribed entries, at a node and its neighbours in S.
-        return largest_share(unbalanced, np.abs(rows) + terms(terms(fixed)), free[1]) <= UNBALANCED
 
     def _improved(self, status: Status, x: Float) -> Status:
         """(n,) statuses that the signs of forces and jumps call for."""

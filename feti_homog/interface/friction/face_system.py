@@ -12,7 +12,15 @@ from functools import cached_property
 import numpy as np
 
 from feti_homog.interface.contact.states import Status
-from feti_homog.interface.friction.status_system import OPEN_FACE, STICK, FollowedStatuses, StatusSystem, free_rows
+from feti_homog.interface.friction.status_system import (
+    OPEN_FACE,
+    STICK,
+    FollowedStatuses,
+    StatusSystem,
+    free_rows,
+    largest_share,
+    residual,
+)
 from feti_homog.typing import Bool, Float, Float32, Int
 
 # Arrays whose products are stored.
@@ -20,18 +28,20 @@ PRODUCTS = 6
 # Factorizations that cost as much as the first followed response.
 FACTORIZATIONS = 12
 
+# Force on a free motion, relative to the forces of the loads, that counts as none.
+UNBALANCED = 1e-7
 # Rounding of forces and jumps, scaled by the stiffness of the node, relative to the terms of its rows of S x.
 NOISE = 1e-11
 
 
 @dataclass(frozen=True)
 class Prescribed:
-    """Loads, and slips of nodes that stick.
+    """Loads, and slips at sticking nodes.
 
     Attributes:
-        by_stress: (v,) loads of prescribed stress.
+        by_stress: (v,) loads with prescribed stress.
         values: (v,) strains, or (S x)_E where the stress is prescribed.
-        slip: (n,) slip of nodes that stick.
+        slip: (n,) slip at sticking nodes.
     """
 
     by_stress: Bool
@@ -108,7 +118,7 @@ class FaceSystem:
 
     def linear(self, status: Status, load: Prescribed, start: Float) -> tuple[Float, bool]:
         """(m,) scaled x with these statuses, and whether it is a solution; start as in `StatusSystem.solve`."""
-        rows, (x, values) = self.free(status, load.by_stress), self.prescribed(status, load, start)
+        rows, (x, values) = free_rows(status, self.friction, load.by_stress), self.prescribed(status, load, start)
         followed = self._turned(*rows)
         if followed is not None:
             solution = followed.solve(x, values, self.terms)
@@ -119,8 +129,8 @@ class FaceSystem:
         return self._system(*rows).solve(x, values)
 
     def sign(self, status: Status, by_stress: Bool) -> int:
-        """Return the sign of the determinant with these statuses, 0 where motions are free."""
-        rows = self.free(status, by_stress)
+        """Return the determinant's sign with these statuses, 0 with free motions."""
+        rows = free_rows(status, self.friction, by_stress)
         return (self._turned(*rows) or self._system(*rows)).sign
 
     def _turned(self, free: Bool, slope: Float) -> FollowedStatuses | None:
@@ -139,16 +149,24 @@ class FaceSystem:
             self._factored += 1
         return self._last[1]
 
-    def free(self, status: Status, by_stress: Bool) -> tuple[Bool, Float]:
-        """Return `free_rows` of statuses."""
-        return free_rows(status, self.friction, by_stress)
-
     def settled(self, status: Status, load: Prescribed, x: Float) -> tuple[Status, Float]:
         """Return the statuses, and x (m,) without the rounding of the way to it.
 
         With a free motion, which rounding would drive, x stays.
         """
         return status, self.linear(status, load, x)[0] if self.sign(status, load.by_stress) else x
+
+    def is_balanced(self, status: Status, load: Prescribed, x: Float) -> bool:
+        """Return False if a force drives a free motion, such as a fibre that turns in its hole."""
+        (free, slope), fixed = free_rows(status, self.friction, load.by_stress), np.zeros(len(x))
+        # Prescribed entries alone: a free motion is as large as its force over the stiffness HELD.
+        fixed[self.loads] = np.where(load.by_stress, 0.0, load.values)
+        fixed[1 : 2 * self.nodes : 2] = np.where(status == STICK, load.slip, 0.0)
+        rows = self.prescribed(status, load, x)[1]
+        unbalanced = np.abs(residual(self.product(x), rows, free, slope))
+        unbalanced = np.maximum(unbalanced - np.finfo(float).eps * np.abs(x).max(initial=0.0), 0.0)
+        # Relative to forces of prescribed entries, at a node and its neighbours in S.
+        return largest_share(unbalanced, np.abs(rows) + self.terms(self.terms(fixed)), slope) <= UNBALANCED
 
     def prescribed(self, status: Status, load: Prescribed, start: Float) -> tuple[Float, Float]:
         """(m,) x with its prescribed entries, and (m,) S x on the rows of loads."""
@@ -160,6 +178,6 @@ class FaceSystem:
         return x, rows
 
     def noise(self, x: Float) -> Float:
-        """(n,) rounding of the scaled force, and jump, of each node."""
+        """(n,) rounding in each node's scaled force, and jump."""
         terms = self.terms(x)[: 2 * self.nodes].reshape(-1, 2)
         return np.asarray(NOISE * terms.max(axis=1, initial=0.0))

@@ -134,14 +134,14 @@ class SlidingCell:
     """Debonded faces of a cell, one set at a time.
 
     Attributes:
-        interface: the contact problem of the plane.
-        friction, friction_of_damage: (k,) mu of this rank's nodes, and of the damaged share of their bonds.
-        rows: (n,) global normal rows of the debonded nodes, rising.
-        faces: of these nodes, on every rank.
+        interface: plane contact problem.
+        friction, friction_of_damage: (k,) mu at this rank's nodes, and in the damaged share of bonds.
+        rows: (n,) global normal rows, rising, one a face.
+        faces: faces, on every rank.
     """
 
     def __init__(self, cell: CoupledInterfaces, friction: Float, friction_of_damage: Float) -> None:
-        """Find the response of the bonded cell to its loads.  Collective; raises as `CondensedProblem`."""
+        """Find the bonded cell's response to its loads.  Collective; raises as `CondensedProblem`."""
         self.cell, self.interface, self.solver = cell, cell.plane, cell.plane.solver
         self.friction, self.friction_of_damage = friction, friction_of_damage
         self._plane, *self._axial = (CondensedProblem(problem) for problem in cell.problems)
@@ -226,9 +226,9 @@ class SlidingCell:
         return np.asarray((x / self.faces.size)[: self.faces.loads.start])
 
     def traction(self, x: Float) -> Float:
-        """(k, 2) or, with the axial one, (k, 3) traction at the bonds of this rank; 0 where they broke.
+        """(k, 2) or, with the axial one, (k, 3) traction at this rank's bonds; 0 where they broke.
 
-        A damaged bond has the traction of its intact share.
+        A damaged bond has its intact share's traction.
         """
         force = np.zeros((len(self.friction), sum(rows.shape[1] for rows in self._held_rows)))
         parts = zip(self._held_rows, self._parts(x), strict=True)
@@ -254,7 +254,7 @@ class SlidingCell:
         return Macroscopic((x / size)[loads], (self.faces.product(x) * size)[loads] / self.cell.area)
 
     def given(self, load: Load) -> Float:
-        """(v,) values of a load in units of scaled x and S x."""
+        """(v,) load values in the units of x and S x."""
         size = self.faces.size[self.faces.loads]
         return np.where(load.by_stress, self.cell.area * load.values / size, load.values * size)
 

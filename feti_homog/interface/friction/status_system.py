@@ -42,7 +42,7 @@ TOO_MUCH, REFINEMENTS = 1e-11, 3
 
 
 def free_rows(status: Status, friction: Float, by_stress: Bool) -> tuple[Bool, Float]:
-    """(m,) unknown entries of x, and (m,) s mu at the slips of sliding nodes, 0 elsewhere."""
+    """(m,) unknown entries of x, and (m,) s mu at sliding nodes' slips, 0 elsewhere."""
     free = np.concatenate([np.stack([status == OPEN_FACE, status != STICK], axis=1).ravel(), by_stress])
     slope = np.zeros(len(free))
     slope[1 : 2 * len(status) : 2] = np.where(np.abs(status) == 1, status * friction, 0.0)
@@ -58,7 +58,7 @@ def residual(y: Float, rhs: Float, free: Bool, slope: Float) -> Float:
 
 
 def largest_share(residuals: Float, terms: Float, slope: Float) -> float:
-    """Return the largest residual (m,), relative to the terms (m,) of its row."""
+    """Return the largest residual (m,), relative to its row's terms (m,)."""
     size, sliding = terms.copy(), np.flatnonzero(slope)
     size[sliding] += np.abs(slope[sliding]) * terms[sliding - 1]
     return float((np.abs(residuals) / np.where(size > 0.0, size, 1.0)).max(initial=0.0))
@@ -71,11 +71,11 @@ class StatusSystem:
 
     Attributes:
         free: (m,) unknown entries of x.
-        sign: sign of the determinant, 0 with a free motion.
+        sign: determinant's sign, 0 with a free motion.
     """
 
     def __init__(self, S: Float, free: Bool, slope: Float) -> None:
-        """Factor the rows that `free_rows` describes, of S (m, m) of `CoulombFaces`."""
+        """Factor the rows by `free_rows` in S (m, m), as in `CoulombFaces`."""
         self.free = free
         sliding = np.flatnonzero(slope)
         place = np.cumsum(self.free) - 1
@@ -140,10 +140,10 @@ class FollowedStatuses:
     """R of m entries of x, which may arrive in any order.
 
     Attributes:
-        S: (m, m) as of `CoulombFaces`.
+        S: (m, m) as in `CoulombFaces`.
         free: (m,) rows of S.
-        slope: (m,) s mu of sliding nodes at their rows of slips, 0 elsewhere.
-        sign: of det M.
+        slope: (m,) s mu at sliding nodes' slips, 0 elsewhere.
+        sign: sign of det M.
     """
 
     def __init__(self, S: Float) -> None:
@@ -212,7 +212,7 @@ class FollowedStatuses:
     def solve(self, x: Float, rhs: Float, terms: Callable[[Float], Float]) -> tuple[Float, Float] | None:
         """(m,) x and S x with the right-hand side (m,), from a start with the prescribed entries.
 
-        None if R has lost too many digits, measured by the terms sum_j |S_ij x_j| of each row.
+        None if R has lost too many digits, measured by each row's terms sum_j |S_ij x_j|.
         """
         prescribed = np.where(self.free, rhs, x)
         if np.count_nonzero(prescribed) <= FEW:

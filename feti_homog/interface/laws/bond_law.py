@@ -43,7 +43,7 @@ class BondLaw(ABC):
         has_toughness: bonds have a fracture energy, which `fracture` gives.
         has_tips: results compare this energy with the energies that drive tips of debonding.
         is_convex: `share` is convex, and so passes 1 once on a straight way.
-        break_names: names of the columns of `breaks`, for tractions with two or three components.
+        break_names: column names in `breaks`, for tractions with two or three components.
     """
 
     has_toughness: ClassVar[bool] = False
@@ -77,7 +77,7 @@ class BondLaw(ABC):
         return np.zeros((k, 0))
 
     def in_state(self, cell: CoupledInterfaces, bonds: BondState) -> BondLaw:
-        """Return the law at this rank's nodes in a state of all bonds.  Collective; its methods are not."""
+        """Return the law at this rank's nodes in their state.  Collective; its methods are not."""
         return self
 
     def convex(self, p: int) -> Bool:
@@ -108,7 +108,7 @@ class BondLaw(ABC):
 
     @property
     def overshoot(self) -> float:
-        """Excess of the first break's traction over the peak of the law, relative to the peak."""
+        """Excess of the first break's traction over the law's peak, relative to the peak."""
         return 0.0
 
     def onset(self) -> BondLaw:
@@ -145,7 +145,7 @@ class BondLaw(ABC):
 class SpringLaw(BondLaw):
     """Law for bonds that break by the energies in their undamaged springs.
 
-    A traction along the fibre adds to the energy of slip: all shear counts alike.
+    A traction along the fibre adds to the slip energy: all shear counts alike.
 
     Attributes:
         normal_stiffness, tangential_stiffness, axial_stiffness: k_n, k_t, k_a, stress per length.
@@ -167,7 +167,7 @@ class SpringLaw(BondLaw):
         return np.asarray(opening), np.asarray(slip)
 
     def mode_angle(self, traction: Float) -> Float:
-        """(p,) psi of tractions (p, c), in radians: sin^2 psi is the energy share of slip."""
+        """(p,) psi of tractions (p, c), in radians: sin^2 psi is the slip's energy share."""
         opening, slip = self.energies(traction)
         return np.asarray(np.arctan2(np.sqrt(slip), np.sqrt(opening)))
 

@@ -36,7 +36,7 @@ MOST_ROUNDING = 1e-6
 
 @dataclass(frozen=True)
 class SpringEnergy(SpringLaw):
-    """A bond breaks when the energy of its spring reaches the toughness.
+    """A bond breaks when its spring energy reaches the toughness.
 
     G_I = <t_n>^2 / (2 k_n), G_II = t_t^2 / (2 k_t), tan^2 psi = G_II / G_I;
     G_I + G_II = G_c = G_Ic [1 + tan^2((1 - lambda) psi)].
@@ -73,7 +73,7 @@ class SpringEnergy(SpringLaw):
         return np.asarray(np.cos((1.0 - self.mode_sensitivity) * self.mode_angle(traction)))
 
     def share(self, traction: Float) -> Float:
-        """(p,) sqrt((G_I + G_II) / G_c) of tractions (p, c).
+        """(p,) sqrt((G_I + G_II) / G_c) under tractions (p, c).
 
         Homogeneous of degree one in the traction, for psi is independent of its size, and convex.
         """
@@ -94,7 +94,7 @@ class Tips:
 
     Attributes:
         node: (t,) node numbers.
-        H: (t, 2, 2) diagonal blocks of the inverse of the dual operator.
+        H: (t, 2, 2) diagonal blocks of the inverse dual operator.
         length: (t,) tributary lengths.
         stiffness: (t, c) upper bound of H, as `ExactInverse.stiffness`.
         axial: (t,) H for slip along the fibres; empty without this problem.
@@ -106,30 +106,15 @@ class Tips:
     stiffness: Float
     axial: Float
 
-    def chosen(self, which: Int) -> Tips:
-        """Return some tips."""
-        axial = self.axial[which] if len(self.axial) else self.axial
-        return Tips(self.node[which], self.H[which], self.length[which], self.stiffness[which], axial)
-
-    def released(self, traction: Float, contact: bool) -> Float:
-        """(t,) energies that breaks under tractions (t, c) release; with `contact` faces do not overlap."""
-        lam = traction * self.length[:, None]
-        released = released_energy(self.H, lam[:, :2], self.stiffness[:, :2], contact)
-        if len(self.axial) == 0:
-            return released
-        gives_way = self.axial > RIGID * self.stiffness[:, 2]
-        along = np.where(gives_way, lam[:, 2] ** 2 / np.where(gives_way, 2.0 * self.axial, 1.0), 0.0)
-        return np.asarray(released + along)
-
 
 @dataclass(frozen=True, kw_only=True)
 class ReleasedEnergy(SpringEnergy):
     """Bonds beside a broken one break when the break releases G_c l, with l their tributary length.
 
-    Other bonds break when the energy of their spring reaches G_c.
+    Other bonds break when their spring energy reaches G_c.
 
     Attributes:
-        influence: inverse of the dual operator, which couples neighbouring bonds.
+        influence: inverse dual operator, which couples neighbouring bonds.
         axial: inverse for slip along the fibres, if that is a problem.
     """
 
@@ -138,11 +123,11 @@ class ReleasedEnergy(SpringEnergy):
 
     @classmethod
     def of(cls, springs: SpringEnergy, influence: ExactInverse, axial: ExactInverse | None = None) -> Self:
-        """Make the law of springs with the inverses of the problems."""
+        """Make the law from springs and the problems' inverses."""
         return cls(**vars(springs), influence=influence, axial=axial)
 
     def in_state(self, cell: CoupledInterfaces, bonds: BondState) -> SpringsAndTips:
-        """Return the law of this rank's nodes with these bonds.  Collective; its methods are not."""
+        """Return the law at this rank's nodes with these bonds.  Collective; its methods are not."""
         tips = self.tips(cell, bonds)
         number = np.full(len(bonds.status), -1)
         number[tips.node] = np.arange(len(tips.node))
@@ -150,7 +135,7 @@ class ReleasedEnergy(SpringEnergy):
         return SpringsAndTips(**springs, tips=tips, number=number, contact=cell.plane.contact)
 
     def tips(self, cell: CoupledInterfaces, bonds: BondState) -> Tips:
-        """Return the tips of this rank.  Collective.
+        """Return this rank's tips.  Collective.
 
         Raises:
             ConvergenceError: rounding hides the released energy.
@@ -197,11 +182,17 @@ class SpringsAndTips(SpringEnergy):
     contact: bool
 
     def share(self, traction: Float) -> Float:
-        """(p,) shares of the strength that tractions (p, c) use."""
+        """(p,) utilisation by tractions (p, c)."""
         used, at = super().share(traction), np.flatnonzero(self.number >= 0)
-        springs, tips = self.at(at), self.tips.chosen(self.number[at])
-        released = tips.released(traction[at], self.contact)
-        used[at] = np.sqrt(released / (springs.toughness * tips.length)) * springs.mode_factor(traction[at])
+        springs, tips, t = self.at(at), self.tips, self.number[at]
+        length, stiffness = tips.length[t], tips.stiffness[t]
+        lam = traction[at] * length[:, None]
+        released = released_energy(tips.H[t], lam[:, :2], stiffness[:, :2], self.contact)
+        if len(tips.axial):
+            gives_way = tips.axial[t] > RIGID * stiffness[:, 2]
+            along = lam[:, 2] ** 2 / np.where(gives_way, 2.0 * tips.axial[t], 1.0)
+            released = released + np.where(gives_way, along, 0.0)
+        used[at] = np.sqrt(released / (springs.toughness * length)) * springs.mode_factor(traction[at])
         return used
 
     def convex(self, p: int) -> Bool:

@@ -47,14 +47,14 @@ def numbers(value: Callable[..., float | Float]) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class CohesiveLaw(SpringLaw):
-    """A law that softens; the history of a bond is its number of broken teeth.
+    """A law that softens; the history of a bond counts broken teeth.
 
     Attributes:
         normal_strength, tangential_strength: N and S.
         normal_toughness, tangential_toughness: G_n and G_t.
         mixing_exponent: eta.
         levels: damage d_0 = 0 < ... < d_n = 1 between teeth.
-        level: number of broken teeth.
+        level: broken teeth.
     """
 
     normal_stiffness: float | Float
@@ -145,7 +145,7 @@ class CohesiveLaw(SpringLaw):
         return replace(self, level=bonds.history[:, 0])
 
     def share(self, traction: Float) -> Float:
-        """(p,) sqrt(W / W_j) of tractions (p, c) at bonds with j broken teeth.
+        """(p,) sqrt(W / W_j) under tractions (p, c) at bonds with j broken teeth.
 
         Homogeneous of degree one, for B is independent of the traction's size.
         """
@@ -176,7 +176,7 @@ class CohesiveLaw(SpringLaw):
         return np.asarray(law._breaking(selected, tooth) * np.diff(self._damages)[tooth])
 
     def onset(self) -> QuadraticStrength:
-        """Return the criterion of the onset of damage."""
+        """Return the criterion for first damage."""
         axial = self.tangential_strength * np.sqrt(self.axial_stiffness / np.asarray(self.tangential_stiffness))
         return QuadraticStrength(self.normal_strength, self.tangential_strength, axial)
 
@@ -192,7 +192,7 @@ class CohesiveLaw(SpringLaw):
         return normal**2 / (2.0 * self.normal_stiffness), tangential**2 / (2.0 * self.tangential_stiffness)
 
     def _breaking(self, traction: Float, tooth: Int) -> Float:
-        """(p,) W_j of teeth, (p,) or one number, in the modes of tractions (p, c)."""
+        """(p,) W_j for teeth, (p,) or one number, under tractions (p, c)."""
         first, second = self.energies(traction)
         stored = first + second
         B = np.divide(second, stored, out=np.zeros(len(stored)), where=stored > 0.0)

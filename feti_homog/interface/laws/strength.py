@@ -34,15 +34,15 @@ class Strength(BondLaw):
         )
 
     def share(self, traction: Float) -> Float:
-        """(p,) shares of the strength that tractions (p, c) use."""
+        """(p,) utilisation by tractions (p, c)."""
         return self.together(self.breaks(traction))
 
     @abstractmethod
     def together(self, shares: Float) -> Float:
-        """(p,) utilisation by the shares (p, c) of components."""
+        """(p,) utilisation by component shares (p, c)."""
 
     def breaks(self, traction: Float) -> Float:
-        """(p, c) components of tractions (p, c), relative to their strengths."""
+        """(p, c) traction components, relative to their strengths."""
         pulls = np.abs(traction)
         pulls[:, 0] = np.maximum(traction[:, 0], 0.0)
         return np.asarray(pulls / self.limits[..., : traction.shape[1]])

@@ -40,8 +40,8 @@ CYCLE = "friction: the statuses of the faces change without end at one load (a c
 class CoulombLeg(Leg):
     """Leg with statuses (n,) of faces and scaled x (m,), as in `CoulombFaces`.
 
-    The rates of a state solve a problem of complementarity, and are constant until a face reaches a limit of its
-    status, a bond its strength, or s = 1.
+    Rates solve a complementarity problem, and are constant until a face reaches a limit of its status, a bond its
+    strength, or s = 1.
 
     A break is an implicit step at constant load to admissible statuses.
     """
@@ -117,7 +117,7 @@ class CoulombLeg(Leg):
         self._first = True
 
     def _go_straight(self, status: Status, x: Float, released: float, heat: float, fracture: float = 0.0) -> None:
-        """Advance straight to scaled x with these statuses, and losses of energy."""
+        """Advance straight to scaled x with these statuses and energy losses."""
         before, mean = self._mean, self.sliding.macroscopic(x)
         work = 0.5 * float((before.stress + mean.stress) @ (mean.strain - before.strain))
         self._stand(status, x, mean, Energies(work, released, fracture, heat))

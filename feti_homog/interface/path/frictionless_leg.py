@@ -61,7 +61,7 @@ class FrictionlessLeg(Leg):
         return self._state
 
     def points(self) -> Iterator[Point]:
-        """Yield the points of the leg, up to a solve without convergence.  Collective."""
+        """Yield the leg's points, up to a solve without convergence.  Collective."""
         self._settle(self._from)
         yield from super().points()
 
@@ -91,7 +91,7 @@ class FrictionlessLeg(Leg):
         """Advance to the next event, or part of the way, and yield its points.  Collective.
 
         Raises:
-            NotCarriedError: neither open nor touching faces carry the stresses of the load.
+            NotCarriedError: neither open nor touching faces carry the load's stresses.
         """
         state, share = self._state, self._share
         try:

@@ -41,7 +41,7 @@ class Leg(ABC):
     def __init__(
         self, cell: CoupledInterfaces, law: BondLaw, waypoints: Sequence[Load], leg: int, begin: PathState
     ) -> None:
-        """Begin at the position of `begin` on the way to waypoint `leg`.  Collective."""
+        """Begin at the position in `begin`, on the way to waypoint `leg`.  Collective."""
         self.cell, self.law, self.leg, self.waypoints = cell, law, leg, waypoints
         self.end = waypoints[leg]
         self.origin = begin.last if begin.position == 0.0 else begin.origin
@@ -68,14 +68,14 @@ class Leg(ABC):
         """Advance to a share of the leg in one step, with fixed bonds.  Collective."""
 
     def points(self) -> Iterator[Point]:
-        """Yield the points of the leg, up to a solve without convergence.  Collective."""
+        """Yield the leg's points, up to a solve without convergence.  Collective."""
         yield from self._break_overloaded()
         while not self._is_over():
             yield from self._advance()
         yield self._point(0, 0, replace(self._path_state(), leg=self.leg + 1, position=0.0))
 
     def step(self, number: int, steps: int, worst_only: bool) -> Point:
-        """Return the point after step `number`, from 1, of the steps of the path.  Collective."""
+        """Return the point after the path's step `number`, from 1.  Collective."""
         before, parted = self._bonds.history, 0
         self._go_to(number * len(self.waypoints) / steps - self.leg)
         while self._is_overloaded():

@@ -34,7 +34,7 @@ class Onset:
     """First break in a cell whose debonded faces do not touch.
 
     Attributes:
-        bonds: law of this rank's nodes in their state.
+        bonds: law at this rank's nodes in their state.
         bonded: (k,) nodes with a bond.
     """
 
@@ -43,7 +43,7 @@ class Onset:
 
     @classmethod
     def of(cls, law: BondLaw, cell: CoupledInterfaces, bonds: BondState) -> Onset:
-        """Make the onset for a law and a state of the bonds.  Collective."""
+        """Make the onset for a law and a bond state.  Collective."""
         return cls(law.in_state(cell, bonds), np.asarray(bonds.status == BONDED))
 
     def utilisation(self, traction: Float, node: Int) -> Float:

@@ -27,14 +27,14 @@ Engine = Callable[[CoupledInterfaces, BondLaw, Sequence[Load], int, PathState], 
 def events(
     cell: CoupledInterfaces, law: BondLaw, waypoints: Sequence[Load], begin: PathState, engine: Engine = FrictionlessLeg
 ) -> Iterator[Point]:
-    """Yield every break along zero -> waypoints[0] -> ..., and the end of each leg.  Collective.
+    """Yield every break along zero -> waypoints[0] -> ..., and each leg's end.  Collective.
 
     A leg begins with the strains or stresses, as its waypoint prescribes, of the state before.  The state of a point
     precedes its break.  On later legs, and with friction on all, changes of contact are points too, with `broke` = 0:
     between points the response is straight.  A point without convergence is the last one.
 
     Raises:
-        NotCarriedError: the last point is the limit of the load.
+        NotCarriedError: the last point is the load limit.
     """
     for leg in range(begin.leg, len(waypoints)):
         if leg == 0 and engine is FrictionlessLeg:

@@ -25,8 +25,8 @@ class PathState:
 
     Attributes:
         leg, position: the load is the share `position`, 0..1, of the way to waypoint `leg`; with increments, `leg` is
-            the number of finished ones.
-        bonds, lam: states of the interface nodes and multipliers to begin with.
+            the number already done.
+        bonds, lam: bond states and multipliers to begin with.
         origin: state at the leg's beginning.
         last: state at the last point.
         broken: fracture energy per area at the last point, by the mode in which each bond broke, 0 without toughness;
@@ -44,7 +44,7 @@ class PathState:
     stretched: float = 0.0
 
     def energies_to(self, after: Macroscopic) -> Energies:
-        """Return the energies of the way from the last point to a state.
+        """Return the energies between the last point and a state.
 
         The response may bend with contact on the way, without losses: the work is stored or released."""
         lost = 0.0 if self.broken is None else self.last.released_to(after)
@@ -63,7 +63,7 @@ class Energies(NamedTuple):
     friction: float = 0.0
 
     def plus(self, more: Energies) -> Energies:
-        """Return the energies of two parts."""
+        """Return the sum with the energies `more`."""
         return Energies(*(a + b for a, b in zip(self, more, strict=True)))
 
 
@@ -72,11 +72,11 @@ NO_ENERGIES = Energies(0.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class Point:
-    """Point of a path.
+    """Path point.
 
     Attributes:
-        load_factor: position on the path, 0 to 1, with equal shares of all legs.
-        scale: factor of the equilibrium `state` that gives the state of the point.
+        load_factor: position on the path, 0 to 1, with equal shares for all legs.
+        scale: factor from the equilibrium `state` to the point's state.
         state: equilibrium.
         broke: number of bonds that part after this state; with increments, in the step before it.
         softened: number of bonds that lose teeth and hold.
@@ -96,7 +96,7 @@ class Point:
 
 
 def unloaded(cell: CoupledInterfaces, bonds: BondState) -> PathState:
-    """Return the beginning of a path with these bonds."""
+    """Return the path's beginning with these bonds."""
     nothing = Macroscopic(np.zeros(len(cell.loads)), np.zeros(len(cell.loads)))
     return PathState(0, 0.0, bonds, cell.no_multipliers(), nothing, nothing)
 
@@ -104,7 +104,7 @@ def unloaded(cell: CoupledInterfaces, bonds: BondState) -> PathState:
 def break_bonds(
     cell: CoupledInterfaces, law: BondLaw, which: Bool, state: Equilibrium, place: PathState
 ) -> tuple[int, int, PathState]:
-    """Break the bonds `which` (k,) in the modes of an equilibrium of any size.  Collective.
+    """Break the bonds `which` (k,) in the modes of an equilibrium, whatever its size.  Collective.
 
     Return the numbers of bonds, on all ranks, that part and that soften, and the path state `place` with the break.
     """

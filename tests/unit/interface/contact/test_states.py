@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -18,9 +20,14 @@ def errors(traction, gap, closed=(True, True, True, False)):
         return np.repeat(values.reshape(2, 2).max(axis=1), 2)
 
     debonded, stress = np.ones(4, bool), np.array([1e5, 1e5, 1e-7, 1e-7])
-    return kkt_errors(
-        MPI.COMM_SELF, traction, LENGTH, np.array(gap), debonded, np.array(closed), 0.5, stress, over_interface
+    nodes = SimpleNamespace(nodes=SimpleNamespace(length=LENGTH))
+    scales = SimpleNamespace(
+        solver=SimpleNamespace(comm=MPI.COMM_SELF, jump_operator=nodes),
+        imposed=lambda acting: 0.5,
+        bond_stress=lambda acting: stress,
+        over_interface=over_interface,
     )
+    return kkt_errors(scales, traction, np.array(gap), debonded, np.array(closed), np.zeros(3))
 
 
 def test_a_state_of_contact_has_none():
