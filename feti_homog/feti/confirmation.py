@@ -44,7 +44,7 @@ class InfluenceSolutions:
         self._residual, self._rounding, self._squares = 0.0, 0.0, np.zeros((2, 0, 0))
 
     def solutions(self, strains: Float, d: Float) -> list[DualSolution] | None:
-        """Return those of the loads (k, v), with jumps d (owned rows, v) of the torn cell; None if F lambda is due.
+        """Return the solutions of loads (k, v), with jumps d (owned rows, v) of the torn cell; None if F lambda is due.
 
         It is always due for loads whose jump on the active rows may be rounding, and where the columns find another
         number of free motions than the coarse space has.  Collective.
@@ -56,14 +56,14 @@ class InfluenceSolutions:
         if not (seen > LEAST_UNCONFIRMED_JUMP**2 * torn).all():
             return None
         free = self._natural.unconstrained_modes.shape[1]
-        found = self._inverse.answer(d, strains.T, free)
-        if found is None:
+        answer = self._inverse.answer(d, strains.T, free)
+        if answer is None:
             return None
-        lam, jumps = found
+        lam, jumps = answer
         if not self._left:
-            whole = self._inverse.answer(d, np.eye(d.shape[1]), free)
-            assert whole is not None
-            self._expected = lam, jumps, np.abs(whole[0]) @ np.abs(strains.T)
+            of_strains = self._inverse.answer(d, np.eye(d.shape[1]), free)
+            assert of_strains is not None
+            self._expected = lam, jumps, np.abs(of_strains[0]) @ np.abs(strains.T)
             return None
         self._left -= 1
         reason, C = int(PETSc.KSP.ConvergedReason.CONVERGED_RTOL), self._operator.compliance
@@ -71,7 +71,7 @@ class InfluenceSolutions:
         return [DualSolution(E, x, jump, None, 0, reason, self._residual, C) for E, x, jump in rows]
 
     def closing(self, d: Float, E: Float, weights: Float) -> Float:
-        """H d E, but for rounding, of loads E (v, k) of a solve with `weights` (k,), for F lambda to confirm.
+        """H d E, but for rounding, for loads E (v, k) in a solve with `weights` (k,), for F lambda to confirm.
 
         Multipliers that `solutions` has left to be confirmed are taken: they cost no columns.  Collective.
         """
@@ -88,9 +88,9 @@ class InfluenceSolutions:
         """
         if solutions and self._expected is not None:
             self._check(d, solutions)
-        confirmed = bool(solutions) and all(each.iterations == 0 and each.reason > 0 for each in solutions)
+        confirmed = bool(solutions) and all(solution.iterations == 0 and solution.reason > 0 for solution in solutions)
         self._granted = min(2 * self._granted + 1, MOST_UNCONFIRMED) if confirmed else 0
-        self._left, self._residual = self._granted, max((each.residual for each in solutions), default=0.0)
+        self._left, self._residual = self._granted, max((solution.residual for solution in solutions), default=0.0)
         if confirmed:
             seen = self._jumps.projected(d, self._jumps.norms(d))
             self._squares = allreduce_sum(self._comm, np.stack([seen.T @ seen, d.T @ d]))
@@ -101,16 +101,18 @@ class InfluenceSolutions:
         Collective; raises as `record`.
         """
         lam, opening = (np.stack(x, axis=1) for x in zip(*((s.lam, s.jump) for s in solutions), strict=True))
-        off, drift = self._errors(lam, opening)
+        lam_error, drift = self._errors(lam, opening)
         # Multipliers that F lambda confirms are off by no less than their residuals.
-        off = float(np.max([off, *(each.residual for each in solutions)]))
-        if not off <= MOST_UNCONFIRMED_ERROR:
-            raise ConvergenceError(f"influence columns: multipliers of the last {self._granted} solves: {off:.1e} off")
-        if (error := float(np.max([off, drift]))) <= max(MOST_FOLLOWED_ERROR, 2.0 * self._rounding):
+        lam_error = float(np.max([lam_error, *(solution.residual for solution in solutions)]))
+        if not lam_error <= MOST_UNCONFIRMED_ERROR:
+            raise ConvergenceError(
+                f"influence columns: multipliers of the last {self._granted} solves: {lam_error:.1e} off"
+            )
+        if (error := float(np.max([lam_error, drift]))) <= max(MOST_FOLLOWED_ERROR, 2.0 * self._rounding):
             return
         # If renewed multipliers stay the same, the error is rounding of F lambda.
         self._inverse.renew_answer(d)
-        strains = np.stack([each.strain for each in solutions], axis=1)
+        strains = np.stack([solution.strain for solution in solutions], axis=1)
         again = self._inverse.answer(d, strains, self._natural.unconstrained_modes.shape[1])
         is_same = again is not None and float(np.max(self._errors(*again))) <= MOST_FOLLOWED_ERROR
         self._rounding = min(error, MOST_CONFIRMED_ROUNDING) if is_same else 0.0
@@ -119,8 +121,8 @@ class InfluenceSolutions:
         """Return how far the expected multipliers and jumps on inactive rows are off these, (owned rows, k) each.
 
         They are relative to the largest of each load; jumps count where no body is free, which may be anywhere.
-        Multipliers of a load may cancel, as where bonds come to be pressed: then a share of those of single strains is
-        what they are measured by.  Collective.
+        Multipliers of a load may cancel, as where bonds come to be pressed: then a share of the multipliers of single
+        strains measures them.  Collective.
         """
         assert self._expected is not None
         expected, jumps, terms = self._expected
@@ -128,5 +130,5 @@ class InfluenceSolutions:
         sizes = np.maximum(np.abs(lam), LEAST_UNCONFIRMED_JUMP * terms)
         parts = np.abs([expected - lam, sizes, is_open * (jumps - opening), opening]).max(axis=1, initial=0.0)
         parts = np.max(self._comm.allgather(parts), axis=0)  # keeps NaN, which MPI.MAX may lose
-        off, drift = (parts[::2] / np.where(parts[1::2] > 0.0, parts[1::2], 1.0)).max(axis=1)
-        return float(off), float(drift)
+        lam_error, drift = (parts[::2] / np.where(parts[1::2] > 0.0, parts[1::2], 1.0)).max(axis=1)
+        return float(lam_error), float(drift)

@@ -17,7 +17,7 @@ from feti_homog.typing import Float
 
 @dataclass(frozen=True)
 class DualSolution:
-    """The multipliers under one macroscopic strain and what follows from them on the interface.
+    """The multipliers under one macroscopic strain, and the jumps that follow from them.
 
     Attributes:
         strain: (v,) E, of plane strain (3,); with the other loads of the problem.
@@ -41,7 +41,7 @@ class DualSolution:
 
     @property
     def opening(self) -> Float:
-        """(owned rows,) B u*: what the springs give way, and the jump of rows without multipliers."""
+        """(owned rows,) B u*: elongation of the springs, and the jump of rows without multipliers."""
         return self.jump + self.compliance * self.lam
 
 
@@ -76,7 +76,7 @@ class ActiveJumps:
         It is measured only if there are jumps which might be.
 
         Args:
-            displacement: (boundary dofs, v) of the torn cell under the unit loads, the same at every call.
+            displacement: (boundary dofs, v) of the torn cell under the unit loads, equal at every call.
             seen: (k,) norms of the jumps on the active rows, projected.
             torn: (k,) norms of the jumps on all rows.
         """
@@ -84,8 +84,8 @@ class ActiveJumps:
         if ((seen > rounding) & (seen < SMALL_JUMP * torn)).any():
             if self._rounding is None:
                 self._rounding = jump_rounding(self._operator, displacement)
-            left = self._natural.project(self._active.restrict(self._rounding @ loads))
-            rounding = np.maximum(rounding, ROUNDING_MARGIN * self.norms(left))
+            projected = self._natural.project(self._active.restrict(self._rounding @ loads))
+            rounding = np.maximum(rounding, ROUNDING_MARGIN * self.norms(projected))
         return rounding
 
     def solutions(
@@ -93,7 +93,7 @@ class ActiveJumps:
     ) -> list[DualSolution]:
         """Return the solutions that multipliers `lam` (owned rows, k) make, with amplitudes, jumps and residuals.
 
-        `jump` (owned rows, k) is d E - F lam, to which rigid-body motions are added; `scale` (k,) that of residuals.
+        `jump` (owned rows, k) is d E - F lam, to which rigid-body motions are added; `scale` (k,) is the residual unit.
         """
         alpha = np.zeros((self._natural.kernel_dimension, len(strains)))
         if self._natural.kernel_dimension:
@@ -102,7 +102,7 @@ class ActiveJumps:
         residual = self.norms(self._active.restrict(jump)) / np.where(scale > 0, scale, 1.0)
         C, parts = self._operator.compliance, (strains, lam.T.copy(), jump.T.copy(), alpha.T.copy(), residual)
         rows = zip(*parts, strict=True)
-        return [DualSolution(E, x, g, a, iterations, reason, float(left), C) for E, x, g, a, left in rows]
+        return [DualSolution(E, x, g, a, iterations, reason, float(size), C) for E, x, g, a, size in rows]
 
     def completed(self, solution: DualSolution, d: Float) -> DualSolution:
         """Return a solution of the present state with amplitudes, jumps and residual by F lambda.
@@ -110,10 +110,10 @@ class ActiveJumps:
         d (owned rows, v) are the jumps of the torn cell.
         """
         torn = (d @ solution.strain)[:, None]
-        left = torn - self._operator.apply(solution.lam[:, None])
+        jump = torn - self._operator.apply(solution.lam[:, None])
         scale = self.norms(self.projected(torn, self.norms(torn)))
         parts = solution.iterations, solution.reason, scale
-        return self.solutions(solution.strain[None], solution.lam[:, None], left, *parts)[0]
+        return self.solutions(solution.strain[None], solution.lam[:, None], jump, *parts)[0]
 
 
 def jump_rounding(operator: DualOperator, displacement: Float) -> Float:

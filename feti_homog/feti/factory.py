@@ -25,19 +25,19 @@ if TYPE_CHECKING:
     from feti_homog.feti.exact.exact_inverse import ExactInverse
 
 
-def _influence(comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> Preconditioner:
+def _influence(operators: InterfaceOperators) -> Preconditioner:
     from feti_homog.feti.exact.exact_inverse import ExactInverse  # four modules that no other one needs
 
-    return ExactInverse(comm, jump_operator, operators)
+    return ExactInverse(operators)
 
 
-def _bonded(comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> Preconditioner:
+def _bonded(operators: InterfaceOperators) -> Preconditioner:
     from feti_homog.feti.exact.reference_cell import BondedInverse  # with two of these modules
 
-    return BondedInverse(comm, jump_operator, operators)
+    return BondedInverse(operators)
 
 
-CLASSES: dict[str, Callable[[MPI.Intracomm, JumpOperator, InterfaceOperators], Preconditioner]] = {
+CLASSES: dict[str, Callable[[InterfaceOperators], Preconditioner]] = {
     "none": lambda *_: Identity(),
     "lumped": Lumped,
     "dirichlet": Dirichlet,
@@ -64,7 +64,7 @@ class SolverParts:
 
     @property
     def coarse_dimension(self) -> int:
-        """Number of coarse displacements; without an adaptive coarse space, of rigid-body motions."""
+        """Number of coarse displacements; of rigid-body motions without an adaptive coarse space."""
         return self.natural.kernel_dimension if self.adaptive is None else self.adaptive.coarse_dimension
 
     def describe(self, comm: MPI.Intracomm) -> str:
@@ -114,7 +114,7 @@ def build(
     thresholds: Thresholds = DEFAULTS,
     recovers: bool = False,
 ) -> SolverParts:
-    """Factor the subdomains and set up what the options and sizes ask for.  Collective.
+    """Factor the subdomains and set up the parts that options and sizes ask for.  Collective.
 
     `compliance` (owned rows,) is C, which may grow if the springs `soften`. Where the run `recovers`
     displacements inside, a rank with one subdomain keeps its factor, which takes about the memory that a factor of the
@@ -142,18 +142,16 @@ def build(
             springs,
             recovers and one_each,
         )
-    plan = choose(_sizes(comm, jump_operator, operators, applications, one_each), options, thresholds)
-    preconditioner = CLASSES[plan.preconditioner](comm, jump_operator, operators)
+    plan = choose(_sizes(operators, applications, one_each), options, thresholds)
+    preconditioner = CLASSES[plan.preconditioner](operators)
     with PETSc.Log.Event("FETINatural"):
-        natural = NaturalCoarseSpace(comm, jump_operator, operators)
+        natural = NaturalCoarseSpace(operators)
     adaptive = None
     if plan.adaptive and isinstance(preconditioner, Dirichlet):
         from feti_homog.feti.coarse.adaptive import AdaptiveCoarseSpace, Balanced  # with its eigenproblems
 
         with PETSc.Log.Event("FETICoarseSetUp"):
-            adaptive = AdaptiveCoarseSpace(
-                comm, jump_operator, operators, preconditioner, options.threshold, thresholds
-            )
+            adaptive = AdaptiveCoarseSpace(operators, preconditioner, options.threshold, thresholds)
         preconditioner = Balanced(preconditioner, adaptive)
     left_out = operators.compliance if plan.preconditioner == "dirichlet" else np.zeros(len(compliance))
     followed = plan.preconditioner == "influence" or not soften
@@ -165,21 +163,15 @@ def build(
     return SolverParts(operators, preconditioner, natural, adaptive, inverse)
 
 
-def _sizes(
-    comm: MPI.Intracomm,
-    jump_operator: JumpOperator,
-    operators: InterfaceOperators,
-    applications: int,
-    one_each: bool,
-) -> ProblemSizes:
-    """Return those of a torn cell; collective."""
-    dense = [o.is_dense for o in operators.operators]
+def _sizes(operators: InterfaceOperators, applications: int, one_each: bool) -> ProblemSizes:
+    """Return the sizes of a torn cell.  Collective."""
+    comm, dense = operators.comm, [o.is_dense for o in operators.operators]
     return ProblemSizes(
         applications=applications,
         bodies_are_cut=_are_cut(comm, operators.subdomains),
         all_dense=comm.allreduce(all(dense), MPI.LAND),
         all_searchable=comm.allreduce(all(np.logical_or(dense, operators.facewise)), MPI.LAND),
-        shared_dofs=jump_operator.shared_dofs,
+        shared_dofs=operators.jump_operator.shared_dofs,
         has_thin=comm.allreduce(any(s.is_thin for s in operators.subdomains), MPI.LOR),
         one_each=one_each,
     )
@@ -187,9 +179,9 @@ def _sizes(
 
 def _has_one_each(comm: MPI.Intracomm, subdomains: Sequence[Subdomain]) -> bool:
     """Return whether each of several ranks has one subdomain, and these reach across materials.  Collective."""
-    own = len(subdomains) == 1, any(s.material is not None for s in subdomains)
-    each, across = (comm.allreduce(*pair) for pair in zip(own, (MPI.LAND, MPI.LOR), strict=True))
-    return comm.size > 1 and each and across
+    flags = len(subdomains) == 1, any(s.material is not None for s in subdomains)
+    has_one, across = (comm.allreduce(*pair) for pair in zip(flags, (MPI.LAND, MPI.LOR), strict=True))
+    return comm.size > 1 and has_one and across
 
 
 def _are_cut(comm: MPI.Intracomm, subdomains: Sequence[Subdomain]) -> bool:

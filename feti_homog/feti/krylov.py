@@ -38,64 +38,45 @@ class ActiveRows:
         return scale_rows(self.mask, x)
 
 
-class ProjectedOperator:
-    """y = P F x on the active rows."""
+class ProjectedProblem:
+    """y = P F x and z = P H r on the active rows; keeps r, the interface jump B u of the iterate."""
 
     def __init__(
         self,
         errors: CallbackErrors,
         operator: DualOperator,
+        preconditioner: Preconditioner,
         natural: NaturalCoarseSpace,
         active: ActiveRows,
         columns: int,
     ) -> None:
         """For vectors of so many columns."""
-        self._errors = errors
-        self.operator, self.natural, self.active = operator, natural, active
-        self.shape = (-1, columns)
-        self.event = PETSc.Log.Event("FETIDual")
+        self._errors, self._operator, self._preconditioner = errors, operator, preconditioner
+        self._natural, self._active, self._residual = natural, active, np.zeros((0, columns))
+        self._events = PETSc.Log.Event("FETIDual"), PETSc.Log.Event("FETIPrecond")
 
     def mult(self, mat: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """y = P F x.  Collective."""
-        with self.event:
-            values = x.getArray(readonly=True).reshape(self.shape)
-            y.setArray(self._errors.call(lambda: self._apply(values), np.full(values.shape, np.nan)).ravel())
-
-    def _apply(self, x: Float) -> Float:
-        return self.natural.project(self.active.restrict(self.operator.apply(x)))
-
-
-class ProjectedPreconditioner:
-    """z = P H r; keeps r, the interface jump B u of the iterate."""
-
-    def __init__(
-        self,
-        comm: MPI.Intracomm,
-        errors: CallbackErrors,
-        preconditioner: Preconditioner,
-        natural: NaturalCoarseSpace,
-        columns: int,
-    ) -> None:
-        """For vectors of so many columns."""
-        self._errors = errors
-        self.comm, self.preconditioner, self.natural = comm, preconditioner, natural
-        self.shape = (-1, columns)
-        self.event = PETSc.Log.Event("FETIPrecond")
-        self._residual = np.zeros((0, columns))
+        with self._events[0]:
+            values = x.getArray(readonly=True).reshape(-1, self._residual.shape[1])
+            y.setArray(self._errors.call(lambda: self._product(values), np.full(values.shape, np.nan)).ravel())
 
     def apply(self, pc: PETSc.PC, r: PETSc.Vec, z: PETSc.Vec) -> None:
         """z = P H r.  Collective."""
-        with self.event:
-            self._residual = r.getArray(readonly=True).reshape(self.shape)
-            z.setArray(self._errors.call(self._apply, np.full(self._residual.shape, np.nan)).ravel())
+        with self._events[1]:
+            self._residual = r.getArray(readonly=True).reshape(-1, self._residual.shape[1])
+            z.setArray(self._errors.call(self._preconditioned, np.full(self._residual.shape, np.nan)).ravel())
 
-    def _apply(self) -> Float:
-        return self.natural.project(self.preconditioner.apply(self._residual))
+    def _product(self, x: Float) -> Float:
+        return self._natural.project(self._active.restrict(self._operator.apply(x)))
+
+    def _preconditioned(self) -> Float:
+        return self._natural.project(self._preconditioner.apply(self._residual))
 
     def jump_norm(self) -> float:
         """|P r| of the last r: the jump that the best rigid-body motions leave.  Collective."""
-        r = self.natural.project(self._residual)
-        return float(np.sqrt(allreduce_sum(self.comm, np.array([(r * r).sum()]))[0]))
+        r = self._natural.project(self._residual)
+        return float(np.sqrt(allreduce_sum(self._operator.boundary.comm, np.array([(r * r).sum()]))[0]))
 
 
 class Stall:
@@ -109,7 +90,7 @@ class Stall:
         self._smallest, self._found_at = np.inf, 0
 
     def is_reached(self, iteration: int, norm: float) -> bool:
-        """Return whether the norm stalls, given that of this iteration."""
+        """Return whether the norm stalls, with its value at this iteration."""
         if norm < self._smallest / 2:
             self._smallest, self._found_at = norm, iteration
         return iteration - self._found_at >= self._patience
@@ -118,15 +99,15 @@ class Stall:
 class PrimalTest:
     """PETSc's convergence test: converged when both primal residuals, the jump and the forces, are below rtol.
 
-    The jump is |P r| relative to that of the torn cell; the forces that would close it are |P H r| relative to those of
-    the torn cell, |P M^-1 P d|.  A small dual residual alone can hide a large one of these.
+    The jump is |P r| relative to the jump of the torn cell; the forces that would close it are |P H r| relative to
+    the forces of the torn cell, |P M^-1 P d|.  A small dual residual alone can hide a large one of these.
 
     Attributes:
         ends_on_stall: whether norms that do not fall any more are a breakdown.
     """
 
-    def __init__(self, errors: CallbackErrors, preconditioner: ProjectedPreconditioner) -> None:
-        self._errors, self.preconditioner, self.ends_on_stall = errors, preconditioner, False
+    def __init__(self, errors: CallbackErrors, problem: ProjectedProblem) -> None:
+        self._errors, self._problem, self.ends_on_stall = errors, problem, False
         self._jump_scale, self._force_scale = 1.0, 1.0
         self._jump_stall, self._force_stall = Stall(STALL_ITERATIONS), Stall(FORCE_STALL_ITERATIONS)
 
@@ -158,7 +139,7 @@ class PrimalTest:
             return self._go_on(self._force_stall.is_reached(iteration, residual))
         if ksp.getType() not in PRECONDITION_TRUE_RESIDUAL:
             return PETSc.KSP.ConvergedReason.CONVERGED_RTOL
-        jump = self.preconditioner.jump_norm()
+        jump = self._problem.jump_norm()
         if jump <= rtol * self._jump_scale:
             return PETSc.KSP.ConvergedReason.CONVERGED_RTOL
         return self._go_on(self._jump_stall.is_reached(iteration, jump))
@@ -189,12 +170,11 @@ class Krylov:
     ) -> None:
         """Set up; `vector` is one of the multiplier vectors.  Collective."""
         self._columns = columns
-        own, whole = vector.getSizes()
-        sizes = (own * columns, whole * columns)
+        owned_rows, all_rows = vector.getSizes()
+        sizes = (owned_rows * columns, all_rows * columns)
         self._errors = CallbackErrors(comm)
-        self._preconditioner = ProjectedPreconditioner(comm, self._errors, preconditioner, natural, columns)
-        self.test = PrimalTest(self._errors, self._preconditioner)
-        context = ProjectedOperator(self._errors, operator, natural, active, columns)
+        context = ProjectedProblem(self._errors, operator, preconditioner, natural, active, columns)
+        self.test = PrimalTest(self._errors, context)
         A = PETSc.Mat().createPython((sizes, sizes), context, comm=vector.comm)
         A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         A.setUp()
@@ -209,29 +189,29 @@ class Krylov:
         pc = self.ksp.getPC()
         pc.setType(PETSc.PC.Type.PYTHON)
         pc.setOptionsPrefix("feti_projected_")
-        pc.setPythonContext(self._preconditioner)
+        pc.setPythonContext(context)
         self.ksp.setFromOptions()
 
     def solve(self, residual: Float) -> Float:
         """Return the multipliers (rows, k) that remove the residual (rows, k), as far as `ksp` converged.  Collective.
 
-        Raises what operator, preconditioner or test raise on all ranks; a rank that raises alone ends the job.
+        Errors of operator, preconditioner or test pass if all ranks raise them; a rank that raises alone ends the job.
         """
         self._right.setArray(residual.ravel())
         self._solution.zeroEntries()
         with self._errors.raised():
             self.ksp.solve(self._right, self._solution)
-        found: Float = self._solution.getArray(readonly=True).reshape(residual.shape).copy()
-        return found
+        multipliers: Float = self._solution.getArray(readonly=True).reshape(residual.shape).copy()
+        return multipliers
 
     def describe(self, iterations: int) -> str:
         """Return iterations and estimated condition number of the last solve, as -feti_view prints them."""
         ksp, load_cases = self.ksp, self._columns
-        words = f"FETI: {load_cases} load case{'s' * (load_cases > 1)}, {iterations} iterations"
+        line = f"FETI: {load_cases} load case{'s' * (load_cases > 1)}, {iterations} iterations"
         if not iterations or ksp.getType() not in ESTIMATES_SINGULAR_VALUES:
-            return words
+            return line
         largest, smallest = ksp.computeExtremeSingularValues()
-        return f"{words}, condition number about {largest / smallest:.3g} ({smallest:.3g} to {largest:.3g})"
+        return f"{line}, condition number about {largest / smallest:.3g} ({smallest:.3g} to {largest:.3g})"
 
     def destroy(self) -> None:
         """Free the shell matrix and the Krylov method; collective."""

@@ -90,7 +90,7 @@ class FetiSolver:
         self.interface_operators, self.preconditioner = parts.operators, parts.preconditioner
         self.exact_inverse = parts.exact_inverse
         self.natural, self.adaptive, self.coarse_dimension = parts.natural, parts.adaptive, parts.coarse_dimension
-        self.operator = DualOperator(self.jump_operator, self.interface_operators, compliance)
+        self.operator = DualOperator(self.interface_operators, compliance)
         if sum(s.n_dofs for s in subdomains) > MOST_DOFS_UNTRIMMED:
             process_memory.trim()
         self.active = ActiveRows(self.rows)
@@ -132,7 +132,7 @@ class FetiSolver:
 
     @property
     def condensed(self) -> CondensedLoads:
-        """The unit loads on the boundaries, with the answer of the interiors to what works there."""
+        """The unit loads on the boundaries, with the answer of the interiors to loads inside."""
         return self.interface_operators.condensed
 
     @property
@@ -145,7 +145,7 @@ class FetiSolver:
         """(boundary dofs, v) K+ (-Q), of the torn cell under the unit loads."""
         operators, u = self.interface_operators, self.interface_operators.apply_flexibility(-self.loads)
         parts = zip(self.subdomains, operators.dofs, operators.slices, strict=True)
-        return np.concatenate([u[:0], *(s.without_rounding(u[own], dofs) for s, dofs, own in parts)])
+        return np.concatenate([u[:0], *(s.without_rounding(u[span], dofs) for s, dofs, span in parts)])
 
     @cached_property
     def d(self) -> Float:
@@ -190,8 +190,11 @@ class FetiSolver:
         """
         k = len(strains)
         self.solves += k
-        if self._by_columns is not None and (found := self._by_columns.solutions(strains, self.d)) is not None:
-            return found
+        if (
+            self._by_columns is not None
+            and (solutions_by_columns := self._by_columns.solutions(strains, self.d)) is not None
+        ):
+            return solutions_by_columns
         krylov = self._krylov_for(k)
         torn_jump = self.d @ strains.T
         torn = self._jumps.norms(torn_jump)
@@ -270,8 +273,8 @@ class FetiSolver:
             is_better = self._jumps.norms(residual) <= self._jumps.norms(right)
             lam, applied = np.where(is_better, lam, 0.0), np.where(is_better, applied, 0.0)
             first = Iterate(lam, applied, np.where(is_better, residual, right))
-            left = float(np.linalg.norm(self._jumps.norms(first.residual)))
-            if krylov.test.is_met(self.rtol, left, self.preconditioner.norm * left):
+            jump = float(np.linalg.norm(self._jumps.norms(first.residual)))
+            if krylov.test.is_met(self.rtol, jump, self.preconditioner.norm * jump):
                 return first, iterations, int(PETSc.KSP.ConvergedReason.CONVERGED_RTOL)
             lam = first.lam + krylov.solve(first.residual)
             iterations += krylov.ksp.getIterationNumber()

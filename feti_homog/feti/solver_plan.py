@@ -49,10 +49,10 @@ class SolverOptions:
             CaseError: an option has no such value.
         """
 
-        def choice(name: str, known: tuple[str, ...], default: str) -> str:
+        def choice(name: str, allowed: tuple[str, ...], default: str) -> str:
             value = text(name, default)
-            if value not in known:
-                raise CaseError(f"-feti_{name} {value}: expected one of {', '.join(known)}")
+            if value not in allowed:
+                raise CaseError(f"-feti_{name} {value}: expected one of {', '.join(allowed)}")
             return value
 
         preconditioner = choice("pc_type", PRECONDITIONERS, "auto")

@@ -1,7 +1,7 @@
-"""Every number of the solver that was chosen: its unit, what it is for, and the command that measured it.
+"""Every chosen number of the solver: its unit, its purpose, and the command that measured it.
 
-This module imports nothing of the program, so that scripts may read it without starting MPI.  `Thresholds` holds what
-may be varied: `scripts/measure_thresholds NAME VALUE...` prints what each value of a field costs and gains.  The
+This module imports nothing of the program, so that scripts may read it without starting MPI.  `Thresholds` holds
+numbers to vary: `scripts/measure_thresholds NAME VALUE...` prints costs and gains of each value.  The
 constants below it are limits of rounding and of memory at a time; no result depends on them beyond the solver's
 tolerance.
 """
@@ -18,7 +18,7 @@ class Thresholds:
     "Measured" is by `scripts/measure_thresholds.py NAME VALUE...` for the values in brackets.
 
     Attributes:
-        dense_boundary_dofs: boundary degrees of freedom of a subdomain up to which `-feti_dual_operator auto` ever
+        dense_boundary_dofs: boundary dofs of a subdomain up to which `-feti_dual_operator auto` ever
             makes dense matrices, of 8 n^2 bytes.
         soft_mode: tau, no unit; displacements p with S p = theta N p, theta < tau, are soft.  The default of
             `-feti_coarse_threshold`; the condition number is about 1 / tau.  Measured [0.1, 0.24, 0.35, 0.5]:
@@ -30,9 +30,9 @@ class Thresholds:
             16, 17 iterations; 14.5, 10.7, 10.2 vectors: one layer finds modes that are none of the body's.
         decayed: displacements on the rest of the boundary, relative to the largest of a face's mode, that are taken for
             0.  Measured [1e-3, 0.01, 0.03, 0.1]: 16, 16, 16, 18 iterations.
-        min_trace_dofs: degrees of freedom that a trace space of a boundary or a face keeps at least.  Measured
+        min_trace_dofs: dofs that a trace space on a boundary or a face keeps at least.  Measured
             [30, 60, 100, 250]: 18, 18, 18, 16 iterations; 6.7, 6.8, 6.9, 7.3 vectors.
-        whole_boundary_dofs: boundary degrees of freedom of a whole body above which its soft modes come from a dense
+        whole_boundary_dofs: boundary dofs of a whole body above which its soft modes come from a dense
             eigenproblem for each face, not from one.  Measured [1000, 5000] with a boundary of 3644: 1.0 and 3.4 s.
         influence_applications: applications of the dual operator from which on influence columns pay
             (`scripts/benchmark_path`).

@@ -7,12 +7,12 @@ import pytest
 from support.torn_cells import tear
 
 from feti_homog.errors import CaseError
-from feti_homog.feti.krylov import PrimalTest, ProjectedOperator, ProjectedPreconditioner
+from feti_homog.feti.krylov import PrimalTest, ProjectedProblem
 
 pytestmark = [pytest.mark.parallel, pytest.mark.quick]
 
 E11 = np.array([1.0, 0.0, 0.0])
-CALLBACKS = [(ProjectedOperator, "_apply"), (ProjectedPreconditioner, "_apply"), (PrimalTest, "_judge")]
+CALLBACKS = [(ProjectedProblem, "_product"), (ProjectedProblem, "_preconditioned"), (PrimalTest, "_judge")]
 
 
 @pytest.mark.parametrize("method", ["cg", "gmres"])

@@ -45,8 +45,8 @@ def test_soft_modes_solve_the_eigenproblem(comm, narrow):
     jump_operator, subdomains = narrow.solver.jump_operator, narrow.cell.subdomains
     boundary = InterfaceOperators(jump_operator, subdomains, "explicit", 1, True)
     neighbours = Neighbours(comm, jump_operator, subdomains)
-    scaled = Dirichlet(comm, jump_operator, boundary)
-    blocks = subdomain_blocks(comm, jump_operator, boundary, scaled, neighbours.rows)
+    scaled = Dirichlet(boundary)
+    blocks = subdomain_blocks(boundary, scaled, neighbours.rows)
     found = kernels_and_soft_modes(blocks, neighbours, THRESHOLD)
     for s, V, count in zip(subdomains, found, narrow.coarse.counts, strict=True):
         B, S = narrow.dense.B[s.submesh.index], narrow.dense.S[s.submesh.index]

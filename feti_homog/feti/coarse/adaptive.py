@@ -1,13 +1,13 @@
-"""The adaptive coarse space: rigid-body motions and soft modes of the subdomains, averaged over copies of each node.
+"""The adaptive coarse space: rigid-body motions and soft subdomain modes, averaged over node copies.
 
-With the coarse displacements Z_0 of `geneo.AveragedModes`, the stiffness S of the boundaries becomes
+With the coarse displacements Z_0 (`geneo.AveragedModes`) the boundary stiffness S becomes
 
     S_0 = S - S Z_0 (Z_0^T S Z_0)^+ Z_0^T S,
 
-what is left of it where the coarse displacements have found their equilibrium.  As B Z_0 = 0, S_0 in place of S in the
-preconditioner M^-1 = B_D S B_D^T makes the exact inverse of the dual operator if Z_0 spans all displacements of the
+the part that is left where the coarse displacements are in equilibrium.  As B Z_0 = 0, S_0 in place of S in the
+preconditioner M^-1 = B_D S B_D^T makes the exact inverse dual operator if Z_0 spans all displacements of the
 glued cell (T9), and takes the soft modes away from the Krylov method if it spans theirs (Spillane & Rixen, IJNME 95,
-2013).  Z_0^T S Z_0 is positive semi-definite, and couples a subdomain with those that share a neighbour with it.
+2013).  Z_0^T S Z_0 is positive semi-definite, and couples subdomains that share a neighbour.
 """
 
 from __future__ import annotations
@@ -26,7 +26,6 @@ from feti_homog.feti.coarse.geneo import (
     scaled_constraints,
     subdomain_blocks,
 )
-from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.neighbours import Neighbours
 from feti_homog.feti.linalg.distributed_solver import DistributedSolver
 from feti_homog.feti.linalg.sparse_matrices import DenseBlockSum, scaled
@@ -45,15 +44,15 @@ from feti_homog.typing import Float, Int
 
 
 class AdaptiveCoarseSpace:
-    """The coarse space of this module.  Every rank has S Z_0 on its subdomains, and its part of a factor.
+    """The adaptive coarse space.  Every rank has S Z_0 on its subdomains, and its share in a factor.
 
-    A rank has those u of the n coarse displacements that reach its subdomains, and no others.
+    A rank has the u coarse displacements, of all n, that reach its subdomains.
 
-    Of a subdomain S Z_0 is dense: of an outer body left whole it has a column for every mode of every inner one.
+    Per subdomain S Z_0 is dense: an uncut outer body has a column for every mode of every inner one.
 
     Attributes:
         threshold: tau.
-        counts: soft modes of each of this rank's subdomains.
+        counts: number of soft modes for each local subdomain.
         coarse_dimension: coarse displacements, n.
         factorizations: of Z_0^T S Z_0 so far.
         solver: of Z_0^T S Z_0, scaled.
@@ -61,8 +60,6 @@ class AdaptiveCoarseSpace:
 
     def __init__(
         self,
-        comm: MPI.Intracomm,
-        jump_operator: JumpOperator,
         operators: InterfaceOperators,
         scaling: StiffnessScaled,
         threshold: float,
@@ -70,17 +67,18 @@ class AdaptiveCoarseSpace:
     ) -> None:
         """Find the modes below the threshold tau and factor.  Collective.
 
-        All boundary operators must be dense but of large bodies. Options under `feti_coarse_` as of
+        All boundary operators must be dense, but on large bodies.  Options under `feti_coarse_` as in
         `DistributedSolver`.
 
         Raises:
             MeshError: the neighbourhood of a face, on any rank, is no subdomain.
             LinAlgError, CaseError: as `factor`.
         """
+        comm, jump_operator = operators.comm, operators.jump_operator
         self.comm, self.threshold = comm, threshold
         self._jump_operator, self._operators, self._scaling = jump_operator, operators, scaling
         self._neighbours = Neighbours(comm, jump_operator, operators.subdomains)
-        blocks = subdomain_blocks(comm, jump_operator, operators, scaling, self._neighbours.rows)
+        blocks = subdomain_blocks(operators, scaling, self._neighbours.rows)
         V = kernels_and_soft_modes(blocks, self._neighbours, threshold, thresholds)
         process_memory.trim()
         self.counts = [v.shape[1] - b.R.shape[1] for v, b in zip(V, blocks, strict=True)]
@@ -103,13 +101,12 @@ class AdaptiveCoarseSpace:
     def activate(self, active: Float) -> None:
         """Average over the copies, and factor.  Collective.
 
-        The copies are those that the owned rows hold together of which `active` is 1, as in the scaling. Raises as
-        `factor`.
+        Owned rows where `active` is 1 hold copies together, as in the scaling.  Raises as `factor`.
         """
         mask = self._jump_operator.gather(active).copy()
         changed = mask != self._mask
         touched = [i for i, rows in enumerate(self._neighbours.rows) if changed[rows].any()]
-        BW = scaled_constraints(self.comm, self._jump_operator, self._scaling)
+        BW = scaled_constraints(self._scaling)
         of = [local_columns(BW, self._operators.slices[i], self._neighbours.rows[i]) for i in touched]
         self._update(touched, of)
         self._mask = mask
@@ -130,7 +127,7 @@ class AdaptiveCoarseSpace:
         return total.matrix()
 
     def factor(self, part: csr_matrix) -> None:
-        """Factor Z_0^T S Z_0, the sum of all parts, scaled to a unit diagonal, with a small multiple of the identity.
+        """Factor Z_0^T S Z_0, the sum of all parts, scaled to a unit diagonal, plus a small multiple of I.
 
         Collective.
 
@@ -145,9 +142,9 @@ class AdaptiveCoarseSpace:
         self.factorizations += 1
         if not self.coarse_dimension:
             return
-        whole = np.zeros(self.coarse_dimension)
-        whole[self._modes.reaching] = part.diagonal()
-        energy = allreduce_sum(self.comm, whole)[self._modes.reaching]
+        energies = np.zeros(self.coarse_dimension)
+        energies[self._modes.reaching] = part.diagonal()
+        energy = allreduce_sum(self.comm, energies)[self._modes.reaching]
         if self._free_energy is None:
             largest = self.comm.allreduce(energy.max(initial=0.0), MPI.MAX)
             self._free_energy = FREE_MODE_ENERGY * np.where(energy > ROUNDED_MODE_ENERGY * largest, energy, largest)
@@ -166,10 +163,7 @@ class AdaptiveCoarseSpace:
                     raise
 
     def balanced(self, x: Float) -> Float:
-        """Return the forces S_0 x (boundary dofs,) or (boundary dofs, k) of displacements x of that shape.
-
-        Collective.
-        """
+        """S_0 x, forces by displacements x (boundary dofs,) or (boundary dofs, k).  Collective."""
         forces = self._operators.apply_with_springs(x)
         if not self.coarse_dimension:
             return forces

@@ -1,6 +1,6 @@
-"""Neighbourhoods of faces of long boundaries, and trace spaces, linear between some of the nodes.
+"""Face neighbourhoods on long boundaries, and trace spaces, linear between some nodes.
 
-For displacements p of a face the energy of the body is at least that of the neighbourhood N of the face, whatever else
+For face displacements p the body energy is at least the energy in the face neighbourhood N, whatever else
 moves:
 
     min { x^T S x : x = p on the face } >= p^T S_N p.
@@ -62,28 +62,28 @@ def trace_space(
     ends = np.empty((len(submesh.edge_keys), 2), np.int64)
     ends[submesh.edge_class] = submesh.vertex_class[submesh.edges]
     first = vertices + edge * inner - 1
-    left = np.where(lower == 0, ends[edge, 0], first + lower)
-    right = np.where(lower + k == lattice.intervals, ends[edge, 1], first + lower + k)
+    lower_node = np.where(lower == 0, ends[edge, 0], first + lower)
+    upper_node = np.where(lower + k == lattice.intervals, ends[edge, 1], first + lower + k)
     weight = (position[between] - lower) / k
     rows = np.concatenate([np.flatnonzero(keep), between, between])
-    columns = np.concatenate([np.arange(m), number[left], number[right]])
+    columns = np.concatenate([np.arange(m), number[lower_node], number[upper_node]])
     values = np.concatenate([np.ones(m), 1 - weight, weight])
-    known = columns >= 0
-    rows, columns, values = rows[known], columns[known], values[known]
+    is_free = columns >= 0
+    rows, columns, values = rows[is_free], columns[is_free], values[is_free]
     entries = np.repeat(values, c), (problem.dofs(rows), problem.dofs(columns))
     return csr_matrix(entries, shape=(c * len(nodes), c * m))
 
 
 @dataclass(frozen=True)
 class FaceNeighbourhood:
-    """The neighbourhood of a face in its body, as a subdomain of its own, condensed to the face's n dofs.
+    """A face neighbourhood in its body, as a subdomain, condensed to the n face dofs.
 
     Attributes:
-        at: (n,) positions of these dofs among the boundary dofs of the body.
+        at: (n,) positions of these dofs among the body's boundary dofs.
         operator: its dense boundary operators.
         R: (n, k) its kernel on the face.
         P: (n, m) its trace space.
-        S_fixed: (n, n) stiffness of the face if other faces, and what is outside the neighbourhood, are held fixed.
+        S_fixed: (n, n) stiffness of the face if other faces and all nodes outside the neighbourhood are fixed.
     """
 
     at: Int
@@ -96,57 +96,55 @@ class FaceNeighbourhood:
 def face_neighbourhoods(
     body: Subdomain, dofs: Int, face: Int, thresholds: Thresholds = DEFAULTS
 ) -> list[FaceNeighbourhood]:
-    """Return the neighbourhoods of a face.
-
-    One for each connected part of what is near it and has enough of its nodes.
+    """Return the face neighbourhoods: connected parts of the triangles near it with enough face nodes.
 
     Args:
         dofs: (n,) boundary dofs of the body, sorted.
-        face: positions among `dofs` of the face's, all of each node.
+        face: positions of the face dofs among `dofs`, node by node.
     """
     on_face = np.zeros(body.mesh.n_classes, bool)
     nodes = body.problem.nodes(dofs)
     on_face[nodes[face]] = True
     on_others = np.zeros_like(on_face)
     on_others[nodes] = ~on_face[nodes]
-    near = _near(body, on_face, thresholds.face_layers)
-    edges = body.submesh.edge_class[body.submesh.triangle_edges[near]]
-    label = components(len(near), *edge_pairs(edges))
-    found = (
-        _neighbourhood(body, dofs, near[label == k], on_face, on_others, thresholds.min_trace_dofs)
+    triangles = _near(body, on_face, thresholds.face_layers)
+    edges = body.submesh.edge_class[body.submesh.triangle_edges[triangles]]
+    label = components(len(triangles), *edge_pairs(edges))
+    neighbourhoods = (
+        _neighbourhood(body, dofs, triangles[label == k], on_face, on_others, thresholds.min_trace_dofs)
         for k in range(label.max() + 1)
     )
-    return [neighbourhood for neighbourhood in found if neighbourhood is not None]
+    return [neighbourhood for neighbourhood in neighbourhoods if neighbourhood is not None]
 
 
 def _neighbourhood(
     body: Subdomain, dofs: Int, triangles: Int, on_face: Bool, on_others: Bool, min_trace_dofs: int
 ) -> FaceNeighbourhood | None:
-    """Return the neighbourhood of some coarse triangles if it has enough of the face."""
+    """Return the neighbourhood in coarse triangles if it has enough face nodes."""
     outside = np.zeros_like(on_face)
     outside[body.mesh.node_class[np.delete(body.mesh.nodes, triangles, axis=0)]] = True
     piece = part(body.submesh, triangles)
-    own = Subdomain.build(piece, body.mesh.lattice, body.L, body.problem, is_thin=body.is_thin, mixed=body.mixed)
-    of_body = np.empty(own.mesh.n_classes, np.int64)
-    of_body[own.mesh.node_class[own.mesh.nodes]] = body.mesh.node_class[body.mesh.nodes[triangles]]
+    subdomain = Subdomain.build(piece, body.mesh.lattice, body.L, body.problem, is_thin=body.is_thin, mixed=body.mixed)
+    of_body = np.empty(subdomain.mesh.n_classes, np.int64)
+    of_body[subdomain.mesh.node_class[subdomain.mesh.nodes]] = body.mesh.node_class[body.mesh.nodes[triangles]]
     nodes = np.flatnonzero(on_face[of_body])
     if len(nodes) < MIN_FACE_NODES:
         return None
     all_of = body.problem.dofs
     face, at = all_of(nodes), np.searchsorted(dofs, all_of(of_body[nodes]))
     movable = all_of(np.flatnonzero(on_face[of_body] | ~(outside | on_others)[of_body]))
-    K = own.take_stiffness()
+    K = subdomain.take_stiffness()
     S_fixed = schur_complement(K[movable][:, movable].tocsr(), np.searchsorted(movable, face))
-    P = trace_space(own.submesh, own.mesh.lattice, own.problem, nodes, min_trace_dofs)
-    return FaceNeighbourhood(at, ExplicitInterfaceOperator(own, K, face), own.R[face], P, S_fixed)
+    P = trace_space(subdomain.submesh, subdomain.mesh.lattice, subdomain.problem, nodes, min_trace_dofs)
+    return FaceNeighbourhood(at, ExplicitInterfaceOperator(subdomain, K, face), subdomain.R[face], P, S_fixed)
 
 
 def _near(body: Subdomain, on_face: Bool, layers: int) -> Int:
     """Coarse triangles within so many layers of the marked nodes."""
     classes = body.mesh.node_class[body.mesh.nodes]
-    near = on_face[classes].any(axis=1)
+    is_near = on_face[classes].any(axis=1)
     for _ in range(layers - 1):
         corners = np.zeros(len(on_face), bool)
-        corners[classes[near, :3]] = True
-        near |= corners[classes[:, :3]].any(axis=1)
-    return np.flatnonzero(near)
+        corners[classes[is_near, :3]] = True
+        is_near |= corners[classes[:, :3]].any(axis=1)
+    return np.flatnonzero(is_near)

@@ -1,12 +1,12 @@
-"""Local eigenproblems that find what slows the preconditioned dual operator down, of all subdomains.
+"""Local eigenproblems of all subdomains: modes that slow the preconditioned dual operator down.
 
 With the averaged soft modes in equilibrium, the largest eigenvalue of the preconditioned dual operator is at most
 1 + N / tau whatever the geometry and the materials, N being the largest number of subdomains that share nodes with one,
 itself included (GenEO: Spillane & Rixen, IJNME 95, 2013).  Measured, it is about 1 / tau.
 
-Modes of subdomains are averaged over the copies of each node: Z_0 = (I - B_D^T B) V, the coarse displacements.
-B Z_0 = 0, for B B_D^T = I, so they are displacements of the cell whose active rows are glued.  A mode of a subdomain
-reaches those that share nodes with it, and no further.
+Subdomain modes are averaged over node copies: Z_0 = (I - B_D^T B) V, the coarse displacements.
+B Z_0 = 0, for B B_D^T = I, so they are displacements of the cell whose active rows are glued.  A subdomain mode
+reaches the subdomains that share nodes with it, and no further.
 """
 
 from __future__ import annotations
@@ -19,7 +19,6 @@ from mpi4py import MPI
 from scipy.sparse import csc_matrix, csr_matrix
 
 from feti_homog.feti.coarse.local_eigenproblems import SubdomainBlocks, eigenproblem
-from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.neighbours import Neighbours
 from feti_homog.feti.linalg.sparse_matrices import add_shared_rows
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
@@ -31,7 +30,7 @@ from feti_homog.typing import Float, Float32, Int
 
 
 class _Jumps(NamedTuple):
-    """Jumps that the modes of one subdomain, itself or a neighbour, open on the rows of a subdomain: B V there.
+    """Jumps B V that the modes of a subdomain, itself or a neighbour, open on subdomain rows.
 
     `rows` (r,) are positions among the subdomain's rows, `columns` (c,) numbers of coarse modes, `values` (r, c).
     """
@@ -42,13 +41,13 @@ class _Jumps(NamedTuple):
 
 
 class AveragedModes:
-    """Z_0 on this rank's subdomains, for any active rows: what it is made of is kept for changes of them.
+    """Z_0 on this rank's subdomains, for any active rows: its parts stay for changes of these rows.
 
     Attributes:
         total: coarse modes of all subdomains, n.
-        columns: of each subdomain the numbers (m,) of the modes that reach it, ascending.
+        columns: for each subdomain the numbers (m,) of modes that reach it, ascending.
         reaching: (u,) the numbers of all that reach this rank's subdomains, ascending.
-        is_own: (u,) whether each of these is of a subdomain of this rank.
+        is_own: (u,) whether each belongs to a local subdomain.
     """
 
     def __init__(
@@ -62,13 +61,13 @@ class AveragedModes:
         none = np.zeros(0, np.int64)
         self.columns = [np.unique(np.concatenate([none, *(jumps.columns for jumps in of)])) for of in self._jumps]
         self.reaching = np.unique(np.concatenate([none, *self.columns]))
-        own = [first + np.arange(v.shape[1]) for first, v in zip(self._first, V, strict=True)]
-        self.is_own = np.isin(self.reaching, np.concatenate([none, *own]))
+        numbers = [first + np.arange(v.shape[1]) for first, v in zip(self._first, V, strict=True)]
+        self.is_own = np.isin(self.reaching, np.concatenate([none, *numbers]))
 
     def of_subdomain(self, i: int, BW: csr_matrix) -> Float:
         """(boundary dofs, m) Z_0 on subdomain i, less its own kernel, which has no energy there.
 
-        Without the kernel, what is left of a rigid-body motion in a stiff subdomain has all its digits.
+        Without the kernel, the rest of a rigid-body motion in a stiff subdomain has all its digits.
 
         Args:
             BW: (rows, boundary dofs) its scaled constraints W^-1 B D^-1 of the active rows.
@@ -84,7 +83,7 @@ class AveragedModes:
         return Z
 
     def translations(self, comm: MPI.Intracomm) -> Float:
-        """(u, c) amplitudes of the translations of the whole cell, which have little energy.  Collective."""
+        """(u, c) amplitudes for translations of the whole cell, which have little energy.  Collective."""
         subdomains = [block.subdomain for block in self._blocks]
         c = subdomains[0].problem.components if subdomains else 0
         amplitudes = np.zeros((self.total, comm.allreduce(c, MPI.MAX)))
@@ -96,9 +95,9 @@ class AveragedModes:
 def _exchange_jumps(
     comm: MPI.Intracomm, blocks: Sequence[SubdomainBlocks], neighbours: Neighbours, V: Sequence[Float]
 ) -> tuple[list[list[_Jumps]], Int]:
-    """Return the jumps on the rows of each subdomain of this rank, and where coarse modes end.  Collective.
+    """Return the jumps on the rows of each local subdomain, and where coarse modes end.  Collective.
 
-    The ends are those of the coarse modes of each subdomain of the cell.
+    The ends are the last coarse mode + 1 for each subdomain in the cell.
     """
     counts = np.zeros(len(neighbours.rank), np.int64)
     counts[neighbours.index] = [v.shape[1] for v in V]
@@ -123,29 +122,28 @@ def _exchange_jumps(
 
 
 def subdomain_blocks(
-    comm: MPI.Intracomm,
-    jump_operator: JumpOperator,
-    operators: InterfaceOperators,
-    scaling: StiffnessScaled,
-    rows: Sequence[Int],
+    operators: InterfaceOperators, scaling: StiffnessScaled, rows: Sequence[Int]
 ) -> list[SubdomainBlocks]:
-    """Return the blocks of this rank's subdomains; `rows` are those of their nodes. Collective."""
-    B, BW = operators.B.tocsc(), scaled_constraints(comm, jump_operator, scaling)
+    """Return the blocks of this rank's subdomains; `rows` belong to their nodes.  Collective."""
+    B, BW = operators.B.tocsc(), scaled_constraints(scaling)
     blocks = []
     for i, (subdomain, operator) in enumerate(zip(operators.subdomains, operators.with_springs, strict=True)):
-        own, scaled = (local_columns(matrix, operators.slices[i], rows[i]) for matrix in (B, BW))
-        blocks.append(SubdomainBlocks(subdomain, operators.dofs[i], operator, own, scaled, operators.facewise[i]))
+        constraints, scaled = (local_columns(matrix, operators.slices[i], rows[i]) for matrix in (B, BW))
+        blocks.append(
+            SubdomainBlocks(subdomain, operators.dofs[i], operator, constraints, scaled, operators.facewise[i])
+        )
     return blocks
 
 
-def scaled_constraints(comm: MPI.Intracomm, jump_operator: JumpOperator, scaling: StiffnessScaled) -> csc_matrix:
-    """(local rows, boundary dofs) W^-1 B D^-1 of the active rows of the scaling, 0 on the others.  Collective."""
+def scaled_constraints(scaling: StiffnessScaled) -> csc_matrix:
+    """(local rows, boundary dofs) W^-1 B D^-1 on the active rows of the scaling, else 0.  Collective."""
+    jump_operator = scaling.jump_operator
     owned = jump_operator.owned[1] - jump_operator.owned[0]
     inverse = scaling.W_inverse.tocoo()
     at = np.searchsorted(jump_operator.rows, jump_operator.owned[0])
     shape = (len(jump_operator.rows), jump_operator.global_rows)
     wide = csr_matrix((inverse.data, (inverse.row + at, inverse.col + jump_operator.owned[0])), shape=shape)
-    W_inverse = add_shared_rows(comm, wide, jump_operator.rows, jump_operator.is_shared_row, owned)[
+    W_inverse = add_shared_rows(jump_operator.comm, wide, jump_operator.rows, jump_operator.is_shared_row, owned)[
         :, jump_operator.rows
     ]
     return (W_inverse @ scaling.BD).tocsc()

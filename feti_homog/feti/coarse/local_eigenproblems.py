@@ -1,4 +1,4 @@
-"""Soft modes of one subdomain, from one eigenproblem on its boundary or from one on each of its faces.
+"""Soft subdomain modes, from one eigenproblem on the boundary or from one on each face.
 
 For a subdomain s with Schur complement S_s and constraints B_s, the displacements p of its boundary with
 
@@ -6,7 +6,7 @@ For a subdomain s with Schur complement S_s and constraints B_s, the displacemen
 
 are soft in s but stiff in the eyes of the preconditioner.  On a large boundary this dense eigenproblem is too large.
 But where each node is shared with one other body only, the weights of M^-1 hardly change along the boundary, its own
-share is no more than S_s, and what makes p stiff is the neighbour's: so each face has an eigenproblem of its own, with
+share is no more than S_s, and the neighbour's share makes p stiff: so each face has an eigenproblem of its own, with
 the Schur complement of the face's neighbourhood for S_s.  The eigenproblems are projected to trace spaces.
 """
 
@@ -33,7 +33,7 @@ class SubdomainBlocks:
     """One subdomain on the rows of its nodes.
 
     Attributes:
-        subdomain, dofs: what it is, and its (n,) boundary dofs.
+        subdomain, dofs: itself, and its (n,) boundary dofs.
         operator: its boundary operators.
         B: (rows, n) constraints.
         BW: (rows, n) scaled constraints W^-1 B D^-1.
@@ -106,28 +106,28 @@ class FaceEigenproblems:
 
     def preconditioner_shares(self) -> Iterator[tuple[int, Float32]]:
         """No less than its share of M^-1 on the rows in common with each other subdomain."""
-        for s, found in self._neighbourhoods.items():
+        for s, neighbourhoods in self._neighbourhoods.items():
             share = np.zeros((len(self.common[s]),) * 2)
-            for near in found:
-                BW = self.block.BW[self.common[s]][:, near.at]
-                share += BW @ (BW @ near.S_fixed).T
+            for part in neighbourhoods:
+                BW = self.block.BW[self.common[s]][:, part.at]
+                share += BW @ (BW @ part.S_fixed).T
             yield s, share.astype(np.float32)
 
     def modes(self, shares: Sequence[tuple[int, Float32]], threshold: float) -> Float:
-        """(n, m) soft modes of the faces, for the shares of other subdomains in M^-1.
+        """(n, m) soft face modes, for other subdomains' shares in M^-1.
 
         The rest of the boundary follows as it does in the whole body, until the mode has decayed.
         """
         forces = [np.zeros((len(self.block.dofs), 0))]
         for s, share in shares:
-            for near in self._neighbourhoods[s]:
-                B = self.block.B[self.common[s]][:, near.at]
-                N = jump_energy(B, near.P, near.R, share)
-                soft = near.P @ soft_modes(
-                    congruent(near.P, near.operator.regularised_schur), N, self._factor * threshold
+            for part in self._neighbourhoods[s]:
+                B = self.block.B[self.common[s]][:, part.at]
+                N = jump_energy(B, part.P, part.R, share)
+                soft = part.P @ soft_modes(
+                    congruent(part.P, part.operator.regularised_schur), N, self._factor * threshold
                 )
                 forces.append(np.zeros((len(self.block.dofs), soft.shape[1])))
-                forces[-1][near.at] = jump_forces(B, soft, near.R, share)
+                forces[-1][part.at] = jump_forces(B, soft, part.R, share)
         modes = self.block.operator.apply_flexibility(np.asfortranarray(np.hstack(forces)))
         largest = np.abs(modes).max(axis=0, initial=0.0)
         return np.where(np.abs(modes) < self._decayed * largest, 0.0, modes)
@@ -136,7 +136,7 @@ class FaceEigenproblems:
 def eigenproblem(
     block: SubdomainBlocks, common: Mapping[int, Int], thresholds: Thresholds = DEFAULTS
 ) -> SubdomainEigenproblem | FaceEigenproblems:
-    """Return the eigenproblem of a subdomain, or those of its faces.
+    """Return the eigenproblem of a subdomain, or one for each face.
 
     Raises:
         TypeError: one on the whole boundary is wanted, but its operators are not dense.
@@ -149,7 +149,7 @@ def eigenproblem(
 
 
 def jump_forces(B: csr_matrix, p: Float, R: Float, M: Float32) -> Float:
-    """(n, m) N p with N = B^T M B, as precise as M, of displacements p (n, m), less what works on the kernel R (n, k).
+    """(n, m) N p with N = B^T M B, as precise as M, for p (n, m), less forces that work on the kernel R (n, k).
 
     S+ N p is a step of inverse iteration: it bends an eigenvector that was sought among traces as the body does.
     """
@@ -165,7 +165,7 @@ def congruent(T: csr_matrix | Float, A: Float | Float32) -> Float:
 
 
 def jump_energy(B: csr_matrix, P: csr_matrix, R: Float, M: Float32) -> Float:
-    """(m + k, m + k) T^T M T of the jumps T = B [P R] of a trace space and a kernel, for symmetric M and as precise."""
+    """(m + k, m + k) T^T M T for jumps T = B [P R] of trace space and kernel, for symmetric M and as precise."""
     TP, TR = (B @ P).astype(np.float32), (B @ R).astype(np.float32)
     MR = M @ TR
     return np.block([[congruent(TP, M), TP.T @ MR], [(TP.T @ MR).T, TR.T @ MR]]).astype(float)
@@ -176,7 +176,7 @@ def soft_modes(S: Float, N: Float, threshold: float) -> Float:
 
     Args:
         S: (m, m) P^T S P, made definite on the kernel of S.
-        N: (m + k, m + k) that of [P R], with the kernel R (n, k) of S.
+        N: (m + k, m + k) [P R]^T N [P R], with the kernel R (n, k) of S.
     """
     m = len(S)
     NR, RNR = N[:m, m:], N[m:, m:]

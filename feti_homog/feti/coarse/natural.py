@@ -8,7 +8,6 @@ import numpy as np
 from mpi4py import MPI
 from scipy.sparse import block_diag, csc_matrix, csr_matrix, diags
 
-from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.linalg.distributed_solver import DistributedSolver
 from feti_homog.feti.linalg.sparse_matrices import assemble_owned_rows
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
@@ -22,11 +21,11 @@ class NaturalCoarseSpace:
     """Solvability of all subdomains on the active multipliers: G^T lam = 0.
 
     The load of a macroscopic strain does no work on rigid-body motions, so e = R^T f vanishes.  G has a row for each
-    multiplier and a column for each kernel mode; every rank holds its own rows, and its part of a factor of G^T G.
+    multiplier and a column for each kernel mode; every rank holds its own rows, and its share in a factor of G^T G.
 
     Attributes:
         kernel_dimension: kernel modes of all subdomains, m.
-        owned_modes: where those of this rank's subdomains are among the m.
+        owned_modes: the modes of this rank's subdomains among the m.
         R: (boundary dofs, own modes) kernels on the boundaries.
         G: (owned rows, m).
         body: (m,) body that each mode moves.
@@ -37,17 +36,12 @@ class NaturalCoarseSpace:
         solver: of G^T G.
     """
 
-    def __init__(
-        self,
-        comm: MPI.Intracomm,
-        jump_operator: JumpOperator,
-        operators: InterfaceOperators,
-    ) -> None:
+    def __init__(self, operators: InterfaceOperators) -> None:
         """Assemble G and factor for all rows.  Collective.
 
         Options under `feti_natural_` as of `DistributedSolver`.
         """
-        subdomains = operators.subdomains
+        comm, jump_operator, subdomains = operators.comm, operators.jump_operator, operators.subdomains
         kernels = [s.R[dofs] for s, dofs in zip(subdomains, operators.dofs, strict=True)]
         modes = sum(R.shape[1] for R in kernels)
         first = comm.exscan(modes) or 0
@@ -112,7 +106,7 @@ class NaturalCoarseSpace:
     def _groups(self) -> list[tuple[Int, Int]]:
         """Modes that may be coupled, (groups, size), and where their blocks are in the entries of G^T G.
 
-        The pieces of the pinned body are glued to the pinned class and cannot move.  Of the others, those that are
+        The pieces of the pinned body are glued to the pinned class and cannot move.  Other modes that are
         coupled have an eigenproblem together, so each is about as large as a fibre's kernel.
         """
         movable = np.flatnonzero(self.body != self.pinned_body)
@@ -153,17 +147,17 @@ class NaturalCoarseSpace:
     def amplitudes(self, x: Float) -> Float:
         """(G^T G)^-1 G^T x on every rank, for the owned rows x (rows,) or (rows, k).  Collective."""
         self._factor_if_wanted()
-        own = np.searchsorted(self.unknowns, np.arange(self.kernel_dimension)[self.owned_modes])
-        whole = np.zeros((self.kernel_dimension, *x.shape[1:]))
-        whole[self.owned_modes] = self.solve(self._GT @ x)[own]
-        return allreduce_sum(self.comm, whole)
+        place = np.searchsorted(self.unknowns, np.arange(self.kernel_dimension)[self.owned_modes])
+        amplitudes = np.zeros((self.kernel_dimension, *x.shape[1:]))
+        amplitudes[self.owned_modes] = self.solve(self._GT @ x)[place]
+        return allreduce_sum(self.comm, amplitudes)
 
     def solve(self, work: Float) -> Float:
         """(G^T G)^-1 times the sum over ranks of work, for the `unknowns`: (u,) or (u, k) both.  Collective."""
         return self.solver.solve(work)
 
     def project(self, x: Float) -> Float:
-        """P x for the owned rows x, whose inactive ones are 0: what no rigid-body motion works on.  Collective."""
+        """P x for the owned rows x, whose inactive ones are 0: no rigid-body motion works on it.  Collective."""
         if not self.kernel_dimension:
             return x.copy()
         self._factor_if_wanted()
@@ -171,7 +165,7 @@ class NaturalCoarseSpace:
         return projected
 
     def free_motions(self, active: Float) -> csc_matrix:
-        """(m, z) as `unconstrained_modes`, if those owned rows were active of which `active` is 1.  Collective."""
+        """(m, z) as `unconstrained_modes`, if the owned rows with `active` = 1 were active.  Collective."""
         return self._null_space(self._gram.entries(active))
 
     def rigid_body_motion(self, amplitudes: Float) -> Float:
@@ -185,7 +179,7 @@ class NaturalCoarseSpace:
 
 
 class GramMatrix:
-    """Entries of G^T A G in the pattern of G^T G, for active rows A = diag(a): sums of products that are made once.
+    """Entries of G^T A G in the pattern of G^T G, for active rows A = diag(a): sums of stored products.
 
     And which of its diagonal blocks are not coupled with each other.
     """
@@ -209,7 +203,7 @@ class GramMatrix:
         self._rows, self._columns = np.divmod(self._keys, self._m)
 
     def entries(self, active: Float) -> Float:
-        """(entries,) of G^T A G for the owned rows of which `active` is 1, row by row.  Collective.
+        """(entries,) of G^T A G, row by row, for owned rows where `active` is 1.  Collective.
 
         Products of rows that changed since the call before are added or taken off.
         """
@@ -233,7 +227,7 @@ class GramMatrix:
         return [some[order[starts[sizes == size][:, None] + np.arange(size)]] for size in np.unique(sizes)]
 
     def places(self, members: Int) -> Int:
-        """(g, s, s) numbers of the entries that couple the members (g, s) of each group; one too many for none."""
+        """(g, s, s) entry numbers that couple the members (g, s) in each group; one too many for none."""
         key = members[:, :, None] * self._m + members[:, None, :]
         at = np.minimum(np.searchsorted(self._keys, key), len(self._keys) - 1)
         return np.asarray(np.where(self._keys[at] == key, at, len(self._keys)))

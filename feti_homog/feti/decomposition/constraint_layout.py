@@ -1,4 +1,4 @@
-"""Rows and columns of the gluing constraints B of one rank, and the interface nodes among them."""
+"""Rows and columns of the gluing constraints B on one rank, and their interface nodes."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class InterfaceNodes:
 
 
 class ConstraintLayout:
-    """Rows and columns of B of one rank, entity by entity.
+    """Rows and columns of B on one rank, entity by entity.
 
     Attributes:
         components: c, rows of a vector constraint.
@@ -63,8 +63,8 @@ class ConstraintLayout:
         first: (n,) the first of them among the local rows.
         rows: (local rows,) their global numbers.
         dofs: (subdomains + 1,) where each subdomain begins among the local dofs.
-        base: for each sharer, the number among the fine nodes of this rank of its first one on the entity; -1 if the
-            sharer is on another rank.
+        base: for each sharer, its first fine node on the entity, as this rank numbers them; -1 if the sharer is on
+            another rank.
     """
 
     def __init__(
@@ -129,7 +129,7 @@ class ConstraintLayout:
         """Rows, columns and values of B on some entities whose bodies have `sizes` copies each."""
         shared = self.shared
         contrasts, c = _contrasts(sizes), self.components
-        k, each = len(contrasts) + 1, np.arange(c)
+        k, component = len(contrasts) + 1, np.arange(c)
         entity, p = expand(entities, shared.nodes[entities])
         first = self.first[entity] + p * c * (k - 1)
         identity = np.broadcast_to(np.eye(c), (len(entity), c, c))
@@ -145,8 +145,8 @@ class ConstraintLayout:
             for r in np.flatnonzero(contrasts[:, j]):
                 turn = frame if r == k - 2 else identity
                 shape = len(dof), c, c
-                rows.append(np.broadcast_to((first[local] + c * r)[:, None, None] + each[:, None], shape).ravel())
-                columns.append(np.broadcast_to(dof[:, None, None] + each, shape).ravel())
+                rows.append(np.broadcast_to((first[local] + c * r)[:, None, None] + component[:, None], shape).ravel())
+                columns.append(np.broadcast_to(dof[:, None, None] + component, shape).ravel())
                 values.append((contrasts[r, j] * turn[local]).ravel())
         return np.concatenate(rows), np.concatenate(columns), np.concatenate(values)
 
@@ -161,7 +161,7 @@ class ConstraintLayout:
         return np.asarray(normal / np.hypot(*normal.T)[:, None])
 
     def _lengths(self, entity: Int, p: Int) -> Float:
-        """(i,) sums over the sides at fine node p of int N ds along the curve; of linear elements, halves of these."""
+        """(i,) int N ds along the curve at fine node p, summed over its sides; half a side for linear elements."""
         shared, order = self.shared, self.lattice.order
         normal, turn, place = shared.normal[entity], shared.turn[entity], self._places(entity, p)
         side, is_edge = order / self.lattice.intervals, shared.is_edge[entity]
@@ -173,7 +173,7 @@ class ConstraintLayout:
         return np.where(is_edge, edge, np.hypot(*normal[:, 0].T))
 
     def node_rows(self) -> tuple[Int, Int]:
-        """First owned row and number of rows of each fine node whose rows are owned."""
+        """First owned row and row count for each fine node whose rows are owned."""
         shared = self.shared
         mine = np.flatnonzero(self._owned)
         size = self.components * (shared.copies[mine] - 1)
@@ -204,16 +204,16 @@ class ConstraintLayout:
         )
 
     def facing(self) -> tuple[Int, Int]:
-        """(local rows, 2) numbers of copies of the outer and the inner body, and (local rows,) the inner body.
+        """(local rows, 2) copy counts in the outer and the inner body, and (local rows,) the inner body.
 
-        They are of rows between two bodies; 0 and -1 of other rows.
+        Rows that are not between two bodies have 0 and -1.
         """
         shared = self.shared
         entity = np.repeat(np.arange(len(shared.key)), shared.copies)
         # Sharers are sorted inwards: the first is the outer body's.
         outer, inner = shared.body[shared.pointer[:-1]], shared.body[shared.pointer[1:] - 1]
         of_outer, of_inner = (
-            np.bincount(entity[shared.body == own[entity]], minlength=len(outer)) for own in (outer, inner)
+            np.bincount(entity[shared.body == body[entity]], minlength=len(outer)) for body in (outer, inner)
         )
         two = np.flatnonzero((outer != inner) & (of_outer + of_inner == shared.copies))
         e, p = expand(two, shared.nodes[two])
@@ -227,12 +227,12 @@ class ConstraintLayout:
     def outer_copies(self) -> tuple[Int, Int]:
         """Return the breakable nodes of which this rank has the outer body's first copy.
 
-        The local row of the bond of each, and that copy among the fine nodes of this rank.
+        The local row of each bond, and the number of its copy among the local fine nodes.
         """
         shared = self.shared
         first = self.base[shared.pointer[:-1]]
-        here = np.flatnonzero((shared.fibre >= 0) & (first >= 0))
-        entity, p = expand(here, shared.nodes[here])
+        local = np.flatnonzero((shared.fibre >= 0) & (first >= 0))
+        entity, p = expand(local, shared.nodes[local])
         return self.first[entity] + self.components * ((p + 1) * (shared.copies[entity] - 1) - 1), first[entity] + p
 
 
@@ -244,7 +244,7 @@ def expand(entities: Int, nodes: Int) -> tuple[Int, Int]:
 
 
 def _contrasts(sizes: Int) -> Float:
-    """(k - 1, k) orthonormal contrasts (Helmert) of copies in each of two bodies, and the difference of their means.
+    """(k - 1, k) orthonormal contrasts (Helmert) between copies in each of two bodies, and between their means.
 
     Bodies of another number never part, and count as one.
     """

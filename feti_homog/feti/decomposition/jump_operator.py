@@ -1,6 +1,6 @@
-"""Gluing constraints B of one rank, their place among the multipliers, springs in place of glue, and blocks of nodes.
+"""Gluing constraints B on one rank, their place among the multipliers, springs in place of glue, and node blocks.
 
-Of the k copies of a fine node, those within one body are glued in x and y by orthonormal contrasts and can never
+Of the k copies of a fine node, copies within one body are glued in x and y by orthonormal contrasts and can never
 part.  A body, such as a fibre, and the one around it are glued by one pair of rows (n, t) between the means of their
 copies; this bond can break.  So B has full row rank, n.(u_outer - u_inner) is the gap, and a multiplier is the nodal
 force that the faces exert on each other: tension is positive.
@@ -30,7 +30,7 @@ class InterfaceSprings:
     """Traction = stiffness x jump at every node that holds, in tension and compression.
 
     Attributes:
-        stiffness: of each interface of the case stress per opening and per slip, or per slip along the fibre;
+        stiffness: for each interface of the case stress per opening and per slip, or per slip along the fibre;
             infinite ones are glue.
         soften: their compliance may grow while the cell is loaded.
     """
@@ -39,7 +39,7 @@ class InterfaceSprings:
     soften: bool = False
 
     def compliance(self, jump_operator: JumpOperator) -> Float:
-        """(owned rows,) C = 1 / (k l) of the rows of interface nodes with the tributary lengths l, 0 of all others."""
+        """(owned rows,) C = 1 / (k l) on interface rows with tributary lengths l, else 0."""
         nodes, C = jump_operator.nodes, np.zeros(jump_operator.owned[1] - jump_operator.owned[0])
         for component, stiffness in enumerate(zip(*self.stiffness, strict=True)):
             C[nodes.row + component] = 1.0 / (np.array(stiffness)[nodes.pair] * nodes.length)
@@ -50,20 +50,21 @@ GLUE = InterfaceSprings(())
 
 
 class JumpOperator:
-    """B of this rank's subdomains and the layout of the multipliers.
+    """B on this rank's subdomains and the multiplier layout.
 
     Attributes:
+        comm: of all ranks.
         problem: the displacements and the unit loads, which ranks without subdomains take from here.
         components: rows of a vector constraint.
         B: (local rows, local dofs) signed, rotated entries; a local row is one that a local dof takes part in.
         rows: global number of each local row.
-        node_rows: first owned row and number of rows of each fine node that this rank owns.
-        shared_dofs: displacements of all nodes that subdomains of any rank share.
+        node_rows: first owned row and row count for each fine node that this rank owns.
+        shared_dofs: number of displacements at nodes that subdomains share, on all ranks.
         nodes: the interface nodes that this rank owns.
-        outer_copies: local rows of the interface nodes of which this rank has a copy of the outer body, and these
+        outer_copies: local rows of interface nodes whose outer copy is on this rank, and these
             copies, as `ConstraintLayout.outer_copies` has them.
-        copies: (local rows, 2) of the outer and the inner body where a row is between two bodies, 0 of other rows.
-        inside: (local rows,) the inner of these bodies, the fibre in general; -1 of other rows.
+        copies: (local rows, 2) counts in the outer and the inner body where a row is between two bodies, else 0.
+        inside: (local rows,) the inner of these bodies, the fibre in general; else -1.
         owned: first global row of this rank and the one after its last.
         global_rows: number of rows on all ranks.
         shared: the vertices and edges that the rows belong to.
@@ -79,7 +80,7 @@ class JumpOperator:
         lattice: ReferenceLattice,
         problem: Problem = PLANE,
     ) -> None:
-        layout = ConstraintLayout(shared, subdomains, lattice, problem.components)
+        self.comm, layout = comm, ConstraintLayout(shared, subdomains, lattice, problem.components)
         self.problem, self.components = problem, layout.components
         self.shared, self._first, self._count = shared, layout.first, layout.count
         elsewhere = np.bincount(np.repeat(np.arange(len(shared.key)), shared.copies), layout.base < 0, len(shared.key))
@@ -96,22 +97,22 @@ class JumpOperator:
         self._exchanges: dict[int, _Exchange] = {}
 
     def rows_of(self, entities: Int) -> Int:
-        """Local rows of the nodes on some of the shared entities, one entity after the other."""
+        """Local rows of nodes on shared entities, one entity after the other."""
         entity, p = expand(entities, self._count[entities])
         return np.asarray(self._first[entity] + p)
 
     def gather(self, owned: Float) -> Float:
-        """Return the local rows of vectors (owned rows,) or (owned rows, k) of which each rank has its own rows."""
+        """Return the local rows of distributed vectors (owned rows,) or (owned rows, k)."""
         return self._exchange(owned).gather(owned)
 
     def sum(self, local: Float) -> Float:
-        """Return the owned rows of the sum over ranks of `local`, (local rows,) or (local rows, k)."""
+        """Return the owned rows of `local`, (local rows,) or (local rows, k), summed over ranks."""
         return self._exchange(local).sum(local)
 
     def from_outer(self, numbers: Int) -> Int:
-        """(k,) the numbers that ranks of the outer bodies give their fine nodes, at the interface nodes of this rank.
+        """(k,) numbers that outer bodies' ranks give their fine nodes, at the interface nodes of this rank.
 
-        The interface nodes are those that it owns; each rank has one number for each of its own fine nodes. Collective.
+        The rank owns the interface nodes; each rank has one number for each of its own fine nodes. Collective.
         """
         rows, copies = self.outer_copies
         local = np.zeros(len(self.rows))
@@ -129,7 +130,7 @@ class JumpOperator:
 
 
 class _Exchange:
-    """Scatters between the owned and the local rows of vectors with k columns; a copy where both are the same."""
+    """Scatters between the owned and the local rows of vectors with k columns; a copy where both are equal."""
 
     def __init__(self, vector: PETSc.Vec, rows: Int, columns: int) -> None:
         self._same = vector.comm.size == 1 and np.array_equal(rows, np.arange(len(rows)))
@@ -138,9 +139,9 @@ class _Exchange:
         sizes = tuple(columns * n for n in vector.getSizes())
         self._owned = PETSc.Vec().createMPI(sizes, bsize=columns, comm=vector.comm)
         self._local = PETSc.Vec().createSeq(columns * len(rows), bsize=columns)
-        here = PETSc.IS().createBlock(columns, rows.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
-        self._scatter = PETSc.Scatter().create(self._owned, here, self._local, None)
-        here.destroy()
+        index_set = PETSc.IS().createBlock(columns, rows.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
+        self._scatter = PETSc.Scatter().create(self._owned, index_set, self._local, None)
+        index_set.destroy()
 
     def gather(self, owned: Float) -> Float:
         """Return the local rows of x (owned rows,) or (owned rows, k)."""
@@ -152,7 +153,7 @@ class _Exchange:
         return local.copy()
 
     def sum(self, local: Float) -> Float:
-        """Return the owned rows of the sum over ranks of x (local rows,) or (local rows, k)."""
+        """Return the owned rows of x (local rows,) or (local rows, k), summed over ranks."""
         if self._same:
             return local
         self._owned.zeroEntries()
@@ -173,7 +174,7 @@ class NodeBlocks:
 
     Attributes:
         rows: number of rows that this rank owns.
-        blocks: for each size k of blocks, the rows (b, k) of the b blocks among the owned ones, and they (b, k, k).
+        blocks: for each block size k the owned rows (b, k) and entries (b, k, k) of the b blocks.
     """
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, local: csr_matrix) -> None:
@@ -190,9 +191,11 @@ class NodeBlocks:
             number = np.full(len(starts), -1)
             number[some] = np.arange(len(some))
             mine = number[block] >= 0
-            own = block[mine]
+            number_of = block[mine]
             dense = np.zeros((len(some), size, size))
-            dense[number[own], entries.row[mine] - starts[own], entries.col[mine] - starts[own]] = entries.data[mine]
+            dense[number[number_of], entries.row[mine] - starts[number_of], entries.col[mine] - starts[number_of]] = (
+                entries.data[mine]
+            )
             self.blocks.append((starts[some][:, None] + np.arange(size), dense))
 
     def inverse(self, active: Float) -> csr_matrix:

@@ -19,13 +19,13 @@ SIDES = {3: ((0, 1), (1, 2), (2, 0)), 6: ((0, 3), (3, 1), (1, 4), (4, 2), (2, 5)
 
 
 class Neighbours:
-    """The pairs of a subdomain t of this rank and any subdomain s that shares nodes with it, itself among them.
+    """Pairs: a local subdomain t and any subdomain s that shares nodes with it, itself included.
 
     Attributes:
-        index: global number of each of this rank's subdomains.
-        local: position in `index` of each of them, by its global number.
-        rank: rank of every subdomain of the cell, by its global number.
-        rows: rows[i] local rows, ascending, of the nodes of subdomain i of this rank.
+        index: global numbers of the local subdomains.
+        local: their positions in `index`, by global number.
+        rank: rank of every subdomain in the cell, by global number.
+        rows: rows[i] local rows, ascending, of the nodes in local subdomain i.
         common: common[i][s] positions in rows[i] of the rows of the nodes that it shares with subdomain s, in the
             same order on both sides.
     """
@@ -35,25 +35,25 @@ class Neighbours:
         self.comm = comm
         self.index = [s.submesh.index for s in subdomains]
         self.local = {s: i for i, s in enumerate(self.index)}
-        self.rank = {s: r for r, own in enumerate(comm.allgather(self.index)) for s in own}
+        self.rank = {s: r for r, indices in enumerate(comm.allgather(self.index)) for s in indices}
         shared_rows: list[dict[int, Int]] = [{} for _ in self.index]
         for t, s, entities in _pairs(jump_operator.shared.pointer, jump_operator.shared.sharer, self.index):
             shared_rows[self.local[t]][s] = jump_operator.rows_of(entities)
         none = np.zeros(0, np.int64)
         self.rows = [of.get(t, none) for t, of in zip(self.index, shared_rows, strict=True)]
         self.common = [
-            {s: np.searchsorted(own, rows) for s, rows in of.items()}
-            for own, of in zip(self.rows, shared_rows, strict=True)
+            {s: np.searchsorted(indices, rows) for s, rows in of.items()}
+            for indices, of in zip(self.rows, shared_rows, strict=True)
         ]
 
     def exchange(
         self, messages: Iterable[tuple[int, int, Message]], deliver: Callable[[int, int, Message], None]
     ) -> None:
-        """Deliver messages between subdomains; those within a rank are delivered as they come.  Collective.
+        """Deliver messages between subdomains; within a rank as they come.  Collective.
 
         Args:
             messages: (i, s, message) from this rank's subdomain i to the subdomain of global number s.
-            deliver: called on the rank of s with the position of s there, the global number of i, and the message.
+            deliver: called on the rank of s with its position there, the global number of i, and the message.
         """
         outgoing: list[list[tuple[int, int, Message]]] = [[] for _ in range(self.comm.size)]
         for i, s, message in messages:
@@ -67,8 +67,8 @@ class Neighbours:
                     deliver(self.local[to], sender, message)
 
 
-def _pairs(pointer: Int, sharer: Int, own: Sequence[int]) -> Iterator[tuple[int, int, Int]]:
-    """Pairs (t, s) of subdomains that share entities, t one of `own`: t, s and these; all in ascending order."""
+def _pairs(pointer: Int, sharer: Int, subdomains: Sequence[int]) -> Iterator[tuple[int, int, Int]]:
+    """Pairs (t, s) of subdomains that share entities, t one of `subdomains`: t, s and these; all in ascending order."""
     copies = np.diff(pointer)
     parts = []
     for k in np.unique(copies):
@@ -78,7 +78,7 @@ def _pairs(pointer: Int, sharer: Int, own: Sequence[int]) -> Iterator[tuple[int,
         columns = among[:, :, None], among[:, None, :], entity[:, None, None]
         parts.append(np.stack([np.broadcast_to(column, shape).ravel() for column in columns]))
     pairs = np.concatenate(parts or [np.zeros((3, 0), np.int64)], axis=1)
-    pairs = pairs[:, np.isin(pairs[0], own)]
+    pairs = pairs[:, np.isin(pairs[0], subdomains)]
     first, second, entity = pairs[:, np.lexsort(pairs[::-1])]
     new = np.ones(len(first), bool)
     new[1:] = (np.diff(first) != 0) | (np.diff(second) != 0)
@@ -88,7 +88,7 @@ def _pairs(pointer: Int, sharer: Int, own: Sequence[int]) -> Iterator[tuple[int,
 
 
 class InterfaceNeighbours:
-    """The interface nodes of all ranks in the order of their rows, and their neighbours.
+    """All interface nodes in row order, and their neighbours.
 
     Attributes:
         rows: (n,) global rows of their bonds, the first of each.
@@ -98,12 +98,12 @@ class InterfaceNeighbours:
 
     def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, subdomains: Sequence[Subdomain]) -> None:
         """Find the neighbours along interfaces.  Collective."""
-        own = jump_operator.owned[0] + jump_operator.nodes.row
-        if (np.diff(own) <= 0).any():
+        rows = jump_operator.owned[0] + jump_operator.nodes.row
+        if (np.diff(rows) <= 0).any():
             raise ValueError("the interface nodes of a rank are not in the order of their rows")
         self.comm = comm
-        self.rows: Int = np.concatenate(comm.allgather(own))
-        self.first = int(np.searchsorted(self.rows, own[0])) if len(own) else 0
+        self.rows: Int = np.concatenate(comm.allgather(rows))
+        self.first = int(np.searchsorted(self.rows, rows[0])) if len(rows) else 0
         bodies, n = np.concatenate(comm.allgather(jump_operator.nodes.bodies)), len(self.rows)
         number = self.node_numbers(jump_operator)
         # Both bodies have the side of an interface once: twice is within a body that is cut, and a void has none.
@@ -119,41 +119,41 @@ class InterfaceNeighbours:
         self._reached[np.repeat(np.arange(n), count), within] = self.adjacency.indices
 
     def rows_near(self, rows: Int, choose: Callable[[Int], Int], enough: int) -> Int:
-        """Return global rows and those near them along the interfaces that `choose` returns, until they are enough."""
+        """Return global rows and near ones along the interfaces that `choose` returns, until they are enough."""
         bonds = np.unique(np.searchsorted(self.rows, rows, side="right") - 1)
         while True:
-            near = (self.rows[bonds][:, None] + np.arange(self._components)).ravel()
-            near = np.union1d(rows, choose(near))
+            reached_rows = (self.rows[bonds][:, None] + np.arange(self._components)).ravel()
+            reached_rows = np.union1d(rows, choose(reached_rows))
             reached = np.unique(self._reached[bonds])
-            if len(near) >= enough or len(reached) == len(bonds):
-                return near
+            if len(reached_rows) >= enough or len(reached) == len(bonds):
+                return reached_rows
             bonds = reached
 
     def node_numbers(self, jump_operator: JumpOperator) -> Int:
-        """(fine nodes of this rank,) number of the interface node that each is a copy of, or -1."""
+        """(local fine nodes,) number of the interface node that each copies, or -1."""
         number = np.full(jump_operator.B.shape[1] // jump_operator.components, -1)
         normal = np.searchsorted(jump_operator.rows, self.rows)
         normal = np.minimum(normal, max(len(jump_operator.rows) - 1, 0))
-        here = np.flatnonzero(jump_operator.rows[normal] == self.rows) if len(jump_operator.rows) else np.zeros(0, int)
-        B = jump_operator.B[normal[here]].tocoo()
-        number[B.col // jump_operator.components] = here[B.row]
+        local = np.flatnonzero(jump_operator.rows[normal] == self.rows) if len(jump_operator.rows) else np.zeros(0, int)
+        B = jump_operator.B[normal[local]].tocoo()
+        number[B.col // jump_operator.components] = local[B.row]
         return number
 
 
 def _sides(subdomains: Sequence[Subdomain], number: Int, body: Int, n: int) -> Int:
-    """(e,) codes a n + b, a < b, of the outer sides of these subdomains between interface nodes a and b of n.
+    """(e,) codes a n + b, a < b, for outer sides of these subdomains between interface nodes a and b.
 
     `body` (n,) is the one of each node whose subdomains count, `number` as of `node_numbers`.
     """
-    found, first = [np.zeros(0, np.int64)], 0
+    codes, first = [np.zeros(0, np.int64)], 0
     for s in subdomains:
         nodes = number[first + s.mesh.node_class[s.mesh.triangles]]
         first += s.mesh.n_classes
         ends = nodes[:, SIDES[nodes.shape[1]]].reshape(-1, 2)
         ends = ends[(ends >= 0).all(axis=1)]
         low, high = np.sort(ends[(body[ends] == s.submesh.body).all(axis=1)], axis=1).T
-        found.append(_once(low * n + high))
-    return np.concatenate(found)
+        codes.append(_once(low * n + high))
+    return np.concatenate(codes)
 
 
 def _once(values: Int) -> Int:

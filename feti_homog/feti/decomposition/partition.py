@@ -30,30 +30,30 @@ def decompose(
 
     See `cut_into_pieces` and `assign_ranks`.
     """
-    left, right, edge = torus.sides
+    tail, head, edge = torus.sides
     subdomain = cut_into_pieces(torus, parts, pieces, torus.edge_lengths[edge].max(), length_classes)
-    apart = subdomain[left] != subdomain[right]
-    neighbours = subdomain[left[apart]], subdomain[right[apart]]
+    apart = subdomain[tail] != subdomain[head]
+    neighbours = subdomain[tail[apart]], subdomain[head[apart]]
     return Decomposition(subdomain, assign_ranks(np.bincount(subdomain), *neighbours, n_ranks))
 
 
 def halves(torus: Torus) -> Decomposition | None:
     """Cut a whole cell into two strips, one for each of two ranks; None if these are not connected.
 
-    Of all strips along x or y that hold about half of the triangles, those that fewest edges separate. On the torus
+    The strips along x or y hold about half of the triangles, and fewest edges separate them.  On the torus
     METIS' halves have boundaries up to half as long again.
     """
-    left, right, _ = torus.sides
+    tail, head, _ = torus.sides
     centres = torus.mesh.points[torus.mesh.triangles].mean(axis=1) / torus.mesh.period % 1.0
-    strips = [_strip(np.argsort(x, kind="stable"), left, right) for x in centres.T]
-    piece = min(strips, key=lambda strip: int((strip[left] != strip[right]).sum())).astype(np.int64)
-    together = piece[left] == piece[right]
-    connected = components(len(piece), left[together], right[together])
+    strips = [_strip(np.argsort(x, kind="stable"), tail, head) for x in centres.T]
+    piece = min(strips, key=lambda strip: int((strip[tail] != strip[head]).sum())).astype(np.int64)
+    together = piece[tail] == piece[head]
+    connected = components(len(piece), tail[together], head[together])
     sizes = np.bincount(connected)
     main = [np.argmax(np.where(np.bincount(connected, piece) == sizes * k, sizes, 0)) for k in range(2)]
     piece ^= ~np.isin(connected, main)  # islands go to the half around them
-    together = piece[left] == piece[right]
-    is_whole = components(len(piece), left[together], right[together]).max() == 1
+    together = piece[tail] == piece[head]
+    is_whole = components(len(piece), tail[together], head[together]).max() == 1
     return Decomposition(piece, np.arange(2)) if is_whole else None
 
 
@@ -80,25 +80,25 @@ def cut_into_pieces(torus: Torus, parts: Int, pieces: Int, longest: float, lengt
         pieces: (b,) wanted pieces of each body; METIS cuts a body that has more than one, by short cuts: so
             they rather cross narrow gaps than run along them, which converges better.
         longest: edge of the whole cell.
-        length_classes: number of lengths of edges that METIS distinguishes; with 1 all count alike.
+        length_classes: number of edge lengths that METIS distinguishes; with 1 all count alike.
     """
-    left, right, edge = torus.sides
-    inside = parts[left] == parts[right]
+    tail, head, edge = torus.sides
+    inside = parts[tail] == parts[head]
     weight = np.ceil(length_classes * torus.edge_lengths[edge] / longest).astype(np.int64)
-    piece = _cut(parts, pieces, left[inside], right[inside], weight[inside])
+    piece = _cut(parts, pieces, tail[inside], head[inside], weight[inside])
     key = parts * (piece.max(initial=0) + 1) + piece
-    together = key[left] == key[right]
-    connected = components(len(parts), left[together], right[together])
+    together = key[tail] == key[head]
+    connected = components(len(parts), tail[together], head[together])
     # Numbered body by body, so that neighbours in number are neighbours in place.
     return renumber(connected, np.lexsort((connected, piece, parts)))
 
 
-def pieces_for_count(load: Int, wanted: int) -> Int:
-    """(b,) pieces of each body: `wanted` in all (never fewer than one a body), the largest pieces halved first."""
+def pieces_for_count(load: Int, count: int) -> Int:
+    """(b,) pieces of each body: `count` in all (never fewer than one a body), the largest pieces halved first."""
     pieces = np.ones(len(load), np.int64)
     heap = [(-float(size), body) for body, size in enumerate(load)]
     heapq.heapify(heap)
-    for _ in range(wanted - len(load)):
+    for _ in range(count - len(load)):
         body = heap[0][1]
         if pieces[body] >= load[body]:
             break
@@ -108,27 +108,27 @@ def pieces_for_count(load: Int, wanted: int) -> Int:
 
 
 def pieces_for_size(load: Int, dofs_per_load: float, max_dofs: int) -> Int:
-    """(b,) pieces of each body such that none has many more than `max_dofs` degrees of freedom."""
+    """(b,) pieces of each body such that none has many more than `max_dofs` dofs."""
     return np.minimum(np.ceil(load * dofs_per_load / max_dofs).astype(np.int64), load)
 
 
 def _cut(parts: Int, pieces: Int, left: Int, right: Int, weight: Int) -> Int:
-    """(m,) number of each triangle's piece in its body; `weight` is the cost of parting neighbours (left, right)."""
-    members, own = np.argsort(parts, kind="stable"), np.argsort(parts[left], kind="stable")
+    """(m,) number of each triangle's piece in its body; parting neighbours (left, right) costs `weight`."""
+    members, sides = np.argsort(parts, kind="stable"), np.argsort(parts[left], kind="stable")
     load, edges = np.bincount(parts, minlength=len(pieces)), np.bincount(parts[left], minlength=len(pieces))
     first, first_edge = np.cumsum(load) - load, np.cumsum(edges) - edges
     number = np.empty(len(parts), np.int64)
     number[members] = np.arange(len(parts)) - np.repeat(first, load)
     piece = np.zeros(len(parts), np.int64)
     for body in np.flatnonzero(pieces > 1):
-        those = own[first_edge[body] : first_edge[body] + edges[body]]
-        graph = _graph(load[body], number[left[those]], number[right[those]], weight[those])
+        some = sides[first_edge[body] : first_edge[body] + edges[body]]
+        graph = _graph(load[body], number[left[some]], number[right[some]], weight[some])
         piece[members[first[body] : first[body] + load[body]]] = _metis(graph, int(pieces[body]))
     return piece
 
 
 def _graph(n: int, left: Int, right: Int, weight: Int) -> csr_matrix:
-    """(n, n) symmetric: sums of the weights of the pairs (left, right)."""
+    """(n, n) symmetric: summed weights of pairs (left, right)."""
     both = (np.r_[left, right], np.r_[right, left])
     return coo_matrix((np.r_[weight, weight], both), shape=(n, n)).tocsr()
 
@@ -147,14 +147,14 @@ def _metis(graph: csr_matrix, count: int, load: Int | None = None) -> Int:
 
 
 def assign_ranks(load: Int, left: Int, right: Int, n_ranks: int) -> Int:
-    """(s,) rank of each subdomain of so many triangles (s,).
+    """(s,) rank of each subdomain with `load` triangles (s,).
 
-    Neighbours (left, right), in a row for each edge that they share, are on the same one as far as the loads stay even;
+    Neighbours (left, right), in a row for each edge that they share, are on one rank as far as the loads stay even;
     some ranks get none if there are more ranks than subdomains.
     """
-    even = balanced(load, n_ranks)
+    by_load = balanced(load, n_ranks)
     if n_ranks == 1 or len(load) <= n_ranks:
-        return even
-    near = _metis(_graph(len(load), left, right, np.ones_like(left)), n_ranks, load)
-    most = [np.bincount(ranks, load, n_ranks).max() for ranks in (near, even)]
-    return near if most[0] <= MAX_IMBALANCE * most[1] and len(np.unique(near)) == n_ranks else even
+        return by_load
+    by_place = _metis(_graph(len(load), left, right, np.ones_like(left)), n_ranks, load)
+    largest = [np.bincount(ranks, load, n_ranks).max() for ranks in (by_place, by_load)]
+    return by_place if largest[0] <= MAX_IMBALANCE * largest[1] and len(np.unique(by_place)) == n_ranks else by_load

@@ -30,7 +30,7 @@ FOLDED = 1e-9
 
 
 def along(ends: Float, turn: Float, place: Float) -> Float:
-    """(k, 2) at the places s (k,) in [0, 1] of edges what is dx / ds, turned or not, at their ends (k, 2, 2).
+    """(k, 2) dx / ds, turned or not, at places s (k,) in [0, 1] of edges, from its values at their ends (k, 2, 2).
 
     On the arc of an ellipse along which the parameter turns by `turn` (k,), it obeys y'' = -turn^2 y; where the edge is
     straight, it is linear, for `turn` is 0.
@@ -42,7 +42,7 @@ def along(ends: Float, turn: Float, place: Float) -> Float:
 
 
 def side_lengths(ends: Float, turn: Float, low: Float, order: int, side: float) -> Float:
-    """(k, order + 1) lengths of the nodes of sides from places `low` (k,), of span `side`; arguments as of `along`."""
+    """(k, order + 1) node lengths on sides from places `low` (k,), with span `side`; arguments as in `along`."""
     places = low[:, None] + side * (1 + POINTS) / 2
     speeds = [np.hypot(*along(ends, turn, place).T) for place in places.T]
     return np.asarray(np.stack(speeds, axis=1) * WEIGHTS @ SHARES[order].T * (side / 2))
@@ -52,7 +52,7 @@ def side_lengths(ends: Float, turn: Float, low: Float, order: int, side: float) 
 class InterfaceGeometry:
     """Geometry of the n shared entities that this rank owns.
 
-    The attributes are those of `SharedEntities`, 0 of other entities and where no bond may break.
+    Attributes as of `SharedEntities`, 0 of other entities and where no bond may break.
     """
 
     normal: Float
@@ -60,86 +60,86 @@ class InterfaceGeometry:
     precracked: Bool
 
     def chosen(self, which: Int) -> InterfaceGeometry:
-        """Return the geometry of the entities of these numbers (k,)."""
+        """Return the geometry of entities `which` (k,)."""
         return InterfaceGeometry(self.normal[which], self.turn[which], self.precracked[which])
 
 
-def breakable_pairs(own: SubmeshesOfRank, table: SubdomainTable, pairs: Int, found: Sharers) -> Int:
+def breakable_pairs(submeshes: SubmeshesOfRank, table: SubdomainTable, pairs: Int, sharers: Sharers) -> Int:
     """(n,) the interface of the two bodies that meet there.
 
     -1 where it never parts, where a third body meets them, and where they do not meet along one line.
     """
-    body, copies = table.body[found.sharer], found.copies
-    outer, inner = body[found.pointer[:-1]], body[found.pointer[1:] - 1]
+    body, copies = table.body[sharers.sharer], sharers.copies
+    outer, inner = body[sharers.pointer[:-1]], body[sharers.pointer[1:] - 1]
     third = (body != np.repeat(outer, copies)) & (body != np.repeat(inner, copies))
     thirds = np.bincount(np.repeat(np.arange(len(copies)), copies), third, len(copies))
-    on_line, vertices = np.ones(len(copies), bool), np.flatnonzero(~found.is_edge)
-    on_line[vertices] = ~own.whole.touching[np.searchsorted(own.whole.class_keys, found.key[vertices])]
+    on_line, vertices = np.ones(len(copies), bool), np.flatnonzero(~sharers.is_edge)
+    on_line[vertices] = ~submeshes.whole.touching[np.searchsorted(submeshes.whole.class_keys, sharers.key[vertices])]
     phase = table.phase
     return np.where((thirds == 0) & (outer != inner) & on_line, pairs[phase[outer], phase[inner]], -1)
 
 
 def interface_geometry(
     comm: MPI.Intracomm,
-    own: SubmeshesOfRank,
+    submeshes: SubmeshesOfRank,
     table: SubdomainTable,
     pairs: Int,
-    found: Sharers,
+    sharers: Sharers,
     lattice: ReferenceLattice,
 ) -> InterfaceGeometry:
     """Return normals, turns and precracks of shared entities.  Collective.
 
     `pairs` and `lattice` as in `share_entities`.
     """
-    n, owner = len(found.key), table.rank[found.innermost]
-    can_part = (owner == comm.rank) & (breakable_pairs(own, table, pairs, found) >= 0)
+    n, owner = len(sharers.key), table.rank[sharers.innermost]
+    can_part = (owner == comm.rank) & (breakable_pairs(submeshes, table, pairs, sharers) >= 0)
     # The last sharer of an edge between two bodies is on the side of the fibre.
-    edges = np.flatnonzero(found.is_edge & can_part)
-    triangle, k = _triangles_beside(own, found.key[edges], found.innermost[edges])
-    whole = own.whole
-    plane = whole.triangle_edges[triangle, k]
+    edges = np.flatnonzero(sharers.is_edge & can_part)
+    triangle, k = _triangles_beside(submeshes, sharers.key[edges], sharers.innermost[edges])
+    mesh = submeshes.whole
+    plane = mesh.triangle_edges[triangle, k]
     normals, turns, precracked = np.zeros((n, 2, 2)), np.zeros(n), np.zeros(n, bool)
-    normals[edges], turns[edges] = normal, turn = edge_normals(whole, triangle, k)
-    precracked[edges] = whole.debonded[whole.edge_class[plane]]
-    ends = whole.class_keys[whole.vertex_class[whole.edges[plane]]]
+    normals[edges], turns[edges] = normal, turn = edge_normals(mesh, triangle, k)
+    precracked[edges] = mesh.debonded[mesh.edge_class[plane]]
+    ends = mesh.class_keys[mesh.vertex_class[mesh.edges[plane]]]
     order, side = lattice.order, lattice.order / lattice.intervals
     starts = np.zeros(len(edges)), np.full(len(edges), 1.0 - side)
     length = np.stack([side_lengths(normal, turn, low, order, side)[:, -k] for k, low in enumerate(starts)], axis=1)
     unit = normal / np.maximum(np.linalg.norm(normal, axis=2), 1e-300)[..., None]
     bonded = np.broadcast_to(~precracked[edges, None], length.shape)
     parts = np.concatenate([unit * length[..., None], length[..., None], bonded[..., None]], axis=2)
-    sums = _sums_at_vertices(comm, found, owner, ends, found.key[edges], parts)
-    vertices = ~found.is_edge
+    sums = _sums_at_vertices(comm, sharers, owner, ends, sharers.key[edges], parts)
+    vertices = ~sharers.is_edge
     scaled = sums[:, :2] * (sums[:, 2] / np.maximum(np.hypot(*sums[:, :2].T), 1e-300))[:, None]
     normals[vertices], precracked[vertices] = scaled[vertices, None], sums[vertices, 3] == 0
-    agree(comm, _check, own, found.chosen(np.flatnonzero(can_part)), normals[can_part], sums[can_part])
+    agree(comm, _check, submeshes, sharers.chosen(np.flatnonzero(can_part)), normals[can_part], sums[can_part])
     return InterfaceGeometry(normals, turns, precracked)
 
 
-def _check(own: SubmeshesOfRank, found: Sharers, normals: Float, sums: Float) -> None:
+def _check(submeshes: SubmeshesOfRank, sharers: Sharers, normals: Float, sums: Float) -> None:
     """Raise MeshError where a normal is not finite or zero, or its sides are folded onto each other.
 
     The directions of folded sides cancel; `normals` (n, 2, 2) and `sums` (n, 4) as in `InterfaceGeometry`.
     """
     length = np.linalg.norm(normals, axis=2)
-    folded = ~found.is_edge & ~(np.hypot(*sums[:, :2].T) > FOLDED * sums[:, 2])
+    folded = ~sharers.is_edge & ~(np.hypot(*sums[:, :2].T) > FOLDED * sums[:, 2])
     bad = np.flatnonzero(~(np.isfinite(length) & (length > 0)).all(axis=1) | folded)
     if len(bad):
-        whole, first = own.whole, bad[0]
-        keys = whole.edge_keys[whole.edge_class] if found.is_edge[first] else whole.class_keys[whole.vertex_class]
-        plane = int(np.flatnonzero(keys == found.key[first])[0])
-        x, y = whole.points[whole.edges[plane] if found.is_edge[first] else [plane]].mean(axis=0)
+        mesh, first = submeshes.whole, bad[0]
+        keys = mesh.edge_keys[mesh.edge_class] if sharers.is_edge[first] else mesh.class_keys[mesh.vertex_class]
+        plane = int(np.flatnonzero(keys == sharers.key[first])[0])
+        x, y = mesh.points[mesh.edges[plane] if sharers.is_edge[first] else [plane]].mean(axis=0)
         raise MeshError(f"the interface has no normal at ({x:.9g}, {y:.9g}): its sides are folded or of no length")
 
 
-def _sums_at_vertices(comm: MPI.Intracomm, found: Sharers, owner: Int, ends: Int, edge: Int, parts: Float) -> Float:
+def _sums_at_vertices(comm: MPI.Intracomm, sharers: Sharers, owner: Int, ends: Int, edge: Int, parts: Float) -> Float:
     """(n, k) the sums over all ranks for each entity that this rank owns.  Collective.
 
     They are of `parts` (p, 2, k) of these edges (p,) for the classes at their `ends` (p, 2), each of which is an entity
     or the pinned class.
     """
-    order, code = np.argsort(found.code), entity_code(ends, False)
-    ordered = found.code[order]
+    order, code = np.argsort(sharers.code), entity_code(ends, False)
+    ordered = sharers.code[order]
     is_entity = np.isin(code, ordered)
     at = np.stack(np.broadcast_arrays(edge[:, None], np.arange(2)), axis=-1)
     to = owner[order[np.searchsorted(ordered, code[is_entity])]]
@@ -151,21 +151,21 @@ def _sums_at_vertices(comm: MPI.Intracomm, found: Sharers, owner: Int, ends: Int
     return sums
 
 
-def _triangles_beside(own: SubmeshesOfRank, key: Int, subdomain: Int) -> tuple[Int, Int]:
+def _triangles_beside(submeshes: SubmeshesOfRank, key: Int, subdomain: Int) -> tuple[Int, Int]:
     """Return the triangle (n,) of this rank's subdomain (n,), and its edge (n,) that is the torus edge `key` (n,)."""
-    whole = own.whole
-    edge = np.searchsorted(whole.edge_keys, key)
-    wanted = np.full(len(whole.edge_keys), -1)
-    wanted[edge] = subdomain
-    beside = whole.edge_class[whole.triangle_edges]
-    triangle, k = np.nonzero(wanted[beside] == own.index[own.member][:, None])
-    order = np.argsort(beside[triangle, k])
-    place = order[np.searchsorted(beside[triangle, k][order], edge)]
+    mesh = submeshes.whole
+    edge = np.searchsorted(mesh.edge_keys, key)
+    subdomain_of = np.full(len(mesh.edge_keys), -1)
+    subdomain_of[edge] = subdomain
+    edges = mesh.edge_class[mesh.triangle_edges]
+    triangle, k = np.nonzero(subdomain_of[edges] == submeshes.index[submeshes.member][:, None])
+    order = np.argsort(edges[triangle, k])
+    place = order[np.searchsorted(edges[triangle, k][order], edge)]
     return triangle[place], k[place]
 
 
 def edge_normals(mesh: Submesh, triangle: Int, k: Int) -> tuple[Float, Float]:
-    """Return normals (n, 2, 2) out of triangles (n,) at the start and end of their edges k (n,).
+    """Return normals (n, 2, 2) out of triangles (n,) where their edges k (n,) start and end.
 
     As in `SharedEntities`, and the turns (n,) of these.
     """
@@ -177,8 +177,8 @@ def edge_normals(mesh: Submesh, triangle: Int, k: Int) -> tuple[Float, Float]:
     # On an arc about c the place y obeys y'' = -turn^2 y.
     angle, centre = turn[curved, None], mesh.circles[plane[curved], :2]
     start, stop = a[curved] - centre, b[curved] - centre
-    ahead = np.stack([stop - np.cos(angle) * start, np.cos(angle) * stop - start], axis=1)
-    tangents[curved] = (angle / np.sin(angle))[:, None] * ahead
+    slopes = np.stack([stop - np.cos(angle) * start, np.cos(angle) * stop - start], axis=1)
+    tangents[curved] = (angle / np.sin(angle))[:, None] * slopes
     normal = np.stack([tangents[..., 1], -tangents[..., 0]], axis=-1)
     backwards = mesh.backwards[triangle, k]
     normal[backwards] = normal[backwards, ::-1]
@@ -230,7 +230,7 @@ class SharedEntities:
 
 
 def share_entities(
-    comm: MPI.Intracomm, own: SubmeshesOfRank, table: SubdomainTable, pairs: Int, lattice: ReferenceLattice
+    comm: MPI.Intracomm, submeshes: SubmeshesOfRank, table: SubdomainTable, pairs: Int, lattice: ReferenceLattice
 ) -> SharedEntities:
     """Return the shared entities of this rank; constraints are numbered rank by rank. Collective.
 
@@ -238,31 +238,31 @@ def share_entities(
         pairs: (phases, phases) the interface of the case between two phases, -1 where they never part.
         lattice: of the coarse triangles.
     """
-    found = find_sharers(comm, own, table)
-    geometry = interface_geometry(comm, own, table, pairs, found, lattice)
+    sharers = find_sharers(comm, submeshes, table)
+    geometry = interface_geometry(comm, submeshes, table, pairs, sharers, lattice)
     if lattice.intervals == 1:
-        vertices = np.flatnonzero(~found.is_edge)
-        found, geometry = found.chosen(vertices), geometry.chosen(vertices)
-    nodes = np.where(found.is_edge, lattice.intervals - 1, 1)
-    owner = table.rank[found.innermost]
-    constraints = np.where(owner == comm.rank, nodes * (found.copies - 1), 0)
+        vertices = np.flatnonzero(~sharers.is_edge)
+        sharers, geometry = sharers.chosen(vertices), geometry.chosen(vertices)
+    nodes = np.where(sharers.is_edge, lattice.intervals - 1, 1)
+    owner = table.rank[sharers.innermost]
+    constraints = np.where(owner == comm.rank, nodes * (sharers.copies - 1), 0)
     begin, own_constraints = comm.exscan(int(constraints.sum())) or 0, int(constraints.sum())
     numbers = begin + np.cumsum(constraints) - constraints
     first, normal, turn, precracked = _sent_by_owners(
-        comm, found, table, numbers, geometry.normal, geometry.turn, geometry.precracked
+        comm, sharers, table, numbers, geometry.normal, geometry.turn, geometry.precracked
     )
     order = np.argsort(first)
-    found = found.chosen(order)
-    pair = breakable_pairs(own, table, pairs, found)
+    sharers = sharers.chosen(order)
+    pair = breakable_pairs(submeshes, table, pairs, sharers)
     return SharedEntities(
-        key=found.key,
-        is_edge=found.is_edge,
+        key=sharers.key,
+        is_edge=sharers.is_edge,
         nodes=nodes[order],
         first=first[order],
-        pointer=found.pointer,
-        sharer=found.sharer,
-        body=table.body[found.sharer],
-        fibre=np.where(pair >= 0, table.body[found.innermost], -1),
+        pointer=sharers.pointer,
+        sharer=sharers.sharer,
+        body=table.body[sharers.sharer],
+        fibre=np.where(pair >= 0, table.body[sharers.innermost], -1),
         pair=pair,
         normal=normal[order],
         turn=turn[order],
@@ -272,14 +272,14 @@ def share_entities(
     )
 
 
-def _sent_by_owners(comm: MPI.Intracomm, found: Sharers, table: SubdomainTable, *columns: Array) -> list[Array]:
-    """Return the columns (n,) or (n, ...) of the entities, each row as the owner of the entity has it. Collective."""
-    rank = table.rank[found.sharer]
-    mine = np.repeat(table.rank[found.innermost] == comm.rank, found.copies)
-    entity = np.repeat(np.arange(len(found.key)), found.copies)
+def _sent_by_owners(comm: MPI.Intracomm, sharers: Sharers, table: SubdomainTable, *columns: Array) -> list[Array]:
+    """Return the columns (n,) or (n, ...) as owners of entities have them.  Collective."""
+    rank = table.rank[sharers.sharer]
+    mine = np.repeat(table.rank[sharers.innermost] == comm.rank, sharers.copies)
+    entity = np.repeat(np.arange(len(sharers.key)), sharers.copies)
     pairs = np.unique(entity[mine] * comm.size + rank[mine])
     entity, to = pairs // comm.size, pairs % comm.size
-    code, *received = exchange(comm, to, found.code[entity], *(column[entity] for column in columns))
+    code, *received = exchange(comm, to, sharers.code[entity], *(column[entity] for column in columns))
     order = np.argsort(code)
-    place = order[np.searchsorted(code[order], found.code)]
+    place = order[np.searchsorted(code[order], sharers.code)]
     return [column[place] for column in received]

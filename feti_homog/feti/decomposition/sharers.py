@@ -56,12 +56,12 @@ def entity_code(key: Int, is_edge: Bool | bool) -> Int:
     return np.asarray(2 * key + is_edge)
 
 
-def find_sharers(comm: MPI.Intracomm, own: SubmeshesOfRank, table: SubdomainTable) -> Sharers:
+def find_sharers(comm: MPI.Intracomm, submeshes: SubmeshesOfRank, table: SubdomainTable) -> Sharers:
     """Return the vertex classes, but for the pinned one, and the torus edges that subdomains share. Collective.
 
-    Several subdomains share each, one of them of this rank.
+    Several subdomains share each, one on this rank at least.
     """
-    code, subdomain = _to_send(own)
+    code, subdomain = _to_send(submeshes)
     code, subdomain = exchange(comm, code // 2 % comm.size, code, subdomain)
     order = np.lexsort((subdomain, table.nesting[table.body[subdomain]], code))
     code, subdomain = code[order], subdomain[order]
@@ -76,24 +76,24 @@ def find_sharers(comm: MPI.Intracomm, own: SubmeshesOfRank, table: SubdomainTabl
     code, count = exchange(comm, to, code[entity], copies[entity])
     whose = ranges(first[entity], copies[entity])
     (sharer,) = exchange(comm, np.repeat(to, copies[entity]), subdomain[whose])
-    found = Sharers(code // 2, code % 2 == 1, np.r_[0, np.cumsum(count)], sharer)
-    return found.chosen(np.lexsort((found.key, found.is_edge)))
+    sharers = Sharers(code // 2, code % 2 == 1, np.r_[0, np.cumsum(count)], sharer)
+    return sharers.chosen(np.lexsort((sharers.key, sharers.is_edge)))
 
 
-def _to_send(own: SubmeshesOfRank) -> tuple[Int, Int]:
-    """Codes of what others may have too, and the subdomains of this rank that have it; each pair once."""
-    whole = own.whole
-    corner, side = whole.vertex_class[whole.triangles], whole.edge_class[whole.triangle_edges]
-    one_sided = np.bincount(side.ravel(), minlength=len(whole.edge_keys)) == 1
-    at_border = np.zeros(len(whole.class_keys), bool)
-    at_border[whole.vertex_class[whole.edges[one_sided[whole.edge_class]]]] = True
-    if whole.pinned >= 0:
-        corner = np.where(corner == whole.pinned, -1, corner)
+def _to_send(submeshes: SubmeshesOfRank) -> tuple[Int, Int]:
+    """Codes of entities that other ranks may have, and local subdomains that have them; each pair once."""
+    mesh = submeshes.whole
+    corner, side = mesh.vertex_class[mesh.triangles], mesh.edge_class[mesh.triangle_edges]
+    one_sided = np.bincount(side.ravel(), minlength=len(mesh.edge_keys)) == 1
+    at_border = np.zeros(len(mesh.class_keys), bool)
+    at_border[mesh.vertex_class[mesh.edges[one_sided[mesh.edge_class]]]] = True
+    if mesh.pinned >= 0:
+        corner = np.where(corner == mesh.pinned, -1, corner)
     kinds = [
-        (entity_code(keys[local], is_edge), own.index[member])
+        (entity_code(keys[local], is_edge), submeshes.index[member])
         for is_edge, keys, (local, member) in (
-            (False, whole.class_keys, _several(corner, own.member, at_border)),
-            (True, whole.edge_keys, _several(side, own.member, one_sided)),
+            (False, mesh.class_keys, _several(corner, submeshes.member, at_border)),
+            (True, mesh.edge_keys, _several(side, submeshes.member, one_sided)),
         )
     ]
     code, subdomain = (np.concatenate(some) for some in zip(*kinds, strict=True))

@@ -31,12 +31,12 @@ class Subdomain:
         mesh: the refined mesh.
         problem: the displacements of the problem.
         L: (v, v) stiffness of the material, see `assemble`; the mean over the area if there are several.
-        laws, material: those that `assemble` is given; the first is (1, v, v), the second None, of one material.
+        laws, material: the arguments of `assemble`; the first is (1, v, v), the second None, of one material.
         Q: (cn, v) load of the unit strains: f = -Q E.
         slopes: (n, 2) int dN/dx, 0 of the pinned class.
         areas: (materials,) of each material.
         R: (cn, k) orthonormal kernel of K: translations, and a rotation in the plane if the piece can turn,
-            less what the pinned class stops.
+            less the motions that the pinned class stops.
         positions: (n, 2) unwrapped positions of the classes.
         is_thin: whether the body is, such as a ring much thinner than its radius: the inverse is ill-conditioned.
         is_outer: whether no other body lies around it.
@@ -72,7 +72,7 @@ class Subdomain:
     ) -> Subdomain:
         """Refine and assemble, without communication; `flags` are `is_thin` and `is_outer`.
 
-        Of one material or several: `laws`, `material` and `mixed` as of `assemble`.
+        One material or several: `laws`, `material` and `mixed` as in `assemble`.
 
         Raises:
             MeshError: an element is inverted, or the rigid-body modes are not in the kernel of K.
@@ -118,8 +118,8 @@ class Subdomain:
     def mean_strain(self, dofs: Int) -> Float:
         """(k, m) whose transpose times the displacements u of `dofs` (k,) is their share in int eps*.
 
-        The integral is over the subdomain and what lies of voids beside it, int_Omega eps* + int u (x) n ds, n outward
-        from the voids; 0 at voids.
+        The integral is over the subdomain and its share of the voids beside it, int_Omega eps* + int u (x) n ds, n
+        outward from the voids; 0 at voids.
         """
         m, slopes = self.problem.strains, self.slopes
         if self.submesh.at_void.any():
@@ -146,7 +146,7 @@ class Subdomain:
             return answers
         strains, R = self.problem.strains, self.R[dofs]
         gradients = (self.problem.gradient(unit) for unit in np.eye(strains))
-        affine = np.stack([(self.positions @ own.T).ravel()[dofs] for own in gradients], axis=1)
+        affine = np.stack([(self.positions @ gradient.T).ravel()[dofs] for gradient in gradients], axis=1)
         rigid = R @ np.linalg.lstsq(R, answers[:, :strains] + affine, rcond=None)[0]
         return np.hstack([rigid - affine, answers[:, strains:]])
 
@@ -162,7 +162,7 @@ class Subdomain:
 
     @property
     def compressible_share(self) -> float:
-        """Share of the diagonal of K in the scaling D: that of a phase with the same mu and lambda <= 2 mu.
+        """Share of the diagonal of K in the scaling D: the diagonal of a phase with equal mu and lambda <= 2 mu.
 
         1 of several materials, none of which is nearly incompressible.
         A boundary that keeps the volume is as stiff as mu, but single nodes of mixed elements are as lambda.
@@ -175,13 +175,13 @@ class Subdomain:
     def elimination_order(self) -> Int | None:
         """(cn,) all dofs in an order of elimination; None where the library finds one at less cost.
 
-        It does where there are no nodes but those of the coarse mesh, all of whose triangles are to be halved.
+        It does where all nodes are coarse nodes, for then all triangles are to be halved.
         """
         pays = self.n_dofs >= LEAST_ORDERED_DOFS and self.mesh.lattice.intervals > 1
         return self.problem.dofs(elimination_order(self.mesh)) if pays else None
 
     def take_stiffness(self) -> csr_matrix:
-        """(cn, cn) K, which belongs to the caller: that of `build` the first time, then one assembled anew."""
+        """(cn, cn) K, which belongs to the caller: the one of `build` at first, then one assembled anew."""
         K, self._built_stiffness = self._built_stiffness, None
         return self.assemble_stiffness() if K is None else K
 
@@ -240,14 +240,14 @@ def label(submesh: Submesh) -> str:
 
 
 def _pinned(K: csr_matrix, problem: Problem, pinned: int) -> csr_matrix:
-    """K, changed to have rows and columns of the node `pinned` of a multiple of the identity; as it is for -1."""
+    """K, with rows and columns of the node `pinned` as in a multiple of I; unchanged for -1."""
     if pinned < 0:
         return K
     dofs, largest = problem.dofs(np.array([pinned])), K.diagonal().max()
     K.data[np.isin(K.indices, dofs)] = 0.0
     for dof in dofs:
-        own = slice(*K.indptr[dof : dof + 2])
-        K.data[own] = np.where(K.indices[own] == dof, largest, 0.0)
+        row = slice(*K.indptr[dof : dof + 2])
+        K.data[row] = np.where(K.indices[row] == dof, largest, 0.0)
     K.eliminate_zeros()
     return K
 

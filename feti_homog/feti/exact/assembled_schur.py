@@ -6,7 +6,6 @@ import numpy as np
 from mpi4py import MPI
 from scipy.sparse import csr_matrix, diags, hstack
 
-from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.linalg.dense_matrices import DenseSolver
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
 from feti_homog.feti.linalg.sparse_matrices import DenseBlockSum, allreduce_sparse
@@ -24,7 +23,7 @@ DIRECTION_ROUNDING = 1e-14
 class AssembledSchur:
     """Z^T S Z of all subdomains, factored once; every rank holds the factor.
 
-    All copies of a node move together, but along a row that is not active those of the inner body move on their own.
+    All copies of a node move together, but along rows that are not active copies of the inner body move on their own.
 
     Attributes:
         size: columns of Z, on all ranks.
@@ -57,9 +56,7 @@ class AssembledSchur:
         self._solver.destroy()
 
 
-def assembled_stiffness(
-    comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators, active: Float
-) -> tuple[csr_matrix, csr_matrix | Float]:
+def assembled_stiffness(operators: InterfaceOperators, active: Float) -> tuple[csr_matrix, csr_matrix | Float]:
     """Return Z (n, columns) and Z^T S Z of all ranks for the owned rows where `active` is 1.  Collective.
 
     The rows must leave no rigid-body motion free.  The sum is dense, in Fortran order, where all ranks' blocks fill
@@ -68,7 +65,7 @@ def assembled_stiffness(
     Raises:
         TypeError: a boundary operator is not dense.
     """
-    Z = _released(comm, jump_operator, operators, _copies_together(comm, jump_operator, operators), active)
+    comm, Z = operators.comm, _released(operators, _copies_together(operators), active)
     size, columns = Z.shape[1], [np.unique(Z[span].indices) for span in operators.slices]
     entries = comm.allreduce(sum(len(of) ** 2 for of in columns))
     is_full = entries >= DENSE_SHARE * size**2 and size <= MOST_DENSE_ROWS and not choices("feti_bonded_")
@@ -88,11 +85,12 @@ def assembled_stiffness(
     return Z, dense.T
 
 
-def _copies_together(comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> csr_matrix:
+def _copies_together(operators: InterfaceOperators) -> csr_matrix:
     """(n, shared dofs) Z with all rows active.  Collective."""
+    jump_operator = operators.jump_operator
     starts, sizes = jump_operator.node_rows
     order = np.argsort(starts)
-    first = comm.exscan(len(starts)) or 0
+    first = operators.comm.exscan(len(starts)) or 0
     node = jump_operator.gather(np.repeat(first + np.arange(len(starts)), sizes[order]).astype(float))
     # Each copy of a node takes part in some row of it, and its dofs are neighbours.
     row = operators.BT.indices[operators.BT.indptr[:-1]]
@@ -101,19 +99,13 @@ def _copies_together(comm: MPI.Intracomm, jump_operator: JumpOperator, operators
     return csr_matrix((np.ones(n), (np.arange(n), shared)), shape=(n, jump_operator.shared_dofs))
 
 
-def _released(
-    comm: MPI.Intracomm,
-    jump_operator: JumpOperator,
-    operators: InterfaceOperators,
-    together: csr_matrix,
-    active: Float,
-) -> csr_matrix:
+def _released(operators: InterfaceOperators, together: csr_matrix, active: Float) -> csr_matrix:
     """(n, columns) Z, for the one with all rows active.
 
-    u_f = y - e (e . y) + e w along the direction e of each row that is not active, and w is a column of its own.
+    u_f = y - e (e . y) + e w along the direction e of each row that is not active, with an extra column for w.
     Collective.
     """
-    released = active == 0
+    released, comm, jump_operator = active == 0, operators.comm, operators.jump_operator
     counts = comm.allgather(int(released.sum()))
     number = np.where(released, sum(counts[: comm.rank]) + np.cumsum(released), 0)
     number = jump_operator.gather(number.astype(float)).astype(np.int64) - 1
@@ -124,12 +116,12 @@ def _released(
         @ operators.B[rows]
         @ diags(operators.of_inner.astype(float))
     )
-    here = np.asarray(e.multiply(e).sum(axis=1)).ravel()
-    rows, e, here = rows[here > 0], e.tocsr()[here > 0], here[here > 0]
-    own = csr_matrix((np.ones(len(rows)), (np.arange(len(rows)), number[rows])), shape=(len(rows), sum(counts)))
-    common = (together - e.T @ (diags(1.0 / here) @ (e @ together))).tocsr()
+    square = np.asarray(e.multiply(e).sum(axis=1)).ravel()
+    rows, e, square = rows[square > 0], e.tocsr()[square > 0], square[square > 0]
+    directions = csr_matrix((np.ones(len(rows)), (np.arange(len(rows)), number[rows])), shape=(len(rows), sum(counts)))
+    common = (together - e.T @ (diags(1.0 / square) @ (e @ together))).tocsr()
     common.data[np.abs(common.data) < DIRECTION_ROUNDING] = 0.0
     common.eliminate_zeros()
-    apart = (e.T @ own).tocsr()
+    apart = (e.T @ directions).tocsr()
     apart.eliminate_zeros()
     return hstack([common, apart]).tocsr()

@@ -2,8 +2,8 @@
 
 Let Gamma be the response of a cell whose active rows are A, `reference_cell`, and C the rows that have changed since:
 some of A have left, others have come or their springs gained compliance.  The columns of C in the present response,
-which `followed_response` keeps up, give the present response to anything else from that of the reference cell
-(`reference_changes`), new followed columns among it.
+which `followed_response` keeps up, turn any other response of the reference cell into the present one
+(`reference_changes`), new columns among them.
 
 The reference cell stays until there are more changes than an option allows: then the cell as it stands, but for gains
 of compliance, is factored in its place.  Where changes cannot be followed, for they lose too many digits, it is
@@ -13,11 +13,9 @@ factored too, and its response is followed from there.
 from __future__ import annotations
 
 import numpy as np
-from mpi4py import MPI
 from petsc4py import PETSc
 
 from feti_homog.errors import CaseError
-from feti_homog.feti.decomposition.jump_operator import JumpOperator
 from feti_homog.feti.decomposition.neighbours import InterfaceNeighbours
 from feti_homog.feti.exact.followed_response import FollowedResponse
 from feti_homog.feti.exact.reference_cell import BodyTies, ReferenceCell, one_sided_jumps, stiffness_of_rows
@@ -43,8 +41,8 @@ class ExactInverse(Preconditioner):
 
     Attributes:
         neighbours: which bonds lie beside each other.
-        stiffness: (all rows,) bounds of the diagonal of H: the stiffness of a node of either side and of the spring
-            between them, in a row, while all others are held.
+        stiffness: (all rows,) bounds for the diagonal of H: the stiffness of both nodes and the spring between them,
+            in a row, while all others are held.
         norm: |H| with all bonds intact, which is the largest, as the power method finds it, with a margin.
         factorizations: reference cells so far.
         batch: columns found at once at least.
@@ -55,7 +53,7 @@ class ExactInverse(Preconditioner):
     is_exact = True
     reference: ReferenceCell
 
-    def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> None:
+    def __init__(self, operators: InterfaceOperators) -> None:
         """Factor the cell with all bonds intact; all boundary operators must be dense.  Collective.
 
         Options: `feti_influence_columns`.
@@ -63,19 +61,20 @@ class ExactInverse(Preconditioner):
         Raises:
             CaseError: the option has no such value.
         """
-        most = NEVER_REFACTORED_ROWS if jump_operator.global_rows <= NEVER_REFACTORED_ROWS else INFLUENCE_COLUMNS
-        most = PETSc.Options("feti_").getInt("influence_columns", most)
-        if most < 1:
-            raise CaseError(f"-feti_influence_columns {most}: expected a whole number above 0")
-        self.comm, self._jump_operator, self._operators, self._most_changes = comm, jump_operator, operators, most
+        comm, jump_operator = operators.comm, operators.jump_operator
+        max_changes = NEVER_REFACTORED_ROWS if jump_operator.global_rows <= NEVER_REFACTORED_ROWS else INFLUENCE_COLUMNS
+        max_changes = PETSc.Options("feti_").getInt("influence_columns", max_changes)
+        if max_changes < 1:
+            raise CaseError(f"-feti_influence_columns {max_changes}: expected a whole number above 0")
+        self.comm, self._operators, self._max_changes = comm, operators, max_changes
         self._first, end = jump_operator.owned
         self._rows = end - self._first
-        self.stiffness = np.concatenate(comm.allgather(stiffness_of_rows(jump_operator, operators)))
-        self._one_sided = one_sided_jumps(comm, jump_operator, operators)
+        self.stiffness = np.concatenate(comm.allgather(stiffness_of_rows(operators)))
+        self._one_sided = one_sided_jumps(operators)
         self._ties = BodyTies(comm, jump_operator)
         self.neighbours = InterfaceNeighbours(comm, jump_operator, operators.subdomains)
         self.batch = INFLUENCE_BATCH * comm.size
-        self.most_followed = min(max(FOLLOWED_COLUMNS, 2 * most), jump_operator.global_rows)
+        self.most_followed = min(max(FOLLOWED_COLUMNS, 2 * max_changes), jump_operator.global_rows)
         self.factorizations = 0
         # Of the present state active rows and what springs gained; the latter from the next `activate` on.
         self._active, self._more = np.ones(self._rows), np.zeros(self._rows)
@@ -94,17 +93,17 @@ class ExactInverse(Preconditioner):
             self._active, self._more = active, self._next
             self._restart()
 
-    def _follow(self, active: Float, more: Float, least: float) -> bool:
-        """Follow rows that leave, come or soften to another state, if pivots are above `least`.  Collective."""
+    def _follow(self, active: Float, more: Float, pivot: float) -> bool:
+        """Follow rows that leave, come or soften to another state, if pivots are above `pivot`.  Collective."""
         gained, turned = more * active - self._more * self._active, self._active - active
-        own = np.flatnonzero((turned != 0.0) | (gained != 0.0))
-        parts = zip(*self.comm.allgather((self._first + own, turned[own], gained[own])), strict=True)
+        places = np.flatnonzero((turned != 0.0) | (gained != 0.0))
+        parts = zip(*self.comm.allgather((self._first + places, turned[places], gained[places])), strict=True)
         rows, turns, gains = (np.concatenate(part) for part in parts)
         if not len(rows):
             return True
         self._is_fresh = False
         self._add_columns(rows)
-        if not self._followed.follow(rows, turns, gains, least):
+        if not self._followed.follow(rows, turns, gains, pivot):
             return False
         self._active, self._more = active, more
         return True
@@ -124,7 +123,7 @@ class ExactInverse(Preconditioner):
         if self.factorizations:
             self.reference.destroy()  # before the new cell takes memory
             process_memory.trim()
-        self.reference = ReferenceCell(self.comm, self._jump_operator, self._operators, self._one_sided, active)
+        self.reference = ReferenceCell(self._operators, self._one_sided, active)
         self.factorizations += 1
         self._unchanged = FollowedResponse(
             self.comm, self._first, self.stiffness, np.zeros((self._rows, 0)), self.most_followed
@@ -137,21 +136,21 @@ class ExactInverse(Preconditioner):
     @property
     def _held(self) -> Float:
         """(owned rows,) 1 on active rows and on pins."""
-        held, pins = self._active.copy(), self._followed.pins - self._first
-        held[pins[(pins >= 0) & (pins < self._rows)]] = 1.0
-        return held
+        holds, pins = self._active.copy(), self._followed.pins - self._first
+        holds[pins[(pins >= 0) & (pins < self._rows)]] = 1.0
+        return holds
 
     def _changes(self) -> ReferenceChanges:
         """Return the changes since the reference cell.  Collective."""
         kinds = np.stack([self.reference.active - self._held, self._more * self._active], axis=1)
-        own = np.flatnonzero(kinds.any(axis=1))
-        parts = zip(*self.comm.allgather((self._first + own, kinds[own])), strict=True)
+        places = np.flatnonzero(kinds.any(axis=1))
+        parts = zip(*self.comm.allgather((self._first + places, kinds[places])), strict=True)
         return ReferenceChanges(self.comm, self._first, self.reference, self._followed, *map(np.concatenate, parts))
 
     def _up_to_date(self) -> ReferenceChanges:
         """Return the changes since the reference cell, which is factored anew if they are too many.  Collective."""
         changes = self._changes()
-        if len(changes.rows) - self._tied <= self._most_changes:
+        if len(changes.rows) - self._tied <= self._max_changes:
             return changes
         tied = self._ties.tied(self._held)
         # Ties that have left are changes of the new cell, too.
@@ -171,12 +170,12 @@ class ExactInverse(Preconditioner):
             rows = np.union1d(rows, self._followed.pins)
             self._add(self._followed.lacking(rows), self._changes(), rows, np.inf)
 
-    def _add(self, rows: Int, changes: ReferenceChanges, needed: Int, most: float = MOST_ASYMMETRY) -> bool:
+    def _add(self, rows: Int, changes: ReferenceChanges, needed: Int, max_error: float = MOST_ASYMMETRY) -> bool:
         """Follow columns of global rows (k,) too, unless followed ones are asymmetric with them.  Collective."""
         if not len(rows):
             return True
         columns = changes.present(self.reference.columns(rows))
-        if not changes.error(rows, columns, self.stiffness) <= most:
+        if not changes.error(rows, columns, self.stiffness) <= max_error:
             return False
         self._followed.make_room(len(rows), np.union1d(needed, changes.rows), self._are_active)
         self._followed.add(rows, columns)
@@ -188,8 +187,8 @@ class ExactInverse(Preconditioner):
         Where only rows lack that have left, none: faces touch here and there.  Collective.
         """
         rows, active = followed.lacking(rows), self._are_active
-        most = self.batch if active[rows].any() else 0
-        return self.neighbours.rows_near(rows, lambda near: followed.lacking(near[active[near]]), most)
+        enough = self.batch if active[rows].any() else 0
+        return self.neighbours.rows_near(rows, lambda some: followed.lacking(some[active[some]]), enough)
 
     @property
     def _are_active(self) -> Bool:
@@ -198,9 +197,9 @@ class ExactInverse(Preconditioner):
 
     @property
     def rounding(self) -> float:
-        """Return the largest force, relative to `stiffness`, that jumps of rigid-body motions of size 1 make.
+        """Return the largest force, relative to `stiffness`, that jumps of unit rigid-body motions make.
 
-        Bodies follow them without force: all of it is rounding, a relative error of H.  Collective."""
+        Bodies follow them without force: it is rounding alone, a relative error of H.  Collective."""
         if self._rounding is None:
             stiffness = self.stiffness[self._first : self._first + self._rows]
             self._rounding = self.reference.force_of_rigid_motions(stiffness)
@@ -217,14 +216,14 @@ class ExactInverse(Preconditioner):
         return self.reference.respond(scale_rows(self.reference.active, g)) + at_rest
 
     def multipliers(self, d: Float, E: Float) -> Float:
-        """H d E, but for rounding, for d (owned rows, v), the same at every call, and E (v, k).  Collective."""
+        """H d E, but for rounding, for d (owned rows, v), equal at every call, and E (v, k).  Collective."""
         return scale_rows(self._active, self.renew_answer(d) @ E)
 
     def answer(self, d: Float, E: Float, free: int = 0) -> tuple[Float, Float] | None:
         """Multipliers H d E and jumps on inactive rows, (owned rows, k), with arguments as of `multipliers`.
 
-        They are those of before with updates.  Jumps are those of one place of the bodies that nothing holds; None
-        where these have another number of motions than `free`.  Collective.
+        They are updated from state to state.  Jumps hold for one place of the bodies that nothing holds; None where
+        these have another number of motions than `free`.  Collective.
         """
         if len(self._followed.pins) != free:
             if not self._is_fresh:
@@ -246,7 +245,7 @@ class ExactInverse(Preconditioner):
         return self._followed.answer
 
     def inverse_blocks(self, pairs: Int) -> Float:
-        """(m, 2, 2) diagonal blocks of H, for the same pairs (m, 2) of active global rows on every rank.  Collective.
+        """(m, 2, 2) diagonal blocks of H, for pairs (m, 2) of active global rows, equal on all ranks.  Collective.
 
         Rows that leave together change the multipliers of their own by all of them, and open by H_ii^-1 lam_i.
         """
@@ -254,9 +253,9 @@ class ExactInverse(Preconditioner):
         return self._followed.blocks(pairs)
 
     def columns(self, rows: Int) -> tuple[Float, Float]:
-        """(owned rows, k) columns of H of the reference cell, and their (k, k) block, for the same global rows (k,).
+        """(owned rows, k) columns of H of the reference cell, and their (k, k) block, for global rows (k,).
 
-        They are those of the bonded cell until rows are first restricted.  Collective.
+        Until rows are first restricted, the reference cell is the bonded one.  Collective.
         """
         if len(self._unchanged.lacking(rows)):
             new = self._with_near(rows, self._unchanged)

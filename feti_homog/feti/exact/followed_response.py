@@ -10,8 +10,8 @@ and where the rows I leave (s = 1) or come to be active (s = -1), with B = Gamma
 
     U_I <- s B U_I,  Gamma_I: <- s B Gamma_I:,  Gamma_:I <- Gamma_:I B s,  Gamma_II <- -s B s,
 
-all others as above.  Springs of rows that are not active have C_0: Gamma_II gives up what they gained where they
-leave, and takes it where they come.  The rows I need one column each; changes of the other columns that are kept wait
+all others as above.  Springs of rows that are not active have C_0: Gamma_II gives up their gains where they leave,
+and takes these where they come.  The rows I need one column each; changes of the other columns that are kept wait
 until there are many.
 
 A row that leaves without a force, for it alone resisted a motion of a body, becomes a pin: it stays among the active
@@ -46,22 +46,22 @@ class FollowedResponse:
         pins: (p,) global rows that left and hold bodies that nothing else does.
     """
 
-    def __init__(self, comm: MPI.Intracomm, first: int, stiffness: Float, answer: Float, most: int) -> None:
+    def __init__(self, comm: MPI.Intracomm, first: int, stiffness: Float, answer: Float, capacity: int) -> None:
         """Begin with the `answer` U and no columns; this rank's rows begin at `first`.
 
-        `stiffness` (all rows,) bounds the diagonal of Gamma on active rows; from `most` columns on, unused ones go.
+        `stiffness` (all rows,) bounds the diagonal of Gamma on active rows; from `capacity` columns on, unused ones go.
         """
         self._comm, self._first, self._stiffness = comm, first, stiffness
         self.answer, self.pins = answer, np.zeros(0, np.int64)
         self._slot = np.full(len(stiffness), -1)
         self._rows: Int = np.zeros(0, np.int64)
         # When each column was last used, counted in changes.
-        self._used, self._now = np.zeros(most, np.int64), 0
+        self._used, self._now = np.zeros(capacity, np.int64), 0
         # Memory is taken when columns come.
-        self._buffer = np.zeros((len(answer), most), order="F")
+        self._buffer = np.zeros((len(answer), capacity), order="F")
         # What is taken off at changes that wait, and its factors in the columns of the rows K that are kept.
         self._waiting = np.zeros((len(answer), WAITING_COLUMNS), order="F")
-        self._factors = np.zeros((most, WAITING_COLUMNS))
+        self._factors = np.zeros((capacity, WAITING_COLUMNS))
         self._count = 0
 
     def lacking(self, rows: Int) -> Int:
@@ -69,30 +69,30 @@ class FollowedResponse:
         return rows[self._slot[rows] < 0]
 
     def make_room(self, more: int, needed: Int, useful: Bool) -> None:
-        """Have room for so many more columns: those longest unused go.
+        """Have room for so many more columns: the longest unused go.
 
-        Columns of the rows `needed` stay; those of rows that are `useful` (all rows,) go last.
+        Columns of the rows `needed` stay; columns of `useful` rows (all rows,) go last.
         """
-        most = len(self._used)
-        if len(self._rows) + more <= most:
+        capacity = len(self._used)
+        if len(self._rows) + more <= capacity:
             return
         # Some more at once, for the others move.
-        count = max(min(int(FOLLOWED_SHARE * most), most - more), 0)
+        count = max(min(int(FOLLOWED_SHARE * capacity), capacity - more), 0)
         spared, is_useful = np.isin(self._rows, needed), useful[self._rows]
         order = np.lexsort([-self._used[: len(self._rows)], ~is_useful, ~spared])
         stay = np.sort(order[: max(count, int(spared.sum()))])
-        kept, n = self._rows[stay], len(stay)
+        rows, n = self._rows[stay], len(stay)
         self._slot[self._rows] = -1
-        self._slot[kept] = np.arange(n)
-        self._rows, self._used[:n] = kept, self._used[stay]
+        self._slot[rows] = np.arange(n)
+        self._rows, self._used[:n] = rows, self._used[stay]
         for part in np.array_split(np.arange(n), n // WAITING_COLUMNS + 1):
             # Columns move to the left, so that none is lost.
             self._buffer[:, part] = self._buffer[:, stay[part]]
         self._factors[:n] = self._factors[stay]
-        if n + more > most:
+        if n + more > capacity:
             wider = np.zeros((len(self._buffer), 2 * (n + more)), order="F")
             wider[:, :n], self._buffer = self._buffer[:, :n], wider
-            new = wider.shape[1] - most
+            new = wider.shape[1] - capacity
             self._used, self._factors = np.pad(self._used, (0, new)), np.pad(self._factors, [(0, new), (0, 0)])
 
     def columns(self, rows: Int) -> Float:
@@ -102,32 +102,32 @@ class FollowedResponse:
 
     def product(self, rows: Int, x: Float) -> Float:
         """(owned rows, k) columns of the global rows (c,), which have them, times x (c, k)."""
-        at, n, known = self._slot[rows], self._count, len(self._rows)
+        at, n, columns = self._slot[rows], self._count, len(self._rows)
         waiting = self._waiting[:, :n] @ (self._factors[at, :n].T @ x)
-        return product_with_some(self._buffer[:, :known], at, x) - waiting
+        return product_with_some(self._buffer[:, :columns], at, x) - waiting
 
     def entries(self, rows: Int, of: Int) -> Float:
-        """(k, c) entries at the global rows (k,) of the columns of the global rows `of` (c,).  Collective."""
-        at, n, own = self._slot[of], self._count, rows - self._first
-        mine = np.flatnonzero((own >= 0) & (own < len(self._buffer)))
-        own, found = own[mine], np.zeros((len(rows), len(of)))
-        found[mine] = self._buffer[own[:, None], at] - self._waiting[own, :n] @ self._factors[at, :n].T
-        return allreduce_sum(self._comm, found)
+        """(k, c) entries at global rows (k,) in the columns of global rows `of` (c,).  Collective."""
+        at, n, places = self._slot[of], self._count, rows - self._first
+        mine = np.flatnonzero((places >= 0) & (places < len(self._buffer)))
+        places, entries = places[mine], np.zeros((len(rows), len(of)))
+        entries[mine] = self._buffer[places[:, None], at] - self._waiting[places, :n] @ self._factors[at, :n].T
+        return allreduce_sum(self._comm, entries)
 
     def blocks(self, pairs: Int) -> Float:
-        """(m, 2, 2) diagonal blocks of Gamma at the pairs (m, 2) of global rows, which have columns.  Collective.
+        """(m, 2, 2) diagonal blocks of Gamma at global row pairs (m, 2), which have columns.  Collective.
 
         A pair is on one rank.
         """
         if len(self.lacking(pairs)):
             raise ValueError("rows without columns have no blocks")
-        own, at, n = pairs - self._first, self._slot[pairs], self._count
+        places, at, n = pairs - self._first, self._slot[pairs], self._count
         self._used[at] = self._now
-        mine = ((own >= 0) & (own < len(self._buffer))).all(axis=1)
-        own, at = own[mine], at[mine]
+        mine = ((places >= 0) & (places < len(self._buffer))).all(axis=1)
+        places, at = places[mine], at[mine]
         blocks = np.zeros((len(pairs), 2, 2))
-        blocks[mine] = self._buffer[own[:, :, None], at[:, None, :]]
-        blocks[mine] -= self._waiting[own, :n] @ self._factors[at, :n].transpose(0, 2, 1)
+        blocks[mine] = self._buffer[places[:, :, None], at[:, None, :]]
+        blocks[mine] -= self._waiting[places, :n] @ self._factors[at, :n].transpose(0, 2, 1)
         return allreduce_sum(self._comm, blocks)
 
     def add(self, rows: Int, columns: Float) -> None:
@@ -138,27 +138,27 @@ class FollowedResponse:
         self._rows = np.concatenate([self._rows, rows])
         self._buffer[:, old:new], self._used[old:new] = columns, self._now
 
-    def follow(self, rows: Int, turned: Float, gained: Float, least: float = LEAST_FOLLOWED_PIVOT) -> bool:
+    def follow(self, rows: Int, turned: Float, gained: Float, pivot: float = LEAST_FOLLOWED_PIVOT) -> bool:
         """Let the global rows (k,) leave (`turned` is 1), come (-1) or soften (0), their springs gain compliance (k,).
 
-        All of them and the pins have columns.  False where pivots below `least` lose too many digits; then this is the
+        All of them and the pins have columns.  False where pivots below `pivot` lose too many digits; then this is the
         response of no state.  Collective.
         """
         is_pin = (rows[:, None] == self.pins).any(axis=1)
         if is_pin.any():
             self.pins = np.setdiff1d(self.pins, rows)
-        held = (turned == 0.0) | is_pin
-        softer = np.flatnonzero(held & (gained != 0.0))
+        stays = (turned == 0.0) | is_pin
+        softer = np.flatnonzero(stays & (gained != 0.0))
         parts = np.array_split(softer, len(softer) // WAITING_COLUMNS + 1)
-        if not all(self.soften(rows[some], gained[some], least) for some in parts if len(some)):
+        if not all(self.soften(rows[some], gained[some], pivot) for some in parts if len(some)):
             return False
         # Rows come before others leave, so that fewer bodies are free meanwhile; half of the room is for pins.
-        moves = np.flatnonzero(~held)
+        moves = np.flatnonzero(~stays)
         moves = moves[np.argsort(turned[moves], kind="stable")]
         parts = np.array_split(moves, 2 * len(moves) // WAITING_COLUMNS + 1)
-        return all(self._exchange(rows[some], turned[some], gained[some], least) for some in parts if len(some))
+        return all(self._exchange(rows[some], turned[some], gained[some], pivot) for some in parts if len(some))
 
-    def soften(self, rows: Int, more: Float, least: float = 0.0) -> bool:
+    def soften(self, rows: Int, more: Float, pivot: float = 0.0) -> bool:
         """Let springs of global rows (k,) gain compliance (k,), some less than 0; False as `follow`.  Collective."""
         self._make_room(len(rows))
         columns, values = self._present(rows)
@@ -166,13 +166,13 @@ class FollowedResponse:
         outer = np.outer(root, root)
         block = np.diag(np.sign(more)) + outer * (values[:k, :k] + values[:k, :k].T) / 2
         # One rank's rounding is that of all.
-        B = self._comm.bcast(np.linalg.inv(block) * outer if _has_digits(block, least) else None)
+        B = self._comm.bcast(np.linalg.inv(block) * outer if _has_digits(block, pivot) else None)
         if B is not None:
             self._change(columns, B, values)
         return B is not None
 
-    def _exchange(self, rows: Int, sign: Float, gained: Float, least: float) -> bool:
-        """Let rows leave (sign 1) or come (-1), and pins leave with those that come; False where digits are lost.
+    def _exchange(self, rows: Int, sign: Float, gained: Float, pivot: float) -> bool:
+        """Let rows leave (sign 1) or come (-1), and pins leave with rows that come; False where digits are lost.
 
         Collective.
         """
@@ -186,40 +186,40 @@ class FollowedResponse:
         if (k := len(rows)) > WAITING_COLUMNS:
             return False
         block = (values[:k, :k] + values[:k, :k].T) / 2 - np.diag(np.where(sign < 0.0, gained, 0.0))
-        found = self._comm.bcast(_regular(block, sign, self._stiffness[rows], least))
-        if found is None:
+        inverse = self._comm.bcast(_regular(block, sign, self._stiffness[rows], pivot))
+        if inverse is None:
             return False
-        which, B = found
+        which, B = inverse
         if len(which):
             self._make_room(len(which))
-            kept = np.concatenate([which, np.arange(k, len(values))])
-            values = np.hstack([values[kept][:, which], values[kept, k:]])
+            some = np.concatenate([which, np.arange(k, len(values))])
+            values = np.hstack([values[some][:, which], values[some, k:]])
             self._turn(rows[which], sign[which], gained[which], B, columns[:, which], values)
         if len(moved) or len(which) < k or len(self.pins):
             loose = np.setdiff1d(np.arange(k), which)
             self.pins, self.answer = np.union1d(np.setdiff1d(self.pins, moved), rows[loose]), self.answer.copy()
-            own = self.pins - self._first
-            self.answer[own[(own >= 0) & (own < len(self.answer))]] = 0.0
+            places = self.pins - self._first
+            self.answer[places[(places >= 0) & (places < len(self.answer))]] = 0.0
             # Springs of pins have C_0, as of all rows that are not active.
             if len(loose := loose[gained[loose] != 0.0]):
-                return self.soften(rows[loose], gained[loose], least)
+                return self.soften(rows[loose], gained[loose], pivot)
         return True
 
     def _turn(self, rows: Int, sign: Float, gained: Float, B: Float, columns: Float, values: Float) -> None:
         """Let rows leave (sign 1) or come (-1) whose block has the inverse B.  Collective."""
         at = self._slot[rows]
         mine = np.flatnonzero((rows >= self._first) & (rows < self._first + len(columns)))
-        own = rows[mine] - self._first
-        theirs = columns @ (B * sign)
-        theirs[own] = -(sign[:, None] * B * sign + np.diag(np.where(sign > 0.0, gained, 0.0)))[mine]
+        places = rows[mine] - self._first
+        turned = columns @ (B * sign)
+        turned[places] = -(sign[:, None] * B * sign + np.diag(np.where(sign > 0.0, gained, 0.0)))[mine]
         # The rows themselves become s B U_I and s B Gamma_I:, from nothing: of what they were, differences lose digits
         # where a stiffness is far from 1.
         self.answer = self.answer.copy()
-        self.answer[own], self._buffer[own], self._waiting[own, : self._count] = 0.0, 0.0, 0.0
-        taken = columns.copy()
-        taken[own] = -np.diag(sign)[mine]
-        self._change(taken, B, values)
-        self._buffer[:, at], self._factors[at] = theirs, 0.0
+        self.answer[places], self._buffer[places], self._waiting[places, : self._count] = 0.0, 0.0, 0.0
+        difference = columns.copy()
+        difference[places] = -np.diag(sign)[mine]
+        self._change(difference, B, values)
+        self._buffer[:, at], self._factors[at] = turned, 0.0
 
     def _present(self, rows: Int) -> tuple[Float, Float]:
         """(owned rows, k) columns, and (k + all columns, k + v) rows of them and of U on every rank.  Collective."""
@@ -229,11 +229,11 @@ class FollowedResponse:
         everywhere = np.concatenate([rows, self._rows])
         return columns, gather_rows(self._comm, np.hstack([columns, self.answer]), self._first, everywhere)
 
-    def _change(self, taken: Float, B: Float, values: Float) -> None:
-        """Take `taken` B times the rows I off the answer, and later off all columns."""
+    def _change(self, difference: Float, B: Float, values: Float) -> None:
+        """Take `difference` B times the rows I off the answer, and later off all columns."""
         n, k = self._count, len(B)
-        self.answer = self.answer - taken @ (B @ values[:k, k:])
-        self._waiting[:, n : n + k], self._factors[: len(self._rows), n : n + k] = taken, values[k:, :k] @ B
+        self.answer = self.answer - difference @ (B @ values[:k, k:])
+        self._waiting[:, n : n + k], self._factors[: len(self._rows), n : n + k] = difference, values[k:, :k] @ B
         self._count += k
 
     def _make_room(self, k: int) -> None:
@@ -249,10 +249,10 @@ class FollowedResponse:
         self._count = 0
 
 
-def _regular(block: Float, sign: Float, stiffness: Float, least: float) -> tuple[Int, Float] | None:
-    """Return the rows that can turn, and the inverse of their part of `block` (k, k); None if pivots are below `least`.
+def _regular(block: Float, sign: Float, stiffness: Float, pivot: float) -> tuple[Int, Float] | None:
+    """Return the rows that can turn, and the inverse of their part of `block` (k, k); None if one is below `pivot`.
 
-    They are all that come (sign -1), and of those that leave (1) as many as leave no body free.
+    All rows that come (sign -1) can turn, and as many of the rows that leave (1) as leave no body free.
     """
     # Rows that leave and rows that come differ by the square of a stiffness.
     root = np.sqrt(np.maximum(np.where(sign > 0.0, stiffness, 1.0 / stiffness), np.abs(block.diagonal())))
@@ -260,7 +260,7 @@ def _regular(block: Float, sign: Float, stiffness: Float, least: float) -> tuple
     scaled, which = block / outer, np.arange(len(block))
     if not _has_digits(scaled, LEAST_FOLLOWED_PIVOT):
         come, leave = np.flatnonzero(sign < 0.0), np.flatnonzero(sign > 0.0)
-        if not len(leave) or not _has_digits(scaled[come[:, None], come], least):
+        if not len(leave) or not _has_digits(scaled[come[:, None], come], pivot):
             return None
         across = scaled[come[:, None], leave]
         rest = scaled[leave[:, None], leave] - across.T @ np.linalg.solve(scaled[come[:, None], come], across)
@@ -268,10 +268,10 @@ def _regular(block: Float, sign: Float, stiffness: Float, least: float) -> tuple
         # The first pivot is taken whatever it is.
         rank = min(rank, int((factor.diagonal() ** 2 > SINGULAR_PIVOT).sum()))
         which = np.concatenate([come, leave[order[:rank] - 1]])
-        if not _has_digits(scaled[which[:, None], which], least):
+        if not _has_digits(scaled[which[:, None], which], pivot):
             return None
     return which, np.linalg.inv(scaled[which[:, None], which]) / outer[which[:, None], which]
 
 
-def _has_digits(block: Float, least: float) -> bool:
-    return bool(np.linalg.svd(block, compute_uv=False).min(initial=1.0) > least)
+def _has_digits(block: Float, pivot: float) -> bool:
+    return bool(np.linalg.svd(block, compute_uv=False).min(initial=1.0) > pivot)

@@ -1,4 +1,4 @@
-"""The cell with a reference set A of active rows, factored, and columns of its response to unit jumps and forces.
+"""The cell with a reference set A of active rows, factored, and its response to unit jumps and forces.
 
 Jumps g on the rows of A and forces f on the others I, each on both faces, make multipliers on A and gaps on I,
 
@@ -51,9 +51,9 @@ class BodyTies:
         bonded = active[self._rows].prod(axis=1)
         holding = allreduce_sum(self._comm, np.bincount(self._pair, bonded, len(self._ties)).astype(float))
         ties = self._ties[holding < HOLDING_BONDS].ravel()
-        own = self._rows[ties[(ties >= 0) & (ties < len(self._rows))]]
+        rows = self._rows[ties[(ties >= 0) & (ties < len(self._rows))]]
         tied = active.copy()
-        tied[own] = 1.0
+        tied[rows] = 1.0
         return tied
 
 
@@ -65,21 +65,14 @@ class ReferenceCell:
         assembled: the cell with the bonds of A.
     """
 
-    def __init__(
-        self,
-        comm: MPI.Intracomm,
-        jump_operator: JumpOperator,
-        operators: InterfaceOperators,
-        one_sided: csr_matrix,
-        active: Float,
-    ) -> None:
+    def __init__(self, operators: InterfaceOperators, one_sided: csr_matrix, active: Float) -> None:
         """Factor the cell with the bonds where `active` (owned rows,) is 1; `one_sided` is B_D.  Collective."""
-        self._comm, self.active = comm, active
-        self._jump_operator, self._operators = jump_operator, operators
+        comm, jump_operator = operators.comm, operators.jump_operator
+        self._comm, self.active, self._jump_operator, self._operators = comm, active, jump_operator, operators
         self._BD, self._BDT = one_sided, one_sided.T.tocsr()
         reached = self._BDT.getnnz(axis=1) > 0
-        self._reached = [bool(reached[own].any()) for own in operators.slices]
-        self.assembled = AssembledSchur(comm, *assembled_stiffness(comm, jump_operator, operators, active))
+        self._reached = [bool(reached[span].any()) for span in operators.slices]
+        self.assembled = AssembledSchur(comm, *assembled_stiffness(operators, active))
         self._is_bonded = not comm.allreduce(bool((active == 0).any()), MPI.LOR)
         self._first = jump_operator.owned[0]
         self._springs = SpringUpdate(comm, self._first, active * operators.compliance, self._without_springs)
@@ -93,7 +86,7 @@ class ReferenceCell:
         return self._springs.apply(self._without_springs(x))
 
     def columns(self, rows: Int) -> Float:
-        """(owned rows, k) Gamma[:, rows] of global rows (k,), the same on every rank.  Collective."""
+        """(owned rows, k) Gamma[:, rows] of global rows (k,), equal on all ranks.  Collective."""
         # A few columns too many are cheaper with others than by themselves.
         chunk = INFLUENCE_CHUNK * min(self._comm.size, CHUNK_RANKS)
         columns = [np.zeros((len(self.active), 0))]
@@ -105,13 +98,15 @@ class ReferenceCell:
         return np.hstack(columns)
 
     def force_of_rigid_motions(self, stiffness: Float) -> float:
-        """Return the largest force, relative to `stiffness` (owned rows,), by jumps of rigid-body motions of size 1.
+        """Return the largest force, relative to `stiffness` (owned rows,), by jumps of unit rigid-body motions.
 
         Collective.
         """
         bodies = zip(self._operators.subdomains, self._operators.dofs, strict=True)
         motions = [s.R[dofs].sum(axis=1) for s, dofs in bodies]
-        moved = np.concatenate([np.zeros(0), *(own / (np.abs(own).max(initial=0.0) or 1.0) for own in motions)])
+        moved = np.concatenate(
+            [np.zeros(0), *(motion / (np.abs(motion).max(initial=0.0) or 1.0) for motion in motions)]
+        )
         jump = scale_rows(self.active, self._jump_operator.sum(self._operators.B @ moved))
         force = scale_rows(self.active, self.respond(jump)) / stiffness
         return float(self._comm.allreduce(np.abs(force).max(initial=0.0), MPI.MAX))
@@ -129,7 +124,7 @@ class ReferenceCell:
         return norm
 
     def _without_springs(self, x: Float) -> Float:
-        """Return the same without the springs at nodes of A where fibre and matrix are both cut.
+        """Gamma x without the springs at nodes of A where fibre and matrix are both cut.
 
         Displacements u = B_D^T g + Z y whose forces S u - B_I^T f vanish on Z; then B_A^T lam = S u - B_I^T f.
         """
@@ -153,19 +148,23 @@ class ReferenceCell:
         return lam + scale_rows(1.0 - self.active, gap)
 
 
-def one_sided_jumps(comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> csr_matrix:
+def one_sided_jumps(operators: InterfaceOperators) -> csr_matrix:
     """(local rows, boundary dofs) B_D with B B_D^T = I that leaves one side of each interface at rest.  Collective.
 
-    So forces are wanted of the other side alone: of the inner body, if it is not so stiff that rounding would show.
+    So only the other side needs forces: the inner body, if it is not so stiff that rounding would show.
     """
+    comm, jump_operator = operators.comm, operators.jump_operator
     inside, B = jump_operator.inside, operators.B.tocoo()
     is_bond = inside >= 0
     inner, mine = inside[B.row], is_bond[B.row]
     # Of each inner body and what is around it: the mean diagonal stiffness.
     side = 2 * inner + operators.of_inner[B.col]
-    most = 2 * (comm.allreduce(int(inside.max(initial=-1)), MPI.MAX) + 1)
+    count_of_sides = 2 * (comm.allreduce(int(inside.max(initial=-1)), MPI.MAX) + 1)
     weights = B.data[mine] ** 2
-    sums = [np.bincount(side[mine], values, most) for values in (weights * operators.diagonal[B.col[mine]], weights)]
+    sums = [
+        np.bincount(side[mine], values, count_of_sides)
+        for values in (weights * operators.diagonal[B.col[mine]], weights)
+    ]
     total, count = allreduce_sum(comm, np.stack(sums))
     outer_mean, inner_mean = (total / np.maximum(count, 1.0)).reshape(-1, 2).T
     moves_inner = np.append(inner_mean <= STIFF_FIBRES * outer_mean, False)[inside]
@@ -174,36 +173,33 @@ def one_sided_jumps(comm: MPI.Intracomm, jump_operator: JumpOperator, operators:
     return csr_matrix(((copies[B.row] * B.data)[moved], (B.row[moved], B.col[moved])), shape=B.shape)
 
 
-def stiffness_of_rows(jump_operator: JumpOperator, operators: InterfaceOperators) -> Float:
+def stiffness_of_rows(operators: InterfaceOperators) -> Float:
     """(owned rows,) 1 / (B D^-1 B^T + C) of each row.  Collective.
 
     D is the diagonal of the bodies' stiffness, C the compliance of the springs.
     """
-    flexibility = jump_operator.sum(operators.B.power(2) @ (1.0 / operators.body_diagonal))
+    flexibility = operators.jump_operator.sum(operators.B.power(2) @ (1.0 / operators.body_diagonal))
     return np.asarray(1.0 / (flexibility + operators.springs))
 
 
 class BondedInverse(Preconditioner):
     """z = H r by the factor of the assembled Schur complement: nothing is left to iterate.
 
-    `ExactInverse` without what follows rows that leave and come: another set of active rows is factored anew.
+    Unlike `ExactInverse` it follows no rows: another set of active rows is factored anew.
     """
 
     norm, soften, is_exact = np.inf, never_softens, True
 
-    def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> None:
+    def __init__(self, operators: InterfaceOperators) -> None:
         """Factor the cell with all bonds; all boundary operators must be dense.  Collective."""
-        self._comm, self._jump_operator, self._operators = comm, jump_operator, operators
-        self._one_sided = one_sided_jumps(comm, jump_operator, operators)
-        first, end = jump_operator.owned
-        self._cell = ReferenceCell(comm, jump_operator, operators, self._one_sided, np.ones(end - first))
+        self._operators, self._one_sided = operators, one_sided_jumps(operators)
+        self._cell = ReferenceCell(operators, self._one_sided, np.ones(len(operators.springs)))
 
     def activate(self, active: Float) -> None:
         """Factor the cell with these bonds, which must hold all bodies, unless it is."""
-        if self._comm.allreduce(bool((active != self._cell.active).any()), MPI.LOR):
+        if self._operators.comm.allreduce(bool((active != self._cell.active).any()), MPI.LOR):
             self._cell.destroy()
-            parts = self._comm, self._jump_operator, self._operators, self._one_sided
-            self._cell = ReferenceCell(*parts, active)
+            self._cell = ReferenceCell(self._operators, self._one_sided, active)
 
     def apply(self, r: Float) -> Float:
         """Return the multipliers that close the jump r on the active rows."""

@@ -1,8 +1,8 @@
-"""The present response from that of the reference cell, by followed columns of the rows C that changed since.
+"""The present response from the response of the reference cell, by followed columns of the rows C that changed.
 
-With W = s of rows that left (1) or came (-1), and dC of those whose springs gained compliance, the transforms of
+With W = s of rows that left (1) or came (-1), and dC of rows whose springs gained compliance, the transforms of
 `followed_response` give Gamma_:C B = Gamma'_:C W with the present response Gamma'.  So all other columns, and
-answers U, follow from those of the reference cell by one product:
+answers U, follow from the columns and answers of the reference cell by one product:
 
     U' = U - Gamma'_:C W U_C,  U 0 before on rows that left or came.
 """
@@ -36,45 +36,45 @@ class ReferenceChanges:
         self._comm, self._first, self._cell, self._followed, self.rows = comm, first, cell, followed, rows
         self._turned, self._more = kinds.T[:, :, None]
         self._weights = np.where(self._turned != 0.0, self._turned, self._more)
-        own = rows - first
-        self._mine = np.flatnonzero((own >= 0) & (own < len(cell.active)))
-        self._own = own[self._mine]
+        places = rows - first
+        self._mine = np.flatnonzero((places >= 0) & (places < len(cell.active)))
+        self._own = places[self._mine]
 
     def present(self, columns: Float) -> Float:
         """(owned rows, k) U' of U (owned rows, k).  Collective."""
-        found = columns.copy()
-        found[self._own[self._turned[self._mine, 0] != 0.0]] = 0.0
-        found -= self._followed.product(self.rows, self._weights * self._gathered(columns))
-        return found
+        response = columns.copy()
+        response[self._own[self._turned[self._mine, 0] != 0.0]] = 0.0
+        response -= self._followed.product(self.rows, self._weights * self._gathered(columns))
+        return response
 
     def refined(self, columns: Float) -> Float:
-        """`present` without the rounding of what is followed, by a step of iterative refinement.  Collective.
+        """`present` without the rounding of followed columns, by one iterative refinement.  Collective.
 
         c = B U_C obeys (Gamma_CC + D) c = U_C with the reference cell's own Gamma.
         """
-        found = self.present(columns)
-        theirs = self._gathered(found)
-        c = self._weights * theirs
-        left = columns - self._cell.respond(self._spread(c))
+        response = self.present(columns)
+        values = self._gathered(response)
+        c = self._weights * values
+        residual = columns - self._cell.respond(self._spread(c))
         # D c of rows that hold in both cells, that came, and that left.
-        stretched = np.where(self._turned == 0.0, theirs, np.where(self._turned < 0.0, -self._more * c, 0.0))
-        rest = self._spread(self._gathered(left) - stretched)
-        left[self._own] = found[self._own]
-        return left + self.present(rest)
+        stretched = np.where(self._turned == 0.0, values, np.where(self._turned < 0.0, -self._more * c, 0.0))
+        rest = self._spread(self._gathered(residual) - stretched)
+        residual[self._own] = response[self._own]
+        return residual + self.present(rest)
 
     def error(self, rows: Int, columns: Float, stiffness: Float) -> float:
-        """Return how far new columns (owned rows, k) of global rows (k,), none of C, are off what is followed of C.
+        """Return how far new columns (owned rows, k) of global rows (k,), none of C, are off the followed columns of C.
 
         Gamma' is symmetric.  Relative to the largest entry, each by its units: `stiffness` (all rows,) on active rows.
         Collective.
         """
         rows, columns = rows[:CHECKED_COLUMNS], columns[:, :CHECKED_COLUMNS]
-        theirs, ours = self._gathered(columns), self._followed.entries(rows, self.rows).T
+        entries, followed = self._gathered(columns), self._followed.entries(rows, self.rows).T
         holds = self._turned[:, 0] <= 0.0, gather_rows(self._comm, self._cell.active, self._first, rows) > 0.0
-        pairs = zip(holds, (np.sqrt(stiffness[each]) for each in (self.rows, rows)), strict=True)
-        units = np.multiply.outer(*(np.where(own, 1.0 / root, root) for own, root in pairs))
-        off, largest = (np.abs(units * x).max(initial=0.0) for x in (theirs - ours, theirs))
-        return float(self._comm.bcast(off / max(largest, 1.0)))
+        pairs = zip(holds, (np.sqrt(stiffness[some]) for some in (self.rows, rows)), strict=True)
+        units = np.multiply.outer(*(np.where(is_active, 1.0 / root, root) for is_active, root in pairs))
+        error, largest = (np.abs(units * x).max(initial=0.0) for x in (entries - followed, entries))
+        return float(self._comm.bcast(error / max(largest, 1.0)))
 
     def _gathered(self, x: Float) -> Float:
         return gather_rows(self._comm, x, self._first, self.rows)

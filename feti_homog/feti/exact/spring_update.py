@@ -36,18 +36,18 @@ class SpringUpdate:
             ConvergenceError: the springs are so soft beside the bodies that rounding of H hides them.
         """
         self.comm, self.first = comm, first
-        own = np.flatnonzero(compliance)
-        self.rows = np.concatenate(comm.allgather(first + own))
+        places = np.flatnonzero(compliance)
+        self.rows = np.concatenate(comm.allgather(first + places))
         if not len(self.rows):
             return
         mine = (self.rows >= first) & (self.rows < first + len(compliance))
         unit = np.zeros((len(compliance), len(self.rows)))
-        unit[own, np.flatnonzero(mine)] = 1.0
+        unit[places, np.flatnonzero(mine)] = 1.0
         self._columns = inverse(unit)
-        stiffness = 1.0 / np.concatenate(comm.allgather(compliance[own]))
+        stiffness = 1.0 / np.concatenate(comm.allgather(compliance[places]))
         block = gather_rows(comm, self._columns, first, self.rows)
         self._factor = agree(comm, _factored, np.diag(stiffness) + (block + block.T) / 2)
-        self._own, self._mine, self._stiffness = own, mine, stiffness[mine]
+        self._own, self._mine, self._stiffness = places, mine, stiffness[mine]
 
     def apply(self, z: Float) -> Float:
         """Return the updated H times r, for z = H r (owned rows,) or (owned rows, k). Collective."""
@@ -72,7 +72,7 @@ def _factored(block: Float) -> tuple[Float, bool]:
 
 
 class SpringUpdated(Preconditioner):
-    """A preconditioner with the update for the springs of all active rows, and for what they soften."""
+    """A preconditioner with the update for the springs of all active rows, which may soften."""
 
     def __init__(self, comm: MPI.Intracomm, inner: Preconditioner, first: int, compliance: Float) -> None:
         """Arguments as of `SpringUpdate`; `inner` is H, for all rows active.  Collective."""
@@ -87,7 +87,7 @@ class SpringUpdated(Preconditioner):
         return self._inner.norm
 
     def soften(self, more: Float) -> None:
-        """Let `more` (owned rows,) be what the springs gained in compliance, from the next `activate` on."""
+        """Let springs have `more` compliance (owned rows,) than at first, from the next `activate` on."""
         self._compliance = self._left_out + more
 
     def activate(self, active: Float) -> None:

@@ -56,8 +56,8 @@ class ShiftedFactor:
 
     Attributes:
         factor: L with L L^T = K + D.
-        rows: (n,) those to which K is condensed.
-        D: (n,) > 0, what is added to the diagonal of K on `rows`.
+        rows: (n,) rows to which K is condensed.
+        D: (n,) > 0, added to the diagonal of K on `rows`.
     """
 
     factor: PartialFactor
@@ -123,7 +123,7 @@ def _by_cholmod(matrix: csr_matrix, rows: Int, loads: Float, order: Int, keep_fa
     D = csr_matrix((shift, (rows, rows)), shape=matrix.shape)
     factor = PartialFactor(csr_matrix(matrix + D), rows, order)
     U, y = factor.last_block(), factor.forward(loads)
-    kept = ShiftedFactor(factor, rows, shift) if keep_factor else None
+    shifted = ShiftedFactor(factor, rows, shift) if keep_factor else None
     del factor  # before S needs its memory
     inner, last = y[:-n], y[-n:]
     q = dtrmm(1.0, U, last[::-1])[::-1].copy()
@@ -132,7 +132,7 @@ def _by_cholmod(matrix: csr_matrix, rows: Int, loads: Float, order: Int, keep_fa
     check_lapack("dlauum", dlauum(U, lower=0, overwrite_c=1)[1])
     S = full_from_lower(U[::-1, ::-1]).T
     S[np.diag_indices(n)] -= shift
-    return CondensedMatrix(S, q, -inner.T @ inner, kept)
+    return CondensedMatrix(S, q, -inner.T @ inner, shifted)
 
 
 def _by_mumps(matrix: csr_matrix, rows: Int) -> Float:
@@ -231,7 +231,7 @@ def check_lapack(routine: str, info: int) -> None:
 
 
 def invert_upper(A: Float) -> None:
-    """Let the upper triangle and the diagonal of the SPD matrix A (n, n), in Fortran order, become those of A^-1.
+    """Invert an SPD matrix A (n, n), in Fortran order, in its upper triangle and diagonal.
 
     The strict lower triangle stays.
 
@@ -257,27 +257,27 @@ def _invert_triangle(U: Float) -> None:
 
 
 def full_from_lower(A: Float, block: int = MIRRORED_BLOCK_ROWS) -> Float:
-    """Return the symmetric matrix, in C order, whose lower triangle is that of A (n, n).
+    """Return the symmetric matrix, in C order, with the lower triangle of A (n, n).
 
     By blocks that fit the cache.
     """
-    whole, lower = A.copy(order="F"), np.tri(block, dtype=bool)
+    full, lower = A.copy(order="F"), np.tri(block, dtype=bool)
     for j in range(0, len(A), block):
         some = slice(j, j + block)
-        whole[:j, some] = whole[some, :j].T
-        corner = whole[some, some]
-        whole[some, some] = np.where(lower[: len(corner), : len(corner)], corner, corner.T)
-    return np.asarray(whole.T)
+        full[:j, some] = full[some, :j].T
+        corner = full[some, some]
+        full[some, some] = np.where(lower[: len(corner), : len(corner)], corner, corner.T)
+    return np.asarray(full.T)
 
 
 def product_with_some(columns: Float, at: Int, x: Float) -> Float:
-    """columns[:, at] x of (n, m) columns, for x (c,) or (c, k), with a copy of a few of them at a time at most."""
+    """columns[:, at] x of (n, m) columns, for x (c,) or (c, k), which copies a few columns at a time."""
     k = x.size // max(len(x), 1)
     if len(at) * (k + COPIED_COLUMNS) > columns.shape[1] * k:
         # A product with all columns is cheaper than a copy of some.
-        whole = np.zeros((columns.shape[1], *x.shape[1:]))
-        whole[at] = x
-        return np.asarray(columns @ whole)
+        padded = np.zeros((columns.shape[1], *x.shape[1:]))
+        padded[at] = x
+        return np.asarray(columns @ padded)
     product = np.zeros((len(columns), *x.shape[1:]))
     for some in np.array_split(np.arange(len(at)), len(at) // COPIED_AT_ONCE + 1):
         product += columns[:, at[some]] @ x[some]

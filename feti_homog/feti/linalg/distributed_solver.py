@@ -38,7 +38,7 @@ class DistributedSolver:
         """Assemble and factor A, and free the factor before.  Collective.
 
         Args:
-            unknowns: (u,) numbers of the unknowns of this rank, ascending; several ranks may have one.
+            unknowns: (u,) numbers of local unknowns, ascending; several ranks may have one.
             part: (u, u) this rank's part of the sum.
             near_kernel: (u, c) vectors of little energy, for multigrid.
 
@@ -69,14 +69,14 @@ class DistributedSolver:
         library = PETSc.Mat.SolverType.MUMPS if self.is_distributed else PETSc.Mat.SolverType.CHOLMOD
         if near_kernel is not None:
             # A basis (n, m), without zeros, that ranks with the same unknown agree on.
-            whole = self._sum(near_kernel) / np.maximum(self._sum(np.ones((len(near_kernel), 1))), 1.0)
-            near_kernel = np.linalg.qr(whole[:, whole.any(axis=0)])[0]
+            mean = self._sum(near_kernel) / np.maximum(self._sum(np.ones((len(near_kernel), 1))), 1.0)
+            near_kernel = np.linalg.qr(mean[:, mean.any(axis=0)])[0]
         # Before a factor that may fail on one rank alone.
         self._x, self._b = matrix.createVecs()
         self._ksp = factored(matrix, self._prefix, library, near_kernel)
 
     def solve(self, B: Float) -> Float:
-        """A^-1 times the sum over ranks of right-hand sides, on the unknowns of this rank.  Collective.
+        """A^-1 times right-hand sides summed over ranks, on the local unknowns.  Collective.
 
         Each rank has a part B (u,) or (u, k) of them.
         """

@@ -37,11 +37,9 @@ ORDERED: Options = {"pc_factor_mat_ordering_type": "natural", "mat_cholmod_nmeth
 
 
 def power_of_two(diagonal: Float, comm: MPI.Intracomm | None = None) -> float:
-    """Return the factor that brings the largest entry of a diagonal to between 1 and 2.
+    """Return the factor that brings the largest entry of a diagonal to between 1 and 2; 1 where none is positive.
 
-    With a communicator the largest entry is that of all ranks' parts.
-
-    It is 1 where none is positive.  Collective, if there are ranks.
+    With a communicator the diagonal is spread over its ranks.  Collective then.
 
     Raises:
         LinAlgError: an entry is not finite; on all ranks.
@@ -55,7 +53,7 @@ def power_of_two(diagonal: Float, comm: MPI.Intracomm | None = None) -> float:
 
 
 def check_factor(pc: PETSc.PC) -> None:
-    """Read what the library of a factored `pc` returned beside the factor.
+    """Check the status that the library of a factored `pc` returned beside the factor.
 
     Raises:
         LinAlgError: the matrix of a Cholesky factorization is not positive definite, or pivots are too small for MUMPS.
@@ -178,17 +176,17 @@ def factored(
         try:
             ksp.setUp()
         except PETSc.Error as error:
-            words = error_words(error)
-            if words.endswith(CHOLMOD_OUT_OF_MEMORY):
-                raise MemoryError(words) from error
-            raise np.linalg.LinAlgError(f"not positive definite ({words})") from error
+            message = error_words(error)
+            if message.endswith(CHOLMOD_OUT_OF_MEMORY):
+                raise MemoryError(message) from error
+            raise np.linalg.LinAlgError(f"not positive definite ({message})") from error
     check_factor(ksp.getPC())
     return ksp
 
 
 @contextmanager
 def _unless_given(options: Options, prefix: str) -> Iterator[None]:
-    """Have the options while the block lasts, those that are given excepted."""
+    """Set options while the block lasts, unless the user has set them."""
     database = PETSc.Options(prefix)
     added = {name: value for name, value in options.items() if not database.hasName(name)}
     for name, value in added.items():
@@ -201,7 +199,7 @@ def _unless_given(options: Options, prefix: str) -> Iterator[None]:
 
 
 def _set_near_kernel(A: PETSc.Mat, near_kernel: Float | None) -> None:
-    """Attach the near-kernel (n, k) to the matrix, the same on all of its ranks."""
+    """Attach the near-kernel (n, k), equal on all ranks, to the matrix."""
     if near_kernel is None or not near_kernel.shape[1]:
         return
     vectors = [A.createVecLeft() for _ in near_kernel.T]
@@ -246,7 +244,7 @@ def _destroy(ksp: PETSc.KSP, *vectors: PETSc.Vec) -> None:
 
 
 def sequential(matrix: csr_matrix) -> PETSc.Mat:
-    """Return the matrix as PETSc's, on this rank alone; both have the same arrays."""
+    """Return the matrix as PETSc's, on this rank alone; both share their arrays."""
     matrix.sort_indices()
     csr = matrix.indptr, matrix.indices, matrix.data
     return PETSc.Mat().createAIJWithArrays(matrix.shape, csr, comm=PETSc.COMM_SELF)

@@ -16,7 +16,7 @@ class DenseBlockSum:
     """The sparse sum of dense blocks that are added one after the other.
 
     Blocks wait in a buffer, which is added to the sum when it has more than `max_buffered_entries` entries and more
-    than the sum itself.  So memory is at most about twice that of the sum, which is copied only when it has doubled.
+    than the sum itself.  So memory is at most about twice the sum, which is copied only when it has doubled.
     """
 
     def __init__(self, shape: tuple[int, int], max_buffered_entries: int = MAX_BUFFERED_ENTRIES) -> None:
@@ -66,7 +66,7 @@ def scaled(A: csr_matrix, weights: Float) -> csr_matrix:
 def assemble_owned_rows(
     comm: MPI.Intracomm, local: csr_matrix, rows: Int, columns: Int, owned: tuple[int, int]
 ) -> csr_matrix:
-    """Return the owned rows of the sum over ranks of `local`. Collective.
+    """Return the owned rows of `local` summed over ranks.  Collective.
 
     Args:
         local: (r, c) this rank's contribution.
@@ -84,24 +84,24 @@ def assemble_owned_rows(
 
 
 def gathered_sum(comm: MPI.Intracomm, part: csr_matrix, unknowns: Int, total: int) -> csr_matrix:
-    """Return the sum (n, n) over ranks of `part` (u, u) in the `unknowns` (u,), the same on every rank.  Collective."""
+    """Return the sum (n, n) over ranks of `part` (u, u) in the `unknowns` (u,), on every rank.  Collective."""
     entries = part.tocoo()
-    own = unknowns[entries.row], unknowns[entries.col], entries.data
-    rows, columns, values = (np.concatenate(parts) for parts in zip(*comm.allgather(own), strict=True))
+    triples = unknowns[entries.row], unknowns[entries.col], entries.data
+    rows, columns, values = (np.concatenate(parts) for parts in zip(*comm.allgather(triples), strict=True))
     return csr_matrix((values, (rows, columns)), shape=(total, total))
 
 
 def add_shared_rows(comm: MPI.Intracomm, local: csr_matrix, rows: Int, is_shared_row: Bool, owned: int) -> csr_matrix:
-    """`local` with what other ranks have in the same rows added.  Collective.
+    """Add the entries of other ranks in shared rows to `local`.  Collective.
 
     Args:
-        local: (r, n) this rank's contribution, with the same n columns on every rank.
+        local: (r, n) this rank's contribution; the n columns are common to all ranks.
         rows: (r,) global numbers of its rows.
         is_shared_row: (r,) whether other ranks have the row too; only these travel.
         owned: number of rows that this rank owns.
 
     Returns:
-        (r, n) the same rows of the sum over ranks.
+        (r, n) these rows of the sum over ranks.
     """
     if comm.size == 1:
         return local
@@ -110,11 +110,11 @@ def add_shared_rows(comm: MPI.Intracomm, local: csr_matrix, rows: Int, is_shared
     narrow = csr_matrix((shared.data, indices, shared.indptr), shape=(shared.shape[0], len(used)))
     A = _assemble(comm, narrow, rows[is_shared_row], used, (owned, _even_share(comm, n)))
     # In descending order: PETSc 3.18 mixes up the columns if every rank asks for all rows in ascending order.
-    wanted = PETSc.IS().createGeneral(rows[is_shared_row][::-1].astype(PETSc.IntType), comm=PETSc.COMM_SELF)
+    asked_rows = PETSc.IS().createGeneral(rows[is_shared_row][::-1].astype(PETSc.IntType), comm=PETSc.COMM_SELF)
     all_columns = PETSc.IS().createStride(n, 0, 1, comm=PETSc.COMM_SELF)
-    sums = A.createSubMatrices(wanted, all_columns)[0]
+    sums = A.createSubMatrices(asked_rows, all_columns)[0]
     indptr, indices, data = sums.getValuesCSR()
-    for petsc_object in (sums, A, wanted, all_columns):
+    for petsc_object in (sums, A, asked_rows, all_columns):
         petsc_object.destroy()
     at = np.flatnonzero(is_shared_row)[::-1]
     place = csr_matrix((np.ones(len(at)), (at, np.arange(len(at)))), shape=(len(rows), len(at)))
@@ -132,16 +132,16 @@ def assemble_distributed(comm: MPI.Intracomm, part: csr_matrix, numbers: Int, to
 
 
 def allreduce_sparse(comm: MPI.Intracomm, part: csr_matrix) -> csr_matrix:
-    """Return the sum over ranks of small sparse square matrices of one shape, on every rank. Collective."""
+    """Sum small sparse square matrices over ranks, on every rank.  Collective."""
     if comm.size == 1:
         return part
     some = np.union1d(np.flatnonzero(np.diff(part.indptr)), part.indices)
     A = assemble_distributed(comm, part[some][:, some], some, part.shape[0])
-    own = A.getValuesCSR()
+    parts = A.getValuesCSR()
     A.destroy()
-    counts, entries = (np.array(comm.allgather(n)) for n in (len(own[0]) - 1, len(own[1])))
-    lengths = allgather_rows(comm, np.diff(own[0]), counts)
-    indices, values = (allgather_rows(comm, x, entries) for x in own[1:])
+    counts, entries = (np.array(comm.allgather(n)) for n in (len(parts[0]) - 1, len(parts[1])))
+    lengths = allgather_rows(comm, np.diff(parts[0]), counts)
+    indices, values = (allgather_rows(comm, x, entries) for x in parts[1:])
     return csr_matrix((values, indices, np.concatenate([[0], np.cumsum(lengths)])), shape=part.shape)
 
 
@@ -159,8 +159,8 @@ def _assemble(comm: MPI.Intracomm, local: csr_matrix, rows: Int, columns: Int, o
     part = PETSc.Mat().createAIJ(csr.shape, csr=(csr.indptr, csr.indices, csr.data), comm=PETSc.COMM_SELF)
     A.setISLocalMat(part)
     A.assemble()
-    whole = PETSc.Mat()
-    A.convert(PETSc.Mat.Type.AIJ, whole)
+    assembled = PETSc.Mat()
+    A.convert(PETSc.Mat.Type.AIJ, assembled)
     for petsc_object in (A, part, *maps):
         petsc_object.destroy()
-    return whole
+    return assembled

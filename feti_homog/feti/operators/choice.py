@@ -1,4 +1,4 @@
-"""Choice of the subdomains with dense boundary operators, and of those examined for soft modes face by face.
+"""Choice of the subdomains with dense boundary operators, or examined for soft modes face by face.
 
 A pure function of sizes: it needs no mesh and no MPI.
 """
@@ -19,7 +19,7 @@ class SubdomainSize:
 
     Attributes:
         dofs: degrees of freedom of the subdomain.
-        boundary_dofs: those of them that constraints act on.
+        boundary_dofs: degrees of freedom that constraints act on.
         is_whole_body: whether all that the subdomain shares, it shares with one other body.
         has_springs: whether springs hold it, with which its stiffness is a dense matrix.
     """
@@ -57,7 +57,7 @@ def choose(
     them, but for large whole bodies, which are examined face by face.
 
     Args:
-        kind: of KINDS; what the user asks for, `auto` leaves the choice here.
+        kind: of KINDS, the user's choice; `auto` leaves it to this function.
         applications: how many times the operators are expected to be applied.
         soft_modes: whether soft modes will be looked for.
         can_condense: whether PETSc has MUMPS, which condenses subdomains to their boundaries.
@@ -67,8 +67,8 @@ def choose(
         n = size.boundary_dofs
         facewise = size.is_whole_body and n > thresholds.whole_boundary_dofs and not size.has_springs
         pays = DENSE_INVERSE_SECONDS * n**3 <= APPLY_SECONDS * size.dofs * applications
-        wanted = pays or size.has_springs or (soft_modes and not facewise)
+        is_useful = pays or size.has_springs or (soft_modes and not facewise)
         possible = n <= thresholds.dense_boundary_dofs and can_condense
-        explicit = kind == "explicit" or (kind == "auto" and wanted and possible)
+        explicit = kind == "explicit" or (kind == "auto" and is_useful and possible)
         choices.append(OperatorChoice(explicit and n > 0, facewise))
     return choices

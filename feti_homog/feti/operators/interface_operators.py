@@ -37,8 +37,8 @@ class DualOperator:
         compliance: (owned rows,) the diagonal C.
     """
 
-    def __init__(self, jump_operator: JumpOperator, boundary: InterfaceOperators, compliance: Float) -> None:
-        self.jump_operator, self.boundary, self.compliance = jump_operator, boundary, compliance
+    def __init__(self, boundary: InterfaceOperators, compliance: Float) -> None:
+        self.jump_operator, self.boundary, self.compliance = boundary.jump_operator, boundary, compliance
 
     def apply(self, x: Float) -> Float:
         """Return sum_s B K+ B^T x + C x for x (owned rows,) or (owned rows, k)."""
@@ -61,15 +61,15 @@ class InterfaceOperators:
         offsets: (subdomains + 1,) where each subdomain begins among the n.
         local_dofs: (n,) their numbers among all dofs of this rank.
         operators: of each subdomain, dense matrices or sparse factors.
-        with_springs: the same with the springs on which a body is, for the preconditioner and the coarse space.
+        with_springs: operators with the springs on which a body is, for preconditioner and coarse space.
         facewise: whether the soft modes of each are to be looked for face by face.
         B: (local rows, n) the constraints on them, and `BT` its transpose.
-        of_inner: (n,) whether each boundary dof is that of the inner of two bodies.
+        of_inner: (n,) whether each boundary dof belongs to the inner of two bodies.
         body_diagonal: (n,) the diagonal of K.
-        diagonal: (n,) the same for scaling jumps: its compressible share, in series with the springs of the body.
-        interiors: kept factors of interiors, by the place of the subdomain.
+        diagonal: (n,) its compressible share, in series with the springs of the body: it scales jumps.
+        interiors: kept interior factors, by place of the subdomain.
         springs: (owned rows,) compliance of the springs.
-        compliance: (owned rows,) the same of springs that belong to no subdomain, as both bodies are cut; else 0.
+        compliance: (owned rows,) of springs that belong to no subdomain, as both bodies are cut; else 0.
     """
 
     def __init__(
@@ -85,10 +85,11 @@ class InterfaceOperators:
     ) -> None:
         """Factor every subdomain, once, as `choose` chooses; takes the stiffness of each.  Arguments as of `choose`.
 
-        `compliance` (local rows,) is that of the springs of the interfaces, None where no rank has any.  `keep_factors`
-        of dense operators for `extend`.  Nothing is communicated: a rank may fail alone.
+        `compliance` (local rows,) belongs to the interface springs, None where no rank has any.  `keep_factors` of
+        dense operators for `extend`.  Nothing is communicated: a rank may fail alone.
         """
-        self.subdomains, self._loads = subdomains, len(jump_operator.problem.loads)
+        self.comm, self.jump_operator, self.subdomains = jump_operator.comm, jump_operator, subdomains
+        self._loads = len(jump_operator.problem.loads)
         self.dofs = _constrained_dofs(jump_operator.B, subdomains)
         self.offsets = np.cumsum([0, *(len(d) for d in self.dofs)])
         first = np.cumsum([0, *(s.n_dofs for s in subdomains)])
@@ -100,9 +101,9 @@ class InterfaceOperators:
         can_condense = bool(PETSc.Sys.hasExternalPackage("mumps"))
         first_row, last_row = jump_operator.owned
         at = int(np.searchsorted(jump_operator.rows, first_row))
-        own = slice(at, at + last_row - first_row)
-        self.springs = np.zeros(last_row - first_row) if compliance is None else compliance[own]
-        self.compliance = np.where((jump_operator.copies[own] > 1).all(axis=1), self.springs, 0.0)
+        owned = slice(at, at + last_row - first_row)
+        self.springs = np.zeros(last_row - first_row) if compliance is None else compliance[owned]
+        self.compliance = np.where((jump_operator.copies[owned] > 1).all(axis=1), self.springs, 0.0)
         self.of_inner = self._inner_dofs(jump_operator)
         roots = self._compliance_roots(jump_operator.copies, compliance)
         springs = [not s.is_outer and root is not None for s, root in zip(subdomains, roots, strict=True)]
@@ -125,11 +126,11 @@ class InterfaceOperators:
         self.body_diagonal, self.diagonal = np.concatenate(bodies), np.concatenate(diagonals)
 
     def _compliance_roots(self, copies: Int, compliance: Float | None) -> list[csr_matrix | None]:
-        """Compute the root of the compliance of each subdomain's springs, None without any."""
+        """Compute the compliance root of each subdomain's springs, None without any."""
         if compliance is None:
             return [None for _ in self.subdomains]
-        found = [compliance_root(self.B[:, span], compliance, copies, self.of_inner[span]) for span in self.slices]
-        return [root if root.shape[1] else None for root in found]
+        roots = [compliance_root(self.B[:, span], compliance, copies, self.of_inner[span]) for span in self.slices]
+        return [root if root.shape[1] else None for root in roots]
 
     @cached_property
     def slices(self) -> list[slice]:
@@ -158,9 +159,9 @@ class InterfaceOperators:
         """S~ x for x (n,) or (n, k) on some of the subdomains, 0 on the others."""
         x = np.asfortranarray(x)
         y = np.zeros(x.shape, order="F")
-        for operator, own, is_wanted in zip(self.with_springs, self.slices, which, strict=True):
-            if is_wanted and x[own].any():
-                operator.apply_schur(x[own], y[own])
+        for operator, span, is_wanted in zip(self.with_springs, self.slices, which, strict=True):
+            if is_wanted and x[span].any():
+                operator.apply_schur(x[span], y[span])
         return y
 
     def apply_flexibility(self, x: Float) -> Float:
@@ -171,8 +172,8 @@ class InterfaceOperators:
         """Return the operators of the subdomains, each applied to its part of x (n,) or (n, k)."""
         x = np.asfortranarray(x)
         y = np.empty(x.shape, order="F")
-        for apply, own in zip(applied, self.slices, strict=True):
-            apply(x[own], y[own])
+        for apply, span in zip(applied, self.slices, strict=True):
+            apply(x[span], y[span])
         return y
 
     @cached_property
@@ -185,10 +186,10 @@ class InterfaceOperators:
     def condensed(self) -> CondensedLoads:
         """The unit loads on all boundaries, and the sum of the stiffnesses."""
         v = self._loads
-        each = [operator.condensed for operator in self.operators]
-        boundary = np.concatenate([np.zeros((0, v)), *(own.boundary for own in each)])
-        of_stresses = sum((own.stiffness for own in each), np.zeros((v, v)))
-        return CondensedLoads(boundary, of_stresses, sum((own.energy for own in each), np.zeros((v, v))))
+        parts = [operator.condensed for operator in self.operators]
+        boundary = np.concatenate([np.zeros((0, v)), *(part.boundary for part in parts)])
+        of_stresses = sum((part.stiffness for part in parts), np.zeros((v, v)))
+        return CondensedLoads(boundary, of_stresses, sum((part.energy for part in parts), np.zeros((v, v))))
 
     def extend(self, place: int, x: Float, loads: Float | None = None, keep: bool = True) -> Float:
         """(dofs, k) displacements of the subdomain at a place, of x (n_s, k) on its boundary and loads (v, k), if any.
@@ -201,8 +202,8 @@ class InterfaceOperators:
             return operator.extend(x, loads)
         if isinstance(operator, ImplicitInterfaceOperator):
             interior = operator.interior
-        elif (kept := self.interiors.get(place)) is not None:
-            interior = kept
+        elif (stored := self.interiors.get(place)) is not None:
+            interior = stored
         else:
             interior = Interior(s.take_stiffness(), self.dofs[place], s.elimination_order())
             if keep:
@@ -240,14 +241,14 @@ def _factor(subdomain: Subdomain, dofs: Int, explicit: bool, keep_factor: bool) 
 
 
 def _constrained_dofs(B: csr_matrix, subdomains: Sequence[Subdomain]) -> list[Int]:
-    """Local numbers of the dofs of each subdomain that constraints act on, all of a node."""
+    """Local numbers of the dofs in each subdomain that constraints act on, node by node."""
     constrained = np.split(B.getnnz(axis=0) > 0, np.cumsum([s.n_dofs for s in subdomains]))[:-1]
     pairs = zip(subdomains, constrained, strict=True)
-    return [s.problem.dofs(np.unique(s.problem.nodes(np.flatnonzero(own)))) for s, own in pairs]
+    return [s.problem.dofs(np.unique(s.problem.nodes(np.flatnonzero(is_constrained)))) for s, is_constrained in pairs]
 
 
 def _sizes(shared: SharedEntities, subdomains: Sequence[Subdomain], dofs: Sequence[Int]) -> list[SubdomainSize]:
-    """Return the sizes of each subdomain on which the choice of operators depends."""
+    """Return the subdomain sizes on which the choice of operators depends."""
     entity = np.repeat(np.arange(len(shared.key)), shared.copies)
     first, last = shared.pointer[:-1], shared.pointer[1:] - 1
     between_two_bodies = (shared.copies == 2) & (shared.body[first] != shared.body[last])

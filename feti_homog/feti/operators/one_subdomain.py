@@ -89,13 +89,13 @@ class ExplicitInterfaceOperator:
         """
         y = self._product(x, out, self._flexibility_diagonal, lower=0)
         if self._refines:
-            left = x - self.apply_schur(y)
-            left[self._fixed] -= self._term @ y[self._fixed]
-            y += self._product(left, None, self._flexibility_diagonal, lower=0)
+            residual = x - self.apply_schur(y)
+            residual[self._fixed] -= self._term @ y[self._fixed]
+            y += self._product(residual, None, self._flexibility_diagonal, lower=0)
         return y
 
     def _product(self, x: Float, out: Float | None, diagonal: Float, lower: int) -> Float:
-        """Return the symmetric matrix of one triangle of the array, and of a diagonal, times x.
+        """Multiply the symmetric matrix in one triangle of the array, and a diagonal, with x.
 
         Fastest in Fortran order.
         """
@@ -103,8 +103,8 @@ class ExplicitInterfaceOperator:
         if out is None:
             out = np.empty(x.shape, order="F")
         if x.size > DENSE_COLUMNS_ONE_BY_ONE * self.n:
-            own = np.multiply(diagonal[:, None], x, order="F")
-            out[:] = dsymm(1.0, A, x, beta=1.0, c=own, overwrite_c=1, lower=lower)
+            scaled = np.multiply(diagonal[:, None], x, order="F")
+            out[:] = dsymm(1.0, A, x, beta=1.0, c=scaled, overwrite_c=1, lower=lower)
         else:
             for column, result in zip(x.reshape(self.n, -1).T, out.reshape(self.n, -1).T, strict=True):
                 np.multiply(diagonal, column, out=result)
@@ -162,7 +162,7 @@ class CondensedLoads:
 
 
 class ImplicitInterfaceOperator:
-    """S and the boundary part of K+ of one subdomain, on its n boundary dofs."""
+    """S and the boundary part of K+ for one subdomain, on its n boundary dofs."""
 
     is_dense = False
 
@@ -179,8 +179,8 @@ class ImplicitInterfaceOperator:
             self.condensed = CondensedLoads(s.Q[dofs], C, C + s.Q.T @ u + u.T @ (K @ u))
             return
         # A single subdomain has no boundary: any of its nodes can be fixed.
-        own = subdomain.problem.nodes(dofs)
-        nodes = np.unique(own) if len(dofs) else np.arange(subdomain.mesh.n_classes)
+        boundary = subdomain.problem.nodes(dofs)
+        nodes = np.unique(boundary) if len(dofs) else np.arange(subdomain.mesh.n_classes)
         self._solver = DirectSolver(subdomain.regularised(K, nodes), "feti_sub_")
 
     @cached_property
@@ -224,9 +224,9 @@ class Interior:
     answers: Float | None = None
 
     def __init__(self, K: csr_matrix, dofs: Int, order: Int | None = None) -> None:
-        """Split K (cn, cn) and factor K_ii; `dofs` (n,) are those of the boundary.  Options under `feti_interior_`.
+        """Split K (cn, cn) at the boundary `dofs` (n,) and factor K_ii.  Options under `feti_interior_`.
 
-        `order` (cn,) is an order of elimination of all dofs; without it the library chooses one.
+        `order` (cn,) is an elimination order of all dofs; without it the library chooses one.
         """
         inside = np.ones(K.shape[0], bool)
         inside[dofs] = False

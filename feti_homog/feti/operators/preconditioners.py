@@ -10,10 +10,9 @@ from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
-from mpi4py import MPI
 from scipy.sparse import csr_matrix, diags
 
-from feti_homog.feti.decomposition.jump_operator import JumpOperator, NodeBlocks
+from feti_homog.feti.decomposition.jump_operator import NodeBlocks
 from feti_homog.feti.operators.interface_operators import InterfaceOperators
 from feti_homog.typing import Float
 
@@ -50,7 +49,7 @@ class Preconditioner(Protocol):
 
 
 def never_softens(preconditioner: Preconditioner, more: Float) -> None:
-    """Raise ValueError: `soften` of those that `SpringUpdated` does not update."""
+    """Raise ValueError: `soften` without `SpringUpdated`."""
     raise ValueError("springs soften, and the preconditioner was set up for springs that never do")
 
 
@@ -77,21 +76,15 @@ class StiffnessScaled(Preconditioner):
 
     norm, soften = np.inf, never_softens
 
-    def __init__(
-        self,
-        comm: MPI.Intracomm,
-        jump_operator: JumpOperator,
-        operators: InterfaceOperators,
-        stiffness: Callable[[Float], Float],
-    ) -> None:
+    def __init__(self, operators: InterfaceOperators, stiffness: Callable[[Float], Float]) -> None:
         """`stiffness` is x -> S x for x (boundary dofs,) or (boundary dofs, k).  Collective."""
-        self.jump_operator, self.stiffness = jump_operator, stiffness
+        self.jump_operator, self.stiffness = operators.jump_operator, stiffness
         # All dofs of a node are on the boundary.
-        c = jump_operator.components
+        c = self.jump_operator.components
         flexibility = diags(np.repeat(1.0 / operators.diagonal.reshape(-1, c).mean(axis=1), c))
         self.BD: csr_matrix = (operators.B @ flexibility).tocsr()
         self.DBT = self.BD.T.tocsr()
-        self.W = NodeBlocks(comm, jump_operator, self.BD @ operators.B.T)
+        self.W = NodeBlocks(operators.comm, self.jump_operator, self.BD @ operators.B.T)
         self.activate(np.ones(self.W.rows))
 
     def activate(self, active: Float) -> None:
@@ -103,7 +96,7 @@ class StiffnessScaled(Preconditioner):
         return np.asarray(self.DBT @ self.jump_operator.gather(self.W_inverse @ g))
 
     def multipliers(self, forces: Float) -> Float:
-        """B_D f = W^-1 B D^-1 f: those on the active rows with B^T lam = f, if there are any."""
+        """B_D f = W^-1 B D^-1 f: lam on the active rows with B^T lam = f, if there is any."""
         return np.asarray(self.W_inverse @ self.jump_operator.sum(self.BD @ forces))
 
     def apply(self, r: Float) -> Float:
@@ -114,12 +107,12 @@ class StiffnessScaled(Preconditioner):
 class Dirichlet(StiffnessScaled):
     """Around the Schur complements."""
 
-    def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> None:
-        super().__init__(comm, jump_operator, operators, operators.apply_with_springs)
+    def __init__(self, operators: InterfaceOperators) -> None:
+        super().__init__(operators, operators.apply_with_springs)
 
 
 class Lumped(StiffnessScaled):
     """Around the boundary blocks of K."""
 
-    def __init__(self, comm: MPI.Intracomm, jump_operator: JumpOperator, operators: InterfaceOperators) -> None:
-        super().__init__(comm, jump_operator, operators, operators.Kbb.__matmul__)
+    def __init__(self, operators: InterfaceOperators) -> None:
+        super().__init__(operators, operators.Kbb.__matmul__)

@@ -1,4 +1,4 @@
-"""Boundary operators of a subdomain: their protocol, and those of a body with springs on its boundary.
+"""Boundary operators of a subdomain: their protocol, and operators of a body with springs on its boundary.
 
 At the far ends of the springs the flexibility is S+ + C, with C = T T^T, and the stiffness is
 
@@ -6,7 +6,7 @@ At the far ends of the springs the flexibility is S+ + C, with C = T T^T, and th
     G = A - A T (I + T^T A T)^-1 T^T A,  A = S + s R R^T,
 
 for the kernel R, orthonormal, and a stiffness s of the size of S.  However soft the springs are, nothing cancels: A has
-no kernel, R is that of S~ but for rounding of S~, and along the springs
+no kernel, R is the kernel of S~ but for rounding, and along the springs
 
     T^T G = (I + T^T A T)^-1 T^T A
 
@@ -57,7 +57,7 @@ def is_dense(operator: BoundaryOperator) -> TypeGuard[DenseOperator]:
 
 
 class _Softening:
-    """From products with S to those with S~.
+    """Turns products with S into products with S~.
 
     Attributes:
         kernel: (n, k) orthonormal.
@@ -65,7 +65,7 @@ class _Softening:
     """
 
     def __init__(self, T: csr_matrix, ST: Float, kernel: Float) -> None:
-        """`T` (n, r) has orthogonal columns, S T is `ST`, and `kernel` (n, k) spans that of S."""
+        """`T` (n, r) has orthogonal columns, S T is `ST`, and `kernel` (n, k) spans the kernel of S."""
         self.kernel, squares = np.linalg.qr(kernel)[0], np.asarray(T.power(2).sum(axis=0)).ravel()
         # Unit directions of the springs; each is T's own times the root of a compliance.
         self._directions = (T @ diags(1.0 / squares)).tocsr()
@@ -100,7 +100,7 @@ class WithSprings:
     """A body with springs on its boundary: S~ and S+ + C, dense if the body's operators are."""
 
     def __init__(self, body: BoundaryOperator, T: csr_matrix, kernel: Float) -> None:
-        """`T` (n, r) is the root of the springs' compliance on the boundary dofs, `kernel` (n, k) that of S there."""
+        """`T` (n, r) is the root of the springs' compliance on the boundary dofs; `kernel` (n, k) is the one of S."""
         self._body, self._T = body, T
         self.is_dense = body.is_dense
         if is_dense(body):
@@ -127,14 +127,14 @@ class WithSprings:
     def regularisation(self, P: csr_matrix) -> Float:
         """(m, m) P^T rho Rf Rf^T P for P (n, m), rho as soft as the springs.
 
-        It makes S~ definite, whose kernel is that of S. Of dense operators alone.
+        It makes S~ definite, for S and S~ share their kernel.  Of dense operators alone.
         """
         assert is_dense(self._body)
         return self._softer * self._body.regularisation(P)
 
 
 def compliance_root(B: csr_matrix, compliance: Float, copies: Int, of_inner: Bool) -> csr_matrix:
-    """(n, r) T of the springs on one body, for its constraints B (rows, n) and the compliance C (rows,) of the rows.
+    """(n, r) T of the springs on one body, for its constraints B (rows, n) and their compliance C (rows,).
 
     A node's spring belongs to the inner of two bodies, but where that is cut, to the outer one: so it softens one body
     alone.  Where both are cut it belongs to neither; see `exact.spring_update`.
@@ -143,7 +143,7 @@ def compliance_root(B: csr_matrix, compliance: Float, copies: Int, of_inner: Boo
         copies: (rows, 2) how many copies the outer and the inner body have there.
         of_inner: (n,) on which of the dofs the body is the inner of two.
     """
-    whole = copies[:, 1] == 1
-    own = np.where(abs(B) @ of_inner > 0, whole, ~whole & (copies[:, 0] == 1))
-    rows = np.flatnonzero((compliance > 0) & own & (B.getnnz(axis=1) > 0))
+    inner_is_whole = copies[:, 1] == 1
+    belongs = np.where(abs(B) @ of_inner > 0, inner_is_whole, ~inner_is_whole & (copies[:, 0] == 1))
+    rows = np.flatnonzero((compliance > 0) & belongs & (B.getnnz(axis=1) > 0))
     return (diags(np.sqrt(compliance[rows])) @ B[rows]).T.tocsr()

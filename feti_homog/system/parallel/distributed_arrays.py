@@ -53,9 +53,9 @@ def alltoall(comm: MPI.Intracomm, parts: list[T]) -> list[T]:
 
 def allreduce_sum(comm: MPI.Intracomm, part: Float) -> Float:
     """sum_rank part_rank of arrays of one shape, on every rank.  Collective."""
-    whole = np.empty_like(part)
-    comm.Allreduce(part, whole)
-    return whole
+    total = np.empty_like(part)
+    comm.Allreduce(part, total)
+    return total
 
 
 def gather_rows(comm: MPI.Intracomm, owned: Float, first: int, rows: Int) -> Float:
@@ -63,7 +63,7 @@ def gather_rows(comm: MPI.Intracomm, owned: Float, first: int, rows: Int) -> Flo
 
     Args:
         first: global number of this rank's first row.
-        rows: global numbers, the same on every rank.
+        rows: global numbers, equal on all ranks.
     """
     mine = (rows >= first) & (rows < first + len(owned))
     values = np.zeros((len(rows), *owned.shape[1:]))
@@ -72,7 +72,7 @@ def gather_rows(comm: MPI.Intracomm, owned: Float, first: int, rows: Int) -> Flo
     return values
 
 
-def allgather_rows(comm: MPI.Intracomm, own: Array, counts: Int) -> Array:
+def allgather_rows(comm: MPI.Intracomm, part: Array, counts: Int) -> Array:
     """Return the rows of all ranks below each other, on every rank. Collective.
 
     Args:
@@ -82,19 +82,19 @@ def allgather_rows(comm: MPI.Intracomm, own: Array, counts: Int) -> Array:
     Returns:
         (sum of counts,) or (sum of counts, k).
     """
-    whole = np.empty((int(counts.sum()), *own.shape[1:]), own.dtype)
-    comm.Allgatherv(np.ascontiguousarray(own), (whole, counts * int(np.prod(own.shape[1:]))))
-    return whole
+    rows = np.empty((int(counts.sum()), *part.shape[1:]), part.dtype)
+    comm.Allgatherv(np.ascontiguousarray(part), (rows, counts * int(np.prod(part.shape[1:]))))
+    return rows
 
 
 def share_columns(comm: MPI.Intracomm, solve: Callable[[Float], Float], B: Float) -> Float:
-    """solve(B) for B (n,) or (n, k), the same on every rank: each rank solves for some of the columns.  Collective."""
+    """solve(B) for B (n,) or (n, k), equal on all ranks: each rank solves for some columns.  Collective."""
     columns = B.shape[1] if B.ndim == 2 else 1
     if comm.size == 1 or columns == 1:
         return solve(B)
     ends = even(columns, comm.size)
-    own = slice(*ends[comm.rank : comm.rank + 2])
-    part = solve(B[:, own]).T if own.start < own.stop else np.zeros((0, len(B)))
+    span = slice(*ends[comm.rank : comm.rank + 2])
+    part = solve(B[:, span]).T if span.start < span.stop else np.zeros((0, len(B)))
     return allgather_rows(comm, part, np.diff(ends)).T
 
 

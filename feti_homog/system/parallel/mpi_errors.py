@@ -25,21 +25,21 @@ class RemoteError(RuntimeError):
 
 
 def on_root(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any) -> T:
-    """Return function(...) of rank 0, on every rank; what it raises is raised on every rank.
+    """Return function(...) of rank 0, on every rank; its errors are raised on every rank.
 
     Collective; the other ranks' arguments do not matter. The result must be picklable; `function` must
     not communicate.
     """
-    own, error = _attempt(function, *args, **kwargs) if comm.rank == 0 else (None, None)
+    value, error = _attempt(function, *args, **kwargs) if comm.rank == 0 else (None, None)
     result: T
-    result, message = comm.bcast((own, _portable(comm, error)), root=0)
+    result, message = comm.bcast((value, _portable(comm, error)), root=0)
     if message is not None:
         raise message if isinstance(error, MemoryError) else error or message
     return result
 
 
 def on_root_only(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any) -> T | None:
-    """Return function(...) on rank 0, None on the others; what it raises is raised on every rank. Collective."""
+    """Return function(...) on rank 0, None on the others; its errors are raised on every rank.  Collective."""
     result, error = _attempt(function, *args, **kwargs) if comm.rank == 0 else (None, None)
     message = comm.bcast(_portable(comm, error), root=0)
     if message is not None:
@@ -50,7 +50,7 @@ def on_root_only(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs
 def agree(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs: Any) -> T:
     """Return function(...) of each rank on that rank; if it raises on any, every rank raises.
 
-    A rank that met a defect raises that; all others raise that of the first such rank or, if there was none, the
+    A rank that met a defect raises it; all others raise the defect of the first such rank or, if there was none, the
     FetiHomogError of the first rank that met one, NoMemoryError of one without memory. Collective; `function` must not
     communicate.
     """
@@ -76,13 +76,13 @@ def agree_after(comm: Comm, function: Callable[..., T], /, *args: Any, **kwargs:
         result = function(*args, **kwargs)
     except FetiHomogError as met:
         error = met
-    own, some = array("i", [error is not None]), array("i", [0])
-    request = comm.Iallreduce(own, some)
+    failed_here, failed = array("i", [error is not None]), array("i", [0])
+    request = comm.Iallreduce(failed_here, failed)
     if error is None:
         request.Wait()
     elif not _comes(request, ARRIVAL_TIMEOUT_S):
         end_job(comm, error)
-    return agree(comm, _returned, result, error) if some[0] else result  # type: ignore[return-value]
+    return agree(comm, _returned, result, error) if failed[0] else result  # type: ignore[return-value]
 
 
 def run_main(comm: Comm, main: Callable[[], int]) -> int:
@@ -116,13 +116,13 @@ def end_job(comm: Comm, error: BaseException) -> NoReturn:
 
 def _without_memory(comm: Comm, error: MemoryError) -> NoMemoryError:
     """Return the error in a line for the user."""
-    words = f": {error}" if str(error) else ""
+    detail = f": {error}" if str(error) else ""
     hint = "`feti-homog check` estimates what a case needs, and more ranks share it"
-    return NoMemoryError(f"rank {comm.rank} of {comm.size} has no memory left{words}; {hint}")
+    return NoMemoryError(f"rank {comm.rank} of {comm.size} has no memory left{detail}; {hint}")
 
 
 def abort(comm: Comm, exit_code: int) -> NoReturn:
-    """End the processes of all ranks; the exit code is that of mpirun."""
+    """End the processes of all ranks; mpirun returns the exit code."""
     sys.stdout.flush()
     comm.Abort(exit_code)
     raise SystemExit(exit_code)

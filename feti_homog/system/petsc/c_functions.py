@@ -32,7 +32,7 @@ def option_was_used(name: str) -> bool:
 
 
 def error_words(error: PETSc.Error) -> str:
-    """Return the last line of an error of PETSc's, without the rank: what was wrong."""
+    """Return the fault that an error of PETSc names: its last line, without the rank."""
     return str(error).splitlines()[-1].split("] ", 1)[-1]
 
 
@@ -71,8 +71,8 @@ def _library() -> ctypes.CDLL:
 class CallbackErrors:
     """Calls functions within PETSc's callbacks, and keeps the first exception that one raises.
 
-    No exception may pass through PETSc's C code: petsc4py 3.22 crashes. Instead the callback returns what ends PETSc's
-    method, such as NaN, and so do all later ones, until `raised` raises the exception.
+    No exception may pass through PETSc's C code: petsc4py 3.22 crashes. Instead the callback returns a value that ends
+    PETSc's method, such as NaN, and so do all later ones, until `raised` raises the exception.
     """
 
     def __init__(self, comm: Comm) -> None:
@@ -97,7 +97,7 @@ class CallbackErrors:
 
     @contextmanager
     def raised(self) -> Iterator[None]:
-        """At the end of the block, which calls PETSc, raise what was kept."""
+        """At the end of the block, which calls PETSc, raise the first exception."""
         try:
             yield
         except PETSc.Error:

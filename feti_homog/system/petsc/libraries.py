@@ -27,7 +27,7 @@ def require() -> None:
     """Import mpi4py, petsc4py and h5py, which starts MPI, not PETSc.
 
     Raises:
-        LibraryError: one line for each that is missing, broken or without MPI, with what to do about it.
+        LibraryError: one line for each that is missing, broken or without MPI, with the remedy.
     """
     faults = [_fault("mpi4py", MPI4PY), _fault("petsc4py", petsc4py_advice()), _fault("h5py", H5PY) or _serial_h5py()]
     if any(faults):
@@ -72,8 +72,8 @@ def _reserve_buffers() -> None:
     blas.dgemm(1.0, square @ square, square)
     matrix = PETSc.Mat().createDense(square.shape, array=square.copy(), comm=PETSc.COMM_SELF)
     matrix.assemble()
-    for each in (matrix.matMult(matrix), matrix):
-        each.destroy()
+    for petsc_object in (matrix.matMult(matrix), matrix):
+        petsc_object.destroy()
 
 
 def _end_petsc(comm: Intracomm) -> None:
@@ -93,19 +93,19 @@ def petsc4py_advice(debian: Path = DEBIAN_PETSC, path: Sequence[str] = sys.path)
 
     Debian has it in a folder of `debian` that PETSC_DIR names.
     """
-    found = [folder for folder in debian.glob("petsc*/*-real") if (folder / "lib/python3/dist-packages").is_dir()]
-    if not found:
+    folders = [folder for folder in debian.glob("petsc*/*-real") if (folder / "lib/python3/dist-packages").is_dir()]
+    if not folders:
         return (
             "install the Debian packages python3-petsc4py and python3-petsc4py-real, or load your cluster's module of "
             "PETSc with petsc4py, and make the environment with scripts/bootstrap"
         )
-    newest = max(found, key=lambda folder: [int(number) for number in re.findall(r"\d+", folder.parent.name)])
+    newest = max(folders, key=lambda folder: [int(number) for number in re.findall(r"\d+", folder.parent.name)])
     environment = "" if DEBIAN_MODULES in path else " and make the environment with --system-site-packages"
     return f"export PETSC_DIR={newest}{environment}, or make the environment with scripts/bootstrap"
 
 
 def _fault(name: str, advice: str) -> str:
-    """Empty if the module can be imported, else why not and what to do."""
+    """Empty if the module can be imported, else fault and remedy."""
     try:
         importlib.import_module(name)
     except ModuleNotFoundError as error:
@@ -128,7 +128,7 @@ def _unfit(name: str, error: Exception, advice: str) -> str:
 
 
 def _serial_h5py() -> str:
-    """Empty if h5py is built with MPI, else what to do."""
+    """Empty if h5py is built with MPI, else the remedy."""
     import h5py
 
     return (

@@ -1,4 +1,4 @@
-"""Names of PETSc's options: those that the solver takes, those of PETSc itself, and names that are almost theirs."""
+"""Names of PETSc's options: the solver's own, PETSc's, and names that are almost theirs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Option:
-    """A PETSc option of the solver: its name without dash, what it takes, its default, one line of help."""
+    """A PETSc option of the solver: name without dash, values, default, one line of help."""
 
     name: str
     value: str
@@ -149,7 +149,7 @@ def without_prefix(names: Iterable[str]) -> list[str]:
 
 
 def only_prints(name: str) -> bool:
-    """Return whether an option (name without dash) shows what solvers do, and chooses nothing of it."""
+    """Return whether an option (name without dash) shows the work of solvers, and chooses nothing."""
     return any(kind.search(name) for kind in (SHOWING, LEVEL))
 
 

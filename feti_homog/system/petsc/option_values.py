@@ -78,7 +78,7 @@ def flag_value(value: Value) -> str | None:
 
 
 def is_flag(name: str) -> bool:
-    """Return whether an option (name without dash) is a flag, which needs no value and may have that of a viewer."""
+    """Return whether an option (name without dash) is a flag, which needs no value and may have a viewer's."""
     return name in FLAGS or is_viewer(name) or (name.startswith("feti_") and SHOWING.search(name) is not None)
 
 
@@ -106,11 +106,11 @@ def _real(expected: str, holds: Callable[[float], bool]) -> Rule:
     return Rule(expected, rule)
 
 
-def _integer(least: int, most: int = LARGEST_INTEGER) -> Rule:
+def _integer(lower: int, upper: int = LARGEST_INTEGER) -> Rule:
     def holds(text: str) -> bool:
-        return re.fullmatch(r"\+?[0-9]{1,10}", text) is not None and least <= int(text) <= most
+        return re.fullmatch(r"\+?[0-9]{1,10}", text) is not None and lower <= int(text) <= upper
 
-    return Rule(f"an integer of at least {least} and at most {most}", holds)
+    return Rule(f"an integer of at least {lower} and at most {upper}", holds)
 
 
 def _is_viewer(text: str) -> bool:
@@ -120,7 +120,7 @@ def _is_viewer(text: str) -> bool:
 
 
 def _is_new_file(text: str) -> bool:
-    """Return whether the text is empty, or what may stand before its first colon is a file that can be written."""
+    """Return whether the text is empty, or up to its first colon a file that can be written."""
     file = text.partition(":")[0]
     return not file or SWITCH.holds(file) or can_be_written(file)
 
@@ -174,7 +174,7 @@ RULES: dict[str, Rule] = {
 
 
 def split_argv(argv: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Return the words that are ours and those that are PETSc's, each in their order.
+    """Return the program's own words and PETSc's, each in their order.
 
     PETSc's are single-dash options with the word after each as its value, unless that word begins another option
     or cannot be the value; a negative number can.
@@ -215,9 +215,9 @@ def petsc_words(options: Mapping[str, str]) -> list[str]:
 
     False flags of the solver stay, for a case may have them true.
     """
-    kept = {name: flag_value(text) if is_own_flag(name) else text for name, text in options.items()}
-    words = [(f"-{name}", text) for name, text in kept.items() if text is not None]
-    return [word for pair in words for word in pair if word]
+    settled = {name: flag_value(text) if is_own_flag(name) else text for name, text in options.items()}
+    pairs = [(f"-{name}", text) for name, text in settled.items() if text is not None]
+    return [word for pair in pairs for word in pair if word]
 
 
 def _is_petsc(word: str) -> bool:

@@ -44,24 +44,21 @@ def case_options(options: Mapping[str, Value]) -> Iterator[None]:
 
     Raises:
         CaseError: before the block, if an option of ours is misspelt or has no such value, or a solver cannot be
-            made with what is given.
+            made with the options.
     """
     database = PETSc.Options()
     on_command_line = given_options()
     options = {name.lower(): value for name, value in options.items()}
-    given = {**options, **on_command_line}
-    faults = [*unknown_options(given), *without_prefix(given), *faulty_values(given)]
+    options_of_run = {**options, **on_command_line}
+    faults = [*unknown_options(options_of_run), *without_prefix(options_of_run), *faulty_values(options_of_run)]
     if faults:
         raise CaseError(*faults)
-    kept = {name: flag_value(value) if is_flag(name) else value for name, value in given.items()}
-    changed = [name for name in given if kept[name] != on_command_line.get(name) and not is_own_flag(name)]
+    settled = {name: flag_value(value) if is_flag(name) else value for name, value in options_of_run.items()}
+    changed = [name for name in options_of_run if settled[name] != on_command_line.get(name) and not is_own_flag(name)]
     try:
         for name in changed:
-            _set(database, name, kept[name])
-        if faults := faults_of_solvers(given_options()):
-            raise CaseError(*faults)
-        # Larger solvers alone read some options: names that are not almost ours are left to `refuse_unused`.
-        _refuse_unread([name for name in given_options() if almost_in_table(name) and not is_flag(name)])
+            _set(database, name, settled[name])
+        _refuse_early(given_options())
         yield
     finally:
         for name in changed:
@@ -82,14 +79,22 @@ def given_options() -> dict[str, str]:
 
 
 def choices(prefix: str) -> list[str]:
-    """Return the given options under a prefix that choose something: not those that only print."""
+    """Return the options under a prefix that choose something and do not only print."""
     return [name for name in given_options() if name.startswith(prefix) and not only_prints(name)]
 
 
 def without_iterations() -> str:
     """Return a line on the given options that print iterations, for a run that has none; empty without any."""
-    given = [f"-{name}" for name in given_options() if name.startswith("feti_ksp_") and only_prints(name)]
-    return f"{', '.join(given)}: the run has no iterations to print" if given else ""
+    printing = [f"-{name}" for name in given_options() if name.startswith("feti_ksp_") and only_prints(name)]
+    return f"{', '.join(printing)}: the run has no iterations to print" if printing else ""
+
+
+def _refuse_early(options: Mapping[str, str]) -> None:
+    """Refuse options that solvers of a 1 x 1 matrix cannot be made with, and misspelt names that they do not read."""
+    if faults := faults_of_solvers(options):
+        raise CaseError(*faults)
+    # Larger solvers alone read some options: names that are not almost ours are left to `refuse_unused`.
+    _refuse_unread([name for name in options if almost_in_table(name) and not is_flag(name)])
 
 
 def refuse_unused() -> None:
@@ -100,8 +105,8 @@ def refuse_unused() -> None:
     Raises:
         CaseError: an option with our prefix is no option of any solver.
     """
-    given = PETSc.Options().getAll().keys() - READ_WHEN_SOLVING
-    _refuse_unread([name for name in given if name.startswith("feti_") and name not in TABLE])
+    names = PETSc.Options().getAll().keys() - READ_WHEN_SOLVING
+    _refuse_unread([name for name in names if name.startswith("feti_") and name not in TABLE])
 
 
 def _refuse_unread(names: list[str]) -> None:
@@ -115,35 +120,48 @@ OWN = ("feti_pc_type", "feti_coarse_space", "feti_coarse_threshold")
 NO_SUCH_METHOD = "requested KSP type"
 
 
-def faults_of_solvers(given: Mapping[str, str]) -> list[str]:
+def faults_of_solvers(options: Mapping[str, str]) -> list[str]:
     """Faults of the options in the database (names without dash) with which PETSc's solvers cannot be made.
 
-    Each solver is made and applied once: a method may lack what it needs only then.  PETSc marks what they read, and
-    prints all that they could with -help.  Options that print are hidden meanwhile.
+    Each solver is made and applied once: a method may lack something only then.  PETSc marks options that
+    they read, and prints all that they could read with -help.  Options that print are hidden meanwhile.
     """
-    database, faults, viewers = PETSc.Options(), [], [name for name in given if is_viewer(name)]
-    for name in viewers:
-        database.delValue(name)
-    try:
+    faults, viewers = [], {name: value for name, value in options.items() if is_viewer(name)}
+    with _hidden(viewers):
         for prefix in ("feti_", *DIRECT_PREFIXES):
             prefixes = ("feti_ksp_", "feti_pc_") if prefix == "feti_" else (prefix,)
-            own = [name for name in given if solver_prefix(name) in prefixes and name not in (*OWN, *viewers)]
-            try:
-                if own or "help" in given:
-                    _solve_once(prefix)
-            except PETSc.Error as error:
-                words = error_words(error)
-                words = "PETSc has no such Krylov method" if NO_SUCH_METHOD in words else words
-                own.sort(key=lambda name: not name.endswith("_type"))  # types first: they decide what others mean
-                faults.append(f"{' '.join(in_words(name, given[name]) for name in own)}: {words}")
-    finally:
-        for name in viewers:
-            database.setValue(name, given[name] or None)
+            names = [name for name in options if solver_prefix(name) in prefixes and name not in (*OWN, *viewers)]
+            if (names or "help" in options) and (fault := _complaint(prefix)):
+                names.sort(key=lambda name: not name.endswith("_type"))  # types first: they decide what others mean
+                faults.append(f"{' '.join(in_words(name, options[name]) for name in names)}: {fault}")
     return faults
 
 
+@contextmanager
+def _hidden(options: Mapping[str, str]) -> Iterator[None]:
+    """Take options out of the database during the block."""
+    database = PETSc.Options()
+    for name in options:
+        database.delValue(name)
+    try:
+        yield
+    finally:
+        for name, value in options.items():
+            database.setValue(name, value or None)
+
+
+def _complaint(prefix: str) -> str:
+    """PETSc's complaint about the options of a solver, empty if there is none."""
+    try:
+        _solve_once(prefix)
+    except PETSc.Error as error:
+        words = error_words(error)
+        return "PETSc has no such Krylov method" if NO_SUCH_METHOD in words else words
+    return ""
+
+
 class _Identity:
-    """The 1 x 1 matrix and preconditioner that, as those of the dual problem, are Python's alone."""
+    """A 1 x 1 matrix and preconditioner in Python alone, as the dual problem has."""
 
     def mult(self, mat: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         x.copy(y)

@@ -1,7 +1,7 @@
 """Partial Cholesky factorizations by the CHOLMOD that PETSc is linked with; PETSc's own interface to it offers none.
 
-MUMPS orders the eliminated rows without regard to those that stay, and takes longer where many stay. CHOLMOD's own
-functions take a given order of all rows. The structures below are those of its manual, the same in KNOWN_VERSIONS.
+MUMPS orders the eliminated rows without regard to rows that stay, and takes longer where many stay.  CHOLMOD's own
+functions take a given order of all rows.  The structures below are from its manual, equal in KNOWN_VERSIONS.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ class PartialFactor:
         is_last[rows] = True
         A.sort_indices()
         # CHOLMOD reads these arrays as they lie in memory.
-        p, i = (own.astype(np.int32, copy=False) for own in (A.indptr, A.indices))
+        p, i = (indices.astype(np.int32, copy=False) for indices in (A.indptr, A.indices))
         x = np.asarray(A.data, np.float64)
         matrix = _Sparse(n, n, A.nnz, _address(p), _address(i), None, _address(x), None, LOWER, 0, REAL, 0, 1, 1)
         # The rows in the order that is asked for; CHOLMOD eliminates row `_order[k]` as its `_place[k]`-th.
@@ -108,7 +108,7 @@ class PartialFactor:
     def last_block(self) -> Float:
         """(m, m) block of L on `rows`, in reverse, so that it is an upper triangle.
 
-        Entry (m - 1 - i, m - 1 - j) is that of L on rows i and j of `rows`. Entries below the diagonal are arbitrary.
+        Entry (m - 1 - i, m - 1 - j) belongs to L on rows i and j of `rows`.  Entries below the diagonal are arbitrary.
         """
         return _block(self._factor.contents, self._place[len(self._place) - self._m :])
 
@@ -141,7 +141,7 @@ class PartialFactor:
 
 
 def _analyse(matrix: _Sparse, order: Int, factor: Any, common: Any) -> Int:
-    """Lay out a factor in a postordering of the elimination tree, which has the same fill as `order` (n,).
+    """Lay out a factor in a postordering of the elimination tree, with the fill of `order` (n,).
 
     Return the place (n,) of each row of `order` in it.
     """
@@ -181,7 +181,7 @@ def _block(factor: _Factor, place: Int) -> Float:
         block = value[values[j] : values[j + 1]].reshape(len(columns), len(i))
         if i.min() < 0 or columns.min() < 0:
             block, columns, i = block[columns >= 0][:, i >= 0], columns[columns >= 0], i[i >= 0]
-        if all((np.diff(each) == -1).all() for each in (columns, i)):  # as a rule: one block
+        if all((np.diff(numbers) == -1).all() for numbers in (columns, i)):  # as a rule: one block
             U.T[columns[-1] : columns[0] + 1, i[-1] : i[0] + 1] = block[::-1, ::-1]
         else:
             U.T[np.ix_(columns, i)] = block

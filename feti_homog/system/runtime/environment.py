@@ -28,10 +28,10 @@ def prefer_own_toolkits() -> None:
     matplotlib = find_spec("matplotlib")
     if matplotlib is None or matplotlib.origin is None:
         return
-    own = Path(matplotlib.origin).parents[1] / "mpl_toolkits"
-    if own.is_dir():
+    folder = Path(matplotlib.origin).parents[1] / "mpl_toolkits"
+    if folder.is_dir():
         toolkits = importlib.import_module("mpl_toolkits")
-        toolkits.__path__ = [str(own), *(path for path in toolkits.__path__ if path != str(own))]
+        toolkits.__path__ = [str(folder), *(path for path in toolkits.__path__ if path != str(folder))]
 
 
 def ignore_settings_of_the_folder() -> None:
@@ -42,17 +42,17 @@ def ignore_settings_of_the_folder() -> None:
     os.environ["MPLBACKEND"] = "agg"
     if not os.path.exists("matplotlibrc") or "matplotlib" in sys.modules:
         return
-    here = os.open(".", os.O_RDONLY)
+    folder = os.open(".", os.O_RDONLY)
     try:
         os.chdir("/")
         importlib.import_module("matplotlib")
     finally:
-        os.fchdir(here)
-        os.close(here)
+        os.fchdir(folder)
+        os.close(folder)
 
 
 def prepare(environment: MutableMapping[str, str]) -> None:
-    """Set what is not yet set; who asks for threads may have them."""
+    """Set variables that are not yet set; who asks for threads may have them."""
     for name, value in SETTINGS.items():
         if name != "OMP_THREAD_LIMIT" or environment["OMP_NUM_THREADS"] == "1":
             environment.setdefault(name, value)

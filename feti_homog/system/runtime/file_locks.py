@@ -147,9 +147,9 @@ def is_locked(path: Path) -> bool:
 
 def this_process() -> str:
     """Machine, process and, under SLURM or PBS, job: how a lock's file names its holder."""
-    words = [socket.gethostname(), f"process {os.getpid()}"]
+    names = [socket.gethostname(), f"process {os.getpid()}"]
     job = os.environ.get("SLURM_JOB_ID") or os.environ.get("PBS_JOBID")
-    return ", ".join([*words, f"job {job}"] if job else words)
+    return ", ".join([*names, f"job {job}"] if job else names)
 
 
 def _written(file: int) -> str:

@@ -1,4 +1,4 @@
-"""Files that users name: regular ones, of bounded size; what waits for a writer or has no end is refused."""
+"""Files that users name: regular ones, of bounded size; files that wait for a writer or have no end are refused."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ STACK, ADDRESSES = 1 << 20, 1 << 30
 def trim(kept: int = 0) -> None:
     """Give freed memory back to the system, which glibc keeps where it lies between blocks in use.
 
-    Up to `kept` freed bytes stay for what comes.
+    Up to `kept` freed bytes stay for later.
     """
     if spare() > kept:
         ctypes.CDLL(None).malloc_trim(0)
@@ -47,9 +47,9 @@ def spare() -> float:
 
 
 def forget_peak(clear_refs: Path = CLEAR_REFS, kept: int = 0) -> None:
-    """Trim, and let the peak begin anew; where the system refuses that, it stays that of the whole process.
+    """Trim, and let the peak begin anew; where the system refuses that, it stays the one of the whole process.
 
-    Up to `kept` freed bytes stay for what comes, and in its peak.
+    Up to `kept` freed bytes stay for later, and in its peak.
     """
     trim(kept)
     with suppress(OSError):
@@ -62,10 +62,13 @@ def require_limits() -> None:
     Raises:
         FetiHomogError: one is too small; a line for each.
     """
-    least = (("stack (ulimit -s)", resource.RLIMIT_STACK, STACK), ("memory (ulimit -v)", resource.RLIMIT_AS, ADDRESSES))
+    limits = (
+        ("stack (ulimit -s)", resource.RLIMIT_STACK, STACK),
+        ("memory (ulimit -v)", resource.RLIMIT_AS, ADDRESSES),
+    )
     faults = [
         f"the {name} of the process is limited to {limit >> 10} KiB; expected at least {needed >> 10} KiB"
-        for name, kind, needed in least
+        for name, kind, needed in limits
         if (limit := resource.getrlimit(kind)[0]) != resource.RLIM_INFINITY and limit < needed
     ]
     if faults:

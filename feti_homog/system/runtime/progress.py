@@ -43,20 +43,20 @@ class Progress:
     def stage(self, name: str) -> Iterator[list[str]]:
         """Provide a PETSc log stage.
 
-        The block may append words to the list, which are printed with its time, that of stages within it left out.
+        The block may append words to the list, which are printed with its time; stages within it count apart.
         """
-        words: list[str] = []
+        remarks: list[str] = []
         start = time.perf_counter()
         self._within.append(0.0)
         try:
             with PETSc.Log.Stage(name):
-                yield words
+                yield remarks
         finally:
-            whole = time.perf_counter() - start
-            took = whole - self._within.pop()
-            self._within[-1] += whole
+            seconds = time.perf_counter() - start
+            took = seconds - self._within.pop()
+            self._within[-1] += seconds
         self.seconds[name] = self.seconds.get(name, 0.0) + took
-        self.say(f"{name:<9} {took:8.2f} s  {' '.join(words)}".rstrip())
+        self.say(f"{name:<9} {took:8.2f} s  {' '.join(remarks)}".rstrip())
 
     def bar(self, items: Iterable[T], label: str) -> Iterator[T]:
         """Yield the items, with a progress bar if rank 0 writes to a terminal."""

@@ -32,10 +32,10 @@ class Description:
         unit: empty for pure numbers, counts and texts.
         shape: of an array, as "(3, 3)" or "(n, 2)".
         components: the names of the columns that an array fills in a table.
-        spatial_components: the same of generalized plane strain, if it has more of them there.
+        spatial_components: `components` of generalized plane strain, if there are more.
         entries: the keys of a mapping and their meanings; a single key in capitals stands for any.
         dtype: of an array in an HDF5 file.
-        name: under which an HDF5 file has it, if not that of the field.
+        name: under which an HDF5 file has it, if not the field's.
     """
 
     meaning: str
@@ -69,7 +69,7 @@ def described(
     spatial_components: tuple[str, ...] = (),
     **options: Any,
 ) -> Any:
-    """Return a dataclass field with a description; `options` are those of `dataclasses.field`."""
+    """Return a dataclass field with a description; `options` go to `dataclasses.field`."""
     description = Description(meaning, unit, shape, components, entries or {}, dtype, name, spatial_components)
     return dataclasses.field(metadata={DESCRIPTION: description}, **options)
 
@@ -96,7 +96,7 @@ def plain(value: Any) -> Any:
 
 
 def restored(kind: type[T], document: Mapping[str, Any]) -> T:
-    """Return the record of a class from what `plain` made of it; other keys are left out.
+    """Return the record of a class from its document by `plain`; other keys are left out.
 
     Raises:
         KeyError: a key without a default is missing.
@@ -111,13 +111,13 @@ def restored(kind: type[T], document: Mapping[str, Any]) -> T:
             continue
         value = values[field.name] = _restored_value(hints[field.name], document[field.name])
         shape = field.metadata[DESCRIPTION].shape
-        if isinstance(value, np.ndarray) and value.ndim not in {_axes(each) for each in shape.split(" or ")}:
+        if isinstance(value, np.ndarray) and value.ndim not in {_axes(words) for words in shape.split(" or ")}:
             raise TypeError(f"{field.name} is no array {shape}")
     return kind(**values)
 
 
 def keys(kind: type, above: str = "") -> Iterator[Key]:
-    """Yield the keys of a record's document, those of the records in it too."""
+    """Yield the keys of a record's document, with the records in it."""
     hints = typing.get_type_hints(kind)
     for name, description in descriptions(kind).items():
         path, hint = f"{above}{name}", _without_none(hints[name])

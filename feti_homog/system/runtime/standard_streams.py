@@ -42,7 +42,7 @@ def end_on_signals() -> None:
 
 
 def launched_rank() -> int:
-    """Return the rank of this process among those that a launcher started, as far as that gives it.
+    """Return the rank of this process among all that a launcher started, if it gives ranks.
 
     Does not need MPI.
     """
@@ -82,7 +82,7 @@ def say(text: str) -> None:
 
 
 def print_product(text: str) -> None:
-    """Print what a command is for.
+    """Print the product of a command.
 
     Raises:
         FetiHomogError: it cannot be written, and not because the reader left.
@@ -102,6 +102,6 @@ def complain(*lines: str) -> None:
 
 
 def _give_up() -> None:
-    """From now on what goes to standard output, also from PETSc and at the end of Python, is lost without an error."""
+    """Discard standard output from now on, PETSc's too and at the end of Python, without an error."""
     with contextlib.suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

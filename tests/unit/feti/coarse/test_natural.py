@@ -52,7 +52,8 @@ def loose_fibres(weights=1.0):
 def coarse_space(bodies, dofs, B):
     """Natural coarse space of these bodies on one rank."""
     operators, n = SimpleNamespace(subdomains=bodies, dofs=dofs, B=B.tocsr()), B.shape[0]
-    return NaturalCoarseSpace(MPI.COMM_SELF, SimpleNamespace(owned=(0, n), rows=np.arange(n)), operators)
+    operators.comm, operators.jump_operator = MPI.COMM_SELF, SimpleNamespace(owned=(0, n), rows=np.arange(n))
+    return NaturalCoarseSpace(operators)
 
 
 @pytest.fixture(scope="module")

@@ -133,7 +133,7 @@ def test_answers_follow_bodies_that_come_free_and_are_caught(scale=1e-3):
 def test_columns_that_make_room_are_those_unused_longest():
     _, F, d = cell(5)
     U, Gamma = response(F, d, np.ones(N), np.zeros(N))
-    followed = FollowedResponse(MPI.COMM_SELF, 0, 1.0 / F.diagonal(), U, most=8)
+    followed = FollowedResponse(MPI.COMM_SELF, 0, 1.0 / F.diagonal(), U, 8)
     followed.add(np.arange(8), Gamma[:, :8])
     followed.make_room(0, NO_ROWS, np.ones(N, bool))
     assert len(followed.lacking(np.arange(8))) == 0
