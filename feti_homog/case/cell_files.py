@@ -84,8 +84,8 @@ def _with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
     if words := missing(file):
         faults.append(f"{given}: {words}")
         return cell
-    from feti_homog.microstructure.fibre_window import read_window  # loads SciPy's trees, which few cases need
-    from feti_homog.microstructure.neighbour_match import knows_neighbours
+    from feti_homog.microstructure.fibre_pattern import read_window  # loads SciPy's trees, which few cases need
+    from feti_homog.microstructure.random_fibres import knows_neighbours
 
     try:
         window = read_window(file)

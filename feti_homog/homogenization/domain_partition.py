@@ -215,7 +215,7 @@ def match_distance(case: Case, width: float, height: float, centres: Float, radi
     window = case.cell.matched
     if window is None:
         return None
-    from feti_homog.microstructure.hard_core import distance_of  # with statistics of neighbours
+    from feti_homog.microstructure.random_fibres import distance_of  # with statistics of neighbours
 
     return distance_of(window, width, height, centres, radii)
 

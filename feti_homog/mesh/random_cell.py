@@ -11,9 +11,8 @@ from feti_homog.case.cell_sizes import fibre_counts, fractions_in_words, void_co
 from feti_homog.errors import MeshError
 from feti_homog.microstructure.arrangement import Arrangement, clear_shift
 from feti_homog.microstructure.fibre_pattern import FibrePattern
-from feti_homog.microstructure.hard_core import MAX_STEPS, placed, relax
-from feti_homog.microstructure.neighbour_match import matched, wanted_distances
 from feti_homog.microstructure.phase_names import FIBRE, VOID
+from feti_homog.microstructure.random_fibres import MAX_STEPS, matched, placed, relax, wanted_distances
 from feti_homog.typing import Float
 
 # Quenched random packings jam near this area fraction.
@@ -82,7 +81,7 @@ def matched_arrangement(cell: Cell) -> Arrangement:
 
     The radii are quantiles of the window `cell.matched`, dealt at random and scaled to the fraction. The centres
     are placed as those of other random cells, `min_gap` mean diameters apart, and then moved one by one until the
-    distances of the nearest and the second neighbours are distributed as in the table (`neighbour_match.matched`). Of
+    distances of the nearest and the second neighbours are distributed as in the table (`random_fibres.matched`). Of
     coated fibres the gap is that of the coatings.
 
     Raises:

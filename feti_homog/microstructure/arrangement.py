@@ -194,20 +194,14 @@ def _away(outlines: Outlines, places: Float, size: Float) -> Float:
 
 def _clear_corners(arrangement: Arrangement, narrowest: float) -> Float:
     """(n, 2) corners whose sides are in the middle of the widest gaps between tangents."""
-    tangents = _tangents(arrangement).transpose(1, 0, 2)
-    lines = [
-        _widest_gaps(places.ravel(), own, narrowest) for places, own in zip(tangents, arrangement.size, strict=True)
-    ]
+    lines = []
+    for touching, period in zip(_tangents(arrangement).transpose(1, 0, 2), arrangement.size, strict=True):
+        places = np.sort(touching.ravel() % period)
+        gaps = np.diff(places, append=places[0] + period)
+        wide = np.argsort(-gaps.round(DECIMALS), kind="stable")[:MOST_GAPS]
+        wide = wide[gaps[wide] > narrowest * gaps[wide[0]]]
+        lines.append(places[wide] + gaps[wide] / 2)
     return np.array(list(product(*lines)))
-
-
-def _widest_gaps(touching: Float, period: float, narrowest: float) -> Float:
-    """Middles (m,) of the widest gaps between positions (k,) at which a side touches something."""
-    places = np.sort(touching % period)
-    gaps = np.diff(places, append=places[0] + period)
-    wide = np.argsort(-gaps.round(DECIMALS), kind="stable")[:MOST_GAPS]
-    wide = wide[gaps[wide] > narrowest * gaps[wide[0]]]
-    return np.asarray(places[wide] + gaps[wide] / 2)
 
 
 def _tangents(arrangement: Arrangement) -> Float:

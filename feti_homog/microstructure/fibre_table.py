@@ -208,15 +208,14 @@ def _check_names(
     for word in others:
         if meant := misspelt(word, [name for name in COLUMNS if name not in names]):
             faults.add(row, f"column {toml_value(word)}: unknown; did you mean {meant}?")
+    ignored = f"; not read: {', '.join(map(toml_value, others))}" if others else ""
     for name in _missing(set(names)):
-        ignored = f"; not read: {', '.join(map(toml_value, others))}" if others else ""
         faults.add(row, f"column {name}: missing{ignored}")
 
 
 def _missing(names: set[str]) -> list[str]:
     """Columns that a table with these lacks: x, y, and the radius or the sizes of a shape, which stand in its place."""
-    instead = [sizes for sizes in REPLACING if names & set(sizes)]
-    sizes = [] if "radius" in names else instead[0] if instead else ("radius",)
+    sizes = next((sizes for sizes in (("radius",), *REPLACING) if names & set(sizes)), ("radius",))
     return [name for name in ("x", "y", *sizes) if name not in names]
 
 
@@ -273,7 +272,7 @@ def _cell_faults(cells: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _phase_faults(cells: Mapping[str, Any]) -> Iterator[str]:
-    """Faults of the phase of one row."""
+    """Yield the faults of the phase of one row."""
     phase = cells.get("phase", "fibre")
     if phase == VOID:
         yield from (f"{key} = {toml_value(cells[key])}: a void has none" for key in OF_FIBRES if cells.get(key))

@@ -61,7 +61,8 @@ def table_arrangement(table: FibreTable, window: str, repairs: bool = False) -> 
     is_placed = table.left is not None and table.bottom is not None
     clear = min(LEAST_CLEARANCE * float(fibres.radii.mean()), clearance(shifted))
     if not is_placed or clearance(fibres) < clear or in_voids(fibres, np.zeros((1, 2))).all():
-        return _in_mesh_order(_rounded(shifted))
+        rounded = _rounded(shifted)
+        return replace(rounded, mesh_order=np.lexsort((rounded.centres[:, 1], rounded.centres[:, 0])))
     return fibres if isinstance(fibres.outlines, Discs) else _rounded(fibres)
 
 
@@ -114,12 +115,6 @@ def _rounded(arrangement: Arrangement) -> Arrangement:
         outlines=outlines.at(np.where(outlines.centres >= arrangement.size - least, 0.0, outlines.centres)),
         coating=arrangement.coating.round(TABLE_DECIMALS),
     )
-
-
-def _in_mesh_order(arrangement: Arrangement) -> Arrangement:
-    """Return the arrangement meshed in the order of its coordinates."""
-    x, y = arrangement.centres.T
-    return replace(arrangement, mesh_order=np.lexsort((y, x)))
 
 
 def _moved_fibres(table: FibreTable, kept: Int, moves: Float) -> tuple[str, ...]:
@@ -192,7 +187,10 @@ def _outside(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> li
     for k in np.flatnonzero((2 * radius >= size.min()) | (radius < SMALLEST_RADIUS * size[0])).tolist():
         limits = f"from {SMALLEST_RADIUS * size[0]:g} to below {size.min() / 2:g} in this cell"
         faults.append(f"row {table.row[k]}: {called[k]} = {radius[k]:g}: expected {limits}")
-    return faults + _unlikely_coatings(table)
+    least, most = COATINGS
+    bad = np.flatnonzero((table.coating > 0) & ((table.coating < least) | (table.coating > most)))
+    expected = f"expected 0, or from {least:g} to {most:g}"
+    return faults + [f"row {table.row[k]}: coating = {table.coating[k]:g}: {expected}" for k in bad.tolist()]
 
 
 def _largest_sizes(table: FibreTable) -> tuple[Float, list[str]]:
@@ -200,14 +198,6 @@ def _largest_sizes(table: FibreTable) -> tuple[Float, list[str]]:
     names = ["radius", *(name for shape in SHAPES for name in shape.sizes if name != "radius")]
     given = np.nan_to_num(np.stack([table.columns[name] for name in names]))
     return given.max(axis=0), [names[k] for k in given.argmax(axis=0).tolist()]
-
-
-def _unlikely_coatings(table: FibreTable) -> list[str]:
-    """Faults of coatings that are too thin or too thick to be meshed."""
-    least, most = COATINGS
-    bad = np.flatnonzero((table.coating > 0) & ((table.coating < least) | (table.coating > most)))
-    expected = f"expected 0, or from {least:g} to {most:g}"
-    return [f"row {table.row[k]}: coating = {table.coating[k]:g}: {expected}" for k in bad.tolist()]
 
 
 def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> tuple[Bool, list[str]]:
