@@ -27,8 +27,8 @@ class FibrePattern:
     Attributes:
         width, height: of the rectangle.
         centres, radii: (N, 2) and (N,) of the discs.
-        periodic: whether what leaves the rectangle on one side returns on the other; otherwise it is a window, of whose
-            surroundings nothing is known.
+        periodic: whether discs that leave the rectangle on one side return on the other; otherwise it is a window with
+            unknown surroundings.
     """
 
     width: float
@@ -61,7 +61,7 @@ class FibrePattern:
     def fibre_fraction(self) -> float:
         """sum_i pi R_i^2 / area over the centres in the rectangle.
 
-        Of a window unbiased, for what leaves it is met, in the mean, by what comes in.
+        Of a window unbiased: areas that leave it are met, in the mean, by areas that come in.
         """
         return pi * fsum(self.radii * self.radii) / self.area
 
@@ -85,9 +85,9 @@ class FibrePattern:
             return self.centres, own
         steps = [range(-n, n + 1) for n in (ceil(reach / length) for length in self.size)]
         shifts = np.array([step for step in product(*steps) if any(step)], dtype=float).reshape(-1, 2) * self.size
-        found = self.wrapped + shifts[:, None]
-        shift, owner = np.nonzero(np.all((found > -reach) & (found < self.size + reach), axis=2))
-        return np.concatenate([self.wrapped, found[shift, owner]]), np.concatenate([own, owner])
+        result = self.wrapped + shifts[:, None]
+        shift, owner = np.nonzero(np.all((result > -reach) & (result < self.size + reach), axis=2))
+        return np.concatenate([self.wrapped, result[shift, owner]]), np.concatenate([own, owner])
 
 
 def read_window(path: Path, size: tuple[float, float] | None = None) -> FibrePattern:

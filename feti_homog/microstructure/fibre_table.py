@@ -45,12 +45,12 @@ class FibreTable:
 
     Attributes:
         name: of the file or list, for faults.
-        row: (N,) line of the file, counted from 1, or place in the list: what faults call the fibre.
+        row: (N,) line of the file, counted from 1, or place in the list: the name of the fibre in faults.
         columns: (N,) numbers of all NUMBERS, and which of them the table has.
         phase: N names, "fibre" where the table gives none, "void" of voids.
         width, height: of the cell; None if the table does not give it.
         left, bottom: coordinates of its lower left corner; None if the table does not give it.
-        remarks: what of the table is not used, a line each.
+        remarks: unused parts of the table, a line each.
     """
 
     name: str
@@ -86,7 +86,7 @@ class FibreTable:
 
     @property
     def strength(self) -> Float:
-        """(N,) strength of the bonds of each fibre / that of the case, 1 where the table gives none."""
+        """(N,) bond strength of each fibre / bond strength of the case, 1 where the table gives none."""
         return self.columns["strength"]
 
     @property
@@ -169,7 +169,7 @@ class _Faults:
         self.lines.append(f"{self._name}: row {row}: {words}")
 
     def throw(self) -> None:
-        """Raise those that there are."""
+        """Raise the faults, if there are any."""
         if self.lines:
             raise CaseError(*self.lines)
 

@@ -1,4 +1,4 @@
-"""The arrangement of the fibres of a table: images that are one fibre, and what is wrong with it."""
+"""The arrangement of the fibres of a table: images of one fibre, and faults."""
 
 from __future__ import annotations
 
@@ -50,12 +50,12 @@ def table_arrangement(table: FibreTable, window: str, repairs: bool = False) -> 
         MeshError: rows lie outside, come twice, overlap or touch; a line for each fault.
     """
     table, repaired = _repaired(table, window) if repairs else (table, ())
-    kept, centres, moves, size = on_torus(table, window)
-    order = np.argsort(table.is_void[kept], kind="stable")
-    rows, places = kept[order], (centres + moves)[order]
+    retained, centres, moves, size = on_torus(table, window)
+    order = np.argsort(table.is_void[retained], kind="stable")
+    rows, places = retained[order], (centres + moves)[order]
     fibres = replace(
         _nested(table, rows, places % size / size[0], float(size[1] / size[0])),
-        remarks=repaired + (_moved_fibres(table, kept, moves) if window == "cut" else ()),
+        remarks=repaired + (_moved_fibres(table, retained, moves) if window == "cut" else ()),
     )
     shifted = clear_shift(fibres)
     is_placed = table.left is not None and table.bottom is not None
@@ -69,20 +69,20 @@ def table_arrangement(table: FibreTable, window: str, repairs: bool = False) -> 
 def _repaired(table: FibreTable, window: str) -> tuple[FibreTable, tuple[str, ...]]:
     """Return the table without slight overlaps, and its repaired rows in one line.
 
-    Fibres that touch or overlap by up to REPAIRED of a radius are smaller by what parts them.
+    Fibres that touch or overlap by up to REPAIRED of a radius shrink until they part.
     """
     assert table.width is not None and table.height is not None
     size, centres = np.array([table.width, table.height]), table.centres - _corner(table)
-    kept = np.flatnonzero(_without_images(table, centres, size, window == "cut")[0])
-    outer = table.outlines[kept].at(centres[kept]).grown((table.coating * table.radius)[kept])
-    first, second, gap, _, across = _gaps(table, kept, outer, size)
-    least = LEAST_GAP * (table.outer_radius[kept][first] + table.outer_radius[kept][second]) / 2
-    smaller = np.minimum(table.radius[kept][first], table.radius[kept][second])
+    retained = np.flatnonzero(_without_images(table, centres, size, window == "cut")[0])
+    outer = table.outlines[retained].at(centres[retained]).grown((table.coating * table.radius)[retained])
+    first, second, gap, _, across = _gaps(table, retained, outer, size)
+    least = LEAST_GAP * (table.outer_radius[retained][first] + table.outer_radius[retained][second]) / 2
+    smaller = np.minimum(table.radius[retained][first], table.radius[retained][second])
     near = (gap < least) & (gap > -REPAIRED * smaller) & ~(across & (window == "cut"))
     share = np.zeros(len(table.row))
     for own in (first[near], second[near]):
-        sizes = np.stack([table.columns[name][kept[own]] for name in ("radius", "a", "b")])
-        np.maximum.at(share, kept[own], (least - gap)[near] / np.nanmin(sizes, axis=0))
+        sizes = np.stack([table.columns[name][retained[own]] for name in ("radius", "a", "b")])
+        np.maximum.at(share, retained[own], (least - gap)[near] / np.nanmin(sizes, axis=0))
     names = {"radius", *(name for shape in SHAPES for name in shape.sizes if name != "sides")}
     # A little more than enough, for the gap is compared with the radii that are left.
     columns = {name: own * (1 - 0.51 * share) if name in names else own for name, own in table.columns.items()}
@@ -140,14 +140,14 @@ def on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]:
     _raise_faults(table, _outside(table, centres, size, is_cut))
     first, faults = _without_images(table, centres, size, is_cut)
     _raise_faults(table, faults)
-    kept = np.flatnonzero(first)
-    centres = centres[kept]
-    outer = table.outlines[kept].at(centres).grown((table.coating * table.radius)[kept])
-    _raise_faults(table, _contacts(table, kept, outer, size, is_cut))
+    retained = np.flatnonzero(first)
+    centres = centres[retained]
+    outer = table.outlines[retained].at(centres).grown((table.coating * table.radius)[retained])
+    _raise_faults(table, _contacts(table, retained, outer, size, is_cut))
     if not is_cut:
-        return kept, centres, np.zeros_like(centres), size
+        return retained, centres, np.zeros_like(centres), size
     try:
-        return kept, centres, cut_window.moves(outer, size), size
+        return retained, centres, cut_window.moves(outer, size), size
     except MeshError as error:
         words = "fibres overlap across the border, and " + str(error)
         raise MeshError(f'[cell] {table.name}: window = "cut": {words}; leave some of them out') from error
@@ -226,7 +226,7 @@ def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool
 def _contacts(table: FibreTable, kept: Int, outer: Outlines, size: Float, is_cut: bool) -> list[str]:
     """Faults of fibres, the rows `kept` (k,) with their coatings, that overlap or touch.
 
-    Of a cut window only of those that do within.
+    Of a cut window only within it.
     """
     first, second, gap, together, across = _gaps(table, kept, outer, size)
     bad = np.flatnonzero((gap < LEAST_GAP * together / 2) & ~(across & is_cut))

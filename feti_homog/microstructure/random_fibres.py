@@ -73,13 +73,13 @@ class NearestNeighbours:
 
 
 def nearest_neighbours(pattern: FibrePattern, count: int = 3) -> NearestNeighbours:
-    """Return those of each fibre, in a periodic cell its images and its own among them."""
+    """Return the neighbours of each fibre; in a periodic cell images count, also its own."""
     candidates, _ = pattern.images(_reach(pattern, count))
     known = min(count, len(candidates) - 1)
     distances, directions = np.full((pattern.count, count), np.inf), np.full((pattern.count, count), np.nan)
     if known:
-        found, which = cKDTree(candidates).query(candidates[: pattern.count], known + 1)
-        distances[:, :known] = found[:, 1:]  # the first is the fibre itself
+        result, which = cKDTree(candidates).query(candidates[: pattern.count], known + 1)
+        distances[:, :known] = result[:, 1:]  # the first is the fibre itself
         vectors = candidates[which[:, 1:]] - candidates[: pattern.count, None]
         directions[:, :known] = np.degrees(np.arctan2(vectors[..., 1], vectors[..., 0])) % 360
     return NearestNeighbours(distances, directions, _weights(pattern, distances))
@@ -183,7 +183,7 @@ def _two_nearest(centres: Float, fibres: Int, size: Float) -> tuple[Float, Int]:
 
 
 def _mean_square(distances: Float, wanted: Float) -> float:
-    """Mean square difference of distances (N, SHELLS), each column sorted, from those wanted."""
+    """Mean square difference of distances (N, SHELLS), each column sorted, from the target."""
     difference = np.sort(distances, axis=0) - wanted
     return float(np.cumsum(difference * difference)[-1]) / wanted.size
 
