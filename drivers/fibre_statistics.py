@@ -17,12 +17,11 @@ from pathlib import Path
 import numpy as np
 import statistics_picture
 from mpi4py.MPI import Intracomm
-from pattern_statistics import SECTORS, FibreStatistics, VoronoiCells, hard_core, measure, poisson
+from pattern_statistics import SECTORS, FibreStatistics, VoronoiCells, hard_core, measure, poisson, smallest_gap
 
 from feti_homog import CaseError, launch
 from feti_homog.commands import listed_fibres
-from feti_homog.microstructure.fibre_pattern import FibrePattern
-from feti_homog.microstructure.fibre_window import read_window
+from feti_homog.microstructure.fibre_pattern import FibrePattern, read_window
 from feti_homog.microstructure.phase_names import VOID
 from feti_homog.typing import Array, Float
 
@@ -42,7 +41,7 @@ def text(found: FibreStatistics, model: str, simulations: int) -> str:
         ("fibres", f"{pattern.count} in a {kind} of {pattern.width:.6g} x {pattern.height:.6g}"),
         ("fibre fraction", f"{pattern.fibre_fraction:.4f}"),
         ("radii", spread),
-        ("smallest gap", f"{pattern.smallest_gap:.4g}, {pattern.smallest_gap / size:.3f} mean diameters"),
+        ("smallest gap", f"{smallest_gap(pattern):.4g}, {smallest_gap(pattern) / size:.3f} mean diameters"),
         *_neighbours(found, size),
         ("local fractions", _local_fractions(cells)),
         ("directions", _directions(found.directions)),

@@ -8,12 +8,11 @@ from itertools import product
 from math import pi, sqrt
 
 import numpy as np
-from scipy.spatial import Voronoi
+from scipy.spatial import Voronoi, cKDTree
 
 from feti_homog.errors import MeshError
 from feti_homog.microstructure.fibre_pattern import FibrePattern
-from feti_homog.microstructure.hard_core import MAX_STEPS, placed
-from feti_homog.microstructure.neighbour_match import NearestNeighbours, nearest_neighbours
+from feti_homog.microstructure.random_fibres import MAX_STEPS, NearestNeighbours, nearest_neighbours, placed
 from feti_homog.typing import Bool, Float
 
 # The longest distance of pair functions, in mean spacings 1 / sqrt(fibres per area): beyond, g is 1 in random cells.
@@ -54,6 +53,28 @@ def distances(pattern: FibrePattern) -> Float:
     return np.asarray(reach * np.arange(1, steps + 1) / steps)
 
 
+def smallest_gap(pattern: FibrePattern) -> float:
+    """Smallest distance between the circles of two fibres, or of one and its image; infinite without pairs."""
+    if not pattern.periodic and pattern.count == 1:
+        return np.inf
+    tree = cKDTree(pattern.images(float(pattern.size.min()))[0])
+    nearest = tree.query(tree.data[: pattern.count], 2)[0][:, 1].min()
+    points, owner = pattern.images(reach := float(nearest + 2 * np.ptp(pattern.radii)) * (1 + 1e-9))
+    pairs = cKDTree(points).query_pairs(reach, output_type="ndarray")
+    pairs = pairs[pairs[:, 0] < pattern.count]
+    distance = np.hypot(*(points[pairs[:, 1]] - points[pairs[:, 0]]).T)
+    return float((distance - pattern.radii[owner[pairs]].sum(axis=1)).min())
+
+
+def pair_vectors(pattern: FibrePattern, reach: float) -> Float:
+    """(k, 2) from each centre to every other one at most `reach` away, images and its own among them."""
+    points, _ = pattern.images(reach * (1 + 1e-9))
+    own = points[: pattern.count]
+    near = cKDTree(own).sparse_distance_matrix(cKDTree(points), reach, output_type="ndarray")
+    near = near[near["i"] != near["j"]]
+    return np.asarray(points[near["j"]] - own[near["i"]])
+
+
 def pair_functions(pattern: FibrePattern, r: Float) -> PairFunctions:
     """K(r) = A / (N (N - 1)) sum_{i != j} w_ij [|x_i - x_j| <= r] at the distances r (m,), and g = K' / (2 pi r).
 
@@ -61,7 +82,7 @@ def pair_functions(pattern: FibrePattern, r: Float) -> PairFunctions:
     window w_ij = A / ((width - |dx|) (height - |dy|)), the translation correction [Ohser & Stoyan 1981], which keeps K
     and g unbiased.  Needs two fibres.
     """
-    vectors = pattern.pair_vectors(float(r[-1]))
+    vectors = pair_vectors(pattern, float(r[-1]))
     place = np.searchsorted(r, np.hypot(*vectors.T))  # of the least r that is not below the distance
     place = np.minimum(place, len(r) - 1)  # of a distance that rounding put beyond the last
     shares = np.bincount(place, _translation_weights(pattern, vectors), len(r))
@@ -76,7 +97,7 @@ def pair_directions(pattern: FibrePattern, reach: float) -> Float:
     Sectors of 180 / SECTORS degrees, the first about x1, the others in order towards x2; a pair has no front and back.
     Pairs of a window have the weights of `pair_functions`.  All are 0 if no two fibres are that near.
     """
-    vectors = pattern.pair_vectors(reach)
+    vectors = pair_vectors(pattern, reach)
     angle = np.degrees(np.arctan2(vectors[:, 1], vectors[:, 0]))
     sector = np.floor(angle * SECTORS / 180 + 0.5).astype(int) % SECTORS
     shares = np.bincount(sector, _translation_weights(pattern, vectors), SECTORS)
@@ -118,7 +139,7 @@ def hard_core(pattern: FibrePattern, generator: np.random.Generator, max_steps: 
         MeshError: no such pattern is found.
     """
     try:
-        return placed(pattern, max(pattern.smallest_gap, 0.0), generator, max_steps)
+        return placed(pattern, max(smallest_gap(pattern), 0.0), generator, max_steps)
     except MeshError as error:
         raise MeshError(f"{error}; compare with --model poisson") from error
 

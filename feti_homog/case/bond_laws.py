@@ -19,8 +19,8 @@ class BondLawEntry:
         keys: keys of [interface] that belong to this law and others that list them.
         needs: keys of all laws that must be given with this one.
         limits: keys of which one must be finite for any bond to break; none if the law always has a limit.
-        description: of what reaches 1 when a bond breaks, or of how it softens, for the key `law`.
-        symbols: that label the law in pictures: symbol, key, and whether its unit is that of stress.
+        description: of the utilisation that reaches 1 when a bond breaks, or of softening, for the key `law`.
+        symbols: that label the law in pictures: symbol, key, and whether its unit is a stress.
         softens: the compliance of springs grows before a bond parts.
         has_process_zone: elements must resolve the length along which bonds break.
     """

@@ -86,12 +86,12 @@ class Case:
 
     @property
     def arcs(self) -> tuple[Arc, ...]:
-        """Return what is debonded from the start; none if the bonding is perfect."""
+        """Return the arcs that are debonded from the start; none if the bonding is perfect."""
         return tuple(arc for interface in self.interfaces for arc in interface.debonded)
 
     @property
     def interface(self) -> InterfaceSection | None:
-        """The first interface, None of perfect bonding; contact, criterion and growth are those of all."""
+        """The first interface, None of perfect bonding; all have its contact, criterion and growth."""
         return self.interfaces[0] if self.interfaces else None
 
     @property
@@ -114,7 +114,7 @@ class Case:
         return self.angle or self.path or self.single_load or self.envelope or Stiffness()
 
     def material_of(self, phase: str) -> Material:
-        """Return the material of a phase; "fibre:2" without its own has that of "fibre". Raises KeyError."""
+        """Return the material of a phase; "fibre:2" without its own takes it from "fibre". Raises KeyError."""
         return self.materials[provider(phase, self.materials)]
 
     def warnings(self) -> tuple[str, ...]:
@@ -151,7 +151,7 @@ class Case:
         return document | {"petsc": dict(self.petsc)}
 
     def digest(self, with_output: bool = True) -> str:
-        """Short name of what the case computes, and writes if `with_output`; not of its name, options, max_events."""
+        """Hash everything that the case computes, and writes if `with_output`; not its name, options, max_events."""
         document = {k: v for k, v in self.resolved().items() if k not in ("name", "output", "petsc")}
         if with_output:
             document["output"] = {k: getattr(self.output, k) for k, e in keys_of(Output).items() if not e.presentation}
@@ -195,11 +195,11 @@ def check_stored(values: Mapping[str, Any]) -> None:
 
 
 def _read_sections(document: dict[str, Any], folder: Path | None) -> tuple[dict[str, Any], list[str]]:
-    """Return what sections hold, with the files of [cell] in `folder` if one is given, and their faults."""
+    """Return the contents of sections, with the files of [cell] in `folder` if one is given, and their faults."""
     reader = TableReader(_selected(document), KEY_OWNERS, _top_level_faults(document))
     selected, faults = reader.selected, reader.faults
     of_rules = [[*rule.faults(document, selected)] for rule in RULES]
-    foreign = {rule.path[0] for rule, found in zip(RULES, of_rules, strict=True) if found and rule.holds is None}
+    foreign = {rule.path[0] for rule, lines in zip(RULES, of_rules, strict=True) if lines and rule.holds is None}
     cell = _read_section(document, "cell", reader)
     sections = {
         "cell": None if "cell" in foreign or cell is None or not folder else checked_cell(cell, folder, faults),

@@ -29,7 +29,7 @@ FEWEST_MATCHED = 10  # fibres: of fewer, distances have no distribution
 
 
 def checked_cell(cell: Cell, folder: Path, faults: list[str]) -> Cell:
-    """Return the cell with what its files have; faults of them and between its keys are added to `faults`."""
+    """Return the cell with the contents of its files; their faults and faults between its keys go to `faults`."""
     cell = _with_match(cell, folder, faults)
     if cell.fibre_fraction is not None:
         spacing = (cell.coating or 0.0) + (cell.min_gap if cell.geometry == "random" else 0.0)
@@ -73,7 +73,7 @@ def missing(file: Path) -> str:
 
 
 def _with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
-    """Return the cell with its table read and what follows from it.
+    """Return the cell with its table read, its number of fibres and its fraction.
 
     The path of the table is completed; number and fraction are those of the table's fibres where the cell has none of
     its own; faults are added to `faults`.
@@ -84,8 +84,8 @@ def _with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
     if words := missing(file):
         faults.append(f"{given}: {words}")
         return cell
-    from feti_homog.microstructure.fibre_window import read_window  # loads SciPy's trees, which few cases need
-    from feti_homog.microstructure.neighbour_match import knows_neighbours
+    from feti_homog.microstructure.fibre_pattern import read_window  # loads SciPy's trees, which few cases need
+    from feti_homog.microstructure.random_fibres import knows_neighbours
 
     try:
         window = read_window(file)
@@ -134,21 +134,21 @@ def _within(table: FibreTable) -> FibreTable:
     outside = over > LEFT_OUT * table.radius
     if not outside.any() or outside.all():
         return table
-    kept, rows = table.rows(np.flatnonzero(~outside)), table.row[outside]
+    retained, rows = table.rows(np.flatnonzero(~outside)), table.row[outside]
     listed = ", ".join(map(str, rows[:MOST_LISTED])) + (", ..." if len(rows) > MOST_LISTED else "")
     left = "1 row with its centre" if len(rows) == 1 else f"{len(rows)} rows with centres"
     line = f'[cell] window = "cut": leaves out {left} outside: {listed}'
-    return replace(kept, remarks=(*table.remarks, line))
+    return replace(retained, remarks=(*table.remarks, line))
 
 
 def _size(name: str, asked: float | None, table: FibreTable, faults: list[str]) -> float | None:
-    """Width or height of the cell: that of the case or that of the table, which must not differ."""
-    own: float | None = getattr(table, name)
-    if asked is None and own is None and table.name != LIST:
+    """Width or height of the cell, from the case or from the table, which must not differ."""
+    stored: float | None = getattr(table, name)
+    if asked is None and stored is None and table.name != LIST:
         faults.append(f"[cell] {name}: missing; {table.name} has no line such as # width = 120, height = 80")
-    elif None not in (asked, own) and asked != own:
-        faults.append(f"[cell] {name} = {asked:g}: {table.name} says {own:g}; give one")
-    return own if asked is None else asked
+    elif None not in (asked, stored) and asked != stored:
+        faults.append(f"[cell] {name} = {asked:g}: {table.name} says {stored:g}; give one")
+    return stored if asked is None else asked
 
 
 # Inner / outer radius of hollow fibres.

@@ -262,7 +262,7 @@ class Cell:
 
 
 def size_faults(cell: Cell) -> list[str]:
-    """Faults of sizes of elements that are larger than those around."""
+    """Faults of element sizes larger than the sizes around."""
     faults, largest = [], ("mesh_size", cell.mesh_size)
     for name, size in (("interface_size", cell.interface_size), ("tip_size", cell.tip_size)):
         if size is not None and size > largest[1]:

@@ -168,7 +168,7 @@ def fibre_counts(cell: Cell) -> dict[str, int]:
 
 
 def _expected_counts(cell: Cell) -> dict[str, float]:
-    """Numbers of fibres of each phase that are not whole; their sum is `fibres`, or what the width holds."""
+    """Numbers of fibres of each phase that are not whole; their sum is `fibres`, or follows from the width."""
     radii = cell.radii or dict.fromkeys(cell.fractions, 1.0)
     per_area = {phase: share / (pi * radii[phase] ** 2) for phase, share in cell.fractions.items()}
     area = cell.fibres / fsum(per_area.values()) if cell.fibres is not None else (cell.width or 1.0) ** 2
@@ -178,7 +178,7 @@ def _expected_counts(cell: Cell) -> dict[str, float]:
 def void_count(cell: Cell, fibre_radius: float) -> int:
     """Return the number of voids of a random cell of width 1 whose fibres have this mean radius.
 
-    It is the whole number next to that of their radius, at least one.
+    It is the whole number nearest to the fraction, at least one.
     """
     if not cell.voids:
         return 0

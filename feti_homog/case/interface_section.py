@@ -1,4 +1,4 @@
-"""The section [interface]: what is debonded from the start, and the bonds that hold or break."""
+"""The section [interface]: arcs that are debonded from the start, and bonds that hold or break."""
 
 from __future__ import annotations
 

@@ -79,8 +79,8 @@ WAYPOINTS = list_of(
 def completed(loads: Sequence[Strain | MixedLoad], plane: str) -> tuple[dict[str, float], ...]:
     """Return the loads of a path in full.
 
-    Of each component one name and value, and the temperature in generalized plane strain. What a load does not name is
-    that of the load before, at first a stress of zero.
+    Of each component one name and value, and the temperature in generalized plane strain. Components that a load does
+    not name stay as in the load before, at first a stress of zero.
     """
     state = PLANE_STATES[plane]
     unloaded = dict.fromkeys((*state.stresses, *[TEMPERATURE] * state.is_spatial), 0.0)
@@ -109,7 +109,7 @@ def named(load: Strain | MixedLoad) -> dict[str, float]:
 
 
 class AnalysisSection:
-    """The section of an analysis; the values here are those of one in which the load breaks no bonds.
+    """The section of an analysis; by default the load breaks no bonds.
 
     Attributes:
         breaks: whether bonds break under its loads.

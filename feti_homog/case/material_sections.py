@@ -21,7 +21,7 @@ CONSTANTS = frozenset(name for form in MATERIAL_FORMS.values() for name in keys_
 
 
 def read_materials(document: Mapping[str, Any], plane: str | None, reader: TableReader) -> dict[str, Material]:
-    """Return the materials by phase; what depends on a geometry, mix or plane state that is faulty is not checked.
+    """Return the materials by phase, without checks that depend on a faulty geometry, mix or plane state.
 
     Empty without a section [material]: that is a fault of the whole document.
     """
@@ -129,7 +129,7 @@ def missing_expansions(materials: Mapping[str, Material], needed_by: str) -> lis
 
 
 def provider(phase: str, materials: Mapping[str, Material]) -> str:
-    """Return the phase whose material a phase has: its own, or that of "fibre" for "fibre:2"."""
+    """Return the phase whose material a phase has: itself, or "fibre" for "fibre:2"."""
     return phase if phase in materials else phase.partition(":")[0]
 
 
@@ -137,7 +137,7 @@ def phase_faults(materials: Mapping[str, Material], phases: Iterable[str]) -> li
     """Faults of phases of the mesh without a material, and of materials without a phase."""
     phases = list(phases)
     providers = [provider(phase, materials) for phase in phases]
-    without = [phase for phase, own in zip(phases, providers, strict=True) if own not in materials]
+    without = [phase for phase, source in zip(phases, providers, strict=True) if source not in materials]
     unused = [phase for phase in materials if phase not in providers]
     has = ", ".join(map(toml_key, phases))
     return [f"[material.{toml_key(phase)}]: missing section; the mesh has this phase" for phase in without] + [

@@ -59,7 +59,7 @@ class KeyRow:
         section: the section's name: "cell", "material", ...; "name" for the key before the first section.
         table: its place in the file: "[cell]", "[material.PHASE], isotropic", ...
         key: its name.
-        accepts: what its value must be.
+        accepts: requirement of its value.
         unit: of the value, empty if it has none.
         default: as TOML writes it or in a word; "required" if the key must be given where it applies; else empty.
         applies: for which geometry, type of analysis or method it may be given; empty: for all.
@@ -78,7 +78,7 @@ class KeyRow:
 
 @dataclass(frozen=True)
 class TableReference:
-    """A table of the case file: its section, its place in the file, what it is for, and its keys."""
+    """A table of the case file: its section, its place in the file, its purpose, and its keys."""
 
     section: str
     place: str
@@ -127,10 +127,10 @@ def tables() -> list[TableReference]:
 
 def tables_of(section: str) -> list[TableReference]:
     """Return the tables of a section. Raises CaseError if there is none of that name."""
-    found = [table for table in tables() if table.section == section]
-    if not found:
+    result = [table for table in tables() if table.section == section]
+    if not result:
         raise CaseError(f"{section}: unknown section; expected one of {', '.join(ORDER)}")
-    return found
+    return result
 
 
 def rows() -> Iterator[KeyRow]:
@@ -166,7 +166,7 @@ def _rows(section: str, place: str, keys: Mapping[str, Key]) -> tuple[KeyRow, ..
 
 
 def as_text(references: Sequence[TableReference]) -> str:
-    """Return the tables in plain text: each key, then what it accepts and when, and what it means."""
+    """Return the tables in plain text: each key with its values, its conditions and its meaning."""
     headings = (textwrap.fill(f"{table.place}: {table.meaning}", WIDTH) for table in references)
     tables = zip(headings, references, strict=True)
     return "\n\n".join("\n".join([heading, *map(_row_text, table.rows)]) for heading, table in tables)

@@ -83,7 +83,7 @@ def axes_lines(kind: str, section: AnalysisSection, materials: Mapping[str, Mate
 
     loaded = [name for load in section.placed.values() for name, value in named(load).items() if value]
     of_loads = axes_line(section.plane if isinstance(section, Envelope) else loaded)
-    phases = [f"[material.{name}]" for name, own in materials.items() if isinstance(own, Orthotropic)]
+    phases = [f"[material.{name}]" for name, material in materials.items() if isinstance(material, Orthotropic)]
     lines = [f"[{kind}] {of_loads}"] if of_loads else []
     lines += [f"{', '.join(phases)} E1 and E2 are across the fibres; along them E3"] if phases else []
     return (". ".join(lines),) if lines else ()
@@ -159,20 +159,20 @@ def _of_table(interface: InterfaceSection) -> dict[str, Any]:
     area = sum((there[0] - here[0]) * (there[1] + here[1]) / 2 for here, there in pairwise(points))
     numbers = tractions[0] / openings[0], tractions[0], area + openings[0] * tractions[0] / 2
     names = STIFFNESSES[0], COHESIVE[0], COHESIVE[2]
-    return {name: own for name, own in zip(names, numbers, strict=True) if getattr(interface, name) is None}
+    return {name: number for name, number in zip(names, numbers, strict=True) if getattr(interface, name) is None}
 
 
 def _cohesive_faults(interface: InterfaceSection, table: Mapping[str, Any], label: str) -> list[str]:
-    """List what is wrong with the numbers of a law that softens, a line each; keys that `table` lacks are not."""
+    """List the faults of numbers of a softening law, a line each, without keys that `table` lacks."""
     law = LAWS[interface.criterion]
     if not law.softens:
         return []
     words = f"law = {toml_value(law.name)}"
     unlimited = [name for name in (*STIFFNESSES, *COHESIVE[:2]) if getattr(interface, name) is None]
     needed = [name for name in unlimited if name in law.needs]
-    found = [f"[{label}] {name}: {words} needs a finite one" for name in needed if name in table]
-    found += [f"[{label}] {line}" for line in _branch_faults(interface)]
-    return found if found or needed else [f"[{label}] {line}" for line in _short_of_energy(interface)]
+    faults = [f"[{label}] {name}: {words} needs a finite one" for name in needed if name in table]
+    faults += [f"[{label}] {line}" for line in _branch_faults(interface)]
+    return faults if faults or needed else [f"[{label}] {line}" for line in _short_of_energy(interface)]
 
 
 def _friction_faults(interface: InterfaceSection, label: str) -> list[str]:
@@ -180,20 +180,20 @@ def _friction_faults(interface: InterfaceSection, label: str) -> list[str]:
     if interface.friction == 0.0:
         return []
     law, words = LAWS[interface.criterion], f"[{label}] friction = {interface.friction:g}"
-    found = [] if interface.contact else [f"{words}: expected 0 with contact = false: faces that overlap do not press"]
+    faults = [] if interface.contact else [f"{words}: expected 0 with contact = false: faces that overlap do not press"]
     if "growth" in law.keys and interface.growth == "released":
-        found.append(f'{words}: expected 0 with growth = "released"; growth = "springs" goes with it')
-    return found
+        faults.append(f'{words}: expected 0 with growth = "released"; growth = "springs" goes with it')
+    return faults
 
 
 def idle_friction_keys(interfaces: tuple[InterfaceSection, ...]) -> list[str]:
     """List the keys of friction that have no effect because there is none, a line each."""
-    found = []
+    lines = []
     for number, each in enumerate(interfaces):
         if each.friction_on_damage and each.friction == 0.0:
             label = interface_label(number, len(interfaces))
-            found.append(f"[{label}] friction_on_damage = true: without effect, for friction = 0")
-    return found
+            lines.append(f"[{label}] friction_on_damage = true: without effect, for friction = 0")
+    return lines
 
 
 def _branch_faults(interface: InterfaceSection) -> Iterator[str]:
@@ -217,12 +217,12 @@ def _softens(tractions: Sequence[float]) -> bool:
 
 
 def _unlike_branch(interface: InterfaceSection) -> Iterator[str]:
-    """Yield the numbers that are others than those of the softening branch."""
+    """Yield the numbers that contradict the softening branch."""
     of_branch = _of_table(replace(interface, normal_stiffness=None, normal_strength=None, normal_toughness=None))
     given = {name: getattr(interface, name) for name in of_branch}
-    for name, own in of_branch.items():
-        if not math.isclose(given[name], own, rel_tol=SAME):
-            yield f"{name} = {given[name]:g}: expected {own:g}, that of openings and tractions, or none"
+    for name, number in of_branch.items():
+        if not math.isclose(given[name], number, rel_tol=SAME):
+            yield f"{name} = {given[name]:g}: expected {number:g}, that of openings and tractions, or none"
 
 
 def _short_of_energy(interface: InterfaceSection) -> Iterator[str]:

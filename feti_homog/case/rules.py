@@ -64,7 +64,7 @@ def _values(selector: Selector) -> Sequence[str]:
 
 
 def _conditional_keys() -> Iterator[Rule]:
-    """Sections and keys that some cases have or need, and others have not."""
+    """Require or refuse sections and keys by the values of selectors."""
     for section, condition in SECTIONS_OF_AN_ANALYSIS.items():
         line = f"[{section}]: missing section; {condition.in_words(section)} needs it"
         yield Rule((), partial(_has_section, section), line, (condition,))
@@ -200,7 +200,7 @@ def _touches_nowhere(document: Any) -> bool:
 
 
 def _loads() -> Iterator[Rule]:
-    """One form of a path; of each component its strain or its stress, by name in generalized plane strain."""
+    """Allow one form of a path, and the strain or the stress of a component; names in generalized plane strain."""
     yield replace(needed(("path",), LOADS[0], "missing; give one", unless=LOADS), names=LOADS)
     yield exclusive(("path",), *LOADS)
     line = f"expected a table such as {{E11 = 0.01}} in {GENERALIZED.in_words('path')}"
@@ -217,7 +217,7 @@ def _outputs() -> Iterator[Rule]:
 
 
 def _along_fibres() -> Iterator[Rule]:
-    """Components that generalized plane strain alone has."""
+    """Refuse components along the fibres outside generalized plane strain."""
     along = [name for name in (*SPATIAL_STRESSES, *SPATIAL_STRAINS) if name not in (*STRESSES, *STRAINS)]
     for path, names in ((("output", "stress"), OUT_OF_PLANE_STRESSES), (("envelope", "plane", ITEMS), along)):
         yield replace(belonging(path, GENERALIZED, _values(PLANE)), holds=partial(_is_none_of, names))

@@ -70,7 +70,7 @@ PHASES = ValueType(
     "a table by phase of names or numbers in the file, or lists of them, such as "
     '{matrix = "Epoxy", fibre = [2, "Glass"]}',
     lambda v: isinstance(v, dict) and v != {} and all(PHASE.fullmatch(k) and _SELECTORS.accepts(v[k]) for k in v),
-    lambda v: {phase: tuple(own if isinstance(own, list) else [own]) for phase, own in v.items()},
+    lambda v: {phase: tuple(names if isinstance(names, list) else [names]) for phase, names in v.items()},
 )
 VOIDS_OF_A_RANDOM_CELL = real(least=0.0, most=0.5)
 VOIDS = either(f"true of a mesh, or {VOIDS_OF_A_RANDOM_CELL.expected}", VOIDS_OF_A_RANDOM_CELL, boolean)

@@ -270,7 +270,7 @@ KEY_OWNERS = {
 
 
 def read_petsc(table: object, faults: list[str]) -> dict[str, Scalar]:
-    """PETSc's options by name; only the run checks those of prefix feti_."""
+    """PETSc's options by name; only the run checks options of prefix feti_."""
     if not isinstance(table, dict):
         faults.append(f"petsc = {toml_value(table)}: expected a section [petsc]")
         return {}

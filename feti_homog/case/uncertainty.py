@@ -32,16 +32,16 @@ class Uncertainty:
 
     def matrix(self) -> Float:
         """(p, p) correlation of all numbers."""
-        names, found = [*self.std], np.eye(len(self.std))
+        names, result = [*self.std], np.eye(len(self.std))
         for first, second, value in self.correlation:
             i, j = names.index(first), names.index(second)
-            found[i, j] = found[j, i] = value
-        return found
+            result[i, j] = result[j, i] = value
+        return result
 
     def propagated(self, J: Float) -> tuple[Float, Float]:
         """(n,) standard deviations of first order of n results of derivatives J (n, p), and the shares (n, p) of each.
 
-        The variances are those of J V J^T; the share of a constant is J_k (V J^T)_k, which may be negative.
+        The variances are the diagonal of J V J^T; the share of a constant is J_k (V J^T)_k, which may be negative.
         """
         A = J * np.array([*self.std.values()])  # changes by one standard deviation of each
         scale = np.abs(A).max(axis=1, initial=np.finfo(float).tiny)  # so that no square over- or underflows
@@ -78,10 +78,10 @@ def _checked(
     faults += [*_deviation_faults(document, given), *_pair_faults(pairs, named)]
     if faults:
         return Uncertainty({})
-    found = Uncertainty(named, tuple((first, second, float(value)) for first, second, value in pairs))
-    if named and np.linalg.eigvalsh(found.matrix()).min() < -ROUNDING:
+    result = Uncertainty(named, tuple((first, second, float(value)) for first, second, value in pairs))
+    if named and np.linalg.eigvalsh(result.matrix()).min() < -ROUNDING:
         faults.append(f"[{UNCERTAINTY}] {CORRELATION}: no constants are so correlated; expected a positive matrix")
-    return found
+    return result
 
 
 def _deviation_faults(document: Mapping[str, Any], given: Sequence[tuple[TomlPath, Any]]) -> Iterator[str]:
@@ -99,7 +99,7 @@ def _deviation_faults(document: Mapping[str, Any], given: Sequence[tuple[TomlPat
 
 
 def _pair_faults(pairs: Any, named: Mapping[str, Any]) -> Iterator[str]:
-    """Yield what is wrong with pairs of correlated constants."""
+    """Yield the faults of pairs of correlated constants."""
     words = f"expected [KEY, KEY, VALUE] of two uncertain constants, {' and '.join(named)}, from -1 to 1"
     known = set[frozenset[str]]()
     for pair in pairs if isinstance(pairs, list) else [pairs]:
@@ -112,7 +112,7 @@ def _pair_faults(pairs: Any, named: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _means(value: Any, path: TomlPath, given: list[tuple[TomlPath, Any]], faults: list[str]) -> Any:
-    """Return a value with the means of uncertain numbers, whose deviations are added to those given."""
+    """Return a value with the means of uncertain numbers; their deviations are appended to `given`."""
     if isinstance(value, list):
         numbers = [()] if len(value) == 1 else [(str(k + 1),) for k in range(len(value))]
         return [_means(item, (*path, *number), given, faults) for item, number in zip(value, numbers, strict=True)]
@@ -139,8 +139,8 @@ def _named(path: TomlPath) -> TomlPath:
 
 def _in_lists(path: TomlPath) -> TomlPath:
     """Return the path of an entry Cij of a stiffness with its row and column."""
-    found = re.fullmatch(r"C([1-6])([1-6])", path[-1]) if path[-2:-1] == (STIFFNESS,) else None
-    return path if found is None else (*path[:-1], *found.groups())
+    result = re.fullmatch(r"C([1-6])([1-6])", path[-1]) if path[-2:-1] == (STIFFNESS,) else None
+    return path if result is None else (*path[:-1], *result.groups())
 
 
 def _deviation(value: Mapping[str, Any]) -> float | None:
@@ -153,33 +153,33 @@ def _deviation(value: Mapping[str, Any]) -> float | None:
 
 def number_at(document: Mapping[str, Any], path: TomlPath) -> float | None:
     """Return the number at a place, None if there is none; the one of several sections of a name has no number."""
-    found = _at(document, _in_lists(path))
-    return float(found) if is_number(found) else None
+    result = _at(document, _in_lists(path))
+    return float(result) if is_number(result) else None
 
 
 def with_number(document: Mapping[str, Any], path: TomlPath, value: float) -> tuple[TomlPath, Any]:
     """Return the key of a number and another value of it; of one in a list the key and value of the list."""
-    whole = _in_lists(path)
-    for k in range(1, len(whole)):
-        found = _at(document, whole[:k])
-        if isinstance(found, list) and not any(isinstance(each, dict) for each in found):
-            changed, place = copy.deepcopy(found), whole[k:]
-            for *above, last in (place, place[::-1]) if whole[k - 1] == STIFFNESS else (place,):
+    full = _in_lists(path)
+    for k in range(1, len(full)):
+        result = _at(document, full[:k])
+        if isinstance(result, list) and not any(isinstance(each, dict) for each in result):
+            changed, place = copy.deepcopy(result), full[k:]
+            for *above, last in (place, place[::-1]) if full[k - 1] == STIFFNESS else (place,):
                 numbers = _at(changed, tuple(above))
                 numbers = numbers[0] if len(numbers) == 1 and isinstance(numbers[0], list) else numbers
                 numbers[int(last) - 1] = value
-            return whole[:k], changed
+            return full[:k], changed
     return path, value
 
 
 def _at(document: Any, path: TomlPath) -> Any:
-    found = document
+    result = document
     for name in path:
-        found = found[0] if isinstance(found, list) and len(found) == 1 else found
-        if isinstance(found, list):  # sections of one name, from 1
-            found = {str(number): each for number, each in enumerate(found, start=1)}
-        found = found.get(name) if isinstance(found, dict) else None
-    return found
+        result = result[0] if isinstance(result, list) and len(result) == 1 else result
+        if isinstance(result, list):  # sections of one name, from 1
+            result = {str(number): each for number, each in enumerate(result, start=1)}
+        result = result.get(name) if isinstance(result, dict) else None
+    return result
 
 
 def _is_pair(pair: Any, named: Mapping[str, Any]) -> bool:

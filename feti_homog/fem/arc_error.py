@@ -40,7 +40,7 @@ class ArcSides:
 
     @classmethod
     def of(cls, body: RecoveredStress, submeshes: Sequence[Submesh], lattice: ReferenceLattice) -> ArcSides:
-        """Find those of subdomains that are refined by the lattice."""
+        """Find the sides of subdomains that the lattice refines."""
         corners = lattice.nodes[lattice.triangles[:, :3]]
         is_zero = np.stack([corners, np.roll(corners, -1, axis=1)]) == 0
         # Side k of the lattice, from its vertex k to the next, is where the coordinate of the third vanishes.
@@ -54,9 +54,9 @@ class ArcSides:
         coarse, k = np.nonzero(turns[triangle_edges] > 0)
         element = (coarse[:, None] * len(corners) + place[k]).ravel()
         side, edge = side[k].ravel(), np.repeat(triangle_edges[coarse, k], n)
-        own = body.triangles[element]
+        triangles = body.triangles[element]
         middle = [3 + side] if lattice.order == 2 else []
-        nodes = np.stack([own[np.arange(len(own)), j] for j in (side, *middle, (side + 1) % 3)], axis=1)
+        nodes = np.stack([triangles[np.arange(len(triangles)), j] for j in (side, *middle, (side + 1) % 3)], axis=1)
         points, turn = body.points[nodes], turns[edge] / n
         spokes = points - centres[edge, None]
         doubled = _cross(spokes[:, 0], spokes[:, -1])
@@ -121,12 +121,12 @@ def arc_energy(body: RecoveredStress, sides: ArcSides) -> Float:
 
 def _at(body: RecoveredStress, sides: ArcSides, place: float) -> Float:
     """(f, m, k) recovered stresses at the place, from 0 to 1, of each side."""
-    found = np.empty((len(sides.element), body.problem.strains, body.loads.shape[1]))
+    result = np.empty((len(sides.element), body.problem.strains, body.loads.shape[1]))
     for k in range(3):
-        own = np.flatnonzero(sides.side == k)
+        members = np.flatnonzero(sides.side == k)
         lam = np.roll([[1 - place, place, 0.0]], k, axis=1)
-        found[own] = body.recovered(sides.element[own], lam)[:, 0]
-    return found
+        result[members] = body.recovered(sides.element[members], lam)[:, 0]
+    return result
 
 
 def _along(tensors: Float, vectors: Float) -> Float:

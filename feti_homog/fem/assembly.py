@@ -57,12 +57,12 @@ def assemble(
 ) -> Assembly:
     """Assemble the subdomain `mesh` of the stiffness L (v, v), or of several.
 
-    Its first rows and columns are those of the strains that displacements make, the others of uniform ones.  Quadratic
+    Its first rows and columns belong to strains of displacements, the others to uniform strains.  Quadratic
     elements of a stiffness that is isotropic in the plane may be mixed: with a bubble and a pressure (`fem.bubble`).
 
     Args:
         laws: L (v, v), or (materials, v, v) with the `material` (t,) of each coarse triangle.
-        mixed: whether elements are, or those of each material.
+        mixed: whether elements are mixed, or whether each material has mixed ones.
     """
     macro, c = MacroElement.of(mesh.lattice), problem.components
     classes, n = mesh.node_class[mesh.nodes], mesh.n_classes
@@ -78,10 +78,10 @@ def assemble(
                 couples[part], loads[part], area = integrate(macro, mesh, part, tensor, L if is_mixed else None)
                 areas[number] += area
         nodes = classes[members].ravel()
-        own = np.stack([np.bincount(nodes, loads[members, :, k].ravel(), n) for k in range(2)], axis=1)
+        slope = np.stack([np.bincount(nodes, loads[members, :, k].ravel(), n) for k in range(2)], axis=1)
         # sum_k int dN/dx_k L[(i,k), :]
-        Q += (own @ np.concatenate(L[problem.voigt], axis=1)).reshape(Q.shape)
-        slopes += own
+        Q += (slope @ np.concatenate(L[problem.voigt], axis=1)).reshape(Q.shape)
+        slopes += slope
     return Assembly(_sparse(couples, classes[:, macro.rows], classes[:, macro.columns], n), Q, slopes, areas)
 
 
@@ -157,7 +157,7 @@ class GroupedSum:
     """Sums of the element matrices' entries of one coarse triangle that belong together.
 
     Attributes:
-        entries: all entries, flat, those that belong together one after the other.
+        entries: all entries, flat, sum after sum.
         first: where each sum begins in `entries`.
     """
 
@@ -178,12 +178,12 @@ class GroupedSum:
 
 @dataclass(frozen=True)
 class MacroElement:
-    """The lattice with q nodes as an element whose nodes couple in p ordered pairs, those that share an element.
+    """The lattice with q nodes as an element whose nodes couple in the p ordered pairs that share an element.
 
     Attributes:
         rows, columns: (p,) lattice nodes of each couple, in row-major order.
         couples: from the entries (4**refine, a, a) of the element matrices to the couples.
-        nodes: from the nodes (4**refine, a) of the elements to those of the lattice.
+        nodes: from the nodes (4**refine, a) of the elements to the lattice nodes.
         products: (p, 4) int dN_A/dr_k dN_B/dr_l over the unit triangle, with (k, l) flat.
         hessians: (p, 9) sums over the elements of the products of second derivatives of their functions (`fem.bubble`)
             if they are quadratic.
@@ -235,11 +235,11 @@ def void_integrals(submesh: Submesh, mesh: FineMesh) -> Float:
     products = LINEAR if mesh.lattice.triangles.shape[1] == 3 else QUADRATIC
     step = len(products) - 1
     for first in range(0, nodes.shape[1] - 1, step):
-        own = nodes[:, first : first + step + 1]
+        side = nodes[:, first : first + step + 1]
         # The body is on the left, the void on the right: n ds = (-dy, dx).
-        tangent = np.einsum("ij,tjk->tik", products, mesh.points[own])
+        tangent = np.einsum("ij,tjk->tik", products, mesh.points[side])
         for k, part in enumerate((-tangent[..., 1], tangent[..., 0])):
-            sums[:, k] += np.bincount(mesh.node_class[own].ravel(), part.ravel(), mesh.n_classes)
+            sums[:, k] += np.bincount(mesh.node_class[side].ravel(), part.ravel(), mesh.n_classes)
     return sums
 
 

@@ -2,8 +2,8 @@
 
 The pressure p = lambda Pi div u, with Pi the projection on linear functions of the reference coordinates, and the
 bubble are eliminated element by element.  So the element has the nodes of a quadratic one, does not lock where lambda
-exceeds the shear modulus mu, and its mean strains, its mean stresses and the loads of uniform strains are those of the
-quadratic one: the bubble vanishes on the boundary, and Pi keeps means.
+exceeds the shear modulus mu, and its mean strains, its mean stresses and the loads of uniform strains equal the
+quadratic ones: the bubble vanishes on the boundary, and Pi keeps means.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def lame(L: Float) -> tuple[float, float]:
 
 
 def affine_couples(L: Float, inverse: Float, determinant: Float) -> Float:
-    """(t, 9, 4) X with which H_a,r H_b,s X_(r s)(i j), H the `HESSIANS`, is what the bubble adds to K_(a i)(b j).
+    """(t, 9, 4) X with which H_a,r H_b,s X_(r s)(i j), H the `HESSIANS`, is the bubble's share in K_(a i)(b j).
 
     The stress of a quadratic u has a constant divergence f on an affine element, and div u is linear.  So the bubble's
     force is -int b f, and its stiffness alone differs from that without pressure:
@@ -86,7 +86,7 @@ class Elements:
         return np.asarray(nodes.reshape(-1, BUBBLE, 2, BUBBLE, 2).transpose(0, 1, 3, 2, 4).reshape(-1, 6, 6, 4))
 
     def with_bubble(self, u: Float) -> Float:
-        """(e, 7, 2, k) displacements (e, 6, 2, k) and those of the bubble that they make."""
+        """(e, 7, 2, k) displacements (e, 6, 2, k) of nodes, and of the bubble that follows them."""
         K, n = self._stiffness(slice(BUBBLE, None)), 2 * BUBBLE
         bubble = np.linalg.solve(K[:, :, n:], K[:, :, :n] @ u.reshape(len(u), n, -1))
         return np.concatenate([u, -bubble[:, None]], axis=1)
@@ -118,11 +118,11 @@ class Elements:
         """
         (first, shear), (e, q, a, _) = self.lame, self.gradients.shape
         flat, weights = self.gradients.reshape(e, q, 2 * a), self.weights[..., None, None]
-        own, projected = (
+        weighted, projected = (
             (weights * of[:, :, functions]).reshape(e, q, -1).transpose(0, 2, 1)
             for of in (self.gradients, self.projected)
         )
-        products = (own @ flat).reshape(e, -1, 2, a, 2)
+        products = (weighted @ flat).reshape(e, -1, 2, a, 2)
         K = shear * products.transpose(0, 1, 4, 3, 2)
         along = shear * (products[:, :, 0, :, 0] + products[:, :, 1, :, 1])
         for i in range(2):

@@ -38,7 +38,7 @@ class Neighbours:
 
     @classmethod
     def of(cls, vertices: Int, corners: Float) -> Neighbours:
-        """Find those of elements with these vertices (e, 3) at `corners` (e, 3, 2); on the boundary sides have one."""
+        """Find the neighbours in elements of vertices (e, 3) at `corners` (e, 3, 2); boundary sides have one."""
         start, stop = vertices.T.ravel(), vertices.T[[1, 2, 0]].ravel()
         size, e = int(vertices.max()) + 1, len(vertices)
         # Elsewhere the sides around a vertex lead to the vertices that they come from; such numbers add up exactly.
@@ -51,16 +51,16 @@ class Neighbours:
         k, element = np.divmod(once, e)
         vector = corners[element, (k + 1) % 3] - corners[element, k]
         at, other = np.concatenate([start[once], stop[once]]), np.concatenate([stop[once], start[once]])
-        wanted = at_boundary[at]
-        return cls(at[wanted], other[wanted], np.concatenate([vector, -vector])[wanted])
+        is_start = at_boundary[at]
+        return cls(at[is_start], other[is_start], np.concatenate([vector, -vector])[is_start])
 
     def shared(self, sums: Float, order: int) -> Float:
-        """(vertices, p, k) what vertices on the boundary get of the sums (vertices, p, k) of their neighbours."""
+        """(vertices, p, k) shares of vertices on the boundary in the sums (vertices, p, k) of their neighbours."""
         moved = _translations(self.vector, order) @ sums[self.other]
         return NEIGHBOURS[order] * gathered(self.at, moved, len(sums))
 
     def shared_moments(self, moments: Float) -> Float:
-        """(6, vertices) what vertices on the boundary get of the moments (6, vertices) of neighbours."""
+        """(6, vertices) shares of vertices on the boundary in the moments (6, vertices) of neighbours."""
         one, x, y, xx, xy, yy = moments[:, self.other]
         a, b = self.vector.T
         moved_x, moved_y = x + a * one, y + b * one
@@ -98,18 +98,18 @@ def linear_values(vertices: Int, away: Float, weights: Float, values: Float, nei
     cofactors = np.stack([xx * yy - xy * xy, xy * my - mx * yy, mx * xy - xx * my])
     determinant = (1.0 + RIDGE) * cofactors[0] + mx * cofactors[1] + my * cofactors[2]
     first = cofactors * scale * (scale[0] / determinant)
-    share = sum(np.take(row, vertices) * own for row, own in zip(first, basis, strict=True))
-    found = csc_matrix((share.T.ravel(), vertices.T.ravel(), np.arange(0, 3 * e + 1, 3)), (size, e)) @ values
+    share = sum(np.take(row, vertices) * part for row, part in zip(first, basis, strict=True))
+    result = csc_matrix((share.T.ravel(), vertices.T.ravel(), np.arange(0, 3 * e + 1, 3)), (size, e)) @ values
     is_shared = np.zeros(size, bool)
     is_shared[neighbours.other] = True
     near = np.flatnonzero(np.take(is_shared, at))
-    each = np.stack([own.ravel()[near] for own in basis], axis=1)
+    each = np.stack([part.ravel()[near] for part in basis], axis=1)
     rows = at[near, None] + size * np.arange(3)
     sums = csc_matrix((each.ravel(), rows.ravel(), np.arange(0, 3 * len(near) + 1, 3)), (3 * size, len(near)))
     zero, one, two = (sums @ values[near % e]).reshape(3, size, -1)[:, neighbours.other]
     (a, b), (f, g, h) = neighbours.vector.T, first[:, neighbours.at]
     moved = (f + a * g + b * h)[:, None] * zero + g[:, None] * one + h[:, None] * two
-    return np.asarray(found + NEIGHBOURS[1] * gathered(neighbours.at, moved[:, None], size)[:, 0])
+    return np.asarray(result + NEIGHBOURS[1] * gathered(neighbours.at, moved[:, None], size)[:, 0])
 
 
 def polynomials(x: Float, order: int) -> Float:
@@ -161,10 +161,10 @@ class KnownTractions:
 
     @classmethod
     def at(cls, node: Int, mean: Float, traction: Float) -> KnownTractions:
-        """Make them of the mean normals (n, 2) of the sides at vertices, but for those at which these cancel."""
+        """Make tractions of the mean side normals (n, 2) at vertices; leave out vertices where normals cancel."""
         length = np.hypot(*mean.T)
-        kept = length > NO_NORMAL
-        return cls(node[kept], mean[kept] / length[kept, None], traction[kept])
+        rows = length > NO_NORMAL
+        return cls(node[rows], mean[rows] / length[rows, None], traction[rows])
 
     def imposed(self, stress: Float, vertex: Int, voigt: Int, flexibility: Float) -> Float:
         """Return stresses (vertices, m, k) with these tractions at `vertex` (n,).
@@ -174,20 +174,20 @@ class KnownTractions:
         sigma + d n + n d - (d . n) n n + a t t in the plane, with d = traction - sigma n and a such that the strain
         along the boundary stays, as it is known on both of its sides; along the fibres sigma + d n.
         """
-        n, own = self.normal, stress[vertex]
-        d = self.traction - np.einsum("ncdk,nd->nck", own[:, voigt], n)
+        n, before = self.normal, stress[vertex]
+        d = self.traction - np.einsum("ncdk,nd->nck", before[:, voigt], n)
         off = np.einsum("nck,nd->ncdk", d, n)
         entries = [tuple(np.argwhere(voigt == number)[0]) for number in range(stress.shape[1])]
         if len(voigt) == 2:
             both = n[:, :, None, None] * n[:, None, :, None]
             off += off.transpose(0, 2, 1, 3) - both * np.einsum("nck,nc->nk", d, n)[:, None, None]
-        found = np.stack([off[:, i, j] for i, j in entries], axis=1)
+        result = np.stack([off[:, i, j] for i, j in entries], axis=1)
         if len(voigt) == 2:
             t = np.column_stack([-n[:, 1], n[:, 0]])
             along = np.stack([t[:, i] * t[:, j] for i, j in entries], axis=1)
             strain = along @ flexibility
-            share = np.einsum("nv,nvk->nk", strain, found) / (strain * along).sum(axis=1)[:, None]
-            found -= along[..., None] * share[:, None]
-        whole = stress.copy()
-        whole[vertex] += found
-        return whole
+            share = np.einsum("nv,nvk->nk", strain, result) / (strain * along).sum(axis=1)[:, None]
+            result -= along[..., None] * share[:, None]
+        full = stress.copy()
+        full[vertex] += result
+        return full

@@ -20,7 +20,7 @@ class PointFields:
 
     Attributes:
         gradients, weights: (e, q, a, 2) of the shape functions, of mixed elements the bubble's last, and (e, q).
-        u: (e, a, 2) displacements, of mixed elements with that of the bubble.
+        u: (e, a, 2) displacements, in mixed elements also of the bubble.
         strain, stress: (e, q, 3).
         density: (e, q) W whose integral is the strain energy: sigma : eps / 2, and p (div u - p / lambda) / 2 in
             mixed elements.
@@ -43,7 +43,7 @@ def point_fields(points: Float, u: Float, L: Float, is_mixed: bool = False) -> P
         return PointFields(g, weights, u, strain, stress, (stress * strain).sum(axis=2) / 2)
     elements = bubble.Elements.of(points, L)
     inner = elements.with_bubble(u[..., None])
-    strain, stress, mean = (found(inner)[..., 0] for found in (elements.strain, elements.stress, elements.dilatation))
+    strain, stress, mean = (field(inner)[..., 0] for field in (elements.strain, elements.stress, elements.dilatation))
     off = strain[..., 0] + strain[..., 1] - mean
     density = ((stress * strain).sum(axis=2) + elements.lame[0] * mean * off) / 2
     return PointFields(elements.gradients, elements.weights, inner[..., 0], strain, stress, density)

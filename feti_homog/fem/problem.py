@@ -21,7 +21,7 @@ class Problem:
     Attributes:
         strain: c rows of two numbers.
         turns: whether a rigid body can turn without strain.
-        loads: v names of the unit loads, those of the m strains first; the others are uniform in the cell.
+        loads: v names of the unit loads, the m strains first; the others are uniform in the cell.
     """
 
     strain: tuple[tuple[int, int], ...]
@@ -40,7 +40,7 @@ class Problem:
 
     @property
     def stresses(self) -> int:
-        """Loads that work on stresses: strains, those of displacements first."""
+        """Loads that work on stresses: strains, of displacements first."""
         return len(self.loads) - ("temperature" in self.loads)
 
     @cached_property

@@ -1,4 +1,4 @@
-"""Stresses recovered in each subdomain from those of its elements, and the energy of their difference.
+"""Stresses recovered in each subdomain from its element stresses, and the energy of their difference.
 
 Zienkiewicz and Zhu (IJNME 33 (1992) 1331): about each vertex a polynomial of the elements' order is fitted to the
 stresses at the points of integration of the elements around it; within an element the fits of its three vertices are
@@ -40,7 +40,7 @@ class ElementStresses:
 
 @dataclass(frozen=True)
 class RecoveredStress:
-    """Stresses of some subdomains of one phase under k loads, those of their elements and the recovered ones.
+    """Element stresses and recovered stresses of some subdomains of one phase under k loads.
 
     Attributes:
         points: (n, 2) plane nodes of all of them.
@@ -99,7 +99,7 @@ class RecoveredStress:
 
     @cached_property
     def numbers(self) -> Int:
-        """(classes,) numbers of those that are vertices."""
+        """(classes,) vertex numbers."""
         is_vertex = np.zeros(len(self.u), bool)
         is_vertex[self.node_class[self.triangles[:, :3]]] = True
         return np.asarray(np.cumsum(is_vertex) - 1)
@@ -138,19 +138,19 @@ class RecoveredStress:
     def _uniform(self, part: slice) -> ElementStresses:
         """Return the stresses of linear elements; loops of NumPy run over the elements."""
         (c, k), m, triangles = self.u.shape[1:], self.problem.strains, self._rows[:, part]
-        (x, y), at = (np.take(own, triangles) for own in self._coordinates), np.take(self.node_class, triangles)
-        zero, first, second = (np.take(self._by_node, own, axis=1) for own in at)
+        (x, y), at = (np.take(row, triangles) for row in self._coordinates), np.take(self.node_class, triangles)
+        zero, first, second = (np.take(self._by_node, row, axis=1) for row in at)
         first -= zero
         second -= zero
         (x1, x2), (y1, y2) = x[1:] - x[0], y[1:] - y[0]
         doubled = x1 * y2 - x2 * y1
         by_place = (y2 * first - y1 * second) / doubled, (x1 * second - x2 * first) / doubled
-        gradient, strain = [own.reshape(c, k, -1) for own in by_place], np.zeros((m, k, len(doubled)))
+        gradient, strain = [row.reshape(c, k, -1) for row in by_place], np.zeros((m, k, len(doubled)))
         for (i, d), number in np.ndenumerate(self.problem.voigt):
             strain[number] += gradient[d][i]
         stress = (self.L[:m, :m] @ strain.reshape(m, -1)).reshape(m * k, -1)
         stress += (self.L[:m] @ self.loads).reshape(-1, 1)
-        points = np.stack([own.sum(axis=0) / 3 for own in (x, y)], axis=1)
+        points = np.stack([row.sum(axis=0) / 3 for row in (x, y)], axis=1)
         return ElementStresses(
             part, points[:, None], doubled[:, None] / 2, np.ascontiguousarray(stress.T).reshape(-1, 1, m, k)
         )
@@ -162,7 +162,7 @@ class RecoveredStress:
         if self.order == 1:
             chunks = [(chunk.points[:, 0], chunk.weights[:, 0], chunk.stress[:, 0]) for chunk in self.elements]
             points, weights, stress = map(np.concatenate, zip(*chunks, strict=True))
-            away = np.stack([own - np.take(x, self._rows) for own, x in zip(points.T, self._coordinates, strict=True)])
+            away = np.stack([row - np.take(x, self._rows) for row, x in zip(points.T, self._coordinates, strict=True)])
             values = linear_values(self.vertices.T, away, weights, stress.reshape(len(stress), -1), neighbours)
             values = self._with_shared(values[:, None])[:, 0]
             if self.known is not None:
@@ -177,17 +177,17 @@ class RecoveredStress:
     def patch_sums(self) -> tuple[Float, Float]:
         """(vertices, p, p) moments of the elements around each vertex, and (vertices, p, m k) of their stresses."""
         moments, sums, size = np.zeros(()), np.zeros(()), int(self.vertices.max()) + 1
-        for own in self.elements:
-            corners = self.points[self.triangles[own.part, :3]]
-            basis = polynomials(own.points[:, None] - corners[:, :, None], self.order)
-            weighted = (basis * own.weights[:, None, :, None]).transpose(0, 1, 3, 2)
-            stress = own.stress.reshape(len(corners), 1, own.points.shape[1], -1)
-            moments = moments + gathered(self.vertices[own.part], weighted @ basis, size)
-            sums = sums + gathered(self.vertices[own.part], weighted @ stress, size)
+        for chunk in self.elements:
+            corners = self.points[self.triangles[chunk.part, :3]]
+            basis = polynomials(chunk.points[:, None] - corners[:, :, None], self.order)
+            weighted = (basis * chunk.weights[:, None, :, None]).transpose(0, 1, 3, 2)
+            stress = chunk.stress.reshape(len(corners), 1, chunk.points.shape[1], -1)
+            moments = moments + gathered(self.vertices[chunk.part], weighted @ basis, size)
+            sums = sums + gathered(self.vertices[chunk.part], weighted @ stress, size)
         return moments, sums
 
     def _with_shared(self, fits: Float) -> Float:
-        """Return fits (vertices, p, m k) with those that are known."""
+        """Return fits (vertices, p, m k) with the shared ones in their places."""
         if self.shared is not None:
             fits[self.numbers[self.shared[0]]] = self.shared[1][:, : fits.shape[1]]
         return fits
@@ -198,37 +198,37 @@ class RecoveredStress:
         if self.order == 1:
             return np.asarray((lam @ self.fits[:, 0][vertices]).reshape(len(vertices), len(lam), *shape))
         corners = self.points[self.triangles[part]]
-        points, found = shape_functions(6, lam) @ corners, np.zeros(())
+        points, result = shape_functions(6, lam) @ corners, np.zeros(())
         for k in range(3):
             basis = polynomials(points - corners[:, None, k], self.order)
-            found = found + (lam[:, k, None] * basis) @ self.fits[vertices[:, k]]
-        return found.reshape(*points.shape[:2], *shape)
+            result = result + (lam[:, k, None] * basis) @ self.fits[vertices[:, k]]
+        return result.reshape(*points.shape[:2], *shape)
 
     def difference(self, with_shares: bool = True) -> tuple[Float, Float]:
-        """(k, k) int ds_i : S : ds_j, ds recovered less own stress; (e, k) what the elements have of its diagonal.
+        """(k, k) int ds_i : S : ds_j, ds recovered less own stress; (e, k) shares of the elements in its diagonal.
 
         Without shares (0, k).
         """
         m, k = self.problem.strains, self.loads.shape[1]
         total, shares = np.zeros((m * k, m * k)), [np.zeros((0, k))]
-        for own in self.elements:
-            off = self._off(own)
-            flat = off.reshape(-1, m * k)
+        for chunk in self.elements:
+            difference = self._off(chunk)
+            flat = difference.reshape(-1, m * k)
             total += flat.T @ flat
             if with_shares:
-                shares.append((self.flexibility @ off * off).sum(axis=(0, 2)))
+                shares.append((self.flexibility @ difference * difference).sum(axis=(0, 2)))
         return np.einsum("ab,akbl->kl", self.flexibility, total.reshape(m, k, m, k)), np.concatenate(shares)
 
-    def _off(self, own: ElementStresses) -> Float:
+    def _off(self, chunk: ElementStresses) -> Float:
         """(q, e, m, k) recovered less own stress at places of the elements, times the root of their weights."""
         if self.order == 2:
-            off = self.recovered(own.part, barycentric(6)) - own.stress
-            return np.asarray((off * np.sqrt(own.weights)[..., None, None]).swapaxes(0, 1))
+            off = self.recovered(chunk.part, barycentric(6)) - chunk.stress
+            return np.asarray((off * np.sqrt(chunk.weights)[..., None, None]).swapaxes(0, 1))
         # Linear less uniform stresses d, of which d_i at the vertices have the sum s:
         # int d d = w/12 (sum_i d_i d_i + s s) = w/12 sum_i (d_i + s/3)^2.
-        e, _, m, k = own.stress.shape
+        e, _, m, k = chunk.stress.shape
         off = np.empty((3, e, m * k))
-        np.take(self.fits[:, 0], self.vertices[own.part].T, axis=0, out=off, mode="clip")  # which needs no buffer
-        off += (off[0] + off[1] + off[2]) / 3 - 2 * own.stress.reshape(e, m * k)
-        off *= np.sqrt(own.weights / 12)
+        np.take(self.fits[:, 0], self.vertices[chunk.part].T, axis=0, out=off, mode="clip")  # which needs no buffer
+        off += (off[0] + off[1] + off[2]) / 3 - 2 * chunk.stress.reshape(e, m * k)
+        off *= np.sqrt(chunk.weights / 12)
         return off.reshape(3, e, m, k)

@@ -48,7 +48,7 @@ class CellSummary:
         frames: (constituents, 2, 2) those of `Ellipses`, of fibres that are circles or ellipses; else NaN.
         snapped: how far a node of a user's mesh was moved to make sides match, at most.
         voids: how many there are.
-        match_distance: how far the fibres are from the table that they match, see `neighbour_match`; None without one.
+        match_distance: how far the fibres are from the table that they match, see `random_fibres`; None without one.
         remarks: how the cell differs from what the case may lead to expect, a line each.
         across: whether subdomains are pieces across materials.
         interface_nodes: how many there are of interfaces, where `across` has no multipliers there.
@@ -215,7 +215,7 @@ def match_distance(case: Case, width: float, height: float, centres: Float, radi
     window = case.cell.matched
     if window is None:
         return None
-    from feti_homog.microstructure.hard_core import distance_of  # with statistics of neighbours
+    from feti_homog.microstructure.random_fibres import distance_of  # with statistics of neighbours
 
     return distance_of(window, width, height, centres, radii)
 

@@ -31,7 +31,7 @@ _MANDEL = {n: np.sqrt(np.outer(scale, scale)) for n, scale in ((3, [1, 1, 2]), (
 
 @dataclass(frozen=True)
 class Moduli:
-    """Moduli in the plane; in plane strain E and nu are those of the plane state, not of the bulk material.
+    """Moduli in the plane; in plane strain E and nu belong to the plane state, not to the bulk material.
 
     nu_ij = -eps_j/eps_i under stress along i; eta_i = gamma_12/eps_i under the same (mutual influence);
     `bulk` and `shear` belong to the nearest isotropic stiffness, `anisotropy` is the relative distance to it.

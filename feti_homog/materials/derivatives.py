@@ -47,7 +47,7 @@ class LawChange:
 
 
 def law_changes(material: Material, plane: str) -> Iterator[LawChange]:
-    """Yield the derivatives by every constant that is given; those of expansions, (6, 6) alone, come last."""
+    """Yield the derivatives by every given constant; expansions, (6, 6) alone, come last."""
     C, none = stiffness_of(material, plane), np.zeros(6)
     is_general = isinstance(material, General)
     for name, value, change in (_of_entries if is_general else _of_constants)(material, plane, C):
@@ -93,12 +93,12 @@ def _of_entries(material: Any, plane: str, C: Float) -> Iterator[tuple[str, floa
             continue
         changed = (given + given.T) / 2 + 0j
         changed[[i, j], [j, i]] += 1j * STEP
-        whole = changed.imag / STEP if len(given) == len(C) else _of_plane_state(changed, plane, condensed="stress")
-        yield f"stiffness.C{i + 1}{j + 1}", float((given[i, j] + given[j, i]) / 2), whole
+        full = changed.imag / STEP if len(given) == len(C) else _of_plane_state(changed, plane, condensed="stress")
+        yield f"stiffness.C{i + 1}{j + 1}", float((given[i, j] + given[j, i]) / 2), full
 
 
 def _of_plane_state(M: NDArray[Any], plane: str, *, condensed: str) -> Float:
-    """Differentiate what a plane state has of a complex stiffness or compliance.
+    """Differentiate the part of a complex stiffness or compliance that a plane state has.
 
     That is all of it, the block of the plane or, in the state `condensed`, this less the share of 33.
     """

@@ -163,7 +163,7 @@ def mori_tanaka(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimat
 def composite_cylinders(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
     """Cylinders of fibre and matrix, alike but for their size, that fill space; one kind of fibres, on springs too.
 
-    Exact for this arrangement: k, E_A, nu_A, G_A and the expansions, which are those of `cylinders_in_matrix`.  Of
+    Exact for this arrangement: k, E_A, nu_A, G_A and the expansions, as of `cylinders_in_matrix`.  Of
     shear across the fibres there are bounds only.  Hashin and Rosen 1964; anisotropic fibres Hashin 1979; expansions
     Rosen and Hashin 1970; springs, of fibres of equal radius, Hashin 1990.
     """
@@ -176,7 +176,7 @@ def composite_cylinders(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) ->
 def self_consistent(matrix: TransverseIsotropy, fibres: Sequence[Fibres]) -> Estimate:
     """Christensen and Lo's estimate; one kind of fibres, on springs too.
 
-    k, E_A, nu_A, G_A and the expansions are those of `composite_cylinders`, G_T is that of `transverse_shear`;
+    k, E_A, nu_A, G_A and the expansions come from `composite_cylinders`, G_T from `transverse_shear`;
     E_T and nu_T follow.  Christensen and Lo 1979; springs, of fibres of equal radius, Hashin 1990.
     """
     if len(fibres) != 1:

@@ -65,7 +65,7 @@ def plane_stiffness(material: Material, plane: str) -> Float:
     """C with [S11, S22, S12] = C [E11, E22, gamma12], (3, 3), symmetric positive definite, unit of stress.
 
     `plane` is "stress" (S33 = 0), "strain" (E33 = 0), or "generalized", where C is that at E33 = 0. Raises ValueError,
-    with the keys at fault, if the constants leave C open or are those of no stable material.
+    with the keys at fault, if the constants leave C open or no material is stable with them.
     """
     if isinstance(material, Isotropic):
         lame, shear = _lame(material, plane)
@@ -94,7 +94,7 @@ def isotropic_ratio(material: Material) -> float | None:
         young, ratio, shear = material.E_transverse, material.nu_transverse, material.G_axial
         pairs = [(material.E_axial, young), (material.nu_axial, ratio), (shear, young / (2 + 2 * ratio))]
         known = pairs if shear is not None else pairs[:2]
-        alike = all(own is not None and math.isclose(own, other, rel_tol=ISOTROPY) for own, other in known)
+        alike = all(first is not None and math.isclose(first, second, rel_tol=ISOTROPY) for first, second in known)
         return ratio if alike else None
     return material.poisson if isinstance(material, Isotropic) else None
 
@@ -236,7 +236,7 @@ def known_compliance(material: Orthotropic | TransverselyIsotropic) -> Float:
 
 
 def _numbers(*constants: float | None) -> list[float]:
-    """Return the constants, NaN for those that are not given."""
+    """Return the constants, NaN for missing ones."""
     return [np.nan if constant is None else constant for constant in constants]
 
 

@@ -37,7 +37,7 @@ class PlaneState:
         strains, stresses: names of the components, in Voigt order.
         is_sheet: whether S33 vanishes; else E33 does, or is a load.
         is_spatial: whether all six strains are loads, and with them a temperature: then axial shear is a problem of its
-            own, the stiffness is (6, 6), and constants, estimates and bounds are those of space.
+            own, the stiffness is (6, 6), and constants, estimates and bounds are spatial.
         numbers: i and j in the names Cij of the entries of strains of the plane.
     """
 

@@ -74,7 +74,7 @@ def random_arrangement(cell: Cell, max_steps: int | None = None, max_attempts: i
     Raises:
         MeshError: no arrangement is found.
     """
-    from feti_homog.microstructure.hard_core import MAX_STEPS, relax  # other cells do without
+    from feti_homog.microstructure.random_fibres import MAX_STEPS, relax  # other cells do without
 
     phase = tuple(name for name, members in fibre_counts(cell).items() for _ in range(members))
     fibres, gap, fraction = len(phase), cell.min_gap, fsum(cell.fractions.values())
@@ -125,15 +125,14 @@ def matched_arrangement(cell: Cell) -> Arrangement:
 
     The radii are quantiles of the window `cell.matched`, dealt at random and scaled to the fraction. Centres
     are placed as in other random cells, `min_gap` mean diameters apart, and then moved one by one until the
-    distances of the nearest and the second neighbours are distributed as in the table (`neighbour_match.matched`). The
+    distances of the nearest and the second neighbours are distributed as in the table (`random_fibres.matched`). The
     gap is between coatings, if there are any.
 
     Raises:
         MeshError: no arrangement is found.
     """
     from feti_homog.microstructure.fibre_pattern import FibrePattern
-    from feti_homog.microstructure.hard_core import placed
-    from feti_homog.microstructure.neighbour_match import matched, wanted_distances
+    from feti_homog.microstructure.random_fibres import matched, placed, wanted_distances
 
     count, fraction = cell.fibres, cell.fibre_fraction
     window = cell.matched

@@ -1,4 +1,4 @@
-"""Fibres on the torus: outlines, what they are made of, where the sides of the cell pass, and pairs near each other."""
+"""Fibres on the torus: outlines, phases, places where the sides of the cell pass, and pairs of near fibres."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ class Arrangement:
 
     Attributes:
         outlines: of them, without the rings around some. Fibre k + 1 of a case is number k; voids come after fibres.
-        phase: (N,) what each is made of.
+        phase: (N,) phase of each.
         coating: (N,) thickness of the ring around each outline, 0 without one.
         is_hollow: (N,) which are voids within rings of the fibre's own phase; other rings are coatings.
-        mesh_order: (N,) in which order they are meshed, on which a few triangles depend; that of the numbers if None.
+        mesh_order: (N,) order of meshing, on which a few triangles depend; by number if None.
         row: (N,) the place of each in its table; None without one.
         remarks: how the cell differs from its table, a line each.
     """
@@ -75,7 +75,7 @@ class Arrangement:
 
     @cached_property
     def radii(self) -> Float:
-        """(N,) of discs of the same area, without rings."""
+        """(N,) radii of discs of equal area, without rings."""
         return self.outlines.radii
 
     @property
@@ -85,7 +85,7 @@ class Arrangement:
 
     @property
     def phases(self) -> tuple[str, ...]:
-        """The phases of the cell: the matrix, those of the fibres in the order in which they first appear, coatings."""
+        """The phases of the cell: the matrix, fibre phases in the order of their first fibres, coatings."""
         named = dict.fromkeys(name for name in self.phase if name != VOID)
         return (MATRIX, *named, *((COATING,) if (self.coated & ~self.is_hollow).any() else ()))
 
@@ -96,7 +96,7 @@ class Arrangement:
 
     @property
     def voids(self) -> int:
-        """Number of voids, those within hollow fibres too."""
+        """Number of voids, also within hollow fibres."""
         return int(self.is_void.sum() + self.is_hollow.sum())
 
     @property
@@ -106,9 +106,9 @@ class Arrangement:
         return tuple(VOID if void else own for own, void in both), tuple(own if void else COATING for own, void in both)
 
     def precedence(self, fibre: Int, is_ring: Bool) -> Int:
-        """(k,) numbers from 1 of what is in the rings, or within them, of fibres (k,).
+        """(k,) numbers from 1 of the rings of fibres (k,), or of their insides.
 
-        Those of coatings come behind all fibres, in the same order.
+        Coatings come behind all fibres, in the same order.
         """
         return np.asarray(fibre + 1 + np.where(is_ring & ~self.is_hollow[fibre], self.fibres, 0))
 
@@ -134,12 +134,12 @@ class Arrangement:
 
     @property
     def outer_radii(self) -> Float:
-        """(N,) of discs with their rings."""
+        """(N,) radii of discs of equal area, with rings."""
         return np.asarray(self.radii + self.coating)
 
     @cached_property
     def shells(self) -> tuple[Outlines, Int]:
-        """All outlines (k,), and whose they are (k,): of each fibre the outer one, then that within a ring."""
+        """All outlines (k,) and their fibres (k,): of each the outer outline, then the one within a ring."""
         coated = np.flatnonzero(self.coated)
         own = np.concatenate([np.arange(len(self.phase)), coated])
         order = np.argsort(own, kind="stable")
@@ -176,15 +176,15 @@ def clear_shift(arrangement: Arrangement) -> Arrangement:
 
 def in_voids(arrangement: Arrangement, corners: Float) -> Bool:
     """(n,) which corners (n, 2) of cells with polygons are in voids; meshes of others need no node at a corner."""
-    found = np.zeros(len(corners), bool)
+    result = np.zeros(len(corners), bool)
     if isinstance(arrangement.outlines, ConvexSums):
         voids = arrangement.outlines[arrangement.is_void | arrangement.is_hollow]
         away = _away(voids, corners, arrangement.size)
         corner, own = np.nonzero((np.abs(away) < voids.extents.max(axis=2)).all(axis=2))
         normal = directions(np.linspace(0.0, 2 * np.pi, NORMALS, endpoint=False))
         reach = voids[own].support(np.broadcast_to(normal, (len(own), *normal.shape)))
-        found[corner[(-away[corner, own] @ normal.T < reach).all(axis=1)]] = True
-    return found
+        result[corner[(-away[corner, own] @ normal.T < reach).all(axis=1)]] = True
+    return result
 
 
 def _away(outlines: Outlines, places: Float, size: Float) -> Float:
@@ -194,20 +194,14 @@ def _away(outlines: Outlines, places: Float, size: Float) -> Float:
 
 def _clear_corners(arrangement: Arrangement, narrowest: float) -> Float:
     """(n, 2) corners whose sides are in the middle of the widest gaps between tangents."""
-    tangents = _tangents(arrangement).transpose(1, 0, 2)
-    lines = [
-        _widest_gaps(places.ravel(), own, narrowest) for places, own in zip(tangents, arrangement.size, strict=True)
-    ]
+    lines = []
+    for touching, period in zip(_tangents(arrangement).transpose(1, 0, 2), arrangement.size, strict=True):
+        places = np.sort(touching.ravel() % period)
+        gaps = np.diff(places, append=places[0] + period)
+        wide = np.argsort(-gaps.round(DECIMALS), kind="stable")[:MOST_GAPS]
+        wide = wide[gaps[wide] > narrowest * gaps[wide[0]]]
+        lines.append(places[wide] + gaps[wide] / 2)
     return np.array(list(product(*lines)))
-
-
-def _widest_gaps(touching: Float, period: float, narrowest: float) -> Float:
-    """Middles (m,) of the widest gaps between positions (k,) at which a side touches something."""
-    places = np.sort(touching % period)
-    gaps = np.diff(places, append=places[0] + period)
-    wide = np.argsort(-gaps.round(DECIMALS), kind="stable")[:MOST_GAPS]
-    wide = wide[gaps[wide] > narrowest * gaps[wide[0]]]
-    return np.asarray(places[wide] + gaps[wide] / 2)
 
 
 def _tangents(arrangement: Arrangement) -> Float:
@@ -238,7 +232,7 @@ def neighbours(centres: Float, size: Float, reach: float) -> tuple[Int, Int, Flo
 
 
 def _pairs(place: Float, count: int, reach: float) -> tuple[Int, Int]:
-    """Pairs i < j of places (n, 2) nearer than `reach`, of few places only those whose first is one of `count`."""
+    """Pairs i < j of places (n, 2) nearer than `reach`; among few places the first is one of `count`."""
     if count * len(place) <= FEW:
         away = place - place[:count, None]
         first, second = np.nonzero((away * away).sum(axis=2) <= reach * reach)

@@ -56,7 +56,7 @@ Parting = Callable[[Int, Int, Float], tuple[Float, Float]]
 
 
 def moves(outlines: Outlines, size: Float) -> Float:
-    """(N, 2) the moves d of outlines on the torus that part those which overlap across its border.
+    """(N, 2) the moves d that part outlines which overlap across the border of the torus.
 
     The periods of the torus are `size` (2,).
 
@@ -108,8 +108,8 @@ def _near(
     shift = np.round((vector - present[second] + present[first]) / size)
     vector = centres[second] - centres[first] + shift * size
     normal, least = parting(first, second, vector)
-    before, wanted = (normal * vector).sum(axis=1) - least, (radii[first] + radii[second]) * gap
-    return _Pairs(first, second, shift, np.where(shift.any(axis=1), wanted, np.minimum(before, wanted)))
+    before, target = (normal * vector).sum(axis=1) - least, (radii[first] + radii[second]) * gap
+    return _Pairs(first, second, shift, np.where(shift.any(axis=1), target, np.minimum(before, target)))
 
 
 def _least_moves(pairs: _Pairs, centres: Float, moved: Float, size: Float, unit: float, parting: Parting) -> Float:

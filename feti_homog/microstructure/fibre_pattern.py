@@ -1,4 +1,4 @@
-"""Round fibres in a rectangle, which is a periodic cell or a window of something larger."""
+"""Round fibres in a rectangle: a periodic cell, or a window of something larger, such as a micrograph."""
 
 from __future__ import annotations
 
@@ -6,11 +6,18 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 from math import ceil, fsum, pi
+from pathlib import Path
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from feti_homog.typing import Float, Int
+from feti_homog.errors import CaseError
+from feti_homog.microstructure.fibre_table import FibreTable, read_table
+from feti_homog.microstructure.shapes.shapes import BOTH_SIZES, have_both_sizes
+from feti_homog.typing import Bool, Float, Int
+
+# Centres nearer than this share of the radius are one fibre twice.
+SAME_CENTRE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -20,8 +27,8 @@ class FibrePattern:
     Attributes:
         width, height: of the rectangle.
         centres, radii: (N, 2) and (N,) of the discs.
-        periodic: whether what leaves the rectangle on one side returns on the other; otherwise it is a window, of whose
-            surroundings nothing is known.
+        periodic: whether discs that leave the rectangle on one side return on the other; otherwise it is a window with
+            unknown surroundings.
     """
 
     width: float
@@ -54,7 +61,7 @@ class FibrePattern:
     def fibre_fraction(self) -> float:
         """sum_i pi R_i^2 / area over the centres in the rectangle.
 
-        Of a window unbiased, for what leaves it is met, in the mean, by what comes in.
+        Of a window unbiased: areas that leave it are met, in the mean, by areas that come in.
         """
         return pi * fsum(self.radii * self.radii) / self.area
 
@@ -78,27 +85,45 @@ class FibrePattern:
             return self.centres, own
         steps = [range(-n, n + 1) for n in (ceil(reach / length) for length in self.size)]
         shifts = np.array([step for step in product(*steps) if any(step)], dtype=float).reshape(-1, 2) * self.size
-        found = self.wrapped + shifts[:, None]
-        shift, owner = np.nonzero(np.all((found > -reach) & (found < self.size + reach), axis=2))
-        return np.concatenate([self.wrapped, found[shift, owner]]), np.concatenate([own, owner])
+        result = self.wrapped + shifts[:, None]
+        shift, owner = np.nonzero(np.all((result > -reach) & (result < self.size + reach), axis=2))
+        return np.concatenate([self.wrapped, result[shift, owner]]), np.concatenate([own, owner])
 
-    @cached_property
-    def smallest_gap(self) -> float:
-        """Smallest distance between the circles of two fibres, or of one and its image; infinite without pairs."""
-        if not self.periodic and self.count == 1:
-            return np.inf
-        tree = cKDTree(self.images(float(self.size.min()))[0])
-        nearest = tree.query(tree.data[: self.count], 2)[0][:, 1].min()
-        points, owner = self.images(reach := float(nearest + 2 * np.ptp(self.radii)) * (1 + 1e-9))
-        pairs = cKDTree(points).query_pairs(reach, output_type="ndarray")
-        pairs = pairs[pairs[:, 0] < self.count]
-        distance = np.hypot(*(points[pairs[:, 1]] - points[pairs[:, 0]]).T)
-        return float((distance - self.radii[owner[pairs]].sum(axis=1)).min())
 
-    def pair_vectors(self, reach: float) -> Float:
-        """(k, 2) from each centre to every other one at most `reach` away, images and its own among them."""
-        points, _ = self.images(reach * (1 + 1e-9))
-        own = points[: self.count]
-        near = cKDTree(own).sparse_distance_matrix(cKDTree(points), reach, output_type="ndarray")
-        near = near[near["i"] != near["j"]]
-        return np.asarray(points[near["j"]] - own[near["i"]])
+def read_window(path: Path, size: tuple[float, float] | None = None) -> FibrePattern:
+    """Return the fibres of a table, at least two, in a window of this width and height.
+
+    Without these, the window is that which the table gives; ellipses count as discs of the same centres and areas.
+
+    Voids are left out. The window begins at the `left` and `bottom` of the table, else at 0.
+
+    Raises:
+        CaseError: the table is faulty, or its size unknown; a fibre has its centre outside of the window, or is there
+            twice.
+    """
+    table = read_table(path).solid
+    width, height = size or (table.width, table.height)
+    if width is None or height is None:
+        raise CaseError(
+            f'{table.name}: the size of the window is missing; expected a line such as "# width = 120, height = 80"'
+        )
+    centres = table.centres - [table.left or 0.0, table.bottom or 0.0]
+    radii = table.radius
+    outside = ~np.all((centres >= 0) & (centres <= [width, height]), axis=1)
+    faults = [
+        *_faults(table, have_both_sizes(table.columns), BOTH_SIZES),
+        *_faults(table, outside, f"its centre is outside of the window of {width:g} x {height:g}"),
+    ]
+    if not faults:
+        pairs = cKDTree(centres).query_pairs(SAME_CENTRE * float(radii.min()), output_type="ndarray")
+        again = np.isin(np.arange(len(centres)), pairs.max(axis=1, initial=-1))
+        faults = _faults(table, again, "there is a fibre at the same place before")
+    if len(centres) < 2:
+        faults.append(f"{table.name}: expected at least two fibres, got {len(centres)}")
+    if faults:
+        raise CaseError(*faults)
+    return FibrePattern(width, height, centres, radii, periodic=False)
+
+
+def _faults(table: FibreTable, are_faulty: Bool, words: str) -> list[str]:
+    return [f"{table.name}: row {row}: {words}" for row in table.row[are_faulty]]

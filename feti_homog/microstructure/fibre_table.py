@@ -45,12 +45,12 @@ class FibreTable:
 
     Attributes:
         name: of the file or list, for faults.
-        row: (N,) line of the file, counted from 1, or place in the list: what faults call the fibre.
+        row: (N,) line of the file, counted from 1, or place in the list: the name of the fibre in faults.
         columns: (N,) numbers of all NUMBERS, and which of them the table has.
         phase: N names, "fibre" where the table gives none, "void" of voids.
         width, height: of the cell; None if the table does not give it.
         left, bottom: coordinates of its lower left corner; None if the table does not give it.
-        remarks: what of the table is not used, a line each.
+        remarks: unused parts of the table, a line each.
     """
 
     name: str
@@ -86,7 +86,7 @@ class FibreTable:
 
     @property
     def strength(self) -> Float:
-        """(N,) strength of the bonds of each fibre / that of the case, 1 where the table gives none."""
+        """(N,) bond strength of each fibre / bond strength of the case, 1 where the table gives none."""
         return self.columns["strength"]
 
     @property
@@ -169,7 +169,7 @@ class _Faults:
         self.lines.append(f"{self._name}: row {row}: {words}")
 
     def throw(self) -> None:
-        """Raise those that there are."""
+        """Raise the faults, if there are any."""
         if self.lines:
             raise CaseError(*self.lines)
 
@@ -208,15 +208,14 @@ def _check_names(
     for word in others:
         if meant := misspelt(word, [name for name in COLUMNS if name not in names]):
             faults.add(row, f"column {toml_value(word)}: unknown; did you mean {meant}?")
+    ignored = f"; not read: {', '.join(map(toml_value, others))}" if others else ""
     for name in _missing(set(names)):
-        ignored = f"; not read: {', '.join(map(toml_value, others))}" if others else ""
         faults.add(row, f"column {name}: missing{ignored}")
 
 
 def _missing(names: set[str]) -> list[str]:
     """Columns that a table with these lacks: x, y, and the radius or the sizes of a shape, which stand in its place."""
-    instead = [sizes for sizes in REPLACING if names & set(sizes)]
-    sizes = [] if "radius" in names else instead[0] if instead else ("radius",)
+    sizes = next((sizes for sizes in (("radius",), *REPLACING) if names & set(sizes)), ("radius",))
     return [name for name in ("x", "y", *sizes) if name not in names]
 
 
@@ -273,7 +272,7 @@ def _cell_faults(cells: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _phase_faults(cells: Mapping[str, Any]) -> Iterator[str]:
-    """Faults of the phase of one row."""
+    """Yield the faults of the phase of one row."""
     phase = cells.get("phase", "fibre")
     if phase == VOID:
         yield from (f"{key} = {toml_value(cells[key])}: a void has none" for key in OF_FIBRES if cells.get(key))

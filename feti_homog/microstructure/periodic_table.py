@@ -1,4 +1,4 @@
-"""The arrangement of the fibres of a table: images that are one fibre, and what is wrong with it."""
+"""The arrangement of the fibres of a table: images of one fibre, and faults."""
 
 from __future__ import annotations
 
@@ -50,38 +50,39 @@ def table_arrangement(table: FibreTable, window: str, repairs: bool = False) -> 
         MeshError: rows lie outside, come twice, overlap or touch; a line for each fault.
     """
     table, repaired = _repaired(table, window) if repairs else (table, ())
-    kept, centres, moves, size = on_torus(table, window)
-    order = np.argsort(table.is_void[kept], kind="stable")
-    rows, places = kept[order], (centres + moves)[order]
+    retained, centres, moves, size = on_torus(table, window)
+    order = np.argsort(table.is_void[retained], kind="stable")
+    rows, places = retained[order], (centres + moves)[order]
     fibres = replace(
         _nested(table, rows, places % size / size[0], float(size[1] / size[0])),
-        remarks=repaired + (_moved_fibres(table, kept, moves) if window == "cut" else ()),
+        remarks=repaired + (_moved_fibres(table, retained, moves) if window == "cut" else ()),
     )
     shifted = clear_shift(fibres)
     is_placed = table.left is not None and table.bottom is not None
     clear = min(LEAST_CLEARANCE * float(fibres.radii.mean()), clearance(shifted))
     if not is_placed or clearance(fibres) < clear or in_voids(fibres, np.zeros((1, 2))).all():
-        return _in_mesh_order(_rounded(shifted))
+        rounded = _rounded(shifted)
+        return replace(rounded, mesh_order=np.lexsort((rounded.centres[:, 1], rounded.centres[:, 0])))
     return fibres if isinstance(fibres.outlines, Discs) else _rounded(fibres)
 
 
 def _repaired(table: FibreTable, window: str) -> tuple[FibreTable, tuple[str, ...]]:
     """Return the table without slight overlaps, and its repaired rows in one line.
 
-    Fibres that touch or overlap by up to REPAIRED of a radius are smaller by what parts them.
+    Fibres that touch or overlap by up to REPAIRED of a radius shrink until they part.
     """
     assert table.width is not None and table.height is not None
     size, centres = np.array([table.width, table.height]), table.centres - _corner(table)
-    kept = np.flatnonzero(_without_images(table, centres, size, window == "cut")[0])
-    outer = table.outlines[kept].at(centres[kept]).grown((table.coating * table.radius)[kept])
-    first, second, gap, _, across = _gaps(table, kept, outer, size)
-    least = LEAST_GAP * (table.outer_radius[kept][first] + table.outer_radius[kept][second]) / 2
-    smaller = np.minimum(table.radius[kept][first], table.radius[kept][second])
+    retained = np.flatnonzero(_without_images(table, centres, size, window == "cut")[0])
+    outer = table.outlines[retained].at(centres[retained]).grown((table.coating * table.radius)[retained])
+    first, second, gap, _, across = _gaps(table, retained, outer, size)
+    least = LEAST_GAP * (table.outer_radius[retained][first] + table.outer_radius[retained][second]) / 2
+    smaller = np.minimum(table.radius[retained][first], table.radius[retained][second])
     near = (gap < least) & (gap > -REPAIRED * smaller) & ~(across & (window == "cut"))
     share = np.zeros(len(table.row))
     for own in (first[near], second[near]):
-        sizes = np.stack([table.columns[name][kept[own]] for name in ("radius", "a", "b")])
-        np.maximum.at(share, kept[own], (least - gap)[near] / np.nanmin(sizes, axis=0))
+        sizes = np.stack([table.columns[name][retained[own]] for name in ("radius", "a", "b")])
+        np.maximum.at(share, retained[own], (least - gap)[near] / np.nanmin(sizes, axis=0))
     names = {"radius", *(name for shape in SHAPES for name in shape.sizes if name != "sides")}
     # A little more than enough, for the gap is compared with the radii that are left.
     columns = {name: own * (1 - 0.51 * share) if name in names else own for name, own in table.columns.items()}
@@ -116,12 +117,6 @@ def _rounded(arrangement: Arrangement) -> Arrangement:
     )
 
 
-def _in_mesh_order(arrangement: Arrangement) -> Arrangement:
-    """Return the arrangement meshed in the order of its coordinates."""
-    x, y = arrangement.centres.T
-    return replace(arrangement, mesh_order=np.lexsort((y, x)))
-
-
 def _moved_fibres(table: FibreTable, kept: Int, moves: Float) -> tuple[str, ...]:
     """List the rows of `kept` (k,) that a cut window moves by these vectors (k, 2), and how far, in one line."""
     distance = np.linalg.norm(moves, axis=1)
@@ -145,14 +140,14 @@ def on_torus(table: FibreTable, window: str) -> tuple[Int, Float, Float, Float]:
     _raise_faults(table, _outside(table, centres, size, is_cut))
     first, faults = _without_images(table, centres, size, is_cut)
     _raise_faults(table, faults)
-    kept = np.flatnonzero(first)
-    centres = centres[kept]
-    outer = table.outlines[kept].at(centres).grown((table.coating * table.radius)[kept])
-    _raise_faults(table, _contacts(table, kept, outer, size, is_cut))
+    retained = np.flatnonzero(first)
+    centres = centres[retained]
+    outer = table.outlines[retained].at(centres).grown((table.coating * table.radius)[retained])
+    _raise_faults(table, _contacts(table, retained, outer, size, is_cut))
     if not is_cut:
-        return kept, centres, np.zeros_like(centres), size
+        return retained, centres, np.zeros_like(centres), size
     try:
-        return kept, centres, cut_window.moves(outer, size), size
+        return retained, centres, cut_window.moves(outer, size), size
     except MeshError as error:
         words = "fibres overlap across the border, and " + str(error)
         raise MeshError(f'[cell] {table.name}: window = "cut": {words}; leave some of them out') from error
@@ -192,7 +187,10 @@ def _outside(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> li
     for k in np.flatnonzero((2 * radius >= size.min()) | (radius < SMALLEST_RADIUS * size[0])).tolist():
         limits = f"from {SMALLEST_RADIUS * size[0]:g} to below {size.min() / 2:g} in this cell"
         faults.append(f"row {table.row[k]}: {called[k]} = {radius[k]:g}: expected {limits}")
-    return faults + _unlikely_coatings(table)
+    least, most = COATINGS
+    bad = np.flatnonzero((table.coating > 0) & ((table.coating < least) | (table.coating > most)))
+    expected = f"expected 0, or from {least:g} to {most:g}"
+    return faults + [f"row {table.row[k]}: coating = {table.coating[k]:g}: {expected}" for k in bad.tolist()]
 
 
 def _largest_sizes(table: FibreTable) -> tuple[Float, list[str]]:
@@ -200,14 +198,6 @@ def _largest_sizes(table: FibreTable) -> tuple[Float, list[str]]:
     names = ["radius", *(name for shape in SHAPES for name in shape.sizes if name != "radius")]
     given = np.nan_to_num(np.stack([table.columns[name] for name in names]))
     return given.max(axis=0), [names[k] for k in given.argmax(axis=0).tolist()]
-
-
-def _unlikely_coatings(table: FibreTable) -> list[str]:
-    """Faults of coatings that are too thin or too thick to be meshed."""
-    least, most = COATINGS
-    bad = np.flatnonzero((table.coating > 0) & ((table.coating < least) | (table.coating > most)))
-    expected = f"expected 0, or from {least:g} to {most:g}"
-    return [f"row {table.row[k]}: coating = {table.coating[k]:g}: {expected}" for k in bad.tolist()]
 
 
 def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool) -> tuple[Bool, list[str]]:
@@ -236,7 +226,7 @@ def _without_images(table: FibreTable, centres: Float, size: Float, is_cut: bool
 def _contacts(table: FibreTable, kept: Int, outer: Outlines, size: Float, is_cut: bool) -> list[str]:
     """Faults of fibres, the rows `kept` (k,) with their coatings, that overlap or touch.
 
-    Of a cut window only of those that do within.
+    Of a cut window only within it.
     """
     first, second, gap, together, across = _gaps(table, kept, outer, size)
     bad = np.flatnonzero((gap < LEAST_GAP * together / 2) & ~(across & is_cut))

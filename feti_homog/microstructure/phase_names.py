@@ -1,4 +1,4 @@
-"""Names of phases, and those that mean something to the program."""
+"""Names of phases, and the reserved ones."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ UNITS_OF_EXCEL = bytes.maketrans(b"\xb5\xb0\xb2", b"uo2")
 
 
 def lines_of(path: Path) -> Iterator[tuple[int, str, str]]:
-    """Yield the number of each line, its cells, empty if it has none, and what follows "#".
+    """Yield the number of each line, its cells, empty if it has none, and the comment behind "#".
 
     Raises:
         CaseError: the file cannot be read, or is no text.
@@ -71,7 +71,7 @@ def _text(path: Path) -> str:
 
 
 def delimiter_of(line: str) -> str | None:
-    """Return what parts the columns of a table whose first line this is; None of spaces."""
+    """Return the delimiter of the columns of a table by its first line; None of spaces."""
     return next((mark for mark in ";\t," if mark in line), None)
 
 
@@ -135,7 +135,7 @@ INSTEAD = {"radius": "a"}
 
 @dataclass(frozen=True)
 class SourceColumn:
-    """A column that is read: its place in the rows, its name, and what makes its value of a number."""
+    """A column that is read: its place in the rows, its name, and the conversion of its numbers."""
 
     place: int
     name: str
@@ -153,13 +153,13 @@ def _bare(word: str) -> str:
 
 
 def _bare_names(words: Sequence[str]) -> list[str]:
-    """Return bare names; MATLAB's orientation is an angle, those of others are in radians, or of another axis."""
+    """Return bare names; MATLAB's orientation is an angle; other programs' are in radians, or of another axis."""
     bare = list(map(_bare, words))
     return ["angle" if name == "orientation" else name for name in bare] if MATLABS_AXIS in bare else bare
 
 
 def understood(words: Sequence[str], known: Sequence[str]) -> tuple[list[SourceColumn], list[str]]:
-    """Return the columns of a line of names that are among those `known`, in any case, and the other words."""
+    """Return the columns of a line of names that are `known`, in any case, and the other words."""
     bare = _bare_names(words)
     values = {"angle": _turned} if AXES_OF_PICTURES & set(bare) else {}
     columns = [SourceColumn(place, name, values.get(name, _same)) for place, name in enumerate(bare) if name in known]
@@ -177,7 +177,7 @@ def are_units(words: Sequence[str]) -> bool:
 
 
 def misspelt(word: str, missing: Sequence[str]) -> str:
-    """Return the column among those that are `missing` that a word is nearly the name of; empty if there is none."""
+    """Return the `missing` column whose name a word nearly is; empty if there is none."""
     near = difflib.get_close_matches(_bare(word), missing, n=1, cutoff=0.75)
     return near[0] if near else ""
 

@@ -19,7 +19,7 @@ from feti_homog.analysis import stored_result
 from feti_homog.case import case
 from feti_homog.commands import listed_fibres
 from feti_homog.errors import FetiHomogError
-from feti_homog.microstructure.fibre_window import read_window
+from feti_homog.microstructure.fibre_pattern import read_window
 from feti_homog.report.cards import export
 from feti_homog.report.text.summary import summary
 from feti_homog.results import seals

@@ -165,7 +165,7 @@ def test_a_stiffness_run_loads_no_other_analysis(tmp_path):
     others |= {"interface.path", "report.plots", "report.page", "homogenization.energy_release"}
     others |= {"materials.estimates", "verify", "studies"}
     others |= {"mesh.readers", "mesh.fill.shape_mesher", "mesh.outline.elliptic_outline"}
-    others |= {"microstructure.hard_core", "microstructure.neighbour_match"}
+    others |= {"microstructure.random_fibres"}
     others |= {"microstructure.statistics"}
     others |= {"feti.coarse.adaptive", "feti.exact.exact_inverse", "feti.exact.spring_update"}
     assert "analysis.stiffness" in loaded and not {"matplotlib"} & {*run.stdout.split()}

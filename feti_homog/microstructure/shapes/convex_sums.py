@@ -22,8 +22,8 @@ SIDES = 3, 12
 class ConvexSums(ConvexCurves):
     """The k sums c + V + F D of convex hulls V and the unit disc D, as `Outlines`.
 
-    V is that of `cores` (k, m, 2), about the origin; `frames` F (k, 2, 2); `centres` c (k, 2). The core of circles and
-    ellipses is the origin, one of fewer corners than m repeats one of them.
+    V is the hull of `cores` (k, m, 2), about the origin; `frames` F (k, 2, 2); `centres` c (k, 2). The core of circles
+    and ellipses is the origin; a core of fewer corners than m repeats one of them.
     """
 
     cores: Float
@@ -76,7 +76,7 @@ class ConvexSums(ConvexCurves):
         return normal, one.support(normal) + other.support(-normal)
 
     def distances(self, offsets: Float) -> Float:
-        """Distances as in `Outlines`: those of POINTS points or more."""
+        """Distances as in `Outlines`, of POINTS points or more."""
         points, _, which = self.at(np.zeros_like(self.centres)).boundary(POINTS)
         first = np.flatnonzero(np.diff(which, prepend=-1))
         each = [np.minimum.reduceat(np.linalg.norm(own[which] - points, axis=1), first) for own in offsets]
@@ -94,7 +94,7 @@ class ConvexSums(ConvexCurves):
     def boundary(self, count: int) -> tuple[Float, Float, Int]:
         """(q, 2) points all around the shapes, (q, 2) unit normals there and (q,) which shape has them.
 
-        They are those of `count` even normals, and between them where these are farther apart than 1 / count of the
+        They lie at `count` even normals, and between them where these are farther apart than 1 / count of the
         circumference.
         """
         normal = directions(np.linspace(0, 2 * np.pi, count, endpoint=False))
@@ -115,7 +115,7 @@ class PolygonalRows:
     """Rows with `sides`, as `Shape`.
 
     Regular polygons of that circumradius, the first corner at `angle`, rounded by circles that touch both sides at a
-    corner; `corner` is their radius / that of the circle within the sides.
+    corner; `corner` is their radius / radius of the circle within the sides.
     """
 
     name, sizes, has_tips = "polygons", ("radius",), False

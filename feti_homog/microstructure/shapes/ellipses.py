@@ -25,7 +25,7 @@ class Ellipses(ConvexCurves):
 
     @classmethod
     def of(cls, centres: Float, a: Float, b: Float, angle: Float) -> Ellipses:
-        """Return those of semi-axes a, b (k,), the first at `angle` (k,) in degrees from x."""
+        """Return the ellipses of semi-axes a, b (k,), the first at `angle` (k,) in degrees from x."""
         cosine, sine = np.cos(np.radians(angle)), np.sin(np.radians(angle))
         axes = np.stack([np.stack([cosine, sine], axis=1), np.stack([-sine, cosine], axis=1)], axis=2)
         return cls(centres, axes * np.stack([a, b], axis=1)[:, None])
@@ -37,7 +37,7 @@ class Ellipses(ConvexCurves):
 
     @property
     def circles(self) -> Float:
-        """(k, 3) centre and radius; that of ellipses which are not round is NaN."""
+        """(k, 3) centre and radius, NaN unless the ellipse is round."""
         return np.column_stack([self.centres, np.where(self.are_round, self.radii, np.nan)])
 
     @property

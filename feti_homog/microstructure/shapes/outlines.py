@@ -1,4 +1,4 @@
-"""Protocols of the outlines of fibres and of the shapes of rows, and what curves of any shape have alike."""
+"""Protocols of fibre outlines and of row shapes, and the common base of curves of any shape."""
 
 from __future__ import annotations
 
@@ -75,13 +75,13 @@ class Outlines(Protocol):
     def distances(self, offsets: Float) -> Float:
         """(n, k) distance from each outline of points at these vectors (n, k, 2) from its centre.
 
-        About, of those that are not round.
+        Approximate unless the outline is round.
         """
 
 
 @dataclass(frozen=True)
 class ConvexCurves:
-    """Curves about the centres (k, 2), given by the rows of all fields: what `Outlines` of any shape have alike."""
+    """Curves about the centres (k, 2), given by the rows of all fields: common base of `Outlines` of any shape."""
 
     centres: Float
 
@@ -112,13 +112,13 @@ class ConvexCurves:
         return self._each(lambda *arrays: np.concatenate(arrays), others)
 
     def _each(self, function: Callable[..., Float], *others: Self) -> Self:
-        """Apply a function to each field, or to that of several curves together."""
+        """Apply a function to each field, or to the same field of several curves together."""
         names = [field.name for field in fields(self)]
         return type(self)(*(function(*(getattr(each, name) for each in (self, *others))) for name in names))
 
 
 class ColumnRange(NamedTuple):
-    """A column of numbers: what an empty cell counts as, and the bound that numbers keep or do not reach."""
+    """A column of numbers: the value of an empty cell, and the bound that numbers keep or do not reach."""
 
     empty: float
     least: float = -np.inf
@@ -130,7 +130,7 @@ class Shape(Protocol):
 
     Attributes:
         name: of several fibres with it.
-        columns: those that other shapes do not need.
+        columns: columns that other shapes do not need.
         sizes: columns of the lengths that are the largest; in place of the radius if that is not among them.
         has_tips: whether its mesh may have nodes at tips of debonded arcs.
     """
@@ -154,7 +154,7 @@ class Shape(Protocol):
         """Faults of rows that have it or seem to: which rows (N,), and the words."""
 
     def outlines(self, rows: Columns, centres: Float) -> Outlines:
-        """Return those of rows (k,) that have it, about centres (k, 2)."""
+        """Return the outlines of rows (k,) with the shape, about centres (k, 2)."""
 
 
 def directions(angle: Float) -> Float:
@@ -170,7 +170,7 @@ def on_circle(circles: Float, angle: Float) -> Float:
 def widest(vector: Float, gap: Callable[[Float], Float]) -> tuple[Float, Float]:
     """Return the largest gap (k,) of pairs and its direction (k,) in radians.
 
-    Vectors (k, 2) go from the first to the second; gap(a) are those across directions a (k, m).
+    Vectors (k, 2) go from the first to the second; gap(a) are the gaps across directions a (k, m).
     """
     step = 2 * np.pi / DIRECTIONS
     around = np.arctan2(vector[:, 1], vector[:, 0])[:, None] + step * np.arange(DIRECTIONS)

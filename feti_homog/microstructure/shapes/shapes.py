@@ -34,7 +34,7 @@ def columns_without_tips(rows: Columns) -> dict[str, Float]:
 
 
 def have_both_sizes(rows: Columns) -> Bool:
-    """(N,) which rows have a radius and the lengths of a shape that stand in its place."""
+    """(N,) which rows have a radius and also lengths that stand in its place."""
     others = [~np.isnan(rows[sizes[0]]) for sizes in REPLACING]
     return np.asarray(~np.isnan(rows["radius"]) & np.logical_or.reduce(others))
 
@@ -54,7 +54,7 @@ def outlines_of(rows: Columns) -> Outlines:
 
 
 def with_parts(outlines: Outlines, parts: Sequence[tuple[Bool, Outlines]]) -> Outlines:
-    """Return the outlines, but those of the rows (N,) of each part in its place.
+    """Return the outlines, with the rows (N,) of each part replaced.
 
     Discs, ellipses or sums, if need be.
     """

@@ -7,7 +7,7 @@ import pytest
 from pattern_statistics import SECTORS, distances, pair_directions, pair_functions, voronoi_cells
 from support.fibre_patterns import hexagonal_lattice, square_lattice
 
-from feti_homog.microstructure.neighbour_match import nearest_neighbours
+from feti_homog.microstructure.random_fibres import nearest_neighbours
 
 SQUARE = [(1.0, 4), (np.sqrt(2), 4), (2.0, 4), (np.sqrt(5), 8), (np.sqrt(8), 4), (3.0, 4), (np.sqrt(10), 8)]
 HEXAGONAL = [(1.0, 6), (np.sqrt(3), 6), (2.0, 6), (np.sqrt(7), 12), (3.0, 6)]

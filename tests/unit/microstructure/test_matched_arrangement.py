@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pattern_statistics import smallest_gap
 from scipy.stats import ks_2samp
 from support.base_case import BASE
 from support.fibre_patterns import hexagonal_lattice, poisson_points
@@ -15,10 +16,14 @@ from feti_homog.case import case as cases
 from feti_homog.case.cell_section import Cell
 from feti_homog.errors import CaseError
 from feti_homog.mesh.arrange import arrange
-from feti_homog.microstructure.fibre_pattern import FibrePattern
-from feti_homog.microstructure.fibre_window import read_window
-from feti_homog.microstructure.hard_core import distance_of
-from feti_homog.microstructure.neighbour_match import match_distance, matched, nearest_neighbours, wanted_distances
+from feti_homog.microstructure.fibre_pattern import FibrePattern, read_window
+from feti_homog.microstructure.random_fibres import (
+    distance_of,
+    match_distance,
+    matched,
+    nearest_neighbours,
+    wanted_distances,
+)
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +61,7 @@ def test_fraction_gap_and_radii_are_kept(table):
     found, window = arrange(cell(table, min_gap=0.04, fibres=60)), read_window(table)
     pattern = pattern_of(found)
     assert pattern.fibre_fraction == pytest.approx(0.2, abs=1e-14)
-    assert pattern.smallest_gap >= 0.04 * 2 * pattern.mean_radius * (1 - 1e-9)
+    assert smallest_gap(pattern) >= 0.04 * 2 * pattern.mean_radius * (1 - 1e-9)
     ratio = np.sort(found.radii) / np.sort(window.radii)
     assert ratio == pytest.approx(ratio[0], rel=0.01)
     assert np.all((found.centres >= 0) & (found.centres < 1))
@@ -67,7 +72,7 @@ def test_coatings_keep_their_gap_and_fibres_their_distances(table):
     assert found.coating == pytest.approx(0.1 * found.radii)
     assert pattern_of(found).fibre_fraction == pytest.approx(0.2, abs=1e-14)
     rings = replace(pattern_of(found), radii=found.outer_radii)
-    assert rings.smallest_gap >= 0.01 * 2 * found.radii.mean() * (1 - 1e-9)
+    assert smallest_gap(rings) >= 0.01 * 2 * found.radii.mean() * (1 - 1e-9)
     assert distance(table, found) < 0.02 < 0.08 < distance(table, arrange(cell(coating=0.1)))
 
 
