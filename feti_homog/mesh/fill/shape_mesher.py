@@ -26,7 +26,7 @@ from feti_homog.microstructure.arrangement import Arrangement
 from feti_homog.microstructure.phase_names import MATRIX, VOID
 from feti_homog.microstructure.shapes.convex_sums import POINTS, ConvexSums
 from feti_homog.microstructure.shapes.outlines import Outlines
-from feti_homog.typing import Float, Int
+from feti_homog.typing import Float
 
 # Distance from a line / size of the cell within which curves lie on it.
 ON_SIDE = 1e-6
@@ -56,7 +56,17 @@ def mesh_outlines(arrangement: Arrangement, sizes: MeshSizes, scale: float) -> C
     refuse_many(size_at, smallest, arrangement.size)
     with gmsh_session() as gmsh:
         number = _add_surfaces(gmsh, arrangement)
-        _match_sides(gmsh, arrangement)
+        # Curves on the right and upper side have the nodes on the left and lower one.
+        curves = [tag for _, tag in gmsh.model.getEntities(1)]
+        boxes = np.array([gmsh.model.getBoundingBox(1, tag) for tag in curves]).reshape(-1, 2, 3)[:, :, :2]
+        for axis, width in enumerate(arrangement.size):
+            sides = []
+            for level in (0.0, width):
+                on = np.flatnonzero(np.abs(boxes[:, :, axis] - level).max(axis=1) < ON_SIDE)
+                sides.append([curves[k] for k in on[np.argsort(boxes[on, :, 1 - axis].mean(axis=1))]])
+            moved = np.eye(4)
+            moved[axis, 3] = width
+            gmsh.model.mesh.setPeriodic(1, sides[1], sides[0], moved.ravel().tolist())
         for option in ("MeshSizeFromPoints", "MeshSizeExtendFromBoundary"):
             gmsh.option.setNumber(f"Mesh.{option}", 0)
         with TemporaryDirectory() as folder:
@@ -165,21 +175,6 @@ def _rounded_lines(occ: ModuleType, corners: Float, rounding: float) -> list[int
     return lines
 
 
-def _match_sides(gmsh: ModuleType, arrangement: Arrangement) -> None:
-    """Copy the nodes on curves from the left to the right, from the lower to the upper side."""
-    size = arrangement.size
-    curves = [tag for _, tag in gmsh.model.getEntities(1)]
-    boxes = np.array([gmsh.model.getBoundingBox(1, tag) for tag in curves]).reshape(-1, 2, 3)[:, :, :2]
-    for axis in (0, 1):
-        sides = []
-        for level in (0.0, size[axis]):
-            on = np.flatnonzero(np.abs(boxes[:, :, axis] - level).max(axis=1) < ON_SIDE)
-            sides.append([curves[k] for k in on[np.argsort(boxes[on, :, 1 - axis].mean(axis=1))]])
-        moved = np.eye(4)
-        moved[axis, 3] = size[axis]
-        gmsh.model.mesh.setPeriodic(1, sides[1], sides[0], moved.ravel().tolist())
-
-
 def _set_sizes(gmsh: ModuleType, path: Path, arrangement: Arrangement, smallest: float, size_at: SizeAt) -> None:
     """Let gmsh interpolate sizes, none below `smallest`, on a grid, by way of a file."""
     size = arrangement.size
@@ -208,7 +203,16 @@ def _sizes_at(arrangement: Arrangement, sizes: MeshSizes) -> tuple[float, SizeAt
     rounds = np.linalg.norm(shapes.frames, axis=1).min(axis=1)
     rounds = np.where(rounds > 0, rounds, np.inf)
     thickness = np.where(arrangement.coated, arrangement.coating, np.inf)
-    length = np.minimum(sizes.interface, PASSAGE_EDGE * _distance_of_others(places, shape, size))
+    # The distance to the nearest point on another shape, or on an image.
+    distance = np.full(len(places), np.inf)
+    steps = np.array(list(product((-1, 0, 1), repeat=2))) * size
+    for label in np.unique(shape):
+        mine, rest = places[shape == label], places[shape != label]
+        if len(rest):
+            distance[shape == label] = cKDTree(wrap(rest, size), boxsize=size).query(wrap(mine, size))[0]
+        images = np.concatenate([mine + step for step in steps if step.any()])
+        distance[shape == label] = np.minimum(distance[shape == label], cKDTree(images).query(mine)[0])
+    length = np.minimum(sizes.interface, PASSAGE_EDGE * distance)
     length = np.minimum(length, np.minimum(2 * np.pi * rounds / MIN_EDGES_AROUND, COATING_EDGE * thickness)[shape])
     for axis in (0, 1):
         away = np.abs(places[:, axis] - np.round(places[:, axis] / size[axis]) * size[axis])
@@ -222,17 +226,3 @@ def _sizes_at(arrangement: Arrangement, sizes: MeshSizes) -> tuple[float, SizeAt
         return np.asarray(np.minimum(sizes.largest, (length[which] + MAX_GROWTH * distance).min(axis=1)))
 
     return float(length.min()), at
-
-
-def _distance_of_others(places: Float, shape: Int, size: Float) -> Float:
-    """(n,) distances from points (n, 2) to the nearest points on other shapes (n,) or on images."""
-    distance = np.full(len(places), np.inf)
-    steps = np.array(list(product((-1, 0, 1), repeat=2))) * size
-    for label in np.unique(shape):
-        mine = places[shape == label]
-        rest = places[shape != label]
-        if len(rest):
-            distance[shape == label] = cKDTree(wrap(rest, size), boxsize=size).query(wrap(mine, size))[0]
-        images = np.concatenate([mine + step for step in steps if step.any()])
-        distance[shape == label] = np.minimum(distance[shape == label], cKDTree(images).query(mine)[0])
-    return distance

@@ -125,9 +125,18 @@ def bridges(lines: CentreLines, size: Float, margin: float, largest: float, vert
     first, count = len(vertices[0]), len(order)
     rank = np.concatenate([first + np.arange(count), first + np.arange(count), np.arange(first)])
     better, worse = _too_near(circle, angle % TURN, rank)
-    # All vertices stay, however near each other.
-    is_bridge = worse >= first
-    return candidates.chosen(_best(first + count, better[is_bridge], worse[is_bridge])[first:])
+    # All vertices stay, however near each other; each rank that stays, best first, excludes the worse ones near it.
+    better, worse = better[worse >= first], worse[worse >= first]
+    stays, open_ = np.zeros(first + count, bool), np.ones(first + count, bool)
+    while open_.any():
+        between = open_[better] & open_[worse]
+        better, worse = better[between], worse[between]
+        free = open_.copy()
+        free[worse] = False
+        stays |= free
+        open_ &= ~free
+        open_[worse[free[better]]] = False
+    return candidates.chosen(stays[first:])
 
 
 def _too_near(circle: Int, angle: Float, rank: Int) -> tuple[Int, Int]:
@@ -146,17 +155,3 @@ def _too_near(circle: Int, angle: Float, rank: Int) -> tuple[Int, Int]:
         better.append(np.minimum(rank[close], rank[after][close]))
         worse.append(np.maximum(rank[close], rank[after][close]))
     return np.concatenate(better), np.concatenate(worse)
-
-
-def _best(count: int, better: Int, worse: Int) -> Bool:
-    """(count,) which ranks stay if each, best first, excludes the worse of its pairs (better, worse)."""
-    stays, open_ = np.zeros(count, bool), np.ones(count, bool)
-    while open_.any():
-        between = open_[better] & open_[worse]
-        better, worse = better[between], worse[between]
-        free = open_.copy()
-        free[worse] = False
-        stays |= free
-        open_ &= ~free
-        open_[worse[free[better]]] = False
-    return stays

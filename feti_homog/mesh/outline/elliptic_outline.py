@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from itertools import product
 
 import numpy as np
@@ -74,7 +73,12 @@ def outline(
     tips = tip_vertices(arrangement, marks, numbering.vertices, at)
     field = _size_field(arrangement, inner, sizes, outer, sharp, tips)
     refuse_many(field.at, field.least, size)
-    find = partial(_ellipse_at, ellipses)
+    area = np.abs(np.linalg.det(ellipses.frames))
+
+    def find(points: Float) -> Int:
+        holds = ellipses.level(points) < 1
+        return np.where(holds.any(axis=1), np.where(holds, area, np.inf).argmin(axis=1), MATRIX)
+
     curves = [side_curves(axis, places[axis], find, around, size, field, numbering, WHOLE) for axis in (0, 1)]
     arcs = EllipticArcs.of(ellipses[which], start, stop, sizes.interface)
     stations = EdgeSamples.of(field, arcs, WHOLE.arc).stations(np.ones(len(which), np.int64), WHOLE.most_nodes)
@@ -141,12 +145,6 @@ def _vertex_angles(
         angles.append(np.append(crossing, mine.parameter(directions(mark)) % TURN))
     whose = np.repeat(np.arange(len(curve)), [len(crossing) for crossing in angles[1:]])
     return (whose, np.concatenate(angles)), (np.concatenate(where), np.concatenate(lengths))
-
-
-def _ellipse_at(ellipses: Ellipses, points: Float) -> Int:
-    """Return the smallest ellipse (k,) around each point, or MATRIX."""
-    holds, area = ellipses.level(points) < 1, np.abs(np.linalg.det(ellipses.frames))
-    return np.where(holds.any(axis=1), np.where(holds, area, np.inf).argmin(axis=1), MATRIX)
 
 
 @dataclass(frozen=True)

@@ -23,25 +23,6 @@ PASSAGE_EDGE = 1.5
 WEDGE = 3
 
 
-def line_size(arrangement: Arrangement, largest: float, vertices: Float) -> SourcedSize:
-    """Return the size of edges at positions on the torus.
-
-    The sources (x_k, h_k) are the two faces of each narrow passage between two fibres, or between a fibre and
-    a side or corner of the cell, with h_k proportional to its width, and the `vertices` (v, 2) that the mesh
-    must have, with the distance to the next one.
-    """
-    size, (shells, disc) = arrangement.size, arrangement.shells
-    circles, caps = np.column_stack([shells.centres, shells.radii]), circle_size(arrangement, largest)
-    outer = np.unique(disc, return_index=True)[1]
-    sources = [
-        _between_fibres(circles[outer], size, caps[outer], largest),
-        _at_sides(circles, size, caps, largest),
-        _at_corners(circles, size, caps),
-        at_vertices(vertices, size, largest),
-    ]
-    return SourcedSize(sources, size, largest)
-
-
 def circle_size(arrangement: Arrangement, largest: float) -> Float:
     """Largest edge length (k,) on an arrangement's circles, such that each has MIN_EDGES_AROUND edges or more.
 
@@ -220,12 +201,25 @@ class SizeField:
 
 
 def size_field(arrangement: Arrangement, sizes: MeshSizes, vertices: Float, tips: Float) -> SizeField:
-    """`line_size`, but smaller near discs and tips.
+    """Return the edge size at positions on the torus, by passages and vertices, and smaller near discs and tips.
 
-    It is at most h_i + g d at the distance d from a disc, and h_t + g max(0, d - h_t) from one of the `tips` (t, 2), so
-    that the edges at a tip have the size h_t; the growth g is MAX_GROWTH.
+    The sources (x_k, h_k) are the two faces of each narrow passage between two fibres, or between a fibre and
+    a side or corner of the cell, with h_k proportional to its width, and the `vertices` (v, 2) that the mesh
+    must have, with the distance to the next one.
+
+    A size is at most h_i + g d at the distance d from a disc, and h_t + g max(0, d - h_t) from one of the `tips`
+    (t, 2), so that edges at a tip have the size h_t; the growth g is MAX_GROWTH.
     """
-    base = line_size(arrangement, sizes.largest, vertices)
+    size, largest, (shells, disc) = arrangement.size, sizes.largest, arrangement.shells
+    circles, caps = np.column_stack([shells.centres, shells.radii]), circle_size(arrangement, largest)
+    outer = np.unique(disc, return_index=True)[1]
+    sources = [
+        _between_fibres(circles[outer], size, caps[outer], largest),
+        _at_sides(circles, size, caps, largest),
+        _at_corners(circles, size, caps),
+        at_vertices(vertices, size, largest),
+    ]
+    base = SourcedSize(sources, size, largest)
     if not sizes.are_graded(arrangement):
         return SizeField(base)
     lines = _FromLines.of(arrangement, sizes, tips)

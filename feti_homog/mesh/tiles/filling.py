@@ -94,7 +94,17 @@ def fill(tile: Tile) -> Filling:
         gmsh.option.setNumber("Mesh.MeshSizeMax", tile.largest)
         surfaces, circle = _add_surfaces(gmsh, tile)
         if tile.is_graded:
-            _grow_from_lines(gmsh, surfaces, tile.largest)
+            # Elements have the nearest outline edge's size h, h + g d at the distance d from it. Otherwise gmsh would
+            # interpolate between the lines: a disc would be as fine within as on its circle.
+            field = gmsh.model.mesh.field
+            extended = field.add("Extend")
+            field.setNumbers(extended, "CurvesList", [tag for _, tag in gmsh.model.getEntities(1)])
+            field.setNumbers(extended, "SurfacesList", surfaces)
+            for option, value in {"SizeMax": tile.largest, "DistMax": tile.largest / MAX_GROWTH, "Power": 1}.items():
+                field.setNumber(extended, option, value)
+            field.setAsBackgroundMesh(extended)
+            gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
+            gmsh.option.setNumber("Mesh.Algorithm", DELAUNAY)
         try:
             gmsh.model.mesh.generate(2)
         except Exception as error:  # gmsh has no other
@@ -138,22 +148,6 @@ def arc_edges(curves: Curves) -> tuple[Int32, Int32]:
     pairs, curve = curves.edges
     circle = curves.circle[curve]
     return pairs[circle != MATRIX].astype(np.int32), circle[circle != MATRIX].astype(np.int32)
-
-
-def _grow_from_lines(gmsh: ModuleType, surfaces: list[int], largest: float) -> None:
-    """Let elements have the nearest outline edge's size h, h + g d at the distance d from it.
-
-    Without this, gmsh interpolates between the lines: a disc would be as fine within as on its circle.
-    """
-    field = gmsh.model.mesh.field
-    extended = field.add("Extend")
-    field.setNumbers(extended, "CurvesList", [tag for _, tag in gmsh.model.getEntities(1)])
-    field.setNumbers(extended, "SurfacesList", surfaces)
-    for option, value in {"SizeMax": largest, "DistMax": largest / MAX_GROWTH, "Power": 1}.items():
-        field.setNumber(extended, option, value)
-    field.setAsBackgroundMesh(extended)
-    gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
-    gmsh.option.setNumber("Mesh.Algorithm", DELAUNAY)
 
 
 def _add_surfaces(gmsh: ModuleType, tile: Tile) -> tuple[list[int], list[int]]:

@@ -9,8 +9,7 @@ import pytest
 from scipy.sparse import csr_matrix, identity
 
 from feti_homog.feti.linalg.sparse_direct import DirectSolver
-from feti_homog.mesh.elimination_order import elimination_order
-from feti_homog.mesh.refinement import FineMesh, ReferenceLattice
+from feti_homog.mesh.refinement import FineMesh, ReferenceLattice, elimination_order
 
 
 def grid(n: int, m: int, refine: int, periodic: bool) -> FineMesh:
