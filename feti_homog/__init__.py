@@ -30,14 +30,22 @@ from feti_homog.version import __version__
 
 if TYPE_CHECKING:
     from feti_homog.analysis.result import Result
-    from feti_homog.api import collect_sweep, draw_state, launch, read_state, run, run_fit, run_sweep
+    from feti_homog.api import collect_sweep, launch, run, run_fit, run_sweep
     from feti_homog.case.case import Case
+    from feti_homog.report.plots.deformed_panels import draw_state
+    from feti_homog.results.viewed_states import read_state
 
 __all__ = [
     "Case", "CaseError", "ConvergenceError", "FetiHomogError", "MeshError", "Result", "__version__", "collect_sweep",
     "draw_state", "launch", "read_state", "run", "run_fit", "run_sweep",
 ]  # fmt: skip
-HOMES = {"Result": "analysis.result", "Case": "case.case"}
+HOMES = {
+    "Case": "case.case",
+    "Result": "analysis.result",
+    "draw_state": "report.plots.deformed_panels",
+    "read_state": "results.viewed_states",
+}
+"""Modules of public names; all others are in `api`."""
 
 
 def __dir__() -> list[str]:

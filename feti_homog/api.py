@@ -21,11 +21,9 @@ from feti_homog.system.runtime.environment import ignore_settings_of_the_folder,
 from feti_homog.system.runtime.standard_streams import end_on_signals, launched_rank
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from mpi4py.MPI import Intracomm
 
     from feti_homog.analysis.result import Result
-    from feti_homog.results.viewed_states import ViewedState
     from feti_homog.studies.sweep_table import SweepTable
 
 
@@ -139,28 +137,6 @@ def run_fit(
     else:
         study = on_root(comm, fit_file.parse, fit, Path())
     return study.run(folder(out), comm, comm.size if ranks_per_case is None else ranks_per_case, retry, quiet)
-
-
-def draw_state(axes: Axes, out: str | Path, number: int = 0, **choices: Any) -> str:
-    """Draw the deformed cell in a state of `out`/result.h5 into Matplotlib's axes; returns the title.
-
-    `choices`: `stress` ("S11", "S22" or "S12"; by default along the largest strain), `scale` of the displacements
-    (default 1) and `most`, the largest stress of the colours, for pictures beside each other.  Call it on one rank.
-    """
-    from feti_homog.report.plots import deformed_panels
-
-    return deformed_panels.draw_state(axes, Path(out), number, **choices)
-
-
-def read_state(out: str | Path, number: int = 0) -> ViewedState:
-    """Return a state in `out`/result.h5 as arrays: mesh, displacements, stresses and derived fields.
-
-    `nodes` and `elements` are dictionaries: displacement, stress, strain, von_mises, ...; see `ViewedState`.  Call it
-    on one rank.
-    """
-    from feti_homog.results import viewed_states
-
-    return viewed_states.read_state(out, number)
 
 
 def launch(

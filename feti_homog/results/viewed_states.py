@@ -47,7 +47,7 @@ class ViewedState:
         return f"ViewedState({self.label!r}, {len(self.points)} nodes, {len(self.cells)} cells)"
 
 
-def read_state(directory: str | Path, state: int = 0) -> ViewedState:
+def read_state(out: str | Path, number: int = 0) -> ViewedState:
     """Return a state of the cell from a result folder.  Call on one rank.
 
     `nodes` has displacement and fluctuation, the periodic part of the displacement (length); `elements` stress and
@@ -58,13 +58,13 @@ def read_state(directory: str | Path, state: int = 0) -> ViewedState:
     Raises:
         CaseError: there is no result.h5, it cannot be read, or has no such state.
     """
-    path = Path(directory) / field_file.NAME
+    path = Path(out) / field_file.NAME
     try:
         with h5py.File(path, "r", locking=False) as file:
             count = len(file.get("state", ()))
-            if not 0 <= state < count:
-                raise CaseError(f"{path}: has no state {state}: its {count} states are numbered from 0")
-            return cell_state(file, state)
+            if not 0 <= number < count:
+                raise CaseError(f"{path}: has no state {number}: its {count} states are numbered from 0")
+            return cell_state(file, number)
     except (OSError, KeyError) as error:
         raise CaseError(f"cannot read {path}: {error}") from error
 

@@ -45,11 +45,15 @@ class ValueType:
 
     def complaint(self, value: Any) -> str:
         """Return the expectation that a value fails, empty if it is valid."""
-        if self.accepts(value):
-            return ""
-        has_scatter = isinstance(value, dict) and set(value) in ({"mean", "std"}, {"mean", "cv"})
-        command = "; `feti-homog uncertainty` takes scatter" if has_scatter else ""
-        return f"expected {self.expected}{magnitudes_in_words(value)}{command}"
+        return "" if self.accepts(value) else f"expected {self.expected}{magnitudes_in_words(value)}{_scatter(value)}"
+
+
+def _scatter(value: Any) -> str:
+    """Return which command takes a value with its scatter, {mean, std} or {mean, cv}; else empty."""
+    if isinstance(value, list):
+        return next(filter(None, map(_scatter, value)), "")
+    has_scatter = isinstance(value, dict) and set(value) in ({"mean", "std"}, {"mean", "cv"})
+    return "; `feti-homog uncertainty` takes scatter" if has_scatter else ""
 
 
 def magnitudes_in_words(value: Any) -> str:

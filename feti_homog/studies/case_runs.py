@@ -135,20 +135,20 @@ def _reset_failures(directory: Path, sweep: Sweep) -> None:
 def _sweep_lock(directory: Path, comm: Intracomm, sweep: Sweep, shared: bool) -> Iterator[None]:
     """Provide the folder made and held: by one sweep, or by any number of single cases. Collective."""
     lock = Lock(directory / LOCK_FILE, shared)
-    on_root(comm, _prepare_and_lock, lock, directory, sweep)
+
+    def prepare() -> None:
+        case_folders.prepare_folder(directory, sweep)
+        try:
+            lock.acquire()
+        except LockHeld as holder:
+            who = str(holder) if shared else f"{holder} (or single cases of it)"
+            raise CaseError(f"--out {directory}: this sweep is being run by {who}") from holder
+
+    on_root(comm, prepare)
     try:
         yield
     finally:
         lock.release()
-
-
-def _prepare_and_lock(lock: Lock, directory: Path, sweep: Sweep) -> None:
-    case_folders.prepare_folder(directory, sweep)
-    try:
-        lock.acquire()
-    except LockHeld as holder:
-        who = str(holder) if lock.shared else f"{holder} (or single cases of it)"
-        raise CaseError(f"--out {directory}: this sweep is being run by {who}") from holder
 
 
 class Outcome(Enum):

@@ -99,22 +99,23 @@ class DeformedCell(drawn_cell.DrawnCell):
 
 def draw_state(
     axes: Axes,
-    directory: Path,
-    number: int,
+    out: str | Path,
+    number: int = 0,
     stress: str = "auto",
     scale: float = 1.0,
     most: float | None = None,
 ) -> str:
-    """Draw a state of `directory`/result.h5 into axes; returns the caption.
+    """Draw the deformed cell in a state of `out`/result.h5 into Matplotlib's axes; returns the caption.  On one rank.
 
-    Colours range from minus `most` to `most`, one scale for pictures side by side; by default they suit the state.
+    `stress` is "S11", "S22" or "S12", by default along the largest strain; `scale` multiplies displacements.  Colours
+    go from minus `most` to `most`, so that pictures beside each other have one scale; by default they suit the state.
 
     `axes.get_legend_handles_labels()` has the marks of bonded, open and closed interfaces.
 
     Raises:
         FetiHomogError: result.h5 cannot be read, or has no such state.
     """
-    path = directory / field_file.NAME
+    path = Path(out) / field_file.NAME
     try:
         with h5py.File(path, "r") as file:
             cell = DeformedCell.of_states(file, [number], {"case": {"output": {"stress": stress}}}, scale, 60_000)
