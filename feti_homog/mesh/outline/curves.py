@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from feti_homog.system.parallel.distributed_arrays import ranges
+from feti_homog.system.parallel.dividing import ranges
 from feti_homog.typing import Bool, Float, Int
 
 # Regions: what is beside a curve where that is no disc or coating.
