@@ -21,7 +21,8 @@ from feti_homog.mesh.sizes.element_estimate import ElementEstimate
 from feti_homog.mesh.sizes.graded_size import SizeField
 from feti_homog.mesh.tiles.filling import Filling, Tile, fill
 from feti_homog.mesh.tiles.tiles import TilePolicy
-from feti_homog.system.parallel.distributed_arrays import balanced, gather, scatter
+from feti_homog.system.parallel.distributed_arrays import gather, scatter
+from feti_homog.system.parallel.dividing import balanced
 from feti_homog.system.parallel.mpi_errors import agree, on_root_only
 
 T = TypeVar("T")

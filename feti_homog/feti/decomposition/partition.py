@@ -11,7 +11,7 @@ from scipy.sparse import coo_matrix, csr_matrix
 
 from feti_homog.feti.thresholds import LENGTH_CLASSES, MAX_IMBALANCE, STRIP_SLACK, STRIP_WIDTHS
 from feti_homog.mesh.periodic_topology import Torus, components, renumber
-from feti_homog.system.parallel.distributed_arrays import balanced
+from feti_homog.system.parallel.dividing import balanced
 from feti_homog.typing import Bool, Int
 
 

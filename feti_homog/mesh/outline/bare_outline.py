@@ -29,7 +29,7 @@ from feti_homog.mesh.sizes.graded_size import MeshSizes, SizeField, circle_size,
 from feti_homog.microstructure.arrangement import Arrangement
 from feti_homog.microstructure.shapes.ellipses import Ellipses
 from feti_homog.microstructure.shapes.outlines import on_circle
-from feti_homog.system.parallel.distributed_arrays import even
+from feti_homog.system.parallel.dividing import even
 from feti_homog.typing import Bool, Float, Int
 
 NO_BRIDGES = Bridges(np.zeros((0, 2), np.int64), np.zeros(0))

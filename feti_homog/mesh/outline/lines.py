@@ -11,7 +11,7 @@ import numpy as np
 from feti_homog.errors import MeshError
 from feti_homog.mesh.sizes.graded_size import SizeField
 from feti_homog.microstructure.shapes.outlines import on_circle
-from feti_homog.system.parallel.distributed_arrays import ranges
+from feti_homog.system.parallel.dividing import ranges
 from feti_homog.typing import Float, Int
 
 # Regions beside a curve that are no disc or coating.

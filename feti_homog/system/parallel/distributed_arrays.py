@@ -1,4 +1,4 @@
-"""Sums, gathered, exchanged and scaled rows of arrays that ranks own, Python objects of any size, loads of ranks.
+"""Sums, gathered, exchanged and scaled rows of arrays that ranks own, and exchanged Python objects of any size.
 
 MPI's own exchange of objects would pickle all parts at once and fail from 2 GiB on; here arrays are sent from where
 they are.
@@ -6,7 +6,6 @@ they are.
 
 from __future__ import annotations
 
-import heapq
 from collections.abc import Callable
 from typing import TypeVar
 
@@ -14,7 +13,8 @@ import numpy as np
 from mpi4py import MPI
 from mpi4py.util import pkl5
 
-from feti_homog.typing import AnyInt, Array, Float, Int
+from feti_homog.system.parallel.dividing import even
+from feti_homog.typing import Array, Float, Int
 
 T = TypeVar("T")
 
@@ -122,29 +122,3 @@ def scale_rows(weights: Float, x: Float) -> Float:
     """diag(weights) x for weights (m,) and x (m,) or (m, k)."""
     scaled: Float = (weights if x.ndim == 1 else weights[:, None]) * x
     return scaled
-
-
-def balanced(load: AnyInt, n_ranks: int) -> Int:
-    """(n,) rank of each of these loads (n,): the largest goes first, each to the least loaded rank."""
-    ranks = np.zeros(len(load), np.int64)
-    heap = [(0, rank) for rank in range(n_ranks)]
-    for k in np.argsort(-load, kind="stable"):
-        total, rank = heap[0]
-        ranks[k] = rank
-        heapq.heapreplace(heap, (total + int(load[k]), rank))
-    return ranks
-
-
-def even(count: int, parts: int) -> Int:
-    """(parts + 1,) where ranges of the numbers 0 .. count - 1 begin, and the last ends.
-
-    Their lengths differ by one at most.
-    """
-    return np.arange(parts + 1) * count // parts
-
-
-def ranges(start: Int, count: Int) -> Int:
-    """start[0] .. start[0] + count[0] - 1, start[1] .. and so on."""
-    ends = np.cumsum(count)
-    shift: Int = np.repeat(start - ends + count, count)
-    return shift + np.arange(count.sum(), dtype=np.int64)
