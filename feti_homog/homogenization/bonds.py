@@ -28,16 +28,6 @@ def axial_springs(case: Case) -> InterfaceSprings:
     return InterfaceSprings(tuple((axial_stiffness(bond),) for bond in case.interfaces), has_softening(case))
 
 
-def teeth_of(case: Case) -> int:
-    """Return the events of a bond until it parts: the teeth of a law that softens, else one."""
-    if not has_softening(case):
-        return 1
-    from feti_homog.interface.laws.cohesive import CohesiveLaw  # which bonds that break at once do not use
-
-    law = bond_law(case.interfaces, np.zeros(0, np.int64))
-    return len(law.levels) - 1 if isinstance(law, CohesiveLaw) else 1
-
-
 def has_softening(case: Case) -> bool:
     """Return True if the law of the bonds changes their compliance."""
     return case.interface is not None and bond_laws.LAWS[case.interface.criterion].softens

@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 
 from feti_homog.case.case import Case
 from feti_homog.errors import CaseError, CheckpointError, FetiHomogError
-from feti_homog.homogenization import phase_laws
 from feti_homog.results import atomic, checkpoint_file
 from feti_homog.results.checkpoint_file import Arrays
 from feti_homog.results.checkpoint_folder import FOLDER, remove
@@ -31,11 +30,8 @@ from feti_homog.system.parallel.mpi_errors import on_root, on_root_only
 
 # Light events that a file has at most; as many a killed run has to find again.
 EVENTS_AT_ONCE = 64
-# Bytes that whole events may take, and a lean one (0.7 kB of 100 fibres).
-WHOLE_BYTES, LEAN_BYTES = 64 * 2**20, 1_000
-# Bytes of a whole event, and for each multiplier in the plane; more with jumps along the fibres, and with friction.
-# They are measured of 120 to 436 multipliers; of more than 4 000 jumps are packed, and 14 in place of 22 are left.
-EVENT_BYTES, MULTIPLIER_BYTES, AXIAL_BYTES, FRICTION_BYTES = 8_000, 22, 9, 17
+# Bytes that whole events may take.
+WHOLE_BYTES = 64 * 2**20
 
 
 class Checkpoint:
@@ -251,14 +247,6 @@ def room_of(case: Case) -> int | None:
     With friction many states are in equilibrium under one load.
     """
     return None if case.has_friction or case.output.states == "all" else WHOLE_BYTES
-
-
-def bytes_at_most(case: Case, multipliers: int, events: int) -> int:
-    """Return about how many bytes the events of a path of a cell with so many multipliers take, at most."""
-    more = (len(phase_laws.problems(case)) - 1) * AXIAL_BYTES + case.has_friction * FRICTION_BYTES
-    whole = events * (multipliers * (MULTIPLIER_BYTES + more) + EVENT_BYTES)
-    room = room_of(case)
-    return whole if room is None else min(whole, room + events * LEAN_BYTES)
 
 
 def _shapes(event: Arrays) -> dict[str, tuple[int, ...]]:

@@ -20,13 +20,11 @@ from feti_homog.feti.decomposition.shared_entities import share_entities
 from feti_homog.feti.factory import database_options
 from feti_homog.feti.solver_plan import ProblemSizes, SolverOptions, SolverPlan
 from feti_homog.homogenization import cost_model, phase_laws, process_zone
-from feti_homog.homogenization.bonds import teeth_of
 from feti_homog.homogenization.domain_partition import CellSummary
 from feti_homog.homogenization.partition_policy import BY_COST
 from feti_homog.homogenization.unit_cell import cut
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.microstructure.phase_names import COATING
-from feti_homog.results import checkpoint
 from feti_homog.studies.sweep import plan
 from feti_homog.studies.sweep.plan import Sweep, case_names
 from feti_homog.system.parallel.mpi_errors import on_root, on_root_only
@@ -61,12 +59,9 @@ def _described(
     own = [subdomains for subdomains, _ in loads]
     nodes = [triangles * lattice.intervals**2 // 2 for _, triangles in loads]
     elements = summary.coarse_triangles * len(lattice.triangles)
-    plan = _plan(case, summary, multipliers, max(_applications(case, summary.across).values()), options, own)
+    applications = max(cost_model.applications(case, each, summary.across) for each in phase_laws.problems(case))
+    plan = _plan(case, summary, multipliers, applications, options, own)
     columns = multipliers if plan.preconditioner == "influence" else 0
-    problems = _applications(case, summary.across or columns > 0)
-    errors = cost_model.has_errors(case)
-    triangles, most_ranks = summary.coarse_triangles, summary.coarse_triangles if summary.across else summary.bodies
-    taken = cost_model.estimate(nodes, own, triangles, most_ranks, problems, columns, errors)
     unresolved = process_zone.warnings(case, summary.width, summary.interface_edge)
     lines = [
         f"case       {case.name}: {case.analysis.type}, plane {case.analysis.plane}",
@@ -88,13 +83,7 @@ def _described(
             f"rank {rank:<5} {_subdomains(count)}, about {2 * n} degrees of freedom"
             for rank, (count, n) in enumerate(zip(own, nodes, strict=True))
         ),
-        *cost_model.estimate_lines(taken, len(loads), summary.across),
-        *_path_lines(case, summary, multipliers, nodes, taken, columns),
-        *(
-            [cost_model.fields_line(case, sum(nodes), elements, multipliers // 2, len(loads))]
-            if case.output.fields
-            else []
-        ),
+        *_estimate_lines(case, summary, multipliers, nodes, own, columns),
         *(f"warning    {warning}" for warning in (*case.warnings(), *summary.warnings(), *unresolved)),
         *(f"remark     {remark}" for remark in (*case.remarks(), *summary.remarks)),
         "the case is valid",
@@ -102,21 +91,25 @@ def _described(
     return "\n".join(lines)
 
 
-def _path_lines(
-    case: Case, summary: CellSummary, multipliers: int, nodes: Sequence[int], taken: cost_model.Estimate, columns: int
+def _estimate_lines(
+    case: Case, summary: CellSummary, multipliers: int, nodes: Sequence[int], subdomains: Sequence[int], columns: int
 ) -> list[str]:
-    """Return the lines about the events of a path; none of another analysis, or of a cell without interfaces."""
-    teeth, memory = teeth_of(case), cost_model.memory_to_the_end(taken, columns, len(nodes))
-    lines = cost_model.events_lines(case, multipliers, summary.fibres, teeth, nodes, taken.seconds, memory)
-    if not lines or case.path is None:
-        return []
-    events = case.path.increments or multipliers // 2 * teeth
-    return [*lines, cost_model.checkpoint_line(checkpoint.bytes_at_most(case, multipliers, events))]
+    """Return the lines about memory, of a path also to complete debonding, and about ranks.
 
-
-def _applications(case: Case, easy: bool) -> dict[int, int]:
-    """Return for each problem, by its displacements of a node, how many times it applies its dual operator."""
-    return {p.components: cost_model.applications(case, p, easy) for p in phase_laws.problems(case)}
+    `nodes` and `subdomains` are of each rank.
+    """
+    ranks, most = len(nodes), summary.coarse_triangles if summary.across else summary.bodies
+    components = [problem.components for problem in phase_laws.problems(case)]
+    memory = cost_model.memory(nodes, subdomains, components, columns)
+    noun, limit = "rank" if ranks == 1 else "ranks", "" if summary.across else ", at most one per body"
+    end = cost_model.memory_to_the_end(case, memory, multipliers, columns, ranks)
+    breaks = case.section.is_followed and case.interfaces and end > memory
+    words = f", {cost_model.in_words(end)} if all bonds break" if breaks else ""
+    return [
+        f"estimate   on {ranks} {noun} about {cost_model.in_words(memory)} on the largest{words}, without pictures",
+        f"ranks      recommended: {cost_model.recommended_ranks(sum(components) * sum(nodes), most)} "
+        f"({cost_model.DOFS_OF_A_RANK} degrees of freedom per rank{limit})",
+    ]
 
 
 def _solver(plan: SolverPlan, multipliers: int) -> str:
