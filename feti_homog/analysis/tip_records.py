@@ -116,7 +116,7 @@ class TipRecorder:
     def __init__(self, cell: TornCell, loaded: CoupledInterfaces, law: BondLaw) -> None:
         """Prepare the records of tips; `loaded` are the interfaces of the cell.  Collective."""
         self._cell, self._loaded, self._law = cell, loaded, law
-        self._neighbours = InterfaceNeighbours(cell.comm, cell.solver.jump_operator, cell.subdomains)
+        self._neighbours = cell.neighbours
 
     def of(self, point: Point) -> Tips:
         """Return the tips of a point on every rank, by fibre, interface and direction. Collective."""

@@ -15,7 +15,6 @@ from typing import TypeVar
 import numpy as np
 from scipy.spatial import cKDTree
 
-from feti_homog.feti.decomposition.neighbours import InterfaceNeighbours
 from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.crack_extension import (
     CrackExtension,
@@ -83,8 +82,7 @@ class EnergyReleaseRates:
         """Find the tips and their neighbours.  Collective."""
         nodes = interface.nodes
         self.cell, self.interface, self._period = cell, interface, cell.summary.period
-        neighbours = InterfaceNeighbours(cell.comm, cell.solver.jump_operator, cell.subdomains)
-        self._chains = InterfaceChains(neighbours.adjacency)
+        self._chains = InterfaceChains(cell.neighbours.adjacency)
         self._extension = CrackExtension(cell.subdomains, self._period)
         self._boundaries = body_boundaries(cell.comm, cell.subdomains)
         self.points, self.bodies = self._gathered(nodes.points), self._gathered(nodes.bodies)

@@ -17,8 +17,8 @@ from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.partition import assign_ranks, cut_into_pieces
 from feti_homog.homogenization import cell_remarks
 from feti_homog.homogenization.cell_remarks import subdomain_remarks, table_remarks
-from feti_homog.homogenization.coarse_meshes import deal_tiles, fill_own
-from feti_homog.homogenization.domain_partition import CellSummary, RankShare, in_cell, match_distance
+from feti_homog.homogenization.coarse_meshes import deal_tiles, fill_own, fill_tiles, place_nodes
+from feti_homog.homogenization.domain_partition import CellSummary, RankShare, distribute, in_cell, match_distance
 from feti_homog.homogenization.partition_policy import PartitionPolicy, can_be_cut_across, wanted_pieces
 from feti_homog.mesh.coarse_mesh import CoarseMesh, representatives
 from feti_homog.mesh.fill.gmsh_mesher import NodedCell
@@ -29,9 +29,19 @@ from feti_homog.mesh.sizes.element_estimate import ElementEstimate
 from feti_homog.mesh.submesh import SubdomainTable, SubmeshesOfRank, cut_for_ranks, joined, pinning
 from feti_homog.mesh.tiles.filling import arc_edges
 from feti_homog.mesh.tiles.tiles import FilledTile, NumberedTile, Regions, tile_torus
-from feti_homog.system.parallel.distributed_arrays import alltoall
+from feti_homog.system.parallel.distributed_arrays import alltoall, scatter
 from feti_homog.system.parallel.mpi_errors import agree, on_root, on_root_only
 from feti_homog.typing import Float, Int
+
+
+def cut(case: Case, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: PartitionPolicy) -> RankShare:
+    """Mesh and cut the cell; return this rank's share.  Collective."""
+    noded = place_nodes(case, comm, policy.tiles)
+    if on_root(comm, can_be_torn_by_tiles, case, noded, lattice, policy):
+        assert not isinstance(noded, CoarseMesh)
+        return tear_by_tiles(case, noded, lattice, comm, policy)
+    mesh = fill_tiles(noded, comm)
+    return scatter(comm, on_root_only(comm, distribute, case, mesh, lattice, comm.size, policy) or [])
 
 
 def can_be_torn_by_tiles(

@@ -22,7 +22,7 @@ from feti_homog.feti.solver_plan import ProblemSizes, SolverOptions, SolverPlan
 from feti_homog.homogenization import cost_model, phase_laws, process_zone
 from feti_homog.homogenization.domain_partition import CellSummary
 from feti_homog.homogenization.partition_policy import BY_COST
-from feti_homog.homogenization.unit_cell import cut
+from feti_homog.homogenization.tile_tearing import cut
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.microstructure.phase_names import COATING
 from feti_homog.studies.sweep import plan
