@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from feti_homog.analysis.context import AnalysisContext
+from feti_homog.analysis.context import Analysis, AnalysisContext
 from feti_homog.analysis.mesh_errors import note_accuracy, state_error
-from feti_homog.analysis.registry import Analysis
 from feti_homog.analysis.result_records import LoadPoint
 from feti_homog.analysis.sensitivities import load_sensitivities, propagated
-from feti_homog.analysis.tip_records import IN_PLANE_LOADS
+from feti_homog.analysis.tip_records import IN_PLANE_LOADS, tip_rates
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
@@ -30,7 +29,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     others = dict(zip(cell.loads, cell.macroscopic(state.solutions).strain.tolist(), strict=True))
     only_in_plane = not any(strain for name, strain in others.items() if name not in IN_PLANE_LOADS)
     if context.case.interface is not None and only_in_plane:
-        point["tips"] = context.tips.of(responses[:1], ["strain"])
+        point["tips"] = tip_rates(context, responses[:1], ["strain"])
     document: dict[str, Any] = {"load": LoadPoint(**point)}
     if context.needs_sensitivities:
         document |= load_sensitivities(context, context.loads.load(target), responses)

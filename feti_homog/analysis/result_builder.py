@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from feti_homog.analysis.cell_records import CellInfo, Checks, FibreInfo, SolverInfo
-from feti_homog.analysis.checks import CONTACT_TOLERANCE
 from feti_homog.analysis.context import AnalysisContext
+from feti_homog.analysis.recorders import CONTACT_TOLERANCE
 from feti_homog.analysis.result import Fields, Result
 from feti_homog.case.case import Case
 from feti_homog.homogenization.uniform_parts import nodes_of_parts

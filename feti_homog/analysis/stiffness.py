@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from feti_homog.analysis.constants import constants
-from feti_homog.analysis.context import AnalysisContext
+from feti_homog.analysis.context import Analysis, AnalysisContext
 from feti_homog.analysis.mesh_errors import mesh_error, unit_errors
-from feti_homog.analysis.registry import Analysis
 from feti_homog.homogenization.averaging import asymmetry
 
 if TYPE_CHECKING:
@@ -42,7 +41,9 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     else:
         context.checks.require("L^ef", {"symmetry": asymmetry(document["effective_stiffness"])})
     if context.case.interface is not None:
-        document["tips"] = context.tips.of(under, loads)
+        from feti_homog.analysis.tip_records import tip_rates  # bonded cells have no tips
+
+        document["tips"] = tip_rates(context, under, loads)
     document |= constants(context.cell, document)
     if context.needs_sensitivities:
         from feti_homog.analysis.sensitivities import propagated, sensitivities  # few runs ask for them

@@ -153,7 +153,9 @@ def _recovered(
     u = np.stack([response.u for response in responses], axis=1)
     loads = np.stack([response.strain for response in responses], axis=1)
     groups_of_rank, meshes = list[Group](), list[tuple[list[Submesh], FineMesh]]()
-    for members, mesh, displacement, place in _displacements(cell, u, loads, keep, lattice):
+    in_equilibrium = lattice is not cell.lattice and not cell.summary.across
+    displacements = _nested_displacements if in_equilibrium else _displacements
+    for members, mesh, displacement, place in displacements(cell, u, loads, keep, lattice):
         first, submeshes = members[0], [s.submesh for s in members]
         stress = RecoveredStress.on(mesh, first.L, first.problem, displacement, loads, first.is_mixed)
         sides = ArcSides.of(stress, submeshes, lattice)
@@ -173,6 +175,18 @@ def _recovered(
         yield replace(stress, known=tractions.get(number), shared=fits.get(number)), sides
 
 
+def _nested_displacements(
+    cell: TornCell, u: Float, loads: Float, keep: bool, lattice: ReferenceLattice
+) -> Iterator[tuple[Members, FineMesh, Float, Int]]:
+    """Yield the groups of `_displacements`, in equilibrium on the mesh of a coarser lattice."""
+    fresh = nested_interiors(cell.solver.interface_operators, cell.lattice, lattice)
+    for interior in cell.nested_interiors if keep else fresh:
+        displacement = interior.displacement(u, loads)
+        place = np.full(displacement.shape[0] * displacement.shape[1], INSIDE)
+        place[interior.known] = interior.place
+        yield interior.members, interior.mesh, displacement, place
+
+
 def _displacements(
     cell: TornCell, u: Float, loads: Float, keep: bool, lattice: ReferenceLattice
 ) -> Iterator[tuple[Members, FineMesh, Float, Int]]:
@@ -184,25 +198,16 @@ def _displacements(
     in equilibrium on its own mesh.
     """
     boundary, is_nested, across = cell.solver.interface_operators, lattice is not cell.lattice, cell.summary.across
-    if is_nested and not across:
-        fresh = nested_interiors(boundary, cell.lattice, lattice)
-        for interior in cell.nested_interiors if keep else fresh:
-            displacement = interior.displacement(u, loads)
-            place = np.full(displacement.shape[0] * displacement.shape[1], INSIDE)
-            place[interior.known] = interior.place
-            yield interior.members, interior.mesh, displacement, place
-        return
     displacements = cell.displacements(u, loads, keep)
+    firsts = cell.offsets if across else boundary.offsets
+    dofs = [np.arange(len(part.dofs)) for part in cell.parts] if across else boundary.dofs
     for group in groups(cell.parts, lattice):
-        members, places = [cell.parts[k] for k in group], list[Int]()
-        mesh = joined([part.mesh for part in members])
+        members = [cell.parts[k] for k in group]
+        mesh, places = joined([part.mesh for part in members]), [np.full(len(part.dofs), INSIDE) for part in members]
         if is_nested:
             mesh = replace(mesh, nodes=mesh.nodes[:, lattice.within(cell.lattice)], lattice=lattice)
-        for k, part in zip(group, members, strict=True):
-            dofs = np.arange(len(part.dofs)) if across else boundary.dofs[k]
-            place = np.full(len(part.dofs), INSIDE)
-            place[dofs] = (cell.offsets if across else boundary.offsets)[k] + np.arange(len(dofs))
-            places.append(place)
+        for k, place in zip(group, places, strict=True):
+            place[dofs[k]] = firsts[k] + np.arange(len(dofs[k]))
         displacement = np.concatenate([next(displacements)[1] for _ in group])
         shape = -1, members[0].problem.components, u.shape[1]
         yield members, mesh, displacement.reshape(shape), np.concatenate(places)
