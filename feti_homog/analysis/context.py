@@ -16,9 +16,8 @@ import numpy as np
 from feti_homog.analysis.recorders import CheckRecorder, StateRecorder
 from feti_homog.case.case import Case
 from feti_homog.errors import CoarseMeshError
-from feti_homog.homogenization import phase_laws, process_zone
-from feti_homog.homogenization.averaging import Homogenization, Response
-from feti_homog.homogenization.fibre_debonding import FibreInterfaces
+from feti_homog.homogenization import cell_remarks, phase_laws
+from feti_homog.homogenization.averaging import FibreInterfaces, Homogenization, Response
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.load_scales import ABSURD
@@ -254,7 +253,7 @@ class AnalysisContext:
     def warnings(self) -> list[str]:
         """List the warnings about probably unintended settings."""
         summary = self.cell.summary
-        return [*process_zone.warnings(self.case, summary.width, summary.interface_edge), *self.checks.warnings()]
+        return [*cell_remarks.warnings(self.case, summary.width, summary.interface_edge), *self.checks.warnings()]
 
 
 @dataclass(frozen=True)

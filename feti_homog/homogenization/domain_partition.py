@@ -9,7 +9,7 @@ import numpy as np
 from feti_homog.case.case import Case
 from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.partition import Decomposition, decompose, halves
-from feti_homog.homogenization import arc_selection, cell_remarks, process_zone
+from feti_homog.homogenization import arc_selection, cell_remarks
 from feti_homog.homogenization.arc_selection import InterfaceNodes
 from feti_homog.homogenization.cell_remarks import mesh_remarks, subdomain_remarks, table_remarks
 from feti_homog.homogenization.partition_policy import (
@@ -172,7 +172,7 @@ def distribute(
         bodies=bodies,
         subdomains=len(rank),
         coarse_triangles=triangles,
-        interface_edge=process_zone.longest_edge(mesh),
+        interface_edge=cell_remarks.longest_edge(mesh),
         numbers=numbers,
         is_fibre=is_fibre,
         constituent_phase=torus.constituent_phase,

@@ -19,7 +19,7 @@ from feti_homog.feti import solver_plan
 from feti_homog.feti.decomposition.shared_entities import share_entities
 from feti_homog.feti.factory import database_options
 from feti_homog.feti.solver_plan import ProblemSizes, SolverOptions, SolverPlan
-from feti_homog.homogenization import cost_model, phase_laws, process_zone
+from feti_homog.homogenization import cell_remarks, cost_model, phase_laws
 from feti_homog.homogenization.domain_partition import CellSummary
 from feti_homog.homogenization.partition_policy import BY_COST
 from feti_homog.homogenization.tile_tearing import cut
@@ -62,7 +62,7 @@ def _described(
     applications = max(cost_model.applications(case, each, summary.across) for each in phase_laws.problems(case))
     plan = _plan(case, summary, multipliers, applications, options, own)
     columns = multipliers if plan.preconditioner == "influence" else 0
-    unresolved = process_zone.warnings(case, summary.width, summary.interface_edge)
+    unresolved = cell_remarks.warnings(case, summary.width, summary.interface_edge)
     lines = [
         f"case       {case.name}: {case.analysis.type}, plane {case.analysis.plane}",
         f"cell       {summary.width:g} x {summary.height:g}, phases {', '.join(summary.phases)}",
