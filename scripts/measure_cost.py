@@ -1,4 +1,4 @@
-"""Measures the constants of feti_homog/homogenization/cost_model.py on this machine, on one rank, and prints them.
+"""Measures the constants of memory in feti_homog/homogenization/partition_policy.py on one rank, and prints them.
 
     .venv/bin/python scripts/measure_cost.py
 
@@ -19,7 +19,7 @@ import tomli_w
 from composite import STIFFNESS
 from scipy.optimize import least_squares
 
-from feti_homog.homogenization import cost_model
+from feti_homog.homogenization import partition_policy
 from feti_homog.results import result_json
 
 CELLS = (
@@ -52,7 +52,7 @@ def main() -> None:
 def memory_fit(runs: list[dict[str, Any]], coated: list[dict[str, Any]]) -> dict[str, tuple[Any, Any]]:
     """Fit the memory of all runs by twice the nodes of their meshes, and of coated ones by their influence columns.
 
-    By the names of constants, as `cost_model` has them: values, and estimates over measurements.
+    By the names of constants, as `partition_policy` has them: values, and estimates over measurements.
     """
     memory, dofs = np.array([(run["memory"], 2 * run["cell"]["nodes"]) for run in [*runs, *coated]]).T
     columns = np.array([*(0 for _ in runs), *(run["solver"]["multipliers"] for run in coated)])
@@ -60,11 +60,11 @@ def memory_fit(runs: list[dict[str, Any]], coated: list[dict[str, Any]]) -> dict
 
 
 def factor_fit() -> dict[str, tuple[Any, Any]]:
-    """Fit the memory that a cell of one factor takes beyond the other constants of `cost_model`."""
+    """Fit the memory that a cell of one factor takes beyond the other constants of `partition_policy`."""
     runs = [document(cell, refine, {}) for cell in CELLS for refine in OF_ONE_FACTOR]
     runs = [run for run in runs if run["solver"]["subdomains"] == 1]
     memory, dofs = np.array([(run["memory"], 2 * run["cell"]["nodes"]) for run in runs]).T
-    others = cost_model.BASE_BYTES + cost_model.DOF_BYTES * dofs
+    others = partition_policy.BASE_BYTES + partition_policy.DOF_BYTES * dofs
     constant = np.median((memory - others) / dofs)
     return {"FACTOR_BYTES": ([constant], (others + constant * dofs) / memory)}
 
@@ -91,4 +91,4 @@ def fitted(values: Any, *columns: Any) -> tuple[Any, Any]:
 
 if __name__ == "__main__":
     main()
-    print("now:", {name: value for name, value in vars(cost_model).items() if name.isupper()})
+    print("now:", {name: value for name, value in vars(partition_policy).items() if name.isupper()})

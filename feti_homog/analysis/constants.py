@@ -9,7 +9,7 @@ import numpy as np
 
 from feti_homog.analysis.cell_records import StiffnessBounds
 from feti_homog.case.case import Case
-from feti_homog.homogenization import bonds
+from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.materials import bounds, laws, spatial_constants
 from feti_homog.microstructure.phase_names import COATING
@@ -66,7 +66,7 @@ def _comparisons(cell: TornCell, fractions: Mapping[str, float]) -> dict[str, An
     from feti_homog.materials.estimates.constituents import Fibres, Springs  # bonded cells in the plane have neither
     from feti_homog.materials.estimates.methods import estimates, fibre_bounds
 
-    summary, case, has_springs = cell.summary, cell.case, bonds.has_springs(cell.case)
+    summary, case, has_springs = cell.summary, cell.case, phase_laws.has_springs(cell.case)
     matrix, *fibre_phases = summary.phases
     radii = {phase: summary.radii[summary.constituent_phase == k] for k, phase in enumerate(summary.phases)}
     phases = {}
@@ -80,8 +80,8 @@ def _comparisons(cell: TornCell, fractions: Mapping[str, float]) -> dict[str, An
         for phase in fibre_phases:
             springs = None
             if has_springs:
-                ((normal, tangential),) = bonds.springs(case).stiffness
-                ((axial,),) = bonds.axial_springs(case).stiffness
+                ((normal, tangential),) = phase_laws.springs(case).stiffness
+                ((axial,),) = phase_laws.axial_springs(case).stiffness
                 springs = Springs(normal, tangential, axial, float(radii[phase][0]))
             fibres.append(Fibres(fractions[phase], phases[phase], springs))
         entries["estimates"] = estimates(phases[matrix], fibres)

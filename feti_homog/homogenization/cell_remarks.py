@@ -8,7 +8,7 @@ import numpy as np
 
 from feti_homog.case.case import Case
 from feti_homog.case.interface_section import interface_label
-from feti_homog.homogenization import bonds
+from feti_homog.homogenization import phase_laws
 from feti_homog.materials.bounds import engineering_moduli
 from feti_homog.materials.laws import plane_stiffness
 from feti_homog.mesh.coarse_mesh import CoarseMesh, interface_edges
@@ -71,7 +71,7 @@ def mesh_remarks(case: Case, torus: Torus, pairs: Int) -> tuple[str, ...]:
     lines, has_curve = [*torus.mesh.remarks], len(torus.mesh.debonded_edges) > 0
     if case.interface is None:
         return (*lines, *(['the curve "debonded" of the mesh is bonded: there is no [interface]'] if has_curve else []))
-    can_open = case.arcs or has_curve or bonds.has_springs(case) or case.section.breaks
+    can_open = case.arcs or has_curve or phase_laws.has_springs(case) or case.section.breaks
     if case.cell.has_own_mesh and not can_open:
         lines.append("[interface]: nothing is debonded, and no bond is elastic: the bonding is perfect")
     left, right, edge = torus.sides
@@ -133,7 +133,7 @@ def process_zone(case: Case) -> float | None:
     for bond in case.interfaces:
         pure = (bond.normal_toughness, bond.normal_strength), (bond.tangential_toughness, bond.tangential_strength)
         lengths += [toughness / strength**2 for toughness, strength in pure if toughness and strength]
-    if not bonds.has_process_zone(case) or not lengths:
+    if not phase_laws.has_process_zone(case) or not lengths:
         return None
     moduli = [engineering_moduli(plane_stiffness(m, case.analysis.plane)) for m in case.materials.values()]
     return min(min(m.E1, m.E2) for m in moduli) * min(lengths)
@@ -146,7 +146,7 @@ def warnings(case: Case, width: float, edge: float) -> list[str]:
         width: of the cell.
         edge: `longest_edge` of the coarse mesh, which `refine` halves.
     """
-    length, softens, lines = process_zone(case), bonds.has_softening(case), _law_warnings(case)
+    length, softens, lines = process_zone(case), phase_laws.has_softening(case), _law_warnings(case)
     resolved = RESOLVED_SOFTENING if softens else RESOLVED
     if length is None or edge / 2**case.cell.refine <= resolved * length:
         return lines
@@ -167,9 +167,9 @@ def warnings(case: Case, width: float, edge: float) -> list[str]:
 
 def _law_warnings(case: Case) -> list[str]:
     """Warn if the energy of a cohesive law depends on the order of modes, and if its teeth overshoot."""
-    if not bonds.has_softening(case):
+    if not phase_laws.has_softening(case):
         return []
-    lines, law = [], bonds.bond_law(case.interfaces, np.zeros(0, np.int64))
+    lines, law = [], phase_laws.bond_law(case.interfaces, np.zeros(0, np.int64))
     for number, bond in enumerate(case.interfaces):
         stiffness, strength, toughness = (
             getattr(bond, f"tangential_{kind}") / getattr(bond, f"normal_{kind}")

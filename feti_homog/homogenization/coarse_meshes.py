@@ -29,9 +29,9 @@ T = TypeVar("T")
 
 
 def place_nodes(case: Case, comm: MPI.Intracomm, policy: TilePolicy) -> NodedCell | CoarseMesh | None:
-    """On rank 0 a user's mesh, or the cell with its tiles still to be filled.  Collective.
+    """Return a user's mesh, or the cell with nodes on lines, placed by all ranks, and empty tiles.  Collective.
 
-    The nodes on its lines are placed by all ranks.
+    None but on rank 0.
 
     Raises:
         CaseError, MeshError: on every rank, as `begin_mesh`.
@@ -42,14 +42,13 @@ def place_nodes(case: Case, comm: MPI.Intracomm, policy: TilePolicy) -> NodedCel
         assert not isinstance(found, UnmeshedCell)
         return found
     field: SizeField = comm.bcast(None if unmeshed is None else unmeshed.bare.field)
-    own = scatter(comm, [] if unmeshed is None else unmeshed.bare.lines.parts(comm.size))
-    stations = gather(comm, agree(comm, own.stations, field))
-    return on_root_only(comm, _with_nodes, unmeshed, stations)
+    lines = scatter(comm, [] if unmeshed is None else unmeshed.bare.lines.parts(comm.size))
+    stations = gather(comm, agree(comm, lines.stations, field))
 
+    def with_nodes(unmeshed: UnmeshedCell) -> NodedCell:
+        return unmeshed.with_nodes(LineStations.joined(stations, unmeshed.bare.lines.sampling))
 
-def _with_nodes(unmeshed: UnmeshedCell, stations: list[LineStations]) -> NodedCell:
-    """Return the cell with the nodes that ranks have placed."""
-    return unmeshed.with_nodes(LineStations.joined(stations, unmeshed.bare.lines.sampling))
+    return on_root_only(comm, with_nodes, unmeshed)
 
 
 def begin_mesh(case: Case, policy: TilePolicy) -> UnmeshedCell | NodedCell | CoarseMesh:
@@ -74,22 +73,23 @@ def begin_mesh(case: Case, policy: TilePolicy) -> UnmeshedCell | NodedCell | Coa
 
 
 def fill_tiles(found: NodedCell | CoarseMesh | None, comm: MPI.Intracomm) -> CoarseMesh | None:
-    """Return the mesh on rank 0, the tiles that it has from `place_nodes` filled by all ranks. Collective.
+    """Return the mesh on rank 0, whose tiles from `place_nodes` all ranks fill.  Collective.
 
     Raises:
-        MeshError: on every rank, if one cannot fill a tile of its.
+        MeshError: on every rank, if one cannot fill a tile.
     """
     tiles = [] if found is None or isinstance(found, CoarseMesh) else [tile for _, tile in found.parts]
     gathered = gather(comm, agree(comm, fill_own, deal_tiles(tiles, [len(tile.points) for tile in tiles], comm)))
     fillings = [filling for _, filling in sorted(chain.from_iterable(gathered), key=itemgetter(0))]
-    return on_root_only(comm, _joined, found, fillings)
+
+    def joined(cell: NodedCell | CoarseMesh) -> CoarseMesh:
+        return cell if isinstance(cell, CoarseMesh) else cell.mesh(fillings)
+
+    return on_root_only(comm, joined, found)
 
 
 def deal_tiles(tiles: list[T], loads: list[int], comm: MPI.Intracomm) -> list[tuple[int, T]]:
-    """Return those of the tiles of rank 0 that this rank fills, with their numbers; `loads` are their sizes.
-
-    Collective.
-    """
+    """Deal the tiles of rank 0, of sizes `loads`; return the numbers and tiles that this rank fills.  Collective."""
     parts: list[list[tuple[int, T]]] = [[] for _ in range(comm.size)]
     for k, rank in enumerate(balanced(np.array(loads, np.int64), comm.size).tolist()):
         parts[rank].append((k, tiles[k]))
@@ -97,14 +97,9 @@ def deal_tiles(tiles: list[T], loads: list[int], comm: MPI.Intracomm) -> list[tu
 
 
 def fill_own(tiles: list[tuple[int, Tile]]) -> list[tuple[int, Filling]]:
-    """Fill them; each keeps its number.
+    """Fill numbered tiles.
 
     Raises:
         MeshError: gmsh cannot fill one.
     """
     return [(k, fill(tile)) for k, tile in tiles]
-
-
-def _joined(found: NodedCell | CoarseMesh, fillings: list[Filling]) -> CoarseMesh:
-    """Return the mesh of these filled tiles, if it is not there already."""
-    return found if isinstance(found, CoarseMesh) else found.mesh(fillings)

@@ -15,7 +15,7 @@ from typing import TypeVar
 import numpy as np
 from scipy.spatial import cKDTree
 
-from feti_homog.homogenization import bonds
+from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.crack_extension import (
     CrackExtension,
@@ -91,7 +91,7 @@ class EnergyReleaseRates:
         direction = np.round(self._gathered(cell.directions), DIRECTION_DIGITS)
         self.direction, self.length = np.where(direction <= -180.0, 180.0, direction), self._gathered(nodes.length)
         # (interfaces, 2) normal and tangential stiffnesses of the bonds, infinite where they are rigid.
-        self._stiffness = np.array(bonds.springs(cell.case).stiffness or ((np.inf, np.inf),))
+        self._stiffness = np.array(phase_laws.springs(cell.case).stiffness or ((np.inf, np.inf),))
         self._tree = cKDTree(wrapped(self.points, self._period), boxsize=self._period)
 
     def of(self, response: Response) -> EnergyRelease:

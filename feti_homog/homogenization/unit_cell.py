@@ -18,7 +18,7 @@ from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.feti.solver import FetiSolver
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
-from feti_homog.homogenization import bonds, cell_remarks, cost_model, phase_laws, uniform_parts
+from feti_homog.homogenization import cell_remarks, partition_policy, phase_laws, uniform_parts
 from feti_homog.homogenization.domain_partition import CellSummary, RankShare
 from feti_homog.homogenization.partition_policy import DEFAULT_POLICY, PartitionPolicy
 from feti_homog.homogenization.tile_tearing import cut
@@ -137,7 +137,7 @@ class TornCell:
     @cached_property
     def strength_factors(self) -> Float:
         """(fibres,) strength of the bonds of each fibre / strength in the case."""
-        return bonds.strength_factors(self.case, self.summary.fibres)
+        return phase_laws.strength_factors(self.case, self.summary.fibres)
 
     @cached_property
     def bond_law(self) -> BondLaw:
@@ -145,7 +145,7 @@ class TornCell:
         nodes = self.solver.jump_operator.nodes
         varies = not (self.strength_factors == 1.0).all()
         factor = self.strength_factors[self.summary.fibre_number(nodes.fibre) - 1] if varies else 1.0
-        return bonds.bond_law(self.case.interfaces, nodes.pair, factor)
+        return phase_laws.bond_law(self.case.interfaces, nodes.pair, factor)
 
     @cached_property
     def directions(self) -> Float:
@@ -216,7 +216,7 @@ def tear(
     summary, table = share.summary, share.table
     problem, recovers = phase_laws.plane_problem(case), case.output.mesh_error or case.output.fields
     with progress.stage("factor") as line:
-        applications, springs = cost_model.applications(case, problem, summary.across), bonds.springs(case)
+        applications, springs = partition_policy.applications(case, problem, summary.across), phase_laws.springs(case)
         solver = FetiSolver(comm, shared, subdomains, lattice, applications, thresholds, springs, problem, recovers)
         multipliers, dimension = solver.jump_operator.global_rows, solver.coarse_dimension
         line.append(f"{multipliers} multipliers, coarse dimension {dimension}")
@@ -227,7 +227,10 @@ def tear(
         axial = agree(comm, assemble_axial, case, summary, subdomains)
         line.append(f"{comm.allreduce(sum(s.n_dofs for s in axial))} degrees of freedom along the fibres")
     with progress.stage("axial"):
-        applications, springs = cost_model.applications(case, AXIAL, summary.across), bonds.axial_springs(case)
+        applications, springs = (
+            partition_policy.applications(case, AXIAL, summary.across),
+            phase_laws.axial_springs(case),
+        )
         solver = FetiSolver(comm, shared, axial, lattice, applications, thresholds, springs, AXIAL, recovers)
     return replace(cell, axial=TornCell(comm, case, summary, lattice, table, axial, solver))
 

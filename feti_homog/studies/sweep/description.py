@@ -19,7 +19,7 @@ from feti_homog.feti import solver_plan
 from feti_homog.feti.decomposition.shared_entities import share_entities
 from feti_homog.feti.factory import database_options
 from feti_homog.feti.solver_plan import ProblemSizes, SolverOptions, SolverPlan
-from feti_homog.homogenization import cell_remarks, cost_model, phase_laws
+from feti_homog.homogenization import cell_remarks, partition_policy, phase_laws
 from feti_homog.homogenization.domain_partition import CellSummary
 from feti_homog.homogenization.partition_policy import BY_COST
 from feti_homog.homogenization.tile_tearing import cut
@@ -59,7 +59,7 @@ def _described(
     own = [subdomains for subdomains, _ in loads]
     nodes = [triangles * lattice.intervals**2 // 2 for _, triangles in loads]
     elements = summary.coarse_triangles * len(lattice.triangles)
-    applications = max(cost_model.applications(case, each, summary.across) for each in phase_laws.problems(case))
+    applications = max(partition_policy.applications(case, each, summary.across) for each in phase_laws.problems(case))
     plan = _plan(case, summary, multipliers, applications, options, own)
     columns = multipliers if plan.preconditioner == "influence" else 0
     unresolved = cell_remarks.warnings(case, summary.width, summary.interface_edge)
@@ -100,15 +100,15 @@ def _estimate_lines(
     """
     ranks, most = len(nodes), summary.coarse_triangles if summary.across else summary.bodies
     components = [problem.components for problem in phase_laws.problems(case)]
-    memory = cost_model.memory(nodes, subdomains, components, columns)
+    memory = partition_policy.memory(nodes, subdomains, components, columns)
     noun, limit = "rank" if ranks == 1 else "ranks", "" if summary.across else ", at most one per body"
-    end = cost_model.memory_to_the_end(case, memory, multipliers, columns, ranks)
+    end = partition_policy.memory_to_the_end(case, memory, multipliers, columns, ranks)
     breaks = case.section.is_followed and case.interfaces and end > memory
-    words = f", {cost_model.in_words(end)} if all bonds break" if breaks else ""
+    few, all_bonds = partition_policy.in_words(memory), f", {partition_policy.in_words(end)} if all bonds break"
     return [
-        f"estimate   on {ranks} {noun} about {cost_model.in_words(memory)} on the largest{words}, without pictures",
-        f"ranks      recommended: {cost_model.recommended_ranks(sum(components) * sum(nodes), most)} "
-        f"({cost_model.DOFS_OF_A_RANK} degrees of freedom per rank{limit})",
+        f"estimate   on {ranks} {noun} about {few} on the largest{all_bonds if breaks else ''}, without pictures",
+        f"ranks      recommended: {partition_policy.recommended_ranks(sum(components) * sum(nodes), most)} "
+        f"({partition_policy.DOFS_OF_A_RANK} degrees of freedom per rank{limit})",
     ]
 
 

@@ -9,16 +9,16 @@ from support.cases import FIBRE, MATRIX, make_case
 
 from feti_homog.case.interface_section import Arc, InterfaceSection
 from feti_homog.case.load_section import Angle
-from feti_homog.homogenization import cost_model
+from feti_homog.homogenization import partition_policy
 from feti_homog.homogenization.phase_laws import problems
 
 
 def memory(dofs=(100_000,), subdomains=(9,), components=(2,), columns=0):
-    return cost_model.memory([n // 2 for n in dofs], subdomains, components, columns)
+    return partition_policy.memory([n // 2 for n in dofs], subdomains, components, columns)
 
 
 def solves(case, problem):
-    return cost_model.applications(case, problem) / cost_model.ITERATIONS_OF_A_SOLVE
+    return partition_policy.applications(case, problem) / partition_policy.ITERATIONS_OF_A_SOLVE
 
 
 def test_all_unit_loads_of_both_problems_are_counted():
@@ -32,24 +32,24 @@ def test_all_unit_loads_of_both_problems_are_counted():
     # Under plus and minus each load; along the fibres nothing touches.
     arcs = InterfaceSection(debonded=(Arc(fibre="all", angle=60.0),))
     touching = [solves(replace(heated, interfaces=(arcs,)), problem) for problem in problems(heated)]
-    assert touching == [2 * 5 * cost_model.SOLVES_OF_A_CONTACT, 2]
+    assert touching == [2 * 5 * partition_policy.SOLVES_OF_A_CONTACT, 2]
 
 
 def test_more_unknowns_problems_and_columns_take_more_memory():
     base = memory()
     assert memory(dofs=(200_000,)) > base > memory(dofs=(50_000, 50_000), subdomains=(5, 4))
     assert base < memory(components=(2, 1)) < 2 * base
-    assert memory(columns=10_000) - base == pytest.approx(10_000 * cost_model.COLUMN_BYTES)
-    assert memory(subdomains=(1,)) - base == pytest.approx(100_000 * cost_model.FACTOR_BYTES)
+    assert memory(columns=10_000) - base == pytest.approx(10_000 * partition_policy.COLUMN_BYTES)
+    assert memory(subdomains=(1,)) - base == pytest.approx(100_000 * partition_policy.FACTOR_BYTES)
 
 
 @pytest.mark.parametrize(("dofs", "bodies", "ranks"), [(1000, 9, 1), (400_000, 31, 8), (10_000_000, 31, 31)])
 def test_suggested_ranks_grow_with_the_size_up_to_the_bodies(dofs, bodies, ranks):
-    assert cost_model.recommended_ranks(dofs, bodies) == ranks
+    assert partition_policy.recommended_ranks(dofs, bodies) == ranks
 
 
 def test_bytes_in_words():
-    assert [cost_model.in_words(size) for size in (2**19, 222 * 2**20, 3e9)] == ["0.5 MiB", "222 MiB", "2.8 GiB"]
+    assert [partition_policy.in_words(size) for size in (2**19, 222 * 2**20, 3e9)] == ["0.5 MiB", "222 MiB", "2.8 GiB"]
 
 
 # One fibre, 10 fibres of teeth, 20 with released energy, 30 with strengths, 50 with energy, each to complete debonding.
@@ -59,20 +59,20 @@ def test_bytes_in_words():
 )
 def test_memory_of_paths_to_the_end(multipliers, few, measured):
     """Within a third of what five paths took; `few` is the estimate for few events in MiB."""
-    found = cost_model.memory_to_the_end(make_case(), few * 2**20, multipliers, multipliers, 1)
+    found = partition_policy.memory_to_the_end(make_case(), few * 2**20, multipliers, multipliers, 1)
     assert 0.75 < found / measured < 4 / 3
 
 
 def test_faces_with_friction_take_dense_matrices():
     case = make_case()
     rubbing = replace(case, interfaces=(InterfaceSection(normal_strength=1.0, friction=0.3),))
-    smooth, rough = (cost_model.memory_to_the_end(each, 2e9, 10_000, 10_000, 1) for each in (case, rubbing))
-    assert cost_model.in_words(rough - smooth) == "4.5 GiB"
+    smooth, rough = (partition_policy.memory_to_the_end(each, 2e9, 10_000, 10_000, 1) for each in (case, rubbing))
+    assert partition_policy.in_words(rough - smooth) == "4.5 GiB"
 
 
 def test_coatings_take_more_iterations_but_across_materials():
     case = make_case()
     coated = replace(case, materials=case.materials | {"coating": case.materials["matrix"]})
     (problem,) = problems(coated)
-    hard, easy = (cost_model.applications(coated, problem, each) for each in (False, True))
-    assert hard == 20 * easy == 20 * cost_model.applications(case, problem)
+    hard, easy = (partition_policy.applications(coated, problem, each) for each in (False, True))
+    assert hard == 20 * easy == 20 * partition_policy.applications(case, problem)
