@@ -1,14 +1,10 @@
-"""One run of an analysis: the cell under its loads, checks, records of states and points, progress.
-
-The analysis of a case is `ANALYSIS` of the module named by [analysis] type, imported when a case asks for it.
-"""
+"""One run of an analysis: the cell under its loads, checks, records of states and points, progress."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -254,24 +250,3 @@ class AnalysisContext:
         """List the warnings about probably unintended settings."""
         summary = self.cell.summary
         return [*cell_remarks.warnings(self.case, summary.width, summary.interface_edge), *self.checks.warnings()]
-
-
-@dataclass(frozen=True)
-class Analysis:
-    """An analysis: `ANALYSIS` of the module of its name.
-
-    Attributes:
-        run: its entries of `Result`, by name; collective.
-        table: whether the entry of its name has points, which NAME.csv lists.
-        events: whether its points are events, with a checkpoint and a log.
-    """
-
-    run: Callable[[AnalysisContext], dict[str, Any]]
-    table: bool = False
-    events: bool = False
-
-
-def analysis_of(case: Case) -> Analysis:
-    """Return the analysis that a case asks for."""
-    analysis: Analysis = import_module(f"feti_homog.analysis.{case.analysis.type}").ANALYSIS
-    return analysis

@@ -13,7 +13,7 @@ import numpy as np
 from mpi4py import MPI
 
 from feti_homog.analysis.constants import constants
-from feti_homog.analysis.context import Analysis, AnalysisContext
+from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.mesh_errors import mesh_error, unit_errors
 from feti_homog.analysis.result_records import EnvelopePoint
 from feti_homog.analysis.tip_records import DIRECTION_DIGITS, bond_directions, criterion_of
@@ -193,6 +193,3 @@ def _unit_tractions(context: AnalysisContext, responses: Sequence[Response]) -> 
         tractions += [np.pad(problem.interface.traction(response.state.solution), padding) for response in group]
         column += c
     return np.stack(tractions)
-
-
-ANALYSIS = Analysis(run, table=True)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from feti_homog.analysis.context import Analysis, AnalysisContext
+from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.mesh_errors import check_accuracy, state_error
 from feti_homog.analysis.path_events import (
     BARS,
@@ -269,6 +269,3 @@ def _checked(context: AnalysisContext, point: Point, name: str) -> tuple[Point, 
     for response in responses:
         context.checks.require(name, response.checks)
     return point, responses
-
-
-ANALYSIS = Analysis(run, table=True, events=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager, nullcontext
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from feti_homog.analysis import result_builder
-from feti_homog.analysis.context import AnalysisContext, analysis_of
+from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.recorders import StateRecorder
 from feti_homog.analysis.result import Result
 from feti_homog.case.case import Case
@@ -191,7 +192,7 @@ def _run_and_write(
     _write(result, directory, cell)
     if states.error is not None:
         raise states.error
-    if analysis_of(cell.case).events and not result.faults:
+    if cell.case.section.is_followed and not result.faults:
         context.checkpoint.clear()
     for name, is_asked, make in (("pictures", output.pictures, _draw), ("report", output.report, _report)):
         if is_asked:
@@ -204,7 +205,8 @@ def _run_and_write(
 def _analyse(context: AnalysisContext) -> dict[str, Any]:
     """Return the entries of `Result` that the analysis asked for makes."""
     with context.progress.stage("solve") as line:
-        analysis = analysis_of(context.case).run(context)
+        module = import_module(f"feti_homog.analysis.{context.case.analysis.type}")
+        analysis: dict[str, Any] = module.run(context)
         iterations = context.checks.iterations
         line.append(f"{len(iterations)} states, {sum(iterations) or 'no'} iterations")
     if not sum(iterations) and (remark := without_iterations()):
@@ -218,14 +220,13 @@ def _write(result: Result, directory: Path, cell: TornCell) -> None:
     written = {result_json.NAME}
     if result.result_h5 is not None:
         written |= {field_file.NAME, *(path.name for path in on_root(cell.comm, xdmf.write, directory))}
-    analysis, name = analysis_of(cell.case), cell.case.analysis.type
-    if analysis.table:
-        from feti_homog.results import csv_tables  # a stiffness has no table
+    points = vars(result).get(name := cell.case.analysis.type)
+    if points is not None:
+        from feti_homog.results import csv_tables  # a stiffness has no points
 
-        points = getattr(result, name)
         rows = points if isinstance(points, tuple) else (points,)
         written.add(on_root(cell.comm, csv_tables.write, directory / f"{name}.csv", rows).name)
-    written |= {output_folder.LOG} if analysis.events else set()
+    written |= {output_folder.LOG} if cell.case.section.is_followed else set()
     on_root_only(cell.comm, output_folder.remove_other_results, directory, written)
 
 

@@ -29,7 +29,7 @@ Constant = tuple[str, float]
 def sensitivities(
     context: AnalysisContext, document: Mapping[str, Any], responses: Sequence[Response], one_sided: bool
 ) -> dict[str, Any]:
-    """Return the entry `sensitivities` of `Result` from the responses to all unit loads.  Collective.
+    """Return `sensitivities` and `uncertainty` of `Result` from the responses to all unit loads.  Collective.
 
     If faces touch without tension, `one_sided`, each column is differentiated at the status of its own load.
 
@@ -42,7 +42,7 @@ def sensitivities(
         for change in derivatives(_cells(context), groups):
             changes = constant_changes(C, thermal, *_secants(change.energies))
             columns[change.name, change.value] = [*changes.values()]
-        return {"sensitivities": _record(composite_constants(C, thermal), columns, False)}
+        return _entries_of(context.case, composite_constants(C, thermal), columns, False)
     plane, *axial = groups
     energies = dict[Constant, list[Float]]()
     for k, (name, response) in enumerate(zip(context.plane.loads, plane, strict=True)):
@@ -52,11 +52,11 @@ def sensitivities(
             matrices = energies.setdefault((change.name, change.value), [np.zeros_like(in_plane), *along_fibres])
             matrices[0][:, k] = in_plane[:, k]
     columns = {key: [*_entries(*_secants(matrices)).values()] for key, matrices in energies.items()}
-    return {"sensitivities": _record(_entries(C, thermal), columns, True)}
+    return _entries_of(context.case, _entries(C, thermal), columns, True)
 
 
 def load_sensitivities(context: AnalysisContext, load: Load, responses: Sequence[Response]) -> dict[str, Any]:
-    """Return the entry `sensitivities` of the state under one load, at its status.  Collective.
+    """Return `sensitivities` and `uncertainty` of the state under one load, at its status.  Collective.
 
     With the stiffness A of the cell at this status, A x = s, of which the load prescribes each component of x or s,
     A dx = -dA x for the free strains, and the stored energy changes by d(x.s / 2).
@@ -80,20 +80,37 @@ def load_sensitivities(context: AnalysisContext, load: Load, responses: Sequence
         ds = dA @ x + A @ dx
         columns[change.name, change.value] = [*entries(dx, ds, float(dx @ s + x @ ds) / 2).values()]
     is_one_sided = context.plane.interface.contact and responses[0].debonded > 0
-    return {"sensitivities": _record(entries(x, s, float(x @ s) / 2), columns, is_one_sided)}
+    return _entries_of(context.case, entries(x, s, float(x @ s) / 2), columns, is_one_sided)
 
 
-def _record(
-    values: Mapping[str, float], columns: Mapping[Constant, Sequence[float]], at_fixed_status: bool
-) -> Sensitivities:
-    return Sensitivities(
-        parameters=tuple(name for name, _ in columns),
+def _entries_of(
+    case: Case, values: Mapping[str, float], columns: Mapping[Constant, Sequence[float]], at_fixed_status: bool
+) -> dict[str, Any]:
+    """Return `sensitivities`, from derivatives by constant, and of uncertain constants `uncertainty`.
+
+    Raises:
+        CaseError: the answer does not depend on an uncertain constant.
+    """
+    matrix, parameters = np.array([*columns.values()]).T, tuple(name for name, _ in columns)
+    record = Sensitivities(
+        parameters=parameters,
         parameter_values=np.array([value for _, value in columns]),
         constants=tuple(values),
         constant_values=np.array([*values.values()]),
-        derivatives=np.array([*columns.values()]).T.reshape(len(values), len(columns)),
+        derivatives=matrix.reshape(len(values), len(columns)),
         at_fixed_status=at_fixed_status,
     )
+    if not (std := case.uncertainty.std):
+        return {"sensitivities": record}
+    if idle := [name for name in std if name not in parameters]:
+        raise CaseError(*(f"[uncertainty] {name}: the {case.analysis.type} does not depend on it" for name in idle))
+    J = record.derivatives[:, [parameters.index(name) for name in std]]
+    deviation, shares = case.uncertainty.propagated(J)
+    parameter_std = np.array([*std.values()])
+    scatter = UncertainConstants(
+        parameters=tuple(std), parameter_std=parameter_std, constants=record.constants, std=deviation, shares=shares
+    )
+    return {"sensitivities": record, "uncertainty": scatter}
 
 
 def _cells(context: AnalysisContext) -> list[TornCell]:
@@ -127,25 +144,3 @@ def _at_status(
             groups[-1].append(replace(response, checks=checks))
             context.checks.record(f"{name}, derivatives, {load}", groups[-1][-1])
     return groups
-
-
-def propagated(case: Case, document: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the entry `uncertainty` of `Result`, as `Uncertainty.propagated`.
-
-    Raises:
-        CaseError: the answer does not depend on an uncertain constant.
-    """
-    sensitivities: Sensitivities = document["sensitivities"]
-    std, parameters = case.uncertainty.std, sensitivities.parameters
-    if idle := [name for name in std if name not in parameters]:
-        raise CaseError(*(f"[uncertainty] {name}: the {case.analysis.type} does not depend on it" for name in idle))
-    J = sensitivities.derivatives[:, [parameters.index(name) for name in std]]
-    deviation, shares = case.uncertainty.propagated(J)
-    entry = UncertainConstants(
-        parameters=tuple(std),
-        parameter_std=np.array([*std.values()]),
-        constants=sensitivities.constants,
-        std=deviation,
-        shares=shares,
-    )
-    return {"uncertainty": entry}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from feti_homog.analysis.constants import constants
-from feti_homog.analysis.context import Analysis, AnalysisContext
+from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.mesh_errors import mesh_error, unit_errors
 from feti_homog.homogenization.averaging import asymmetry
 
@@ -14,13 +14,11 @@ if TYPE_CHECKING:
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
-    """`effective_stiffness`, whose columns are the stresses under the unit strains.
+    """Return `effective_stiffness`, with stresses under the unit strains as columns, and entries that follow from it.
 
-    With contact between debonded faces also `effective_stiffness_compression`, its columns -Sigma(-E); `tips` of
-    debonded arcs under each of them; `mesh_error` of the estimated errors; `sensitivities` and `uncertainty` if
-    the case asks for them.
-
-    If a temperature is a load, `thermal_stress` under a unit of it, and `thermal_stress_compression`.
+    With contact between debonded faces also `effective_stiffness_compression`, columns -Sigma(-E); `tips` of debonded
+    arcs under each load; `mesh_error`; `sensitivities` and `uncertainty` if the case asks for them.  If a temperature
+    is a load, `thermal_stress` under a unit temperature, and `thermal_stress_compression`.
     """
     bonds = context.bonds(None)
     starts = context.loads.zero_multipliers()
@@ -46,11 +44,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
         document["tips"] = tip_rates(context, under, loads)
     document |= constants(context.cell, document)
     if context.needs_sensitivities:
-        from feti_homog.analysis.sensitivities import propagated, sensitivities  # few runs ask for them
+        from feti_homog.analysis.sensitivities import sensitivities  # few runs ask for them
 
         document |= sensitivities(context, document, first, one_sided)
-        document |= propagated(context.case, document) if context.case.uncertainty.std else {}
     return document | mesh_error(context, document, errors, errors_of_minus)
-
-
-ANALYSIS = Analysis(run)
