@@ -19,7 +19,6 @@ import tomli_w
 from composite import STIFFNESS
 from scipy.optimize import least_squares
 
-from feti_homog.homogenization import partition_policy
 from feti_homog.results import result_json
 
 CELLS = (
@@ -60,10 +59,12 @@ def memory_fit(runs: list[dict[str, Any]], coated: list[dict[str, Any]]) -> dict
 
 
 def factor_fit() -> dict[str, tuple[Any, Any]]:
-    """Fit the memory that a cell of one factor takes beyond the other constants of `partition_policy`."""
+    """Fit the memory that a cell of one factor takes beyond the other constants, as they are now."""
     runs = [document(cell, refine, {}) for cell in CELLS for refine in OF_ONE_FACTOR]
     runs = [run for run in runs if run["solver"]["subdomains"] == 1]
     memory, dofs = np.array([(run["memory"], 2 * run["cell"]["nodes"]) for run in runs]).T
+    from feti_homog.homogenization import partition_policy  # starts MPI, after which no run can be started
+
     others = partition_policy.BASE_BYTES + partition_policy.DOF_BYTES * dofs
     constant = np.median((memory - others) / dofs)
     return {"FACTOR_BYTES": ([constant], (others + constant * dofs) / memory)}
@@ -91,4 +92,3 @@ def fitted(values: Any, *columns: Any) -> tuple[Any, Any]:
 
 if __name__ == "__main__":
     main()
-    print("now:", {name: value for name, value in vars(partition_policy).items() if name.isupper()})

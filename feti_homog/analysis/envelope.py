@@ -130,13 +130,15 @@ class _Finder:
         largest = float(self._comm.allreduce(used.max(initial=0.0), MPI.MAX))
         for first in range(0, len(rays.strain), self._chunk):
             loads = self._unit_loads(rays.strain[first : first + self._chunk], 0.0, names)
-            ahead = np.tensordot(loads, self._unit, axes=1)
+            directions = np.tensordot(loads, self._unit, axes=1)
             if largest < 1.0:
                 before = start if rays.temperature else None
-                factors = self._onset.factors(ahead, self._noise * self._error_utilisation(loads), before)
+                factors = self._onset.factors(directions, self._noise * self._error_utilisation(loads), before)
             else:
-                factors = np.tile(np.where(used >= largest * (1.0 - UTILISATION_TIE), 0.0, np.inf), (len(ahead), 1))
-            for ray, (factor, fibre, pair, angle, *shares) in enumerate(self._first(factors, start, ahead), first):
+                factors = np.tile(
+                    np.where(used >= largest * (1.0 - UTILISATION_TIE), 0.0, np.inf), (len(directions), 1)
+                )
+            for ray, (factor, fibre, pair, angle, *shares) in enumerate(self._first(factors, start, directions), first):
                 if np.isinf(factor):
                     yield {}
                     continue
@@ -161,21 +163,21 @@ class _Finder:
             first = end
         return total
 
-    def _first(self, factors: Float, before: Float, ahead: Float) -> list[list[float]]:
+    def _first(self, factors: Float, before: Float, directions: Float) -> list[list[float]]:
         """Return for each ray the least factor, fibre, interface and direction of its bond, and shares of the break.
 
         Bonds that break together: lowest fibre, then interface, then angle.  Collective.
         """
         n = len(factors)
-        least = factors.min(axis=1, initial=np.inf)
-        self._comm.Allreduce(MPI.IN_PLACE, least, MPI.MIN)
+        smallest = factors.min(axis=1, initial=np.inf)
+        self._comm.Allreduce(MPI.IN_PLACE, smallest, MPI.MIN)
         best = np.full((n, 4 + len(self._break_names)), np.inf)
-        best[:, 0] = least
-        together = factors[:, self._order] <= least[:, None] * (1.0 + UTILISATION_TIE)
-        rays = np.flatnonzero(together.any(axis=1) & np.isfinite(least))
+        best[:, 0] = smallest
+        together = factors[:, self._order] <= smallest[:, None] * (1.0 + UTILISATION_TIE)
+        rays = np.flatnonzero(together.any(axis=1) & np.isfinite(smallest))
         node: Int = self._order[together[rays].argmax(axis=1)] if len(rays) else np.zeros(0, np.int64)
         best[rays, 1:4] = np.column_stack([self._fibre[node], self._pair[node], self._direction[node]])
-        traction = before[node] + least[rays, None] * ahead[rays, node]
+        traction = before[node] + smallest[rays, None] * directions[rays, node]
         best[rays, 4:] = self._onset.bonds.law.at(node).breaks(traction)
         table = np.stack(self._comm.allgather(best))
         first = np.lexsort((np.round(table[:, :, 3], DIRECTION_DIGITS), table[:, :, 2], table[:, :, 1]), axis=0)[0]

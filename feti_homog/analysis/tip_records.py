@@ -37,7 +37,7 @@ def criterion_of(cell: TornCell, grows: bool = False) -> BondLaw:
     has_tips = grows or cell.sum_over_ranks(int(cell.debonded(None).sum())) > 0
     if not has_tips or not cell.solver.jump_operator.global_rows:
         return law
-    inverses = [inverse for each in cell.problems if (inverse := each.solver.exact_inverse) is not None]
+    inverses = [inverse for problem in cell.problems if (inverse := problem.solver.exact_inverse) is not None]
     if len(inverses) < len(cell.problems):
         raise CaseError('[interface] growth = "released": needs -feti_pc_type influence; or growth = "springs"')
     return ReleasedEnergy(law, *inverses)
@@ -45,16 +45,16 @@ def criterion_of(cell: TornCell, grows: bool = False) -> BondLaw:
 
 def tip_rates(context: AnalysisContext, responses: Sequence[Response], loads: Sequence[str]) -> TipRates:
     """Return rates at all tips under each load in the plane; none while all is bonded.  Collective."""
-    found = [
+    rates = [
         (context.release_rates.of(response), load)
         for response, load in zip(responses, loads, strict=True)
         if load.lstrip("-") in IN_PLANE_LOADS and response.debonded
     ]
-    columns = [(at.fibre, at.pair, at.direction, at.total, *at.modes.T, at.mode_angle, at.length) for at, _ in found]
-    table = map(np.concatenate, zip(*columns, strict=True)) if found else [np.zeros(0)] * 8
+    columns = [(at.fibre, at.pair, at.direction, at.total, *at.modes.T, at.mode_angle, at.length) for at, _ in rates]
+    table = map(np.concatenate, zip(*columns, strict=True)) if rates else [np.zeros(0)] * 8
     fibre, pair, angle, G, G_I, G_II, psi, length = table
     return TipRates(
-        load=tuple(load for at, load in found for _ in at.fibre),
+        load=tuple(load for at, load in rates for _ in at.fibre),
         fibre=tuple(fibre.astype(int).tolist()),
         angle=angle,
         G=G,

@@ -80,9 +80,9 @@ class InterfaceNodes:
 
         `pairs` as in `share_entities`, `numbers` (constituents,) of fibres.
         """
-        left, right, edge = torus.sides
-        pair = pairs[torus.mesh.phase[left], torus.mesh.phase[right]]
-        sides = torus.constituent[np.stack([left, right])][:, pair >= 0]
+        first, second, edge = torus.sides
+        pair = pairs[torus.mesh.phase[first], torus.mesh.phase[second]]
+        sides = torus.constituent[np.stack([first, second])][:, pair >= 0]
         inner = np.take_along_axis(sides, torus.nesting[sides].argmax(axis=0)[None], axis=0)[0]
         between = edge[pair >= 0]
         plane = np.unique(torus.torus_edge, return_index=True)[1][between]
@@ -136,16 +136,14 @@ def faults(case: Case, nodes: InterfaceNodes, moved: Sequence[MovedTips]) -> lis
         for (place, arc), opening in product(enumerate(interface.debonded), openings):
             angle, line = opening if arc.angle is None else arc.angle, f"[{label}] debonded[{place}]"
             for fibre in [None] if isinstance(arc.fibre, str) else arc.fibre:
-                if not angle or of_pair.selects(arc, opening, fibre, moved[pair]):
-                    continue
-                if fibre is not None and fibre not in of_pair.fibre:
-                    between = interface.between
-                    which = "that can debond" if between is None else f"between {' and '.join(between)}"
-                    lines.append(f"{line}.fibre: fibre {fibre} has no interface {which}")
-                    continue
-                whose = "any fibre" if fibre is None else f"fibre {fibre}"
-                lines.append(
-                    f"{line}: no node of {whose} is within the arc of {angle} degrees; make it wider, or the elements "
-                    "smaller"
-                )
+                if angle and not of_pair.selects(arc, opening, fibre, moved[pair]):
+                    lines.append(line + _fault(angle, fibre, of_pair, interface.between))
     return list(dict.fromkeys(lines))
+
+
+def _fault(angle: float, fibre: int | None, nodes: InterfaceNodes, between: Sequence[str] | None) -> str:
+    if fibre is not None and fibre not in nodes.fibre:
+        which = "that can debond" if between is None else f"between {' and '.join(between)}"
+        return f".fibre: fibre {fibre} has no interface {which}"
+    whose = "any fibre" if fibre is None else f"fibre {fibre}"
+    return f": no node of {whose} is within the arc of {angle} degrees; make it wider, or the elements smaller"

@@ -141,10 +141,10 @@ class Homogenization:
         acting = self.interface.acting(state.bonds, strain, state.asked)
         largest = (self._largest(u) + self.interface.scales.imposed(acting)) or 1.0
         imposed = float(self.interface.scales.imposed_strain(acting).max()) or 1.0
-        least = self.interface.scales.stress_scale(acting) * imposed
+        reuss = self.interface.scales.stress_scale(acting) * imposed
         checks = {
             "strain": float(np.abs(star - opening / self.cell.summary.area).max() / imposed) + self._strain_inside,
-            "hill": float(abs(energy + rubbing - stress @ strain) / (max(abs(energy), least) or 1.0)),
+            "hill": float(abs(energy + rubbing - stress @ strain) / (max(abs(energy), reuss) or 1.0)),
         }
         if solver.jump_operator.global_rows:
             checks["jump"] = self._largest(active * state.solution.jump) / largest

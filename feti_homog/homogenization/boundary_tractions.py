@@ -78,7 +78,7 @@ def _forces(cell: TornCell, responses: Sequence[Response], groups: Sequence[Grou
         BT = jumps.B.T.tocsr()
         u = np.concatenate([np.zeros((0, k)), *(group.stress.u.reshape(-1, k) for group in groups)])
         solutions = [replace(response.state.solution, strain=response.strain) for response in responses]
-        lam = np.stack([cell.across_bonds(own, x)[0] for own, x in zip(solutions, u.T, strict=True)], axis=1)
+        lam = np.stack([cell.across_bonds(solution, x)[0] for solution, x in zip(solutions, u.T, strict=True)], axis=1)
     else:
         jumps, BT = cell.solver.jump_operator, cell.solver.interface_operators.BT
         lam = np.stack([response.scale * response.state.solution.lam for response in responses], axis=1)

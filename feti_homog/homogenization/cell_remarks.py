@@ -43,14 +43,14 @@ def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:
     return pairs
 
 
-def faults(case: Case, phases: tuple[str, ...], left: AnyInt, right: AnyInt) -> list[str]:
+def faults(case: Case, phases: tuple[str, ...], first: AnyInt, second: AnyInt) -> list[str]:
     """List faults of interfaces between phases that the cell lacks, or that touch nowhere in it.
 
-    Phases `left` (n,) touch phases `right` (n,).
+    Phases `first` (n,) touch phases `second` (n,).
     """
     lines = []
     touching = np.zeros((len(phases), len(phases)), bool)
-    touching[left, right] = touching[right, left] = True
+    touching[first, second] = touching[second, first] = True
     for number, interface in enumerate(case.interfaces):
         if interface.between is None:
             continue
@@ -74,20 +74,25 @@ def mesh_remarks(case: Case, torus: Torus, pairs: Int) -> tuple[str, ...]:
     can_open = case.arcs or has_curve or phase_laws.has_springs(case) or case.section.breaks
     if case.cell.has_own_mesh and not can_open:
         lines.append("[interface]: nothing is debonded, and no bond is elastic: the bonding is perfect")
-    left, right, edge = torus.sides
-    may_part = pairs[torus.mesh.phase[left], torus.mesh.phase[right]] >= 0
-    ends = np.unique(torus.edge_ends[edge[may_part & (torus.constituent[left] != torus.constituent[right])]])
+    first, second, edge = torus.sides
+    may_part = pairs[torus.mesh.phase[first], torus.mesh.phase[second]] >= 0
+    ends = np.unique(torus.edge_ends[edge[may_part & (torus.constituent[first] != torus.constituent[second])]])
     kinds = ((torus.meeting[ends] > 2, "three bodies meet"), (torus.touching[ends], "two bodies meet more than once"))
     if counts := [f"at {which.sum()} {kind}" for which, kind in kinds if which.any()]:
         lines.append(f"[interface] nodes that never part: {', '.join(counts)}")
-    at = np.searchsorted(torus.class_keys, pinned_class(torus))  # pinned against translation, Eq. (15)
-    if not torus.never_part[at] and torus.meeting[at] >= 2:
-        x, y = torus.mesh.points[np.flatnonzero(torus.node_class == at)[0]]
-        lines.append(
-            f"[interface] the node at ({x:.6g}, {y:.6g}) never parts: it holds the cell, for all nodes of the mesh are "
-            "on interfaces; use a finer mesh"
-        )
-    return tuple(lines)
+    return (*lines, *_pinned_bond(torus))
+
+
+def _pinned_bond(torus: Torus) -> list[str]:
+    """Remark a bond at the node that is pinned against translation, Eq. (15): it never parts."""
+    at = np.searchsorted(torus.class_keys, pinned_class(torus))
+    if torus.never_part[at] or torus.meeting[at] < 2:
+        return []
+    x, y = torus.mesh.points[np.flatnonzero(torus.node_class == at)[0]]
+    return [
+        f"[interface] the node at ({x:.6g}, {y:.6g}) never parts: it holds the cell, for all nodes of the mesh are on "
+        "interfaces; use a finer mesh"
+    ]
 
 
 def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles: int) -> tuple[str, ...]:

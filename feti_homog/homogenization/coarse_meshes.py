@@ -36,11 +36,11 @@ def place_nodes(case: Case, comm: MPI.Intracomm, policy: TilePolicy) -> NodedCel
     Raises:
         CaseError, MeshError: on every rank, as `begin_mesh`.
     """
-    found = on_root_only(comm, begin_mesh, case, policy)
-    unmeshed = found if isinstance(found, UnmeshedCell) else None
+    cell = on_root_only(comm, begin_mesh, case, policy)
+    unmeshed = cell if isinstance(cell, UnmeshedCell) else None
     if not comm.bcast(unmeshed is not None):
-        assert not isinstance(found, UnmeshedCell)
-        return found
+        assert not isinstance(cell, UnmeshedCell)
+        return cell
     field: SizeField = comm.bcast(None if unmeshed is None else unmeshed.bare.field)
     lines = scatter(comm, [] if unmeshed is None else unmeshed.bare.lines.parts(comm.size))
     stations = gather(comm, agree(comm, lines.stations, field))
@@ -58,34 +58,34 @@ def begin_mesh(case: Case, policy: TilePolicy) -> UnmeshedCell | NodedCell | Coa
         CaseError: a phase has no material, or a material no phase.
         MeshError: the cell cannot be meshed, or its mesh file is faulty.
     """
-    found: UnmeshedCell | NodedCell | CoarseMesh
+    cell: UnmeshedCell | NodedCell | CoarseMesh
     if case.cell.has_own_mesh:
         from feti_homog.mesh.readers.msh_reader import read_cell  # with the readers of all formats
 
-        found = read_cell(case.cell)
+        cell = read_cell(case.cell)
     else:
         listed = listed_arrangement(case.cell)
         estimate = ElementEstimate.of(case.cell, listed)
-        cell = replace(case.cell, tip_size=arc_selection.size(case, estimate))
-        found = begin(cell, listed, arc_selection.marks(case, estimate.fibres), policy)
-    cases.check_phases(case, found.phases)
-    return found
+        section = replace(case.cell, tip_size=arc_selection.size(case, estimate))
+        cell = begin(section, listed, arc_selection.marks(case, estimate.fibres), policy)
+    cases.check_phases(case, cell.phases)
+    return cell
 
 
-def fill_tiles(found: NodedCell | CoarseMesh | None, comm: MPI.Intracomm) -> CoarseMesh | None:
+def fill_tiles(cell: NodedCell | CoarseMesh | None, comm: MPI.Intracomm) -> CoarseMesh | None:
     """Return the mesh on rank 0, whose tiles from `place_nodes` all ranks fill.  Collective.
 
     Raises:
         MeshError: on every rank, if one cannot fill a tile.
     """
-    tiles = [] if found is None or isinstance(found, CoarseMesh) else [tile for _, tile in found.parts]
+    tiles = [] if cell is None or isinstance(cell, CoarseMesh) else [tile for _, tile in cell.parts]
     gathered = gather(comm, agree(comm, fill_own, deal_tiles(tiles, [len(tile.points) for tile in tiles], comm)))
     fillings = [filling for _, filling in sorted(chain.from_iterable(gathered), key=itemgetter(0))]
 
     def joined(cell: NodedCell | CoarseMesh) -> CoarseMesh:
         return cell if isinstance(cell, CoarseMesh) else cell.mesh(fillings)
 
-    return on_root_only(comm, joined, found)
+    return on_root_only(comm, joined, cell)
 
 
 def deal_tiles(tiles: list[T], loads: list[int], comm: MPI.Intracomm) -> list[tuple[int, T]]:

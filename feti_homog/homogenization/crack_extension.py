@@ -1,6 +1,6 @@
 """A virtual extension of the crack at the tip of a debonded arc, and what it releases.
 
-The nodes around the tip turn about the centre of the fibre by s q, and their displacements with them; q is 1 near the
+The nodes around the tip turn about the centre of the fibre by s q, and their displacements with them; q is 1 inside the
 tip and falls to 0 farther away.  The tip moves along the interface by s R, bonded nodes stay bonded, and gaps stay as
 they are: an admissible variation of the equilibrium, whose energy changes with the energy of the elements.
 """
@@ -52,11 +52,11 @@ class CrackExtension:
             u: (dofs,) u*.
             E: (2, 2) macroscopic strain.
         """
-        near = self._tree.query_ball_point(wrapped(tip, self._period), reach)
-        if not near:
+        inside = self._tree.query_ball_point(wrapped(tip, self._period), reach)
+        if not inside:
             return 0.0
         mesh = self.subdomain.mesh
-        nodes = mesh.triangles[np.unique(self._elements_of[near].indices)]
+        nodes = mesh.triangles[np.unique(self._elements_of[inside].indices)]
         points = mesh.points[nodes]
         away = nearest_image(points - tip, self._period)
         # An element moves as one to the image of its node that is nearest to the tip.
@@ -88,10 +88,10 @@ def body_boundaries(comm: MPI.Comm, subdomains: Sequence[Subdomain]) -> tuple[Fl
     return _of_all(comm, points, np.zeros((0, 2))), _of_all(comm, body, np.zeros(0, np.int64))
 
 
-def _of_all(comm: MPI.Comm, own: list[Array], none: Array) -> Array:
+def _of_all(comm: MPI.Comm, rows: list[Array], none: Array) -> Array:
     """Return the rows of all ranks; `none` has no rows.  Collective."""
-    rows: Array = np.concatenate(comm.allgather(np.concatenate([none, *own])))
-    return rows
+    joined: Array = np.concatenate(comm.allgather(np.concatenate([none, *rows])))
+    return joined
 
 
 def reach_of_tips(tips: Float, spokes: Float, bodies: Int, boundaries: tuple[Float, Int], period: Float) -> Float:
@@ -108,8 +108,8 @@ def reach_of_tips(tips: Float, spokes: Float, bodies: Int, boundaries: tuple[Flo
     if len(tips) > 1:
         nearest, _ = cKDTree(places, boxsize=period).query(places, 2)
         reach = np.minimum(reach, nearest[:, 1])
-    near = cKDTree(wrapped(points, period), boxsize=period).query_ball_point(places, reach)
-    for t, nodes in enumerate(near):
+    inside = cKDTree(wrapped(points, period), boxsize=period).query_ball_point(places, reach)
+    for t, nodes in enumerate(inside):
         away = nearest_image(points[nodes] - tips[t], period)
         off_circle = np.abs(np.linalg.norm(away + spokes[t], axis=1) / radius[t] - 1) > OFF_CIRCLE
         limits = off_circle | ~np.isin(body[nodes], bodies[t])

@@ -114,7 +114,7 @@ def _border(submeshes: Sequence[Submesh], mesh: FineMesh) -> tuple[Int, Int, Int
         rows = np.stack(np.broadcast_arrays(s.constituent[triangle][:, None], key, place), axis=2).reshape(-1, 3)
         classes, once = np.unique(line, return_index=True)
         borders.append((rows[once], classes, edges, line))
-    vertices, classes, edges, lines = (np.concatenate(each) for each in zip(*borders, strict=True))
+    vertices, classes, edges, lines = (np.concatenate(rows) for rows in zip(*borders, strict=True))
     return vertices, classes, edges, lines
 
 
@@ -140,15 +140,15 @@ def fits_across_cuts(shared: SharedVertices, bodies: Sequence[RecoveredStress]) 
     flags = shared.sum([np.isin(strip.shared, strip.bounds)[:, None].astype(float) for strip in strips])
     neighbours = [strip.neighbours(flag[:, 0] > 0) for strip, flag in zip(strips, flags, strict=True)]
     order = bodies[0].order if bodies else 1
-    near = [
+    more = [
         (pairs.shared_matrices(moments, order), pairs.shared(sums, order))
         for pairs, (moments, sums) in zip(neighbours, patches, strict=True)
     ]
     fits = {}
-    near = _over_pieces(shared, strips, near)
-    for mesh, strip, pairs, patch, more in zip(shared.meshes, strips, neighbours, patches, near, strict=True):
+    more = _over_pieces(shared, strips, more)
+    for mesh, strip, pairs, patch, added in zip(shared.meshes, strips, neighbours, patches, more, strict=True):
         changed = np.union1d(strip.shared, pairs.at[np.isin(pairs.other, strip.shared)])
-        of_strip = fitted(*(a[changed] + b[changed] for a, b in zip(patch, more, strict=True)))
+        of_strip = fitted(*(a[changed] + b[changed] for a, b in zip(patch, added, strict=True)))
         fits[mesh] = np.flatnonzero(strip.is_vertex)[changed], of_strip
     return fits
 
@@ -178,9 +178,9 @@ class _Strip:
         is_vertex, at = np.zeros(len(body.u), bool), body.node_class[body.triangles[:, :3]]
         is_vertex[classes] = True
         for _ in range(LAYERS):
-            near = is_vertex[at].any(axis=1)
-            is_vertex[at[near]] = True
-        stress = replace(body, triangles=body.triangles[near])
+            reached = is_vertex[at].any(axis=1)
+            is_vertex[at[reached]] = True
+        stress = replace(body, triangles=body.triangles[reached])
         corners, size = stress.points[stress.triangles[:, :3]], int(is_vertex.sum())
         start, stop = stress.vertices.ravel(), stress.vertices[:, [1, 2, 0]].ravel()
         vector = (corners[:, [1, 2, 0]] - corners).reshape(-1, 2)

@@ -144,8 +144,8 @@ def distribute(
     pairs = cell_remarks.pairs_of(case, mesh.phases)
     circles = fibre_circles(torus)
     centres = in_cell(circles[:, :2], mesh.period)
-    touching = (mesh.phase[side] for side in torus.sides[:2])
-    faults = cell_remarks.faults(case, mesh.phases, *touching) + arc_selection.fibre_faults(case, centres[is_fibre])
+    faults = cell_remarks.faults(case, mesh.phases, *(mesh.phase[side] for side in torus.sides[:2]))
+    faults += arc_selection.fibre_faults(case, centres[is_fibre])
     moved = (debonded_arcs.NOT_MOVED,) * len(case.interfaces)
     if case.arcs and not faults:
         nodes = InterfaceNodes.of(torus, lattice, pairs, numbers, centres)
@@ -158,20 +158,17 @@ def distribute(
     cut = _cut_across(case, torus, lattice, n_ranks, policy)
     across = cut is not None
     if cut is None:
-        # Coarse edges of each body that several bodies share.
-        left, right, _ = torus.sides
-        outer = parts[left] != parts[right]
-        edges = np.bincount(np.r_[parts[left[outer]], parts[right[outer]]], minlength=bodies)
-        pieces = wanted_pieces(case, np.bincount(parts), edges, lattice, n_ranks, policy)
+        sides = parts[np.stack(torus.sides[:2])]
+        shared_edges = np.bincount(sides[:, sides[0] != sides[1]].ravel(), minlength=bodies)
+        pieces = wanted_pieces(case, np.bincount(parts), shared_edges, lattice, n_ranks, policy)
         cut = decompose(torus, parts, pieces, n_ranks)
-    subdomain, rank = cut.subdomain, cut.rank
-    table = SubdomainTable.of(torus, subdomain, rank, across)
+    table = SubdomainTable.of(torus, cut.subdomain, cut.rank, across)
     summary = CellSummary(
         width=mesh.width,
         height=mesh.height,
         phases=mesh.phases,
         bodies=bodies,
-        subdomains=len(rank),
+        subdomains=len(cut.rank),
         coarse_triangles=triangles,
         interface_edge=cell_remarks.longest_edge(mesh),
         numbers=numbers,
@@ -187,13 +184,13 @@ def distribute(
         remarks=(
             *table_remarks(case),
             *mesh_remarks(case, torus, pairs),
-            *subdomain_remarks(case, bodies, len(rank), triangles),
+            *subdomain_remarks(case, bodies, len(cut.rank), triangles),
         ),
         across=across,
         interface_nodes=_interface_nodes(torus, pairs, lattice) if across else None,
     )
-    shares = cut_for_ranks(torus, subdomain, table, n_ranks, pinned_class(torus))
-    return [RankShare(summary, table, pairs, submeshes) for submeshes in shares]
+    submeshes = cut_for_ranks(torus, cut.subdomain, table, n_ranks, pinned_class(torus))
+    return [RankShare(summary, table, pairs, share) for share in submeshes]
 
 
 def _cut_across(
@@ -229,8 +226,8 @@ def in_cell(points: Float, period: Float) -> Float:
 
 def _interface_nodes(torus: Torus, pairs: Int, lattice: ReferenceLattice) -> int:
     """Count the nodes at which two bodies could part if they had an interface."""
-    left, right, edge = torus.sides
-    between = edge[pairs[torus.mesh.phase[left], torus.mesh.phase[right]] >= 0]
+    first, second, edge = torus.sides
+    between = edge[pairs[torus.mesh.phase[first], torus.mesh.phase[second]] >= 0]
     plane = np.unique(torus.torus_edge, return_index=True)[1][between]
     ends = np.unique(torus.node_class[torus.edges[plane]])
     may_part = ~torus.never_part[ends] & (torus.class_keys[ends] != pinned_class(torus))

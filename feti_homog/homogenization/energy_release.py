@@ -35,7 +35,7 @@ from feti_homog.typing import Float, Int
 Array = TypeVar("Array", Float, Int, Status)
 
 DIRECTION_DIGITS = 9
-# Length at which the modes are separated, at least one element / radius of the fibre.
+# Length at which the modes are separated, at smallest one element / radius of the fibre.
 MODE_LENGTH = 1e-3
 
 
@@ -164,22 +164,24 @@ class EnergyReleaseRates:
 
         Lengths are MODE_LENGTH radii, or the element behind the tip if it is longer.
         """
-        least, order = MODE_LENGTH * self._radius(tips), self.cell.case.cell.order
-        work, length = np.zeros((len(least), 2)), np.zeros(len(least))
+        smallest, order = MODE_LENGTH * self._radius(tips), self.cell.case.cell.order
+        work, length = np.zeros((len(smallest), 2)), np.zeros(len(smallest))
         # Nodes of a chain within these lengths at most, and one element more.
-        counts = self._tree.query_ball_point(wrapped(self.points[tips.node], self._period), least, return_length=True)
+        counts = self._tree.query_ball_point(
+            wrapped(self.points[tips.node], self._period), smallest, return_length=True
+        )
         steps = order + int(counts.max(initial=1))
         chains = [self._chains.onward(tips.node, start, steps) for start in (tips.behind, tips.ahead)]
-        for t, (behind, ahead) in enumerate(zip(*chains, strict=True)):
+        for t, (behind, front) in enumerate(zip(*chains, strict=True)):
             debonded = (behind >= 0) & ((status[behind] != BONDED) | (behind == tips.node[t]))
-            bonded = (ahead >= 0) & (status[ahead] == BONDED)
+            bonded = (front >= 0) & (status[front] == BONDED)
             # The first debonded nodes behind, and the first bonded ones ahead.
-            behind, ahead = (
-                chain[: np.argmin(np.append(mask, False))] for chain, mask in ((behind, debonded), (ahead, bonded))
+            behind, front = (
+                chain[: np.argmin(np.append(mask, False))] for chain, mask in ((behind, debonded), (front, bonded))
             )
-            to_behind, to_ahead = (self._distance(chain, tips.node[t]) for chain in (behind, ahead))
-            length[t] = max(least[t], to_behind[min(order, len(behind) - 1)])
-            work[t] = closing_work(length[t], to_ahead, force[ahead], to_behind, jump[behind])
+            to_behind, to_front = (self._distance(chain, tips.node[t]) for chain in (behind, front))
+            length[t] = max(smallest[t], to_behind[min(order, len(behind) - 1)])
+            work[t] = closing_work(length[t], to_front, force[front], to_behind, jump[behind])
         return work, length
 
     def _gathered(self, values: Array) -> Array:

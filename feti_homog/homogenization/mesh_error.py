@@ -22,15 +22,15 @@ from feti_homog.system.parallel.distributed_arrays import allreduce_sum
 from feti_homog.typing import Float, Int
 
 Members = list[Subdomain] | list[UniformPart]
-# Errors of elements and of arcs over those of meshes refined once and twice less, by the order of elements, all by
-# `scripts/measure_mesh_error.py --factors`; in cells with a phase that locks, of quadratic ones by "true" there; and
-# of the mesh refined once less with the displacements of the mesh itself at its nodes, by whether there are bubbles.
+# Ratios of errors of elements and of arcs to errors on meshes refined once and twice less, by the order of elements,
+# measured by `scripts/measure_mesh_error.py --factors`; in cells with a phase that locks, for quadratic elements from
+# true errors; and to the mesh refined once less with displacements of the mesh at its nodes, by whether it has bubbles.
 NESTED = {1: ((0.26, 0.27), (0.07, 0.066)), 2: ((1 / 15, 1 / 14), (1 / 185, 1 / 255))}
 LOCKED = {1: (0.31, 0.34), 2: (0.1, 0.065)}
 SAMPLED = {False: (0.066, 0.065), True: (0.052, 0.065)}
-# The two parts may cancel; at least these shares of both are left, `scripts/measure_mesh_error.py`: on the diagonal; of
-# two states by the order of elements; with quadratic ones beside interfaces that may part, or where few corners have
-# most of it; and where faces touch at different places, for which the energy is not bilinear.
+# The two parts may cancel; the smallest shares that remain (`scripts/measure_mesh_error.py`): on the diagonal; of two
+# states by the order of elements; of quadratic ones with interfaces that may part, or with few corners that have most
+# of the error; and where faces touch at different places, for which the energy is not bilinear.
 LEAST_SHARE, LEAST_OF_TWO = 0.05, {1: 0.01, 2: 0.005}
 LEAST_OF_TWO_UNEVEN, LEAST_OF_TWO_TOUCHING = 0.05, 1.0
 
@@ -40,11 +40,11 @@ class EnergyErrors:
     """Errors of E_i . Sigma_j, (k, k), of k responses under the strains E_i of a cell of area |UC|.
 
     Attributes:
-        elements: 1/|UC| int ds_i : S : ds_j of recovered stresses less those of elements, and what springs have
-            beyond tips: the stiffness is too high.
-        arcs: what sides of elements make of arcs and of springs along them, of either sign.
-        shares: (m, k) what each element of this rank has of the first one's diagonal, none if they are not kept.
-        least_of_two: share of both parts, as if they did not cancel, that is left at least off the diagonal.
+        elements: 1/|UC| int ds_i : S : ds_j of recovered less element stresses, and energy of springs beyond tips; the
+            stiffness is too high.
+        arcs: errors of straight or parabolic sides along arcs, and of springs along sides, of either sign.
+        shares: (m, k) shares of this rank's elements in the diagonal of `elements`; without rows if not asked for.
+        least_of_two: smallest ratio, off the diagonal, of the error to both parts without cancellation.
     """
 
     elements: Float
@@ -58,14 +58,9 @@ class EnergyErrors:
         return self.elements + self.arcs
 
     @property
-    def apart(self) -> Float:
-        """(k, k) both parts as if they did not cancel."""
-        return self.elements - self.arcs
-
-    @property
     def least(self) -> Float:
-        """(k, k) the share of these that is left at least."""
-        return LEAST_SHARE * self.apart
+        """(k, k) smallest error that cancellation of both parts leaves."""
+        return LEAST_SHARE * (self.elements - self.arcs)
 
     @property
     def absolute(self) -> Float:
@@ -83,35 +78,36 @@ def energy_errors(
     keep: bool = True,
     nested: bool | None = None,
 ) -> EnergyErrors:
-    """Return the estimates of responses of one problem, a few subdomains at a time.  Collective.
+    """Estimate the errors of responses of one problem, a few subdomains at a time.  Collective.
 
-    `keep` what states of the cell need later: the factors of interiors, and `shares`.  `nested` from the mesh that is
-    refined less, by default where `is_nested`.
+    Args:
+        contact: whether faces touch.
+        keep: whether later states need the factors of interiors, and the caller `shares`.
+        nested: whether to use the mesh refined less; by default where `is_nested`.
     """
     k, area = len(responses), cell.summary.area
     nested = is_nested(cell, responses) if nested is None else nested
     lattice = cell.nested_lattice if nested else cell.lattice
     fewer = cell.lattice.halvings - lattice.halvings
-    found, shares = np.zeros((2, k, k)), [np.zeros((0, k))]
+    sums, shares = np.zeros((2, k, k)), [np.zeros((0, k))]
     of_elements, of_arcs = factors(cell, fewer)
     for stress, sides in _recovered(cell, responses, keep, lattice):
-        total, each = stress.difference(keep)
-        arcs = arc_energy(stress, sides)
-        found += of_elements * total, of_arcs * arcs
-        shares.append(np.repeat(of_elements * each / 4**fewer, 4**fewer, axis=0))
-    elements, arcs = allreduce_sum(cell.comm, found) / area
+        energy, of_each = stress.difference(keep)
+        sums += of_elements * energy, of_arcs * arc_energy(stress, sides)
+        shares.append(np.repeat(of_elements * of_each / 4**fewer, 4**fewer, axis=0))
+    elements, arcs = allreduce_sum(cell.comm, sums) / area
     if cell.case.interfaces and not cell.summary.across:
         lam = np.stack([response.scale * response.state.solution.lam for response in responses], axis=1)
         state = responses[0].state
         springs = cell.spring_sides.errors(state.status, state.solution.compliance, lam)
         elements, arcs = np.stack([elements, arcs]) + np.stack(springs) / area
     is_uneven = _has_corners(cell) or (lattice.order == 2 and bool(cell.case.interfaces))
-    least = LEAST_OF_TWO_UNEVEN if is_uneven else LEAST_OF_TWO[lattice.order]
-    return EnergyErrors(elements, arcs, np.concatenate(shares) / area, LEAST_OF_TWO_TOUCHING if contact else least)
+    smallest = LEAST_OF_TWO_UNEVEN if is_uneven else LEAST_OF_TWO[lattice.order]
+    return EnergyErrors(elements, arcs, np.concatenate(shares) / area, LEAST_OF_TWO_TOUCHING if contact else smallest)
 
 
 def factors(cell: TornCell, fewer: int) -> tuple[float, float]:
-    """Return the errors of elements and of arcs over those of the mesh with so many halvings less.  Collective."""
+    """Return ratios of errors of elements and of arcs to errors on the mesh with `fewer` halvings.  Collective."""
     order = cell.lattice.order
     if cell.summary.across and fewer:
         return SAMPLED[any(s.is_mixed for s in cell.subdomains)]
@@ -129,7 +125,7 @@ def is_nested(cell: TornCell, responses: Sequence[Response]) -> bool:
     """
     lattice = cell.lattice
     submeshes = (s.submesh for s in cell.subdomains)
-    straight = any(bool((own.at_void[own.edge_class] & (own.turns == 0)).any()) for own in submeshes)
+    straight = any(bool((mesh.at_void[mesh.edge_class] & (mesh.turns == 0)).any()) for mesh in submeshes)
     if not lattice.halvings or _has_corners(cell) or cell.comm.allreduce(straight, MPI.LOR):
         return False
     if not cell.case.interfaces:
@@ -183,7 +179,7 @@ def _nested_displacements(
     for interior in cell.nested_interiors if keep else fresh:
         displacement = interior.displacement(u, loads)
         place = np.full(displacement.shape[0] * displacement.shape[1], INSIDE)
-        place[interior.known] = interior.place
+        place[interior.fixed] = interior.place
         yield interior.members, interior.mesh, displacement, place
 
 

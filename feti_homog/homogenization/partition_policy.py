@@ -113,8 +113,8 @@ def can_be_cut_across(case: Case) -> bool:
     asked, free = case.decomposition, ("auto", None, None, "torus")
     if case.interfaces or (asked.cut, asked.subdomains, asked.max_dofs, case.cell.bodies) != free:
         return False
-    given = {*case.petsc, *given_options()} - TOLERANCES
-    if any(name.startswith("feti_") and not only_prints(name) for name in given):
+    options = {*case.petsc, *given_options()} - TOLERANCES
+    if any(name.startswith("feti_") and not only_prints(name) for name in options):
         return False
     ratios = (isotropic_ratio(material) or 0.0 for material in case.materials.values())
     # Contrast: the largest ratio of the largest entries of two phases' stiffnesses, in any problem.
@@ -197,12 +197,12 @@ def memory_to_the_end(case: Case, few: float, multipliers: int, columns: int, ra
     return few + columns / ranks * (PATH_BYTES + stored * PAIR_BYTES) + faces
 
 
-def recommended_ranks(dofs: int, most: int) -> int:
-    """Return how many ranks a cell can use: `most` are its bodies, for more ranks would cut them.
+def recommended_ranks(dofs: int, bodies: int) -> int:
+    """Return how many ranks a cell can use: no more than its bodies, for more ranks would cut them.
 
     Cut bodies cost iterations; of cells that are cut across materials coarse triangles stand for bodies.
     """
-    return max(1, min(most, ceil(dofs / DOFS_OF_A_RANK)))
+    return max(1, min(bodies, ceil(dofs / DOFS_OF_A_RANK)))
 
 
 def in_words(size: float) -> str:

@@ -111,12 +111,12 @@ def components(plane: Float, *axial: Float) -> Float:
 
 def spatial_vector(plane: Float | None, axial: Float | None) -> Float:
     """(6,) from numbers [11, 22, 12, 33, ...] of the plane problem and [13, 23] of the axial one; None is zero."""
-    whole = np.zeros(6)
+    vector = np.zeros(6)
     if plane is not None:
-        whole[IN_PLANE] = plane[:4]
+        vector[IN_PLANE] = plane[:4]
     if axial is not None:
-        whole[AXIAL_SHEAR] = axial
-    return whole
+        vector[AXIAL_SHEAR] = axial
+    return vector
 
 
 def springs(case: Case) -> InterfaceSprings:
@@ -172,16 +172,16 @@ class SectionValues:
     pair: Int
     factor: float | Float
 
-    def __call__(self, key: str, *others: str) -> float | Float:
+    def __call__(self, key: str, *more: str) -> float | Float:
         """Return the value of a key, or the next key with a value, at all nodes or (k,) at each; else inf."""
-        sections = self.everywhere(key, *others)
+        sections = self.everywhere(key, *more)
         values = float(sections[0]) if len(sections) == 1 else sections[self.pair]
         power = POWERS.get(key.rpartition("_")[2], 0)
         return values * self.factor**power if power else values
 
-    def everywhere(self, key: str, *others: str) -> Float:
+    def everywhere(self, key: str, *more: str) -> Float:
         """(s,) values of all sections, for the factor 1."""
-        names = (key, *others)
+        names = (key, *more)
         values = [next((v for n in names if (v := getattr(bond, n)) is not None), math.inf) for bond in self.bonds]
         return np.array(values or [math.inf], float)
 

@@ -85,8 +85,8 @@ class SpringSides:
         # A tip is bonded on its whole length; the part on its debonded side has no springs.
         tips = self._chains.tips(status)
         ends = self._points[np.stack([tips.behind, tips.ahead])] - self._points[tips.node]
-        behind, ahead = np.linalg.norm(ends - np.round(ends / self._period) * self._period, axis=2)
-        beyond = np.einsum("t,tci,tcj->ij", behind / (behind + ahead), force[tips.node], jump[tips.node])
+        behind, front = np.linalg.norm(ends - np.round(ends / self._period) * self._period, axis=2)
+        beyond = np.einsum("t,tci,tcj->ij", behind / (behind + front), force[tips.node], jump[tips.node])
         return np.asarray(beyond), allreduce_sum(self._comm, self._of_sides(holds, stiffness, jump))
 
     def _of_sides(self, holds: Bool, stiffness: Float, jump: Float) -> Float:

@@ -6,7 +6,6 @@ ranks, not on the rank that filled a tile.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import chain
 
 import numpy as np
@@ -45,7 +44,7 @@ def cut(case: Case, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: Part
 
 
 def can_be_torn_by_tiles(
-    case: Case, found: NodedCell | CoarseMesh | None, lattice: ReferenceLattice, policy: PartitionPolicy
+    case: Case, noded: NodedCell | CoarseMesh | None, lattice: ReferenceLattice, policy: PartitionPolicy
 ) -> bool:
     """Return whether nothing needs the mesh on one rank.
 
@@ -53,9 +52,9 @@ def can_be_torn_by_tiles(
     are expected to be small enough for cuts across materials.  A user's mesh is on one rank already.
     """
     on_one_rank = case.arcs or case.cell.bodies == "plane" or case.decomposition.subdomains is not None
-    if not isinstance(found, NodedCell) or len(found.parts) < 2 or on_one_rank:
+    if not isinstance(noded, NodedCell) or len(noded.parts) < 2 or on_one_rank:
         return False
-    triangles = ElementEstimate.of(case.cell, found.arrangement).triangles
+    triangles = ElementEstimate.of(case.cell, noded.arrangement).triangles
     dofs = round(triangles * lattice.intervals**2)
     return not (policy.across_pieces(dofs, 1) and can_be_cut_across(case))
 
@@ -68,21 +67,21 @@ def tear_by_tiles(
     Raises:
         CaseError, MeshError: on every rank, as `tiled_cell` and `filling.fill`.
     """
-    facts = on_root(comm, tiled_cell, case, noded)
+    phase_pairs, nesting, edges = on_root(comm, tiled_cell, case, noded)
     regions: Regions = comm.bcast(None if noded is None else noded.regions)
     torus, tile = _filled(noded, regions, comm)
     load = np.bincount(torus.constituent, minlength=len(regions.phase))
     comm.Allreduce(MPI.IN_PLACE, load)
-    pieces = wanted_pieces(case, load, facts.edges, lattice, comm.size, policy)
+    pieces = wanted_pieces(case, load, edges, lattice, comm.size, policy)
     longest = comm.allreduce(float(torus.edge_lengths.max(initial=0.0)), MPI.MAX)
     local = agree(comm, _cut, torus, tile, pieces / load, longest)
     subdomain, body, loads = _numbered(torus, tile, local, comm)
     neighbours = comm.gather(agree(comm, _neighbours, torus, subdomain))
     rank = on_root(comm, _assigned, loads, neighbours or [], comm.size)
-    table, pinned = SubdomainTable(body, rank, facts.nesting, regions.phase), _pinned(torus, comm)
+    table, pinned = SubdomainTable(body, rank, nesting, regions.phase), _pinned(torus, comm)
     shares = agree(comm, lambda: list(cut_for_ranks(torus, subdomain, table, comm.size, pinned)))
     summary = on_root(comm, summary_of, case, noded, len(body), int(load.sum()))
-    return RankShare(summary, table, facts.pairs, joined(alltoall(comm, shares)))
+    return RankShare(summary, table, phase_pairs, joined(alltoall(comm, shares)))
 
 
 def _filled(noded: NodedCell | None, regions: Regions, comm: MPI.Intracomm) -> tuple[Torus, Int]:
@@ -99,9 +98,9 @@ def _filled(noded: NodedCell | None, regions: Regions, comm: MPI.Intracomm) -> t
 
 def _cut(torus: Torus, tile: Int, pieces_per_triangle: Float, longest: float) -> Int:
     """(m,) the subdomain of each triangle of this rank, numbered from 0 tile by tile within a constituent."""
-    left, right, _ = torus.sides
-    within = (tile[left] == tile[right]) & (torus.constituent[left] == torus.constituent[right])
-    label = components(len(tile), left[within], right[within])
+    a, b, _ = torus.sides
+    within = (tile[a] == tile[b]) & (torus.constituent[a] == torus.constituent[b])
+    label = components(len(tile), a[within], b[within])
     first = np.unique(label, return_index=True)[1]
     order = np.lexsort((first, tile[first], torus.constituent[first]))
     parts = np.argsort(order)[label]
@@ -128,19 +127,19 @@ def _neighbours(torus: Torus, subdomain: Int) -> tuple[Int, Int, Int, Int]:
 
     Then edges (k,) with one triangle on this rank and the other one elsewhere, and its subdomain here (k,).
     """
-    left, right, _ = torus.sides
-    apart = subdomain[left] != subdomain[right]
+    a, b, _ = torus.sides
+    apart = subdomain[a] != subdomain[b]
     edges = torus.triangle_torus_edges
     alone = (np.bincount(edges.ravel(), minlength=len(torus.edge_keys)) == 1) & ~torus.at_void
     triangle, k = np.nonzero(alone[edges])
-    return subdomain[left[apart]], subdomain[right[apart]], torus.edge_keys[edges[triangle, k]], subdomain[triangle]
+    return subdomain[a[apart]], subdomain[b[apart]], torus.edge_keys[edges[triangle, k]], subdomain[triangle]
 
 
 def _assigned(load: Int, neighbours: list[tuple[Int, Int, Int, Int]], n_ranks: int) -> Int:
     """(s,) rank of each subdomain, by the `neighbours` of all ranks."""
-    left, right, edge, side = (np.concatenate(rows) for rows in zip(*neighbours, strict=True))
+    a, b, edge, side = (np.concatenate(rows) for rows in zip(*neighbours, strict=True))
     side = side[np.argsort(edge, kind="stable")]
-    return assign_ranks(load, np.append(left, side[::2]), np.append(right, side[1::2]), n_ranks)
+    return assign_ranks(load, np.append(a, side[::2]), np.append(b, side[1::2]), n_ranks)
 
 
 def _pinned(torus: Torus, comm: MPI.Intracomm) -> int:
@@ -153,23 +152,8 @@ def _pinned(torus: Torus, comm: MPI.Intracomm) -> int:
     return best[-1]
 
 
-@dataclass(frozen=True)
-class TiledCell:
-    """Facts for all ranks.
-
-    Attributes:
-        pairs: (phases, phases) as in `cell_remarks.pairs_of`.
-        nesting: (constituents,) as in `Torus.nesting`.
-        edges: (constituents,) coarse edges that several constituents share.
-    """
-
-    pairs: Int
-    nesting: Int
-    edges: Int
-
-
-def tiled_cell(case: Case, noded: NodedCell) -> TiledCell:
-    """Return the tiled cell without debonded arcs.
+def tiled_cell(case: Case, noded: NodedCell) -> tuple[Int, Int, Int]:
+    """Return facts of a tiled cell: `cell_remarks.pairs_of`, `Torus.nesting`, shared coarse edges (constituents,).
 
     Raises:
         CaseError: an interface of the case is between phases that do not touch.
@@ -190,7 +174,7 @@ def tiled_cell(case: Case, noded: NodedCell) -> TiledCell:
     shared = (sides >= 0).all(axis=0)
     count = np.diff(curves.first)[arcs] - 1
     edges = np.bincount(sides[:, shared].ravel(), np.tile(count[shared], 2), n).astype(np.int64)
-    return TiledCell(cell_remarks.pairs_of(case, regions.phases), nesting, edges)
+    return cell_remarks.pairs_of(case, regions.phases), nesting, edges
 
 
 def tiles_to_fill(noded: NodedCell) -> list[NumberedTile]:

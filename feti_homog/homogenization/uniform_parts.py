@@ -112,9 +112,9 @@ class ForcesBetweenParts:
         torn, nodes = joined([p.mesh for p in parts]), problem.nodes(np.flatnonzero(jumps.B.getnnz(axis=0)))
         is_shared = np.zeros(torn.n_classes, bool)
         is_shared[nodes] = True
-        beside = np.flatnonzero(is_shared[torn.node_class[torn.nodes]].any(axis=1))
-        mesh, classes = _restricted(torn, beside)
-        law = np.repeat(np.arange(len(parts)), [len(p.mesh.nodes) for p in parts])[beside]
+        touching = np.flatnonzero(is_shared[torn.node_class[torn.nodes]].any(axis=1))
+        mesh, classes = _restricted(torn, touching)
+        law = np.repeat(np.arange(len(parts)), [len(p.mesh.nodes) for p in parts])[touching]
         used, material = np.unique(law, return_inverse=True)
         mixed = tuple(parts[k].is_mixed for k in used)
         body = assemble(mesh, np.stack([parts[k].L for k in used]), problem, mixed, material)
@@ -136,15 +136,15 @@ class NestedInterior:
     Attributes:
         members: the subdomains.
         mesh: their meshes, joined.
-        known: (c n,) prescribed displacements: on the boundary, and 0 where a class is pinned.
-        place: (known,) places among the displacements of all boundaries; PINNED where a class is pinned.
+        fixed: (c n,) prescribed displacements: on the boundary, and 0 where a class is pinned.
+        place: (fixed,) places among the displacements of all boundaries; PINNED where a class is pinned.
         interior: the free displacements.
         loads: (free, v) forces Q of the unit loads on free displacements; None without voids.
     """
 
     members: list[Subdomain]
     mesh: FineMesh
-    known: Int
+    fixed: Int
     place: Int
     interior: Interior
     loads: Float | None
@@ -165,19 +165,19 @@ class NestedInterior:
             fine[mesh.node_class[mesh.nodes]] = s.mesh.node_class[s.mesh.nodes[:, nested]]
             numbers.append(of_fine[s.problem.dofs(fine)])
         place = np.concatenate(numbers)
-        known = np.flatnonzero(place != INSIDE)
+        fixed = np.flatnonzero(place != INSIDE)
         mesh = joined(meshes)
         body = assemble(mesh, first.L, first.problem, first.is_mixed)
-        interior = Interior(body.K, known)
+        interior = Interior(body.K, fixed)
         loads = body.Q[interior.dofs] if any(s.submesh.at_void.any() for s in members) else None
-        return cls(members, mesh, known, place[known], interior, loads)
+        return cls(members, mesh, fixed, place[fixed], interior, loads)
 
     def displacement(self, u: Float, loads: Float) -> Float:
         """(classes, c, k) u* of u (boundary dofs, k) on all boundaries under the loads (v, k)."""
         problem = self.members[0].problem
         on_boundary = np.vstack([u, np.zeros((1, u.shape[1]))])[self.place]  # PINNED is the last row
-        all_dofs = np.empty((len(self.known) + len(self.interior.dofs), u.shape[1]))
-        all_dofs[self.known], all_dofs[self.interior.dofs] = on_boundary, self.interior.extend(on_boundary)
+        all_dofs = np.empty((len(self.fixed) + len(self.interior.dofs), u.shape[1]))
+        all_dofs[self.fixed], all_dofs[self.interior.dofs] = on_boundary, self.interior.extend(on_boundary)
         if self.loads is not None:
             all_dofs[self.interior.dofs] -= self.interior.solve(self.loads @ loads)
         return all_dofs.reshape(-1, problem.components, u.shape[1])

@@ -90,7 +90,7 @@ class TornCell:
     def displacement(self, solution: DualSolution) -> Float:
         """(dofs,) u* on the parts of this rank.  Collective."""
         u = self.solver.boundary_displacement(solution)
-        return np.concatenate([np.zeros(0), *(own for _, own in self.displacements(u, solution.strain))])
+        return np.concatenate([np.zeros(0), *(part for _, part in self.displacements(u, solution.strain))])
 
     def displacements(self, u: Float, loads: Float, keep: bool = True) -> Iterator[tuple[UniformPart, Float]]:
         """Yield each part with its u* (dofs, k) for u (boundary dofs, k) on all boundaries and the loads (v, k).
