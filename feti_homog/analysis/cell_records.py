@@ -138,7 +138,7 @@ class Sensitivities:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class UncertainConstants:
-    """Scatter of the n constants of a cell by that of p constants of its phases and interfaces, of first order."""
+    """Scatter of the n constants of a cell by p uncertain constants of its phases and interfaces, to first order."""
 
     parameters: tuple[str, ...] = described("uncertain constants of the case, such as `material.fibre.young`")
     parameter_std: Float = described("their standard deviations, each in its unit", "", "(p,)")

@@ -1,6 +1,6 @@
 """`analysis.type = "envelope"`: the onset of debonding in a plane of macroscopic stresses or strains.
 
-The cell is linear, so tractions of all loads are superposed from those of the unit loads: no direction costs a solve.
+The cell is linear, so tractions under all loads are superposed from unit loads: no direction costs a solve.
 """
 
 from __future__ import annotations

@@ -94,20 +94,19 @@ def _gathered(comm: Intracomm, part: Part) -> Part | None:
 class Result:
     """The result of a case, the same on every rank but for `fields`.
 
-    Printed, it is a short summary; in a notebook, tables.  `schema_keys` lists all that is written.
+    Printed, it is a short summary; in a notebook, tables.  `schema_keys` lists all written keys.
 
     Attributes:
-        effective_stiffness: (3, 3), of generalized plane strain (6, 6), L^ef, its columns the stresses under the unit
-            strains; of analysis "stiffness".
-        effective_stiffness_compression: the same under minus the unit strains, where debonded faces touch without
-            tension.
+        effective_stiffness: (3, 3), of generalized plane strain (6, 6), L^ef, with stresses under the unit strains as
+            columns; of analysis "stiffness".
+        effective_stiffness_compression: L^ef under minus the unit strains, if debonded faces touch without tension.
         compliance, thermal_stress, thermal_expansion: of generalized plane strain, (6, 6) and (6,), else None.
         moduli, bounds: of perfectly bonded cells, else None.
-        mesh_error: estimated errors by the mesh of a stiffness and of what follows from it, unless the case forgoes it.
+        mesh_error: estimated mesh errors of a stiffness and its constants, unless the case forgoes them.
         sensitivities: derivatives of a stiffness by the constants of the case, if it asks for them, else None.
-        uncertainty: scatter of a stiffness and what follows from it, if constants of the case are uncertain, else None.
-        tips: energy release rates of a stiffness with debonded arcs, else None; those of an angle are in its points.
-        angle, path, envelope: the points of these analyses, else None; `points` has those of the first two as arrays.
+        uncertainty: scatter of a stiffness and its constants, if constants of the case are uncertain, else None.
+        tips: energy release rates of a stiffness with debonded arcs, else None; points of angles have their own.
+        angle, path, envelope: the points of these analyses, else None; `points` has angles and paths as arrays.
         fields: mesh, interface and states on this rank if they were asked for, else None; not written to result.json.
     """
 

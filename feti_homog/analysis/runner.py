@@ -102,7 +102,7 @@ def _accurate(
     """Return solved(case, fault of an earlier mesh, resume), once more on a finer mesh if the case asks for one.
 
     If the finer mesh fails, also for want of memory on all ranks, on the first mesh again.  `resume` finds the
-    checkpoint of either mesh; a run that could not solve the finer one leaves that of the first.  Collective.
+    checkpoint of either mesh; a run that could not solve the finer one leaves its own.  Collective.
     """
     try:
         return solved(case, None, resume)

@@ -1,6 +1,6 @@
-"""A virtual extension of the crack at the tip of a debonded arc, and what it releases.
+"""A virtual extension of the crack at the tip of a debonded arc, and the energy that it releases.
 
-The nodes around the tip turn about the centre of the fibre by s q, and their displacements with them; q is 1 inside the
+The nodes around the tip turn about the centre of the fibre by s q, and their displacements with them; q is 1 near the
 tip and falls to 0 farther away.  The tip moves along the interface by s R, bonded nodes stay bonded, and gaps stay as
 they are: an admissible variation of the equilibrium, whose energy changes with the energy of the elements.
 """

@@ -35,7 +35,7 @@ from feti_homog.typing import Float, Int
 Array = TypeVar("Array", Float, Int, Status)
 
 DIRECTION_DIGITS = 9
-# Length at which the modes are separated, at smallest one element / radius of the fibre.
+# Length at which the modes are separated, at least one element / radius of the fibre.
 MODE_LENGTH = 1e-3
 
 

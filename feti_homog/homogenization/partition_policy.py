@@ -58,14 +58,14 @@ class PartitionPolicy:
         piece_dofs: size of a piece; smaller pieces make the coarse problem slower, larger ones the factors and the
             dense matrices.
         piece_boundary_dofs: largest boundary of a piece to other bodies; for pieces of narrow bodies.
-        cut_factor: a bonded body is cut if it is larger than a piece by this factor, or its boundary than the largest.
+        cut_factor: a bonded body is cut if it, or its boundary, is larger than a piece's by this factor.
         even_cut_factor, even_share: factor in place of `cut_factor` for bodies up to this share of the load of a rank,
             which are distributed evenly without cuts.
         breakable_boundary_dofs: where bonds may break, a body is cut if its boundary is larger: the cell is solved so
             often that uncut bodies pay as long as dense matrices of their boundaries are small.
         tiles: of the coarse mesh.
         across_dofs: where nothing can part, cells up to this size are cut across materials, not body by body.
-        across_piece_dofs: size of such a piece, which has no more multipliers than a piece of a body.
+        across_piece_dofs: size of such a piece, with as many multipliers as a smaller piece of a body.
         whole_dofs: such a cell on one rank is not cut up to this size: one sparse factor takes less time than dense
             matrices of pieces, and twice their memory.
         whole_ranks: up to so many ranks have one piece each of such a cell, with Schur complements factored together;

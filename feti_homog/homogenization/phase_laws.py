@@ -105,7 +105,7 @@ def secants(plane: Float, *axial: Float) -> dict[str, Float]:
 
 
 def components(plane: Float, *axial: Float) -> Float:
-    """(3,) or, with an axial problem, (6,) components of a strain or stress from those of each problem."""
+    """(3,) or, with an axial problem, (6,) components of a strain or stress from its parts in each problem."""
     return spatial_vector(plane, *axial) if axial else plane
 
 

@@ -1,4 +1,4 @@
-"""Errors of springs at nodes in the energy of each pair of responses, added to those of elements and arcs."""
+"""Errors of springs at nodes in the energy of each pair of responses, added to errors of elements and arcs."""
 
 from __future__ import annotations
 
