@@ -33,8 +33,8 @@ from reference.references import ARC_OF_120_DEGREES_FINE, AXIAL_SHEAR, BONDED, E
 from feti_homog import Case, run
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.homogenization.mesh_error import energy_errors, factors, is_nested
-from feti_homog.homogenization.nested_interiors import locks
 from feti_homog.homogenization.partition_policy import BY_COST
+from feti_homog.homogenization.uniform_parts import locks
 from feti_homog.homogenization.unit_cell import tear
 from feti_homog.system.runtime.progress import Progress
 from feti_homog.typing import Float

@@ -8,16 +8,16 @@ import numpy as np
 
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.mesh_errors import energy_error, note_accuracy, state_error, unit_errors
-from feti_homog.analysis.registry import Analysis
 from feti_homog.analysis.result_records import AnglePoint
+from feti_homog.analysis.tip_records import tip_rates
 from feti_homog.case.loads import Angle
 from feti_homog.homogenization.averaging import Response, asymmetry
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
-    """`angle`, a list of points: under a given strain the stress, else the stiffness from the three unit cases.
+    """Return `angle`, a point an angle: the stress under the strain of the case, else the stiffness by unit loads.
 
-    Each angle begins with the multipliers of the one before it.
+    Each angle begins with the multipliers of the angle before.
     """
     section = context.case.section
     assert isinstance(section, Angle)
@@ -43,10 +43,7 @@ def run(context: AnalysisContext) -> dict[str, Any]:
             point |= {"stored": responses[0].stored, "stored_in_springs": responses[0].in_springs}
             context.record_state(responses, 1.0, label, number)
         starts = [r.state.solution.lam for r in responses]
-        tips = context.tips.of(responses, context.loads.names if unit else ("strain",))
-        points.append(AnglePoint(**point | context.point(responses), tips=tips))
+        point["tips"] = tip_rates(context, responses, context.loads.names if unit else ("strain",))
+        points.append(AnglePoint(**point | context.point(responses)))
     note_accuracy(context, max(point.mesh_error or 0.0 for point in points))
     return {"angle": tuple(points)}
-
-
-ANALYSIS = Analysis(run, table=True)

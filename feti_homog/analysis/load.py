@@ -6,14 +6,13 @@ from typing import Any
 
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.mesh_errors import note_accuracy, state_error
-from feti_homog.analysis.registry import Analysis
 from feti_homog.analysis.result_records import LoadPoint
 from feti_homog.analysis.sensitivities import load_sensitivities
-from feti_homog.analysis.tip_records import IN_PLANE_LOADS
+from feti_homog.analysis.tip_records import IN_PLANE_LOADS, tip_rates
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
-    """`load`: the state under the load, with what is debonded from the start, open or in contact.
+    """Return `load`, the state under the load with debonded faces from the start, open or in contact.
 
     `tips` of its arcs if only strains of the plane are there; `sensitivities` if the case asks.
     """
@@ -27,14 +26,11 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     note_accuracy(context, max(error.values(), default=0.0))
     context.record_state(responses, 1.0, "load", 0)
     point = context.loaded_point(responses) | error | {"free_motions": state.free_motions}
-    others = dict(zip(cell.loads, cell.macroscopic(state.solutions).strain.tolist(), strict=True))
-    only_in_plane = not any(strain for name, strain in others.items() if name not in IN_PLANE_LOADS)
+    strains = zip(cell.loads, cell.macroscopic(state.solutions).strain.tolist(), strict=True)
+    only_in_plane = not any(strain for name, strain in strains if name not in IN_PLANE_LOADS)
     if context.case.interface is not None and only_in_plane:
-        point["tips"] = context.tips.of(responses[:1], ["strain"])
+        point["tips"] = tip_rates(context, responses[:1], ["strain"])
     document: dict[str, Any] = {"load": LoadPoint(**point)}
     if context.needs_sensitivities:
         document |= load_sensitivities(context, context.loads.load(target), responses)
     return document
-
-
-ANALYSIS = Analysis(run, table=True)

@@ -1,4 +1,4 @@
-"""Estimated errors of the mesh in the entries of a stiffness and in the constants that follow from it."""
+"""Estimated mesh errors in a stiffness, in constants that follow from it, and in the energy of states."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.linalg import eigh
 
+from feti_homog.analysis.constants import stiffness_constants
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.result_records import MeshError
 from feti_homog.errors import NotCarriedError
 from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response
-from feti_homog.materials import constants as named_constants
 from feti_homog.system.runtime.records import plain
 from feti_homog.typing import Float
 
@@ -23,30 +23,27 @@ if TYPE_CHECKING:
     from feti_homog.homogenization.mesh_error import EnergyErrors
 
 Named = Mapping[str, Float]
-# True errors of the energy / estimated ones, at the most.
-OFF = 3.0
-# Share of a bound by which rounding may leave a value outside.
-ROUNDING = 1e-9
+PARTS = ("absolute", "signed", "least")
+OFF = 3.0  # largest ratio of true errors of the energy to estimated ones
+ROUNDING = 1e-9  # of bounds, relative
 
 
 def unit_errors(context: AnalysisContext, responses: list[Response]) -> tuple[list[EnergyErrors], list[Response]]:
-    """Return the errors of the responses to all unit loads, by problem, and the responses with elements' shares.
+    """Estimate the errors of the responses to all unit loads, by problem; return the responses with elements' shares.
 
-    No errors if the case asks for none, no shares if nobody does.  Collective.
+    Without `mesh_error` no errors; without a use for shares the responses as they are.  Collective.
     """
     if not context.case.output.mesh_error:
         return [], responses
     from feti_homog.homogenization.mesh_error import energy_errors  # with the recovery of stresses
 
-    found: list[EnergyErrors] = []
-    first, shared, keep = 0, list[Response](), context.recovers_again
-    for problem in context.loads.problems:
-        own = responses[first : first + len(problem.loads)]
-        touches = problem.interface.contact and any(response.debonded for response in own)
-        found.append(energy_errors(problem.cell, own, touches, keep))
-        shared += [replace(response, shares=part) for response, part in zip(own, found[-1].shares.T, strict=True)]
-        first += len(problem.loads)
-    return found, shared if keep else responses
+    errors: list[EnergyErrors] = []
+    shared, keep = list[Response](), context.recovers_again
+    for problem, group in zip(context.loads.problems, context.loads.by_problem(responses), strict=True):
+        touches = problem.interface.contact and any(response.debonded for response in group)
+        errors.append(energy_errors(problem.cell, group, touches, keep))
+        shared += [replace(response, shares=part) for response, part in zip(group, errors[-1].shares.T, strict=True)]
+    return errors, shared if keep else responses
 
 
 def mesh_error(
@@ -54,96 +51,96 @@ def mesh_error(
 ) -> dict[str, Any]:
     """Return the entry `mesh_error` of `Result`, empty without errors.
 
-    A constant f(C) errs by |f(C - signed) - f(C)| or, if that is more, |f(C - least) - f(C)|.  Notes where the error is
-    more than the case asked for, and values outside their bounds, which are faults beyond any error of the mesh.
+    A constant f(C) errs by max(|f(C - signed) - f(C)|, |f(C - least) - f(C)|).  Notes errors above the accuracy of the
+    case, and values outside their bounds, which are faults beyond any mesh error.
 
     Args:
-        secants: `effective_stiffness` and what follows from it, as in `Result`.
-        of_plus: errors of the unit loads.
-        of_minus: those of minus the unit loads, where faces touch.
+        secants: `effective_stiffness` and entries that follow from it, as in `Result`.
+        of_plus, of_minus: errors of plus and, where faces touch, minus the unit loads.
     """
     if not of_plus:
         return {}
-    parts = {name: _secants(of_plus, name) for name in ("absolute", "signed", "least")}
-    found = parts["absolute"]
-    found |= {f"{name}_compression": entry for name, entry in _secants(of_minus, "absolute").items()}
+    parts = {name: _secants(of_plus, name) for name in PARTS}
+    entries = parts["absolute"]
+    entries |= {f"{name}_compression": entry for name, entry in _secants(of_minus, "absolute").items()}
     stiffness, heat = secants["effective_stiffness"], secants.get("thermal_stress")
-    constants, energy = dict[str, float](), _of_energy(stiffness, parts)
+    constants, energy = dict[str, float](), _energy(stiffness, parts)
     if "moduli" in secants or "constants" in secants:
-        here = _constants(stiffness, heat)
-        changed = {name: _constants(*_changed(stiffness, heat, parts[name])) for name in ("signed", "least")}
-        off = {part: {name: np.abs(each[name] - here[name]) for name in here} for part, each in changed.items()}
-        errors = {name: np.maximum(off["signed"][name], off["least"][name]) for name in here}
-        _note_bounds(context, secants, here, errors, energy)
-        expansion = errors.pop("thermal_expansion", None)
-        found |= {} if expansion is None else {"thermal_expansion": expansion}
+        values, errors = _constants(stiffness, heat), dict[str, Any]()
+        for changes in (parts["signed"], parts["least"]):
+            changed_heat = None if heat is None else heat - changes["thermal_stress"]
+            changed = _constants(stiffness - changes["effective_stiffness"], changed_heat)
+            errors = {name: np.maximum(errors.get(name, 0.0), np.abs(changed[name] - values[name])) for name in values}
+        _note_bounds(context, secants, values, errors, energy)
+        entries |= {name: errors.pop(name) for name in ("thermal_expansion",) if name in errors}
         constants = {name: float(value) for name, value in errors.items()}
     note_accuracy(context, energy)
-    return {"mesh_error": MeshError(**found, energy=energy, constants=constants)}
+    return {"mesh_error": MeshError(**entries, energy=energy, constants=constants)}
 
 
 def note_accuracy(context: AnalysisContext, energy: float) -> None:
-    """Note which mesh would do if the relative error of the energy is more than the case asks for.  Collective."""
+    """Note a sufficient mesh if the relative error of the energy is above the accuracy of the case.  Collective."""
     cell = context.case.cell
     if cell.accuracy is None or (energy := context.cell.comm.bcast(energy)) <= cell.accuracy:
         return
     finer = cell.refine + math.ceil(math.log(energy / cell.accuracy, 4**cell.order))
-    words = f"[cell] accuracy = {cell.accuracy:g}: the estimated error of the strain energy is {energy:.1e}"
+    line = f"[cell] accuracy = {cell.accuracy:g}: the estimated error of the strain energy is {energy:.1e}"
     context.notes.append(
-        f"{words}; mesh_size = {cell.mesh_size:g}, refine = {finer} and order = {cell.order} in its place would do"
+        f"{line}; mesh_size = {cell.mesh_size:g}, refine = {finer} and order = {cell.order} in its place would do"
     )
 
 
 def _note_bounds(
-    context: AnalysisContext, secants: Mapping[str, Any], here: Named, errors: Named, energy: float
+    context: AnalysisContext, secants: Mapping[str, Any], values: Named, errors: Named, energy: float
 ) -> None:
-    """Note constants outside the bounds of their phases; report a fault beyond any possible error of the mesh.
+    """Note constants outside the bounds of their phases; report a fault beyond any possible mesh error.
 
     No constant errs relatively by more than `energy`, the largest relative error of the strain energy, of which the
     estimate counts OFF times.  Bounds apply to cells of their symmetry, and follow from the meshed shares of phases.
     """
     limits: dict[str, Sequence[float]] = {}
-    if (known := secants.get("bounds")) is not None and known.hashin_shtrikman is not None:
-        C, off = secants["effective_stiffness"], errors["bulk"]
-        is_square = max(abs(C[0, 0] - C[1, 1]), *np.abs(C[:2, 2])) <= off
-        is_isotropic = here["anisotropy"] <= errors["anisotropy"]
-        limits |= {"bulk": known.hashin_shtrikman.bulk} if is_square else {}
-        limits |= {"shear": known.hashin_shtrikman.shear} if is_isotropic else {}
-    if secants.get("fibre_bounds") is not None and here["deviation"] <= errors["deviation"]:
+    plane = secants.get("bounds")
+    if plane is not None and plane.hashin_shtrikman is not None:
+        C = secants["effective_stiffness"]
+        is_square = max(abs(C[0, 0] - C[1, 1]), *np.abs(C[:2, 2])) <= errors["bulk"]
+        is_isotropic = values["anisotropy"] <= errors["anisotropy"]
+        limits |= {"bulk": plane.hashin_shtrikman.bulk} if is_square else {}
+        limits |= {"shear": plane.hashin_shtrikman.shear} if is_isotropic else {}
+    if secants.get("fibre_bounds") is not None and values["deviation"] <= errors["deviation"]:
         limits |= {name: pair for name, pair in plain(secants["fibre_bounds"]).items() if pair is not None}
     for name, (lower, upper) in limits.items():
-        value, error = float(here[name]), float(errors[name])
+        value, error = float(values[name]), float(errors[name])
         outside = max(lower - value, value - upper)
         if outside <= ROUNDING * abs(upper):
             continue
-        words = f"{name} = {value:.6g} is outside its bounds, {lower:.6g} and {upper:.6g}, by {outside:.1e}"
+        line = f"{name} = {value:.6g} is outside its bounds, {lower:.6g} and {upper:.6g}, by {outside:.1e}"
         possible = OFF * max(error, energy * abs(value))
         if outside > possible:
-            context.checks.faults.append(f"{words}, more than any error of the mesh, {possible:.1e}; result marked")
+            context.checks.faults.append(f"{line}, more than any error of the mesh, {possible:.1e}; result marked")
         else:
-            context.notes.append(f"{words}; the estimated error of the mesh is {error:.1e}: refine")
+            context.notes.append(f"{line}; the estimated error of the mesh is {error:.1e}: refine")
 
 
 def state_error(context: AnalysisContext, responses: Sequence[Response]) -> tuple[dict[str, float], list[Response]]:
-    """Return `mesh_error`, the relative error of the energy of one state, and its responses with the elements' shares.
+    """Return `mesh_error`, the relative error of the energy of one state, and its responses with elements' shares.
 
-    No error if the case asks for none, no shares if nobody does.  Collective.
+    Without `mesh_error` no error; without a use for shares the responses as they are.  Collective.
     """
     if not context.case.output.mesh_error:
         return {}, list(responses)
     from feti_homog.homogenization.mesh_error import energy_errors  # with the recovery of stresses
 
-    pairs = zip(context.loads.problems, responses, strict=False)
-    keep = context.recovers_again
+    keep, pairs = context.recovers_again, zip(context.loads.problems, responses, strict=False)
     errors = [energy_errors(problem.cell, [response], keep=keep) for problem, response in pairs]
     energy = sum(2 * response.stored for response in responses)
-    size = max(abs(sum(getattr(each, part).item() for each in errors)) for part in ("signed", "least"))
-    shared = [replace(r, shares=each.shares[:, 0] if keep else None) for r, each in zip(responses, errors, strict=True)]
+    size = max(abs(sum(getattr(error, part).item() for error in errors)) for part in ("signed", "least"))
+    shares = [error.shares[:, 0] if keep else None for error in errors]
+    shared = [replace(response, shares=part) for response, part in zip(responses, shares, strict=True)]
     return {"mesh_error": size / energy if energy > 0 else 0.0}, shared
 
 
 def check_accuracy(context: AnalysisContext) -> None:
-    """Note, of a case that asks for an accuracy, the error of the cell under the first load, before any bond breaks.
+    """Note the error of the cell under the first load, before any bond breaks, if the case asks for an accuracy.
 
     Collective.
     """
@@ -153,54 +150,43 @@ def check_accuracy(context: AnalysisContext) -> None:
     try:
         state = cell.equilibrium(context.loads.load(target), context.bonds(None), cell.no_multipliers())
     except NotCarriedError:
-        return  # so will the path be, unless friction carries its loads
+        return  # the path will meet it, unless friction carries its loads
     error, _ = state_error(context, context.loads.responses(state, 1.0))
     note_accuracy(context, error["mesh_error"])
 
 
 def energy_error(stiffness: Float, errors: list[EnergyErrors]) -> dict[str, float]:
-    """Return `mesh_error` of a secant stiffness, the largest relative error of the strain energy, if there is one."""
-    parts = {name: _secants(errors, name) for name in ("absolute", "signed", "least")}
-    return {"mesh_error": _of_energy(stiffness, parts)} if errors else {}
+    """Return `mesh_error` of a secant stiffness, the largest relative error of the strain energy."""
+    return {"mesh_error": _energy(stiffness, {name: _secants(errors, name) for name in PARTS})} if errors else {}
 
 
 def _secants(errors: Sequence[EnergyErrors], name: str) -> dict[str, Float]:
-    """Return the errors of one kind as those of `effective_stiffness` and `thermal_stress`."""
+    """Return the errors of one kind in `effective_stiffness` and `thermal_stress`."""
     if not errors:
         return {}
-    found = phase_laws.secants(*(getattr(each, name) for each in errors))
-    return {"effective_stiffness": found.pop("stiffness")} | found
-
-
-def _changed(stiffness: Float, heat: Float | None, errors: Mapping[str, Float]) -> tuple[Float, Float | None]:
-    heat = None if heat is None else heat - errors["thermal_stress"]
-    return stiffness - errors["effective_stiffness"], heat
+    entries = phase_laws.secants(*(getattr(error, name) for error in errors))
+    return {"effective_stiffness": entries.pop("stiffness")} | entries
 
 
 def _constants(stiffness: Float, heat: Float | None) -> dict[str, Float]:
     """Return the constants of a stiffness by name, and the `thermal_expansion`."""
-    if len(stiffness) == 3:
-        return {name: np.asarray(value) for name, value in plain(named_constants.engineering_moduli(stiffness)).items()}
-    strains = None if heat is None else -np.linalg.solve(stiffness, heat)
-    records = (
-        named_constants.engineering_constants(stiffness),
-        named_constants.transversely_isotropic_part(stiffness, strains),
-        named_constants.transverse_moduli(stiffness),
-    )
-    named = {name: value for record in records for name, value in plain(record).items() if value is not None}
-    found = {name: np.asarray(value) for name, value in named.items()}
-    compliance = np.linalg.inv(stiffness)
-    found |= {f"nu3{k + 1}": -compliance[2, k] / compliance[2, 2] for k in range(2)}  # nu12, nu13 of the material
-    return found if strains is None else found | {"thermal_expansion": strains}
+    entries = stiffness_constants(stiffness, heat)
+    compliance = entries.pop("compliance", None)
+    named: dict[str, Any] = {}
+    for key, record in entries.items():
+        named |= {key: record} if key == "thermal_expansion" else plain(record)
+    if compliance is not None:  # nu12 and nu13 of the material
+        named |= {f"nu3{k + 1}": -compliance[2, k] / compliance[2, 2] for k in range(2)}
+    return {name: np.asarray(value) for name, value in named.items() if value is not None}
 
 
-def _of_energy(stiffness: Float, parts: Mapping[str, Mapping[str, Float]]) -> float:
+def _energy(stiffness: Float, parts: Mapping[str, Mapping[str, Float]]) -> float:
     """Return the largest relative error of the strain energy under any strain.
 
-    Of a stiffness that is not positive definite under unit strains.
+    If the stiffness is not positive definite, the largest under unit strains.
     """
     symmetric = (stiffness + stiffness.T) / 2
     if np.linalg.eigvalsh(symmetric)[0] <= 0:
         return float((np.diag(parts["absolute"]["effective_stiffness"]) / np.abs(np.diag(stiffness))).max())
     errors = (parts[name]["effective_stiffness"] for name in ("signed", "least"))
-    return max(float(np.abs(eigh((each + each.T) / 2, symmetric, eigvals_only=True)).max()) for each in errors)
+    return max(float(np.abs(eigh((error + error.T) / 2, symmetric, eigvals_only=True)).max()) for error in errors)

@@ -1,10 +1,12 @@
-"""An event of a path with the energies up to it, and the form in which the checkpoint keeps it."""
+"""Events of a path: energies up to each, their form in the checkpoint, and lines about them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from types import TracebackType
+from typing import Any, Self
 
 import numpy as np
 
@@ -19,8 +21,14 @@ from feti_homog.interface.loads import Load, Macroscopic
 from feti_homog.interface.path.path_points import NO_ENERGIES, Energies, PathState, Point, most_utilised
 from feti_homog.results.checkpoint import has_multipliers
 from feti_homog.results.checkpoint_file import Arrays
+from feti_homog.system.runtime.progress import Progress
 
-# Conditions of contact; the last is known only with friction.
+SECONDS_A_LINE = 1.0
+# Equal steps tell the time left; the number of events is unknown.
+STEPS_BAR = "{l_bar}{bar}| {elapsed}, {remaining} left{postfix}"
+EVENTS_BAR = "{l_bar}{bar}| {elapsed}{postfix}"
+BARS = {"events": EVENTS_BAR, "increments": STEPS_BAR}
+# Conditions of contact; the last only with friction.
 KKT_LAWS = ("kkt_complementarity", "kkt_penetration", "kkt_tension", "kkt_friction")
 # Laws whose errors a response may have.
 LAWS = ("strain", "hill", "jump", "stress", *KKT_LAWS)
@@ -32,15 +40,12 @@ SUFFIXES = ("", "_axial")
 
 @dataclass
 class Work:
-    """Energies per area of the cell up to a point's state.
-
-    What is lost to breaks is the work of the loads less what is stored.
+    """Energies per area of the cell up to a point: breaks lose the work of the loads less the stored energy.
 
     Attributes:
-        all_equilibria: where every bond broke at its own load, the first leg with its snap-back.
-        load_controlled: what is lost where the load only rose on the first leg, as in a test: a bond of a snap-back
-            breaks at the largest load t so far, and loses (t / own load)^2 times as much, for all is of degree one in
-            the load.
+        all_equilibria: every bond breaks at its own load, the first leg with its snap-back.
+        load_controlled: loss if the load only rises on the first leg, as in a test: a bond of a snap-back breaks at the
+            largest load t so far, and loses (t / its load)^2 times as much, for all is of degree one in the load.
     """
 
     all_equilibria: Energies = NO_ENERGIES
@@ -56,7 +61,7 @@ class Work:
         self.resume_from(self.all_equilibria.plus(point.energies), controlled, point)
 
     def resume_from(self, all_equilibria: Energies, load_controlled: float, point: Point) -> None:
-        """Go on from a point up to which there were these."""
+        """Go on from a point with the energies up to it."""
         self.all_equilibria, self.load_controlled = all_equilibria, load_controlled
         self._load, self._largest_load = point.load_factor, max(point.load_factor, self._largest_load)
 
@@ -64,12 +69,12 @@ class Work:
 def stored(
     point: Point, responses: Sequence[Response], work: Work, cell: CoupledInterfaces
 ) -> tuple[dict[str, Any], Arrays]:
-    """Return a point with its responses as plain numbers and distributed arrays, for the checkpoint.
+    """Take a point with its responses apart, into plain numbers and distributed arrays for the checkpoint.
 
     A path goes on from the multipliers of its last state.
     """
     after = point.after
-    whole: dict[str, Any] = {
+    numbers: dict[str, Any] = {
         "path": [point.load_factor, point.scale, float(after.leg), after.position, point.broke, point.softened],
         "energies": [*point.energies, *work.all_equilibria, work.load_controlled],
         "macroscopic": np.stack([after.origin.strain, after.origin.stress, after.last.strain, after.last.stress]),
@@ -77,24 +82,29 @@ def stored(
         "stretched": after.stretched,
     }
     distributed: Arrays = {"used": point.used} | _bonds_apart(after.bonds, "_after")
-    for suffix, each, response, state in zip(SUFFIXES, cell.problems, responses, point.state.problems, strict=False):
-        numbers, arrays = _taken_apart(state, each.solver.natural.kernel_dimension)
-        numbers |= _averages(response)
-        whole |= {f"{name}{suffix}": value for name, value in numbers.items()}
+    for suffix, interface, response, state in zip(
+        SUFFIXES, cell.problems, responses, point.state.problems, strict=False
+    ):
+        apart, arrays = _taken_apart(state, interface.solver.natural.kernel_dimension)
+        # Numbers of a response that follow from the multipliers.
+        apart["means"] = np.stack([response.strain, response.stress])
+        apart["energies_of"] = [response.stored, response.in_springs]
+        apart["errors"] = [response.checks.get(law, UNCHECKED) for law in LAWS]
+        numbers |= {f"{name}{suffix}": value for name, value in apart.items()}
         distributed |= {f"{name}{suffix}": value for name, value in arrays.items()}
-    return whole, distributed
+    return numbers, distributed
 
 
 def restored(event: Arrays, cell: CoupledInterfaces) -> tuple[Point, tuple[Energies, float]]:
-    """Put together what `stored` took apart of an event of a cell: the point, and the energies up to it.
+    """Put an event together that `stored` took apart: the point, and the energies up to it.
 
-    Of a lean event the arrays that `found_again` fills are empty.
+    A lean event has empty arrays, which `found_again` fills.
     """
     load_factor, scale, leg, position, *counts = event["path"].tolist()
     energies = event["energies"].tolist()
     pairs = zip(cell.problems, SUFFIXES, strict=False)
-    state, *others = (_put_together(event, each, suffix) for each, suffix in pairs)
-    state = replace(state, axial=others[0]) if others else state
+    state, *axial = (_put_together(event, interface, suffix) for interface, suffix in pairs)
+    state = replace(state, axial=axial[0]) if axial else state
     origin_strain, origin_stress, strain, stress = event["macroscopic"]
     broken = float(event["broken"])
     after = PathState(
@@ -108,38 +118,34 @@ def restored(event: Arrays, cell: CoupledInterfaces) -> tuple[Point, tuple[Energ
         float(event["stretched"]),
     )
     broke, softened = map(int, counts)
-    own = len(NO_ENERGIES)
+    n = len(NO_ENERGIES)
     used = event.get("used", EMPTY)
-    point = Point(load_factor, scale, state, broke, softened, Energies(*energies[:own]), used, after)
-    return point, (Energies(*energies[own : 2 * own]), energies[2 * own])
+    point = Point(load_factor, scale, state, broke, softened, Energies(*energies[:n]), used, after)
+    return point, (Energies(*energies[n : 2 * n]), energies[2 * n])
 
 
 def averages(event: Arrays, point: Point, loads: CellLoads) -> list[Response]:
-    """Return the responses of a restored event, as they were when it was stored.  Collective."""
-    found = list[Response]()
+    """Return the stored responses of a restored event.  Collective."""
+    responses = list[Response]()
     for suffix, problem, state in zip(SUFFIXES, loads.problems, point.state.problems, strict=False):
         strain, stress = event[f"means{suffix}"]
         (stored, in_springs), errors = (event[f"{name}{suffix}"].tolist() for name in ("energies_of", "errors"))
         checks = {law: error for law, error in zip(LAWS, errors, strict=True) if error != UNCHECKED}
         counts, damage = problem.counts(state.status), problem.damage(state.bonds)
         means = strain, stress, point.scale, stored, in_springs
-        found.append(Response(*means, state, EMPTY, checks, counts, damage))
-    return found
+        responses.append(Response(*means, state, EMPTY, checks, counts, damage))
+    return responses
 
 
 def found_again(point: Point, cell: CoupledInterfaces, law: BondLaw) -> Point:
     """Return the point of a lean event with the equilibrium of its load and bonds.  Collective."""
-    known = point.state
-    state = cell.equilibrium(_load(known), known.bonds, cell.no_multipliers())
-    # An equilibrium under the whole load is scaled, and so is what it uses.
+    loads = ((problem.load.values, problem.load.by_stress) for problem in point.state.problems)
+    values, by_stress = zip(*loads, strict=True)
+    load = Load(np.concatenate(values), np.concatenate(by_stress))
+    state = cell.equilibrium(load, point.state.bonds, cell.no_multipliers())
+    # An equilibrium under the whole load is scaled, and so are its utilisations.
     used = point.scale * most_utilised(cell, law, state)[0]
     return replace(point, state=state, used=used, after=replace(point.after, lam=state.multipliers))
-
-
-def _load(state: Equilibrium) -> Load:
-    """Return the load of all problems."""
-    values, by_stress = zip(*((each.load.values, each.load.by_stress) for each in state.problems), strict=True)
-    return Load(np.concatenate(values), np.concatenate(by_stress))
 
 
 def read(context: AnalysisContext, law: BondLaw, number: int) -> tuple[Arrays, Point]:
@@ -149,16 +155,20 @@ def read(context: AnalysisContext, law: BondLaw, number: int) -> tuple[Arrays, P
     return event, point if has_multipliers(event) else found_again(point, cell, law)
 
 
-def holding(context: AnalysisContext, law: BondLaw, known: int) -> int:
-    """Return how many of the known events of the checkpoint hold.
+def holding(context: AnalysisContext, law: BondLaw, count: int) -> int:
+    """Return how many of `count` events of the checkpoint hold.
 
-    Those after the last before which F lambda confirmed all problems, each at an event of its own or at one after it,
-    are confirmed here, up to one whose checks fail or whose means are wrong.  Collective.
+    Confirms the last events, after which F lambda did not confirm all problems, up to a failed check or a wrong mean.
+    Collective.
     """
-    first, waiting = known, set(SUFFIXES[: len(context.loads.problems)])
-    while first and (waiting := waiting - _confirmed(context.checkpoint.read(first - 1))):
+    first, waiting = count, set(SUFFIXES[: len(context.loads.problems)])
+    while first:
+        event = context.checkpoint.read(first - 1)
+        waiting -= {suffix for suffix in SUFFIXES if event.get(f"confirmed{suffix}", False)}
+        if not waiting:
+            break
         first -= 1
-    for number in range(first, known):
+    for number in range(first, count):
         event, point = read(context, law, number)
         responses = context.loads.responses(context.loads.interfaces.completed(point.state), point.scale)
         for response, kept in zip(responses, averages(event, point, context.loads), strict=True):
@@ -167,27 +177,13 @@ def holding(context: AnalysisContext, law: BondLaw, known: int) -> int:
             change = np.abs(response.stress - kept.stress).max()
             if not change <= context.checks.tolerance("stress") * np.abs(response.stress).max():
                 return number
-    return known
-
-
-def _confirmed(event: Arrays) -> set[str]:
-    """Return the suffixes of the problems that F lambda confirmed at an event."""
-    return {suffix for suffix in SUFFIXES if event.get(f"confirmed{suffix}", False)}
-
-
-def _averages(response: Response) -> dict[str, Any]:
-    """Return the numbers of a response that follow from the multipliers."""
-    return {
-        "means": np.stack([response.strain, response.stress]),
-        "energies_of": [response.stored, response.in_springs],
-        "errors": [response.checks.get(law, UNCHECKED) for law in LAWS],
-    }
+    return count
 
 
 def _taken_apart(state: Equilibrium, kernel: int) -> tuple[dict[str, Any], Arrays]:
-    """Return the equilibrium of one problem with so many amplitudes, NaN where there are none."""
+    """Take the equilibrium of one problem apart; `kernel` amplitudes are NaN if not confirmed."""
     solution = state.solution
-    whole: dict[str, Any] = {
+    numbers: dict[str, Any] = {
         "numbers": [state.iterations, state.solves, state.free_motions, solution.iterations, solution.reason],
         "load": np.stack([state.load.values, state.load.by_stress]),
         "strain": solution.strain,
@@ -197,7 +193,7 @@ def _taken_apart(state: Equilibrium, kernel: int) -> tuple[dict[str, Any], Array
         "asked": state.asked,
         "certificate": [state.certificate.get(law, np.nan) for law in KKT_LAWS],
     }
-    return whole, {"lam": solution.lam, "jump": solution.jump} | _bonds_apart(state.bonds, "")
+    return numbers, {"lam": solution.lam, "jump": solution.jump} | _bonds_apart(state.bonds, "")
 
 
 def _put_together(event: Arrays, interface: ContactProblem, suffix: str) -> Equilibrium:
@@ -224,3 +220,51 @@ def _bonds_apart(bonds: BondState, suffix: str) -> Arrays:
 def _bonds_together(event: Arrays, suffix: str) -> BondState:
     """Rebuild the state of bonds from the arrays of `_bonds_apart`."""
     return BondState(*(event.get(f"{field.name}{suffix}") for field in fields(BondState)))  # type: ignore[arg-type]
+
+
+class EventProgress:
+    """Lines about the events of a path, and a bar of the share of the path, while a context lasts.
+
+    The first, the last and urgent lines are printed, other lines once a second at most; the bar on terminals alone.
+    """
+
+    def __init__(self, progress: Progress, layout: str, file: str, clock: Callable[[], float] = time.monotonic) -> None:
+        """Take the layout of the bar, STEPS_BAR or EVENTS_BAR, and the file of all lines."""
+        self._progress, self._layout, self._file, self._clock = progress, layout, file, clock
+        self._next_line, self._held_back, self._left_out = float("-inf"), "", 0
+        self._bar: Any = None
+
+    def __enter__(self) -> Self:
+        if self._progress.on_terminal:
+            from tqdm import tqdm  # of no use to most runs, and slow to import
+
+            self._bar = tqdm(total=1.0, desc="path", bar_format=self._layout, leave=False)
+        return self
+
+    def report(self, line: str, urgent: bool) -> None:
+        """Print or hold back a line about an event."""
+        now = self._clock()
+        self._left_out += bool(self._held_back)
+        self._held_back = ""
+        if urgent or now >= self._next_line:
+            self._progress.say(line)
+            self._next_line = now + SECONDS_A_LINE
+        else:
+            self._held_back = line
+
+    def advance(self, share: float, text: str) -> None:
+        """Move the bar to the share of the path at an event, with a text."""
+        if self._bar is not None:
+            self._bar.set_postfix_str(text, refresh=False)
+            self._bar.update(max(share - self._bar.n, 0.0))
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._bar is not None:
+            self._bar.close()
+        if self._held_back:
+            self._progress.say(self._held_back)
+        if self._left_out:
+            count = "1 more event is" if self._left_out == 1 else f"{self._left_out} more events are"
+            self._progress.say(f"  {count} in {self._file}")

@@ -1,8 +1,8 @@
 """Scaling of paths with the toughness: one run calibrates it.
 
-With the stiffness of its springs given, a bond breaks by energy at tractions that grow as the root of the toughness,
-and the cell with contact is homogeneous of degree one in its loads.  So a toughness s^2 times as large, under s times
-the loads, has the same events at s times the strains and stresses; energies are s^2 times as large.
+On springs of fixed stiffness a bond breaks by energy at tractions that grow with the root of the toughness, and the
+cell with contact is homogeneous of degree one in its loads.  So a toughness s^2 times as large, under s times the
+loads, has the same events at s times the strains and stresses, and s^2 times the energies.
 """
 
 from __future__ import annotations
@@ -18,12 +18,13 @@ from feti_homog.analysis.result_records import PathPoint, Peak, Tips
 from feti_homog.results.path_curves import interface_sections, scales_with_toughness
 
 LOADS = ("strain", "to", "waypoints")
+ENERGIES = ("stored", "stored_in_springs", "work", "dissipated", "dissipated_strain_controlled", "fracture_energy")
 
 Record = TypeVar("Record", PathPoint, Peak, Tips)
 
 
 def ratio(document: Mapping[str, Any], toughness: float) -> float:
-    """Return s = sqrt(toughness / that of the case), of several interfaces that of the first.
+    """Return s = sqrt(toughness / toughness of the case), of several interfaces by the first.
 
     Raises ValueError for a result that does not scale.
     """
@@ -43,22 +44,18 @@ def case(old: Mapping[str, Any], s: float) -> dict[str, Any]:
 
 def point(old: PathPoint, s: float) -> PathPoint:
     """Return a point with s times its strain, stress and temperature, and s^2 times its energies."""
-    energies = (
-        *("stored", "stored_in_springs", "work", "dissipated"),
-        *("dissipated_strain_controlled", "fracture_energy"),
-    )
     tips = None if old.tips is None else _scaled(old.tips, ("G_I", "G_II"), s**2)
-    return replace(_scaled(_scaled(old, ("strain", "stress", "temperature"), s), energies, s**2), tips=tips)
+    return replace(_scaled(_scaled(old, ("strain", "stress", "temperature"), s), ENERGIES, s**2), tips=tips)
 
 
 def peak(old: Peak, s: float) -> Peak:
-    """Return the peak of the points that are so scaled."""
+    """Return the peak of scaled points."""
     names = ("stress", "strain", "first_break_stress", "first_break_strain", "stress_left")
     return _scaled(_scaled(old, names, s), ("dissipated",), s**2)
 
 
 def _scaled(old: Record, names: tuple[str, ...], factor: float) -> Record:
-    """Return a record with some of its numbers and arrays, those that are there, multiplied."""
+    """Return a record with some of its numbers and arrays multiplied; None stays."""
     values = {name: getattr(old, name) for name in names}
     changes = {name: _times(value, factor) for name, value in values.items() if value is not None}
     return replace(old, **changes)

@@ -1,4 +1,4 @@
-"""Result of a case: the object that Python programs receive, the content of result.json, and fields in memory."""
+"""Result of a case: an object for Python programs, the content of result.json, and fields in memory."""
 
 from __future__ import annotations
 
@@ -45,16 +45,16 @@ Part = TypeVar("Part", MeshPart, FibrePart, InterfacePart, StatePart)
 
 @dataclass(frozen=True, repr=False)
 class Fields:
-    """This rank's part of the fields; `gathered` has all of them.
+    """This rank's part of the fields; `gathered` has all parts.
 
     Attributes:
         header: size of the cell, phases, units.
-        mesh: points (n, 2), triangles (m, 3 or 6) and what they belong to; nodes are torn between subdomains.
+        mesh: points (n, 2), triangles (m, 3 or 6), their bodies and phases; nodes are torn between subdomains.
         fibres: number as in case files (f,), body, phase, centre (f, 2) and radius (f,), on rank 0.
         interface: points (k, 2), normal (k, 2), length (k,) and fibre (k,) of the fibre-matrix interface nodes, and the
             numbers of their nodes in the gathered mesh.
-        states: of each load case, or point of an angle or path: displacement (n, 2), stress (m, 3),
-            traction, jump (k, 2) and status (k,), with the strain, mean stress, load factor and label of the state.
+        states: for each load case, or point of an angle or path: displacement (n, 2), stress (m, 3), traction, jump
+            (k, 2) and status (k,), with strain, mean stress, load factor and label.
     """
 
     comm: Intracomm
@@ -68,16 +68,15 @@ class Fields:
         return f"Fields({len(self.mesh.points)} nodes, {len(self.mesh.triangles)} elements, {len(self.states)} states)"
 
     def gathered(self) -> Fields | None:
-        """Return the fields of all ranks as one part, on rank 0; None on the others. Collective."""
+        """Return the fields of all ranks as one part, on rank 0; None elsewhere.  Collective."""
         first = self.comm.exscan(len(self.mesh.points)) or 0
         mesh = _gathered(self.comm, replace(self.mesh, triangles=self.mesh.triangles + np.int64(first)))
         fibres, interface = _gathered(self.comm, self.fibres), _gathered(self.comm, self.interface)
         states = [_gathered(self.comm, state) for state in self.states]
         if mesh is None or fibres is None or interface is None:
             return None
-        return Fields(
-            self.comm, self.header, mesh, fibres, interface, tuple(state for state in states if state is not None)
-        )
+        rows = tuple(state for state in states if state is not None)
+        return Fields(self.comm, self.header, mesh, fibres, interface, rows)
 
 
 def _gathered(comm: Intracomm, part: Part) -> Part | None:
@@ -85,27 +84,26 @@ def _gathered(comm: Intracomm, part: Part) -> Part | None:
     parts = {name: comm.gather(getattr(part, name)) for name in tables(part)}
     if comm.rank:
         return None
-    whole: dict[str, Any] = {name: np.concatenate(rows or []) for name, rows in parts.items()}
-    return replace(part, **whole)
+    joined: dict[str, Any] = {name: np.concatenate(rows or []) for name, rows in parts.items()}
+    return replace(part, **joined)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)  # arrays have no single answer to "equal"
 class Result:
     """The result of a case, the same on every rank but for `fields`.
 
-    Printed, it is a short summary; in a notebook, tables.  `schema_keys` lists all that is written.
+    Printed, it is a short summary; in a notebook, tables.  `schema_keys` lists all written keys.
 
     Attributes:
-        effective_stiffness: (3, 3), of generalized plane strain (6, 6), L^ef, its columns the stresses under the unit
-            strains; of analysis "stiffness".
-        effective_stiffness_compression: the same under minus the unit strains, where debonded faces touch without
-            tension.
+        effective_stiffness: (3, 3), of generalized plane strain (6, 6), L^ef, with stresses under the unit strains as
+            columns; of analysis "stiffness".
+        effective_stiffness_compression: L^ef under minus the unit strains, if debonded faces touch without tension.
         compliance, thermal_stress, thermal_expansion: of generalized plane strain, (6, 6) and (6,), else None.
         moduli, bounds: of perfectly bonded cells, else None.
-        mesh_error: estimated errors by the mesh of a stiffness and of what follows from it, unless the case forgoes it.
+        mesh_error: estimated mesh errors of a stiffness and its constants, unless the case forgoes them.
         sensitivities: derivatives of a stiffness by the constants of the case, if it asks for them, else None.
-        tips: energy release rates of a stiffness with debonded arcs, else None; those of an angle are in its points.
-        angle, path, envelope: the points of these analyses, else None; `points` has those of the first two as arrays.
+        tips: energy release rates of a stiffness with debonded arcs, else None; points of angles have their own.
+        angle, path, envelope: the points of these analyses, else None; `points` has angles and paths as arrays.
         fields: mesh, interface and states on this rank if they were asked for, else None; not written to result.json.
     """
 
@@ -190,34 +188,33 @@ class Result:
 
     @classmethod
     def of(cls, document: Mapping[str, Any]) -> Result:
-        """Return the result of what result.json holds. Raises KeyError if a key is missing."""
+        """Return the result with the content of result.json.  Raises KeyError if a key is missing."""
         return restored(cls, document)
 
     @property
     def document(self) -> dict[str, Any]:
-        """Return what result.json holds, in its order; arrays are NumPy's."""
+        """Return the content of result.json, in its order; arrays are NumPy's."""
         document: dict[str, Any] = plain(self)
         return document
 
     @property
     def points(self) -> dict[str, NDArray[Any]]:
-        """Arrays over the n points of an angle or a path by name, empty for other analyses.
+        """Return arrays over the n points of an angle or a path by name, empty for other analyses.
 
         `angle` or `load_factor` (n,), `strain` and `stress` (n, 3) or (n, 6), `stiffness` (n, 3, 3) or (n, 6, 6),
-        `debonded_length` (n, f), `bonded`, `open`, `closed`, ... (n,); NaN where a point has no such number.  The tips
-        are in the points alone.
+        `debonded_length` (n, f), `bonded`, `open`, `closed`, ... (n,); NaN where a point has no such number; no tips.
         """
         documents = [plain(point) for point in (*(self.angle or ()), *(self.path or ()))]
         names = dict.fromkeys(name for point in documents for name in point if name != "tips")
         return {name: np.array([point.get(name, np.nan) for point in documents]) for name in names}
 
     def rising_strain(self) -> dict[str, Float]:
-        """Corners (v,) of the leading strain and of all stresses, by their names, along a path of one leg.
+        """Return corners (v,) of the leading strain, first, and of all stresses, by name, along a path of one leg.
 
-        They are those of a test with rising load: where bonds break the stress drops, or under a given stress the
-        strain jumps, to the next branch that holds. The strain comes first; a table of pandas takes them all.
+        In a test with rising load the stress drops where bonds break, or under a given stress the strain jumps, to the
+        next branch that holds.
 
-        Raises ValueError for any other result, and where that strain does not rise with the load.
+        Raises ValueError for any other result, and if the strain does not rise with the load.
         """
         from feti_homog.results import path_curves  # of no use to other analyses
 
@@ -230,13 +227,11 @@ class Result:
         return {self.peak.strain_name: columns.pop(self.peak.strain_name)} | columns
 
     def path_scaled(self, *, toughness: float) -> Result:
-        """Return the result of the same path with another toughness, its loads multiplied by s.
+        """Return the result of the path with another toughness, of the first interface, and s times the loads.
 
-        s = sqrt(toughness / that of the case); of several interfaces the toughness is that of the first, and the others
-        alike.
-
-        Strains and stresses are s times, energies s^2 times as large, at the same events and load factors: bonds break
-        by energy on springs of given stiffness.  Fields, states and digest are those of no run, and left out.
+        s = sqrt(toughness / toughness of the case), alike for all interfaces.  Strains and stresses are s times,
+        energies s^2 times as large, at equal events and load factors: bonds break by energy on springs of given
+        stiffness.  Fields, states and digest belong to no run, and are left out.
 
         Raises ValueError for any other result, and for a toughness that is not positive.
         """
@@ -255,10 +250,9 @@ class Result:
         )
 
     def first_drop(self) -> tuple[Float, int]:
-        """(3,) or (6,) stress left after the first break of a path of one leg, and the number of a point.
+        """Return the stress (3,) or (6,) after the first break of a path of one leg, under the load of the break.
 
-        The load is held there; the point is the one whose branch the stress is on. Raises ValueError for any other
-        result.
+        And the number of the point on its branch.  Raises ValueError for any other result.
         """
         from feti_homog.results import path_curves
 

@@ -8,31 +8,46 @@ from typing import Any
 import numpy as np
 
 from feti_homog.analysis.cell_records import CellInfo, Checks, FibreInfo, SolverInfo
-from feti_homog.analysis.checks import CONTACT_TOLERANCE
 from feti_homog.analysis.context import AnalysisContext
+from feti_homog.analysis.recorders import CONTACT_TOLERANCE
 from feti_homog.analysis.result import Fields, Result
-from feti_homog.case.case import Case
 from feti_homog.homogenization.uniform_parts import nodes_of_parts
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.microstructure.shapes.ellipses import Ellipses
 from feti_homog.system.parallel.mpi_errors import on_root
 from feti_homog.version import __version__
 
-# Phases that are no fibres.
 AROUND_FIBRES = ("matrix", "coating")
-# Share of the fibres' area that polygons may lose without a remark.
-REMARKABLE_LOSS = 0.005
+REMARKABLE_LOSS = 0.005  # of the fibres' area, by polygons
 
 
 def result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields | None) -> Result:
-    """Return the entries of an analysis with all that belongs to them; collective."""
+    """Return the result with the entries of an analysis.  Collective."""
     cell, progress, checks = context.cell, context.progress, context.checks
     fractions = cell.fractions()
+    # Straight edges cut off a part of the fibres.
+    area = sum(cell.case.cell.fractions.values())
+    meshed = sum(share for phase, share in fractions.items() if phase not in AROUND_FIBRES)
+    lost = 1.0 - meshed / area if area and cell.case.cell.order == 1 else 0.0
+    polygons = f"[cell] order = 1: polygons have {lost:.1%} less area than the fibres asked for; refine, or order = 2"
+    cell_info = CellInfo(
+        width=cell.summary.width,
+        height=cell.summary.height,
+        area=cell.summary.area,
+        fibre_fraction=meshed,
+        fractions=fractions,
+        porosity=1.0 - sum(fractions.values()) if cell.summary.voids else 0.0,
+        elements=cell.sum_over_ranks(sum(len(s.mesh.triangles) for s in cell.subdomains)),
+        nodes=cell.sum_over_ranks(sum(map(nodes_of_parts, cell.subdomains))),
+        mesh_size=None if cell.case.cell.has_own_mesh else cell.case.cell.mesh_size,
+        refine=cell.case.cell.refine,
+        match_distance=cell.summary.match_distance,
+    )
     return Result(
         version=__version__,
         case=cell.case.resolved(),
         digest=on_root(cell.comm, cell.case.digest),
-        cell=_cell_info(cell, fractions),
+        cell=cell_info,
         fibres=_fibres(cell),
         solver=_solver_info(context),
         checks=Checks(**checks.errors),
@@ -42,7 +57,7 @@ def result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields
         remarks=(
             *cell.case.remarks(),
             *cell.summary.remarks,
-            *_lost_area(cell.case, fractions),
+            *([polygons] if lost > REMARKABLE_LOSS else []),
             *context.remarks(),
         ),
         faults=tuple(checks.faults),
@@ -54,35 +69,8 @@ def result(context: AnalysisContext, analysis: Mapping[str, Any], fields: Fields
     )
 
 
-def _lost_area(case: Case, fractions: Mapping[str, float]) -> tuple[str, ...]:
-    """Return a remark if straight edges cut off much of the fibres that the case asks for."""
-    asked = sum(case.cell.fractions.values())
-    meshed = sum(share for phase, share in fractions.items() if phase not in AROUND_FIBRES)
-    lost = 1.0 - meshed / asked if asked else 0.0
-    if case.cell.order != 1 or lost <= REMARKABLE_LOSS:
-        return ()
-    return (f"[cell] order = 1: polygons have {lost:.1%} less area than the fibres asked for; refine, or order = 2",)
-
-
-def _cell_info(cell: TornCell, fractions: dict[str, float]) -> CellInfo:
-    """Collect the numbers of the cell.  Collective."""
-    return CellInfo(
-        width=cell.summary.width,
-        height=cell.summary.height,
-        area=cell.summary.area,
-        fibre_fraction=sum(f for phase, f in fractions.items() if phase not in AROUND_FIBRES),
-        fractions=fractions,
-        porosity=1.0 - sum(fractions.values()) if cell.summary.voids else 0.0,
-        elements=cell.sum_over_ranks(sum(len(s.mesh.triangles) for s in cell.subdomains)),
-        nodes=cell.sum_over_ranks(sum(map(nodes_of_parts, cell.subdomains))),
-        mesh_size=None if cell.case.cell.has_own_mesh else cell.case.cell.mesh_size,
-        refine=cell.case.cell.refine,
-        match_distance=cell.summary.match_distance,
-    )
-
-
 def _fibres(cell: TornCell) -> tuple[FibreInfo, ...]:
-    """Return the fibres of the cell."""
+    """Return the records of the fibres of the cell."""
     summary, factors = cell.summary, cell.strength_factors
     bodies, varies = summary.fibre_bodies, not (factors == 1.0).all()
     ellipses = Ellipses(summary.centres, summary.frames)
@@ -103,7 +91,7 @@ def _fibres(cell: TornCell) -> tuple[FibreInfo, ...]:
 
 
 def _solver_info(context: AnalysisContext) -> SolverInfo:
-    """Return the solver's entry of all problems together.  Collective."""
+    """Return the record of the solvers of all problems.  Collective."""
     cell = context.cell
     plan, solver = cell.summary, cell.solver
     solvers = [problem.solver for problem in cell.problems]

@@ -35,7 +35,7 @@ DEBONDED_SHARES = "the same of the interfaces of each section [[interface]], in 
 
 @dataclass(frozen=True, kw_only=True, eq=False)  # arrays have no single answer to "equal"
 class MeshError:
-    """Estimates of how far the mesh is from the exact answer: recovered stresses against those of the elements."""
+    """Estimated mesh errors, by the distance of recovered stresses to element stresses."""
 
     effective_stiffness: Float = described("error of each entry", STRESS, EITHER_STIFFNESS)
     effective_stiffness_compression: Float | None = described(
@@ -54,10 +54,10 @@ class MeshError:
 
 @dataclass(frozen=True, eq=False)  # arrays have no single answer to "equal"
 class Tips:
-    """The t tips of debonding at a point, bonds that hold beside broken ones, by fibre, interface and direction.
+    """The t tips of debonding at a point, bonds that hold next to broken ones, by fibre, interface and direction.
 
-    What drives them is an energy per area, compared with G_c(psi): that of their spring or, where `growth` is
-    "released", what their break would release.
+    An energy per area drives them, compared with G_c(psi): the energy of their spring or, where `growth` is "released",
+    the energy that their break would release.
     """
 
     fibre: tuple[int, ...] = described("number of the fibre of each tip")
@@ -200,7 +200,7 @@ class PathPoint:
 class Peak:
     """The largest stress of a path up to its deepest fall.
 
-    It is of the component whose strain leads: of those that the loads change the largest.
+    It is the stress of the leading strain, the largest one that the loads change.
     """
 
     stress_name: str = described("name of the component")
@@ -226,7 +226,7 @@ class Peak:
 
 @dataclass(frozen=True, kw_only=True)
 class LoadPoint:
-    """The equilibrium under one load, with what is debonded from the start."""
+    """The equilibrium under one load, with faces debonded from the start."""
 
     strain: Float = described("macroscopic strain", "", EITHER, STRAINS, spatial_components=SPATIAL_STRAINS)
     stress: Float = described("macroscopic stress", STRESS, EITHER, STRESSES, spatial_components=SPATIAL_STRESSES)

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 from feti_homog.analysis.constants import constants
 from feti_homog.analysis.context import AnalysisContext
 from feti_homog.analysis.mesh_errors import mesh_error, unit_errors
-from feti_homog.analysis.registry import Analysis
 from feti_homog.homogenization.averaging import asymmetry
 
 if TYPE_CHECKING:
@@ -15,13 +14,11 @@ if TYPE_CHECKING:
 
 
 def run(context: AnalysisContext) -> dict[str, Any]:
-    """`effective_stiffness`, whose columns are the stresses under the unit strains.
+    """Return `effective_stiffness`, with stresses under the unit strains as columns, and entries that follow from it.
 
-    With contact between debonded faces also `effective_stiffness_compression`, its columns -Sigma(-E); `tips` of
-    debonded arcs under each of them; `mesh_error` of the estimated errors; `sensitivities` if
-    the case asks for them.
-
-    If a temperature is a load, `thermal_stress` under a unit of it, and `thermal_stress_compression`.
+    With contact between debonded faces also `effective_stiffness_compression`, columns -Sigma(-E); `tips` of debonded
+    arcs under each load; `mesh_error`; `sensitivities` if the case asks for them.  If a temperature
+    is a load, `thermal_stress` under a unit temperature, and `thermal_stress_compression`.
     """
     bonds = context.bonds(None)
     starts = context.loads.zero_multipliers()
@@ -42,13 +39,12 @@ def run(context: AnalysisContext) -> dict[str, Any]:
     else:
         context.checks.require("L^ef", {"symmetry": asymmetry(document["effective_stiffness"])})
     if context.case.interface is not None:
-        document["tips"] = context.tips.of(under, loads)
+        from feti_homog.analysis.tip_records import tip_rates  # bonded cells have no tips
+
+        document["tips"] = tip_rates(context, under, loads)
     document |= constants(context.cell, document)
     if context.needs_sensitivities:
         from feti_homog.analysis.sensitivities import sensitivities  # few runs ask for them
 
         document |= sensitivities(context, document, first, one_sided)
     return document | mesh_error(context, document, errors, errors_of_minus)
-
-
-ANALYSIS = Analysis(run)

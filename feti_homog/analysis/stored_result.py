@@ -1,4 +1,4 @@
-"""The result that a folder holds: read by whoever did not compute it, and known to be what its run wrote."""
+"""The result in a folder, checked to be complete and of one run."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from feti_homog.results import checkpoint_file, field_file, result_json, seals
 
 
 def read(directory: Path) -> dict[str, Any]:
-    """Return the document of `directory`/result.json, whose result.h5 is that of its run. Call on one rank.
+    """Return the document of `directory`/result.json, with result.h5 of the same run.  Call on one rank.
 
     Raises:
-        CaseError: one of both is missing, damaged, or of another program or run.
+        CaseError: a file is missing, damaged, or of another program or run.
     """
     document = result_json.read(directory)
     result = _restored(directory, document)
@@ -27,10 +27,10 @@ def read(directory: Path) -> dict[str, Any]:
 
 
 def check_to_draw(directory: Path) -> None:
-    """Check that the fields of `directory` are those of its result.json; they may stand alone.  Call on one rank.
+    """Check that result.h5 and result.json in `directory` are of one run; result.h5 may be alone.  Call on one rank.
 
     Raises:
-        CaseError: result.h5 is missing, or one of both is damaged, or of another program or run.
+        CaseError: result.h5 is missing, or a file is damaged, or of another program or run.
     """
     if os.path.lexists(directory / result_json.NAME):  # a link in a circle is there, too
         read(directory)
@@ -39,7 +39,7 @@ def check_to_draw(directory: Path) -> None:
 
 
 def finished(directory: Path, case: Case) -> bool:
-    """Return whether `directory` has the whole result of this case and no checkpoint of a later run.  Call on one rank.
+    """Return whether `directory` has the complete result of a case and no checkpoint.  Call on one rank.
 
     Raises:
         CaseError: the result is damaged, or of another case.
@@ -51,11 +51,11 @@ def finished(directory: Path, case: Case) -> bool:
     if result.digest != case.digest():
         now = case.resolved()
         changed = [f"[{k}]" for k in now if k not in ("name", "petsc") and now[k] != result.case.get(k)]
-        words = f", which differs in {', '.join(changed)}" if changed else ""
-        raise CaseError(f"--resume: {directory} holds the result of another case{words}; choose another folder")
-    if case.output.fields and not (directory / field_file.NAME).exists():
-        return False
+        where = f", which differs in {', '.join(changed)}" if changed else ""
+        raise CaseError(f"--resume: {directory} holds the result of another case{where}; choose another folder")
     if case.output.fields:
+        if not (directory / field_file.NAME).exists():
+            return False
         _check_fields(directory, result)
     return result.status == "done"
 

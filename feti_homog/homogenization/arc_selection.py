@@ -20,61 +20,54 @@ from feti_homog.microstructure.phase_names import COATING, MATRIX
 from feti_homog.typing import Bool, Float, Int
 
 # The stress at a tip is singular, so that the energy errs by about the size of the elements there, elsewhere by
-# h^(2 order). At this share of a balance the tips err no more than the rest (`scripts/measure_tips.py`).
+# h^(2 order). At this share of a balance tips err no more than the rest (`scripts/measure_tips.py`).
 TIP_SHARE = 0.5
-# Where one mesh has the tips of many openings, of which one at a time is there: triangles that all tips together add by
-# default / those of the mesh without them, at most.
+# Largest ratio of triangles that the tips of many openings, of which a state has one, add to a mesh by default.
 TIP_TRIANGLES = 2.0
-# Size at tips / width of the cell by default, at least.
-LEAST_SIZE = 1e-5
+LEAST_SIZE = 1e-5  # at tips / width of the cell, by default
 
 
 def on_interface(case: Case, interface: InterfaceSection, fibres: int) -> dict[int, list[float]]:
-    """Directions in [0, 360) of the tips of its arcs on so many fibres, by the fibre's number from 0.
-
-    They are those at all openings.
-    """
+    """Return directions in [0, 360) of the tips of arcs at all openings, by the fibre's number from 0."""
     return debonded_arcs.tips(interface.debonded, case.section.openings, fibres)
 
 
 def marks(case: Case, fibres: int) -> dict[int, list[float]]:
-    """Directions of all tips on so many fibres, by the number of their curve (`BareOutline.of`)."""
-    found: dict[int, set[float]] = {}
+    """Return directions of all tips by the number of their curve (`BareOutline.of`)."""
+    by_curve: dict[int, set[float]] = {}
     for interface in case.interfaces:
         is_within = interface.between is not None and {COATING, MATRIX} & set(interface.between) == {COATING}
-        for fibre, own in on_interface(case, interface, fibres).items():
-            found.setdefault(~fibre if is_within else fibre, set()).update(own)
-    return {curve: sorted(found[curve]) for curve in sorted(found)}
+        for fibre, directions in on_interface(case, interface, fibres).items():
+            by_curve.setdefault(~fibre if is_within else fibre, set()).update(directions)
+    return {curve: sorted(by_curve[curve]) for curve in sorted(by_curve)}
 
 
 def size(case: Case, estimate: ElementEstimate) -> float | None:
-    """Element size at tips / width of the cell, None for that of the interface: that of the case, or by default
+    """Return the element size at tips / width of the cell, None for the size at the interface.
+
+    Without `tip_size` in the case it is, with the mean radius / width R,
 
         h_t = 2^refine R (h / R)^(2 order) / 2,  h = interface_size / 2^refine,
 
-    with R the mean radius / width; but with several openings not so small that their tips took more than TIP_TRIANGLES.
-    Along paths tips move, and only that of the case counts; so it is with envelopes, for they begin paths.
+    with several openings so large that their tips take at most TIP_TRIANGLES.  Along paths, and so in envelopes, tips
+    move, and `tip_size` alone counts.
     """
-    cell, tips = case.cell, sum(len(own) for own in marks(case, estimate.fibres).values())
+    cell, tips = case.cell, sum(map(len, marks(case, estimate.fibres).values()))
     if cell.tip_size is not None or case.section.breaks or not tips:
         return cell.tip_size
     radius, around = estimate.mean_radius, estimate.interface_size
     fine = around / 2**cell.refine
     balanced: float = TIP_SHARE * 2**cell.refine * radius * (fine / radius) ** (2 * cell.order)
-    wanted = max(balanced, LEAST_SIZE)
+    size_at_tips = max(balanced, LEAST_SIZE)
     if len(case.section.openings) > 1:
         share = TIP_TRIANGLES * estimate.triangles / tips
-        wanted = max(wanted, around / ratio_at_a_tip(share))
-    return min(around, wanted)
+        size_at_tips = max(size_at_tips, around / ratio_at_a_tip(share))
+    return min(around, size_at_tips)
 
 
 @dataclass(frozen=True)
 class InterfaceNodes:
-    """Nodes of interfaces on rank 0, before the refinement.
-
-    (k,) numbers of fibres from 1, interfaces of the case, directions in degrees about their centres, and whether they
-    are vertices of the coarse mesh.
-    """
+    """(k,) nodes of interfaces on rank 0, before the refinement: fibres from 1, interfaces, directions in degrees."""
 
     fibre: Int
     pair: Int
@@ -83,13 +76,13 @@ class InterfaceNodes:
 
     @classmethod
     def of(cls, torus: Torus, lattice: ReferenceLattice, pairs: Int, numbers: Int, centres: Float) -> InterfaceNodes:
-        """Place the nodes on edges that may debond, on their chords, but for vertices that never part.
+        """Place nodes on the chords of edges that may debond, but for vertices that never part.
 
-        `pairs` as in `share_entities`, `numbers` (constituents,) those of fibres.
+        `pairs` as in `share_entities`, `numbers` (constituents,) of fibres.
         """
-        left, right, edge = torus.sides
-        pair = pairs[torus.mesh.phase[left], torus.mesh.phase[right]]
-        sides = torus.constituent[np.stack([left, right])][:, pair >= 0]
+        first, second, edge = torus.sides
+        pair = pairs[torus.mesh.phase[first], torus.mesh.phase[second]]
+        sides = torus.constituent[np.stack([first, second])][:, pair >= 0]
         inner = np.take_along_axis(sides, torus.nesting[sides].argmax(axis=0)[None], axis=0)[0]
         between = edge[pair >= 0]
         plane = np.unique(torus.torus_edge, return_index=True)[1][between]
@@ -98,44 +91,35 @@ class InterfaceNodes:
         points = ends[:, :1] * (1 - share) + ends[:, 1:] * share
         parts = np.ones(points.shape[:2], bool)
         parts[:, [0, -1]] = ~torus.never_part[torus.node_class[torus.edges[plane]]]
-        own, step = np.nonzero(parts)
-        return cls(
-            numbers[inner[own]],
-            pair[pair >= 0][own],
-            debonded_arcs.angles(points[parts], inner[own], centres, torus.mesh.period),
-            (step == 0) | (step == lattice.intervals),
-        )
+        side, step = np.nonzero(parts)
+        directions = debonded_arcs.angles(points[parts], inner[side], centres, torus.mesh.period)
+        is_vertex = (step == 0) | (step == lattice.intervals)
+        return cls(numbers[inner[side]], pair[pair >= 0][side], directions, is_vertex)
 
     def moved_tips(self, case: Case, fibres: int) -> tuple[MovedTips, ...]:
-        """Find the tips of each interface, on so many fibres, that the mesher has put into a vertex near them.
-
-        A user's mesh has its vertices where they are.
-        """
+        """Find the tips of each interface that the mesher has moved into a near vertex; none in a user's mesh."""
         if case.cell.has_own_mesh:
             return (debonded_arcs.NOT_MOVED,) * len(case.interfaces)
-        most, moved = float(np.degrees(MERGED)), []
+        distance, moved = float(np.degrees(MERGED)), []
         for pair, interface in enumerate(case.interfaces):
-            own = self.is_vertex & (self.pair == pair)
-            wanted = on_interface(case, interface, fibres)
-            moved.append(debonded_arcs.moved_tips(wanted, self.fibre[own], self.direction[own], most))
+            at = self.is_vertex & (self.pair == pair)
+            tips = on_interface(case, interface, fibres)
+            moved.append(debonded_arcs.moved_tips(tips, self.fibre[at], self.direction[at], distance))
         return tuple(moved)
 
     def within(self, pair: int) -> InterfaceNodes:
-        """Return those of one interface of the case."""
-        own = self.pair == pair
-        return InterfaceNodes(self.fibre[own], self.pair[own], self.direction[own], self.is_vertex[own])
+        """Return the nodes of one interface of the case."""
+        at = self.pair == pair
+        return InterfaceNodes(self.fibre[at], self.pair[at], self.direction[at], self.is_vertex[at])
 
     def selects(self, arc: Arc, opening: float | None, fibre: int | None, moved: MovedTips) -> bool:
-        """Return whether any node, of that fibre if it is given, is within the arc."""
+        """Return whether any node, of the fibre if there is one, is within the arc."""
         inside = debonded_arcs.debonded([arc], opening, self.fibre, self.direction, moved)
         return bool((inside if fibre is None else inside[self.fibre == fibre]).any())
 
 
 def fibre_faults(case: Case, centres: Float) -> list[str]:
-    """List the faults of the fibres of arcs in a cell.
-
-    Its fibres have these centres (fibres, 2), NaN where there is none.
-    """
+    """List faults of the fibres of arcs, for centres (fibres, 2) of the fibres, NaN without a centre."""
     return [
         fault
         for pair, interface in enumerate(case.interfaces)
@@ -144,25 +128,22 @@ def fibre_faults(case: Case, centres: Float) -> list[str]:
 
 
 def faults(case: Case, nodes: InterfaceNodes, moved: Sequence[MovedTips]) -> list[str]:
-    """Faults of arcs, and of openings of [angle], other than 0 that select no node of a fibre."""
+    """List faults of arcs, and of openings of [angle], other than 0 that select no node of a fibre."""
     openings: Sequence[float | None] = case.section.openings or [None]
-    found = []
+    lines = []
     for pair, interface in enumerate(case.interfaces):
-        own, label = nodes.within(pair), interface_label(pair, len(case.interfaces))
+        of_pair, label = nodes.within(pair), interface_label(pair, len(case.interfaces))
         for (place, arc), opening in product(enumerate(interface.debonded), openings):
-            whole = opening if arc.angle is None else arc.angle
-            fibres = [None] if isinstance(arc.fibre, str) else list(arc.fibre)
-            empty = [fibre for fibre in fibres if whole and not own.selects(arc, opening, fibre, moved[pair])]
-            line = f"[{label}] debonded[{place}]"
-            found += [_fault(line, whole, fibre, own, interface.between) for fibre in empty]
-    return list(dict.fromkeys(found))
+            angle, line = opening if arc.angle is None else arc.angle, f"[{label}] debonded[{place}]"
+            for fibre in [None] if isinstance(arc.fibre, str) else arc.fibre:
+                if angle and not of_pair.selects(arc, opening, fibre, moved[pair]):
+                    lines.append(line + _fault(angle, fibre, of_pair, interface.between))
+    return list(dict.fromkeys(lines))
 
 
-def _fault(
-    line: str, opening: float | None, fibre: int | None, nodes: InterfaceNodes, between: Sequence[str] | None
-) -> str:
+def _fault(angle: float, fibre: int | None, nodes: InterfaceNodes, between: Sequence[str] | None) -> str:
     if fibre is not None and fibre not in nodes.fibre:
         which = "that can debond" if between is None else f"between {' and '.join(between)}"
-        return f"{line}.fibre: fibre {fibre} has no interface {which}"
+        return f".fibre: fibre {fibre} has no interface {which}"
     whose = "any fibre" if fibre is None else f"fibre {fibre}"
-    return f"{line}: no node of {whose} is within the arc of {opening} degrees; make it wider, or the elements smaller"
+    return f": no node of {whose} is within the arc of {angle} degrees; make it wider, or the elements smaller"

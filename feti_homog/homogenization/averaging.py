@@ -1,6 +1,6 @@
-"""Macroscopic response of the torn cell, and the laws that every response must obey.
+"""Macroscopic response of the torn cell, the laws that every response must obey, and debonded lengths of fibres.
 
-The strain E is that of the problem, in the plane [E11, E22, gamma12], with its other loads behind; so is the stress.
+Strains E are [E11, E22, gamma12] in the plane, then the other loads of the problem; stresses are alike.
 """
 
 from __future__ import annotations
@@ -30,25 +30,25 @@ class Response:
 
     Attributes:
         strain: (v,) E.
-        stress: (v,) Sigma = <sigma>, what works on E.
+        stress: (v,) Sigma = <sigma>, which does work on E.
         scale: the response is `scale` times `state`.
-        stored: energy per area of the cell, 1/2 <sigma:eps> from the displacements and what the springs store.
-        in_springs: the latter, 1/2 sum lam^2 C / |UC|.
+        stored: energy per area of the cell, 1/2 <sigma:eps> of the displacements and the energy of springs.
+        in_springs: energy of springs, 1/2 sum lam^2 C / |UC|.
         state: interface states, multipliers, jumps and amplitudes.
         u: (boundary dofs,) fluctuating displacement u* on the boundaries of this rank's subdomains; (0,) if brief.
-        checks: relative errors of the laws: `strain` <eps> = E, Eq. (3), with the opening of debonded faces and
-            the strain of voids, which is that of their boundaries, as parts of <eps>;
-            `hill` <sigma:eps> = Sigma:E, Eq. (8), springs included, relative to <sigma:eps> or, if
-            that is less, to what a bonded cell stores at least by Reuss' bound, for a debonded one may store nothing;
-            with friction <sigma:eps> and what the forces on debonded faces do on their jumps;
-            `jump`, the largest opening of a glued node relative to the largest displacement, which does not vanish
-            where forces do; the KKT certificate of contact; and if stresses are prescribed `stress`, the
-            largest error of one relative to the largest stress or, if that is less, to what the strains would make in a
-            bonded cell at least. Of a cell that is one subdomain nothing is glued, and there is no `jump`; `strain`
-            is that of its mesh, which is closed, and `hill` that of the factor (`CondensedLoads.energy`).
+        checks: relative errors of the laws.
+            `strain`: <eps> = E, Eq. (3), with the opening of debonded faces and the strain of voids, by their
+            boundaries, as parts of <eps>; of a cell that is one subdomain its mesh is closed.
+            `hill`: <sigma:eps> = Sigma:E, Eq. (8), springs included, with friction the work of forces on debonded faces
+            too; relative to <sigma:eps> or, if less, to Reuss' bound of the energy of a bonded cell, for a debonded
+            cell may store nothing; of a cell that is one subdomain by the factor (`CondensedLoads.energy`).
+            `jump`: the largest opening of a glued node relative to the largest displacement, which does not vanish
+            where forces do; absent of a cell that is one subdomain.
+            `stress`: the largest error of a prescribed stress relative to the largest stress or, if less, to the least
+            stress of the strains in a bonded cell.  And the KKT certificate of contact.
         counts: numbers of `bonded`, `open` and `closed` interface nodes.
         damage: (k,) of the bonds, 0 intact to 1 broken.
-        shares: (m,) what each element of this rank has of the estimated error of E . Sigma, where it is known.
+        shares: (m,) shares of this rank's elements in the estimated error of E . Sigma; None without estimate.
     """
 
     strain: Float
@@ -65,7 +65,7 @@ class Response:
 
     @property
     def leading(self) -> str:
-        """The largest strain of the plane and its stress, in words."""
+        """Names and values of the largest strain of the plane and its stress."""
         k = int(np.abs(self.strain[: len(STRAINS)]).argmax())
         return f"{STRAINS[k]} {self.strain[k]:.4g}, {STRESSES[k]} {self.stress[k]:.4g}"
 
@@ -79,7 +79,7 @@ class Homogenization:
     """Averages over a torn cell with its interfaces.
 
     Attributes:
-        law: of the bonds, without what tips release.
+        law: law of the bonds, without energies that tips release.
         interface: the contact problem.
     """
 
@@ -102,7 +102,7 @@ class Homogenization:
     def respond(self, strains: Float, bonds: BondState, starts: Sequence[Float]) -> list[Response]:
         """Solve the unit-cell problem under every strain of (k, v) and average.  Collective.
 
-        `bonds` have the debonded nodes and a guess of who is in contact; `starts` are first multipliers.
+        `bonds` have the debonded nodes and first contact statuses; `starts` are first multipliers.
 
         Raises:
             ConvergenceError: a solve broke down and left no numbers.
@@ -113,10 +113,9 @@ class Homogenization:
         return [self.response(self.interface.equilibrium(Load.strain(E), bonds, start), 1.0) for E, start in pairs]
 
     def response(self, state: Equilibrium, scale: float, brief: bool = False) -> Response:
-        """Return the averages of `scale` times an equilibrium. Collective.
+        """Return the averages of `scale` times an equilibrium.  Collective.
 
-        If `brief`, a state that F lambda did not confirm has those that follow from its multipliers, and of the checks
-        those of contact alone.
+        If `brief`, a state that F lambda did not confirm has averages by its multipliers and checks of contact alone.
 
         Raises:
             ConvergenceError: its numbers are not finite.
@@ -142,10 +141,10 @@ class Homogenization:
         acting = self.interface.acting(state.bonds, strain, state.asked)
         largest = (self._largest(u) + self.interface.scales.imposed(acting)) or 1.0
         imposed = float(self.interface.scales.imposed_strain(acting).max()) or 1.0
-        least = self.interface.scales.stress_scale(acting) * imposed
+        reuss = self.interface.scales.stress_scale(acting) * imposed
         checks = {
             "strain": float(np.abs(star - opening / self.cell.summary.area).max() / imposed) + self._strain_inside,
-            "hill": float(abs(energy + rubbing - stress @ strain) / (max(abs(energy), least) or 1.0)),
+            "hill": float(abs(energy + rubbing - stress @ strain) / (max(abs(energy), reuss) or 1.0)),
         }
         if solver.jump_operator.global_rows:
             checks["jump"] = self._largest(active * state.solution.jump) / largest
@@ -154,7 +153,7 @@ class Homogenization:
         return self._scaled(state, scale, stress, energy, u, checks)
 
     def _stretched(self, state: Equilibrium) -> float:
-        """Return lam C lam per area, twice what springs store; also of bonds that rub.  Collective."""
+        """Return lam C lam per area, twice the energy of springs, also of bonds that rub.  Collective."""
         springs = state.solution.compliance * state.solution.lam
         twice = float(state.solution.lam @ springs) + energy_beside_springs(self.interface, state)
         return float(self.cell.comm.allreduce(twice)) / self.cell.summary.area
@@ -163,11 +162,10 @@ class Homogenization:
         self, state: Equilibrium, scale: float, stress: Float, energy: float, u: Float, checks: dict[str, float]
     ) -> Response:
         """Return the response that is `scale` times a state with <sigma:eps> = `energy`.  Collective."""
-        counts = self.counts(state.status)
         means = scale * state.solution.strain, scale * stress
         energies = scale**2 * energy / 2, scale**2 * self._stretched(state) / 2
-        checks, damage = checks | state.certificate, self.damage(state.bonds)
-        return Response(*means, scale, *energies, state, scale * u, checks, counts, damage)
+        errors, damage = checks | state.certificate, self.damage(state.bonds)
+        return Response(*means, scale, *energies, state, scale * u, errors, self.counts(state.status), damage)
 
     def damage(self, bonds: BondState) -> Float:
         """(k,) damage of the bonds, 0 intact to 1 broken."""
@@ -175,27 +173,24 @@ class Homogenization:
         return (bonds.status != BONDED).astype(float) if damage is None else damage
 
     def _rubbing(self, state: Equilibrium) -> float:
-        """Return the sum of force times slip of faces with friction, per area: what the loads do not store.
-
-        Collective.
-        """
+        """Return the sum of force times slip of faces with friction, per area, which is not stored.  Collective."""
         if state.bonds.gap_and_slip is None:
             return 0.0
-        own = float(state.solution.lam @ state.solution.jump) - energy_beside_springs(self.interface, state)
-        return float(self.cell.comm.allreduce(own)) / self.cell.summary.area
+        work = float(state.solution.lam @ state.solution.jump) - energy_beside_springs(self.interface, state)
+        return float(self.cell.comm.allreduce(work)) / self.cell.summary.area
 
     def _unmet_stress(self, state: Equilibrium, stress: Float) -> float:
-        """Return the error of the prescribed stresses, relative to the load and to the stresses. Collective."""
+        """Return the error of the prescribed stresses, relative to the load and to the stresses.  Collective."""
         load, scales = state.load, self.interface.scales
-        # Scaled by the roots of their stiffnesses, so that none is small beside another.
+        # Scaled by the roots of their stiffnesses, so that none is small next to another.
         root, imposed = scales.roots, scales.imposed_strain(state.asked)
-        off = np.abs((stress - load.values)[load.by_stress] / root[load.by_stress]).max()
+        error = np.abs((stress - load.values)[load.by_stress] / root[load.by_stress]).max()
         largest = max(np.abs(stress / root)[: len(imposed)].max(), (root[: len(imposed)] * imposed).max())
-        return float(off / (largest or 1.0))
+        return float(error / (largest or 1.0))
 
     def counts(self, status: Status) -> dict[str, int]:
-        """Interface nodes in each state; collective."""
-        if self.cell.summary.across:  # no multiplier is there, and nothing can part
+        """Count interface nodes in each state.  Collective."""
+        if self.cell.summary.across:  # without multipliers there nothing can part
             return {"bonded": self.cell.summary.interface_nodes or 0, "open": 0, "closed": 0}
         numbers = np.array([(status == kind).sum() for kind in (BONDED, OPEN, CLOSED)])
         sums = self.cell.comm.allreduce(numbers)
@@ -212,21 +207,21 @@ class Homogenization:
 
     @cached_property
     def _strain_of_displacements(self) -> Float:
-        """(boundary dofs, m) of which int eps* over bodies and voids is the transpose times u."""
+        """(boundary dofs, m) matrix whose transpose times u is int eps* over bodies and voids."""
         m, dofs = self.cell.solver.problem.strains, self.cell.solver.interface_operators.dofs
         pairs = zip(self.cell.subdomains, dofs, strict=True)
-        return np.concatenate([np.zeros((0, m)), *(s.mean_strain(own) for s, own in pairs)])
+        return np.concatenate([np.zeros((0, m)), *(s.mean_strain(boundary) for s, boundary in pairs)])
 
     @cached_property
     def _strain_inside(self) -> float:
         """The largest share of an inner node in int eps*, relative: 0 of closed meshes and voids.  Collective."""
         inner, size = 0.0, 0.0
-        for s, own in zip(self.cell.subdomains, self.cell.solver.interface_operators.dofs, strict=True):
+        for s, boundary in zip(self.cell.subdomains, self.cell.solver.interface_operators.dofs, strict=True):
             size = max(size, float(np.sqrt(s.area)))
             if not s.loads_inside:
                 continue
             inside = np.ones(s.n_dofs, bool)
-            inside[own] = False
+            inside[boundary] = False
             if s.submesh.pinned >= 0:  # it does not move
                 inside[s.problem.dofs(np.array([s.submesh.pinned]))] = False
             inner = max(inner, float(np.abs(s.mean_strain(np.flatnonzero(inside))).max(initial=0.0)))
@@ -248,21 +243,58 @@ class Homogenization:
         return float(self.cell.comm.allreduce(np.abs(values).max(initial=0.0), MPI.MAX))
 
 
+class FibreInterfaces:
+    """Interfaces of the f fibres of a cell, by their numbers; a coated fibre may have two.
+
+    A node has its tributary length, debonded or not.
+    """
+
+    def __init__(self, cell: TornCell) -> None:
+        """Sum the lengths of all interfaces.  Collective."""
+        self._comm, self._nodes = cell.comm, cell.solver.jump_operator.nodes
+        self._fibres, self._pairs = cell.summary.fibres, len(cell.case.interfaces)
+        self._fibre = cell.summary.fibre_number(self._nodes.fibre) - 1
+        self._length = self._sums(self._nodes.length)
+        of_coating = self._sums(self._nodes.length * ~cell.summary.is_fibre[self._nodes.fibre])
+        radius = np.where(of_coating > 0, np.nan, cell.summary.radii[cell.summary.fibre_bodies])
+        round_fibre = np.degrees(1.0 / np.where(np.isnan(radius), 1.0, radius))
+        self._degrees = np.where(np.isnan(radius), 360.0 / np.where(self._length > 0, self._length, 1.0), round_fibre)
+
+    def debonded_length(self, status: Status) -> Float:
+        """(f,) debonded length of each fibre's interface; `status` (k,) of this rank's nodes.  Collective."""
+        return self._sums(self._nodes.length * (status != BONDED))
+
+    def damaged_length(self, damage: Float) -> Float:
+        """(f,) length of each fibre's interface with damage (k,) between 0 and 1, which still holds.  Collective."""
+        return self._sums(self._nodes.length * ((damage > 0.0) & (damage < 1.0)))
+
+    def loose(self, status: Status) -> list[int]:
+        """Return the numbers, from 1, of fibres without a bond that holds.  Collective."""
+        bonded = self._sums(self._nodes.length * (status == BONDED))
+        return [int(number) for number in np.flatnonzero((bonded == 0.0) & (self._length > 0.0)) + 1]
+
+    def angle(self, length: Float) -> Float:
+        """(f,) degrees of arc of lengths (f,): 360 times their share if not round, or coated with an interface."""
+        return np.asarray(length * self._degrees)
+
+    def share(self, length: Float) -> float:
+        """Return the share of lengths (f,) in all interfaces."""
+        return float(length.sum() / (self._length.sum() or 1.0))
+
+    def shares(self, status: Status) -> Float:
+        """(i,) debonded share of the length of the interfaces of each section [[interface]].  Collective."""
+        length, debonded = (
+            np.bincount(self._nodes.pair, values, self._pairs).astype(float)
+            for values in (self._nodes.length, self._nodes.length * (status != BONDED))
+        )
+        length = allreduce_sum(self._comm, length)
+        return np.asarray(allreduce_sum(self._comm, debonded) / np.where(length > 0, length, 1.0))
+
+    def _sums(self, values: Float) -> Float:
+        sums: Float = np.bincount(self._fibre, values, self._fibres).astype(float)
+        return allreduce_sum(self._comm, sums)
+
+
 def asymmetry(L: Float) -> float:
     """max |L - L^T| / max |L|."""
     return float(np.abs(L - L.T).max() / np.abs(L).max())
-
-
-def displacement(cell: TornCell, strain: Float, u: Float) -> Float:
-    """(nodes, c) total displacement H y + u*, Eq. (14), at the plane nodes of this rank's parts; H y of the strains."""
-    points = np.concatenate([s.mesh.points for s in cell.parts] or [np.zeros((0, 2))])
-    problem = cell.solver.problem
-    imposed = points @ problem.gradient(strain[: problem.strains]).T
-    return np.asarray(imposed + fluctuation(cell, u))
-
-
-def fluctuation(cell: TornCell, u: Float) -> Float:
-    """(nodes, c) u* at these nodes."""
-    parts, c = zip(cell.parts, cell.offsets, strict=False), cell.solver.problem.components
-    own = [u[o : o + len(s.dofs)].reshape(-1, c)[s.mesh.node_class] for s, o in parts]
-    return np.concatenate(own or [np.zeros((0, c))])

@@ -1,27 +1,37 @@
-"""Remarks on a cell that its case may not lead to expect, and the interfaces of the case between its phases."""
+"""Interfaces of a case between the phases of its cell, unexpected properties of the cell, and unresolved bonds."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
 from feti_homog.case.case import Case
 from feti_homog.case.interface_section import interface_label
-from feti_homog.homogenization import bonds
+from feti_homog.homogenization import phase_laws
+from feti_homog.materials.constants import engineering_moduli
+from feti_homog.materials.laws import plane_stiffness
+from feti_homog.mesh.coarse_mesh import CoarseMesh, interface_edges
 from feti_homog.mesh.periodic_topology import Torus
 from feti_homog.mesh.submesh import pinned_class
 from feti_homog.schema.wording import toml_value
 from feti_homog.typing import AnyInt, Int
 
 SAME_FRACTION = 0.01  # of a matched table and its cell, relative
+# Largest element on an interface / length of the process zone. With 0.54 of it the stresses of the square cell of
+# tests/parallel/test_energy.py are within 1.4 % of those with elements a quarter as long, with 1.1 of it within 4.3 %.
+RESOLVED = 0.5
+# The same of cohesive laws, whose tractions fall along it.
+RESOLVED_SOFTENING = 1 / 3
+# Relative difference of stiffness ratios, or of teeth, that is none.
+SAME_RATIO = 1e-3
+LARGEST_REFINE, SMALLEST_SIZE = 8, 1e-5
 
 
 def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:
-    """(phases, phases) symmetric: the place of the interface between two phases among the case's.
+    """(phases, phases) numbers of the case's interfaces between two phases; -1 where they never part.
 
-    It is -1 where there is none and they never part.
-
-    An interface without `between` is that of the matrix, the first phase, with all others; so is perfect
-    bonding, which is looked at there too.
+    An interface without `between` lies between the matrix, the first phase, and all other phases; perfect bonding too.
     """
     pairs = np.full((len(phases), len(phases)), -1)
     for number, between in enumerate([interface.between for interface in case.interfaces] or [None]):
@@ -33,85 +43,73 @@ def pairs_of(case: Case, phases: tuple[str, ...]) -> Int:
     return pairs
 
 
-def faults(case: Case, phases: tuple[str, ...], left: AnyInt, right: AnyInt) -> list[str]:
-    """Faults of interfaces between phases that the cell does not have, or that touch nowhere in it.
+def faults(case: Case, phases: tuple[str, ...], first: AnyInt, second: AnyInt) -> list[str]:
+    """List faults of interfaces between phases that the cell lacks, or that touch nowhere in it.
 
-    Those numbered `left` (n,) touch those numbered `right` (n,).
+    Phases `first` (n,) touch phases `second` (n,).
     """
-    found = []
+    lines = []
     touching = np.zeros((len(phases), len(phases)), bool)
-    touching[left, right] = touching[right, left] = True
+    touching[first, second] = touching[second, first] = True
     for number, interface in enumerate(case.interfaces):
         if interface.between is None:
             continue
         line = f"[{interface_label(number, len(case.interfaces))}] between = {toml_value(list(interface.between))}: "
         unknown = [name for name in interface.between if name not in phases]
         if unknown:
-            found.append(f"{line}the cell has no phase {toml_value(unknown[0])}; it has {', '.join(phases)}")
+            lines.append(f"{line}the cell has no phase {toml_value(unknown[0])}; it has {', '.join(phases)}")
         elif not touching[tuple(map(phases.index, interface.between))]:
-            found.append(f"{line}expected phases that touch; in this cell they do nowhere")
-    return found
+            lines.append(f"{line}expected phases that touch; in this cell they do nowhere")
+    return lines
 
 
 def mesh_remarks(case: Case, torus: Torus, pairs: Int) -> tuple[str, ...]:
-    """List what the mesh remarks, an [interface] without an effect, and nodes that never part, a line each.
+    """List remarks on the mesh: its own, an [interface] without an effect, and nodes that never part.
 
     `pairs` as in `share_entities`.
     """
-    return (
-        *torus.mesh.remarks,
-        *_bonding(case, len(torus.mesh.debonded_edges) > 0),
-        *((*_held_nodes(torus, pairs), *_pinned_bond(torus)) if case.interfaces else ()),
-    )
-
-
-def _held_nodes(torus: Torus, pairs: Int) -> tuple[str, ...]:
-    """Count the nodes of interfaces that never part: where three bodies meet, and where two meet more than once."""
-    left, right, edge = torus.sides
-    may_part = pairs[torus.mesh.phase[left], torus.mesh.phase[right]] >= 0
-    ends = np.unique(torus.edge_ends[edge[may_part & (torus.constituent[left] != torus.constituent[right])]])
+    lines, has_curve = [*torus.mesh.remarks], len(torus.mesh.debonded_edges) > 0
+    if case.interface is None:
+        return (*lines, *(['the curve "debonded" of the mesh is bonded: there is no [interface]'] if has_curve else []))
+    can_open = case.arcs or has_curve or phase_laws.has_springs(case) or case.section.breaks
+    if case.cell.has_own_mesh and not can_open:
+        lines.append("[interface]: nothing is debonded, and no bond is elastic: the bonding is perfect")
+    first, second, edge = torus.sides
+    may_part = pairs[torus.mesh.phase[first], torus.mesh.phase[second]] >= 0
+    ends = np.unique(torus.edge_ends[edge[may_part & (torus.constituent[first] != torus.constituent[second])]])
     kinds = ((torus.meeting[ends] > 2, "three bodies meet"), (torus.touching[ends], "two bodies meet more than once"))
-    words = [f"at {which.sum()} {what}" for which, what in kinds if which.any()]
-    return (f"[interface] nodes that never part: {', '.join(words)}",) if words else ()
+    if counts := [f"at {which.sum()} {kind}" for which, kind in kinds if which.any()]:
+        lines.append(f"[interface] nodes that never part: {', '.join(counts)}")
+    return (*lines, *_pinned_bond(torus))
 
 
-def _pinned_bond(torus: Torus) -> tuple[str, ...]:
-    """Mention that the node which is pinned against translation, Eq. (15), is a bond, and so never parts."""
+def _pinned_bond(torus: Torus) -> list[str]:
+    """Remark a bond at the node that is pinned against translation, Eq. (15): it never parts."""
     at = np.searchsorted(torus.class_keys, pinned_class(torus))
     if torus.never_part[at] or torus.meeting[at] < 2:
-        return ()
+        return []
     x, y = torus.mesh.points[np.flatnonzero(torus.node_class == at)[0]]
-    return (
+    return [
         f"[interface] the node at ({x:.6g}, {y:.6g}) never parts: it holds the cell, for all nodes of the mesh are on "
-        "interfaces; use a finer mesh",
-    )
-
-
-def _bonding(case: Case, has_debonded_curve: bool) -> tuple[str, ...]:
-    """Mention a debonded curve without an [interface], and an [interface] under which every bond is perfect."""
-    if case.interface is None:
-        return ('the curve "debonded" of the mesh is bonded: there is no [interface]',) if has_debonded_curve else ()
-    can_open = case.arcs or has_debonded_curve or bonds.has_springs(case) or case.section.breaks
-    if can_open or not case.cell.has_own_mesh:
-        return ()
-    return ("[interface]: nothing is debonded, and no bond is elastic: the bonding is perfect",)
+        "interfaces; use a finer mesh"
+    ]
 
 
 def subdomain_remarks(case: Case, bodies: int, subdomains: int, coarse_triangles: int) -> tuple[str, ...]:
-    """Mention that there are more or fewer subdomains than the case asks for, and why."""
+    """Remark more or fewer subdomains than the case asks for, with the reason."""
     asked = case.decomposition.subdomains
     if asked is None or asked == subdomains:
         return ()
     if subdomains > asked:
-        whole = f"each of the {bodies} bodies is at least one"
-        why = whole if bodies > asked else "pieces that METIS leaves in several parts were split"
+        bodies_alone = f"each of the {bodies} bodies is at least one"
+        why = bodies_alone if bodies > asked else "pieces that METIS leaves in several parts were split"
     else:
         why = f"METIS makes no more of {coarse_triangles} coarse triangles; a smaller mesh_size has more"
     return (f"[decomposition] subdomains = {asked}: {subdomains} were made: {why}",)
 
 
 def table_remarks(case: Case) -> tuple[str, ...]:
-    """Mention a fibre fraction other than that of the table that the cell matches."""
+    """Remark a fibre fraction that differs from the matched table."""
     cell = case.cell
     if cell.match is None or cell.matched is None or cell.fibre_fraction is None:
         return ()
@@ -122,3 +120,92 @@ def table_remarks(case: Case) -> tuple[str, ...]:
         f"[cell] fibre_fraction = {cell.fibre_fraction:g}: {cell.match.name} has {fraction:.4g}; neighbours are as far "
         "away as there, in diameters",
     )
+
+
+def longest_edge(mesh: CoarseMesh) -> float:
+    """Return the longest edge between phases; 0 if there is none."""
+    ends = mesh.points[interface_edges(mesh)]
+    return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max(initial=0.0))
+
+
+def process_zone(case: Case) -> float | None:
+    """Return the least length E' G_Ic / sigma_c^2 of bonds that break by energy; None of other bonds.
+
+    sigma_c = sqrt(2 k_n G_Ic), or the strength of a cohesive law, in the shorter of its pure modes.  E' is Young's
+    modulus of the plane state, E / (1 - nu^2) in plane strain, along the most compliant axis of all phases.
+    """
+    lengths = [1 / (2 * bond.normal_stiffness) for bond in case.interfaces if bond.toughness and bond.normal_stiffness]
+    for bond in case.interfaces:
+        pure = (bond.normal_toughness, bond.normal_strength), (bond.tangential_toughness, bond.tangential_strength)
+        lengths += [toughness / strength**2 for toughness, strength in pure if toughness and strength]
+    if not phase_laws.has_process_zone(case) or not lengths:
+        return None
+    moduli = [engineering_moduli(plane_stiffness(m, case.analysis.plane)) for m in case.materials.values()]
+    return min(min(m.E1, m.E2) for m in moduli) * min(lengths)
+
+
+def warnings(case: Case, width: float, edge: float) -> list[str]:
+    """Warn about elements on the interface that do not resolve the process zone, and about cohesive laws.
+
+    Args:
+        width: of the cell.
+        edge: `longest_edge` of the coarse mesh, which `refine` halves.
+    """
+    length, softens, lines = process_zone(case), phase_laws.has_softening(case), _law_warnings(case)
+    resolved = RESOLVED_SOFTENING if softens else RESOLVED
+    if length is None or edge / 2**case.cell.refine <= resolved * length:
+        return lines
+    size = f"elements on the interface are up to {edge / 2**case.cell.refine:.3g} long"
+    size += f" after refine = {case.cell.refine}" if case.cell.refine else ""
+    if softens:
+        zone, share = f"E' G / N^2 = {length:.3g} long", "a third"
+    else:
+        # The bonds of the shortest process zone break at this traction in pure opening.
+        pairs = [(bond.normal_stiffness or 0.0, bond.toughness or 0.0) for bond in case.interfaces]
+        stiffness, toughness = max(pair for pair in pairs if all(pair))
+        strength = f"{math.sqrt(2.0 * stiffness * toughness):.3g}"
+        zone, share = f"E' G_Ic / sigma_c^2 = {length:.3g} long for sigma_c = sqrt(2 k_n G_Ic) = {strength}", "half"
+    law, limit = f'[interface] law = "{case.interfaces[0].criterion}"', f"elements should be at most {share} of that"
+    remedies = _remedies(case, width, edge, resolved * length)
+    return [f"{law}: {size}; the process zone is {zone}, {limit}: set {remedies}", *lines]
+
+
+def _law_warnings(case: Case) -> list[str]:
+    """Warn if the energy of a cohesive law depends on the order of modes, and if its teeth overshoot."""
+    if not phase_laws.has_softening(case):
+        return []
+    lines, law = [], phase_laws.bond_law(case.interfaces, np.zeros(0, np.int64))
+    for number, bond in enumerate(case.interfaces):
+        stiffness, strength, toughness = (
+            getattr(bond, f"tangential_{kind}") / getattr(bond, f"normal_{kind}")
+            for kind in ("stiffness", "strength", "toughness")
+        )
+        similar = strength**2 / toughness
+        if abs(stiffness / similar - 1.0) > SAME_RATIO:
+            lines.append(
+                f"[{interface_label(number, len(case.interfaces))}] tangential_stiffness / normal_stiffness = "
+                f"{stiffness:.4g}: other than (normal_toughness / tangential_toughness) (tangential_strength / "
+                f"normal_strength)^2 = {similar:.4g}: the energy of bonds whose mode changes depends on the way"
+            )
+    excess, tolerance = law.overshoot, case.interfaces[0].softening_tolerance
+    if excess > tolerance * (1.0 + SAME_RATIO):
+        lines.append(
+            f"[interface] teeth = {case.interfaces[0].teeth}: the first exceeds the peak traction by {excess:.1%}, "
+            f"softening_tolerance is {tolerance:.1%}; without teeth the program chooses their number"
+        )
+    return lines
+
+
+def _remedies(case: Case, width: float, edge: float, length: float) -> str:
+    """Return keys that make elements as short as `length`."""
+    refine = math.ceil(math.log2(edge / length))
+    # Rounded down to two digits.
+    size = length * 2**case.cell.refine / width
+    digit = 10.0 ** (math.floor(math.log10(size)) - 1)
+    size = math.floor(size / digit + 1e-9) * digit
+    finer = [f"refine = {refine}"] if refine <= LARGEST_REFINE else []
+    if case.cell.has_own_mesh:
+        return " or ".join([*finer, "a finer mesh"])
+    if size >= SMALLEST_SIZE:
+        finer.insert(0, f"interface_size = {size:.2g} (or mesh_size, of all elements)")
+    return ", or ".join(finer) or "interface_size and refine"

@@ -16,7 +16,6 @@ from feti_homog.homogenization import arc_selection
 from feti_homog.mesh.arrange import listed_arrangement
 from feti_homog.mesh.coarse_mesh import CoarseMesh
 from feti_homog.mesh.fill.gmsh_mesher import NodedCell, UnmeshedCell, begin
-from feti_homog.mesh.outline.bare_outline import LineStations
 from feti_homog.mesh.sizes.element_estimate import ElementEstimate
 from feti_homog.mesh.sizes.graded_size import SizeField
 from feti_homog.mesh.tiles.filling import Filling, Tile, fill
@@ -29,27 +28,26 @@ T = TypeVar("T")
 
 
 def place_nodes(case: Case, comm: MPI.Intracomm, policy: TilePolicy) -> NodedCell | CoarseMesh | None:
-    """On rank 0 a user's mesh, or the cell with its tiles still to be filled.  Collective.
+    """Return a user's mesh, or the cell with nodes on lines, placed by all ranks, and empty tiles.  Collective.
 
-    The nodes on its lines are placed by all ranks.
+    None but on rank 0.
 
     Raises:
         CaseError, MeshError: on every rank, as `begin_mesh`.
     """
-    found = on_root_only(comm, begin_mesh, case, policy)
-    unmeshed = found if isinstance(found, UnmeshedCell) else None
+    cell = on_root_only(comm, begin_mesh, case, policy)
+    unmeshed = cell if isinstance(cell, UnmeshedCell) else None
     if not comm.bcast(unmeshed is not None):
-        assert not isinstance(found, UnmeshedCell)
-        return found
+        assert not isinstance(cell, UnmeshedCell)
+        return cell
     field: SizeField = comm.bcast(None if unmeshed is None else unmeshed.bare.field)
-    own = scatter(comm, [] if unmeshed is None else unmeshed.bare.lines.parts(comm.size))
-    stations = gather(comm, agree(comm, own.stations, field))
-    return on_root_only(comm, _with_nodes, unmeshed, stations)
+    lines = scatter(comm, [] if unmeshed is None else unmeshed.bare.lines.parts(comm.size))
+    stations = gather(comm, agree(comm, lines.stations, field))
 
+    def with_nodes(unmeshed: UnmeshedCell) -> NodedCell:
+        return unmeshed.with_nodes(unmeshed.bare.lines.joined(stations))
 
-def _with_nodes(unmeshed: UnmeshedCell, stations: list[LineStations]) -> NodedCell:
-    """Return the cell with the nodes that ranks have placed."""
-    return unmeshed.with_nodes(unmeshed.bare.lines.joined(stations))
+    return on_root_only(comm, with_nodes, unmeshed)
 
 
 def begin_mesh(case: Case, policy: TilePolicy) -> UnmeshedCell | NodedCell | CoarseMesh:
@@ -59,37 +57,38 @@ def begin_mesh(case: Case, policy: TilePolicy) -> UnmeshedCell | NodedCell | Coa
         CaseError: a phase has no material, or a material no phase.
         MeshError: the cell cannot be meshed, or its mesh file is faulty.
     """
-    found: UnmeshedCell | NodedCell | CoarseMesh
+    cell: UnmeshedCell | NodedCell | CoarseMesh
     if case.cell.has_own_mesh:
         from feti_homog.mesh.readers.msh_reader import read_cell  # with the readers of all formats
 
-        found = read_cell(case.cell)
+        cell = read_cell(case.cell)
     else:
         listed = listed_arrangement(case.cell)
         estimate = ElementEstimate.of(case.cell, listed)
-        cell = replace(case.cell, tip_size=arc_selection.size(case, estimate))
-        found = begin(cell, listed, arc_selection.marks(case, estimate.fibres), policy)
-    cases.check_phases(case, found.phases)
-    return found
+        section = replace(case.cell, tip_size=arc_selection.size(case, estimate))
+        cell = begin(section, listed, arc_selection.marks(case, estimate.fibres), policy)
+    cases.check_phases(case, cell.phases)
+    return cell
 
 
-def fill_tiles(found: NodedCell | CoarseMesh | None, comm: MPI.Intracomm) -> CoarseMesh | None:
-    """Return the mesh on rank 0, the tiles that it has from `place_nodes` filled by all ranks. Collective.
+def fill_tiles(cell: NodedCell | CoarseMesh | None, comm: MPI.Intracomm) -> CoarseMesh | None:
+    """Return the mesh on rank 0, whose tiles from `place_nodes` all ranks fill.  Collective.
 
     Raises:
-        MeshError: on every rank, if one cannot fill a tile of its.
+        MeshError: on every rank, if one cannot fill a tile.
     """
-    tiles = [] if found is None or isinstance(found, CoarseMesh) else [tile for _, tile in found.parts]
+    tiles = [] if cell is None or isinstance(cell, CoarseMesh) else [tile for _, tile in cell.parts]
     gathered = gather(comm, agree(comm, fill_own, deal_tiles(tiles, [len(tile.points) for tile in tiles], comm)))
     fillings = [filling for _, filling in sorted(chain.from_iterable(gathered), key=itemgetter(0))]
-    return on_root_only(comm, _joined, found, fillings)
+
+    def joined(cell: NodedCell | CoarseMesh) -> CoarseMesh:
+        return cell if isinstance(cell, CoarseMesh) else cell.mesh(fillings)
+
+    return on_root_only(comm, joined, cell)
 
 
 def deal_tiles(tiles: list[T], loads: list[int], comm: MPI.Intracomm) -> list[tuple[int, T]]:
-    """Return those of the tiles of rank 0 that this rank fills, with their numbers; `loads` are their sizes.
-
-    Collective.
-    """
+    """Deal the tiles of rank 0, of sizes `loads`; return the numbers and tiles that this rank fills.  Collective."""
     parts: list[list[tuple[int, T]]] = [[] for _ in range(comm.size)]
     for k, rank in enumerate(balanced(np.array(loads, np.int64), comm.size).tolist()):
         parts[rank].append((k, tiles[k]))
@@ -97,14 +96,9 @@ def deal_tiles(tiles: list[T], loads: list[int], comm: MPI.Intracomm) -> list[tu
 
 
 def fill_own(tiles: list[tuple[int, Tile]]) -> list[tuple[int, Filling]]:
-    """Fill them; each keeps its number.
+    """Fill numbered tiles.
 
     Raises:
         MeshError: gmsh cannot fill one.
     """
     return [(k, fill(tile)) for k, tile in tiles]
-
-
-def _joined(found: NodedCell | CoarseMesh, fillings: list[Filling]) -> CoarseMesh:
-    """Return the mesh of these filled tiles, if it is not there already."""
-    return found if isinstance(found, CoarseMesh) else found.mesh(fillings)

@@ -1,8 +1,8 @@
-"""A virtual extension of the crack at the tip of a debonded arc, and what it releases.
+"""A virtual extension of the crack at the tip of a debonded arc, and the energy that it releases.
 
 The nodes around the tip turn about the centre of the fibre by s q, and their displacements with them; q is 1 near the
-tip and falls to 0 farther away.  That moves the tip along the interface by s R and leaves bonded nodes bonded and gaps
-as they are.  So it is an admissible variation of the equilibrium, whose energy changes as that of the elements does.
+tip and falls to 0 farther away.  The tip moves along the interface by s R, bonded nodes stay bonded, and gaps stay as
+they are: an admissible variation of the equilibrium, whose energy changes with the energy of the elements.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from feti_homog.typing import Float, Int
 Array = TypeVar("Array", Float, Int)
 
 QUARTER_TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
-# Radius around a tip beyond which nothing turns / distance to what must not turn, and at most / a period of the cell;
-# radius within which all turns alike / that one.
+# Radius around a tip beyond which nothing turns / distance to boundaries, and at most / a period of the cell; radius
+# within which all turns alike / this radius.
 REACH, REACH_OF_A_PERIOD, CORE = 0.8, 0.32, 0.5
 # Relative distance from a circle beyond which a node of the same bodies is on another boundary or image of them.
 OFF_CIRCLE = 1e-4
@@ -32,97 +32,75 @@ VOID = -1
 
 
 class CrackExtension:
-    """The elements of a rank, from which the energy of a crack's extension is summed."""
-
-    def __init__(self, subdomains: Sequence[Subdomain], period: Float) -> None:
-        """`period` (2,) is that of the cell."""
-        self._pieces = [_Elements(s, period) for s in subdomains]
-
-    def energy_changes(self, bodies: Int, tips: Float, spokes: Float, reach: Float, u: Float, E: Float) -> Float:
-        """(t,) changes of this rank's energy when the crack at each tip turns by a unit angle.
-
-        Args:
-            bodies: (t, 2) the two constituents between which each tip is; no other is within its reach.
-            tips, spokes: (t, 2) their places, and those from the centres of their circles.
-            reach: (t,) beyond it nothing turns.
-            u: (dofs of this rank,) u*.
-            E: (2, 2) macroscopic strain.
-        """
-        change, first = np.zeros(len(bodies)), 0
-        for piece in self._pieces:
-            last = first + piece.subdomain.n_dofs
-            own = u[first:last].reshape(-1, 2)[piece.subdomain.mesh.node_class]
-            first = last
-            for t in np.flatnonzero((bodies == piece.subdomain.submesh.body).any(axis=1)):
-                change[t] += piece.energy_change(tips[t], spokes[t], reach[t], own, E)
-        return change
-
-
-class _Elements:
-    """The elements of a subdomain, found around points."""
+    """Elements of a subdomain, found around points, from which the energy of a crack's extension is summed."""
 
     def __init__(self, subdomain: Subdomain, period: Float) -> None:
+        """`period` (2,) of the cell."""
         mesh = subdomain.mesh
-        self.subdomain, self.period = subdomain, period
+        self.subdomain, self._period = subdomain, period
         self._tree = cKDTree(wrapped(mesh.points, period), boxsize=period)
         elements = np.repeat(np.arange(len(mesh.triangles)), mesh.triangles.shape[1])
         entries = np.ones(len(elements), np.int8), (mesh.triangles.ravel(), elements)
         self._elements_of = csr_matrix(entries, shape=(len(mesh.points), len(mesh.triangles)))
 
     def energy_change(self, tip: Float, spoke: Float, reach: float, u: Float, E: Float) -> float:
-        """Return the same of these elements and one tip; u (plane nodes, 2)."""
-        near = self._tree.query_ball_point(wrapped(tip, self.period), reach)
-        if not near:
+        """Return the change of energy when the crack at a tip turns by a unit angle.
+
+        Args:
+            tip, spoke: (2,) place, and place relative to the centre of the circle.
+            reach: distance beyond which nothing turns.
+            u: (dofs,) u*.
+            E: (2, 2) macroscopic strain.
+        """
+        inside = self._tree.query_ball_point(wrapped(tip, self._period), reach)
+        if not inside:
             return 0.0
         mesh = self.subdomain.mesh
-        nodes = mesh.triangles[np.unique(self._elements_of[near].indices)]
+        nodes = mesh.triangles[np.unique(self._elements_of[inside].indices)]
         points = mesh.points[nodes]
-        away = nearest_image(points - tip, self.period)
-        # An element lies as one, at the image of its node that is nearest to the tip.
+        away = nearest_image(points - tip, self._period)
+        # An element moves as one to the image of its node that is nearest to the tip.
         nearest = np.argmin((away**2).sum(axis=2), axis=1)[:, None, None]
         away = points + np.take_along_axis(away - points, nearest, axis=1)
         share = np.clip((reach - np.linalg.norm(away, axis=2)) / (reach * (1 - CORE)), 0.0, 1.0)[..., None]
-        total = u[nodes] + away @ E
+        total = u.reshape(-1, 2)[mesh.node_class[nodes]] + away @ E
         moved, changed = share * ((away + spoke) @ QUARTER_TURN.T), share * (total @ QUARTER_TURN.T)
         return energy_change(points, total, self.subdomain.L[:3, :3], moved, changed, self.subdomain.is_mixed)
 
 
 def body_boundaries(comm: MPI.Comm, subdomains: Sequence[Subdomain]) -> tuple[Float, Int]:
-    """(k, 2) nodes on the boundaries of the bodies of all ranks, and (k,) whose they are; VOID at voids.  Collective.
+    """(k, 2) nodes on the boundaries of the bodies of all ranks, and (k,) their bodies; VOID at voids.  Collective.
 
-    Where two bodies meet, nodes come once for each.  Cuts between the pieces of a body are no boundaries of it.
+    Each body has its own nodes where two bodies meet.  Cuts between the pieces of a body are no boundaries.
     """
-    sides = [np.bincount(s.submesh.edge_class[s.submesh.triangle_edges].ravel()) == 1 for s in subdomains]
-    keys = [s.submesh.edge_keys[own] for s, own in zip(subdomains, sides, strict=True)]
-    own_edges = [
-        np.column_stack([key, np.full(len(key), s.submesh.body)]) for s, key in zip(subdomains, keys, strict=True)
-    ]
-    edges, pieces = np.unique(_of_all(comm, own_edges, np.zeros((0, 2), np.int64)), axis=0, return_counts=True)
-    cuts = edges[pieces > 1]
-    points, body = [], []
-    for s, own in zip(subdomains, sides, strict=True):
+    borders = [np.bincount(s.submesh.edge_class[s.submesh.triangle_edges].ravel()) == 1 for s in subdomains]
+    rows = []
+    for s, border in zip(subdomains, borders, strict=True):
+        key = s.submesh.edge_keys[border]
+        rows.append(np.column_stack([key, np.full(len(key), s.submesh.body)]))
+    edges, pieces = np.unique(_of_all(comm, rows, np.zeros((0, 2), np.int64)), axis=0, return_counts=True)
+    cuts, points, body = edges[pieces > 1], [], []
+    for s, border in zip(subdomains, borders, strict=True):
         cut = np.isin(s.submesh.edge_keys, cuts[cuts[:, 1] == s.submesh.body, 0])
-        for which, name in ((own & ~cut & ~s.submesh.at_void, s.submesh.body), (s.submesh.at_void, VOID)):
-            points.append(s.mesh.points[np.unique(nodes_along(s.submesh, s.mesh, which))])
+        for edge, name in ((border & ~cut & ~s.submesh.at_void, s.submesh.body), (s.submesh.at_void, VOID)):
+            points.append(s.mesh.points[np.unique(nodes_along(s.submesh, s.mesh, edge))])
             body.append(np.full(len(points[-1]), name))
     return _of_all(comm, points, np.zeros((0, 2))), _of_all(comm, body, np.zeros(0, np.int64))
 
 
-def _of_all(comm: MPI.Comm, own: list[Array], none: Array) -> Array:
-    """Return the rows of all ranks; `none` has no rows. Collective."""
-    rows: Array = np.concatenate(comm.allgather(np.concatenate([none, *own])))
-    return rows
+def _of_all(comm: MPI.Comm, rows: list[Array], none: Array) -> Array:
+    """Return the rows of all ranks; `none` has no rows.  Collective."""
+    joined: Array = np.concatenate(comm.allgather(np.concatenate([none, *rows])))
+    return joined
 
 
 def reach_of_tips(tips: Float, spokes: Float, bodies: Int, boundaries: tuple[Float, Int], period: Float) -> Float:
-    """(t,) radius around each tip in which its crack may be extended.
-
-    No other tip and no boundary is there but the circle between its bodies.
+    """(t,) radius around each tip in which its crack may be extended: no other tip, no boundary but its circle.
 
     Args:
-        tips, spokes: (t, 2) their places, and those from the centres of their circles.
-        bodies: (t, 2) the two constituents between which each tip is.
-        boundaries: those of all bodies (`body_boundaries`).
+        tips, spokes: (t, 2) places, and places relative to the centres of their circles.
+        bodies: (t, 2) constituents on both sides of each tip.
+        boundaries: nodes and bodies of `body_boundaries`.
     """
     radius, (points, body) = np.linalg.norm(spokes, axis=1), boundaries
     reach = np.minimum(radius, REACH_OF_A_PERIOD / REACH * period.min())
@@ -130,11 +108,11 @@ def reach_of_tips(tips: Float, spokes: Float, bodies: Int, boundaries: tuple[Flo
     if len(tips) > 1:
         nearest, _ = cKDTree(places, boxsize=period).query(places, 2)
         reach = np.minimum(reach, nearest[:, 1])
-    near = cKDTree(wrapped(points, period), boxsize=period).query_ball_point(places, reach)
-    for t, others in enumerate(near):
-        away = nearest_image(points[others] - tips[t], period)
+    inside = cKDTree(wrapped(points, period), boxsize=period).query_ball_point(places, reach)
+    for t, nodes in enumerate(inside):
+        away = nearest_image(points[nodes] - tips[t], period)
         off_circle = np.abs(np.linalg.norm(away + spokes[t], axis=1) / radius[t] - 1) > OFF_CIRCLE
-        limits = off_circle | ~np.isin(body[others], bodies[t])
+        limits = off_circle | ~np.isin(body[nodes], bodies[t])
         reach[t] = min(reach[t], np.linalg.norm(away[limits], axis=1).min(initial=np.inf))
     return np.asarray(REACH * reach)
 

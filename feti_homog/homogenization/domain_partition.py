@@ -1,4 +1,4 @@
-"""The cut cell, on rank 0: from a case to its coarse mesh, and to the submeshes that each rank gets."""
+"""The cut cell, on rank 0: from its coarse mesh to the submeshes of each rank."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from feti_homog.case.case import Case
 from feti_homog.errors import CaseError
 from feti_homog.feti.decomposition.partition import Decomposition, decompose, halves
-from feti_homog.homogenization import arc_selection, cell_remarks, process_zone
+from feti_homog.homogenization import arc_selection, cell_remarks
 from feti_homog.homogenization.arc_selection import InterfaceNodes
 from feti_homog.homogenization.cell_remarks import mesh_remarks, subdomain_remarks, table_remarks
 from feti_homog.homogenization.partition_policy import (
@@ -40,18 +40,18 @@ class CellSummary:
         phases: names of the material phases, the matrix first.
         bodies, subdomains, coarse_triangles: numbers of them.
         interface_edge: longest coarse edge between phases.
-        numbers: (constituents,) of the fibre that each is, from 1 as in case files, or that it coats; 0 of the matrix.
-        is_fibre: (constituents,) which are fibres: neither the matrix nor a coating of one.
+        numbers: (constituents,) numbers from 1, as in case files, of fibres and of the fibres that coatings coat; 0 of
+            the matrix.
+        is_fibre: (constituents,) mark fibres, not the matrix and coatings.
         constituent_phase: (constituents,) place of the phase of each in `phases`.
-        centres, radii: (constituents, 2) and (constituents,) centre, within the cell, and radius of each fibre, NaN
-            where there is none.
-        frames: (constituents, 2, 2) those of `Ellipses`, of fibres that are circles or ellipses; else NaN.
-        snapped: how far a node of a user's mesh was moved to make sides match, at most.
-        voids: how many there are.
-        match_distance: how far the fibres are from the table that they match, see `random_fibres`; None without one.
-        remarks: how the cell differs from what the case may lead to expect, a line each.
+        centres, radii: (constituents, 2) and (constituents,) centres, in the cell, and radii of fibres, else NaN.
+        frames: (constituents, 2, 2) as in `Ellipses`, of fibres that are circles or ellipses; else NaN.
+        snapped: largest distance by which nodes of a user's mesh were moved to make sides match.
+        voids: number of voids.
+        match_distance: distance of the fibres to the table that they match, see `random_fibres`; None without table.
+        remarks: unexpected properties of the cell, a line each.
         across: whether subdomains are pieces across materials.
-        interface_nodes: how many there are of interfaces, where `across` has no multipliers there.
+        interface_nodes: number of interface nodes, if `across`, which has no multipliers there.
     """
 
     width: float
@@ -87,19 +87,16 @@ class CellSummary:
 
     @property
     def fibre_bodies(self) -> Int:
-        """(fibres,) the constituents that are fibres, in the order of their numbers."""
+        """(fibres,) constituents that are fibres, by their numbers."""
         return np.flatnonzero(self.is_fibre)
 
     @property
     def coatings(self) -> Float:
-        """(fibres,) thickness of their coatings, 0 without one; NaN where they are not round."""
+        """(fibres,) thickness of coatings, 0 without one; NaN of fibres that are not round."""
         return coating_thickness(self.numbers, self.is_fibre, Ellipses(self.centres, self.frames).semi_axes)
 
     def fibre_number(self, constituent: Int) -> Int:
-        """(k,) numbers from 1 of the fibres that are these constituents (k,) or that these coat.
-
-        They are those that a case file has; 0 of the matrix.
-        """
+        """(k,) fibre `numbers` of constituents (k,)."""
         return np.asarray(self.numbers[constituent])
 
     def warnings(self) -> list[str]:
@@ -125,7 +122,7 @@ class RankShare:
     Attributes:
         summary, table: of the whole cell.
         pairs: (phases, phases) as in `cell_remarks.pairs_of`.
-        submeshes: those of the rank.
+        submeshes: submeshes of the rank.
     """
 
     summary: CellSummary
@@ -137,7 +134,7 @@ class RankShare:
 def distribute(
     case: Case, mesh: CoarseMesh, lattice: ReferenceLattice, n_ranks: int, policy: PartitionPolicy = DEFAULT_POLICY
 ) -> list[RankShare]:
-    """Cut the cell into subdomains and share them among the ranks; one share for each rank.
+    """Cut the cell into subdomains; return a share for each rank.
 
     Raises:
         CaseError: an arc of the case lies on a fibre that cannot have it, or selects no node.
@@ -147,8 +144,8 @@ def distribute(
     pairs = cell_remarks.pairs_of(case, mesh.phases)
     circles = fibre_circles(torus)
     centres = in_cell(circles[:, :2], mesh.period)
-    touching = (mesh.phase[each] for each in torus.sides[:2])
-    faults = cell_remarks.faults(case, mesh.phases, *touching) + arc_selection.fibre_faults(case, centres[is_fibre])
+    faults = cell_remarks.faults(case, mesh.phases, *(mesh.phase[side] for side in torus.sides[:2]))
+    faults += arc_selection.fibre_faults(case, centres[is_fibre])
     moved = (debonded_arcs.NOT_MOVED,) * len(case.interfaces)
     if case.arcs and not faults:
         nodes = InterfaceNodes.of(torus, lattice, pairs, numbers, centres)
@@ -158,21 +155,22 @@ def distribute(
         raise CaseError(*faults)
     parts = torus.constituent if case.cell.bodies == "torus" else torus.plane_parts()
     bodies, triangles = int(parts.max()) + 1, len(mesh.triangles)
-    found = _cut_across(case, torus, lattice, n_ranks, policy)
-    across = found is not None
-    if found is None:
-        wanted = wanted_pieces(case, np.bincount(parts), _outer_edges(torus, parts), lattice, n_ranks, policy)
-        found = decompose(torus, parts, wanted, n_ranks)
-    subdomain, rank = found.subdomain, found.rank
-    table = SubdomainTable.of(torus, subdomain, rank, across)
+    cut = _cut_across(case, torus, lattice, n_ranks, policy)
+    across = cut is not None
+    if cut is None:
+        sides = parts[np.stack(torus.sides[:2])]
+        shared_edges = np.bincount(sides[:, sides[0] != sides[1]].ravel(), minlength=bodies)
+        pieces = wanted_pieces(case, np.bincount(parts), shared_edges, lattice, n_ranks, policy)
+        cut = decompose(torus, parts, pieces, n_ranks)
+    table = SubdomainTable.of(torus, cut.subdomain, cut.rank, across)
     summary = CellSummary(
         width=mesh.width,
         height=mesh.height,
         phases=mesh.phases,
         bodies=bodies,
-        subdomains=len(rank),
+        subdomains=len(cut.rank),
         coarse_triangles=triangles,
-        interface_edge=process_zone.longest_edge(mesh),
+        interface_edge=cell_remarks.longest_edge(mesh),
         numbers=numbers,
         is_fibre=is_fibre,
         constituent_phase=torus.constituent_phase,
@@ -186,28 +184,28 @@ def distribute(
         remarks=(
             *table_remarks(case),
             *mesh_remarks(case, torus, pairs),
-            *subdomain_remarks(case, bodies, len(rank), triangles),
+            *subdomain_remarks(case, bodies, len(cut.rank), triangles),
         ),
         across=across,
         interface_nodes=_interface_nodes(torus, pairs, lattice) if across else None,
     )
-    shares = cut_for_ranks(torus, subdomain, table, n_ranks, pinned_class(torus))
-    return [RankShare(summary, table, pairs, own) for own in shares]
+    submeshes = cut_for_ranks(torus, cut.subdomain, table, n_ranks, pinned_class(torus))
+    return [RankShare(summary, table, pairs, share) for share in submeshes]
 
 
 def _cut_across(
     case: Case, torus: Torus, lattice: ReferenceLattice, n_ranks: int, policy: PartitionPolicy
 ) -> Decomposition | None:
-    """Return the cell cut across materials; None where that is not wanted, or leaves a rank without a piece."""
+    """Return the cell cut across materials; None if it is not asked for, or leaves a rank without a piece."""
     triangles = len(torus.mesh.triangles)
     pieces = policy.across_pieces(triangles * lattice.intervals**2, n_ranks) if can_be_cut_across(case) else 0
     if not 0 < pieces <= triangles:
         return None
     is_large = triangles * lattice.intervals**2 >= policy.strip_dofs
-    if pieces == n_ranks == 2 and is_large and (found := halves(torus)):
-        return found
-    found = decompose(torus, np.zeros(triangles, np.int64), np.array([pieces]), n_ranks)
-    return found if len(found.rank) >= n_ranks else None  # METIS leaves some pieces empty
+    if pieces == n_ranks == 2 and is_large and (strips := halves(torus)):
+        return strips
+    cut = decompose(torus, np.zeros(triangles, np.int64), np.array([pieces]), n_ranks)
+    return cut if len(cut.rank) >= n_ranks else None  # METIS leaves some pieces empty
 
 
 def match_distance(case: Case, width: float, height: float, centres: Float, radii: Float) -> float | None:
@@ -221,23 +219,16 @@ def match_distance(case: Case, width: float, height: float, centres: Float, radi
 
 
 def in_cell(points: Float, period: Float) -> Float:
-    """Return the images of points (k, 2) in [0, period); those that rounding puts at its end are at 0."""
+    """Return the images of points (k, 2) in [0, period); points at its end by rounding go to 0."""
     inside = np.mod(points, period)
     return np.where(inside > (1 - ROUNDING) * period, 0.0, inside)
 
 
 def _interface_nodes(torus: Torus, pairs: Int, lattice: ReferenceLattice) -> int:
-    """Return the number of nodes at which two bodies could part if they had an interface."""
-    left, right, edge = torus.sides
-    between = edge[pairs[torus.mesh.phase[left], torus.mesh.phase[right]] >= 0]
+    """Count the nodes at which two bodies could part if they had an interface."""
+    first, second, edge = torus.sides
+    between = edge[pairs[torus.mesh.phase[first], torus.mesh.phase[second]] >= 0]
     plane = np.unique(torus.torus_edge, return_index=True)[1][between]
     ends = np.unique(torus.node_class[torus.edges[plane]])
     may_part = ~torus.never_part[ends] & (torus.class_keys[ends] != pinned_class(torus))
     return len(between) * (lattice.intervals - 1) + int(may_part.sum())
-
-
-def _outer_edges(torus: Torus, parts: Int) -> Int:
-    """(b,) coarse edges of each body that others share."""
-    left, right, _ = torus.sides
-    outer = parts[left] != parts[right]
-    return np.bincount(np.r_[parts[left[outer]], parts[right[outer]]], minlength=int(parts.max()) + 1)

@@ -1,17 +1,27 @@
-"""Number of pieces that a cell is cut into: from the case, else the fastest."""
+"""Pieces that a cell is cut into, its memory, the ranks that it can use, and how often its dual operator is applied.
+
+Memory is linear in the degrees of freedom, for bodies are cut into pieces of one size.  `scripts/measure_cost.py`
+measures its constants.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from math import ceil
 
 import numpy as np
 
+from feti_homog.case.bond_laws import laws_with
 from feti_homog.case.case import Case
+from feti_homog.fem.problem import AXIAL, Problem
 from feti_homog.feti.decomposition.partition import pieces_for_count, pieces_for_size
+from feti_homog.feti.thresholds import INFLUENCE_COLUMNS, NEVER_REFACTORED_ROWS
 from feti_homog.homogenization import phase_laws
 from feti_homog.materials.laws import isotropic_ratio
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.mesh.tiles.tiles import DEFAULT_TILES, TilePolicy
+from feti_homog.microstructure.phase_names import COATING
 from feti_homog.system.petsc.option_table import only_prints
 from feti_homog.system.petsc.options import given_options
 from feti_homog.typing import Int
@@ -21,33 +31,47 @@ MOST_POISSON = 0.45
 # Ratio of stiffnesses up to which subdomains may have several phases: above, rounding in their dense matrices costs
 # accuracy (4e-7 at 1e6, 2e-10 at 9e3) and then convergence.
 MOST_CONTRAST = 1e3
-# Options that only set how exact the solver is: others that choose ask for a dual problem, which one subdomain has not.
+# Options that only set the accuracy of the solver; other options need a dual problem, which one subdomain lacks.
 TOLERANCES = {"feti_ksp_rtol", "feti_ksp_atol", "feti_ksp_max_it"}
+# Bytes of a rank without degrees of freedom, for each of these, and for each multiplier that has influence columns.
+BASE_BYTES, DOF_BYTES, COLUMN_BYTES = 1.8e8, 1.5e3, 2.0e4
+# Bytes more for each displacement of the largest problem of a cell that is one factor: of seven bonded cells of 31 000
+# to 271 000 degrees of freedom estimates are 0.93 to 1.07 times the measured memory, of two of order 2 0.85 times.
+FACTOR_BYTES = 2.9e2
+# Bytes more of a path to complete debonding with influence columns: for each multiplier of a rank, and for each pair of
+# one and a column, of which a cell that is factored anew has `INFLUENCE_COLUMNS`. Of five paths of 1 to 50 fibres, 120
+# to 4 110 multipliers, on one rank, estimates are 0.93 to 1.17 times the measured memory.
+PATH_BYTES, PAIR_BYTES = 7e4, 50
+# Bytes for each pair of jumps of debonded faces with friction: six dense matrices (`interface.friction`).
+FACE_PAIR_BYTES = 48
+# Degrees of freedom of a rank; with fewer, its waiting for others takes more than it saves.
+DOFS_OF_A_RANK = 50_000
+# Typical numbers, by which operators are chosen; iterations with coatings are without influence columns.
+ITERATIONS_OF_A_SOLVE, ITERATIONS_WITH_COATINGS, SOLVES_OF_A_CONTACT, SOLVES_OF_A_PATH = 20, 400, 3, 100
 
 
 @dataclass(frozen=True)
 class PartitionPolicy:
-    """Into how many pieces the mesh and bodies are cut by default; sizes in degrees of freedom after refinement.
+    """Default numbers of pieces of the mesh and of bodies; sizes in degrees of freedom after refinement.
 
     Attributes:
-        piece_dofs: of a piece; with smaller pieces the coarse problem takes longer, with larger ones the factors and
-            the dense matrices do.
-        piece_boundary_dofs: of a piece on the boundary to other bodies, at most; for pieces of narrow bodies.
-        cut_factor: a bonded body is cut if it is larger than a piece by this factor, or its boundary to other bodies is
-            than that of a piece.
-        even_cut_factor, even_share: instead of `cut_factor`, this one for bodies that are no more than this share of
-            the load of a rank, for they can be distributed evenly as they are.
-        breakable_boundary_dofs: where bonds may break, a body is cut only if its boundary has more: the cell is solved
-            so often then that whole bodies pay as long as dense matrices of their boundaries are small.
+        piece_dofs: size of a piece; smaller pieces make the coarse problem slower, larger ones the factors and the
+            dense matrices.
+        piece_boundary_dofs: largest boundary of a piece to other bodies; for pieces of narrow bodies.
+        cut_factor: a bonded body is cut if it, or its boundary, is larger than a piece's by this factor.
+        even_cut_factor, even_share: factor in place of `cut_factor` for bodies up to this share of the load of a rank,
+            which are distributed evenly without cuts.
+        breakable_boundary_dofs: where bonds may break, a body is cut if its boundary is larger: the cell is solved so
+            often that uncut bodies pay as long as dense matrices of their boundaries are small.
         tiles: of the coarse mesh.
         across_dofs: where nothing can part, cells up to this size are cut across materials, not body by body.
-        across_piece_dofs: of such a piece, which has no more multipliers than one of a body; so it may be larger.
-        whole_dofs: such a cell on one rank is not cut up to this size: one sparse factor takes less time than the dense
-            matrices of pieces do, and twice their memory.
-        whole_ranks: on up to so many ranks each has one piece of such a cell, whose Schur complements are factored
-            together; they are too large for more ranks.
-        strip_dofs: cells from this size on are halved into strips: below, boundaries are short anyway, and estimates of
-            errors, which leave boundaries as they are, depend less on the direction of METIS' cuts.
+        across_piece_dofs: size of such a piece, with as many multipliers as a smaller piece of a body.
+        whole_dofs: such a cell on one rank is not cut up to this size: one sparse factor takes less time than dense
+            matrices of pieces, and twice their memory.
+        whole_ranks: up to so many ranks have one piece each of such a cell, with Schur complements factored together;
+            for more ranks these are too large.
+        strip_dofs: cells from this size on are halved into strips: smaller ones have short boundaries anyway, and
+            mesh errors, estimated up to boundaries, depend less on the direction of METIS' cuts.
 
     `scripts/benchmark scripts/cases/benchmark_1m.toml --tools feti` times the bonded ones, `scripts/benchmark_path`
     those of bodies that may part, and `scripts/benchmark --table small` the last five.
@@ -67,10 +91,7 @@ class PartitionPolicy:
     strip_dofs: int = 30_000
 
     def across_pieces(self, dofs: int, n_ranks: int) -> int:
-        """Return into how many pieces a cell in which nothing can part is cut across materials; 0 for body by body.
-
-        As many for each rank.
-        """
+        """Return the pieces, equally many on each rank, of a cell cut across materials; 0 for body by body."""
         if dofs > self.across_dofs:
             return 0
         if n_ranks <= self.whole_ranks and dofs <= self.whole_dofs:
@@ -79,31 +100,27 @@ class PartitionPolicy:
 
 
 DEFAULT_POLICY = PartitionPolicy()
-# What runs of cases take: at most this many degrees of freedom are cheaper across materials.
+# The policy of runs: cells up to this size are cheaper across materials.
 BY_COST = PartitionPolicy(across_dofs=400_000)
 
 
 def can_be_cut_across(case: Case) -> bool:
     """Return whether subdomains may reach across materials: nothing parts, and the case leaves the cut to the program.
 
-    The scaling of jumps in nearly incompressible phases and between phases of very different stiffness is of bodies.
-    Options of the dual solver are for the subdomains that it is known for.
+    Jumps of nearly incompressible phases and of very different stiffness are scaled body by body; options of the dual
+    solver are meant for bodies.
     """
     asked, free = case.decomposition, ("auto", None, None, "torus")
     if case.interfaces or (asked.cut, asked.subdomains, asked.max_dofs, case.cell.bodies) != free:
         return False
-    given = {*case.petsc, *given_options()} - TOLERANCES
-    if any(name.startswith("feti_") and not only_prints(name) for name in given):
+    options = {*case.petsc, *given_options()} - TOLERANCES
+    if any(name.startswith("feti_") and not only_prints(name) for name in options):
         return False
     ratios = (isotropic_ratio(material) or 0.0 for material in case.materials.values())
-    return max(ratios) <= MOST_POISSON and _contrast(case) <= MOST_CONTRAST
-
-
-def _contrast(case: Case) -> float:
-    """Return the largest ratio of the largest entries of two phases' stiffnesses to strains, in any problem."""
+    # Contrast: the largest ratio of the largest entries of two phases' stiffnesses, in any problem.
     law_kinds = (phase_laws.plane_law, phase_laws.axial_law)[: len(phase_laws.problems(case))]
     sizes = np.array([[np.abs(law(case, phase)[:4, :4]).max() for phase in case.materials] for law in law_kinds])
-    return float((sizes.max(axis=1) / sizes.min(axis=1)).max())
+    return max(ratios) <= MOST_POISSON and float((sizes.max(axis=1) / sizes.min(axis=1)).max()) <= MOST_CONTRAST
 
 
 def wanted_pieces(
@@ -114,7 +131,7 @@ def wanted_pieces(
     n_ranks: int,
     policy: PartitionPolicy = DEFAULT_POLICY,
 ) -> Int:
-    """(b,) wanted pieces of each body, from the case, else from the policy; at least one for each rank.
+    """(b,) pieces of each body, from the case, else from the policy; at least one for each rank.
 
     Args:
         load: (b,) coarse triangles of each body.
@@ -138,3 +155,58 @@ def wanted_pieces(
     by_boundary = np.minimum(-(-boundary // policy.piece_boundary_dofs), load)
     pieces = np.where(to_cut, np.maximum(by_size, by_boundary), 1)
     return pieces if pieces.sum() >= n_ranks else pieces_for_count(load, n_ranks)
+
+
+def applications(case: Case, problem: Problem, across: bool = False) -> int:
+    """Estimate how many times the analysis applies the dual operator of a problem.
+
+    Coatings cost no iterations where pieces reach `across` materials.
+    """
+    has_arcs = bool(case.arcs) or case.cell.has_own_mesh  # with a curve "debonded", perhaps
+    touches = case.interface is not None and case.interface.contact and (has_arcs or case.section.is_followed)
+    contact = touches and problem != AXIAL  # along the fibres nothing touches
+    many = case.section.is_followed or (has_arcs and _asks_for_tips(case))
+    solves = SOLVES_OF_A_PATH if many else case.section.solves(len(problem.loads), contact)
+    iterations = ITERATIONS_WITH_COATINGS if COATING in case.materials and not across else ITERATIONS_OF_A_SOLVE
+    return iterations * solves * (SOLVES_OF_A_CONTACT if contact else 1)
+
+
+def _asks_for_tips(case: Case) -> bool:
+    """Return whether an envelope with arcs needs the inverse of the dual operator, which many solves call for."""
+    bond = case.interface
+    by_energy = bond is not None and bond.criterion in laws_with("growth") and bond.growth == "released"
+    return case.section.breaks and by_energy
+
+
+def memory(nodes: Sequence[int], subdomains: Sequence[int], components: Sequence[int], columns: int) -> float:
+    """Estimate the bytes of the largest rank; `nodes` and `subdomains` are of each rank.
+
+    Args:
+        components: displacements of a node in each problem.
+        columns: multipliers that have influence columns.
+    """
+    in_one_factor = max(components) * max(nodes) if max(subdomains) == 1 else 0
+    dofs = sum(components) * max(nodes)
+    return BASE_BYTES + dofs * DOF_BYTES + in_one_factor * FACTOR_BYTES + columns / len(nodes) * COLUMN_BYTES
+
+
+def memory_to_the_end(case: Case, few: float, multipliers: int, columns: int, ranks: int) -> float:
+    """Estimate the bytes of the largest rank when all bonds of a path have broken; `few` are its bytes before."""
+    stored = columns if columns <= NEVER_REFACTORED_ROWS else INFLUENCE_COLUMNS
+    faces = FACE_PAIR_BYTES * multipliers**2 if case.has_friction else 0
+    return few + columns / ranks * (PATH_BYTES + stored * PAIR_BYTES) + faces
+
+
+def recommended_ranks(dofs: int, bodies: int) -> int:
+    """Return how many ranks a cell can use: no more than its bodies, for more ranks would cut them.
+
+    Cut bodies cost iterations; of cells that are cut across materials coarse triangles stand for bodies.
+    """
+    return max(1, min(bodies, ceil(dofs / DOFS_OF_A_RANK)))
+
+
+def in_words(size: float) -> str:
+    """Return bytes in words."""
+    size /= 2**20
+    digits = 1 if size < 10 else 0
+    return f"{size:.{digits}f} MiB" if size < 1000 else f"{size / 1024:.1f} GiB"

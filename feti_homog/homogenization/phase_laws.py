@@ -1,26 +1,35 @@
-"""The problems that a case asks for on the plane mesh, and the stiffness of its phases in them.
+"""The problems of a case on the plane mesh, the stiffness of its phases in them, its springs and laws of bonds.
 
 In generalized plane strain the loads of the plane problem are e = [E11, E22, gamma12, E33, T], T a change of
-temperature, and A = N^T C N with N e = [E11, E22, gamma12, E33] - alpha T.  So A e is [S11, S22, S12, S33] and what
-works on T, and 1/2 e.A e the energy that is stored.
+temperature, and A = N^T C N with N e = [E11, E22, gamma12, E33] - alpha T.  So A e is [S11, S22, S12, S33] and the
+conjugate of T, and 1/2 e.A e the stored energy.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from feti_homog.case import cell_sizes
+from feti_homog.case import bond_laws, cell_sizes
 from feti_homog.case.case import Case
+from feti_homog.case.interface_section import InterfaceSection
 from feti_homog.fem.problem import AXIAL, GENERALIZED, PLANE, Problem
+from feti_homog.feti.decomposition.jump_operator import InterfaceSprings
+from feti_homog.interface.laws.bond_law import BondLaw, law_class
 from feti_homog.materials.derivatives import LawChange
 from feti_homog.materials.laws import expansion, plane_stiffness, spatial_stiffness
 from feti_homog.materials.voigt import PLANE_STATES
-from feti_homog.typing import Float
+from feti_homog.typing import Float, Int
 
 IN_PLANE, AXIAL_SHEAR = [0, 1, 5, 2], [4, 3]
-"""Where the strains of the plane problem, E33 among them, and of the axial one stand in the order of space."""
+"""Places of the strains of the plane problem, with E33, and of the axial problem in the order of space."""
+# Power of a fibre's factor for keys of these endings: laws remain similar, for all openings grow by the factor too, and
+# the length of the process zone stays.
+POWERS = {"strength": 1, "toughness": 2}
 
 
 def problems(case: Case) -> tuple[Problem, ...]:
@@ -94,15 +103,97 @@ def secants(plane: Float, *axial: Float) -> dict[str, Float]:
 
 
 def components(plane: Float, *axial: Float) -> Float:
-    """(3,) or, with an axial problem, (6,) components of a strain or stress from those of each problem."""
+    """(3,) or, with an axial problem, (6,) components of a strain or stress from its parts in each problem."""
     return spatial_vector(plane, *axial) if axial else plane
 
 
 def spatial_vector(plane: Float | None, axial: Float | None) -> Float:
     """(6,) from numbers [11, 22, 12, 33, ...] of the plane problem and [13, 23] of the axial one; None is zero."""
-    whole = np.zeros(6)
+    vector = np.zeros(6)
     if plane is not None:
-        whole[IN_PLANE] = plane[:4]
+        vector[IN_PLANE] = plane[:4]
     if axial is not None:
-        whole[AXIAL_SHEAR] = axial
-    return whole
+        vector[AXIAL_SHEAR] = axial
+    return vector
+
+
+def springs(case: Case) -> InterfaceSprings:
+    """Return normal and tangential springs of the problem in the plane."""
+    stiffness = ((bond.normal_stiffness or math.inf, bond.tangential_stiffness or math.inf) for bond in case.interfaces)
+    return InterfaceSprings(tuple(stiffness), has_softening(case))
+
+
+def axial_springs(case: Case) -> InterfaceSprings:
+    """Return the springs of the problem along the fibres; without a stiffness of their own as around the fibre."""
+    stiffness = ((bond.axial_stiffness or bond.tangential_stiffness or math.inf,) for bond in case.interfaces)
+    return InterfaceSprings(tuple(stiffness), has_softening(case))
+
+
+def has_softening(case: Case) -> bool:
+    """Return whether the law of the bonds changes their compliance."""
+    return case.interface is not None and bond_laws.LAWS[case.interface.criterion].softens
+
+
+def has_springs(case: Case) -> bool:
+    """Return whether any bond gives way."""
+    stiffnesses = (*springs(case).stiffness, *axial_springs(case).stiffness)
+    return any(math.isfinite(stiffness) for row in stiffnesses for stiffness in row)
+
+
+def strength_factors(case: Case, fibres: int) -> Float:
+    """(fibres,) strength of the bonds of each fibre / strength in the case.
+
+    f = (-ln(1 - U))^(1/m) / Gamma(1 + 1/m) with uniform U, Weibull's distribution of modulus m and mean 1, times the
+    column `strength` of a table of fibres.  Fibre N takes the N-th number of the generator in any cell.
+    """
+    factors, scatter = np.ones(fibres), case.interface.scatter if case.interface else None
+    if scatter is not None:
+        # A separate stream: the arrangement takes other numbers of the same seed.
+        uniform = np.random.default_rng(np.random.SeedSequence(scatter.seed, spawn_key=(1,))).random(fibres)
+        factors = (-np.log1p(-uniform)) ** (1.0 / scatter.shape) / math.gamma(1.0 + 1.0 / scatter.shape)
+    table = case.cell.table
+    if table is None:
+        return factors
+    from feti_homog.microstructure.periodic_table import fibre_rows  # with windows of tables
+
+    return factors * table.strength[fibre_rows(table, case.cell.window)]
+
+
+@dataclass(frozen=True)
+class SectionValues:
+    """Values of the keys of sections [interface] at nodes (k,) of the sections `pair` (k,).
+
+    `factor` (k,), by the fibre of each node, multiplies strengths, and squared toughnesses.
+    """
+
+    bonds: Sequence[InterfaceSection]
+    pair: Int
+    factor: float | Float
+
+    def __call__(self, key: str, *more: str) -> float | Float:
+        """Return the value of a key, or the next key with a value, at all nodes or (k,) at each; else inf."""
+        sections = self.everywhere(key, *more)
+        values = float(sections[0]) if len(sections) == 1 else sections[self.pair]
+        power = POWERS.get(key.rpartition("_")[2], 0)
+        return values * self.factor**power if power else values
+
+    def everywhere(self, key: str, *more: str) -> Float:
+        """(s,) values of all sections, for the factor 1."""
+        names = (key, *more)
+        values = [next((v for n in names if (v := getattr(bond, n)) is not None), math.inf) for bond in self.bonds]
+        return np.array(values or [math.inf], float)
+
+    def common(self, key: str) -> Any:
+        """Return the common value of all sections."""
+        return getattr(self.bonds[0], key)
+
+
+def bond_law(bonds: Sequence[InterfaceSection], pair: Int, factor: float | Float = 1.0) -> BondLaw:
+    """Return the law of the bonds at nodes (k,), arguments as in `SectionValues`; without sections no bond breaks."""
+    name = bonds[0].criterion if bonds else bond_laws.DEFAULT
+    return law_class(name).of_keys(SectionValues(bonds, pair, factor))
+
+
+def has_process_zone(case: Case) -> bool:
+    """Return whether elements must resolve the length along which the bonds of a case break."""
+    return case.interface is not None and bond_laws.LAWS[case.interface.criterion].has_process_zone

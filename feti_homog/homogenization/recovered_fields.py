@@ -1,4 +1,4 @@
-"""Recovery of fields from a response: displacements at nodes, strains and stresses of elements, tractions and jumps."""
+"""Fields of a response: displacements at nodes, strains and stresses of elements, tractions and jumps."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from feti_homog.fem.assembly import element_strain
-from feti_homog.homogenization.averaging import Response, displacement, fluctuation
+from feti_homog.homogenization.averaging import Response
 from feti_homog.homogenization.unit_cell import TornCell
 from feti_homog.materials import laws
 from feti_homog.typing import Float
@@ -19,9 +19,9 @@ class RecoveredFields:
 
     Attributes:
         displacement, fluctuation: (n, c).
-        strain, stress: (m, v) means over the elements: the loads in each, and what works on them.
+        strain, stress: (m, v) means over the elements: loads in each, and stresses that do work on them.
         traction, jump: (k, c).
-        shares: (m,) what each has of the estimated error of E . Sigma; NaN if the case asks for no estimate.
+        shares: (m,) shares of elements in the estimated error of E . Sigma; NaN without estimate.
     """
 
     displacement: Float
@@ -43,17 +43,32 @@ def recover(cell: TornCell, response: Response | None) -> RecoveredFields:
         return RecoveredFields(points, points, elements, elements, pairs, pairs, np.zeros(m))
     solution = response.state.solution
     u = cell.displacement(solution)
-    lam, opening = (response.scale * each for each in cell.across_bonds(solution, u))
-    u *= response.scale
+    lam, opening = (response.scale * rows for rows in cell.across_bonds(solution, u))
     pair = nodes.row[:, None] + np.arange(problem.components)
-    return RecoveredFields(
-        displacement(cell, response.strain, u),
-        fluctuation(cell, u),
-        *_element_fields(cell, response.strain, u),
-        lam[pair] / nodes.length[:, None],
-        opening[pair],
-        _shares(cell, response),
-    )
+    traction = lam[pair] / nodes.length[:, None]
+    fields = _part_fields(cell, response.strain, response.scale * u)
+    return RecoveredFields(*fields, traction, opening[pair], _shares(cell, response))
+
+
+def _part_fields(cell: TornCell, loads: Float, u: Float) -> tuple[Float, Float, Float, Float]:
+    """Return total displacements H y + u*, Eq. (14), and u* (n, c) at the plane nodes of this rank's parts.
+
+    Then means over their elements under the loads (v,): strains with the other loads, and stresses on them, (m, v).
+    """
+    problem = cell.solver.problem
+    m, c = problem.strains, problem.components
+    H = problem.gradient(loads[:m])
+    totals, fluctuations = [np.zeros((0, c))], [np.zeros((0, c))]
+    strains, stresses = [np.zeros((0, len(loads)))], [np.zeros((0, len(loads)))]
+    for s, offset in zip(cell.parts, cell.offsets, strict=False):
+        of_part = u[offset : offset + len(s.dofs)].reshape(-1, c)
+        fluctuations.append(of_part[s.mesh.node_class])
+        totals.append(s.mesh.points @ H.T + fluctuations[-1])
+        strain = element_strain(s.mesh.points, s.mesh.triangles, s.mesh.node_class, of_part, problem)[0]
+        strains.append(np.column_stack([loads[:m] + strain, np.tile(loads[m:], (len(strain), 1))]))
+        stresses.append(strains[-1] @ s.L)
+    total, fluctuation, strain, stress = (np.concatenate(rows) for rows in (totals, fluctuations, strains, stresses))
+    return total, fluctuation, strain, stress
 
 
 def _shares(cell: TornCell, response: Response) -> Float:
@@ -67,28 +82,12 @@ def _shares(cell: TornCell, response: Response) -> Float:
 
 
 def _sizes(cell: TornCell) -> list[tuple[int, int]]:
-    """Nodes and elements of this rank's parts."""
+    """Return the numbers of nodes and elements of this rank's parts."""
     return [(len(s.mesh.points), len(s.mesh.triangles)) for s in cell.parts]
 
 
-def _element_fields(cell: TornCell, loads: Float, u: Float) -> tuple[Float, Float]:
-    """Means over the elements under the loads (v,): strains with the other loads, and what works on them, (m, v)."""
-    problem = cell.solver.problem
-    of_displacements, others = loads[: problem.strains], loads[problem.strains :]
-    strains, stresses = ([np.zeros((0, len(loads)))] for _ in range(2))
-    for s, offset in zip(cell.parts, cell.offsets, strict=False):
-        own = u[offset : offset + len(s.dofs)].reshape(-1, problem.components)
-        strain = of_displacements + element_strain(
-            s.mesh.points, s.mesh.triangles, s.mesh.node_class, own, problem
-        )[0]  # fmt: skip
-        strain = np.column_stack([strain, np.tile(others, (len(strain), 1))])
-        strains.append(strain)
-        stresses.append(strain @ s.L)
-    return np.concatenate(strains), np.concatenate(stresses)
-
-
 def out_of_plane_stress(cell: TornCell, stress: Float) -> Float:
-    """Stresses 33 (m,) of the stresses (m, 3) in plane strain or stress."""
+    """(m,) stresses 33 for the stresses (m, 3) in plane strain or stress."""
     plane = cell.case.analysis.plane
     rules = [laws.out_of_plane(cell.case.material_of(s.submesh.phase), plane)[0] for s in cell.parts]
     sizes = [elements for _, elements in _sizes(cell)]

@@ -4,11 +4,11 @@ With e_i the strains of the unit load i, its other uniform loads behind, the sti
 
     |UC| C_ij = sum_phases A : int e_i (x) e_j + sum_rows [u]_i k [u]_j,
 
-and since its fields make it stationary, dC_ij is the same with dA and dk: exact for the discrete cell.  Bodies need
-the integrals alone, once per phase.  With faces in contact the cell is linear as long as none opens or closes.
+and since its fields make it stationary, dC_ij has dA and dk in place of A and k: exact for the discrete cell.  Bodies
+need the integrals alone, once per phase.  With faces in contact the cell is linear as long as no face opens or closes.
 
-By the fraction f of fibres that grow, d f / d ln R = 2 f, a stiffness has the derivative of the energies on the mesh
-that moves, at fixed nodal u - E x: exact for that mesh, whatever the nodes do between the fibres.
+By the fraction f of growing fibres, d f / d ln R = 2 f, a stiffness has the derivative of the energies on the moving
+mesh, at fixed nodal u - E x: exact for the mesh, wherever the nodes between the fibres move.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class Derivative:
     Attributes:
         name: the key with its section, such as `material.fibre.young`.
         value: the constant.
-        energies: of each problem (v, v), as its stresses under its unit loads.
+        energies: (v, v) derivatives of the stresses of each problem under its unit loads.
     """
 
     name: str
@@ -56,18 +56,18 @@ class Derivative:
 def derivatives(cells: Sequence[TornCell], responses: Sequence[Sequence[Response]]) -> list[Derivative]:
     """Return the derivatives by all constants, from the responses of each problem to its unit loads.  Collective."""
     case, area = cells[0].case, cells[0].summary.area
-    integrals = [_integrals(cell, own) for cell, own in zip(cells, responses, strict=True)]
-    found = [*_by_phases(cells[0], [grams for grams, _ in integrals])]
-    springs = [_stretched_springs(cell, own) for cell, own in zip(cells, responses, strict=True)]
+    integrals = [_integrals(cell, group) for cell, group in zip(cells, responses, strict=True)]
+    changes = [*_by_phases(cells[0], [grams for grams, _ in integrals])]
+    springs = [_stretched_springs(cell, group) for cell, group in zip(cells, responses, strict=True)]
     for name, value, places in _spring_constants(case):
         energies = tuple(
-            sum((own[place] for place in here), np.zeros(own.shape[2:])) / (value * area)
-            for own, here in zip(springs, places, strict=False)
+            sum((work[place] for place in of_problem), np.zeros(work.shape[2:])) / (value * area)
+            for work, of_problem in zip(springs, places, strict=False)
         )
-        found.append(Derivative(name, value, energies))
+        changes.append(Derivative(name, value, energies))
     for f in _fractions(case):
-        found.append(Derivative("cell.fibre_fraction", f, tuple(growth / (2 * f * area) for _, growth in integrals)))
-    return found
+        changes.append(Derivative("cell.fibre_fraction", f, tuple(growth / (2 * f * area) for _, growth in integrals)))
+    return changes
 
 
 def _by_phases(cell: TornCell, grams: Sequence[Mapping[str, Float]]) -> Iterator[Derivative]:
@@ -76,27 +76,29 @@ def _by_phases(cell: TornCell, grams: Sequence[Mapping[str, Float]]) -> Iterator
     for phase in grams[0]:
         for change in law_changes(case.materials[phase], case.analysis.plane):
             if is_heated or not change.name.startswith("expansion"):
-                pairs = zip(phase_laws.law_derivatives(case, phase, change), (own[phase] for own in grams), strict=True)
+                pairs = zip(
+                    phase_laws.law_derivatives(case, phase, change), (gram[phase] for gram in grams), strict=True
+                )
                 energies = tuple(np.einsum("ab,aibj->ij", dA, gram) / cell.summary.area for dA, gram in pairs)
                 yield Derivative(f"material.{phase}.{change.name}", change.value, energies)
 
 
 def _integrals(cell: TornCell, responses: Sequence[Response]) -> tuple[dict[str, Float], Float]:
-    """(v, k, v, k) int e_i (x) e_j over the bodies of each material under k unit loads, and what growing fibres change.
+    """(v, k, v, k) int e_i (x) e_j over the bodies of each material under k unit loads; (k, k) changes by growth.
 
-    The latter, (k, k), is the derivative of the energies by ln R of all fibres, if the case has that.  Collective.
+    Changes are derivatives of the energies by ln R of all fibres, 0 unless the case has such fibres.  Collective.
     """
     problem, loads = cell.solver.problem, np.stack([response.strain for response in responses], axis=1)
     boundary = np.stack([response.u for response in responses], axis=1)
     m, (v, k) = problem.strains, loads.shape
-    # Of [strains of displacements, 1], whose products are summed, to [those strains, the other loads].
-    whole = np.zeros((m * k + 1, v * k))
-    whole[: m * k, : m * k], whole[-1, m * k :] = np.eye(m * k), loads[m:].ravel()
+    # From [strains of displacements, 1], whose products are summed, to [strains of displacements, other loads].
+    T = np.zeros((m * k + 1, v * k))
+    T[: m * k, : m * k], T[-1, m * k :] = np.eye(m * k), loads[m:].ravel()
     materials = dict.fromkeys(provider(phase, cell.case.materials) for phase in cell.summary.phases)
     sums = {material: np.zeros((m * k + 1,) * 2) for material in materials}
     grows, growth = any(_fractions(cell.case)), np.zeros((k, k))
-    for s, own in cell.displacements(boundary, loads):
-        u = own.reshape(-1, problem.components, k)
+    for s, displacement in cell.displacements(boundary, loads):
+        u = displacement.reshape(-1, problem.components, k)
         V = _velocity(s.mesh.points, cell.summary) if grows else None
         for first in range(0, len(s.mesh.triangles), ELEMENTS_AT_ONCE):
             nodes = s.mesh.triangles[first : first + ELEMENTS_AT_ONCE]
@@ -104,16 +106,16 @@ def _integrals(cell: TornCell, responses: Sequence[Response]) -> tuple[dict[str,
             sums[provider(s.submesh.phase, cell.case.materials)] += fields.products()
             if V is not None:
                 growth += fields.change(problem, s.L, V[nodes], loads[m:])
-    grams = {name: whole.T @ allreduce_sum(cell.comm, own) @ whole for name, own in sums.items()}
-    return {name: own.reshape(v, k, v, k) for name, own in grams.items()}, allreduce_sum(cell.comm, growth)
+    grams = {name: (T.T @ allreduce_sum(cell.comm, gram) @ T).reshape(v, k, v, k) for name, gram in sums.items()}
+    return grams, allreduce_sum(cell.comm, growth)
 
 
 @dataclass(frozen=True)
 class _Fields:
     """Fields of e elements at q points under k loads.
 
-    In mixed elements the energy is stationary for the bubble too, and with the pressure lambda Pi div u it has
-    -lambda r^2 beside that of the strains, r = div u - Pi div u.
+    In mixed elements the energy is stationary for the bubble too; with the pressure lambda Pi div u it is the energy of
+    the strains less lambda r^2, r = div u - Pi div u.
 
     Attributes:
         gradients, weights: (e, q, a, 2) of the shape functions of the nodes, and (e, q).
@@ -130,7 +132,7 @@ class _Fields:
 
     @classmethod
     def of(cls, s: UniformPart, nodes: Int32, u: Float, loads: Float) -> _Fields:
-        """Fields of elements of nodes (e, a) and displacements u (e, a, c, k) under the loads (m, k)."""
+        """Find the fields of elements with nodes (e, a), displacements u (e, a, c, k) and loads (m, k)."""
         points, (_, a, c, k) = s.mesh.points[nodes], u.shape
         elements = bubble.Elements.of(points, s.L) if s.is_mixed else None
         g, w = gradients(points) if elements is None else (elements.gradients, elements.weights)
@@ -142,39 +144,34 @@ class _Fields:
         return cls(g[:, :, :a], w, slopes, strain + loads, rest)
 
     def products(self) -> Float:
-        """(mk + 1, mk + 1) int f f^T of the strains and 1.
-
-        Products of 11 and 22 are such that those with an isotropic dA have -d lambda r^2.
-        """
+        """(mk + 1, mk + 1) int f f^T of the strains and 1; products of 11 and 22 have -d lambda r^2 of isotropic dA."""
         *points, _, k = self.strain.shape
-        found = _gram(np.concatenate([self.strain.reshape(*points, -1), np.ones((*points, 1))], axis=2), self.weights)
+        gram = _gram(np.concatenate([self.strain.reshape(*points, -1), np.ones((*points, 1))], axis=2), self.weights)
         if self.rest is not None:
             change = _gram(self.rest, self.weights) / 2
-            found[:k, k : 2 * k] -= change
-            found[k : 2 * k, :k] -= change
-        return found
+            gram[:k, k : 2 * k] -= change
+            gram[k : 2 * k, :k] -= change
+        return gram
 
-    def change(self, problem: Problem, A: Float, V: Float, others: Float) -> Float:
+    def change(self, problem: Problem, A: Float, V: Float, more: Float) -> Float:
         """(k, k) derivative of int e_i A e_j where the nodes (e, a, 2) move by s V, at fixed displacements.
 
-        That is int (de_i + div V e_i / 2) A e_j and its transpose, d grad u = -grad V grad u; `others` (v - m, k) are
-        loads behind.
+        int (de_i + div V e_i / 2) A e_j and its transpose, d grad u = -grad V grad u; `more` (v - m, k) other loads.
         """
         (e, q, _, c, k), m = self.slopes.shape, problem.strains
         grad_V = self.gradients.transpose(0, 1, 3, 2) @ V[:, None]
         div_V = np.trace(grad_V, axis1=2, axis2=3)[..., None, None]
         moved = -grad_V @ self.slopes.reshape(e, q, 2, c * k)
         moved = _strains(moved.reshape(self.slopes.shape), problem)
-        behind = np.broadcast_to(others, (e, q, *others.shape))
-        strain = np.concatenate([self.strain, behind], axis=2)
+        strain = np.concatenate([self.strain, np.broadcast_to(more, (e, q, *more.shape))], axis=2)
         work = self.weights[..., None, None] * (A @ strain)
         half = div_V / 2 * strain
         half[:, :, :m] += moved
-        found = np.tensordot(half, work, ((0, 1, 2), (0, 1, 2)))
+        change = np.tensordot(half, work, ((0, 1, 2), (0, 1, 2)))
         if self.rest is not None:
             half = moved[:, :, 0] + moved[:, :, 1] + div_V[..., 0] / 2 * self.rest
-            found -= A[0, 1] * np.tensordot(half, self.weights[..., None] * self.rest, ((0, 1), (0, 1)))
-        return np.asarray(found + found.T)
+            change -= A[0, 1] * np.tensordot(half, self.weights[..., None] * self.rest, ((0, 1), (0, 1)))
+        return np.asarray(change + change.T)
 
 
 def _strains(slopes: Float, problem: Problem) -> Float:
@@ -194,17 +191,17 @@ def _gram(fields: Float, weights: Float) -> Float:
 def _stretched_springs(cell: TornCell, responses: Sequence[Response]) -> Float:
     """(sections, components, k, k) sums of [u]_i k [u]_j = lam_i C lam_j over the rows of bonds.  Collective."""
     nodes, c, k = cell.solver.jump_operator.nodes, cell.solver.problem.components, len(responses)
-    found = np.zeros((len(cell.case.interfaces), c, k, k))
+    work = np.zeros((len(cell.case.interfaces), c, k, k))
     lam = np.stack([response.scale * response.state.solution.lam for response in responses], axis=1)
-    for section, component in np.ndindex(found.shape[:2]):
+    for section, component in np.ndindex(work.shape[:2]):
         rows = nodes.row[nodes.pair == section] + component
         C = responses[0].state.solution.compliance[rows]
-        found[section, component] = lam[rows].T @ (C[:, None] * lam[rows])
-    return np.asarray(allreduce_sum(cell.comm, found))
+        work[section, component] = lam[rows].T @ (C[:, None] * lam[rows])
+    return np.asarray(allreduce_sum(cell.comm, work))
 
 
 def _spring_constants(case: Case) -> Iterator[tuple[str, float, tuple[list[tuple[int, int]], list[tuple[int, int]]]]]:
-    """Yield each finite stiffness of an interface, and of which sections and components it is in each problem."""
+    """Yield each finite stiffness of an interface, with its sections and components in each problem."""
     several = len(case.interfaces) > 1
     for number, bond in enumerate(case.interfaces):
         section = f"interface.{number + 1}" if several else "interface"
@@ -215,14 +212,14 @@ def _spring_constants(case: Case) -> Iterator[tuple[str, float, tuple[list[tuple
             "tangential_stiffness": ([(number, 1)], around),
             "axial_stiffness": ([], along),
         }
-        for name, own in places.items():
+        for name, by_problem in places.items():
             value = getattr(bond, name)
             if value is not None and np.isfinite(value):
-                yield f"{section}.{name}", value, own
+                yield f"{section}.{name}", value, by_problem
 
 
 def _fractions(case: Case) -> Iterator[float]:
-    """Yield the fraction of equal fibres in a pattern, bonded to the matrix without a coating; none of other cells."""
+    """Yield the fraction of equal fibres in a pattern, bonded to the matrix without a coating; else nothing."""
     cell = case.cell
     if cell.geometry in PATTERNS and cell.coating is None and not case.interfaces and cell.fibre_fraction is not None:
         yield cell.fibre_fraction
@@ -231,11 +228,10 @@ def _fractions(case: Case) -> Iterator[float]:
 def _velocity(points: Float, cell: CellSummary) -> Float:
     """(n, 2) V = dx / d ln R at points (n, 2) where all fibres of a pattern grow.
 
-    It is x - c in a fibre of centre c and radius R, and around it falls to nothing halfway to the next fibre.
+    x - c in a fibre of centre c and radius R, falling to 0 halfway to the next fibre.
     """
-    period = np.array([cell.width, cell.height])
-    centres, radii = cell.centres[cell.is_fibre], cell.radii[cell.is_fibre]
-    found = np.zeros_like(points)
+    centres, radii, period = cell.centres[cell.is_fibre], cell.radii[cell.is_fibre], cell.period
+    V = np.zeros_like(points)
     for number, (centre, radius) in enumerate(zip(centres, radii, strict=True)):
         gaps = np.linalg.norm(centres[:, None] + IMAGES * period - centre, axis=2) - radii[:, None] - radius
         gaps[number, (IMAGES == 0).all(axis=1)] = np.inf
@@ -244,5 +240,5 @@ def _velocity(points: Float, cell: CellSummary) -> Float:
         away -= period * np.round(away / period)
         distance = np.linalg.norm(away, axis=1, keepdims=True)
         share = np.clip((radius + reach - distance) / reach, 0.0, 1.0) * radius / np.maximum(distance, radius)
-        found += away * np.where(distance <= radius * (1 + ON_CIRCLE), 1.0, share)
-    return found
+        V += away * np.where(distance <= radius * (1 + ON_CIRCLE), 1.0, share)
+    return V

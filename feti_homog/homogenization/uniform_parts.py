@@ -1,6 +1,7 @@
-"""Parts of subdomains that lie in one body each, for averages of phases and estimates.
+"""Parts of subdomains in one body each, and displacements inside bodies on a mesh that is refined less.
 
-A subdomain of one material is a part itself; one across materials has a part for each body that it reaches.
+A subdomain of one material is a part itself; one across materials has a part for each body that it reaches.  The mesh
+that is refined less has a quarter or a sixteenth of the elements; its nodes are among the nodes of the mesh.
 """
 
 from __future__ import annotations
@@ -17,21 +18,32 @@ from feti_homog.fem.problem import Problem
 from feti_homog.feti.decomposition.jump_operator import JumpOperator, NodeBlocks
 from feti_homog.feti.decomposition.shared_entities import SharedEntities, share_entities
 from feti_homog.feti.decomposition.subdomain import Subdomain
+from feti_homog.feti.operators.interface_operators import InterfaceOperators
+from feti_homog.feti.operators.one_subdomain import Interior
 from feti_homog.mesh.periodic_topology import present
-from feti_homog.mesh.refinement import FineMesh, ReferenceLattice, joined
+from feti_homog.mesh.refinement import FineMesh, ReferenceLattice, joined, refine
 from feti_homog.mesh.submesh import SubdomainTable, Submesh, SubmeshesOfRank, joined_meshes, part
 from feti_homog.typing import Float, Int
+
+# Subdomains of so many elements at once: few enough for the processor's cache, many enough for NumPy.
+ELEMENTS_AT_ONCE = 1 << 13
+# Halvings from which on the mesh that is refined twice less serves.
+REFINED_OFTEN = 3
+# Largest lambda / mu on that mesh, of a Poisson's ratio of 0.4: beyond, errors of coarse elements are no guide.
+LOCKING = 4.0
+# Places of displacements inside bodies, and of pinned ones.
+INSIDE, PINNED = -2, -1
 
 
 @dataclass(frozen=True, eq=False)
 class UniformPart:
-    """A part of a subdomain, of one material.
+    """Part of a subdomain, in one body.
 
     Attributes:
-        place: of the subdomain among those of its rank.
-        submesh, mesh: of the part.
-        dofs: (cn,) the degrees of freedom of the subdomain that are the part's.
-        L, problem: as of `Subdomain`.
+        place: number of the subdomain on its rank.
+        submesh, mesh: coarse share and refined mesh of the part.
+        dofs: (cn,) its degrees of freedom in the subdomain.
+        L, problem: as in `Subdomain`.
         is_mixed: whether its elements have a bubble and a pressure of their own.
     """
 
@@ -45,10 +57,7 @@ class UniformPart:
 
 
 def parts_of(subdomains: Sequence[Subdomain], phase_of: Sequence[str]) -> Iterator[UniformPart]:
-    """Yield the parts of one subdomain after the other, with its index, those of one phase together.
-
-    `phase_of` (constituents,) are the names of phases.
-    """
+    """Yield the parts of all subdomains, in each by phase and body; `phase_of` (constituents,) are names of phases."""
     for place, s in enumerate(subdomains):
         if s.material is None:
             yield UniformPart(place, s.submesh, s.mesh, np.arange(s.n_dofs), s.L, s.problem, s.is_mixed)
@@ -56,114 +65,159 @@ def parts_of(subdomains: Sequence[Subdomain], phase_of: Sequence[str]) -> Iterat
         order = np.lexsort((s.submesh.constituent, s.material))
         bodies = s.submesh.constituent[order]
         for members in np.split(order, np.flatnonzero(np.diff(bodies)) + 1):
-            body, law, is_mixed = int(s.submesh.constituent[members[0]]), *_law(s, members)
+            body, law = int(s.submesh.constituent[members[0]]), s.material[members[0]]
             submesh = replace(part(s.submesh, members), body=body, phase=phase_of[body])
             mesh, classes = _restricted(s.mesh, members)
-            yield UniformPart(place, submesh, mesh, s.problem.dofs(classes), law, s.problem, is_mixed)
+            is_mixed = bool(np.broadcast_to(s.mixed, len(s.laws))[law])
+            yield UniformPart(place, submesh, mesh, s.problem.dofs(classes), s.laws[law], s.problem, is_mixed)
 
 
 def nodes_of_parts(s: Subdomain) -> int:
-    """Return the number of plane nodes of all parts of a subdomain; those of several count for each."""
+    """Count the plane nodes of all parts of a subdomain; a node of several parts counts for each."""
     body, nodes = np.repeat(s.submesh.constituent, s.mesh.nodes.shape[1]), s.mesh.nodes.ravel()
-    one = np.empty(len(s.mesh.points), np.int64)
-    one[nodes] = body
-    others = np.flatnonzero(one[nodes] != body)
-    return len(one) + len(np.unique(nodes[others].astype(np.int64) * (int(body.max()) + 1) + body[others]))
-
-
-def parts_of_phases(subdomains: Sequence[Subdomain], lattice: ReferenceLattice, elements: int) -> Iterator[UniformPart]:
-    """Yield the parts of subdomains across materials in the same order, several bodies of one phase together.
-
-    So many that a part has no more than `elements`, and none that touch.  They keep all nodes and edges of the
-    subdomain; their elements are those of a `lattice` of no more halvings than its own.
-    """
-    for place, s in enumerate(subdomains):
-        assert s.material is not None
-        corners = s.submesh.vertex_class[s.submesh.triangles]
-        order = np.lexsort((s.submesh.constituent, s.material))
-        bodies = np.split(order, np.flatnonzero(np.diff(s.submesh.constituent[order])) + 1)
-        for members in _apart(bodies, corners, s.material, elements // len(lattice.triangles)):
-            names = ("constituent", "triangles", "triangle_edges", "backwards")
-            submesh = replace(s.submesh, **{name: getattr(s.submesh, name)[members] for name in names})
-            nodes = s.mesh.nodes[members]
-            nodes = nodes if lattice is s.mesh.lattice else nodes[:, lattice.within(s.mesh.lattice)]
-            mesh = replace(s.mesh, nodes=nodes, curved=s.mesh.curved[members], lattice=lattice)
-            law, is_mixed = _law(s, members)
-            yield UniformPart(place, submesh, mesh, np.arange(s.n_dofs), law, s.problem, is_mixed)
-
-
-def _law(s: Subdomain, members: Int) -> tuple[Float, bool]:
-    """Return the stiffness of coarse triangles of one material, and whether their elements are mixed."""
-    assert s.material is not None
-    number = s.material[members[0]]
-    return s.laws[number], bool(np.broadcast_to(s.mixed, len(s.laws))[number])
-
-
-def _apart(bodies: Sequence[Int], corners: Int, material: Int, most: int) -> Iterator[Int]:
-    """Yield the triangles of bodies, of several if they are of one material, touch nowhere and are at most `most`."""
-    group, size, seen = list[Int](), 0, np.full(int(corners.max()) + 1, -1)
-    for number, own in enumerate(bodies):
-        touches = (seen[corners[own]] >= number - len(group)).any()
-        if group and (touches or size + len(own) > most or material[own[0]] != material[group[0][0]]):
-            yield np.concatenate(group)
-            group, size = [], 0
-        seen[corners[own]] = number
-        group.append(own)
-        size += len(own)
-    yield np.concatenate(group)
+    last = np.empty(len(s.mesh.points), np.int64)
+    last[nodes] = body
+    more = np.flatnonzero(last[nodes] != body)
+    return len(last) + len(np.unique(nodes[more].astype(np.int64) * (int(body.max()) + 1) + body[more]))
 
 
 def _restricted(mesh: FineMesh, members: Int) -> tuple[FineMesh, Int]:
-    """Return the coarse triangles `members` (t,) of a mesh as a mesh of its own, and (c,) the classes that it has."""
+    """Return the mesh of the coarse triangles `members` (t,) alone, and (c,) its classes in the mesh."""
     nodes, local = present(mesh.nodes[members], len(mesh.points))
     classes, node_class = present(mesh.node_class[nodes], mesh.n_classes)
-    own = local.astype(np.int32), node_class.astype(np.int32)
-    return FineMesh(mesh.points[nodes], own[0], mesh.curved[members], own[1], len(classes), mesh.lattice), classes
-
-
-def numbered(comm: MPI.Intracomm, parts: Sequence[UniformPart]) -> list[UniformPart]:
-    """Return parts with numbers of their own among those of all ranks.  Collective."""
-    first = comm.exscan(len(parts)) or 0
-    return [replace(p, submesh=replace(p.submesh, index=first + k)) for k, p in enumerate(parts)]
+    numbers, curved = (local.astype(np.int32), node_class.astype(np.int32)), mesh.curved[members]
+    return FineMesh(mesh.points[nodes], numbers[0], curved, numbers[1], len(classes), mesh.lattice), classes
 
 
 def share_parts(
     comm: MPI.Intracomm, parts: Sequence[UniformPart], table: SubdomainTable, pairs: Int, lattice: ReferenceLattice
 ) -> SharedEntities:
-    """Return what parts share, as `share_entities` does of subdomains; of these there is the `table`.  Collective."""
+    """Share the nodes of parts as `share_entities` shares nodes of subdomains, listed in `table`.  Collective."""
     body = np.array([p.submesh.body for p in parts])
     member = np.repeat(np.arange(len(parts)), [len(p.mesh.nodes) for p in parts])
     index, phase = np.array([p.submesh.index for p in parts]), tuple(p.submesh.phase for p in parts)
-    own = SubmeshesOfRank(joined_meshes([p.submesh for p in parts]), member, index, body, phase)
+    submeshes = SubmeshesOfRank(joined_meshes([p.submesh for p in parts]), member, index, body, phase)
     bodies = comm.allgather(body)
-    rank = np.repeat(np.arange(comm.size), [len(each) for each in bodies])
-    return share_entities(
-        comm, own, SubdomainTable(np.concatenate(bodies), rank, table.nesting, table.phase), pairs, lattice
-    )
+    rank = np.repeat(np.arange(comm.size), [len(bodies_of_rank) for bodies_of_rank in bodies])
+    table = SubdomainTable(np.concatenate(bodies), rank, table.nesting, table.phase)
+    return share_entities(comm, submeshes, table, pairs, lattice)
 
 
 class ForcesBetweenParts:
-    """Multipliers of the constraints between parts, by which each is in equilibrium with its displacements."""
+    """Multipliers of the constraints between parts, which keep each part in equilibrium with its displacements."""
 
     def __init__(self, comm: MPI.Intracomm, parts: Sequence[UniformPart], jumps: JumpOperator) -> None:
-        """Assemble the coarse triangles at constraints, of one problem.  Collective."""
+        """Assemble the coarse triangles at constraints.  Collective."""
         self._jumps, problem = jumps, jumps.problem
         torn, nodes = joined([p.mesh for p in parts]), problem.nodes(np.flatnonzero(jumps.B.getnnz(axis=0)))
         is_shared = np.zeros(torn.n_classes, bool)
         is_shared[nodes] = True
-        beside = np.flatnonzero(is_shared[torn.node_class[torn.nodes]].any(axis=1))
-        mesh, classes = _restricted(torn, beside)
-        law = np.repeat(np.arange(len(parts)), [len(p.mesh.nodes) for p in parts])[beside]
+        touching = np.flatnonzero(is_shared[torn.node_class[torn.nodes]].any(axis=1))
+        mesh, classes = _restricted(torn, touching)
+        law = np.repeat(np.arange(len(parts)), [len(p.mesh.nodes) for p in parts])[touching]
         used, material = np.unique(law, return_inverse=True)
         mixed = tuple(parts[k].is_mixed for k in used)
-        found = assemble(mesh, np.stack([parts[k].L for k in used]), problem, mixed, material)
-        self._dofs, self._K, self._Q = problem.dofs(classes), found.K, found.Q
-        self._inverse = NodeBlocks(comm, jumps, csr_matrix(jumps.B @ jumps.B.T)).inverse(
-            np.ones(jumps.owned[1] - jumps.owned[0])
-        )
+        body = assemble(mesh, np.stack([parts[k].L for k in used]), problem, mixed, material)
+        self._dofs, self._K, self._Q = problem.dofs(classes), body.K, body.Q
+        blocks = NodeBlocks(comm, jumps, csr_matrix(jumps.B @ jumps.B.T))
+        self._inverse = blocks.inverse(np.ones(jumps.owned[1] - jumps.owned[0]))
 
     def multipliers(self, u: Float, loads: Float) -> Float:
         """(owned rows,) lam = (B B^T)^-1 B f, f = -K u - Q E, of displacements u (dofs,) and loads E.  Collective."""
         forces = np.zeros(len(u))
         forces[self._dofs] = -self._K @ u[self._dofs] - self._Q @ loads
         return np.asarray(self._inverse @ self._jumps.sum(self._jumps.B @ forces))
+
+
+@dataclass(frozen=True)
+class NestedInterior:
+    """Coarser meshes of some subdomains of one phase, c displacements a node.
+
+    Attributes:
+        members: the subdomains.
+        mesh: their meshes, joined.
+        fixed: (c n,) prescribed displacements: on the boundary, and 0 where a class is pinned.
+        place: (fixed,) places among the displacements of all boundaries; PINNED where a class is pinned.
+        interior: the free displacements.
+        loads: (free, v) forces Q of the unit loads on free displacements; None without voids.
+    """
+
+    members: list[Subdomain]
+    mesh: FineMesh
+    fixed: Int
+    place: Int
+    interior: Interior
+    loads: Float | None
+
+    @classmethod
+    def of(
+        cls, places: Sequence[int], boundary: InterfaceOperators, lattice: ReferenceLattice, nested: Int
+    ) -> NestedInterior:
+        """Refine, assemble and factor; `nested` numbers the nodes of the lattice among the nodes of the finer one."""
+        members = [boundary.subdomains[place] for place in places]
+        first, meshes, numbers = members[0], [refine(s.submesh, lattice) for s in members], list[Int]()
+        for k, s, mesh in zip(places, members, meshes, strict=True):
+            of_fine = np.full(s.n_dofs, INSIDE)
+            of_fine[boundary.dofs[k]] = boundary.offsets[k] + np.arange(len(boundary.dofs[k]))
+            if s.submesh.pinned >= 0:
+                of_fine[s.problem.dofs(np.array([s.submesh.pinned]))] = PINNED
+            fine = np.empty(mesh.n_classes, np.int64)
+            fine[mesh.node_class[mesh.nodes]] = s.mesh.node_class[s.mesh.nodes[:, nested]]
+            numbers.append(of_fine[s.problem.dofs(fine)])
+        place = np.concatenate(numbers)
+        fixed = np.flatnonzero(place != INSIDE)
+        mesh = joined(meshes)
+        body = assemble(mesh, first.L, first.problem, first.is_mixed)
+        interior = Interior(body.K, fixed)
+        loads = body.Q[interior.dofs] if any(s.submesh.at_void.any() for s in members) else None
+        return cls(members, mesh, fixed, place[fixed], interior, loads)
+
+    def displacement(self, u: Float, loads: Float) -> Float:
+        """(classes, c, k) u* of u (boundary dofs, k) on all boundaries under the loads (v, k)."""
+        problem = self.members[0].problem
+        on_boundary = np.vstack([u, np.zeros((1, u.shape[1]))])[self.place]  # PINNED is the last row
+        all_dofs = np.empty((len(self.fixed) + len(self.interior.dofs), u.shape[1]))
+        all_dofs[self.fixed], all_dofs[self.interior.dofs] = on_boundary, self.interior.extend(on_boundary)
+        if self.loads is not None:
+            all_dofs[self.interior.dofs] -= self.interior.solve(self.loads @ loads)
+        return all_dofs.reshape(-1, problem.components, u.shape[1])
+
+
+def locks(subdomains: Sequence[Subdomain | UniformPart], comm: MPI.Intracomm) -> bool:
+    """Return whether linear elements of a phase of any rank hardly change their volume.  Collective."""
+    locking = any(s.problem.components == 2 and s.L[0, 1] > LOCKING * s.L[2, 2] for s in subdomains)
+    return bool(comm.allreduce(locking, MPI.LOR))
+
+
+def nested_lattice(
+    lattice: ReferenceLattice, subdomains: Sequence[Subdomain], comm: MPI.Intracomm, across: bool
+) -> ReferenceLattice:
+    """Return the lattice of the coarser mesh: refined once less, or twice after many halvings if no phase locks.
+
+    Not twice if subdomains reach across materials.  Collective.
+    """
+    often = not locks(subdomains, comm) and lattice.halvings >= REFINED_OFTEN and not across
+    return lattice.coarser(2 if often else 1)
+
+
+def nested_interiors(
+    boundary: InterfaceOperators, lattice: ReferenceLattice, coarser: ReferenceLattice
+) -> Iterator[NestedInterior]:
+    """Yield the interiors of this rank's subdomains, refined by the lattice, on the coarser one, group by group."""
+    nested = coarser.within(lattice)
+    for group in groups(boundary.subdomains, coarser):
+        yield NestedInterior.of(group, boundary, coarser, nested)
+
+
+def groups(subdomains: Sequence[Subdomain | UniformPart], lattice: ReferenceLattice) -> Iterator[list[int]]:
+    """Yield places of consecutive subdomains of one phase, of ELEMENTS_AT_ONCE elements at most."""
+    group, elements = list[int](), 0
+    for place, s in enumerate(subdomains):
+        count = len(s.mesh.nodes) * len(lattice.triangles)
+        elements += count
+        if group and (elements > ELEMENTS_AT_ONCE or s.submesh.phase != subdomains[group[0]].submesh.phase):
+            yield group
+            group, elements = [], count
+        group.append(place)
+    if group:
+        yield group

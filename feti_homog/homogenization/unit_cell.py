@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 from mpi4py import MPI
@@ -17,31 +18,31 @@ from feti_homog.feti.decomposition.subdomain import Subdomain
 from feti_homog.feti.dual_solution import DualSolution
 from feti_homog.feti.solver import FetiSolver
 from feti_homog.feti.thresholds import DEFAULTS, Thresholds
-from feti_homog.homogenization import bonds, cell_remarks, cost_model, phase_laws
-from feti_homog.homogenization.coarse_meshes import fill_tiles, place_nodes
-from feti_homog.homogenization.domain_partition import CellSummary, RankShare, distribute
-from feti_homog.homogenization.nested_interiors import NestedInterior, nested_interiors, nested_lattice
+from feti_homog.homogenization import cell_remarks, partition_policy, phase_laws, uniform_parts
+from feti_homog.homogenization.domain_partition import CellSummary, RankShare
 from feti_homog.homogenization.partition_policy import DEFAULT_POLICY, PartitionPolicy
-from feti_homog.homogenization.tile_tearing import can_be_torn_by_tiles, tear_by_tiles
-from feti_homog.homogenization.uniform_parts import ForcesBetweenParts, UniformPart, numbered, parts_of, share_parts
+from feti_homog.homogenization.tile_tearing import cut
+from feti_homog.homogenization.uniform_parts import UniformPart
 from feti_homog.interface import debonded_arcs
 from feti_homog.interface.laws.bond_law import BondLaw
-from feti_homog.mesh.coarse_mesh import CoarseMesh
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.mesh.submesh import SubdomainTable, Submesh, SubmeshesOfRank
 from feti_homog.microstructure.phase_names import COATING, MATRIX
-from feti_homog.system.parallel.distributed_arrays import scatter
-from feti_homog.system.parallel.mpi_errors import agree, on_root, on_root_only
+from feti_homog.system.parallel.mpi_errors import agree
 from feti_homog.system.runtime.progress import Progress
 from feti_homog.typing import Bool, Float, Int
+
+if TYPE_CHECKING:
+    from feti_homog.feti.decomposition.neighbours import InterfaceNeighbours
+    from feti_homog.homogenization.spring_errors import SpringSides
 
 
 @dataclass(frozen=True)
 class TornCell:
-    """The cell on all ranks; `subdomains` are this rank's, and `lattice` refines each coarse triangle of them.
+    """The cell on all ranks; `lattice` refines each coarse triangle of this rank's `subdomains`.
 
-    `axial` is the same cell with the displacement along the fibres, on the same meshes and interface nodes; None unless
-    the case is one of generalized plane strain.
+    `axial` is the cell with the displacement along the fibres, on the same meshes and interface nodes; None unless the
+    plane state is generalized plane strain.
     """
 
     comm: MPI.Intracomm
@@ -55,43 +56,46 @@ class TornCell:
 
     @property
     def problems(self) -> tuple[TornCell, ...]:
-        """The cell in each of its problems: that of the plane first."""
+        """The cell in each of its problems, the plane first."""
         return (self,) if self.axial is None else (self, self.axial)
 
     @cached_property
     def offsets(self) -> Int:
-        """Return where each part begins in this rank's vectors of their degrees of freedom."""
+        """First degree of freedom of each part in this rank's vectors."""
         return np.cumsum([0, *(len(part.dofs) for part in self.parts)])
 
     @cached_property
     def parts(self) -> list[UniformPart]:
-        """The parts of this rank's subdomains that lie in one body each.  Collective when first read."""
-        summary = self.summary
-        parts = list(parts_of(self.subdomains, [summary.phases[k] for k in summary.constituent_phase.tolist()]))
-        return numbered(self.comm, parts) if summary.across else parts
+        """Parts of this rank's subdomains in one body each, numbered over all ranks.  Collective when first read."""
+        phases = [self.summary.phases[k] for k in self.summary.constituent_phase.tolist()]
+        parts = list(uniform_parts.parts_of(self.subdomains, phases))
+        if not self.summary.across:
+            return parts
+        first = self.comm.exscan(len(parts)) or 0
+        return [replace(p, submesh=replace(p.submesh, index=first + k)) for k, p in enumerate(parts)]
 
     @cached_property
     def jumps(self) -> JumpOperator:
-        """B between all parts, also those of one subdomain, of no multipliers.  Collective when first read."""
+        """B between all parts, within a subdomain too, without multipliers.  Collective when first read."""
         if not self.summary.across:
             return self.solver.jump_operator
         pairs = cell_remarks.pairs_of(self.case, self.summary.phases)
-        shared = share_parts(self.comm, self.parts, self.table, pairs, self.lattice)
+        shared = uniform_parts.share_parts(self.comm, self.parts, self.table, pairs, self.lattice)
         return JumpOperator(self.comm, shared, self.parts, self.lattice, self.solver.problem)
 
     @cached_property
-    def _forces(self) -> ForcesBetweenParts:
-        return ForcesBetweenParts(self.comm, self.parts, self.jumps)
+    def _forces(self) -> uniform_parts.ForcesBetweenParts:
+        return uniform_parts.ForcesBetweenParts(self.comm, self.parts, self.jumps)
 
     def displacement(self, solution: DualSolution) -> Float:
-        """(dofs,) u* of a solution on the parts of this rank.  Collective."""
+        """(dofs,) u* on the parts of this rank.  Collective."""
         u = self.solver.boundary_displacement(solution)
-        return np.concatenate([np.zeros(0), *(own for _, own in self.displacements(u, solution.strain))])
+        return np.concatenate([np.zeros(0), *(part for _, part in self.displacements(u, solution.strain))])
 
     def displacements(self, u: Float, loads: Float, keep: bool = True) -> Iterator[tuple[UniformPart, Float]]:
-        """Yield each part with its u* (dofs, k), of u (boundary dofs, k) on all boundaries under the loads (v, k).
+        """Yield each part with its u* (dofs, k) for u (boundary dofs, k) on all boundaries and the loads (v, k).
 
-        `keep` the factors of interiors.
+        `keep` stores the factors of interiors.
         """
         place, extended = -1, np.zeros(0)
         for part in self.parts:
@@ -100,66 +104,80 @@ class TornCell:
             yield part, extended[part.dofs]
 
     def across_bonds(self, solution: DualSolution, u: Float) -> tuple[Float, Float]:
-        """(owned rows of `jumps`,) lam and openings of a solution with the displacements u of parts.  Collective."""
-        if not self.summary.across or not self.jumps.global_rows:  # a single part: there is nothing between parts
+        """(owned rows of `jumps`,) lam and openings for the displacements u of parts.  Collective."""
+        if not self.summary.across or not self.jumps.global_rows:  # without jumps there is a single part
             return solution.lam, solution.opening
         return self._forces.multipliers(u, solution.strain), self.jumps.sum(self.jumps.B @ u)
 
     @cached_property
+    def neighbours(self) -> InterfaceNeighbours:
+        """The interface nodes of all ranks.  Collective when first read."""
+        from feti_homog.feti.decomposition.neighbours import InterfaceNeighbours  # most cells have no interfaces
+
+        return InterfaceNeighbours(self.comm, self.solver.jump_operator, self.subdomains)
+
+    @cached_property
+    def spring_sides(self) -> SpringSides:
+        """Sides of elements along springs.  Collective when first read."""
+        from feti_homog.homogenization.spring_errors import SpringSides
+
+        jumps = self.solver.jump_operator
+        return SpringSides(jumps, self.neighbours, self.parts, self.lattice, self.summary.period)
+
+    @cached_property
     def class_nodes(self) -> Int:
-        """(c,) a plane node, numbered alike, of each class of this rank's parts, one part after the other."""
+        """(c,) a plane node of each class of this rank's parts, one part after the other."""
         nodes, first = [np.zeros(0, np.int64)], 0
         for mesh in (part.mesh for part in self.parts):
-            own = np.empty(mesh.n_classes, np.int64)
-            own[mesh.node_class] = first + np.arange(len(mesh.points))
-            nodes.append(own)
+            nodes.append(np.empty(mesh.n_classes, np.int64))
+            nodes[-1][mesh.node_class] = first + np.arange(len(mesh.points))
             first += len(mesh.points)
         return np.concatenate(nodes)
 
     @cached_property
     def strength_factors(self) -> Float:
-        """(fibres,) those of `bonds.strength_factors`."""
-        return bonds.strength_factors(self.case, self.summary.fibres)
+        """(fibres,) strength of the bonds of each fibre / strength in the case."""
+        return phase_laws.strength_factors(self.case, self.summary.fibres)
 
     @cached_property
     def bond_law(self) -> BondLaw:
-        """Law of the bonds at this rank's interface nodes, by the sections of interfaces and the fibres' factors."""
+        """Law of the bonds at this rank's interface nodes."""
         nodes = self.solver.jump_operator.nodes
         varies = not (self.strength_factors == 1.0).all()
         factor = self.strength_factors[self.summary.fibre_number(nodes.fibre) - 1] if varies else 1.0
-        return bonds.bond_law(self.case.interfaces, nodes.pair, factor)
+        return phase_laws.bond_law(self.case.interfaces, nodes.pair, factor)
 
     @cached_property
     def directions(self) -> Float:
-        """(k,) directions in degrees of this rank's interface nodes about the centres of their fibres."""
+        """(k,) directions in degrees from the centres of fibres to this rank's interface nodes."""
         nodes = self.solver.jump_operator.nodes
         return debonded_arcs.angles(nodes.points, nodes.fibre, self.summary.centres, self.summary.period)
 
     @cached_property
     def nested_lattice(self) -> ReferenceLattice:
         """The lattice of the mesh that is refined less.  Collective when first read."""
-        return nested_lattice(self.lattice, self.subdomains, self.comm, self.summary.across)
+        return uniform_parts.nested_lattice(self.lattice, self.subdomains, self.comm, self.summary.across)
 
     @cached_property
-    def nested_interiors(self) -> list[NestedInterior]:
+    def nested_interiors(self) -> list[uniform_parts.NestedInterior]:
         """The interiors of this rank's subdomains on the mesh that is refined less."""
-        return list(nested_interiors(self.solver.interface_operators, self.lattice, self.nested_lattice))
+        return list(uniform_parts.nested_interiors(self.solver.interface_operators, self.lattice, self.nested_lattice))
 
     def debonded(self, opening: float | None) -> Bool:
-        """(k,) which of this rank's interface nodes are debonded from the start: none without an [interface].
+        """(k,) mark this rank's interface nodes that are debonded from the start.
 
-        Arcs without an angle have that `opening`; None if there are none.
+        Arcs without an angle have the `opening`, which is None without such arcs.
         """
         nodes = self.solver.jump_operator.nodes
         number = self.summary.fibre_number(nodes.fibre)
-        found = nodes.precracked & bool(self.case.interfaces)
+        is_debonded = nodes.precracked & bool(self.case.interfaces)
         for pair, (interface, moved) in enumerate(zip(self.case.interfaces, self.summary.moved_tips, strict=True)):
             inside = debonded_arcs.debonded(interface.debonded, opening, number, self.directions, moved)
-            found |= inside & (nodes.pair == pair)
-        return np.asarray(found)
+            is_debonded |= inside & (nodes.pair == pair)
+        return np.asarray(is_debonded)
 
     def areas(self) -> dict[str, float]:
-        """Meshed area of each phase; collective."""
+        """Meshed area of each phase.  Collective."""
         local = dict.fromkeys(self.summary.phases, 0.0)
         for s in self.subdomains:
             for phase, area in zip(_phases(self.summary, s.submesh), s.areas.tolist(), strict=True):
@@ -167,19 +185,19 @@ class TornCell:
         return {phase: self.comm.allreduce(area) for phase, area in local.items()}
 
     def fractions(self) -> dict[str, float]:
-        """Share of each phase in the area of the cell, in that of the mesh where there are no voids; collective."""
+        """Share of each phase in the area of the cell; without voids in the area of the mesh.  Collective."""
         areas = self.areas()
-        whole = self.summary.area if self.summary.voids else sum(areas.values())
-        return {phase: area / whole for phase, area in areas.items()}
+        total = self.summary.area if self.summary.voids else sum(areas.values())
+        return {phase: area / total for phase, area in areas.items()}
 
     def sum_over_ranks(self, number: int) -> int:
-        """Sum of a number over ranks; collective."""
+        """Sum a number over ranks.  Collective."""
         return int(self.comm.allreduce(number))
 
     def destroy(self) -> None:
-        """Free the solvers; collective."""
-        for each in self.problems:
-            each.solver.destroy()
+        """Free the solvers.  Collective."""
+        for cell in self.problems:
+            cell.solver.destroy()
 
 
 def tear(
@@ -194,28 +212,31 @@ def tear(
     Raises:
         CaseError, MeshError: on every rank.
     """
-    own, shared, lattice, subdomains = assemble_subdomains(case, comm, progress, policy)
-    summary, table = own.summary, own.table
+    share, shared, lattice, subdomains = assemble_subdomains(case, comm, progress, policy)
+    summary, table = share.summary, share.table
     problem, recovers = phase_laws.plane_problem(case), case.output.mesh_error or case.output.fields
-    with progress.stage("factor") as words:
-        applications, springs = cost_model.applications(case, problem, summary.across), bonds.springs(case)
+    with progress.stage("factor") as line:
+        applications, springs = partition_policy.applications(case, problem, summary.across), phase_laws.springs(case)
         solver = FetiSolver(comm, shared, subdomains, lattice, applications, thresholds, springs, problem, recovers)
         multipliers, dimension = solver.jump_operator.global_rows, solver.coarse_dimension
-        words.append(f"{multipliers} multipliers, coarse dimension {dimension}")
+        line.append(f"{multipliers} multipliers, coarse dimension {dimension}")
     cell = TornCell(comm, case, summary, lattice, table, subdomains, solver)
     if len(phase_laws.problems(case)) == 1:
         return cell
-    with progress.stage("assemble") as words:
+    with progress.stage("assemble") as line:
         axial = agree(comm, assemble_axial, case, summary, subdomains)
-        words.append(f"{comm.allreduce(sum(s.n_dofs for s in axial))} degrees of freedom along the fibres")
+        line.append(f"{comm.allreduce(sum(s.n_dofs for s in axial))} degrees of freedom along the fibres")
     with progress.stage("axial"):
-        applications, springs = cost_model.applications(case, AXIAL, summary.across), bonds.axial_springs(case)
+        applications, springs = (
+            partition_policy.applications(case, AXIAL, summary.across),
+            phase_laws.axial_springs(case),
+        )
         solver = FetiSolver(comm, shared, axial, lattice, applications, thresholds, springs, AXIAL, recovers)
     return replace(cell, axial=TornCell(comm, case, summary, lattice, table, axial, solver))
 
 
 def assemble_axial(case: Case, summary: CellSummary, subdomains: Sequence[Subdomain]) -> list[Subdomain]:
-    """Return the subdomains of this rank with the displacement along the fibres, on the meshes that they have."""
+    """Return the subdomains of this rank with the displacement along the fibres, on their meshes."""
     law = partial(phase_laws.axial_law, case)
     return [
         Subdomain.on(
@@ -230,63 +251,45 @@ def assemble_subdomains(
 ) -> tuple[RankShare, SharedEntities, ReferenceLattice, list[Subdomain]]:
     """Mesh the cell, cut it on rank 0; refine and assemble the subdomains on their ranks.  Collective.
 
-    Returns this rank's share, what its subdomains share with others, the lattice of the refinement, and they.
+    Returns this rank's share, its entities shared with other ranks, the lattice of the refinement, and the subdomains.
     Raises as `tear`.
     """
     lattice = ReferenceLattice.of(case.cell.refine, case.cell.order)
-    with progress.stage("mesh") as words:
-        own = cut(case, lattice, comm, policy)
-        summary = own.summary
-        shared = share_entities(comm, own.submeshes, own.table, own.pairs, lattice)
-        words.append(f"{summary.coarse_triangles} triangles, {summary.bodies} bodies, {summary.subdomains} subdomains")
-    for line in summary.remarks:
-        progress.say(f"remark: {line}")
-    with progress.stage("assemble") as words:
-        subdomains = agree(comm, _assemble, case, summary, own.submeshes, lattice)
+    with progress.stage("mesh") as line:
+        share = cut(case, lattice, comm, policy)
+        summary = share.summary
+        shared = share_entities(comm, share.submeshes, share.table, share.pairs, lattice)
+        line.append(f"{summary.coarse_triangles} triangles, {summary.bodies} bodies, {summary.subdomains} subdomains")
+    for remark in summary.remarks:
+        progress.say(f"remark: {remark}")
+    with progress.stage("assemble") as line:
+        subdomains = agree(comm, _assemble, case, summary, share.submeshes, lattice)
         dofs = comm.allreduce(sum(s.n_dofs for s in subdomains))
         meshed = comm.allreduce(sum(s.area for s in subdomains))
         if summary.voids:
-            words.append(f"{summary.voids} voids, porosity {1 - meshed / summary.area:.6g},")
-        words.append(f"{dofs} degrees of freedom, refine = {case.cell.refine}, order = {case.cell.order}")
-    return own, shared, lattice, subdomains
-
-
-def cut(case: Case, lattice: ReferenceLattice, comm: MPI.Intracomm, policy: PartitionPolicy) -> RankShare:
-    """Return this rank's share of the cell, meshed and cut.  Collective."""
-    found = place_nodes(case, comm, policy.tiles)
-    if on_root(comm, can_be_torn_by_tiles, case, found, lattice, policy):
-        assert not isinstance(found, CoarseMesh)
-        return tear_by_tiles(case, found, lattice, comm, policy)
-    mesh = fill_tiles(found, comm)
-    return scatter(comm, on_root_only(comm, distribute, case, mesh, lattice, comm.size, policy) or [])
+            line.append(f"{summary.voids} voids, porosity {1 - meshed / summary.area:.6g},")
+        line.append(f"{dofs} degrees of freedom, refine = {case.cell.refine}, order = {case.cell.order}")
+    return share, shared, lattice, subdomains
 
 
 def _assemble(
     case: Case, summary: CellSummary, submeshes: SubmeshesOfRank, lattice: ReferenceLattice
 ) -> list[Subdomain]:
     """Return the subdomains of this rank, refined and assembled."""
-    problem, law = phase_laws.plane_problem(case), partial(phase_laws.plane_law, case)
-    return [
-        Subdomain.build(
-            s, lattice, _laws(summary, s, law), problem, _material(summary, s),
-            tuple(phase_laws.is_mixed(case, name) for name in _phases(summary, s)),
-            is_thin=s.phase == COATING, is_outer=s.phase == MATRIX,
-        )
-        for s in submeshes.cut()
-    ]  # fmt: skip
+    problem, law, subdomains = phase_laws.plane_problem(case), partial(phase_laws.plane_law, case), list[Subdomain]()
+    for s in submeshes.cut():
+        phase_of = summary.constituent_phase[s.constituent]
+        material = None if s.phase else np.unique(phase_of, return_inverse=True)[1]
+        mixed = tuple(phase_laws.is_mixed(case, name) for name in _phases(summary, s))
+        flags = {"is_thin": s.phase == COATING, "is_outer": s.phase == MATRIX}
+        subdomains.append(Subdomain.build(s, lattice, _laws(summary, s, law), problem, material, mixed, **flags))
+    return subdomains
 
 
 def _laws(summary: CellSummary, submesh: Submesh, law: Callable[[str], Float]) -> Float:
-    """Return the stiffnesses of a subdomain by the `law` of each phase, as `assemble` is given them."""
+    """Return the stiffnesses of a subdomain by the `law` of each phase, as `assemble` takes them."""
     laws = np.stack([law(phase) for phase in _phases(summary, submesh)])
     return np.asarray(laws[0] if submesh.phase else laws)
-
-
-def _material(summary: CellSummary, submesh: Submesh) -> Int | None:
-    """(t,) which of the laws each coarse triangle has, None of one material."""
-    if submesh.phase:
-        return None
-    return np.asarray(np.unique(summary.constituent_phase[submesh.constituent], return_inverse=True)[1])
 
 
 def _phases(summary: CellSummary, submesh: Submesh) -> list[str]:

@@ -17,15 +17,12 @@ from numpy.typing import NDArray
 
 from feti_homog.case.case import Case
 from feti_homog.errors import CaseError, CheckpointError
-from feti_homog.homogenization import phase_laws
 from feti_homog.results import atomic, checkpoint_file
 from feti_homog.results.checkpoint_file import FOLDER, NAME, Arrays, packed, records, unpacked
 from feti_homog.system.parallel.mpi_errors import on_root, on_root_only
 
-# Bytes of events up to which they have their multipliers, and of an event without (0.7 kB of 100 fibres).
-WHOLE_BYTES, LEAN_BYTES = 64 * 2**20, 1_000
-# Bytes of an event with multipliers, and for each multiplier: in the plane, more along the fibres, more with friction.
-EVENT_BYTES, MULTIPLIER_BYTES, AXIAL_BYTES, FRICTION_BYTES = 700, 16, 7, 2
+# Bytes of events up to which they have their multipliers.
+WHOLE_BYTES = 64 * 2**20
 # Arrays that an equilibrium with the bonds of the event has again.
 FOUND_AGAIN = re.compile(r"(lam|jump|used|alpha)(_axial)?(_ends)?")
 
@@ -177,14 +174,6 @@ def room_of(case: Case) -> int | None:
     With friction many equilibria exist under one load.
     """
     return None if case.has_friction or case.output.states == "all" else WHOLE_BYTES
-
-
-def bytes_at_most(case: Case, multipliers: int, events: int) -> int:
-    """Estimate the largest size of the event file (bytes) of a path."""
-    more = (len(phase_laws.problems(case)) - 1) * AXIAL_BYTES + case.has_friction * FRICTION_BYTES
-    full = events * (multipliers * (MULTIPLIER_BYTES + more) + EVENT_BYTES)
-    room = room_of(case)
-    return full if room is None else min(full, room + events * LEAN_BYTES)
 
 
 def _part(event: Arrays, rank: int) -> Arrays:

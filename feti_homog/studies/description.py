@@ -18,14 +18,12 @@ from feti_homog.feti import solver_plan
 from feti_homog.feti.decomposition.shared_entities import share_entities
 from feti_homog.feti.factory import database_options
 from feti_homog.feti.solver_plan import ProblemSizes, SolverOptions, SolverPlan
-from feti_homog.homogenization import cost_model, phase_laws, process_zone
-from feti_homog.homogenization.bonds import teeth_of
+from feti_homog.homogenization import cell_remarks, partition_policy, phase_laws
 from feti_homog.homogenization.domain_partition import CellSummary
 from feti_homog.homogenization.partition_policy import BY_COST
-from feti_homog.homogenization.unit_cell import cut
+from feti_homog.homogenization.tile_tearing import cut
 from feti_homog.mesh.refinement import ReferenceLattice
 from feti_homog.microstructure.phase_names import COATING
-from feti_homog.results import checkpoint
 from feti_homog.studies import sweep_cases
 from feti_homog.studies.sweep_cases import Sweep, case_names
 from feti_homog.system.parallel.mpi_errors import on_root, on_root_only
@@ -63,16 +61,13 @@ def _described(
     elements = summary.coarse_triangles * len(lattice.triangles)
     plan = _plan(case, summary, multipliers, options, subdomains)
     columns = multipliers if plan.preconditioner == "influence" else 0
-    problems = _applications(case, summary.across or columns > 0)
-    triangles, most_ranks = summary.coarse_triangles, summary.coarse_triangles if summary.across else summary.bodies
-    cost = cost_model.estimate(nodes, subdomains, triangles, most_ranks, problems, columns, cost_model.has_errors(case))
-    unresolved = process_zone.warnings(case, summary.width, summary.interface_edge)
+    unresolved = cell_remarks.warnings(case, summary.width, summary.interface_edge)
     solver = plan.in_words if multipliers else "one factor of the whole cell: no multipliers, no iterations"
     lines = [
         f"case       {case.name}: {case.analysis.type}, plane {case.analysis.plane}",
         f"cell       {summary.width:g} x {summary.height:g}, phases {', '.join(summary.phases)}",
         *([f"voids      {summary.voids}"] if summary.voids else []),
-        f"mesh       {triangles} coarse triangles, {elements} "
+        f"mesh       {summary.coarse_triangles} coarse triangles, {elements} "
         f"elements of order {case.cell.order}, about {2 * sum(nodes)} degrees of freedom",
         *(
             [f"sizes      mesh_size = {case.cell.mesh_size:g}, refine = {case.cell.refine}, as asked for by accuracy"]
@@ -86,9 +81,7 @@ def _described(
             f"rank {rank:<5} {_subdomains(count)}, about {2 * n} degrees of freedom"
             for rank, (count, n) in enumerate(zip(subdomains, nodes, strict=True))
         ),
-        *cost_model.estimate_lines(cost, len(loads), summary.across),
-        *_path_lines(case, summary, multipliers, nodes, cost, columns),
-        *_field_lines(case, sum(nodes), elements, multipliers // 2, len(loads)),
+        *_estimate_lines(case, summary, multipliers, nodes, subdomains, columns),
         *(f"warning    {warning}" for warning in (*case.warnings(), *summary.warnings(), *unresolved)),
         *(f"remark     {remark}" for remark in (*case.remarks(), *summary.remarks)),
         "the case is valid",
@@ -96,25 +89,25 @@ def _described(
     return "\n".join(lines)
 
 
-def _path_lines(
-    case: Case, summary: CellSummary, multipliers: int, nodes: Sequence[int], cost: cost_model.Estimate, columns: int
+def _estimate_lines(
+    case: Case, summary: CellSummary, multipliers: int, nodes: Sequence[int], subdomains: Sequence[int], columns: int
 ) -> list[str]:
-    """Return lines about a path's events; none for other analyses or without interfaces."""
-    teeth, memory = teeth_of(case), cost_model.memory_to_the_end(cost, columns, len(nodes))
-    lines = cost_model.events_lines(case, multipliers, summary.fibres, teeth, nodes, cost.seconds, memory)
-    if not lines or case.path is None:
-        return []
-    events = case.path.increments or multipliers // 2 * teeth
-    return [*lines, cost_model.checkpoint_line(checkpoint.bytes_at_most(case, multipliers, events))]
+    """Return lines about memory, of a path also to complete debonding, and about ranks.
 
-
-def _field_lines(case: Case, nodes: int, elements: int, interface_nodes: int, ranks: int) -> list[str]:
-    return [cost_model.fields_line(case, nodes, elements, interface_nodes, ranks)] if case.output.fields else []
-
-
-def _applications(case: Case, easy: bool) -> dict[int, int]:
-    """Return dual operator applications of each problem, by displacements a node."""
-    return {p.components: cost_model.applications(case, p, easy) for p in phase_laws.problems(case)}
+    `nodes` and `subdomains` are counted on each rank.
+    """
+    ranks, most_ranks = len(nodes), summary.coarse_triangles if summary.across else summary.bodies
+    components = [problem.components for problem in phase_laws.problems(case)]
+    memory = partition_policy.memory(nodes, subdomains, components, columns)
+    noun, limit = "rank" if ranks == 1 else "ranks", "" if summary.across else ", at most one per body"
+    end = partition_policy.memory_to_the_end(case, memory, multipliers, columns, ranks)
+    breaks = case.section.is_followed and case.interfaces and end > memory
+    few, all_bonds = partition_policy.in_words(memory), f", {partition_policy.in_words(end)} if all bonds break"
+    return [
+        f"estimate   on {ranks} {noun} about {few} on the largest{all_bonds if breaks else ''}, without pictures",
+        f"ranks      recommended: {partition_policy.recommended_ranks(sum(components) * sum(nodes), most_ranks)} "
+        f"({partition_policy.DOFS_OF_A_RANK} degrees of freedom per rank{limit})",
+    ]
 
 
 def _subdomains(count: int) -> str:
@@ -132,7 +125,9 @@ def _plan(
     dense = options.operator != "implicit"
     has_thin = COATING in case.materials and not summary.across
     one_each = summary.across and len(subdomains) > 1 and set(subdomains) == {1}
-    applications = max(_applications(case, summary.across).values())
+    applications = max(
+        partition_policy.applications(case, problem, summary.across) for problem in phase_laws.problems(case)
+    )
     sizes = ProblemSizes(applications, summary.is_cut, dense, dense, multipliers, has_thin, one_each)
     plan = solver_plan.choose(sizes, options)
     if case.has_friction and plan.preconditioner != "influence":

@@ -41,7 +41,7 @@ class TwoSteps(MaxStrength):
 @pytest.fixture
 def path(comm, monkeypatch, request):
     """Return the interfaces, the law and the points of the path."""
-    monkeypatch.setattr("feti_homog.homogenization.bonds.has_softening", lambda case: True)
+    monkeypatch.setattr("feti_homog.homogenization.phase_laws.has_softening", lambda case: True)
     case = {"geometry": "square", "mesh_size": 0.25, "petsc": {"feti_pc_type": request.param}}
     solver = torn_cells.tear(comm, springs=STIFFNESS, **case).solver
     law, k = TwoSteps(30.0, 15.0), len(solver.jump_operator.nodes.row)

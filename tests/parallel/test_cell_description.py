@@ -48,19 +48,10 @@ def test_the_solver_is_the_one_that_is_reported(comm, name):
     cell.destroy()
 
 
-def test_increments_are_what_a_checkpoint_holds(comm):
-    few, many = (
-        changed(*PATH, end=STRENGTH.replace("[int", f'method = "increments"\nincrements = {n}\n[int'))
-        for n in (3, 3000)
-    )
-    sizes = []
-    for text in (few, many):
-        case = Case.parse(tomllib.loads(text))
-        lines = comm.bcast(describe(case, comm)).splitlines()
-        (line,) = [line for line in lines if line.startswith("checkpoint")]
-        number, unit = line.split()[3:5]
-        sizes.append(float(number) * {"KiB": 1, "MiB": 1024}[unit])
-    assert sizes[1] > 100 * sizes[0]
+def test_only_paths_have_the_memory_of_complete_debonding(comm):
+    printed = [comm.bcast(describe(Case.parse(tomllib.loads(CASES[name])), comm)) for name in ("path", "bonded")]
+    lines = [line for text in printed for line in text.splitlines() if line.startswith("estimate")]
+    assert ["if all bonds break" in line for line in lines] == [True, False]
 
 
 @pytest.mark.parametrize("option", ['feti_pc_type = "lumped"', 'feti_dual_operator = "implicit"'])

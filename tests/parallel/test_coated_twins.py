@@ -12,7 +12,7 @@ from support.cases import relative_error
 from support.loads import strains
 
 from feti_homog import Case
-from feti_homog.analysis.criteria import criterion_of
+from feti_homog.analysis.tip_records import criterion_of
 from feti_homog.homogenization import unit_cell
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import BONDED, CLOSED, OPEN

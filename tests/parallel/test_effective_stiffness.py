@@ -9,7 +9,7 @@ import pytest
 from reference.closed_forms import hill_bulk, homogeneous
 from support.cases import FIBRE, MATRIX, make_case, monolithic_stiffness, relative_error, solve
 
-from feti_homog.homogenization import cost_model
+from feti_homog.homogenization import partition_policy
 
 pytestmark = pytest.mark.parallel
 
@@ -170,4 +170,7 @@ def test_swapped_phases_lie_within_voigt_and_reuss(comm):
 def test_estimates_count_the_solves_that_are_done(comm, plane):
     case = make_case(plane=plane)
     cell, *_ = solve(case, comm)
-    assert cost_model.applications(case, cell.solver.problem) == cell.solver.solves * cost_model.ITERATIONS_OF_A_SOLVE
+    assert (
+        partition_policy.applications(case, cell.solver.problem)
+        == cell.solver.solves * partition_policy.ITERATIONS_OF_A_SOLVE
+    )

@@ -11,7 +11,7 @@ from support.ranks import parallel_assert
 from unit.mesh.faulty_meshes import RIGHT_SIDE, grid
 
 from feti_homog import Case, run
-from feti_homog.analysis.criteria import criterion_of
+from feti_homog.analysis.tip_records import criterion_of
 from feti_homog.errors import CaseError
 from feti_homog.homogenization.averaging import Homogenization
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces

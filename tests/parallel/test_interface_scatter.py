@@ -8,7 +8,7 @@ from scipy.stats import weibull_min
 from support.ranks import PIECES
 
 from feti_homog import Case, run
-from feti_homog.homogenization.bonds import strength_factors
+from feti_homog.homogenization.phase_laws import strength_factors
 from feti_homog.system.parallel.mpi_errors import on_root
 from feti_homog.verify.certificate import verify
 

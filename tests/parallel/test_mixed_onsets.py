@@ -11,7 +11,7 @@ from support.cases import relative_error
 from support.ranks import PIECES, parallel_assert
 
 from feti_homog import Case, run
-from feti_homog.analysis.criteria import criterion_of
+from feti_homog.analysis.tip_records import criterion_of
 from feti_homog.homogenization import unit_cell
 from feti_homog.interface.contact.contact_problem import ContactProblem
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces

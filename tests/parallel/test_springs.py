@@ -83,7 +83,7 @@ def test_springs_that_soften_are_those_that_were_soft_from_the_beginning(comm, m
     if not pieces and preconditioner != "influence":
         with pytest.raises(ValueError, match="never do"):
             soft.set_state(np.ones(soft.rows), 2 * soft.intact_compliance)
-    monkeypatch.setattr("feti_homog.homogenization.bonds.has_softening", lambda case: True)
+    monkeypatch.setattr("feti_homog.homogenization.phase_laws.has_softening", lambda case: True)
     cell = torn_cells.tear(comm, springs=(400.0, 200.0), **case)
     first = solutions(cell, cell.solver, cell.solver.intact_compliance)
     np.testing.assert_allclose(2 * cell.solver.intact_compliance, soft.intact_compliance, rtol=1e-14)

@@ -11,7 +11,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from feti_homog import Case, run
-from feti_homog.analysis.criteria import criterion_of
+from feti_homog.analysis.tip_records import criterion_of
 from feti_homog.homogenization import unit_cell
 from feti_homog.interface.contact.coupled_interfaces import CoupledInterfaces
 from feti_homog.interface.contact.states import OPEN

@@ -161,7 +161,7 @@ def test_a_stiffness_run_loads_no_other_analysis(tmp_path):
     )
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=tmp_path)
     loaded = {name.removeprefix("feti_homog.") for name in run.stdout.split() if name.startswith("feti_homog.")}
-    others = {f"analysis.{name}" for name in ("angle", "path", "load", "envelope", "tip_rates", "constants_in_space")}
+    others = {f"analysis.{name}" for name in ("angle", "path", "load", "envelope", "tip_records")}
     others |= {"interface.path", "report.plots", "report.page", "homogenization.energy_release"}
     others |= {"materials.estimates", "verify", "studies"}
     others |= {"mesh.readers", "mesh.fill.shape_mesher", "mesh.outline.elliptic_outline"}

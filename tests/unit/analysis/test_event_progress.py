@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from mpi4py import MPI
 
-from feti_homog.analysis.event_progress import EVENTS_BAR, STEPS_BAR, EventProgress
+from feti_homog.analysis.path_events import EVENTS_BAR, STEPS_BAR, EventProgress
 from feti_homog.system.runtime.progress import Progress
 
 

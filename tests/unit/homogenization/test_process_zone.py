@@ -11,7 +11,7 @@ from support.whole_meshes import coarse_mesh
 from unit.mesh.faulty_meshes import grid
 
 from feti_homog.case import case as cases
-from feti_homog.homogenization import process_zone
+from feti_homog.homogenization import cell_remarks
 from feti_homog.studies.description import describe
 
 # Glass and epoxy in MPa and micrometres, G_Ic = 2 J/m2, fibres of 7.5 micrometres: Tavara and others, Eng. Anal. Bound.
@@ -42,7 +42,7 @@ def case_of(normal_stiffness=2025.0, criterion="energy", plane="strain", folder=
 
 def warnings(case):
     mesh = coarse_mesh(case, MPI.COMM_SELF)
-    return process_zone.warnings(case, mesh.width, process_zone.longest_edge(mesh))
+    return cell_remarks.warnings(case, mesh.width, cell_remarks.longest_edge(mesh))
 
 
 @pytest.mark.parametrize(
@@ -52,14 +52,14 @@ def test_the_length_is_that_of_the_matrix_and_the_strength(stiffness, plane, len
     """E' G_Ic / sigma_c^2 with sigma_c = 90 or 60 MPa, E' = 2790 / (1 - 0.33^2) or 2790."""
     strength = {2025.0: 90.0, 900.0: 60.0}[stiffness]
     modulus = 2790.0 / (1 - 0.33**2) if plane == "strain" else 2790.0
-    found = process_zone.process_zone(case_of(stiffness, plane=plane))
+    found = cell_remarks.process_zone(case_of(stiffness, plane=plane))
     assert found == pytest.approx(modulus * 2.0 / strength**2, rel=1e-12) and found == pytest.approx(length, abs=5e-4)
 
 
 @pytest.mark.parametrize(("size", "edges"), [(None, 48), (0.01, 4 * 57)])
 def test_the_longest_edge_is_a_chord(size, edges):
     """The circle in quarters, each of as many edges as its length takes: the cell is 21.02 micrometres wide."""
-    found = process_zone.longest_edge(coarse_mesh(case_of(interface_size=size), MPI.COMM_SELF))
+    found = cell_remarks.longest_edge(coarse_mesh(case_of(interface_size=size), MPI.COMM_SELF))
     assert found == pytest.approx(2 * 7.5 * np.sin(np.pi / edges), rel=1e-9)
 
 
@@ -81,7 +81,7 @@ def test_what_the_warning_asks_for_is_enough(remedy):
 
 
 def test_other_bonds_have_no_such_length():
-    assert process_zone.process_zone(case_of(criterion="max")) is None and warnings(case_of(criterion="max")) == []
+    assert cell_remarks.process_zone(case_of(criterion="max")) is None and warnings(case_of(criterion="max")) == []
 
 
 COHESIVE = {
@@ -100,7 +100,7 @@ def test_the_zone_is_that_of_the_shorter_mode_of_the_weakest_pair(shear):
         between = (["coating", "matrix"], ["fibre", "coating"])
         interfaces = [own | {"between": pair} for own, pair in zip(pairs, between, strict=False)]
         document = DOCUMENT | {"interface": interfaces, "cell": CELL | {"coating": 0.1}}
-        found = process_zone.process_zone(cases.parse(document, Path()))
+        found = cell_remarks.process_zone(cases.parse(document, Path()))
         assert found == pytest.approx(modulus * min(0.05 / 40.0**2, shear / 60.0**2))
 
 
@@ -111,7 +111,7 @@ def test_the_warning_has_the_traction_of_the_pair_with_the_shortest_zone():
         for k, G, pair in ((900.0, 8.0, ["coating", "matrix"]), (2025.0, 2.0, ["fibre", "coating"]))
     ]
     case = cases.parse(DOCUMENT | {"interface": interfaces, "cell": CELL | {"coating": 0.1}}, Path())
-    line = process_zone.warnings(case, 20.0, 50.0)[0]
+    line = cell_remarks.warnings(case, 20.0, 50.0)[0]
     assert "for sigma_c = sqrt(2 k_n G_Ic) = 90, " in line and f"= {2790.0 / (1 - 0.33**2) / 4050:.3g} long" in line
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from feti_homog.case.bond_laws import LAWS
 from feti_homog.case.interface_section import InterfaceSection
-from feti_homog.homogenization.bonds import bond_law
+from feti_homog.homogenization.phase_laws import bond_law
 
 NUMBERS = {
     "normal_stiffness": 100.0, "tangential_stiffness": 50.0, "normal_strength": 2.0, "tangential_strength": 1.5,

@@ -10,7 +10,7 @@ from scipy.integrate import quad
 
 from feti_homog.case.interface_section import InterfaceSection
 from feti_homog.errors import CaseError
-from feti_homog.homogenization.bonds import bond_law
+from feti_homog.homogenization.phase_laws import bond_law
 from feti_homog.interface.contact.states import BondState
 from feti_homog.interface.laws.energy import SpringEnergy
 from feti_homog.interface.laws.softening import Bilinear, Exponential, Table

@@ -1,0 +1,137 @@
+"""Recorders of a run: convergence and errors of the laws that responses obey, and states with their fields."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from itertools import count
+
+from feti_homog.analysis.result import Fields
+from feti_homog.errors import FetiHomogError
+from feti_homog.homogenization.averaging import Response
+from feti_homog.homogenization.unit_cell import TornCell
+from feti_homog.results import field_parts, seals
+from feti_homog.results.field_file import FieldFile
+from feti_homog.results.field_layout import StatePart
+from feti_homog.results.seals import FileSeal
+from feti_homog.system.parallel.mpi_errors import on_root
+
+# Largest relative error of a check that passes, in relative tolerances of the Krylov method: sums over the cell and
+# jumps of stiffness make so much of the solver's error.
+CHECK_ERROR_PER_RTOL = 1e3
+# Largest error that passes with any tolerance: a check that is wrong by more has no result.
+MAX_CHECK_ERROR = 1e-4
+# Largest error of the KKT conditions that passes, relative to the scales of `contact_certificate.kkt_errors`.
+CONTACT_TOLERANCE = 1e-6
+
+
+@dataclass
+class CheckRecorder:
+    """Checks of all responses of a run.
+
+    Attributes:
+        rtol: relative tolerance of the Krylov method.
+        iterations, reasons: of every dual solve so far.
+        errors: largest error of each law so far.
+        faults: lines about solves that did not converge and checks that failed.
+    """
+
+    rtol: float
+    iterations: list[int] = field(default_factory=list)
+    reasons: list[int] = field(default_factory=list)
+    errors: dict[str, float] = field(default_factory=dict)
+    faults: list[str] = field(default_factory=list)
+
+    def record(self, name: str, response: Response) -> str:
+        """Record the checks of a response, with a fault if it breaks a law; returns a line about it."""
+        state, error = response.state, response.checks.get("jump")
+        self.iterations.append(state.iterations)
+        self.reasons.append(state.solution.reason)
+        without = "by the factor of the cell" if response.checks.keys() & {"hill"} else "by influence columns"
+        jump = without if error is None else f"relative jump {error:.1e}"
+        line = f"{state.iterations or 'no'} iterations, {jump}"
+        if response.debonded:
+            line += f", {response.debonded} debonded ({response.counts['closed']} closed), {state.solves} solves"
+        if state.free_motions:
+            line += f", {state.free_motions} free motions"
+        if state.solution.reason < 0:
+            self.faults.append(
+                f"{name}: no convergence after {state.iterations} iterations, {jump} "
+                f"(KSPConvergedReason {state.solution.reason}); result marked"
+            )
+        self.require(name, response.checks)
+        return f"  {name}: {line}"
+
+    def require(self, name: str, errors: Mapping[str, float]) -> None:
+        """Record the largest errors; a fault for each error that is NaN or above its tolerance."""
+        for law, error in errors.items():
+            self.errors[law] = max(error, self.errors.get(law, 0.0))
+            if not error <= (tolerance := self.tolerance(law)):
+                self.faults.append(f"{name}: check {law}: {error:.1e}, expected at most {tolerance:.1e}; result marked")
+
+    def tolerance(self, law: str) -> float:
+        """Largest error of a check that passes."""
+        if law.startswith("kkt_"):
+            return CONTACT_TOLERANCE
+        return min(CHECK_ERROR_PER_RTOL * self.rtol, MAX_CHECK_ERROR)
+
+    def warnings(self) -> list[str]:
+        """Return a line if the solver's tolerance is looser than the checks."""
+        if CHECK_ERROR_PER_RTOL * self.rtol <= MAX_CHECK_ERROR:
+            return []
+        return [
+            f"-feti_ksp_rtol {self.rtol:g} asks for less than the checks do: the result is marked unless their errors "
+            f"are at most {MAX_CHECK_ERROR:g}"
+        ]
+
+
+class StateRecorder:
+    """Recorder of the states of a run, to a file and to memory, or neither.
+
+    Attributes:
+        has_place: whether states go anywhere.
+        error: why the file was given up; the numbers are computed without it.
+    """
+
+    def __init__(self, cell: TornCell, file: FieldFile | None, keep: bool, say: Callable[[str], object]) -> None:
+        self._cell, self._file, self._keep = cell, file, keep
+        self._number, self._states, self._say = count(), list[StatePart](), say
+        self.has_place = keep or file is not None
+        self.error: FetiHomogError | None = None
+
+    def record(
+        self, plane: Response | None, axial: Response | None, load_factor: float, label: str, point: int
+    ) -> None:
+        """Take responses, one of which may be None, as the next state.  Collective."""
+        if self._file is None and not self._keep:
+            return
+        state: StatePart
+        if plane is None or len(self._cell.problems) > 1:
+            state = field_parts.spatial_state_part(self._cell, plane, axial, load_factor, label, point)
+        else:
+            state = field_parts.state_part(self._cell, plane, load_factor, label, point)
+        self._write(lambda file: file.write_state(next(self._number), state))
+        if self._keep:
+            self._states.append(state)
+
+    def seal(self) -> FileSeal | None:
+        """Complete the file; returns its seal, None without a file.  Collective."""
+        self._write(FieldFile.close)
+        return None if self._file is None else on_root(self._cell.comm, seals.seal, self._file.path)
+
+    def _write(self, write: Callable[[FieldFile], object]) -> None:
+        """Write to the file if there is one; give it up on all ranks if that fails."""
+        if self._file is not None:
+            try:
+                write(self._file)
+            except FetiHomogError as error:
+                self._file, self.error = None, error
+                self._say(f"warning: {error}; the remaining results are computed without it")
+
+    def fields(self) -> Fields | None:
+        """Return this rank's fields; None unless they go to memory."""
+        if not self._keep:
+            return None
+        cell = self._cell
+        parts = field_parts.mesh_part(cell), field_parts.fibre_part(cell), field_parts.interface_part(cell)
+        return Fields(cell.comm, field_parts.header(cell), *parts, tuple(self._states))
