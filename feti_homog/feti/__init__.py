@@ -1,7 +1,7 @@
 """The dual problem of the torn cell: subdomains, multipliers, dual operator, coarse spaces, preconditioners, solver.
 
 Imports `fem`, `feti.coarse`, `feti.decomposition`, `feti.exact`, `feti.operators`, `mesh` and `system`.  Main entry:
-`solver.FetiSolver`.  Its own floors, each on the floors below:
+`solver.FetiSolver`. Its own floors, each on the floors below:
 
     solver, factory, solver_plan, krylov, dual_solution, confirmation
     coarse           natural and adaptive coarse space, the preconditioner with the latter

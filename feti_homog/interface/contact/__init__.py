@@ -1,4 +1,4 @@
 """Open and closed nodes of debonded interfaces at one load.
 
-Imports `feti`, `interface.loads`, `materials`, `mesh` and `system`.  Main entry: `contact_problem.ContactProblem`.
+Imports `feti`, `interface`, `materials`, `mesh` and `system`.  Main entry: `contact_problem.ContactProblem`.
 """

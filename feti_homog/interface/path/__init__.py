@@ -1,5 +1,5 @@
 """Paths of load: from event to event, onsets, later legs.
 
-Imports `feti`, `interface.contact`, `interface.friction`, `interface.laws`, `interface.loads` and `system`.  Main
-entry: `path_following`.
+Imports `feti`, `interface`, `interface.contact`, `interface.friction`, `interface.laws` and `system`.  Main entry:
+`path_following`.
 """
