@@ -12,7 +12,7 @@ from scipy.linalg import eigh
 
 from feti_homog.analysis.constants import stiffness_constants
 from feti_homog.analysis.context import AnalysisContext
-from feti_homog.analysis.result_records import MeshError
+from feti_homog.analysis.result_records import MeshErrors
 from feti_homog.errors import NotCarriedError
 from feti_homog.homogenization import phase_laws
 from feti_homog.homogenization.averaging import Response
@@ -75,7 +75,7 @@ def mesh_error(
         entries |= {name: errors.pop(name) for name in ("thermal_expansion",) if name in errors}
         constants = {name: float(value) for name, value in errors.items()}
     note_accuracy(context, energy)
-    return {"mesh_error": MeshError(**entries, energy=energy, constants=constants)}
+    return {"mesh_error": MeshErrors(**entries, energy=energy, constants=constants)}
 
 
 def note_accuracy(context: AnalysisContext, energy: float) -> None:

@@ -22,7 +22,7 @@ from feti_homog.analysis.result_records import (
     AnglePoint,
     EnvelopePoint,
     LoadPoint,
-    MeshError,
+    MeshErrors,
     PathPoint,
     Peak,
     TipRates,
@@ -33,7 +33,7 @@ from feti_homog.materials.voigt import voigt_names
 from feti_homog.results.field_layout import FibrePart, Header, InterfacePart, MeshPart, StatePart, tables
 from feti_homog.results.result_json import SCHEMA
 from feti_homog.results.seals import FileSeal
-from feti_homog.system.runtime.records import BYTES, SECONDS, STRESS, Key, described, keys, plain, restored
+from feti_homog.system.runtime.records import BYTES, SECONDS, STRESS, ResultKey, described, keys, plain, restored
 from feti_homog.typing import Float
 
 if TYPE_CHECKING:
@@ -158,7 +158,7 @@ class Result:
     )
     estimates: Estimates | None = described("closed estimates of the same, of a cell without debonding", default=None)
     fibre_bounds: FibreBounds | None = described("bounds of the same, of rigid bonds", default=None)
-    mesh_error: MeshError | None = described("estimated errors of a stiffness by its mesh", default=None)
+    mesh_error: MeshErrors | None = described("estimated errors of a stiffness by its mesh", default=None)
     sensitivities: Sensitivities | None = described(
         "derivatives of a stiffness, if the case asks for them", default=None
     )
@@ -276,6 +276,6 @@ class Result:
         return notebook(self.document)
 
 
-def schema_keys() -> Iterator[Key]:
+def schema_keys() -> Iterator[ResultKey]:
     """Yield the keys of result.json with type, unit and meaning: its reference table."""
     return keys(Result)

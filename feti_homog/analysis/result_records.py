@@ -34,7 +34,7 @@ DEBONDED_SHARES = "the same of the interfaces of each section [[interface]], in 
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)  # arrays have no single answer to "equal"
-class MeshError:
+class MeshErrors:
     """Estimated mesh errors, by the distance of recovered stresses to element stresses."""
 
     effective_stiffness: Float = described("error of each entry", STRESS, EITHER_STIFFNESS)

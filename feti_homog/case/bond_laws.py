@@ -73,7 +73,7 @@ REGISTRY = (
     *(
         BondLawEntry(
             name,
-            f"softening.{name.capitalize()}",
+            f"softening.{name.capitalize()}Law",
             (*COHESIVE, *OF_SOFTENING, *(BRANCH if name == "table" else ())),
             description,
             ((r"N", "normal_strength", True), (r"S", "tangential_strength", True)),

@@ -22,8 +22,8 @@ from feti_homog.case.sections import (
     UNKNOWN,
     Measured,
     MeasuredCurve,
+    SectionTable,
     SweepSection,
-    Table,
     Unknown,
 )
 from feti_homog.case.uncertainty import CORRELATION, UNCERTAINTY
@@ -36,9 +36,9 @@ ORDER = ("name", "cell", "material", *[*SECTIONS][1:], "petsc", UNCERTAINTY, SWE
 """Sections in the order of the reference."""
 
 FIT_TABLES = (
-    Table(UNKNOWN, f"[{UNKNOWN}] SECTION.KEY", Unknown),
-    Table(MEASURED, f"[{MEASURED}] NAME", Measured),
-    Table(MEASURED, f"[{MEASURED}] {CURVE}", MeasuredCurve),
+    SectionTable(UNKNOWN, f"[{UNKNOWN}] SECTION.KEY", Unknown),
+    SectionTable(MEASURED, f"[{MEASURED}] NAME", Measured),
+    SectionTable(MEASURED, f"[{MEASURED}] {CURVE}", MeasuredCurve),
 )
 """Tables of the file of `feti-homog fit`, beside those of its cases."""
 
@@ -119,7 +119,7 @@ def tables() -> list[TableReference]:
         *map(_table, (*TABLES, *FIT_TABLES)),
         TableReference("petsc", "[petsc]", PETSC_MEANING, (PETSC_OPTION,)),
         TableReference(UNCERTAINTY, f"[{UNCERTAINTY}]", UNCERTAINTY_MEANING, (DEVIATION, PAIRS)),
-        _table(Table(SWEEP, f"[{SWEEP}]", SweepSection), AXIS),
+        _table(SectionTable(SWEEP, f"[{SWEEP}]", SweepSection), AXIS),
         TableReference(SWEEP, RANGE, "Values of a key that lie between two ends.", _rows(SWEEP, RANGE, RANGE_KEYS)),
     ]
     return sorted(found, key=lambda table: ORDER.index(table.section))
@@ -139,7 +139,7 @@ def rows() -> Iterator[KeyRow]:
         yield from table.rows
 
 
-def _table(table: Table, *rows: KeyRow) -> TableReference:
+def _table(table: SectionTable, *rows: KeyRow) -> TableReference:
     place = f"{table.place}, {table.form}" if table.form else table.place
     first_paragraph = (inspect.getdoc(table.contents) or "").partition("\n\n")[0]
     meaning = " ".join(first_paragraph.split())

@@ -236,7 +236,7 @@ TOP_LEVEL = (*SECTIONS, "material", "petsc", "name")
 
 
 @dataclass(frozen=True)
-class Table:
+class SectionTable:
     """A table.
 
     Attributes:
@@ -253,12 +253,12 @@ class Table:
 
 
 TABLES = (
-    *(Table(section, f"[{section}]", contents) for section, contents in SECTIONS.items()),
-    *(Table("material", "[material.PHASE]", contents, form) for form, contents in MATERIAL_FORMS.items()),
-    Table("interface", "an arc of [interface] debonded", Arc),
-    Table("interface", "[interface] scatter", Scatter),
-    Table("path", "a load of [path] to or waypoints", MixedLoad),
-    Table("load", "[load] to", MixedLoad),
+    *(SectionTable(section, f"[{section}]", contents) for section, contents in SECTIONS.items()),
+    *(SectionTable("material", "[material.PHASE]", contents, form) for form, contents in MATERIAL_FORMS.items()),
+    SectionTable("interface", "an arc of [interface] debonded", Arc),
+    SectionTable("interface", "[interface] scatter", Scatter),
+    SectionTable("path", "a load of [path] to or waypoints", MixedLoad),
+    SectionTable("load", "[load] to", MixedLoad),
 )
 
 

@@ -24,7 +24,7 @@ NO_NORMAL = 0.1
 
 
 @dataclass(frozen=True)
-class Neighbours:
+class PatchNeighbours:
     """Pairs of neighbours, the first of which is on the boundary, where vertices have few elements of their own.
 
     Attributes:
@@ -37,7 +37,7 @@ class Neighbours:
     vector: Float
 
     @classmethod
-    def of(cls, vertices: Int, corners: Float) -> Neighbours:
+    def of(cls, vertices: Int, corners: Float) -> PatchNeighbours:
         """Find the neighbours in elements of vertices (e, 3) at `corners` (e, 3, 2); boundary sides have one."""
         start, stop = vertices.T.ravel(), vertices.T[[1, 2, 0]].ravel()
         size, e = int(vertices.max()) + 1, len(vertices)
@@ -74,7 +74,7 @@ class Neighbours:
         return NEIGHBOURS[order] * gathered(self.at, moved, len(moments))
 
 
-def linear_values(vertices: Int, away: Float, weights: Float, values: Float, neighbours: Neighbours) -> Float:
+def linear_values(vertices: Int, away: Float, weights: Float, values: Float, neighbours: PatchNeighbours) -> Float:
     """(vertices, k) values at the vertices of linear fits to uniform ones (e, k).
 
     Each is a weighted mean of the values around it, so that sums over elements are not made, but where neighbours share

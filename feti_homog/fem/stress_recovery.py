@@ -15,7 +15,7 @@ import numpy as np
 
 from feti_homog.fem import bubble
 from feti_homog.fem.assembly import ELEMENTS_AT_ONCE
-from feti_homog.fem.local_fits import KnownTractions, Neighbours, fitted, gathered, linear_values, polynomials
+from feti_homog.fem.local_fits import KnownTractions, PatchNeighbours, fitted, gathered, linear_values, polynomials
 from feti_homog.fem.problem import Problem
 from feti_homog.fem.shape_functions import barycentric, gradients, shape_functions
 from feti_homog.mesh.refinement import FineMesh
@@ -158,7 +158,7 @@ class RecoveredStress:
     @cached_property
     def fits(self) -> Float:
         """(vertices, p, m k) coefficients of the polynomials about each vertex, see `polynomials`; p = 1 of order 1."""
-        neighbours = Neighbours.of(self.vertices, self.points[self.triangles[:, :3]])
+        neighbours = PatchNeighbours.of(self.vertices, self.points[self.triangles[:, :3]])
         if self.order == 1:
             chunks = [(chunk.points[:, 0], chunk.weights[:, 0], chunk.stress[:, 0]) for chunk in self.elements]
             points, weights, stress = map(np.concatenate, zip(*chunks, strict=True))

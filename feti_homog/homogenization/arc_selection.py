@@ -66,7 +66,7 @@ def size(case: Case, estimate: ElementEstimate) -> float | None:
 
 
 @dataclass(frozen=True)
-class InterfaceNodes:
+class EstimatedNodes:
     """(k,) nodes of interfaces on rank 0, before the refinement: fibres from 1, interfaces, directions in degrees."""
 
     fibre: Int
@@ -75,7 +75,7 @@ class InterfaceNodes:
     is_vertex: Bool
 
     @classmethod
-    def of(cls, torus: Torus, lattice: ReferenceLattice, pairs: Int, numbers: Int, centres: Float) -> InterfaceNodes:
+    def of(cls, torus: Torus, lattice: ReferenceLattice, pairs: Int, numbers: Int, centres: Float) -> EstimatedNodes:
         """Place nodes on the chords of edges that may debond, but for vertices that never part.
 
         `pairs` as in `share_entities`, `numbers` (constituents,) of fibres.
@@ -107,10 +107,10 @@ class InterfaceNodes:
             moved.append(debonded_arcs.moved_tips(tips, self.fibre[at], self.direction[at], distance))
         return tuple(moved)
 
-    def within(self, pair: int) -> InterfaceNodes:
+    def within(self, pair: int) -> EstimatedNodes:
         """Return the nodes of one interface of the case."""
         at = self.pair == pair
-        return InterfaceNodes(self.fibre[at], self.pair[at], self.direction[at], self.is_vertex[at])
+        return EstimatedNodes(self.fibre[at], self.pair[at], self.direction[at], self.is_vertex[at])
 
     def selects(self, arc: Arc, opening: float | None, fibre: int | None, moved: MovedTips) -> bool:
         """Return whether any node, of the fibre if there is one, is within the arc."""
@@ -127,7 +127,7 @@ def fibre_faults(case: Case, centres: Float) -> list[str]:
     ]
 
 
-def faults(case: Case, nodes: InterfaceNodes, moved: Sequence[MovedTips]) -> list[str]:
+def faults(case: Case, nodes: EstimatedNodes, moved: Sequence[MovedTips]) -> list[str]:
     """List faults of arcs, and of openings of [angle], other than 0 that select no node of a fibre."""
     openings: Sequence[float | None] = case.section.openings or [None]
     lines = []
@@ -141,7 +141,7 @@ def faults(case: Case, nodes: InterfaceNodes, moved: Sequence[MovedTips]) -> lis
     return list(dict.fromkeys(lines))
 
 
-def _fault(angle: float, fibre: int | None, nodes: InterfaceNodes, between: Sequence[str] | None) -> str:
+def _fault(angle: float, fibre: int | None, nodes: EstimatedNodes, between: Sequence[str] | None) -> str:
     if fibre is not None and fibre not in nodes.fibre:
         which = "that can debond" if between is None else f"between {' and '.join(between)}"
         return f".fibre: fibre {fibre} has no interface {which}"

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 from mpi4py import MPI
 
-from feti_homog.fem.local_fits import Neighbours, fitted
+from feti_homog.fem.local_fits import PatchNeighbours, fitted
 from feti_homog.fem.stress_recovery import RecoveredStress
 from feti_homog.feti.decomposition.sharers import entity_code
 from feti_homog.mesh.refinement import FineMesh
@@ -191,14 +191,14 @@ class _Strip:
         sides = np.stack([start, stop], axis=1)
         return cls(stress, is_vertex, stress.numbers[classes], sides[once], vector[once], np.unique(sides[single]))
 
-    def neighbours(self, at_boundary: Bool) -> Neighbours:
+    def neighbours(self, at_boundary: Bool) -> PatchNeighbours:
         """Return pairs whose first is on the boundary of the body, as shared vertices (n,) are if `at_boundary`."""
         is_bound = np.zeros(int(self.is_vertex.sum()), bool)
         is_bound[self.bounds] = True
         is_bound[self.shared] = at_boundary
         at, other = np.concatenate([self.sides, self.sides[:, ::-1]]).T
         vector = np.concatenate([self.vector, -self.vector])
-        return Neighbours(at[is_bound[at]], other[is_bound[at]], vector[is_bound[at]])
+        return PatchNeighbours(at[is_bound[at]], other[is_bound[at]], vector[is_bound[at]])
 
 
 def _code(a: Int, b: Int, size: int) -> Int:

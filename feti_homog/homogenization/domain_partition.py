@@ -8,9 +8,9 @@ import numpy as np
 
 from feti_homog.case.case import Case
 from feti_homog.errors import CaseError
-from feti_homog.feti.decomposition.partition import Decomposition, decompose, halves
+from feti_homog.feti.decomposition.partition import Partition, decompose, halves
 from feti_homog.homogenization import arc_selection, cell_remarks
-from feti_homog.homogenization.arc_selection import InterfaceNodes
+from feti_homog.homogenization.arc_selection import EstimatedNodes
 from feti_homog.homogenization.cell_remarks import mesh_remarks, subdomain_remarks, table_remarks
 from feti_homog.homogenization.partition_policy import (
     DEFAULT_POLICY,
@@ -148,7 +148,7 @@ def distribute(
     faults += arc_selection.fibre_faults(case, centres[is_fibre])
     moved = (debonded_arcs.NOT_MOVED,) * len(case.interfaces)
     if case.arcs and not faults:
-        nodes = InterfaceNodes.of(torus, lattice, pairs, numbers, centres)
+        nodes = EstimatedNodes.of(torus, lattice, pairs, numbers, centres)
         moved = nodes.moved_tips(case, int(is_fibre.sum()))
         faults = arc_selection.faults(case, nodes, moved)
     if faults:
@@ -195,7 +195,7 @@ def distribute(
 
 def _cut_across(
     case: Case, torus: Torus, lattice: ReferenceLattice, n_ranks: int, policy: PartitionPolicy
-) -> Decomposition | None:
+) -> Partition | None:
     """Return the cell cut across materials; None if it is not asked for, or leaves a rank without a piece."""
     triangles = len(torus.mesh.triangles)
     pieces = policy.across_pieces(triangles * lattice.intervals**2, n_ranks) if can_be_cut_across(case) else 0

@@ -23,7 +23,7 @@ Model = Callable[[Float], Float]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Estimates:
+class ParameterEstimates:
     """Estimates for n unknowns from m data.
 
     Attributes:
@@ -104,7 +104,7 @@ class Estimates:
 
 def estimate(
     model: Model, jacobian: Model, measured: tuple[Float, Float], start: Float, bounds: tuple[Float, Float]
-) -> Estimates:
+) -> ParameterEstimates:
     """Return the estimates from the values (m,) that `model` gives for unknowns (n,), and their derivatives (m, n).
 
     `measured` are the data and their standard deviations.  The search is a dogleg in the box of the bounds; where no
@@ -139,7 +139,7 @@ def summarize(
     bounds: tuple[Float, Float],
     evaluations: int = 0,
     converged: bool = True,
-) -> Estimates:
+) -> ParameterEstimates:
     """Return the estimates x (n,) with the computed values (m,) and their derivatives (m, n) there."""
     y, std = measured
     J = derivatives / std[:, None]
@@ -148,7 +148,7 @@ def summarize(
     margin = STEP * (upper - lower)
     at_bound = np.where(x >= upper - margin, 1, np.where(x <= lower + margin, -1, 0))
     s = np.pad(s, (0, len(x) - len(s)))
-    return Estimates(x=x, computed=computed, residuals=(computed - y) / std, jacobian=J, at_bound=at_bound,
+    return ParameterEstimates(x=x, computed=computed, residuals=(computed - y) / std, jacobian=J, at_bound=at_bound,
                      singular_values=s, directions=V, evaluations=evaluations, converged=converged)  # fmt: skip
 
 

@@ -23,7 +23,7 @@ from feti_homog.materials.voigt import PLANE_STATES
 from feti_homog.results import atomic
 from feti_homog.studies import estimation, fit_result
 from feti_homog.studies.axes import Assignment
-from feti_homog.studies.estimation import Estimates
+from feti_homog.studies.estimation import ParameterEstimates
 from feti_homog.studies.predictions import Datum, exact_derivatives, predicted
 from feti_homog.studies.study import SILENT, Evaluator, Study
 from feti_homog.studies.sweep_cases import Sweep, cases_at
@@ -105,7 +105,7 @@ class Fit(Study):
     def text(self, document: Mapping[str, Any]) -> str:
         return fit_result.text(document)
 
-    def _write(self, directory: Path, estimates: Estimates) -> dict[str, Any]:
+    def _write(self, directory: Path, estimates: ParameterEstimates) -> dict[str, Any]:
         """Write measured.csv and fit.png, and return the content of fit.json.  On one rank."""
         from feti_homog.studies import pictures  # only a rank that draws loads Matplotlib
 
@@ -157,7 +157,7 @@ class Evaluations:
     evaluator: Evaluator
     answers: dict[Point, list[Answer]] = field(default_factory=dict)
 
-    def estimate(self) -> Estimates | None:
+    def estimate(self) -> ParameterEstimates | None:
         """Return the estimates on rank 0.  Collective: the other ranks serve its questions."""
         comm = self.evaluator.comm
         if comm.rank:

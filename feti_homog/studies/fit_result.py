@@ -11,14 +11,14 @@ import numpy as np
 
 from feti_homog.case.sections import Unknown
 from feti_homog.report.text.table import Column, Table
-from feti_homog.studies.estimation import CONFIDENCE, Estimates, names_of
+from feti_homog.studies.estimation import CONFIDENCE, ParameterEstimates, names_of
 from feti_homog.studies.predictions import Datum
 
 FIRST, LEAST_SHARE, MOST_DEVIATIONS = Column("", -38), 0.01, 3.0
 HEAD = ("test", "name", "strain", "value", "std", "computed", "residual")
 
 
-def content(unknowns: Mapping[str, Unknown], data: Sequence[Datum], estimates: Estimates) -> dict[str, Any]:
+def content(unknowns: Mapping[str, Unknown], data: Sequence[Datum], estimates: ParameterEstimates) -> dict[str, Any]:
     """Return the content of fit.json behind its name; numbers that are not finite are None."""
     faults = _faults(unknowns, estimates)
     return {
@@ -51,7 +51,7 @@ def content(unknowns: Mapping[str, Unknown], data: Sequence[Datum], estimates: E
     }  # fmt: skip
 
 
-def _faults(unknowns: Mapping[str, Unknown], estimates: Estimates) -> list[str]:
+def _faults(unknowns: Mapping[str, Unknown], estimates: ParameterEstimates) -> list[str]:
     """Return a line for each reason to distrust the estimates."""
     faults = [] if estimates.converged else [f"no minimum after {estimates.evaluations} evaluations"]
     faults += names_of(estimates.undetermined, [*unknowns])

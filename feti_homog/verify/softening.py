@@ -140,7 +140,7 @@ class Cohesive(BondLaw):
         return np.asarray(area - np.where(d < 1.0, K * (1.0 - d) * (first + stretch * high) ** 2 / 2, 0.0))
 
 
-class Table(Cohesive):
+class TableLaw(Cohesive):
     """Straight pieces."""
 
     @property
@@ -167,13 +167,13 @@ class Table(Cohesive):
         return np.asarray((means * (ends - places[:-1])).sum(axis=-1))
 
 
-class Bilinear(Table):
+class BilinearLaw(TableLaw):
     """One straight piece."""
 
     _points = np.array([0.0, 1.0]), np.array([1.0, 0.0])
 
 
-class Exponential(Cohesive):
+class ExponentialLaw(Cohesive):
     """exp(-u)."""
 
     last = -float(np.log(TAIL))

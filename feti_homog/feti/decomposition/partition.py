@@ -16,16 +16,14 @@ from feti_homog.typing import Bool, Int
 
 
 @dataclass(frozen=True)
-class Decomposition:
+class Partition:
     """Subdomain of each coarse triangle, (m,), and rank of each subdomain, (s,)."""
 
     subdomain: Int
     rank: Int
 
 
-def decompose(
-    torus: Torus, parts: Int, pieces: Int, n_ranks: int, length_classes: int = LENGTH_CLASSES
-) -> Decomposition:
+def decompose(torus: Torus, parts: Int, pieces: Int, n_ranks: int, length_classes: int = LENGTH_CLASSES) -> Partition:
     """Cut the bodies of a whole cell into pieces, and assign these to ranks.
 
     See `cut_into_pieces` and `assign_ranks`.
@@ -34,10 +32,10 @@ def decompose(
     subdomain = cut_into_pieces(torus, parts, pieces, torus.edge_lengths[edge].max(), length_classes)
     apart = subdomain[tail] != subdomain[head]
     neighbours = subdomain[tail[apart]], subdomain[head[apart]]
-    return Decomposition(subdomain, assign_ranks(np.bincount(subdomain), *neighbours, n_ranks))
+    return Partition(subdomain, assign_ranks(np.bincount(subdomain), *neighbours, n_ranks))
 
 
-def halves(torus: Torus) -> Decomposition | None:
+def halves(torus: Torus) -> Partition | None:
     """Cut a whole cell into two strips, one for each of two ranks; None if these are not connected.
 
     The strips along x or y hold about half of the triangles, and fewest edges separate them.  On the torus
@@ -54,7 +52,7 @@ def halves(torus: Torus) -> Decomposition | None:
     piece ^= ~np.isin(connected, main)  # islands go to the half around them
     together = piece[tail] == piece[head]
     is_whole = components(len(piece), tail[together], head[together]).max() == 1
-    return Decomposition(piece, np.arange(2)) if is_whole else None
+    return Partition(piece, np.arange(2)) if is_whole else None
 
 
 def _strip(order: Int, left: Int, right: Int) -> Bool:

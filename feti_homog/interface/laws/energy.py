@@ -89,7 +89,7 @@ class SpringEnergy(SpringLaw):
 
 
 @dataclass(frozen=True)
-class Tips:
+class TipEnergies:
     """The bonds of this rank beside broken ones.
 
     Attributes:
@@ -134,7 +134,7 @@ class ReleasedEnergy(SpringEnergy):
         springs = {field.name: getattr(self, field.name) for field in fields(SpringEnergy)}
         return SpringsAndTips(**springs, tips=tips, number=number, contact=cell.plane.contact)
 
-    def tips(self, cell: CoupledInterfaces, bonds: BondState) -> Tips:
+    def tips(self, cell: CoupledInterfaces, bonds: BondState) -> TipEnergies:
         """Return this rank's tips.  Collective.
 
         Raises:
@@ -154,7 +154,7 @@ class ReleasedEnergy(SpringEnergy):
             rows = self.axial.neighbours.rows[numbers]
             axial = self.axial.inverse_blocks(np.stack([rows, rows], axis=1))[mine, 0, 0]
             stiffness = np.column_stack([stiffness, self.axial.stiffness[rows[mine]]])
-        return Tips(node, H, cell.nodes.length[node], stiffness, axial)
+        return TipEnergies(node, H, cell.nodes.length[node], stiffness, axial)
 
     @staticmethod
     def _activate(influence: ExactInverse, interface: ContactProblem, bonds: BondState) -> None:
@@ -177,7 +177,7 @@ class SpringsAndTips(SpringEnergy):
         contact: whether faces do not overlap.
     """
 
-    tips: Tips
+    tips: TipEnergies
     number: Int
     contact: bool
 

@@ -251,12 +251,12 @@ class PiecewiseLinear(CohesiveLaw):
 
 
 @dataclass(frozen=True)
-class Bilinear(PiecewiseLinear):
+class BilinearLaw(PiecewiseLinear):
     """Traction falls in a straight line."""
 
 
 @dataclass(frozen=True)
-class Table(PiecewiseLinear):
+class TableLaw(PiecewiseLinear):
     """Traction over opening in mode I from a table; other modes stretch the branch to their toughness."""
 
     @classmethod
@@ -267,7 +267,7 @@ class Table(PiecewiseLinear):
 
 
 @dataclass(frozen=True)
-class Exponential(CohesiveLaw):
+class ExponentialLaw(CohesiveLaw):
     """tau = exp(-u)."""
 
     @property

@@ -49,7 +49,7 @@ def can_be_written(file: str) -> bool:
 
 
 @dataclass(frozen=True)
-class Rule:
+class OptionRule:
     """Values that an option takes, in words and as a test of a text, which is empty if no value is given."""
 
     expected: str
@@ -96,21 +96,21 @@ def _text(value: Value) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
-def _real(expected: str, holds: Callable[[float], bool]) -> Rule:
+def _real(expected: str, holds: Callable[[float], bool]) -> OptionRule:
     def rule(text: str) -> bool:
         try:
             return holds(float(text)) and "_" not in text
         except ValueError:
             return False
 
-    return Rule(expected, rule)
+    return OptionRule(expected, rule)
 
 
-def _integer(lower: int, upper: int = LARGEST_INTEGER) -> Rule:
+def _integer(lower: int, upper: int = LARGEST_INTEGER) -> OptionRule:
     def holds(text: str) -> bool:
         return re.fullmatch(r"\+?[0-9]{1,10}", text) is not None and lower <= int(text) <= upper
 
-    return Rule(f"an integer of at least {lower} and at most {upper}", holds)
+    return OptionRule(f"an integer of at least {lower} and at most {upper}", holds)
 
 
 def _is_viewer(text: str) -> bool:
@@ -135,8 +135,8 @@ def _has_options(file: str) -> bool:
     return all(not line or line.startswith(("-", "#", "!", "%", "alias ")) for line in lines)
 
 
-SWITCH = Rule("true or false, or no value", lambda text: text.lower() in ("", *TRUE, *FALSE))
-PRINTS = Rule(
+SWITCH = OptionRule("true or false, or no value", lambda text: text.lower() in ("", *TRUE, *FALSE))
+PRINTS = OptionRule(
     "true or false, no value, or ascii:FILE of an existing folder",
     lambda text: SWITCH.holds(text) or _is_viewer(text),
 )
@@ -145,10 +145,10 @@ NOT_NEGATIVE = _real("a number of at least 0", lambda number: 0.0 <= number < ma
 
 
 # With a relative tolerance of 1 or more nothing is solved.
-RULES: dict[str, Rule] = {
+RULES: dict[str, OptionRule] = {
     **{name: SWITCH for name in FLAGS},
     **{
-        option.name: Rule(f"one of {option.value.replace('|', ', ')}", option.value.split("|").__contains__)
+        option.name: OptionRule(f"one of {option.value.replace('|', ', ')}", option.value.split("|").__contains__)
         for option in OPTIONS
         if "|" in option.value and not option.value.endswith("...")
     },
@@ -158,17 +158,17 @@ RULES: dict[str, Rule] = {
     "feti_ksp_divtol": _real("a number above 1", lambda number: 1.0 < number < math.inf),
     "feti_ksp_max_it": _integer(1),
     "feti_schur_mat_mumps_icntl_14": _integer(0, 10_000),
-    "feti_schur_pc_type": Rule("cholesky, for what is condensed is symmetric", "cholesky".__eq__),
-    "feti_schur_pc_factor_mat_solver_type": Rule("mumps, which alone makes Schur complements", "mumps".__eq__),
-    "feti_ksp_error_if_not_converged": Rule(
+    "feti_schur_pc_type": OptionRule("cholesky, for what is condensed is symmetric", "cholesky".__eq__),
+    "feti_schur_pc_factor_mat_solver_type": OptionRule("mumps, which alone makes Schur complements", "mumps".__eq__),
+    "feti_ksp_error_if_not_converged": OptionRule(
         "nothing: the run reports it and keeps its results", lambda text: text.lower() in FALSE
     ),
-    "fp_trap": Rule(
+    "fp_trap": OptionRule(
         "nothing: numbers that are not finite are checked where they may occur", lambda text: text.lower() in FALSE
     ),
-    **{name: Rule(NEW_FILE, _is_new_file) for name in ("info", "malloc_dump", "malloc_view")},
-    "options_file": Rule("a file with an option of PETSc in each line", _has_options),
-    "log_trace": Rule(NEW_FILE, lambda text: not text or can_be_written(text)),
+    **{name: OptionRule(NEW_FILE, _is_new_file) for name in ("info", "malloc_dump", "malloc_view")},
+    "options_file": OptionRule("a file with an option of PETSc in each line", _has_options),
+    "log_trace": OptionRule(NEW_FILE, lambda text: not text or can_be_written(text)),
 }
 """For each of these options, what is expected in words, and whether a text is that."""
 

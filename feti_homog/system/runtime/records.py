@@ -49,7 +49,7 @@ class Description:
 
 
 @dataclass(frozen=True)
-class Key:
+class ResultKey:
     """A key of a document, `path` being its place: `cell.width`, `path[].strain`, `timings.STAGE`."""
 
     path: str
@@ -116,15 +116,15 @@ def restored(kind: type[T], document: Mapping[str, Any]) -> T:
     return kind(**values)
 
 
-def keys(kind: type, above: str = "") -> Iterator[Key]:
+def keys(kind: type, above: str = "") -> Iterator[ResultKey]:
     """Yield the keys of a record's document, with the records in it."""
     hints = typing.get_type_hints(kind)
     for name, description in descriptions(kind).items():
         path, hint = f"{above}{name}", _without_none(hints[name])
-        yield Key(path, type_words(hint, description), description.unit, description.meaning)
+        yield ResultKey(path, type_words(hint, description), description.unit, description.meaning)
         for key, meaning in description.entries.items():
             item = typing.get_args(hint)[1]
-            yield Key(f"{path}.{key}", WORDS.get(item, "any"), description.unit, meaning)
+            yield ResultKey(f"{path}.{key}", WORDS.get(item, "any"), description.unit, meaning)
         if dataclasses.is_dataclass(hint):
             yield from keys(typing.cast(type, hint), f"{path}.")
         elif (item := _record_of_tuple(hint)) is not None:

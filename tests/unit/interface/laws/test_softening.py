@@ -13,7 +13,7 @@ from feti_homog.errors import CaseError
 from feti_homog.homogenization.phase_laws import bond_law
 from feti_homog.interface.contact.states import BondState
 from feti_homog.interface.laws.energy import SpringEnergy
-from feti_homog.interface.laws.softening import Bilinear, Exponential, Table
+from feti_homog.interface.laws.softening import BilinearLaw, ExponentialLaw, TableLaw
 
 # MOOSE's tests of the law of Camanho and Davila: REFERENCES 4.
 MOOSE = {
@@ -33,7 +33,7 @@ STEEP = MOOSE | {
     "normal_toughness": 5.0,
 }
 BRANCH = {"openings": (0.01, 0.5, 2.0), "tractions": (1.0, 0.4, 0.0)}
-LAWS = {"bilinear": Bilinear, "exponential": Exponential, "table": Table}
+LAWS = {"bilinear": BilinearLaw, "exponential": ExponentialLaw, "table": TableLaw}
 
 
 def made(name, teeth, keys=MOOSE, tolerance=0.02):
