@@ -43,7 +43,7 @@ def test_ctrl_c_is_one_line_and_130(tmp_path, command):
 def test_the_order_to_end_is_one_line_of_all_ranks(tmp_path):
     """SIGTERM, which mpirun sends some seconds after Ctrl-C.  Rank 1, here the first, outlives rank 0."""
     out = tmp_path / "out"
-    here = Hook("feti_homog.homogenization.unit_cell:place_nodes", "report(os.getpid()); wait()", rank=None)
+    here = Hook("feti_homog.homogenization.tile_tearing:place_nodes", "report(os.getpid()); wait()", rank=None)
     last = Hook("feti_homog.system.runtime.standard_streams:time.sleep", "report('ends'); outlive(0)", rank=1)
     with HookedJob(2, [here, last], "run", case_file(tmp_path), "--out", out) as job:
         reports = [job.reported().split() for _ in range(4)]
