@@ -14,7 +14,7 @@ class BondLawEntry:
     """Bond law as a case names it.
 
     Attributes:
-        name: [interface] value for law, or criterion.
+        name: value of [interface] law, or criterion.
         implementation: "module.Class".
         keys: keys of [interface] that belong to this law and others that list them.
         needs: keys of all laws that must be given with this one.
