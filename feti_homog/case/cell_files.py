@@ -73,7 +73,7 @@ def missing(file: Path) -> str:
 
 
 def _with_match(cell: Cell, folder: Path, faults: list[str]) -> Cell:
-    """Return the cell with its table read, its fibre number and its fraction.
+    """Return the cell with its table read, its number of fibres and its fraction.
 
     The table's path is completed; number and fraction come from the table's fibres where the cell has none of
     its own; faults are added to `faults`.

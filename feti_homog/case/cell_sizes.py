@@ -1,4 +1,4 @@
-"""Sizes that follow from a cell: its fibre numbers, its width, its element order and size.
+"""Sizes that follow from a cell: its numbers of fibres, its width, its element order and size.
 
 Fibres of several phases have a fraction and a radius each: `mix` and `radii`.  Element order and size follow where
 a cell gives its accuracy.  Mixed elements have their own bubble and pressure.
@@ -168,7 +168,7 @@ def fibre_counts(cell: Cell) -> dict[str, int]:
 
 
 def _expected_counts(cell: Cell) -> dict[str, float]:
-    """Fibre numbers per phase that are not whole; their sum is `fibres`, or follows from the width."""
+    """Numbers of fibres per phase that are not whole; their sum is `fibres`, or follows from the width."""
     radii = cell.radii or dict.fromkeys(cell.fractions, 1.0)
     per_area = {phase: share / (pi * radii[phase] ** 2) for phase, share in cell.fractions.items()}
     area = cell.fibres / fsum(per_area.values()) if cell.fibres is not None else (cell.width or 1.0) ** 2
@@ -176,7 +176,7 @@ def _expected_counts(cell: Cell) -> dict[str, float]:
 
 
 def void_count(cell: Cell, fibre_radius: float) -> int:
-    """Return the number of voids in a random cell with width 1 whose fibres have this mean radius.
+    """Return the number of voids in a random cell of width 1 whose fibres have this mean radius.
 
     It is the whole number nearest to the fraction, at least one.
     """

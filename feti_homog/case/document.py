@@ -61,7 +61,7 @@ def _is_deeper(document: dict[str, Any], depth: int) -> bool:
 def to_document(values: object) -> dict[str, Any]:
     """Return the values with TOML's types: NumPy's scalars as numbers, arrays and tuples as lists, paths as texts.
 
-    Values with other types are left as they are: the keys refuse them.
+    Values of other types are left as they are: the keys refuse them.
 
     Raises:
         TypeError: the values are no mapping.

@@ -79,7 +79,7 @@ WAYPOINTS = list_of(
 def completed(loads: Sequence[Strain | MixedLoad], plane: str) -> tuple[dict[str, float], ...]:
     """Return a path's loads in full.
 
-    Each component has one name and value, and the temperature in generalized plane strain. Components that a load does
+    One name and value for each component, and the temperature in generalized plane strain. Components that a load does
     not name stay as in the load before, at first a stress of zero.
     """
     state = PLANE_STATES[plane]

@@ -116,7 +116,7 @@ def _keys_by_form(table: object) -> dict[str, list[str]]:
 
 
 def missing_expansions(materials: Mapping[str, Material], needed_by: str) -> list[str]:
-    """Faults in materials without thermal expansion, which something needs.
+    """Faults of materials without thermal expansion, which something needs.
 
     Their other faults are reported elsewhere.
     """

@@ -51,7 +51,7 @@ def relation_faults(sections: Mapping[str, Any], document: Mapping[str, Any], pl
 
 
 def _heated_loads(path: LoadPath | None, load: SingleLoad | None) -> Iterator[str]:
-    """Yield the places where loads name a temperature."""
+    """Yield the places of loads that name a temperature."""
     for kind, section in (("load", load), ("path", path)):
         for place, given in ({} if section is None else section.placed).items():
             if TEMPERATURE in named(given):
@@ -149,7 +149,7 @@ def _written(value: Any) -> str:
 
 
 def _of_table(interface: InterfaceSection) -> dict[str, Any]:
-    """Return normal stiffness, strength and toughness in a table that begins at its peak, where they are not given."""
+    """Return normal stiffness, strength and toughness of a table that begins at its peak, where they are not given."""
     openings, tractions = interface.openings, interface.tractions
     if BRANCH[0] not in LAWS[interface.criterion].keys:
         return {}
@@ -163,7 +163,7 @@ def _of_table(interface: InterfaceSection) -> dict[str, Any]:
 
 
 def _cohesive_faults(interface: InterfaceSection, table: Mapping[str, Any], label: str) -> list[str]:
-    """List the number faults in a softening law, a line each, without keys that `table` lacks."""
+    """List the faults of numbers in a softening law, a line each, without keys that `table` lacks."""
     law = LAWS[interface.criterion]
     if not law.softens:
         return []

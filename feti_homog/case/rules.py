@@ -186,7 +186,7 @@ def _some_arc(table: Any) -> bool:
 
 
 def _breaks(strengths: Sequence[str], table: Any) -> bool:
-    """Return whether bonds in a section break under some load: a finite strength, or a law without one."""
+    """Return whether bonds of a section break under some load: a finite strength, or a law without one."""
     unlimited = [law.name for law in REGISTRY if not law.limits]
     is_finite = (has(table, name) and table[name] not in (math.inf, INF) for name in strengths)
     return any(is_finite) or any(has(table, key) and table[key] in unlimited for key in ("criterion", "law"))
