@@ -75,7 +75,7 @@ class PatchNeighbours:
 
 
 def linear_values(vertices: Int, away: Float, weights: Float, values: Float, neighbours: PatchNeighbours) -> Float:
-    """(vertices, k) values of linear fits at the vertices, from uniform element values (e, k).
+    """(vertices, k) linear fits at the vertices, from uniform element values (e, k).
 
     Each is a weighted mean of values around it, so that sums over elements are not made, but where neighbours share
     them.
@@ -139,7 +139,7 @@ def gathered(place: Int, values: Float, size: int) -> Float:
 
 
 def fitted(moments: Float, sums: Float) -> Float:
-    """(n, p, k) polynomial coefficients with these moments (n, p, p) and sums (n, p, k)."""
+    """(n, p, k) coefficients of the polynomials with these moments (n, p, p) and sums (n, p, k)."""
     scale = 1 / np.sqrt(np.einsum("nii->ni", moments))[..., None]
     normalized = moments * scale * scale.transpose(0, 2, 1) + RIDGE * np.eye(moments.shape[1])
     return np.asarray(scale * np.linalg.solve(normalized, scale * sums))

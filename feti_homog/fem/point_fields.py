@@ -67,7 +67,7 @@ def energy_change(points: Float, u: Float, L: Float, moved: Float, changed: Floa
         points, u: (e, a, 2) element nodes and their displacements.
         L: (3, 3) stiffness.
         moved, changed: (e, a, 2) dx and du.
-        is_mixed: whether the elements have a bubble and their own pressure.
+        is_mixed: whether the elements have their own bubble and pressure.
     """
     fields, nodes = point_fields(points, u, L, is_mixed), points.shape[1]
     grad_u = np.einsum("eai,eqad->eqid", fields.u, fields.gradients)

@@ -1,4 +1,4 @@
-"""Stresses recovered in each subdomain from its element stresses, and the energy in their difference.
+"""Stresses recovered in each subdomain from its element stresses, and the energy of their difference.
 
 Zienkiewicz and Zhu (IJNME 33 (1992) 1331): about each vertex a polynomial of the elements' order is fitted to the
 stresses at the integration points in the elements around it; within an element its three vertices' fits are
@@ -49,7 +49,7 @@ class RecoveredStress:
         L, problem: as in `Subdomain`; m displacement strains, v loads.
         u: (classes, c, k) fluctuating displacements.
         loads: (v, k) the strains and other loads.
-        is_mixed: whether the elements have a bubble and their own pressure.
+        is_mixed: whether the elements have their own bubble and pressure.
         known: tractions that the recovered stresses in linear elements obey.
         shared: (n,) vertex classes whose fits (n, p, m k) take in elements from their body's other pieces.
     """

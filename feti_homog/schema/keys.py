@@ -85,7 +85,7 @@ class Key:
     presentation: bool = False
 
     def fault(self, name: str, table: Mapping[str, Any]) -> str:
-        """Return the fault in the table key with this name, whatever the case; empty if there is none."""
+        """Return the fault of the key with this name in a table, whatever the case; empty if there is none."""
         if name not in table:
             return f": missing; expected {self.type.expected}" if self.required and not self.only else ""
         words = self.type.complaint(table[name])
@@ -248,7 +248,7 @@ def needed(
 def belonging(
     path: TablePath, condition: Condition, values: Sequence[str], *when: Condition, instead: str = ""
 ) -> Rule:
-    """Refuse the key or section where the path ends where the selector has other values than the condition."""
+    """Refuse the key or section at the end of the path where the selector has other values than the condition."""
     others = tuple(value for value in values if value not in condition.values)
 
     def words(_: Any, selected: Selected) -> str:

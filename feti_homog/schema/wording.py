@@ -68,7 +68,7 @@ def dotted_key(path: Iterable[str]) -> str:
 def suggestion(name: str, known: Iterable[str], owners: Mapping[str, str]) -> str:
     """Return the end of a fault on an unknown name: where it belongs, the nearest known name, or all known names.
 
-    `owners` gives each key's place that belongs elsewhere.
+    `owners` gives the place of each key that belongs elsewhere.
     """
     known = list(known)
     nearest = difflib.get_close_matches(name, known, n=1)
